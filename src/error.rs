@@ -1,0 +1,61 @@
+//! The one error type, and the exit code that each kind of failure ends the program with.
+
+use std::path::Path;
+
+/// Everything that can go wrong, grouped by what the user can do about it (see [`Error::exit_code`]).
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A comparison, check or run did not come out as it should (exit code 1).
+    #[error("{0}")]
+    Failed(String),
+    /// The command line makes no sense (exit code 2).
+    #[error("{0}")]
+    Usage(String),
+    /// No suitable device, driver, feature or display (exit code 3).
+    #[error("{0}")]
+    Unsupported(String),
+    /// A missing, malformed or oversized input (exit code 4).
+    #[error("{0}")]
+    Input(String),
+    /// The device was lost, or it or the host ran out of memory (exit code 5).
+    #[error("{0}")]
+    Device(String),
+}
+
+impl Error {
+    /// Process exit code: 1 failed, 2 usage, 3 unsupported, 4 bad input, 5 device lost or out of memory.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Failed(_) => 1,
+            Error::Usage(_) => 2,
+            Error::Unsupported(_) => 3,
+            Error::Input(_) => 4,
+            Error::Device(_) => 5,
+        }
+    }
+
+    /// Bad input found in `path`: one line that starts with the file.
+    pub fn input(path: &Path, what: impl std::fmt::Display) -> Self {
+        Error::Input(format!("{}: {what}", path.display()))
+    }
+
+    /// Bad input found in `path` at a line counted from 1.
+    pub fn input_at(path: &Path, line: usize, what: impl std::fmt::Display) -> Self {
+        Error::Input(format!("{}:{line}: {what}", path.display()))
+    }
+
+    /// Adds where it happened in front of the message and keeps the kind.
+    pub fn context(self, place: impl std::fmt::Display) -> Self {
+        let join = |message: String| format!("{place}: {message}");
+        match self {
+            Error::Failed(m) => Error::Failed(join(m)),
+            Error::Usage(m) => Error::Usage(join(m)),
+            Error::Unsupported(m) => Error::Unsupported(join(m)),
+            Error::Input(m) => Error::Input(join(m)),
+            Error::Device(m) => Error::Device(join(m)),
+        }
+    }
+}
+
+/// Shorthand for results of this crate.
+pub type Result<T> = std::result::Result<T, Error>;

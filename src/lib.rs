@@ -1,0 +1,24 @@
+//! Precomputed shadow fields for dynamic scenes, on hand-managed Vulkan.
+//!
+//! Method: Zhou, Hu, Lin, Guo, Shum, *Precomputed Shadow Fields for Dynamic Scenes*, SIGGRAPH 2005, low-frequency version.
+//! Around every object, cube maps are captured at points on concentric shells and projected to spherical harmonics (SH):
+//! an object occlusion field (OOF) for what blocks, a source radiance field (SRF) for what shines. At run time every vertex
+//! of every receiver merges these fields with order-4 SH products.
+//!
+//! # Conventions
+//!
+//! | thing | choice |
+//! |---|---|
+//! | SH basis | real, orthonormal, Condon-Shortley phase as in Sloan, *Stupid SH Tricks*: Y1,-1 = -.488603 y, Y1,0 = .488603 z, Y1,1 = -.488603 x; index l(l+1)+m; evaluated as polynomials of a unit vector |
+//! | bands | n bands = n^2 coefficients; "order 4" in the literature is 4 bands, 16 coefficients |
+//! | space | right-handed, +y up, metres; SH are taken on world x, y, z as they stand |
+//! | cube faces | +X -X +Y -Y +Z -Z with Vulkan's s/t on each; texel centres; exact texel solid angle, weights sum to 4 pi |
+//! | field distances | in units of the object's bounding-sphere radius r, from the sphere's centre |
+//! | occlusion field | stores the *blocked* part b = P[1 - V]: 0 where nothing blocks |
+//! | scale | uniform and positive |
+//! | light | linear Rec.709 radiance; radiosity B = albedo/pi * integral L V max(0, n.w) dw |
+//! | numbers | tables in f64, shaders in f32, field storage f16 or f32 |
+
+pub mod error;
+
+pub use error::{Error, Result};

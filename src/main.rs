@@ -1,0 +1,1 @@
+fn main() { let c = shaderc::Compiler::new().unwrap(); let _ = c; }

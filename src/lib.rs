@@ -22,3 +22,5 @@
 pub mod error;
 
 pub use error::{Error, Result};
+#[allow(unsafe_code)]
+pub mod gpu;

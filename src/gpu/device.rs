@@ -1,0 +1,399 @@
+//! Instance, logical device and queue: the root that every other Vulkan object keeps alive.
+
+use super::Checked;
+use super::select::{Candidate, choose};
+use super::validation::{LAYER, Messages, Validation, on_message};
+use crate::error::{Error, Result};
+use ash::vk;
+use std::ffi::{CStr, CString};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+
+/// What the caller decides about a device.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Index, UUID or part of a name; `None` takes the best.
+    pub device: Option<String>,
+    /// Which validation checks run.
+    pub validation: Validation,
+    /// Folder for compiled shaders and the pipeline cache; `None` keeps nothing on disk.
+    pub cache_dir: Option<PathBuf>,
+}
+
+/// Instance-level objects; dropped after the logical device.
+struct Instance {
+    entry: ash::Entry,
+    handle: ash::Instance,
+    debug: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    has_debug_utils: bool,
+    /// Boxed: the messenger holds its address.
+    messages: Box<Messages>,
+}
+
+impl Instance {
+    fn new(validation: Validation) -> Result<Self> {
+        // SAFETY: loading the system's Vulkan loader runs its initialisers, which are trusted like any shared library.
+        let entry = unsafe { ash::Entry::load() }.map_err(|error| {
+            Error::Unsupported(format!("no Vulkan loader found ({error}); Debian's package is libvulkan1"))
+        })?;
+        // SAFETY (the two enumerations): plain queries on a live entry.
+        let version = unsafe { entry.try_enumerate_instance_version() }
+            .checked("vkEnumerateInstanceVersion", "instance")?
+            .unwrap_or(vk::API_VERSION_1_0);
+        if version < vk::API_VERSION_1_3 {
+            return Err(Error::Unsupported(format!("the Vulkan loader speaks {}, 1.3 is needed", version_text(version))));
+        }
+        // SAFETY: as above.
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }
+            .checked("vkEnumerateInstanceLayerProperties", "instance")?;
+        let has_layer = layers.iter().any(|l| l.layer_name_as_c_str() == Ok(LAYER));
+        if validation != Validation::Off && !has_layer {
+            return Err(Error::Unsupported(
+                "the Khronos validation layer is not installed (Debian's package is vulkan-validationlayers)".into(),
+            ));
+        }
+        // SAFETY: as above.
+        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
+            .checked("vkEnumerateInstanceExtensionProperties", "instance")?;
+        let has_debug_utils =
+            extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
+
+        let application = vk::ApplicationInfo::default()
+            .application_name(c"shadow-fields")
+            .engine_name(c"shadow-fields")
+            .api_version(vk::API_VERSION_1_3);
+        let mut layer_names = Vec::new();
+        let mut extension_names = Vec::new();
+        if has_debug_utils {
+            extension_names.push(ash::ext::debug_utils::NAME.as_ptr());
+        }
+        if validation != Validation::Off {
+            layer_names.push(LAYER.as_ptr());
+            extension_names.push(ash::ext::validation_features::NAME.as_ptr());
+        }
+        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(validation.features());
+        let mut create = vk::InstanceCreateInfo::default()
+            .application_info(&application)
+            .enabled_layer_names(&layer_names)
+            .enabled_extension_names(&extension_names);
+        if validation != Validation::Off {
+            create = create.push_next(&mut features);
+        }
+        // SAFETY: every pointer in `create` outlives the call; the handle is destroyed in `Drop` after its children.
+        let handle = unsafe { entry.create_instance(&create, None) }.checked("vkCreateInstance", "instance")?;
+        let mut instance = Instance { entry, handle, debug: None, has_debug_utils, messages: Box::default() };
+        if validation != Validation::Off {
+            instance.listen()?;
+        }
+        Ok(instance)
+    }
+
+    fn listen(&mut self) -> Result<()> {
+        let loader = ash::ext::debug_utils::Instance::new(&self.entry, &self.handle);
+        let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
+            .message_severity(
+                vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+            )
+            .message_type(
+                vk::DebugUtilsMessageTypeFlagsEXT::GENERAL
+                    | vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION
+                    | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
+            )
+            .pfn_user_callback(Some(on_message))
+            .user_data((&raw const *self.messages).cast_mut().cast());
+        // SAFETY: `messages` is boxed and dropped after the messenger (see `Drop`).
+        let messenger = unsafe { loader.create_debug_utils_messenger(&create, None) }
+            .checked("vkCreateDebugUtilsMessengerEXT", "instance")?;
+        self.debug = Some((loader, messenger));
+        Ok(())
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        // SAFETY: the logical device was dropped before (field order of `Device`); the messenger goes before its instance.
+        unsafe {
+            if let Some((loader, messenger)) = &self.debug {
+                loader.destroy_debug_utils_messenger(*messenger, None);
+            }
+            self.handle.destroy_instance(None);
+        }
+    }
+}
+
+/// The logical device, its one queue (graphics and compute) and what is known of the hardware.
+///
+/// Cheap to share: everything that owns a Vulkan object holds an `Arc<Device>`.
+pub struct Device {
+    pub(super) handle: ash::Device,
+    pub(super) queue: vk::Queue,
+    pub(super) queue_family: u32,
+    pub(super) memory: vk::PhysicalDeviceMemoryProperties,
+    pub(super) names: Option<ash::ext::debug_utils::Device>,
+    pub(super) pipeline_cache: vk::PipelineCache,
+    pub(super) physical: vk::PhysicalDevice,
+    /// Limits of the physical device.
+    pub limits: vk::PhysicalDeviceLimits,
+    /// Name, driver, kind.
+    pub info: Candidate,
+    /// Folder for compiled shaders and the pipeline cache.
+    pub cache_dir: Option<PathBuf>,
+    pub(super) next_resource: AtomicU64,
+    omitted_barrier: AtomicUsize,
+    /// Last: the instance outlives the device.
+    instance: Instance,
+}
+
+impl Device {
+    /// Every physical device, in the loader's order.
+    ///
+    /// # Errors
+    /// `Unsupported` without a loader.
+    pub fn list() -> Result<Vec<Candidate>> {
+        let instance = Instance::new(Validation::Off)?;
+        Ok(physical_devices(&instance)?.into_iter().map(|(_, candidate)| candidate).collect())
+    }
+
+    /// Opens the chosen device with Vulkan 1.3 core features and no extension.
+    ///
+    /// # Errors
+    /// `Unsupported` without a loader, a suitable device, or the validation layer that was asked for.
+    pub fn new(options: &Options) -> Result<Arc<Self>> {
+        let instance = Instance::new(options.validation)?;
+        let devices = physical_devices(&instance)?;
+        let candidates: Vec<_> = devices.iter().map(|(_, candidate)| candidate.clone()).collect();
+        let info = choose(&candidates, options.device.as_deref())?.clone();
+        let physical = devices[info.index].0;
+
+        // SAFETY: queries on a handle that the live instance returned.
+        let (families, memory, properties) = unsafe {
+            (
+                instance.handle.get_physical_device_queue_family_properties(physical),
+                instance.handle.get_physical_device_memory_properties(physical),
+                instance.handle.get_physical_device_properties(physical),
+            )
+        };
+        let queue_family = queue_family(&families).expect("a suitable candidate has a queue");
+        let priorities = [1.0];
+        let queues =
+            [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
+        let mut core_1_3 = vk::PhysicalDeviceVulkan13Features::default()
+            .dynamic_rendering(true)
+            .synchronization2(true)
+            .maintenance4(true);
+        let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut core_1_3);
+        // SAFETY: the features were checked in `physical_devices`; destroyed in `Drop`, before the instance.
+        let handle = unsafe { instance.handle.create_device(physical, &create, None) }
+            .checked("vkCreateDevice", &info.name)?;
+        // SAFETY: family and index were given at creation.
+        let queue = unsafe { handle.get_device_queue(queue_family, 0) };
+        let names = instance.has_debug_utils.then(|| ash::ext::debug_utils::Device::new(&instance.handle, &handle));
+        let mut device = Device {
+            handle,
+            queue,
+            queue_family,
+            memory,
+            names,
+            pipeline_cache: vk::PipelineCache::null(),
+            physical,
+            limits: properties.limits,
+            info,
+            cache_dir: options.cache_dir.clone(),
+            next_resource: AtomicU64::new(1),
+            omitted_barrier: AtomicUsize::new(usize::MAX),
+            instance,
+        };
+        device.pipeline_cache = device.load_pipeline_cache(&properties)?;
+        Ok(Arc::new(device))
+    }
+
+    /// What the validation layer said since the last call.
+    pub fn take_validation_messages(&self) -> Vec<String> {
+        self.instance.messages.take()
+    }
+
+    /// Makes every recording leave out its `index`-th barrier, counted from 0, so that a test can show that the tracker
+    /// notices; `None` restores normal recording.
+    pub fn omit_barrier(&self, index: Option<usize>) {
+        self.omitted_barrier.store(index.unwrap_or(usize::MAX), Ordering::Relaxed);
+    }
+
+    pub(super) fn omitted_barrier(&self) -> usize {
+        self.omitted_barrier.load(Ordering::Relaxed)
+    }
+
+    /// Whether optimal-tiling images of `format` support `features`.
+    pub fn supports(&self, format: vk::Format, features: vk::FormatFeatureFlags) -> bool {
+        // SAFETY: a query on a live handle.
+        let properties =
+            unsafe { self.instance.handle.get_physical_device_format_properties(self.physical, format) };
+        properties.optimal_tiling_features.contains(features)
+    }
+
+    /// Gives a Vulkan object the name that debuggers and the validation layer show.
+    pub(super) fn name(&self, object: impl vk::Handle, name: &str) {
+        let Some(names) = &self.names else { return };
+        let name = CString::new(name).unwrap_or_default();
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+        // SAFETY: the object belongs to this device and is alive. A name is a courtesy: failing to set it is ignored.
+        let _ = unsafe { names.set_debug_utils_object_name(&info) };
+    }
+
+    fn pipeline_cache_path(&self) -> Option<PathBuf> {
+        Some(self.cache_dir.as_ref()?.join(format!("pipelines-{}.bin", self.info.uuid)))
+    }
+
+    fn load_pipeline_cache(&self, properties: &vk::PhysicalDeviceProperties) -> Result<vk::PipelineCache> {
+        let data = self.pipeline_cache_path().and_then(|path| std::fs::read(path).ok()).unwrap_or_default();
+        let trusted = cache_header_fits(&data, properties);
+        if !trusted && !data.is_empty() {
+            log::info!("the pipeline cache on disk belongs to another driver; starting afresh");
+        }
+        let create = vk::PipelineCacheCreateInfo::default().initial_data(if trusted { &data } else { &[] });
+        // SAFETY: the data's header was checked against this device; destroyed in `Drop`.
+        unsafe { self.handle.create_pipeline_cache(&create, None) }.checked("vkCreatePipelineCache", "pipeline cache")
+    }
+
+    /// Writes the pipeline cache to disk through a temporary file. Failing to is logged, not an error.
+    pub fn save_pipeline_cache(&self) {
+        let Some(path) = self.pipeline_cache_path() else { return };
+        // SAFETY: the cache is alive.
+        let Ok(data) = (unsafe { self.handle.get_pipeline_cache_data(self.pipeline_cache) }) else { return };
+        if let Err(error) = super::shader::write_atomically(&path, &data) {
+            log::warn!("{}: the pipeline cache was not saved: {error}", path.display());
+        }
+    }
+
+    /// Waits until the queue has finished everything.
+    ///
+    /// # Errors
+    /// `Device` when the device was lost.
+    pub fn wait_idle(&self) -> Result<()> {
+        // SAFETY: the queue is used from one thread at a time by construction of `Commands::submit`.
+        unsafe { self.handle.device_wait_idle() }.checked("vkDeviceWaitIdle", &self.info.name)
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: every owner of a child object held an `Arc` of this device, so none is left.
+        unsafe {
+            let _ = self.handle.device_wait_idle();
+            self.handle.destroy_pipeline_cache(self.pipeline_cache, None);
+            self.handle.destroy_device(None);
+        }
+    }
+}
+
+/// Whether pipeline-cache data starts with a version-one header of this very device (Vulkan specification, "Pipeline Cache
+/// Header").
+fn cache_header_fits(data: &[u8], properties: &vk::PhysicalDeviceProperties) -> bool {
+    let word = |at: usize| data.get(at..at + 4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes")));
+    let one = vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32;
+    word(0).is_some_and(|length| length >= 32 && length as usize <= data.len())
+        && word(4) == Some(one)
+        && word(8) == Some(properties.vendor_id)
+        && word(12) == Some(properties.device_id)
+        && data.get(16..32) == Some(&properties.pipeline_cache_uuid[..])
+}
+
+fn queue_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
+    let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+    families
+        .iter()
+        .position(|f| f.queue_flags.contains(needed) && f.timestamp_valid_bits > 0)
+        .and_then(|index| u32::try_from(index).ok())
+}
+
+fn version_text(version: u32) -> String {
+    let (major, minor, patch) =
+        (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version));
+    format!("{major}.{minor}.{patch}")
+}
+
+fn physical_devices(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Candidate)>> {
+    // SAFETY: a query on a live instance. No driver at all is an empty list to the caller.
+    let handles = match unsafe { instance.handle.enumerate_physical_devices() } {
+        Err(vk::Result::ERROR_INITIALIZATION_FAILED | vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Vec::new(),
+        other => other.checked("vkEnumeratePhysicalDevices", "instance")?,
+    };
+    Ok(handles.into_iter().enumerate().map(|(index, handle)| (handle, describe(instance, index, handle))).collect())
+}
+
+fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
+    // SAFETY (whole block): queries on live handles with structs that outlive the calls; the 1.3 structs are only chained
+    // where the device itself speaks 1.3.
+    let (properties, unsuitable, identity, driver) = unsafe {
+        let properties = instance.handle.get_physical_device_properties(physical);
+        let mut identity = vk::PhysicalDeviceIDProperties::default();
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut both = vk::PhysicalDeviceProperties2::default().push_next(&mut identity).push_next(&mut driver);
+        if properties.api_version >= vk::API_VERSION_1_2 {
+            instance.handle.get_physical_device_properties2(physical, &mut both);
+        }
+        let mut unsuitable = None;
+        if properties.api_version < vk::API_VERSION_1_3 {
+            unsuitable = Some(format!("speaks Vulkan {}, 1.3 is needed", version_text(properties.api_version)));
+        } else {
+            let mut core_1_3 = vk::PhysicalDeviceVulkan13Features::default();
+            let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut core_1_3);
+            instance.handle.get_physical_device_features2(physical, &mut features);
+            let families = instance.handle.get_physical_device_queue_family_properties(physical);
+            let missing = [
+                (core_1_3.dynamic_rendering, "dynamicRendering"),
+                (core_1_3.synchronization2, "synchronization2"),
+                (core_1_3.maintenance4, "maintenance4"),
+            ];
+            if let Some((_, feature)) = missing.iter().find(|(present, _)| *present == vk::FALSE) {
+                unsuitable = Some(format!("lacks the feature {feature}"));
+            } else if queue_family(&families).is_none() {
+                unsuitable = Some("has no queue with graphics, compute and timestamps".into());
+            }
+        }
+        (properties, unsuitable, identity, driver)
+    };
+    let text = |chars: &[std::ffi::c_char]| {
+        let bytes: Vec<u8> = chars.iter().map(|&c| c.cast_unsigned()).collect();
+        CStr::from_bytes_until_nul(&bytes).map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+    };
+    let (driver_name, driver_info) = (text(&driver.driver_name), text(&driver.driver_info));
+    let driver = match (driver_name.is_empty(), driver_info.is_empty()) {
+        (true, _) => format!("driver version {}", properties.driver_version),
+        (false, true) => driver_name,
+        (false, false) => format!("{driver_name}, {driver_info}"),
+    };
+    Candidate {
+        index,
+        name: text(&properties.device_name),
+        kind: properties.device_type,
+        api: version_text(properties.api_version),
+        driver,
+        uuid: identity.device_uuid.iter().map(|byte| format!("{byte:02x}")).collect(),
+        unsuitable,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn foreign_pipeline_caches_are_refused() {
+        let mut properties = vk::PhysicalDeviceProperties { vendor_id: 7, device_id: 9, ..Default::default() };
+        properties.pipeline_cache_uuid[3] = 5;
+        let mut data = Vec::new();
+        for word in [32_u32, 1, 7, 9] {
+            data.extend(word.to_le_bytes());
+        }
+        data.extend(properties.pipeline_cache_uuid);
+        assert!(cache_header_fits(&data, &properties));
+        for at in [0, 4, 8, 12, 19] {
+            let mut damaged = data.clone();
+            damaged[at] ^= 0x40;
+            assert!(!cache_header_fits(&damaged, &properties), "byte {at}");
+        }
+        assert!(!cache_header_fits(&data[..31], &properties));
+        assert!(!cache_header_fits(&[], &properties));
+    }
+}

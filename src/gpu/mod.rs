@@ -1,0 +1,48 @@
+//! A thin layer over `ash`: device, memory, shaders, pipelines, command recording.
+//!
+//! It knows nothing of spherical harmonics, fields or scenes, and it holds all of the crate's `unsafe`. Every Vulkan object
+//! has one owner whose `Drop` destroys it; every owner keeps the [`Device`] alive.
+
+pub mod access;
+pub mod commands;
+pub mod device;
+pub mod memory;
+pub mod pipeline;
+pub mod reflect;
+pub mod select;
+pub mod shader;
+pub mod validation;
+
+pub use access::Access;
+pub use commands::{Bind, Commands, Timing};
+pub use device::{Device, Options};
+pub use memory::{Buffer, BufferKind, Image, TexelView};
+pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState};
+pub use shader::{Shader, Stage};
+pub use validation::Validation;
+
+use crate::error::{Error, Result};
+use ash::vk;
+
+/// Turns a Vulkan result into this crate's error, naming the call and the object it was made for.
+pub(crate) trait Checked<T> {
+    fn checked(self, call: &str, object: &str) -> Result<T>;
+}
+
+impl<T> Checked<T> for std::result::Result<T, vk::Result> {
+    fn checked(self, call: &str, object: &str) -> Result<T> {
+        self.map_err(|code| {
+            let message = format!("{call} ({object}): {code:?}");
+            match code {
+                vk::Result::ERROR_OUT_OF_HOST_MEMORY
+                | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
+                | vk::Result::ERROR_DEVICE_LOST => Error::Device(message),
+                vk::Result::ERROR_FEATURE_NOT_PRESENT
+                | vk::Result::ERROR_EXTENSION_NOT_PRESENT
+                | vk::Result::ERROR_LAYER_NOT_PRESENT
+                | vk::Result::ERROR_INCOMPATIBLE_DRIVER => Error::Unsupported(message),
+                _ => Error::Failed(message),
+            }
+        })
+    }
+}

@@ -1,0 +1,315 @@
+//! Pipelines with their layouts, built from what reflection found.
+
+use super::Checked;
+use super::device::Device;
+use super::reflect::{Binding, BindingKind, Input};
+use super::shader::{Shader, Stage};
+use crate::error::{Error, Result};
+use ash::vk;
+use std::sync::Arc;
+
+/// Descriptor set layout and pipeline layout; shared shape of both kinds of pipeline.
+pub(super) struct Layout {
+    device: Arc<Device>,
+    pub(super) set: vk::DescriptorSetLayout,
+    pub(super) pipeline: vk::PipelineLayout,
+    pub(super) bindings: Vec<Binding>,
+    pub(super) push_bytes: u32,
+    pub(super) push_stages: vk::ShaderStageFlags,
+}
+
+impl Layout {
+    fn new(device: &Arc<Device>, name: &str, shaders: &[&Shader]) -> Result<Self> {
+        let mut bindings: Vec<Binding> = Vec::new();
+        for binding in shaders.iter().flat_map(|s| &s.reflection.bindings) {
+            if !bindings.iter().any(|b| b.index == binding.index) {
+                bindings.push(binding.clone());
+            }
+        }
+        bindings.sort_by_key(|b| b.index);
+        let all_stages = shaders.iter().fold(vk::ShaderStageFlags::empty(), |all, s| all | stage_flag(s.stage));
+        let descriptions: Vec<_> = bindings
+            .iter()
+            .map(|b| {
+                vk::DescriptorSetLayoutBinding::default()
+                    .binding(b.index)
+                    .descriptor_type(descriptor_type(b.kind))
+                    .descriptor_count(1)
+                    .stage_flags(all_stages)
+            })
+            .collect();
+        let create = vk::DescriptorSetLayoutCreateInfo::default().bindings(&descriptions);
+        // SAFETY: destroyed in `Drop`.
+        let set = unsafe { device.handle.create_descriptor_set_layout(&create, None) }
+            .checked("vkCreateDescriptorSetLayout", name)?;
+        let mut layout = Layout {
+            device: device.clone(),
+            set,
+            pipeline: vk::PipelineLayout::null(),
+            bindings,
+            push_bytes: shaders.iter().map(|s| s.reflection.push_bytes).max().unwrap_or(0),
+            push_stages: shaders
+                .iter()
+                .filter(|s| s.reflection.push_bytes > 0)
+                .fold(vk::ShaderStageFlags::empty(), |all, s| all | stage_flag(s.stage)),
+        };
+        if layout.push_bytes > device.limits.max_push_constants_size {
+            return Err(Error::Unsupported(format!(
+                "{name} has {} bytes of push constants, the device takes {}",
+                layout.push_bytes, device.limits.max_push_constants_size
+            )));
+        }
+        let sets = [set];
+        let ranges =
+            [vk::PushConstantRange { stage_flags: layout.push_stages, offset: 0, size: layout.push_bytes }];
+        let create = vk::PipelineLayoutCreateInfo::default()
+            .set_layouts(&sets)
+            .push_constant_ranges(if layout.push_bytes > 0 { &ranges } else { &[] });
+        // SAFETY: destroyed in `Drop`.
+        layout.pipeline = unsafe { device.handle.create_pipeline_layout(&create, None) }
+            .checked("vkCreatePipelineLayout", name)?;
+        device.name(set, name);
+        device.name(layout.pipeline, name);
+        Ok(layout)
+    }
+}
+
+impl Drop for Layout {
+    fn drop(&mut self) {
+        // SAFETY: recordings that use the pipeline borrow it until the device has finished with them.
+        unsafe {
+            self.device.handle.destroy_pipeline_layout(self.pipeline, None);
+            self.device.handle.destroy_descriptor_set_layout(self.set, None);
+        }
+    }
+}
+
+fn stage_flag(stage: Stage) -> vk::ShaderStageFlags {
+    match stage {
+        Stage::Compute => vk::ShaderStageFlags::COMPUTE,
+        Stage::Vertex => vk::ShaderStageFlags::VERTEX,
+        Stage::Fragment => vk::ShaderStageFlags::FRAGMENT,
+    }
+}
+
+pub(super) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
+    match kind {
+        BindingKind::Storage => vk::DescriptorType::STORAGE_BUFFER,
+        BindingKind::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
+        BindingKind::Texel => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+        BindingKind::Image => vk::DescriptorType::SAMPLED_IMAGE,
+    }
+}
+
+/// A shader module that lives while a pipeline is made from it.
+struct Module<'d>(&'d Device, vk::ShaderModule);
+
+impl<'d> Module<'d> {
+    fn new(device: &'d Device, shader: &Shader) -> Result<Self> {
+        let create = vk::ShaderModuleCreateInfo::default().code(&shader.spirv);
+        // SAFETY: the words come from the compiler or its hashed cache; destroyed in `Drop`.
+        let module = unsafe { device.handle.create_shader_module(&create, None) }
+            .checked("vkCreateShaderModule", &shader.name)?;
+        device.name(module, &shader.name);
+        Ok(Module(device, module))
+    }
+}
+
+impl Drop for Module<'_> {
+    fn drop(&mut self) {
+        // SAFETY: pipelines do not need their modules after creation.
+        unsafe { self.0.handle.destroy_shader_module(self.1, None) };
+    }
+}
+
+/// Destroys a pipeline before its layout goes.
+struct PipelineHandle(Arc<Device>, vk::Pipeline);
+
+impl Drop for PipelineHandle {
+    fn drop(&mut self) {
+        // SAFETY: recordings that use the pipeline borrow it until the device has finished with them.
+        unsafe { self.0.handle.destroy_pipeline(self.1, None) };
+    }
+}
+
+/// One compute shader, ready to dispatch.
+pub struct ComputePipeline {
+    handle: PipelineHandle,
+    pub(super) layout: Layout,
+    /// Workgroup size.
+    pub local_size: [u32; 3],
+    /// Name of the pass.
+    pub name: String,
+}
+
+impl ComputePipeline {
+    /// Builds the pipeline; `constants` sets specialisation constants by the name they have in the source.
+    ///
+    /// # Errors
+    /// `Unsupported` when the shader goes over a device limit; `Failed` for a constant that the shader does not have.
+    pub fn new(device: &Arc<Device>, name: &str, shader: &Shader, constants: &[(&str, u32)]) -> Result<Self> {
+        let layout = Layout::new(device, name, &[shader])?;
+        let local_size = shader.reflection.local_size;
+        let invocations: u32 = local_size.iter().product();
+        if invocations > device.limits.max_compute_work_group_invocations {
+            return Err(Error::Unsupported(format!(
+                "{name} wants {invocations} invocations a workgroup, the device takes {}",
+                device.limits.max_compute_work_group_invocations
+            )));
+        }
+        let mut entries = Vec::new();
+        let mut data = Vec::new();
+        for (wanted, value) in constants {
+            let constant = shader.reflection.constants.iter().find(|c| c.name == *wanted).ok_or_else(|| {
+                Error::Failed(format!("{name}: {} has no specialisation constant \"{wanted}\"", shader.name))
+            })?;
+            let offset = (entries.len() * 4) as u32;
+            entries.push(vk::SpecializationMapEntry { constant_id: constant.id, offset, size: 4 });
+            data.extend_from_slice(&value.to_ne_bytes());
+        }
+        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
+        let module = Module::new(device, shader)?;
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(module.1)
+            .name(c"main")
+            .specialization_info(&specialization);
+        let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline);
+        // SAFETY: everything that `create` points to outlives the call; destroyed by `PipelineHandle`.
+        let handle = unsafe { device.handle.create_compute_pipelines(device.pipeline_cache, &[create], None) }
+            .map_err(|(_, code)| code)
+            .checked("vkCreateComputePipelines", name)?[0];
+        device.name(handle, name);
+        Ok(ComputePipeline { handle: PipelineHandle(device.clone(), handle), layout, local_size, name: name.into() })
+    }
+
+    pub(super) fn raw(&self) -> vk::Pipeline {
+        self.handle.1
+    }
+}
+
+/// Fixed-function state of a graphics pipeline; the rest is the same for all of ours (filled triangles, no blending,
+/// counter-clockwise front faces, dynamic viewport and scissor).
+#[derive(Clone, Copy, Debug)]
+pub struct GraphicsState {
+    /// Colour attachment format.
+    pub color: vk::Format,
+    /// Depth attachment format; with one, depth is tested and written, nearer being *greater* (reversed).
+    pub depth: Option<vk::Format>,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Faces that are not drawn.
+    pub cull: vk::CullModeFlags,
+}
+
+/// A vertex and a fragment shader, ready to draw indexed triangles. Vertex input `location` reads tightly packed floats
+/// from the vertex buffer bound at the same number.
+pub struct GraphicsPipeline {
+    handle: PipelineHandle,
+    pub(super) layout: Layout,
+    pub(super) inputs: Vec<Input>,
+    /// Fixed-function state.
+    pub state: GraphicsState,
+    /// Name of the pass.
+    pub name: String,
+}
+
+impl GraphicsPipeline {
+    /// Builds the pipeline.
+    ///
+    /// # Errors
+    /// As [`ComputePipeline::new`].
+    pub fn new(
+        device: &Arc<Device>,
+        name: &str,
+        vertex: &Shader,
+        fragment: &Shader,
+        state: GraphicsState,
+    ) -> Result<Self> {
+        let layout = Layout::new(device, name, &[vertex, fragment])?;
+        let modules = [Module::new(device, vertex)?, Module::new(device, fragment)?];
+        let stages = [
+            (vk::ShaderStageFlags::VERTEX, modules[0].1),
+            (vk::ShaderStageFlags::FRAGMENT, modules[1].1),
+        ]
+        .map(|(stage, module)| {
+            vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main")
+        });
+        let inputs = vertex.reflection.inputs.clone();
+        let bindings: Vec<_> = inputs
+            .iter()
+            .map(|i| vk::VertexInputBindingDescription {
+                binding: i.location,
+                stride: i.components * 4,
+                input_rate: vk::VertexInputRate::VERTEX,
+            })
+            .collect();
+        let attributes: Vec<_> = inputs
+            .iter()
+            .map(|i| vk::VertexInputAttributeDescription {
+                location: i.location,
+                binding: i.location,
+                format: attribute_format(i.components),
+                offset: 0,
+            })
+            .collect();
+        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
+            .vertex_binding_descriptions(&bindings)
+            .vertex_attribute_descriptions(&attributes);
+        let assembly =
+            vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+        let raster = vk::PipelineRasterizationStateCreateInfo::default()
+            .polygon_mode(vk::PolygonMode::FILL)
+            .cull_mode(state.cull)
+            .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
+            .line_width(1.0);
+        let multisample = vk::PipelineMultisampleStateCreateInfo::default()
+            .rasterization_samples(vk::SampleCountFlags::from_raw(state.samples));
+        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(state.depth.is_some())
+            .depth_write_enable(state.depth.is_some())
+            .depth_compare_op(vk::CompareOp::GREATER);
+        let blend_attachments =
+            [vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)];
+        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend_attachments);
+        let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
+        let colors = [state.color];
+        let mut rendering = vk::PipelineRenderingCreateInfo::default()
+            .color_attachment_formats(&colors)
+            .depth_attachment_format(state.depth.unwrap_or(vk::Format::UNDEFINED));
+        let create = vk::GraphicsPipelineCreateInfo::default()
+            .stages(&stages)
+            .vertex_input_state(&vertex_input)
+            .input_assembly_state(&assembly)
+            .viewport_state(&viewport)
+            .rasterization_state(&raster)
+            .multisample_state(&multisample)
+            .depth_stencil_state(&depth)
+            .color_blend_state(&blend)
+            .dynamic_state(&dynamic)
+            .layout(layout.pipeline)
+            .push_next(&mut rendering);
+        // SAFETY: everything that `create` points to outlives the call; destroyed by `PipelineHandle`.
+        let handle = unsafe { device.handle.create_graphics_pipelines(device.pipeline_cache, &[create], None) }
+            .map_err(|(_, code)| code)
+            .checked("vkCreateGraphicsPipelines", name)?[0];
+        device.name(handle, name);
+        let handle = PipelineHandle(device.clone(), handle);
+        Ok(GraphicsPipeline { handle, layout, inputs, state, name: name.into() })
+    }
+
+    pub(super) fn raw(&self) -> vk::Pipeline {
+        self.handle.1
+    }
+}
+
+fn attribute_format(components: u32) -> vk::Format {
+    match components {
+        1 => vk::Format::R32_SFLOAT,
+        2 => vk::Format::R32G32_SFLOAT,
+        3 => vk::Format::R32G32B32_SFLOAT,
+        _ => vk::Format::R32G32B32A32_SFLOAT,
+    }
+}

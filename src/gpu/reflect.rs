@@ -1,0 +1,280 @@
+//! What a SPIR-V module declares: bindings, push constants, local size, specialisation constants, vertex inputs and the
+//! layout of every struct.
+
+use crate::error::{Error, Result};
+use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass};
+use std::collections::{BTreeMap, HashMap};
+
+/// What kind of descriptor a binding wants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BindingKind {
+    /// `buffer` block.
+    Storage,
+    /// `uniform` block.
+    Uniform,
+    /// `textureBuffer` and its integer forms.
+    Texel,
+    /// `texture2D` without a sampler.
+    Image,
+}
+
+/// One binding of descriptor set 0.
+#[derive(Clone, Debug)]
+pub struct Binding {
+    /// `binding = N`.
+    pub index: u32,
+    /// Name of the variable, or of its block where the variable has none.
+    pub name: String,
+    /// Kind of descriptor.
+    pub kind: BindingKind,
+    /// Whether the shader may write it.
+    pub writes: bool,
+    /// Bytes of the fixed part of the block; 0 for texels and images.
+    pub block_bytes: u32,
+}
+
+/// One specialisation constant.
+#[derive(Clone, Debug)]
+pub struct Constant {
+    /// Name in the source.
+    pub name: String,
+    /// `constant_id`.
+    pub id: u32,
+}
+
+/// One vertex attribute.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Input {
+    /// `location`.
+    pub location: u32,
+    /// Number of floats, 1 to 4.
+    pub components: u32,
+}
+
+/// Byte offsets of a struct's members, by name, in order of declaration.
+pub type Layout = Vec<(String, u32)>;
+
+/// The outcome of reflection.
+#[derive(Clone, Debug, Default)]
+pub struct Reflection {
+    /// Bindings that the optimised code still uses, by index.
+    pub bindings: Vec<Binding>,
+    /// Size of the push-constant block in bytes; 0 without one.
+    pub push_bytes: u32,
+    /// Workgroup size of a compute shader.
+    pub local_size: [u32; 3],
+    /// Specialisation constants.
+    pub constants: Vec<Constant>,
+    /// Vertex inputs by location; empty for other stages.
+    pub inputs: Vec<Input>,
+    /// Struct name to member offsets.
+    pub structs: BTreeMap<String, Layout>,
+    /// Struct name to the stride of arrays of it, where the module has such an array.
+    pub strides: BTreeMap<String, u32>,
+}
+
+impl Reflection {
+    /// Reads a module.
+    ///
+    /// # Errors
+    /// `Failed` when the words are no SPIR-V, or declare something that this layer does not use (other sets than 0,
+    /// unknown descriptor kinds).
+    pub fn new(spirv: &[u32]) -> Result<Self> {
+        let module =
+            rspirv::dr::load_words(spirv).map_err(|error| Error::Failed(format!("unreadable SPIR-V: {error}")))?;
+        Reader::new(&module).reflect()
+    }
+}
+
+/// Indexes over a module that make the questions below one-liners.
+struct Reader<'m> {
+    module: &'m Module,
+    definitions: HashMap<u32, &'m Instruction>,
+    names: HashMap<u32, &'m str>,
+    member_names: HashMap<(u32, u32), &'m str>,
+}
+
+fn id(operand: &Operand) -> u32 {
+    match operand {
+        Operand::IdRef(id) => *id,
+        other => unreachable!("an id was expected, not {other:?}"),
+    }
+}
+
+fn literal(operand: Option<&Operand>) -> u32 {
+    match operand {
+        Some(Operand::LiteralBit32(value)) => *value,
+        other => unreachable!("a literal was expected, not {other:?}"),
+    }
+}
+
+impl<'m> Reader<'m> {
+    fn new(module: &'m Module) -> Self {
+        let mut names = HashMap::new();
+        let mut member_names = HashMap::new();
+        for instruction in &module.debug_names {
+            match (instruction.class.opcode, &instruction.operands[..]) {
+                (Op::Name, [target, Operand::LiteralString(name)]) => {
+                    names.insert(id(target), name.as_str());
+                }
+                (Op::MemberName, [target, Operand::LiteralBit32(member), Operand::LiteralString(name)]) => {
+                    member_names.insert((id(target), *member), name.as_str());
+                }
+                _ => {}
+            }
+        }
+        let definitions =
+            module.types_global_values.iter().filter_map(|i| i.result_id.map(|result| (result, i))).collect();
+        Reader { module, definitions, names, member_names }
+    }
+
+    fn name(&self, target: u32) -> &'m str {
+        self.names.get(&target).copied().unwrap_or("")
+    }
+
+    /// Operands after the decoration's name, if `target` carries it.
+    fn decoration(&self, target: u32, wanted: Decoration) -> Option<&'m [Operand]> {
+        self.module.annotations.iter().find_map(|i| match (i.class.opcode, &i.operands[..]) {
+            (Op::Decorate, [on, Operand::Decoration(found), rest @ ..]) if id(on) == target && *found == wanted => {
+                Some(rest)
+            }
+            _ => None,
+        })
+    }
+
+    fn member_decoration(&self, target: u32, member: u32, wanted: Decoration) -> Option<&'m [Operand]> {
+        self.module.annotations.iter().find_map(|i| match (i.class.opcode, &i.operands[..]) {
+            (Op::MemberDecorate, [on, Operand::LiteralBit32(at), Operand::Decoration(found), rest @ ..])
+                if id(on) == target && *at == member && *found == wanted =>
+            {
+                Some(rest)
+            }
+            _ => None,
+        })
+    }
+
+    fn reflect(&self) -> Result<Reflection> {
+        let mut out = Reflection { local_size: [1; 3], ..Default::default() };
+        for instruction in &self.module.types_global_values {
+            let Some(result) = instruction.result_id else { continue };
+            match instruction.class.opcode {
+                Op::TypeStruct => self.structure(result, instruction, &mut out),
+                Op::TypeArray | Op::TypeRuntimeArray => {
+                    if let Some(stride) = self.decoration(result, Decoration::ArrayStride) {
+                        out.strides.insert(self.name(id(&instruction.operands[0])).to_owned(), literal(stride.first()));
+                    }
+                }
+                Op::Variable => self.variable(result, instruction, &mut out)?,
+                _ => {}
+            }
+            if let Some(constant) = self.decoration(result, Decoration::SpecId) {
+                out.constants.push(Constant { name: self.name(result).to_owned(), id: literal(constant.first()) });
+            }
+            let is_size = matches!(self.decoration(result, Decoration::BuiltIn), Some([Operand::BuiltIn(BuiltIn::WorkgroupSize)]));
+            if is_size {
+                return Err(Error::Failed("the local size must be literal, not a specialisation constant".into()));
+            }
+        }
+        for mode in &self.module.execution_modes {
+            if let [_, Operand::ExecutionMode(ExecutionMode::LocalSize), x, y, z] = &mode.operands[..] {
+                out.local_size = [literal(Some(x)), literal(Some(y)), literal(Some(z))];
+            }
+        }
+        out.strides.remove("");
+        out.bindings.sort_by_key(|b| b.index);
+        out.inputs.sort_by_key(|i| i.location);
+        Ok(out)
+    }
+
+    fn structure(&self, result: u32, instruction: &Instruction, out: &mut Reflection) {
+        let layout: Layout = (0..instruction.operands.len() as u32)
+            .filter_map(|member| {
+                let offset = self.member_decoration(result, member, Decoration::Offset)?;
+                let name = self.member_names.get(&(result, member)).copied().unwrap_or("");
+                Some((name.to_owned(), literal(offset.first())))
+            })
+            .collect();
+        if !layout.is_empty() {
+            out.structs.insert(self.name(result).to_owned(), layout);
+        }
+    }
+
+    fn variable(&self, result: u32, instruction: &Instruction, out: &mut Reflection) -> Result<()> {
+        let Operand::StorageClass(class) = instruction.operands[0] else { return Ok(()) };
+        let pointer = self.definitions[&instruction.result_type.expect("a variable has a type")];
+        let target = id(&pointer.operands[1]);
+        match class {
+            StorageClass::PushConstant => out.push_bytes = self.size_bytes(target),
+            StorageClass::Input => {
+                if let Some(location) = self.decoration(result, Decoration::Location) {
+                    let components = match self.definitions[&target].class.opcode {
+                        Op::TypeVector => literal(self.definitions[&target].operands.get(1)),
+                        _ => 1,
+                    };
+                    out.inputs.push(Input { location: literal(location.first()), components });
+                }
+            }
+            StorageClass::StorageBuffer | StorageClass::Uniform | StorageClass::UniformConstant => {
+                out.bindings.push(self.binding(result, target, class)?);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn binding(&self, variable: u32, target: u32, class: StorageClass) -> Result<Binding> {
+        let definition = self.definitions[&target];
+        let own = self.name(variable);
+        let name = if own.is_empty() { self.name(target) } else { own }.to_owned();
+        let set = self.decoration(variable, Decoration::DescriptorSet).map_or(0, |o| literal(o.first()));
+        if set != 0 {
+            return Err(Error::Failed(format!("{name} is in descriptor set {set}; all bindings are in set 0")));
+        }
+        let index = self
+            .decoration(variable, Decoration::Binding)
+            .map(|o| literal(o.first()))
+            .ok_or_else(|| Error::Failed(format!("{name} has no binding number")))?;
+        let (kind, writes) = match (class, definition.class.opcode) {
+            (StorageClass::StorageBuffer, Op::TypeStruct) => {
+                let members = definition.operands.len() as u32;
+                let read_only = self.decoration(variable, Decoration::NonWritable).is_some()
+                    || (0..members)
+                        .all(|member| self.member_decoration(target, member, Decoration::NonWritable).is_some());
+                (BindingKind::Storage, !read_only)
+            }
+            (StorageClass::Uniform, Op::TypeStruct) => (BindingKind::Uniform, false),
+            (StorageClass::UniformConstant, Op::TypeImage) => match definition.operands[1] {
+                Operand::Dim(Dim::DimBuffer) => (BindingKind::Texel, false),
+                Operand::Dim(Dim::Dim2D) => (BindingKind::Image, false),
+                ref other => return Err(Error::Failed(format!("{name}: images of {other:?} are not in use"))),
+            },
+            (class, opcode) => return Err(Error::Failed(format!("{name}: no binding for {class:?} of {opcode:?}"))),
+        };
+        let block_bytes = if definition.class.opcode == Op::TypeStruct { self.size_bytes(target) } else { 0 };
+        Ok(Binding { index, name, kind, writes, block_bytes })
+    }
+
+    /// Bytes of a type; a runtime array counts as 0.
+    fn size_bytes(&self, of: u32) -> u32 {
+        let definition = self.definitions[&of];
+        let operands = &definition.operands;
+        match definition.class.opcode {
+            Op::TypeInt | Op::TypeFloat => literal(operands.first()) / 8,
+            Op::TypeVector | Op::TypeMatrix => literal(operands.get(1)) * self.size_bytes(id(&operands[0])),
+            Op::TypeArray => {
+                let length = literal(self.definitions[&id(&operands[1])].operands.first());
+                let stride = self.decoration(of, Decoration::ArrayStride).map(|o| literal(o.first()));
+                length * stride.unwrap_or_else(|| self.size_bytes(id(&operands[0])))
+            }
+            Op::TypeStruct => (0..operands.len() as u32)
+                .map(|member| {
+                    let offset = self.member_decoration(of, member, Decoration::Offset);
+                    offset.map_or(0, |o| literal(o.first())) + self.size_bytes(id(&operands[member as usize]))
+                })
+                .max()
+                .unwrap_or(0),
+            _ => 0,
+        }
+    }
+}

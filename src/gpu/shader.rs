@@ -1,0 +1,240 @@
+//! GLSL to SPIR-V through shaderc at run time, with an include callback and a cache on disk.
+
+use super::reflect::Reflection;
+use crate::error::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// Part of the pipeline that a shader is for; the file ending of its entry point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// `.comp`
+    Compute,
+    /// `.vert`
+    Vertex,
+    /// `.frag`
+    Fragment,
+}
+
+impl Stage {
+    fn kind(self) -> shaderc::ShaderKind {
+        match self {
+            Stage::Compute => shaderc::ShaderKind::Compute,
+            Stage::Vertex => shaderc::ShaderKind::Vertex,
+            Stage::Fragment => shaderc::ShaderKind::Fragment,
+        }
+    }
+}
+
+/// Everything that decides what SPIR-V comes out.
+pub struct Source<'a> {
+    /// File name, for messages.
+    pub name: &'a str,
+    /// Stage it is compiled for.
+    pub stage: Stage,
+    /// GLSL text of the entry point.
+    pub text: String,
+    /// Macros, name and value.
+    pub defines: &'a [(String, String)],
+    /// Text of an included file by the name in the `#include` line.
+    pub include: &'a dyn Fn(&str) -> Option<String>,
+}
+
+/// Compiled code and what reflection found in it.
+#[derive(Clone, Debug)]
+pub struct Shader {
+    /// File name of the entry point.
+    pub name: String,
+    /// Stage it was compiled for.
+    pub stage: Stage,
+    /// SPIR-V 1.6 words.
+    pub spirv: Vec<u32>,
+    /// Bindings, blocks, local size, constants.
+    pub reflection: Reflection,
+}
+
+/// Deepest chain of includes.
+const INCLUDE_DEPTH: usize = 16;
+
+impl Shader {
+    /// Compiles `source`, or takes the words from `cache_dir` when the same source, includes, defines and compiler have been
+    /// compiled before.
+    ///
+    /// # Errors
+    /// `Failed` with the compiler's lines, or when an include is missing.
+    pub fn compile(source: &Source<'_>, cache_dir: Option<&Path>) -> Result<Self> {
+        let includes = gather(source)?;
+        let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{}.spv", key(source, &includes))));
+        let cached = path.as_ref().and_then(|path| std::fs::read(path).ok()).and_then(|bytes| words(&bytes));
+        let shader = |spirv: Vec<u32>| -> Result<Self> {
+            let reflection = Reflection::new(&spirv).map_err(|error| error.context(source.name))?;
+            Ok(Shader { name: source.name.to_owned(), stage: source.stage, spirv, reflection })
+        };
+        // A damaged cache entry that reflection cannot read is compiled anew.
+        if let Some(found) = cached.and_then(|spirv| shader(spirv).ok()) {
+            return Ok(found);
+        }
+        let spirv = compile(source, &includes)?;
+        if let Some(path) = path
+            && let Err(error) = write_atomically(&path, &seal(&spirv))
+        {
+            log::warn!("{}: the compiled shader was not saved: {error}", path.display());
+        }
+        shader(spirv)
+    }
+}
+
+/// Every file that the source includes, directly or not, by name.
+fn gather(source: &Source<'_>) -> Result<BTreeMap<String, String>> {
+    fn visit(
+        source: &Source<'_>,
+        chain: &mut Vec<String>,
+        text: &str,
+        found: &mut BTreeMap<String, String>,
+    ) -> Result<()> {
+        if chain.len() > INCLUDE_DEPTH {
+            return Err(Error::Failed(format!("includes nest deeper than {INCLUDE_DEPTH}: {}", chain.join(" > "))));
+        }
+        for line in text.lines() {
+            let Some(rest) = line.trim_start().strip_prefix("#include") else { continue };
+            let name = rest.trim().trim_matches('"').to_owned();
+            if found.contains_key(&name) {
+                continue;
+            }
+            let included = (source.include)(&name)
+                .ok_or_else(|| Error::Failed(format!("{}: there is no \"{name}\" to include", chain.join(" > "))))?;
+            chain.push(name.clone());
+            found.insert(name, included.clone());
+            visit(source, chain, &included, found)?;
+            chain.pop();
+        }
+        Ok(())
+    }
+    let mut found = BTreeMap::new();
+    visit(source, &mut vec![source.name.to_owned()], &source.text, &mut found)?;
+    Ok(found)
+}
+
+/// Hash of all that changes the outcome: texts, defines, stage, compiler version and the options in [`compile`].
+fn key(source: &Source<'_>, includes: &BTreeMap<String, String>) -> String {
+    static COMPILER: OnceLock<(u32, u32)> = OnceLock::new();
+    let mut hasher = blake3::Hasher::new();
+    let mut part = |text: &str| {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    };
+    part(&format!("{:?} {:?} vulkan1.3 performance debug", COMPILER.get_or_init(shaderc::get_spirv_version), source.stage));
+    part(env!("CARGO_PKG_VERSION"));
+    part(&source.text);
+    for (name, value) in source.defines {
+        part(name);
+        part(value);
+    }
+    for (name, text) in includes {
+        part(name);
+        part(text);
+    }
+    hasher.finalize().to_hex()[..32].to_owned()
+}
+
+fn compile(source: &Source<'_>, includes: &BTreeMap<String, String>) -> Result<Vec<u32>> {
+    let failed = |what: String| Error::Failed(format!("{}: {what}", source.name));
+    let compiler = shaderc::Compiler::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
+    let mut options =
+        shaderc::CompileOptions::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
+    options.set_target_spirv(shaderc::SpirvVersion::V1_6);
+    options.set_optimization_level(shaderc::OptimizationLevel::Performance);
+    // Names survive optimisation only with debug information; reflection needs them.
+    options.set_generate_debug_info();
+    options.set_warnings_as_errors();
+    for (name, value) in source.defines {
+        options.add_macro_definition(name, Some(value));
+    }
+    options.set_include_callback(|name, _, from, _| {
+        let content = includes.get(name).cloned().ok_or_else(|| format!("{from}: there is no \"{name}\" to include"))?;
+        Ok(shaderc::ResolvedInclude { resolved_name: name.to_owned(), content })
+    });
+    let artifact = compiler
+        .compile_into_spirv(&source.text, source.stage.kind(), source.name, "main", Some(&options))
+        .map_err(|error| failed(error.to_string()))?;
+    Ok(artifact.as_binary().to_vec())
+}
+
+/// Cache file: the words with a hash in front, so that a damaged file is never handed to a driver.
+fn seal(spirv: &[u32]) -> Vec<u8> {
+    let bytes: &[u8] = bytemuck::cast_slice(spirv);
+    let mut out = blake3::hash(bytes).as_bytes().to_vec();
+    out.extend_from_slice(bytes);
+    out
+}
+
+fn words(sealed: &[u8]) -> Option<Vec<u32>> {
+    let (hash, bytes) = sealed.split_at_checked(32)?;
+    (blake3::hash(bytes).as_bytes() == hash && bytes.len() % 4 == 0)
+        .then(|| bytes.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes"))).collect())
+}
+
+/// Writes a file so that another process sees the old one or the new one, never a part; folders are made as needed.
+pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let folder = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
+    let folder = if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder };
+    std::fs::create_dir_all(&folder)?;
+    let mut file = tempfile::NamedTempFile::new_in(&folder)?;
+    std::io::Write::write_all(&mut file, bytes)?;
+    file.persist(path).map_err(|error| error.error)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "#version 460\n#include \"a.glsl\"\nlayout(local_size_x = 8) in;\n\
+        layout(std430, binding = 0) buffer Out { float values[]; };\nvoid main() { values[0] = A + float(B); }\n";
+
+    fn source<'a>(include: &'a dyn Fn(&str) -> Option<String>, defines: &'a [(String, String)]) -> Source<'a> {
+        Source { name: "test.comp", stage: Stage::Compute, text: TEXT.into(), defines, include }
+    }
+
+    #[test]
+    fn cache_key_sees_includes_and_defines_and_damage_is_compiled_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let one = |name: &str| (name == "a.glsl").then(|| "const float A = 1.0;\n".to_owned());
+        let two = |name: &str| (name == "a.glsl").then(|| "const float A = 2.0;\n".to_owned());
+        let b = |value: &str| vec![("B".to_owned(), value.to_owned())];
+        let compile = |include: &dyn Fn(&str) -> Option<String>, defines: &[(String, String)]| {
+            Shader::compile(&source(include, defines), Some(folder.path())).unwrap().spirv
+        };
+        let first = compile(&one, &b("3"));
+        let files = || std::fs::read_dir(folder.path().join("spirv")).unwrap().map(|f| f.unwrap().path()).collect::<Vec<_>>();
+        assert_eq!(files().len(), 1);
+        assert_eq!(compile(&one, &b("3")), first);
+        assert_eq!(files().len(), 1, "the same source is found again");
+        assert_ne!(compile(&two, &b("3")), first);
+        assert_ne!(compile(&one, &b("4")), first);
+        assert_eq!(files().len(), 3);
+        for file in files() {
+            let mut bytes = std::fs::read(&file).unwrap();
+            let last = bytes.len() - 1;
+            bytes[last] ^= 1;
+            std::fs::write(&file, bytes).unwrap();
+        }
+        assert_eq!(compile(&one, &b("3")), first, "a damaged entry is not used");
+    }
+
+    #[test]
+    fn missing_include_names_its_chain() {
+        let include = |name: &str| (name == "a.glsl").then(|| "#include \"gone.glsl\"\n".to_owned());
+        let error = Shader::compile(&source(&include, &[]), None).unwrap_err().to_string();
+        assert!(error.contains("test.comp > a.glsl") && error.contains("gone.glsl"), "{error}");
+    }
+
+    #[test]
+    fn compile_errors_carry_file_and_line() {
+        let include = |_: &str| Some("const float A = nonsense;\n".to_owned());
+        let error = Shader::compile(&source(&include, &[("B".into(), "1".into())]), None).unwrap_err().to_string();
+        assert!(error.contains("a.glsl:1") && error.contains("nonsense"), "{error}");
+    }
+}

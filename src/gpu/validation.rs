@@ -1,0 +1,111 @@
+//! The validation layer: which checks are on, and what it said.
+
+use crate::error::{Error, Result};
+use ash::vk;
+use std::ffi::{CStr, c_void};
+use std::sync::Mutex;
+
+/// Name of the Khronos layer, as the loader lists it.
+pub const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// Messages that are known and harmless; each with the reason it stands here. Matched against the message id name.
+///
+/// Empty: at present nothing on the drivers tried needs an exception.
+const ACCEPTED: &[(&str, &str)] = &[];
+
+/// How much of the validation layer is switched on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Validation {
+    /// The layer is not loaded.
+    #[default]
+    Off,
+    /// Usage checks of every call.
+    Core,
+    /// Usage checks and synchronisation hazards.
+    Sync,
+    /// Usage checks and GPU-assisted checks of shader accesses.
+    Gpu,
+}
+
+impl std::str::FromStr for Validation {
+    type Err = String;
+    fn from_str(word: &str) -> std::result::Result<Self, String> {
+        match word {
+            "off" => Ok(Validation::Off),
+            "core" => Ok(Validation::Core),
+            "sync" => Ok(Validation::Sync),
+            "gpu" => Ok(Validation::Gpu),
+            _ => Err(format!("unknown validation mode \"{word}\" (off, core, sync or gpu)")),
+        }
+    }
+}
+
+impl Validation {
+    /// Features of `VK_EXT_validation_features` that the mode adds to the layer's usage checks.
+    pub(super) fn features(self) -> &'static [vk::ValidationFeatureEnableEXT] {
+        match self {
+            Validation::Off | Validation::Core => &[],
+            Validation::Sync => &[vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION],
+            Validation::Gpu => &[
+                vk::ValidationFeatureEnableEXT::GPU_ASSISTED,
+                vk::ValidationFeatureEnableEXT::GPU_ASSISTED_RESERVE_BINDING_SLOT,
+            ],
+        }
+    }
+}
+
+/// What the layer reported so far, filled by [`on_message`]; lives as long as the instance.
+#[derive(Default)]
+pub struct Messages(Mutex<Vec<String>>);
+
+impl Messages {
+    /// Everything reported since the last call, oldest first, without the accepted messages.
+    pub fn take(&self) -> Vec<String> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
+    }
+
+    fn push(&self, text: String) {
+        self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push(text);
+    }
+
+    /// An error that quotes every message, if there is any.
+    pub fn into_result(messages: Vec<String>) -> Result<()> {
+        if messages.is_empty() {
+            return Ok(());
+        }
+        Err(Error::Failed(format!("the validation layer reported {}: {}", messages.len(), messages.join(" | "))))
+    }
+}
+
+/// The debug messenger's callback: warnings and errors go to the log and into [`Messages`].
+///
+/// # Safety
+/// Called by the loader with valid pointers; `user` is the `Messages` that the messenger was created with, which the
+/// instance's owner keeps alive until after the messenger is destroyed.
+pub(super) unsafe extern "system" fn on_message(
+    severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kinds: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    user: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: see the function's contract.
+    let (data, messages) = unsafe { (&*data, &*user.cast::<Messages>()) };
+    let text = |pointer: *const std::ffi::c_char| {
+        if pointer.is_null() {
+            return String::new();
+        }
+        // SAFETY: a non-null string of the callback data is NUL-terminated and outlives the call.
+        unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
+    };
+    let (id, body) = (text(data.p_message_id_name), text(data.p_message));
+    if ACCEPTED.iter().any(|(accepted, _)| *accepted == id) || id == "Loader Message" {
+        return vk::FALSE;
+    }
+    if severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR) {
+        log::error!("validation: {id}: {body}");
+    } else {
+        log::warn!("validation: {id}: {body}");
+    }
+    messages.push(format!("{id}: {body}"));
+    vk::FALSE
+}

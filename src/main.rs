@@ -1,1 +1,4 @@
-fn main() { let c = shaderc::Compiler::new().unwrap(); let _ = c; }
+fn main() {
+    let c = shaderc::Compiler::new().unwrap();
+    let _ = c;
+}

@@ -1,0 +1,47 @@
+//! Spherical harmonics in f64: the maths that bakes, shaders and references rest on. No Vulkan, no files.
+//!
+//! Conventions, tested in `tests/sh_*.rs` and `tests/cube.rs`:
+//!
+//! - real orthonormal basis with the Condon-Shortley phase (reference 1): Y1,-1 = -.488603 y, Y1,0 = .488603 z,
+//!   Y1,1 = -.488603 x; coefficient l (l + 1) + m; n bands are n^2 coefficients, 1 to [`MAX_BANDS`];
+//! - directions are unit vectors of a right-handed space, taken as they stand: no axes are swapped;
+//! - a function is blocked part, radiance or transfer; its unit is its coefficients' unit;
+//! - cube faces +X -X +Y -Y +Z -Z with Vulkan's s and t ([`cube`]).
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`basis`] | evaluation of the basis, and its GLSL |
+//! | [`quadrature`] | exact rules on the sphere |
+//! | [`cube`] | faces, texels, solid angles |
+//! | [`project`] | texels to coefficients |
+//! | [`product`] | the triple-product tensor, products, growth certificates |
+//! | [`product_program`] | the product as straight-line code, and its GLSL |
+//! | [`rotation`] | block-diagonal rotation, and its GLSL |
+//! | [`lobe`] | closed forms: caps, spheres, the clamped cosine |
+//! | [`program`] | straight-line programs: run by tests, printed for shaders |
+//!
+//! # References
+//!
+//! 1. P.-P. Sloan, *Stupid Spherical Harmonics (SH) Tricks*, GDC 2008: basis, phase, zonal rotation, triple products.
+//! 2. P.-P. Sloan, *Efficient Spherical Harmonic Evaluation*, JCGT 2 (2), 2013: polynomials in x, y, z.
+//! 3. J. Snyder, *Code Generation and Factoring for Fast Evaluation of Low-order Spherical Harmonic Products and Squares*,
+//!    MSR-TR-2006-53, 2006: the product's sparsity and what factoring saves.
+//! 4. R. Ramamoorthi, P. Hanrahan, *An Efficient Representation for Irradiance Environment Maps*, SIGGRAPH 2001: the
+//!    clamped cosine.
+//! 5. A. D. McLaren, *Optimal Numerical Integration on a Sphere*, Mathematics of Computation 17, 1963: the 32-point rule.
+
+pub mod basis;
+pub mod cube;
+pub mod lobe;
+pub mod product;
+pub mod product_program;
+pub mod program;
+pub mod project;
+pub mod quadrature;
+pub mod rotation;
+
+pub use basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate, glsl_basis};
+pub use product::Tensor;
+pub use product_program::{glsl_product, product_cost};
+pub use project::project;
+pub use rotation::{Rotation, glsl_rotate};

@@ -20,8 +20,9 @@
 //! | numbers | tables in f64, shaders in f32, field storage f16 or f32 |
 
 pub mod error;
+pub mod field;
+#[allow(unsafe_code)]
+pub mod gpu;
 pub mod sh;
 
 pub use error::{Error, Result};
-#[allow(unsafe_code)]
-pub mod gpu;

@@ -3,12 +3,12 @@
 //! A [`Commands`] borrows every resource that is recorded into it; `submit` waits for the device, so nothing that the
 //! device still uses can be dropped.
 
+use super::Checked;
 use super::access::{Access, Tracker};
 use super::device::Device;
 use super::memory::{Buffer, Image, TexelView, whole};
 use super::pipeline::{ComputePipeline, GraphicsPipeline, Layout, descriptor_type};
 use super::reflect::BindingKind;
-use super::Checked;
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -98,22 +98,19 @@ impl<'r> Commands<'r> {
         let pool = vk::CommandPoolCreateInfo::default()
             .queue_family_index(device.queue_family)
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
-        let queries = vk::QueryPoolCreateInfo::default()
-            .query_type(vk::QueryType::TIMESTAMP)
-            .query_count(2 * MAX_PASSES);
+        let queries =
+            vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_PASSES);
         // SAFETY (whole block): every handle is stored in `commands` as soon as it exists and destroyed in its `Drop`.
         unsafe {
             commands.pool = handle.create_command_pool(&pool, None).checked("vkCreateCommandPool", name)?;
-            commands.fence = handle
-                .create_fence(&vk::FenceCreateInfo::default(), None)
-                .checked("vkCreateFence", name)?;
+            commands.fence =
+                handle.create_fence(&vk::FenceCreateInfo::default(), None).checked("vkCreateFence", name)?;
             commands.queries = handle.create_query_pool(&queries, None).checked("vkCreateQueryPool", name)?;
             let allocate = vk::CommandBufferAllocateInfo::default()
                 .command_pool(commands.pool)
                 .level(vk::CommandBufferLevel::PRIMARY)
                 .command_buffer_count(1);
-            commands.buffer =
-                handle.allocate_command_buffers(&allocate).checked("vkAllocateCommandBuffers", name)?[0];
+            commands.buffer = handle.allocate_command_buffers(&allocate).checked("vkAllocateCommandBuffers", name)?[0];
             let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             handle.begin_command_buffer(commands.buffer, &begin).checked("vkBeginCommandBuffer", name)?;
             handle.cmd_reset_query_pool(commands.buffer, commands.queries, 0, 2 * MAX_PASSES);
@@ -282,15 +279,15 @@ impl<'r> Commands<'r> {
         let pass = self.pass_name();
         for binding in &layout.bindings {
             let resource = resources.get(binding.index as usize).unwrap_or(&Bind::None);
-            let complain = |what: &str| -> ! {
-                panic!("pass {name}, binding {} ({}): {what}", binding.index, binding.name)
-            };
+            let complain =
+                |what: &str| -> ! { panic!("pass {name}, binding {} ({}): {what}", binding.index, binding.name) };
             let mut write = vk::WriteDescriptorSet::default()
                 .dst_set(set)
                 .dst_binding(binding.index)
                 .descriptor_type(descriptor_type(binding.kind))
                 .descriptor_count(1);
-            let (mut buffers, mut views, mut images) = ([Default::default()], [Default::default()], [Default::default()]);
+            let (mut buffers, mut views, mut images) =
+                ([Default::default()], [Default::default()], [Default::default()]);
             match (binding.kind, resource) {
                 (BindingKind::Storage | BindingKind::Uniform, Bind::Buffer(_) | Bind::Range(..)) => {
                     let (buffer, range) = match resource {
@@ -323,8 +320,7 @@ impl<'r> Commands<'r> {
                         _ => Access::ComputeRead,
                     };
                     self.tracker.use_range(buffer.id, &buffer.name, range.clone(), access, &pass);
-                    buffers =
-                        [vk::DescriptorBufferInfo { buffer: buffer.raw(), offset: range.start, range: size }];
+                    buffers = [vk::DescriptorBufferInfo { buffer: buffer.raw(), offset: range.start, range: size }];
                     write = write.buffer_info(&buffers);
                 }
                 (BindingKind::Texel, Bind::Texel(view)) => {
@@ -378,8 +374,8 @@ impl<'r> Commands<'r> {
         let layouts = [layout.set];
         let allocate = vk::DescriptorSetAllocateInfo::default().descriptor_pool(*pool).set_layouts(&layouts);
         // SAFETY: the pool has room (counted); freed with it.
-        let sets = unsafe { handle.allocate_descriptor_sets(&allocate) }
-            .checked("vkAllocateDescriptorSets", &self.name)?;
+        let sets =
+            unsafe { handle.allocate_descriptor_sets(&allocate) }.checked("vkAllocateDescriptorSets", &self.name)?;
         self.device.name(sets[0], &self.name);
         Ok(sets[0])
     }
@@ -463,9 +459,7 @@ impl<'r> Commands<'r> {
                 .image_layout(Access::DepthWrite.layout())
                 .load_op(vk::AttachmentLoadOp::CLEAR)
                 .store_op(vk::AttachmentStoreOp::DONT_CARE)
-                .clear_value(vk::ClearValue {
-                    depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 },
-                })
+                .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } })
         });
         let colors = [color];
         let extent = vk::Extent2D { width: shape.width, height: shape.height };

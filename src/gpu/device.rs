@@ -42,7 +42,10 @@ impl Instance {
             .checked("vkEnumerateInstanceVersion", "instance")?
             .unwrap_or(vk::API_VERSION_1_0);
         if version < vk::API_VERSION_1_3 {
-            return Err(Error::Unsupported(format!("the Vulkan loader speaks {}, 1.3 is needed", version_text(version))));
+            return Err(Error::Unsupported(format!(
+                "the Vulkan loader speaks {}, 1.3 is needed",
+                version_text(version)
+            )));
         }
         // SAFETY: as above.
         let layers = unsafe { entry.enumerate_instance_layer_properties() }
@@ -56,8 +59,7 @@ impl Instance {
         // SAFETY: as above.
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
             .checked("vkEnumerateInstanceExtensionProperties", "instance")?;
-        let has_debug_utils =
-            extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
+        let has_debug_utils = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
 
         let application = vk::ApplicationInfo::default()
             .application_name(c"shadow-fields")
@@ -184,8 +186,8 @@ impl Device {
             .maintenance4(true);
         let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut core_1_3);
         // SAFETY: the features were checked in `physical_devices`; destroyed in `Drop`, before the instance.
-        let handle = unsafe { instance.handle.create_device(physical, &create, None) }
-            .checked("vkCreateDevice", &info.name)?;
+        let handle =
+            unsafe { instance.handle.create_device(physical, &create, None) }.checked("vkCreateDevice", &info.name)?;
         // SAFETY: family and index were given at creation.
         let queue = unsafe { handle.get_device_queue(queue_family, 0) };
         let names = instance.has_debug_utils.then(|| ash::ext::debug_utils::Device::new(&instance.handle, &handle));
@@ -226,8 +228,7 @@ impl Device {
     /// Whether optimal-tiling images of `format` support `features`.
     pub fn supports(&self, format: vk::Format, features: vk::FormatFeatureFlags) -> bool {
         // SAFETY: a query on a live handle.
-        let properties =
-            unsafe { self.instance.handle.get_physical_device_format_properties(self.physical, format) };
+        let properties = unsafe { self.instance.handle.get_physical_device_format_properties(self.physical, format) };
         properties.optimal_tiling_features.contains(features)
     }
 

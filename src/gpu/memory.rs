@@ -66,18 +66,12 @@ impl Memory {
                 needs.size, heap.size
             )));
         }
-        let allocate =
-            vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(index as u32);
+        let allocate = vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(index as u32);
         // SAFETY: size and type come from the device; freed in `Drop`.
-        let handle =
-            unsafe { device.handle.allocate_memory(&allocate, None) }.checked("vkAllocateMemory", name)?;
+        let handle = unsafe { device.handle.allocate_memory(&allocate, None) }.checked("vkAllocateMemory", name)?;
         device.name(handle, name);
         let coherent = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-        Ok(Memory {
-            device: device.clone(),
-            handle,
-            host_coherent: types[index].property_flags.contains(coherent),
-        })
+        Ok(Memory { device: device.clone(), handle, host_coherent: types[index].property_flags.contains(coherent) })
     }
 }
 
@@ -268,8 +262,8 @@ impl<'b> TexelView<'b> {
         let range = buffer.size_bytes / Self::texel_bytes(format) * Self::texel_bytes(format);
         let create = vk::BufferViewCreateInfo::default().buffer(buffer.raw()).format(format).range(range);
         // SAFETY: the view borrows the buffer, so it goes first; destroyed in `Drop`.
-        let handle = unsafe { device.handle.create_buffer_view(&create, None) }
-            .checked("vkCreateBufferView", &buffer.name)?;
+        let handle =
+            unsafe { device.handle.create_buffer_view(&create, None) }.checked("vkCreateBufferView", &buffer.name)?;
         device.name(handle, &buffer.name);
         Ok(TexelView { handle, buffer })
     }
@@ -378,6 +372,13 @@ impl Image {
 
 /// The one mip level and layer of an image of `format`.
 pub(super) fn whole(format: vk::Format) -> vk::ImageSubresourceRange {
-    let aspect = if format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
-    vk::ImageSubresourceRange { aspect_mask: aspect, base_mip_level: 0, level_count: 1, base_array_layer: 0, layer_count: 1 }
+    let aspect =
+        if format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
+    vk::ImageSubresourceRange {
+        aspect_mask: aspect,
+        base_mip_level: 0,
+        level_count: 1,
+        base_array_layer: 0,
+        layer_count: 1,
+    }
 }

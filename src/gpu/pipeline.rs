@@ -60,14 +60,13 @@ impl Layout {
             )));
         }
         let sets = [set];
-        let ranges =
-            [vk::PushConstantRange { stage_flags: layout.push_stages, offset: 0, size: layout.push_bytes }];
+        let ranges = [vk::PushConstantRange { stage_flags: layout.push_stages, offset: 0, size: layout.push_bytes }];
         let create = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(&sets)
             .push_constant_ranges(if layout.push_bytes > 0 { &ranges } else { &[] });
         // SAFETY: destroyed in `Drop`.
-        layout.pipeline = unsafe { device.handle.create_pipeline_layout(&create, None) }
-            .checked("vkCreatePipelineLayout", name)?;
+        layout.pipeline =
+            unsafe { device.handle.create_pipeline_layout(&create, None) }.checked("vkCreatePipelineLayout", name)?;
         device.name(set, name);
         device.name(layout.pipeline, name);
         Ok(layout)
@@ -228,13 +227,10 @@ impl GraphicsPipeline {
     ) -> Result<Self> {
         let layout = Layout::new(device, name, &[vertex, fragment])?;
         let modules = [Module::new(device, vertex)?, Module::new(device, fragment)?];
-        let stages = [
-            (vk::ShaderStageFlags::VERTEX, modules[0].1),
-            (vk::ShaderStageFlags::FRAGMENT, modules[1].1),
-        ]
-        .map(|(stage, module)| {
-            vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main")
-        });
+        let stages = [(vk::ShaderStageFlags::VERTEX, modules[0].1), (vk::ShaderStageFlags::FRAGMENT, modules[1].1)]
+            .map(|(stage, module)| {
+                vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main")
+            });
         let inputs = vertex.reflection.inputs.clone();
         let bindings: Vec<_> = inputs
             .iter()

@@ -124,7 +124,11 @@ fn key(source: &Source<'_>, includes: &BTreeMap<String, String>) -> String {
         hasher.update(&(text.len() as u64).to_le_bytes());
         hasher.update(text.as_bytes());
     };
-    part(&format!("{:?} {:?} vulkan1.3 performance debug", COMPILER.get_or_init(shaderc::get_spirv_version), source.stage));
+    part(&format!(
+        "{:?} {:?} vulkan1.3 performance debug",
+        COMPILER.get_or_init(shaderc::get_spirv_version),
+        source.stage
+    ));
     part(env!("CARGO_PKG_VERSION"));
     part(&source.text);
     for (name, value) in source.defines {
@@ -141,8 +145,7 @@ fn key(source: &Source<'_>, includes: &BTreeMap<String, String>) -> String {
 fn compile(source: &Source<'_>, includes: &BTreeMap<String, String>) -> Result<Vec<u32>> {
     let failed = |what: String| Error::Failed(format!("{}: {what}", source.name));
     let compiler = shaderc::Compiler::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
-    let mut options =
-        shaderc::CompileOptions::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
+    let mut options = shaderc::CompileOptions::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
     options.set_target_spirv(shaderc::SpirvVersion::V1_6);
     options.set_optimization_level(shaderc::OptimizationLevel::Performance);
@@ -153,7 +156,8 @@ fn compile(source: &Source<'_>, includes: &BTreeMap<String, String>) -> Result<V
         options.add_macro_definition(name, Some(value));
     }
     options.set_include_callback(|name, _, from, _| {
-        let content = includes.get(name).cloned().ok_or_else(|| format!("{from}: there is no \"{name}\" to include"))?;
+        let content =
+            includes.get(name).cloned().ok_or_else(|| format!("{from}: there is no \"{name}\" to include"))?;
         Ok(shaderc::ResolvedInclude { resolved_name: name.to_owned(), content })
     });
     let artifact = compiler
@@ -208,7 +212,8 @@ mod tests {
             Shader::compile(&source(include, defines), Some(folder.path())).unwrap().spirv
         };
         let first = compile(&one, &b("3"));
-        let files = || std::fs::read_dir(folder.path().join("spirv")).unwrap().map(|f| f.unwrap().path()).collect::<Vec<_>>();
+        let files =
+            || std::fs::read_dir(folder.path().join("spirv")).unwrap().map(|f| f.unwrap().path()).collect::<Vec<_>>();
         assert_eq!(files().len(), 1);
         assert_eq!(compile(&one, &b("3")), first);
         assert_eq!(files().len(), 1, "the same source is found again");

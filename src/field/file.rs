@@ -1,0 +1,119 @@
+//! Files that cannot be mistaken: a prologue with magic, version and lengths, a header in JSON, a payload, and one hash over
+//! all of it. Little-endian; written to a temporary file and renamed.
+//!
+//! ```text
+//! 0   8 bytes  magic: what kind of file
+//! 8   u32      version
+//! 12  u32      header length in bytes
+//! 16  u64      payload length in bytes
+//! 24  32 bytes BLAKE3 over bytes 0..24, header and payload
+//! 56  header, then payload, then the end of the file
+//! ```
+
+use super::{Header, ShadowField};
+use crate::error::{Error, Result};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// First bytes of a field file.
+pub const FIELD_MAGIC: [u8; 8] = *b"SHFIELD\n";
+/// First bytes of a cached transfer file.
+pub const TRANSFER_MAGIC: [u8; 8] = *b"SHTRANS\n";
+/// Version that this program writes and reads. Goes up whenever the meaning of header or payload changes.
+pub const VERSION: u32 = 1;
+/// Longest header that is read.
+const HEADER_LIMIT: u64 = 64 << 10;
+/// Largest payload that is read: 4 GiB.
+const PAYLOAD_LIMIT: u64 = 4 << 30;
+const PROLOGUE: usize = 56;
+
+fn seal(prologue: &[u8], header: &[u8], payload: &[u8]) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(prologue).update(header).update(payload);
+    *hasher.finalize().as_bytes()
+}
+
+/// Writes header and payload to `path`.
+///
+/// # Errors
+/// `Input` when the file cannot be written; nothing is left half-written.
+pub fn write<H: Serialize>(path: &Path, magic: [u8; 8], header: &H, payload: &[u8]) -> Result<()> {
+    let header = serde_json::to_vec(header).expect("headers are plain data");
+    let mut bytes = magic.to_vec();
+    bytes.extend(VERSION.to_le_bytes());
+    bytes.extend((header.len() as u32).to_le_bytes());
+    bytes.extend((payload.len() as u64).to_le_bytes());
+    let hash = seal(&bytes, &header, payload);
+    bytes.extend(hash);
+    bytes.extend(&header);
+    bytes.extend(payload);
+    crate::gpu::shader::write_atomically(path, &bytes)
+        .map_err(|error| Error::input(path, format!("cannot be written: {error}")))
+}
+
+/// Reads what [`write`] wrote. Lengths are checked against the file's size before anything is allocated for them.
+///
+/// # Errors
+/// `Input` when the file is missing, of another kind or version, cut, damaged, or its header is malformed.
+pub fn read<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
+    let bad = |what: String| Error::input(path, what);
+    let mut file = File::open(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
+    let size = file.metadata().map_err(|error| bad(format!("cannot be read: {error}")))?.len();
+    let mut prologue = [0; PROLOGUE];
+    file.read_exact(&mut prologue).map_err(|_| bad(format!("{size} bytes are too short for a field file")))?;
+    if prologue[..8] != magic {
+        return Err(bad("not a field file of this kind (magic bytes differ)".into()));
+    }
+    let word = |at: usize| u32::from_le_bytes(prologue[at..at + 4].try_into().expect("four bytes"));
+    if word(8) != VERSION {
+        return Err(bad(format!("version {}, this program reads version {VERSION}", word(8))));
+    }
+    let header_len = u64::from(word(12));
+    let payload_len = u64::from_le_bytes(prologue[16..24].try_into().expect("eight bytes"));
+    if header_len > HEADER_LIMIT || payload_len > PAYLOAD_LIMIT {
+        return Err(bad(format!("claims a header of {header_len} and a payload of {payload_len} bytes")));
+    }
+    if PROLOGUE as u64 + header_len + payload_len != size {
+        return Err(bad(format!(
+            "claims {} bytes but has {size}: cut short or damaged",
+            PROLOGUE as u64 + header_len + payload_len
+        )));
+    }
+    let mut header = vec![0; header_len as usize];
+    let mut payload = vec![0; payload_len as usize];
+    file.read_exact(&mut header)
+        .and_then(|()| file.read_exact(&mut payload))
+        .map_err(|error| bad(format!("cannot be read: {error}")))?;
+    if seal(&prologue[..24], &header, &payload) != prologue[24..] {
+        return Err(bad("damaged: the hash over header and payload does not match".into()));
+    }
+    let header = serde_json::from_slice(&header).map_err(|error| bad(format!("malformed header: {error}")))?;
+    Ok((header, payload))
+}
+
+impl ShadowField {
+    /// Writes the field to an `.sf` file.
+    ///
+    /// # Errors
+    /// As [`write`].
+    pub fn write(&self, path: &Path) -> Result<()> {
+        write(path, FIELD_MAGIC, &self.header, &self.payload)
+    }
+
+    /// Reads an `.sf` file.
+    ///
+    /// # Errors
+    /// As [`read`]; also when the header's numbers are out of range or do not fit the payload.
+    pub fn read(path: &Path) -> Result<Self> {
+        let (header, payload): (Header, _) = read(path, FIELD_MAGIC)?;
+        header.validate().map_err(|error| Error::input(path, error))?;
+        if header.payload_bytes() != payload.len() as u64 {
+            let (claimed, found) = (header.payload_bytes(), payload.len());
+            return Err(Error::input(path, format!("the header claims {claimed} bytes of samples, {found} are there")));
+        }
+        Ok(ShadowField { header, payload })
+    }
+}

@@ -1,0 +1,120 @@
+//! A baked field: where it is sampled ([`lattice`]), what is stored, and its file ([`file`]).
+
+pub mod file;
+pub mod lattice;
+pub mod quantity;
+
+pub use lattice::{Lattice, Lookup};
+pub use quantity::{Kind, Storage};
+
+use crate::error::{Error, Result};
+use crate::sh::basis::coefficient_count;
+use glam::DVec3;
+use half::f16;
+use serde::{Deserialize, Serialize};
+
+/// Everything about a field but its coefficients.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// What the field holds.
+    pub kind: Kind,
+    /// SH bands; bands^2 coefficients a channel.
+    pub bands: usize,
+    /// Number format of the coefficients.
+    pub storage: Storage,
+    /// Sample points.
+    pub lattice: Lattice,
+    /// Edge of the captured cube faces in texels.
+    pub face_px: u32,
+    /// Samples that lay inside the solid and were filled from their neighbours.
+    pub filled_samples: u32,
+    /// Centre of the bounding sphere in the mesh's own frame, metres.
+    pub centre_m: [f32; 3],
+    /// Radius of the bounding sphere, metres.
+    pub radius_m: f32,
+    /// Radiance fields: what stored coefficients are multiplied by, so that f16 holds any brightness. Occlusion fields: 1.
+    pub radiance_scale: f32,
+    /// Name of the mesh, for people.
+    pub mesh: String,
+    /// Content hash of the mesh, hexadecimal.
+    pub mesh_hash: String,
+}
+
+impl Header {
+    /// Coefficients of one channel as stored: rounded up to a multiple of four, so that shaders read whole quads.
+    pub fn channel_stride(&self) -> usize {
+        quantity::channel_stride(self.bands)
+    }
+
+    /// Coefficients of one sample as stored.
+    pub fn sample_stride(&self) -> usize {
+        self.kind.channels() * self.channel_stride()
+    }
+
+    /// Bytes of the payload.
+    pub fn payload_bytes(&self) -> u64 {
+        u64::from(self.lattice.stored_count()) * (self.sample_stride() * self.storage.bytes()) as u64
+    }
+
+    /// Checks every number against its range.
+    ///
+    /// # Errors
+    /// `Input` naming the number.
+    pub fn validate(&self) -> Result<()> {
+        self.lattice.validate()?;
+        let bad = |what: String| Err(Error::Input(what));
+        if !(2..=7).contains(&self.bands) {
+            return bad(format!("{} bands, a field has 2 to 7", self.bands));
+        }
+        if !(4..=1024).contains(&self.face_px) {
+            return bad(format!("faces of {} px, a field has 4 to 1024", self.face_px));
+        }
+        let finite = self.centre_m.iter().all(|c| c.is_finite()) && self.radiance_scale.is_finite();
+        if !finite || !(self.radius_m > 0.0 && self.radius_m.is_finite()) || self.radiance_scale < 0.0 {
+            return bad("centre, radius or radiance scale is not a usable number".into());
+        }
+        Ok(())
+    }
+}
+
+/// A field in host memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShadowField {
+    /// Parameters.
+    pub header: Header,
+    /// Stored coefficients, little-endian: samples in stored order, channels within a sample, coefficients within a channel.
+    pub payload: Vec<u8>,
+}
+
+impl ShadowField {
+    /// Stored coefficient by stored sample, channel and coefficient, as a number of the field's unit (blocked part or
+    /// radiance, still multiplied by [`Lattice::scale`]).
+    pub fn stored(&self, sample: u32, channel: usize, coefficient: usize) -> f64 {
+        let header = &self.header;
+        let at = sample as usize * header.sample_stride() + channel * header.channel_stride() + coefficient;
+        let raw = match header.storage {
+            Storage::F32 => {
+                f64::from(f32::from_le_bytes(self.payload[4 * at..4 * at + 4].try_into().expect("four bytes")))
+            }
+            Storage::F16 => {
+                f16::from_le_bytes(self.payload[2 * at..2 * at + 2].try_into().expect("two bytes")).to_f64()
+            }
+        };
+        raw * f64::from(header.radiance_scale)
+    }
+
+    /// The field at `position` (object's frame, in r from the sphere's centre): coefficients of one channel. The twin of
+    /// `glsl/field.glsl`.
+    pub fn lookup(&self, position: DVec3, lookup: Lookup, channel: usize, out: &mut [f64]) {
+        let lattice = &self.header.lattice;
+        let corners = lattice.corners(position, lookup);
+        let unscale = lattice.unscale(position.length());
+        for (coefficient, value) in out.iter_mut().enumerate().take(coefficient_count(self.header.bands)) {
+            *value = (0..8)
+                .filter(|&k| corners.weight[k] != 0.0)
+                .map(|k| corners.weight[k] * self.stored(corners.index[k], channel, coefficient))
+                .sum::<f64>()
+                * unscale;
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! What a field holds and in which number format.
+
+use serde::{Deserialize, Serialize};
+
+/// What a field's coefficients mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Object occlusion field: the blocked part b = P[1 - V], one channel.
+    Occlusion,
+    /// Source radiance field: P[L] in red, green and blue.
+    Radiance,
+}
+
+impl Kind {
+    /// Channels of a sample.
+    pub fn channels(self) -> usize {
+        match self {
+            Kind::Occlusion => 1,
+            Kind::Radiance => 3,
+        }
+    }
+}
+
+/// Number format of stored coefficients.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Storage {
+    /// 32-bit floats.
+    F32,
+    /// 16-bit floats: half the bytes; error under 1e-3 of the blocked part.
+    #[default]
+    F16,
+}
+
+impl Storage {
+    /// Bytes of one coefficient.
+    pub fn bytes(self) -> usize {
+        match self {
+            Storage::F32 => 4,
+            Storage::F16 => 2,
+        }
+    }
+}
+
+impl std::str::FromStr for Storage {
+    type Err = String;
+    fn from_str(word: &str) -> Result<Self, String> {
+        match word {
+            "f32" => Ok(Storage::F32),
+            "f16" => Ok(Storage::F16),
+            _ => Err(format!("unknown storage \"{word}\" (f16 or f32)")),
+        }
+    }
+}
+
+/// Coefficients of one channel as stored: bands^2 rounded up to a multiple of four.
+pub fn channel_stride(bands: usize) -> usize {
+    (bands * bands).next_multiple_of(4)
+}

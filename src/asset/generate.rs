@@ -1,0 +1,295 @@
+//! Meshes made from numbers: the shapes of the built-in scenes and of the tests, with analytic normals.
+//!
+//! The functions assert their ranges. [`Generator`] is the same as data for scene files, checked with a message.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::mesh::{COORDINATE_LIMIT_M, Mesh, TRIANGLE_LIMIT};
+use super::teapot;
+use crate::error::{Error, Result};
+
+/// Most halvings of the edges of an icosahedron: 1.3 million triangles.
+pub const SPHERE_SUBDIVISION_LIMIT: u32 = 8;
+/// Emission pattern of the x < 0 half of [`torus_two_colour`], linear RGB.
+pub const COOL: Vec3 = Vec3::new(0.08, 0.35, 1.0);
+/// Emission pattern of the x > 0 half of [`torus_two_colour`], linear RGB.
+pub const WARM: Vec3 = Vec3::new(1.0, 0.38, 0.08);
+/// Half the width of the blend between the two, as a share of the major radius: narrow, yet several segments wide.
+const BLEND: f64 = 0.15;
+
+/// A generated mesh as a scene file names it: a table with one key, for example `sphere = { radius_m = 0.5, subdivisions = 3 }`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Generator {
+    /// See [`plane`].
+    Plane {
+        /// Edge length in metres.
+        size_m: f32,
+        /// Squares along an edge.
+        cells: u32,
+    },
+    /// See [`sphere`].
+    Sphere {
+        /// Radius in metres.
+        radius_m: f32,
+        /// Times every triangle of an icosahedron is cut in four.
+        subdivisions: u32,
+    },
+    /// See [`torus`].
+    Torus {
+        /// Radius in metres of the circle in the middle of the ring.
+        major_m: f32,
+        /// Radius in metres of the ring's cross-section.
+        minor_m: f32,
+        /// Pieces around the axis.
+        segments: u32,
+        /// Pieces around the cross-section.
+        sides: u32,
+    },
+    /// See [`torus_two_colour`]; fields as of `torus`.
+    TorusTwoColour {
+        /// Radius in metres of the circle in the middle of the ring.
+        major_m: f32,
+        /// Radius in metres of the ring's cross-section.
+        minor_m: f32,
+        /// Pieces around the axis.
+        segments: u32,
+        /// Pieces around the cross-section.
+        sides: u32,
+    },
+    /// See [`cuboid`].
+    Cuboid {
+        /// Edge lengths in metres along x, y and z.
+        size_m: Vec3,
+        /// Squares along every edge.
+        cells: u32,
+    },
+    /// See [`teapot::teapot`].
+    Teapot {
+        /// Squares along an edge of each of the 32 patches.
+        subdivisions: u32,
+    },
+}
+
+impl Generator {
+    /// Checks the numbers and makes the mesh.
+    ///
+    /// # Errors
+    /// [`Error::Input`], one line, where a length is not positive and finite or a count is zero or makes too many triangles.
+    pub fn build(&self) -> Result<Mesh> {
+        use Generator::{Cuboid, Plane, Sphere, Teapot, Torus, TorusTwoColour};
+        let square = |n: u32| u64::from(n).pow(2);
+        let (lengths, counts, triangles) = match *self {
+            Plane { size_m, cells } => (vec![size_m], vec![cells], square(cells).saturating_mul(2)),
+            Sphere { radius_m, subdivisions } => {
+                if subdivisions > SPHERE_SUBDIVISION_LIMIT {
+                    return Err(Error::Input(format!("subdivisions are over the limit of {SPHERE_SUBDIVISION_LIMIT}")));
+                }
+                (vec![radius_m], vec![], 0)
+            }
+            Torus { major_m, minor_m, segments, sides } | TorusTwoColour { major_m, minor_m, segments, sides } => {
+                if segments < 3 || sides < 3 {
+                    return Err(Error::Input("a torus needs at least 3 segments and 3 sides".into()));
+                }
+                if minor_m > major_m {
+                    return Err(Error::Input("the minor radius of a torus is at most its major radius".into()));
+                }
+                (vec![major_m, minor_m], vec![], (u64::from(segments) * u64::from(sides)).saturating_mul(2))
+            }
+            Cuboid { size_m, cells } => (size_m.to_array().to_vec(), vec![cells], square(cells).saturating_mul(12)),
+            Teapot { subdivisions } => (vec![], vec![subdivisions], square(subdivisions).saturating_mul(64)),
+        };
+        if lengths.iter().any(|l| !(1e-7..=COORDINATE_LIMIT_M / 2.0).contains(l)) {
+            return Err(Error::Input(format!("a length is not within 1e-7 to {:e} m", COORDINATE_LIMIT_M / 2.0)));
+        }
+        if counts.contains(&0) {
+            return Err(Error::Input("a count of cells or subdivisions is zero".into()));
+        }
+        if triangles > TRIANGLE_LIMIT as u64 {
+            return Err(Error::Input(format!("{triangles} triangles are over the limit of {TRIANGLE_LIMIT}")));
+        }
+        Ok(match *self {
+            Plane { size_m, cells } => plane(size_m, cells),
+            Sphere { radius_m, subdivisions } => sphere(radius_m, subdivisions),
+            Torus { major_m, minor_m, segments, sides } => torus(major_m, minor_m, segments, sides),
+            TorusTwoColour { major_m, minor_m, segments, sides } => torus_two_colour(major_m, minor_m, segments, sides),
+            Cuboid { size_m, cells } => cuboid(size_m, cells),
+            Teapot { subdivisions } => teapot::teapot(teapot::CONTROL_TEXT, subdivisions)?,
+        })
+    }
+}
+
+/// A generated mesh holds what [`Mesh::new`] asks for once its numbers are in range.
+fn finish(
+    name: &str,
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    colors: Option<Vec<Vec3>>,
+    triangles: Vec<[u32; 3]>,
+) -> Mesh {
+    Mesh::new(name, positions, normals, colors, triangles)
+        .unwrap_or_else(|e| panic!("generator {name} made a bad mesh: {e}"))
+}
+
+/// Place `index` of 0 to `cells` on an edge of `size` centred on zero. One function, so that shared edges match bit for bit,
+/// and odd about the middle, so that opposite ends do.
+fn along(size: f32, index: u32, cells: u32) -> f32 {
+    (f64::from(size) * 0.5 * (2.0 * f64::from(index) - f64::from(cells)) / f64::from(cells)) as f32
+}
+
+/// The two triangles of a square whose corners are numbered around it.
+fn split([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
+    [[a, b, c], [a, c, d]]
+}
+
+/// A square in y = 0 around the origin with normal +y: edges of `size_m` along x and z, (cells + 1)^2 vertices.
+pub fn plane(size_m: f32, cells: u32) -> Mesh {
+    assert!(size_m > 0.0 && cells > 0, "plane: size {size_m}, cells {cells}");
+    let row = cells + 1;
+    let positions: Vec<Vec3> =
+        (0..row * row).map(|i| Vec3::new(along(size_m, i % row, cells), 0.0, along(size_m, i / row, cells))).collect();
+    let corner = |x: u32, z: u32| z * row + x;
+    let triangles = (0..cells * cells).flat_map(|i| {
+        let (x, z) = (i % cells, i / cells);
+        split([corner(x, z), corner(x, z + 1), corner(x + 1, z + 1), corner(x + 1, z)])
+    });
+    let triangles = triangles.collect();
+    finish("plane", positions, vec![Vec3::Y; (row * row) as usize], None, triangles)
+}
+
+/// A closed sphere around the origin: an icosahedron whose triangles are cut in four `subdivisions` times (at most
+/// [`SPHERE_SUBDIVISION_LIMIT`]), every vertex on the sphere. 10 * 4^s + 2 vertices, 20 * 4^s triangles.
+pub fn sphere(radius_m: f32, subdivisions: u32) -> Mesh {
+    assert!(radius_m > 0.0 && subdivisions <= SPHERE_SUBDIVISION_LIMIT, "sphere: radius {radius_m}, {subdivisions}");
+    let golden = (1.0 + 5f64.sqrt()) / 2.0;
+    // Cyclic turns of (0, +-1, +-golden); the twenty faces are the triples at edge length 2.
+    let mut points: Vec<DVec3> = [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)]
+        .iter()
+        .flat_map(|&(a, b)| [DVec3::new(0.0, a, b), DVec3::new(a, b, 0.0), DVec3::new(b, 0.0, a)])
+        .collect();
+    let near = |a: usize, b: usize| (points[a].distance_squared(points[b]) - 4.0).abs() < 1e-9;
+    let mut triangles: Vec<[u32; 3]> = Vec::new();
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                if near(a, b) && near(b, c) && near(c, a) {
+                    let outward = points[a].dot(points[b].cross(points[c])) > 0.0;
+                    triangles.push(if outward { [a, b, c] } else { [a, c, b] }.map(|i| i as u32));
+                }
+            }
+        }
+    }
+    points.iter_mut().for_each(|p| *p = p.normalize());
+    for _ in 0..subdivisions {
+        let mut middles = HashMap::new();
+        let mut middle = |a: u32, b: u32| {
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                points.push((points[a as usize] + points[b as usize]).normalize());
+                points.len() as u32 - 1
+            })
+        };
+        triangles = triangles
+            .iter()
+            .flat_map(|&[a, b, c]| {
+                let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+                [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
+            })
+            .collect();
+    }
+    let positions = points.iter().map(|p| (*p * f64::from(radius_m)).as_vec3()).collect();
+    finish("sphere", positions, points.iter().map(|p| p.as_vec3()).collect(), None, triangles)
+}
+
+/// A closed ring around the y axis: `major_m` to the middle of its cross-section, which has radius `minor_m` <= `major_m`.
+/// segments * sides vertices, all on the torus.
+pub fn torus(major_m: f32, minor_m: f32, segments: u32, sides: u32) -> Mesh {
+    ring("torus", major_m, minor_m, segments, sides, None)
+}
+
+/// [`torus`] whose emission pattern is [`WARM`] where x > 0 and [`COOL`] where x < 0, with a narrow smooth blend.
+pub fn torus_two_colour(major_m: f32, minor_m: f32, segments: u32, sides: u32) -> Mesh {
+    let color = |p: Vec3| {
+        let t = ((f64::from(p.x) / (f64::from(major_m) * BLEND) + 1.0) * 0.5).clamp(0.0, 1.0);
+        COOL.lerp(WARM, (t * t * (3.0 - 2.0 * t)) as f32)
+    };
+    ring("torus_two_colour", major_m, minor_m, segments, sides, Some(&color))
+}
+
+fn ring(
+    name: &str,
+    major_m: f32,
+    minor_m: f32,
+    segments: u32,
+    sides: u32,
+    color: Option<&dyn Fn(Vec3) -> Vec3>,
+) -> Mesh {
+    assert!(
+        minor_m > 0.0 && minor_m <= major_m && segments > 2 && sides > 2,
+        "{name}: {major_m} {minor_m} {segments} {sides}"
+    );
+    let vertex = |i: u32| {
+        let around = TAU * f64::from(i / sides) / f64::from(segments);
+        let across = TAU * f64::from(i % sides) / f64::from(sides);
+        let outward = DVec3::new(around.cos(), 0.0, -around.sin());
+        let normal = outward * across.cos() + DVec3::Y * across.sin();
+        ((outward * f64::from(major_m) + normal * f64::from(minor_m)).as_vec3(), normal.as_vec3())
+    };
+    let (positions, normals): (Vec<Vec3>, Vec<Vec3>) = (0..segments * sides).map(vertex).unzip();
+    let corner = |s: u32, k: u32| (s % segments) * sides + k % sides;
+    let triangles = (0..segments * sides)
+        .flat_map(|i| {
+            let (s, k) = (i / sides, i % sides);
+            split([corner(s, k), corner(s + 1, k), corner(s + 1, k + 1), corner(s, k + 1)])
+        })
+        .collect();
+    let colors = color.map(|c| positions.iter().map(|p| c(*p)).collect());
+    finish(name, positions, normals, colors, triangles)
+}
+
+/// A closed box around the origin with `cells` squares along every edge; normals are split at the edges, positions agree.
+pub fn cuboid(size_m: Vec3, cells: u32) -> Mesh {
+    assert!(size_m.min_element() > 0.0 && cells > 0, "cuboid: size {size_m}, cells {cells}");
+    let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    let row = cells + 1;
+    for axis in 0..3 {
+        for side in [0, cells] {
+            let base = positions.len() as u32;
+            let mut normal = Vec3::ZERO;
+            normal[axis] = if side == 0 { -1.0 } else { 1.0 };
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            for i in 0..row * row {
+                let mut p = Vec3::ZERO;
+                p[axis] = along(size_m[axis], side, cells);
+                p[u] = along(size_m[u], i % row, cells);
+                p[v] = along(size_m[v], i / row, cells);
+                positions.push(p);
+                normals.push(normal);
+            }
+            let corner = |x: u32, y: u32| base + y * row + x;
+            for i in 0..cells * cells {
+                let (x, y) = (i % cells, i / cells);
+                let square = [corner(x, y), corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)];
+                // u, v and the axis are right-handed, so the square as it stands faces the positive side.
+                triangles.extend(split(if side == 0 { [square[0], square[3], square[2], square[1]] } else { square }));
+            }
+        }
+    }
+    finish("cuboid", positions, normals, None, triangles)
+}
+
+/// The meshes of `assets/meshes`, by name: what [`super::embedded`] offers and `scripts/meshes` writes.
+pub fn library() -> Vec<Mesh> {
+    let teapot = teapot::teapot(teapot::CONTROL_TEXT, teapot::DEFAULT_SUBDIVISIONS);
+    vec![
+        plane(6.0, 32),
+        sphere(0.5, 3),
+        torus(0.5, 0.2, 48, 24),
+        torus_two_colour(0.5, 0.15, 48, 20),
+        cuboid(Vec3::ONE, 6),
+        teapot.unwrap_or_else(|e| panic!("the embedded control points are malformed: {e}")),
+    ]
+}

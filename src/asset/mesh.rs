@@ -1,0 +1,238 @@
+//! A checked triangle mesh and what is derived from it once: bounding sphere, closedness, convexity, flatness, identity.
+
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+
+use super::{enclose, obj, topology};
+use crate::error::{Error, Result};
+
+/// Most triangles a mesh may have: 48 MB of indices, and edge tables of about 200 MB while it is checked.
+pub const TRIANGLE_LIMIT: usize = 4_000_000;
+/// Largest magnitude of a coordinate in metres; with f32 positions anything beyond has no sub-metre detail left.
+pub const COORDINATE_LIMIT_M: f32 = 1e7;
+/// Smallest bounding radius in metres; below, squared lengths leave the range of f32 in the shaders.
+const RADIUS_MINIMUM_M: f32 = 1e-9;
+/// A mesh whose area is below this share of its squared radius is a point or a line up to f32 rounding.
+const RELATIVE_AREA_MINIMUM: f64 = 1e-10;
+
+/// Triangles with one unit normal per vertex; vertices are split where normals differ. Positions in metres.
+///
+/// The four arrays are public to read. What the accessors return was computed from them by [`Mesh::new`], so build a new
+/// mesh instead of altering one. Vertices stand in the order of their first use by a triangle; every vertex is used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh {
+    /// Name for messages: the generator's, or the file's stem.
+    pub name: String,
+    /// Positions in metres, all finite and within [`COORDINATE_LIMIT_M`].
+    pub positions: Vec<Vec3>,
+    /// Unit normals, one per position.
+    pub normals: Vec<Vec3>,
+    /// Linear RGB emission pattern per position, finite and not negative, if the mesh has one.
+    pub colors: Option<Vec<Vec3>>,
+    /// Indices into the arrays above, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    centre: Vec3,
+    radius_m: f32,
+    shape: topology::Shape,
+    content_hash: [u8; 32],
+}
+
+impl Mesh {
+    /// Checks and completes a mesh.
+    ///
+    /// Empty `normals` are computed from the triangles, weighted by angle; given ones are brought to unit length, and those
+    /// of zero length replaced by computed ones. Triangles with two equal corners are dropped, which leaves a closed surface
+    /// closed; needles and other triangles without area are kept, since dropping them could open it. Unused vertices go.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with one line: no triangles, more than [`TRIANGLE_LIMIT`], an index out of range, a number that is
+    /// not finite or beyond [`COORDINATE_LIMIT_M`], zero radius, zero total area.
+    pub fn new(
+        name: impl Into<String>,
+        positions: Vec<Vec3>,
+        normals: Vec<Vec3>,
+        colors: Option<Vec<Vec3>>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<Self> {
+        check_numbers(&positions, &normals, colors.as_deref(), &triangles)?;
+        let (used, triangles) = compact(&positions, &triangles);
+        if triangles.is_empty() {
+            return Err(Error::Input("no faces with three different corners".into()));
+        }
+        let pick = |from: &[Vec3]| used.iter().map(|&i| from[i as usize]).collect::<Vec<_>>();
+        let positions = pick(&positions);
+        let normals =
+            complete_normals(&positions, &triangles, &if normals.is_empty() { normals } else { pick(&normals) });
+        let colors = colors.map(|c| pick(&c));
+
+        let (centre, radius_m) = enclose::bounding_sphere(&positions);
+        if radius_m < RADIUS_MINIMUM_M {
+            return Err(Error::Input(format!("zero radius: all vertices lie within {RADIUS_MINIMUM_M:e} m")));
+        }
+        let area = area_m2(&positions, &triangles);
+        if area < RELATIVE_AREA_MINIMUM * f64::from(radius_m).powi(2) {
+            return Err(Error::Input("zero total area: all triangles are points or needles".into()));
+        }
+        let shape = topology::shape(&positions, &triangles, centre, radius_m);
+        let content_hash = hash(&positions, &normals, colors.as_deref(), &triangles);
+        Ok(Self { name: name.into(), positions, normals, colors, triangles, centre, radius_m, shape, content_hash })
+    }
+
+    /// Reads a Wavefront OBJ file; see [`obj`] for what is understood.
+    ///
+    /// # Errors
+    /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line.
+    pub fn load(path: &Path) -> Result<Self> {
+        obj::load(path)
+    }
+
+    /// Reads OBJ text from memory, for files embedded in the binary; `path` is only for messages and the name.
+    ///
+    /// # Errors
+    /// As [`Mesh::load`].
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
+        obj::parse(bytes, path)
+    }
+
+    /// Centre and radius in metres of the smallest enclosing sphere (see [`enclose::bounding_sphere`]).
+    pub fn bounding_sphere(&self) -> (Vec3, f32) {
+        (self.centre, self.radius_m)
+    }
+
+    /// Whether the surface, with equal positions welded, is a 2-manifold without boundary, wound consistently and outwards
+    /// (positive volume). Only then may back faces be culled.
+    pub fn is_closed(&self) -> bool {
+        self.shape.closed
+    }
+
+    /// Whether the mesh is closed, in one piece, without handles, and bends outwards (or not at all) at every edge.
+    pub fn is_convex(&self) -> bool {
+        self.shape.convex
+    }
+
+    /// Whether all vertices lie in one plane, within 1e-5 of the bounding radius.
+    pub fn is_flat(&self) -> bool {
+        self.shape.flat
+    }
+
+    /// Vertices - edges + triangles after welding equal positions: 2 for a sphere, 0 for a torus.
+    pub fn euler_characteristic(&self) -> i64 {
+        self.shape.euler_characteristic
+    }
+
+    /// Total area in square metres.
+    pub fn area_m2(&self) -> f64 {
+        area_m2(&self.positions, &self.triangles)
+    }
+
+    /// Signed volume in cubic metres, positive for a closed mesh wound outwards; of no meaning for an open one.
+    pub fn volume_m3(&self) -> f64 {
+        topology::volume_m3(&self.positions, &self.triangles, self.centre)
+    }
+
+    /// BLAKE3 of positions, normals, colours and triangles, not of the name: equal meshes share baked fields.
+    pub fn content_hash(&self) -> [u8; 32] {
+        self.content_hash
+    }
+}
+
+/// Refuses what the rest of the crate must never meet.
+fn check_numbers(positions: &[Vec3], normals: &[Vec3], colors: Option<&[Vec3]>, triangles: &[[u32; 3]]) -> Result<()> {
+    let fail = |message: String| Err(Error::Input(message));
+    if triangles.is_empty() {
+        return fail("no faces".into());
+    }
+    if triangles.len() > TRIANGLE_LIMIT {
+        return fail(format!("{} triangles are over the limit of {TRIANGLE_LIMIT}", triangles.len()));
+    }
+    if !normals.is_empty() && normals.len() != positions.len() {
+        return fail(format!("{} normals for {} positions", normals.len(), positions.len()));
+    }
+    if colors.is_some_and(|c| c.len() != positions.len()) {
+        return fail(format!("{} colours for {} positions", colors.map_or(0, <[_]>::len), positions.len()));
+    }
+    if let Some(bad) = triangles.iter().flatten().find(|&&i| i as usize >= positions.len()) {
+        return fail(format!("index {bad} is out of range: there are {} vertices", positions.len()));
+    }
+    if let Some(p) = positions.iter().find(|p| !p.is_finite() || p.abs().max_element() > COORDINATE_LIMIT_M) {
+        return fail(format!("position {p} is not finite or beyond {COORDINATE_LIMIT_M:e} m"));
+    }
+    if let Some(n) = normals.iter().find(|n| !n.is_finite()) {
+        return fail(format!("normal {n} is not finite"));
+    }
+    if let Some(c) = colors.into_iter().flatten().find(|c| !c.is_finite() || c.min_element() < 0.0) {
+        return fail(format!("colour {c} is negative or not finite"));
+    }
+    Ok(())
+}
+
+/// Drops triangles with two equal corners and renumbers vertices by first use: (old index of every new vertex, triangles).
+fn compact(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 3]>) {
+    let mut new_index = vec![u32::MAX; positions.len()];
+    let mut used = Vec::new();
+    let kept = triangles
+        .iter()
+        .filter(|t| {
+            let [a, b, c] = t.map(|i| positions[i as usize]);
+            a != b && b != c && c != a
+        })
+        .map(|t| {
+            t.map(|old| {
+                let new = &mut new_index[old as usize];
+                if *new == u32::MAX {
+                    *new = used.len() as u32;
+                    used.push(old);
+                }
+                *new
+            })
+        })
+        .collect();
+    (used, kept)
+}
+
+/// Unit normals: the given ones normalised; where there is none, the angle-weighted mean of the triangles around the vertex
+/// (Thuermer and Wuethrich 1998), which does not depend on how a face is cut; +y where even that vanishes.
+fn complete_normals(positions: &[Vec3], triangles: &[[u32; 3]], given: &[Vec3]) -> Vec<Vec3> {
+    let mut sums = vec![DVec3::ZERO; positions.len()];
+    if given.is_empty() || given.iter().any(|n| n.as_dvec3().try_normalize().is_none()) {
+        for t in triangles {
+            let p = t.map(|i| positions[i as usize].as_dvec3());
+            let Some(face) = (p[1] - p[0]).cross(p[2] - p[0]).try_normalize() else { continue };
+            for k in 0..3 {
+                sums[t[k] as usize] += face * (p[(k + 1) % 3] - p[k]).angle_between(p[(k + 2) % 3] - p[k]);
+            }
+        }
+    }
+    let unit = |i: usize| {
+        let file = given
+            .get(i)
+            .and_then(|n| if is_unit(*n) { Some(*n) } else { n.as_dvec3().try_normalize().map(|n| n.as_vec3()) });
+        file.or_else(|| sums[i].try_normalize().map(|n| n.as_vec3())).unwrap_or(Vec3::Y)
+    };
+    (0..positions.len()).map(unit).collect()
+}
+
+/// Whether a normal has unit length up to f32 rounding; such a one is kept bit for bit, so that files read back unchanged.
+fn is_unit(normal: Vec3) -> bool {
+    (normal.as_dvec3().length_squared() - 1.0).abs() < 5e-7
+}
+
+fn area_m2(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
+    let area = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| positions[i as usize].as_dvec3());
+        0.5 * (b - a).cross(c - a).length()
+    };
+    triangles.iter().map(area).sum()
+}
+
+fn hash(positions: &[Vec3], normals: &[Vec3], colors: Option<&[Vec3]>, triangles: &[[u32; 3]]) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    for count in [positions.len(), colors.map_or(0, <[_]>::len), triangles.len()] {
+        hasher.update(&(count as u64).to_le_bytes());
+    }
+    // Host byte order: every platform that this crate builds for is little endian.
+    hasher.update(bytemuck::cast_slice(positions)).update(bytemuck::cast_slice(normals));
+    hasher.update(bytemuck::cast_slice(colors.unwrap_or_default())).update(bytemuck::cast_slice(triangles));
+    *hasher.finalize().as_bytes()
+}

@@ -1,0 +1,13 @@
+//! What comes from outside: triangle meshes, distant light and pictures.
+//!
+//! Everything read from a file is checked here, once: the modules below may trust a [`mesh::Mesh`] to be finite, indexed
+//! within range and of positive size.
+
+pub mod enclose;
+pub mod generate;
+pub mod mesh;
+pub mod obj;
+pub mod teapot;
+pub mod topology;
+
+pub use mesh::Mesh;

@@ -1,0 +1,242 @@
+//! Wavefront OBJ: a checking reader around `tobj`, and a writer that reads back bit for bit.
+//!
+//! Understood: `v x y z [w | r g b]` (colours are linear emission), `vn`, and `f` with any number of corners, as `v`, `v/vt`,
+//! `v//vn` or `v/vt/vn`, counted from 1 or from the end (-1). Groups, objects, materials, texture coordinates, points and lines
+//! are skipped: the file is one mesh. If any corner lacks a normal, all normals are computed; vertices are then smooth where
+//! faces share an index. Faces of more than three corners become fans, so they should be convex.
+//!
+//! `tobj` accepts NaN, indices past the end (some of which it wraps around), faces without corners (a panic) and corners
+//! whose normal it invents. So every line is checked here first, which also gives the line numbers, and `tobj` is handed only
+//! the checked lines, with plain indices.
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+use glam::Vec3;
+
+use super::mesh::{COORDINATE_LIMIT_M, Mesh, TRIANGLE_LIMIT};
+use crate::error::{Error, Result};
+
+/// Largest file that is read, in bytes: 256 MiB.
+pub const FILE_LIMIT_BYTES: u64 = 256 << 20;
+
+/// Reads a file; see [`Mesh::load`].
+///
+/// # Errors
+/// [`Error::Input`]: missing, over [`FILE_LIMIT_BYTES`], or as [`parse`].
+pub fn load(path: &Path) -> Result<Mesh> {
+    let file = File::open(path).map_err(|e| Error::input(path, e))?;
+    let mut bytes = Vec::new();
+    // One byte past the limit tells an oversized file; its stated length may be wrong, as for a pipe.
+    file.take(FILE_LIMIT_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::input(path, e))?;
+    parse(&bytes, path)
+}
+
+/// Reads OBJ text; see [`Mesh::parse`].
+///
+/// # Errors
+/// [`Error::Input`]: over [`FILE_LIMIT_BYTES`], not UTF-8, a malformed line, or as [`Mesh::new`].
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh> {
+    if bytes.len() as u64 > FILE_LIMIT_BYTES {
+        return Err(Error::input(path, format!("over the limit of {} MiB for a mesh file", FILE_LIMIT_BYTES >> 20)));
+    }
+    let text = std::str::from_utf8(bytes).map_err(|e| {
+        let line = 1 + bytes[..e.valid_up_to()].iter().filter(|&&b| b == b'\n').count();
+        Error::input_at(path, line, "not UTF-8 text")
+    })?;
+    let count = |keyword| text.lines().filter(|l| l.split_whitespace().next() == Some(keyword)).count();
+    let mut scan = Scan { position_total: count("v"), normal_total: count("vn"), ..Default::default() };
+    for (index, line) in text.lines().enumerate() {
+        scan.line(line).map_err(|what| Error::input_at(path, index + 1, what))?;
+    }
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    scan.into_mesh(&name).map_err(|e| e.context(path.display()))
+}
+
+/// What has been read so far: counts to check indices against, and the lines that go on to `tobj`.
+#[derive(Default)]
+struct Scan {
+    checked: String,
+    position_total: usize,
+    normal_total: usize,
+    position_count: usize,
+    color_count: usize,
+    normal_count: usize,
+    triangle_count: usize,
+    faces: String,
+    faces_with_normals: String,
+    lacks_normals: bool,
+}
+
+impl Scan {
+    fn line(&mut self, line: &str) -> std::result::Result<(), String> {
+        let mut words = line.split('#').next().unwrap_or_default().split_whitespace();
+        match words.next() {
+            Some("v") => self.position(&numbers(words)?),
+            Some("vn") => self.normal(&numbers(words)?),
+            Some("f") => self.face(words),
+            _ => Ok(()),
+        }
+    }
+
+    fn position(&mut self, values: &[f32]) -> std::result::Result<(), String> {
+        let (xyz, rest) = values.split_at_checked(3).ok_or("a position needs three numbers")?;
+        let colored = match rest {
+            [] => false,
+            [w] if *w == 1.0 => false,
+            [w] => return Err(format!("weight {w}: only 1 is supported")),
+            [r, g, b] if r.min(*g).min(*b) >= 0.0 => true,
+            [_, _, _] => return Err("a colour is negative".into()),
+            _ => return Err(format!("a position has 3, 4 or 6 numbers, not {}", values.len())),
+        };
+        if let Some(far) = xyz.iter().find(|c| c.abs() > COORDINATE_LIMIT_M) {
+            return Err(format!("coordinate {far} is beyond the limit of {COORDINATE_LIMIT_M:e} m"));
+        }
+        if colored != (self.color_count > 0) && self.position_count > 0 {
+            return Err("some positions have colours and some have none".into());
+        }
+        self.position_count += 1;
+        self.color_count += usize::from(colored);
+        self.write("v", if colored { values } else { xyz });
+        Ok(())
+    }
+
+    fn normal(&mut self, values: &[f32]) -> std::result::Result<(), String> {
+        if values.len() != 3 {
+            return Err(format!("a normal has 3 numbers, not {}", values.len()));
+        }
+        self.normal_count += 1;
+        self.write("vn", values);
+        Ok(())
+    }
+
+    fn write(&mut self, keyword: &str, values: &[f32]) {
+        self.checked += keyword;
+        values.iter().for_each(|v| self.checked += &format!(" {v:?}"));
+        self.checked += "\n";
+    }
+
+    fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> std::result::Result<(), String> {
+        let (mut plain, mut with_normals, mut corner_count) = (String::from("f"), String::from("f"), 0);
+        for word in words {
+            let parts: Vec<&str> = word.split('/').collect();
+            if parts.len() > 3 {
+                return Err(format!("malformed corner {word:?}"));
+            }
+            let position = index(parts[0], self.position_count, self.position_total, "position")?;
+            // Writing into a string cannot fail.
+            let _ = write!(plain, " {position}");
+            match parts.get(2) {
+                Some(part) => {
+                    let normal = index(part, self.normal_count, self.normal_total, "normal")?;
+                    let _ = write!(with_normals, " {position}//{normal}");
+                }
+                None => self.lacks_normals = true,
+            }
+            corner_count += 1;
+        }
+        if corner_count < 3 {
+            return Err(format!("a face needs at least three corners, not {corner_count}"));
+        }
+        self.triangle_count += corner_count - 2;
+        if self.triangle_count > TRIANGLE_LIMIT {
+            return Err(format!("over the limit of {TRIANGLE_LIMIT} triangles"));
+        }
+        self.faces += &plain;
+        self.faces += "\n";
+        self.faces_with_normals += &with_normals;
+        self.faces_with_normals += "\n";
+        Ok(())
+    }
+
+    fn into_mesh(mut self, name: &str) -> Result<Mesh> {
+        if self.triangle_count == 0 {
+            return Err(Error::Input("no faces".into()));
+        }
+        self.checked += if self.lacks_normals { &self.faces } else { &self.faces_with_normals };
+        let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+        let (models, _) = tobj::load_obj_buf(&mut self.checked.as_bytes(), &options, |_| Ok(Default::default()))
+            .map_err(|e| Error::Input(e.to_string()))?;
+        let [model] = &models[..] else { return Err(Error::Input(format!("{} objects instead of one", models.len()))) };
+        join_indices(name, &model.mesh, !self.lacks_normals)
+    }
+}
+
+/// Gives every (position, normal) pair in use a vertex of its own.
+fn join_indices(name: &str, from: &tobj::Mesh, has_normals: bool) -> Result<Mesh> {
+    let triple = |values: &[f32], i: u32| Vec3::from_slice(&values[3 * i as usize..]);
+    let (mut positions, mut normals, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut vertices = HashMap::new();
+    let mut corners = Vec::with_capacity(from.indices.len());
+    for (k, &position) in from.indices.iter().enumerate() {
+        let normal = if has_normals { from.normal_indices[k] } else { 0 };
+        corners.push(*vertices.entry((position, normal)).or_insert_with(|| {
+            positions.push(triple(&from.positions, position));
+            if has_normals {
+                normals.push(triple(&from.normals, normal));
+            }
+            if !from.vertex_color.is_empty() {
+                colors.push(triple(&from.vertex_color, position));
+            }
+            positions.len() as u32 - 1
+        }));
+    }
+    let triangles = corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    Mesh::new(name, positions, normals, (!colors.is_empty()).then_some(colors), triangles)
+}
+
+/// The numbers of a line, each finite as f32.
+fn numbers<'a>(words: impl Iterator<Item = &'a str>) -> std::result::Result<Vec<f32>, String> {
+    words
+        .map(|word| match word.parse::<f32>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            Ok(_) => Err(format!("number {word:?} is not finite")),
+            Err(_) => Err(format!("malformed number {word:?}")),
+        })
+        .collect()
+}
+
+/// An index counted from 1, or back from the `count` lines so far if negative, as one counted from 1.
+fn index(word: &str, count: usize, total: usize, of: &str) -> std::result::Result<usize, String> {
+    let value: i64 = word.parse().map_err(|_| format!("malformed {of} index {word:?}"))?;
+    let plain = if value < 0 { value.saturating_add(count as i64 + 1) } else { value };
+    if plain < 1 || plain > total as i64 {
+        return Err(format!("{of} index {value} is out of range: the file has {total} ({count} up to here)"));
+    }
+    Ok(plain as usize)
+}
+
+/// The mesh as OBJ text, which reads back as the same mesh, bit for bit. Equal normals are written once.
+pub fn write_obj(mesh: &Mesh) -> String {
+    let mut text =
+        format!("# {}: {} vertices, {} triangles, metres\n", mesh.name, mesh.positions.len(), mesh.triangles.len());
+    // Writing into a string cannot fail. The shortest digits that give the same f32 back are what Rust prints.
+    for (i, p) in mesh.positions.iter().enumerate() {
+        let _ = write!(text, "v {} {} {}", p.x, p.y, p.z);
+        if let Some(colors) = &mesh.colors {
+            let _ = write!(text, " {} {} {}", colors[i].x, colors[i].y, colors[i].z);
+        }
+        text += "\n";
+    }
+    let mut numbers = HashMap::new();
+    let mut normal_of = Vec::with_capacity(mesh.normals.len());
+    for n in &mesh.normals {
+        let next = numbers.len() + 1;
+        let number = *numbers.entry(n.to_array().map(f32::to_bits)).or_insert(next);
+        if number == next {
+            let _ = writeln!(text, "vn {} {} {}", n.x, n.y, n.z);
+        }
+        normal_of.push(number);
+    }
+    for t in &mesh.triangles {
+        text += "f";
+        for &i in t {
+            let _ = write!(text, " {}//{}", i + 1, normal_of[i as usize]);
+        }
+        text += "\n";
+    }
+    text
+}

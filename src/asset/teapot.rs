@@ -1,0 +1,153 @@
+//! Martin Newell's teapot (1975): 32 bicubic Bezier patches from the control points in `assets/newell_teapot.txt`.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, IVec3, Vec3};
+
+use super::mesh::Mesh;
+use crate::error::{Error, Result};
+
+/// The control points; source and credit stand in its header and in `assets/CREDITS.md`.
+pub const CONTROL_TEXT: &str = include_str!("../../assets/newell_teapot.txt");
+/// Squares along a patch edge that give about 6 000 triangles.
+pub const DEFAULT_SUBDIVISIONS: u32 = 10;
+/// The vertical is divided by this for the squat look that the drawings of the teapot have had since Blinn.
+const VERTICAL_SQUEEZE: f64 = 1.3;
+/// Vertices of neighbouring patches closer than this, in units of the table, are one position.
+const WELD_DISTANCE: f64 = 1e-6;
+/// Normals that agree this closely at one position are one vertex; f64 rounding leaves less than 1e-9 between patches that
+/// meet smoothly.
+const WELD_COSINE: f64 = 1.0 - 1e-6;
+
+type Patch = [[DVec3; 4]; 4];
+
+/// Tessellates the patches of `control_text` with `subdivisions` squares along each edge.
+///
+/// The result has y up, spout towards +x, handle towards -x, its base on y = 0, and is in units of the original table taken
+/// as metres (6.5 m from handle to spout, 2.4 m high). Normals are analytic, and point out of the body. Where a patch edge
+/// collapses to a point the limit is taken and triangles without extent are dropped. The mesh is not closed: the lid stands
+/// on an open pot, and spout and handle reach into it.
+///
+/// # Errors
+/// [`Error::Input`] for malformed control text.
+pub fn teapot(control_text: &str, subdivisions: u32) -> Result<Mesh> {
+    assert!(subdivisions > 0, "teapot: no subdivisions");
+    let mut weld = Weld::default();
+    let mut triangles = Vec::new();
+    for patch in patches(control_text)? {
+        let row = subdivisions + 1;
+        let vertices: Vec<u32> = (0..row * row)
+            .map(|i| {
+                let (u, v) =
+                    (f64::from(i / row) / f64::from(subdivisions), f64::from(i % row) / f64::from(subdivisions));
+                let (position, normal) = evaluate(&patch, u, v);
+                weld.add(position, normal)
+            })
+            .collect();
+        for i in 0..subdivisions * subdivisions {
+            let (u, v) = (i / subdivisions, i % subdivisions);
+            let at = |u: u32, v: u32| vertices[(u * row + v) as usize];
+            let [a, b, c, d] = [at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)];
+            // The table's u x v points into the body, so the square is wound the other way and normals are v x u.
+            triangles.extend([[a, c, b], [a, d, c]]);
+        }
+    }
+    Mesh::new("teapot", weld.positions, weld.normals, None, triangles)
+}
+
+/// Reads `v x y z` and `p` lines; turns z up into y up and squeezes the vertical.
+fn patches(text: &str) -> Result<Vec<Patch>> {
+    let bad = |line: usize| Error::Input(format!("teapot control points, line {line}: malformed"));
+    let mut points: Vec<DVec3> = Vec::new();
+    let mut patches = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words[..] {
+            ["v", x, y, z] => {
+                let number = |w: &str| w.parse::<f64>().map_err(|_| bad(i + 1));
+                points.push(DVec3::new(number(x)?, number(z)? / VERTICAL_SQUEEZE, -number(y)?));
+            }
+            ["p", ref indices @ ..] if indices.len() == 16 => {
+                let mut patch = [[DVec3::ZERO; 4]; 4];
+                for (k, word) in indices.iter().enumerate() {
+                    let point = word.parse::<usize>().ok().and_then(|index| points.get(index));
+                    patch[k / 4][k % 4] = *point.ok_or_else(|| bad(i + 1))?;
+                }
+                patches.push(patch);
+            }
+            ["#", ..] | [] => {}
+            _ => return Err(bad(i + 1)),
+        }
+    }
+    Ok(patches)
+}
+
+/// Cubic Bernstein polynomials and their derivatives at `t`.
+fn bernstein(t: f64) -> ([f64; 4], [f64; 4]) {
+    let s = 1.0 - t;
+    let value = [s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t];
+    (value, [-3.0 * s * s, 3.0 * s * s - 6.0 * s * t, 6.0 * s * t - 3.0 * t * t, 3.0 * t * t])
+}
+
+fn blend(patch: &Patch, u: [f64; 4], v: [f64; 4]) -> DVec3 {
+    (0..16).map(|k| patch[k / 4][k % 4] * (u[k / 4] * v[k % 4])).sum()
+}
+
+/// Position and unit normal.
+///
+/// Along a collapsed edge u = 0 the derivative S_v vanishes and near it is u S_uv: the limit of the normal is that of
+/// S_uv x S_u, and with the sign of (1/2 - u) at u = 1. Edges v = 0 and v = 1 likewise.
+fn evaluate(patch: &Patch, u: f64, v: f64) -> (DVec3, DVec3) {
+    let ((bu, du), (bv, dv)) = (bernstein(u), bernstein(v));
+    let along_u = blend(patch, du, bv);
+    let along_v = blend(patch, bu, dv);
+    let mixed = blend(patch, du, dv);
+    // Derivatives are of the size of the control polygon; 1e-9 of that is rounding.
+    let vanishes = |d: DVec3| d.length() < 1e-9;
+    let inwards = |t: f64| if t < 0.5 { 1.0 } else { -1.0 };
+    let normal = match (vanishes(along_u), vanishes(along_v)) {
+        (false, true) => (mixed * inwards(u)).cross(along_u),
+        (true, false) => along_v.cross(mixed * inwards(v)),
+        _ => along_v.cross(along_u),
+    };
+    (blend(patch, bu, bv), normal.normalize_or(DVec3::Y))
+}
+
+/// Collects vertices: positions closer than [`WELD_DISTANCE`] become equal, and one vertex where the normals agree as well.
+#[derive(Default)]
+struct Weld {
+    cells: HashMap<IVec3, Vec<u32>>,
+    exact: Vec<DVec3>,
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+}
+
+impl Weld {
+    fn add(&mut self, position: DVec3, normal: DVec3) -> u32 {
+        // Cells much larger than the distance, and the neighbours whose border is close.
+        let cell = |p: DVec3| (p / (64.0 * WELD_DISTANCE)).floor().as_ivec3();
+        let (low, high) = (cell(position - WELD_DISTANCE), cell(position + WELD_DISTANCE));
+        let mut found = None;
+        for x in low.x..=high.x {
+            for y in low.y..=high.y {
+                for z in low.z..=high.z {
+                    for &i in self.cells.get(&IVec3::new(x, y, z)).into_iter().flatten() {
+                        if self.exact[i as usize].distance(position) < WELD_DISTANCE {
+                            if self.normals[i as usize].as_dvec3().dot(normal) > WELD_COSINE {
+                                return i;
+                            }
+                            found = Some(i);
+                        }
+                    }
+                }
+            }
+        }
+        let exact = found.map_or(position, |i| self.exact[i as usize]);
+        let index = self.exact.len() as u32;
+        self.cells.entry(cell(exact)).or_default().push(index);
+        self.exact.push(exact);
+        self.positions.push(exact.as_vec3());
+        self.normals.push(normal.as_vec3());
+        index
+    }
+}

@@ -1,0 +1,158 @@
+//! How the triangles of a mesh hang together once equal positions are welded.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, Vec3};
+
+/// What a baker needs to know about a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shape {
+    /// 2-manifold without boundary, wound consistently, positive volume.
+    pub closed: bool,
+    /// Closed, in one piece, Euler characteristic 2, no edge bends inwards.
+    pub convex: bool,
+    /// All vertices in one plane.
+    pub flat: bool,
+    /// Vertices - edges + triangles.
+    pub euler_characteristic: i64,
+}
+
+/// Distance from the plane that still counts as in it, relative to the bounding radius: some f32 roundings of a vertex.
+const FLAT_TOLERANCE: f64 = 1e-5;
+/// How far f32 rounding moves a vertex, relative to the bounding radius, with a factor 4 to spare for rotated files.
+const VERTEX_NOISE: f64 = 5e-7;
+
+/// One side of a triangle: `corner` is 3 * triangle + k, the side runs from that corner to the next one.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    low: u32,
+    high: u32,
+    reversed: bool,
+    corner: u32,
+}
+
+/// Classifies the surface. `triangles` have three different positions each; `radius_m` is that of the bounding sphere.
+pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m: f32) -> Shape {
+    let (welded, vertex_count) = weld(positions);
+    let corners: Vec<u32> = triangles.iter().flatten().map(|&i| welded[i as usize]).collect();
+    let mut sides: Vec<Side> = (0..corners.len()).map(|corner| side(&corners, corner)).collect();
+    sides.sort_unstable();
+    let edges: Vec<&[Side]> = sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)).collect();
+    let euler_characteristic = vertex_count as i64 - edges.len() as i64 + triangles.len() as i64;
+
+    // Sorted, so that the side that runs from low to high stands first.
+    let paired = edges.iter().all(|e| e.len() == 2 && !e[0].reversed && e[1].reversed);
+    let closed = paired
+        && fan_count(&edges, corners.len()) == vertex_count
+        && volume_m3(positions, triangles, centre) > VERTEX_NOISE * f64::from(radius_m).powi(3);
+    let convex = closed
+        && euler_characteristic == 2
+        && piece_count(&edges, triangles.len()) == 1
+        && edges.iter().all(|e| bends_outwards(e, positions, triangles, f64::from(radius_m)));
+    Shape { closed, convex, flat: is_flat(positions, f64::from(radius_m)), euler_characteristic }
+}
+
+/// Signed volume in cubic metres: the sum of the tetrahedra from `centre` to every triangle.
+pub fn volume_m3(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3) -> f64 {
+    let volume = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| positions[i as usize].as_dvec3() - centre.as_dvec3());
+        a.dot(b.cross(c)) / 6.0
+    };
+    triangles.iter().map(volume).sum()
+}
+
+/// Numbers equal positions alike (-0 is 0): (number of every position, how many there are).
+fn weld(positions: &[Vec3]) -> (Vec<u32>, usize) {
+    let mut numbers = HashMap::with_capacity(positions.len());
+    let welded = positions
+        .iter()
+        .map(|p| {
+            let next = numbers.len() as u32;
+            *numbers.entry((*p + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert(next)
+        })
+        .collect();
+    (welded, numbers.len())
+}
+
+fn next_corner(corner: usize) -> usize {
+    if corner % 3 == 2 { corner - 2 } else { corner + 1 }
+}
+
+fn side(corners: &[u32], corner: usize) -> Side {
+    let (from, to) = (corners[corner], corners[next_corner(corner)]);
+    Side { low: from.min(to), high: from.max(to), reversed: from > to, corner: corner as u32 }
+}
+
+/// Number of closed fans of triangles around vertices: more than there are vertices where two surfaces touch in a point.
+fn fan_count(edges: &[&[Side]], corner_count: usize) -> usize {
+    let mut sets = Sets::new(corner_count);
+    for e in edges {
+        let (a, b) = (e[0].corner as usize, e[1].corner as usize);
+        sets.join(a, next_corner(b));
+        sets.join(next_corner(a), b);
+    }
+    sets.count
+}
+
+fn piece_count(edges: &[&[Side]], triangle_count: usize) -> usize {
+    let mut sets = Sets::new(triangle_count);
+    edges.iter().for_each(|e| sets.join(e[0].corner as usize / 3, e[1].corner as usize / 3));
+    sets.count
+}
+
+/// Disjoint sets with path halving.
+struct Sets {
+    parent: Vec<u32>,
+    count: usize,
+}
+
+impl Sets {
+    fn new(count: usize) -> Self {
+        Self { parent: (0..count as u32).collect(), count }
+    }
+
+    fn root(&mut self, mut i: usize) -> usize {
+        while self.parent[i] as usize != i {
+            self.parent[i] = self.parent[self.parent[i] as usize];
+            i = self.parent[i] as usize;
+        }
+        i
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        if a != b {
+            self.parent[a.max(b)] = a.min(b) as u32;
+            self.count -= 1;
+        }
+    }
+}
+
+/// Whether the far corner of one triangle lies below the plane of the other, or above it by no more than rounding explains:
+/// noise of the first triangle's plane is magnified by how much farther from the edge that corner is.
+fn bends_outwards(edge: &[Side], positions: &[Vec3], triangles: &[[u32; 3]], radius_m: f64) -> bool {
+    let at = |corner: usize| positions[triangles[corner / 3][corner % 3] as usize].as_dvec3();
+    let (one, other) = (edge[0].corner as usize, edge[1].corner as usize);
+    let (from, to) = (at(one), at(next_corner(one)));
+    let own_far = at(next_corner(next_corner(one)));
+    let other_far = at(next_corner(next_corner(other)));
+    let normal = (to - from).cross(own_far - from);
+    let Some(unit) = normal.try_normalize() else { return true };
+    let length = to.distance(from);
+    let own_height = normal.length() / length;
+    let other_height = (to - from).cross(other_far - from).length() / length;
+    unit.dot(other_far - from) <= VERTEX_NOISE * radius_m * (1.0 + other_height / own_height)
+}
+
+/// Takes three vertices that span the set as widely as possible, so that the plane is well determined, and tests the rest.
+fn is_flat(positions: &[Vec3], radius_m: f64) -> bool {
+    let most = |measure: &dyn Fn(DVec3) -> f64| {
+        let larger = |a: DVec3, b: DVec3| if measure(b) > measure(a) { b } else { a };
+        positions.iter().map(|p| p.as_dvec3()).reduce(larger).unwrap_or_default()
+    };
+    let a = positions[0].as_dvec3();
+    let b = most(&|p| p.distance_squared(a));
+    let c = most(&|p| (p - a).cross(b - a).length_squared());
+    let Some(normal) = (b - a).cross(c - a).try_normalize() else { return false };
+    positions.iter().all(|p| normal.dot(p.as_dvec3() - a).abs() <= FLAT_TOLERANCE * radius_m)
+}

@@ -20,10 +20,13 @@
 //! | numbers | tables in f64, shaders in f32, field storage f16 or f32 |
 
 pub mod asset;
+pub mod bake;
 pub mod error;
 pub mod field;
 #[allow(unsafe_code)]
 pub mod gpu;
+pub mod layout;
 pub mod sh;
+pub mod shaders;
 
 pub use error::{Error, Result};

@@ -98,11 +98,11 @@ impl Default for Lattice {
     }
 }
 
-/// Value of [`Lattice::inner`] that leaves the choice to [`Lattice::resolved`].
+/// Value of [`Lattice::inner`] that leaves the choice to the bake (see [`Lattice::starting_at`]).
 pub const AUTOMATIC: f64 = 0.0;
 /// First shell of an object that fills its bounding sphere: just off the surface, so that no sample grazes it.
 pub const OUTSIDE_INNER: f64 = 1.02;
-/// First shell of an object with room inside its sphere.
+/// Smallest first shell: for objects with room up to the centre of their sphere.
 pub const ROOMY_INNER: f64 = 0.25;
 
 /// Stored samples to interpolate, with weights that are at least 0 and sum to 1.
@@ -198,10 +198,10 @@ impl Lattice {
         self.spacing.distance((f64::from(index) - offset) / slope)
     }
 
-    /// This lattice with its first shell fixed: just off the sphere, or well inside it where the object leaves room.
-    pub fn resolved(mut self, has_room_inside: bool) -> Self {
+    /// This lattice with its first shell at `inner` (in r), unless it was chosen before.
+    pub fn starting_at(mut self, inner: f64) -> Self {
         if self.inner == AUTOMATIC {
-            self.inner = if has_room_inside { ROOMY_INNER } else { OUTSIDE_INNER };
+            self.inner = inner;
         }
         self
     }
@@ -292,6 +292,20 @@ impl Lattice {
             }
         }
         out
+    }
+
+    /// The four captured directions around one of a cube lattice.
+    pub fn cell_neighbours(&self, direction: u32) -> Vec<u32> {
+        let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
+        let n = i64::from(cells);
+        let (face, x, y) = (direction / (cells * cells), direction % cells, direction / cells % cells);
+        let (x, y) = (i64::from(x), i64::from(y));
+        [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)]
+            .map(|(x, y)| {
+                let within = (0..n).contains(&x) && (0..n).contains(&y);
+                if within { self.cell_index(face, x, y) } else { self.neighbour(face, x, y) }
+            })
+            .to_vec()
     }
 
     fn cell_index(&self, face: u32, x: i64, y: i64) -> u32 {

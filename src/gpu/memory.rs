@@ -158,16 +158,26 @@ impl Buffer {
     /// As [`Buffer::new`].
     pub fn with_data<T: Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
         let mut buffer = Self::new(device, name, BufferKind::Device, size_of_val(data) as u64)?;
-        if buffer.mapped.is_some() {
-            buffer.write(0, data);
-            return Ok(buffer);
-        }
-        let mut staging = Self::new(device, "staging", BufferKind::Upload, size_of_val(data) as u64)?;
-        staging.write(0, data);
-        let mut commands = Commands::new(device, "upload")?;
-        commands.copy(&staging, &buffer);
-        commands.submit()?;
+        buffer.fill(0, data)?;
         Ok(buffer)
+    }
+
+    /// Writes `data` at a byte offset (a multiple of 4), directly or through a staging buffer as the memory allows.
+    ///
+    /// # Errors
+    /// As [`Buffer::new`].
+    pub fn fill<T: Pod>(&mut self, offset_bytes: u64, data: &[T]) -> Result<()> {
+        if self.mapped.is_some() {
+            self.write(offset_bytes, data);
+            return Ok(());
+        }
+        let device = self.device().clone();
+        let mut staging = Self::new(&device, "staging", BufferKind::Upload, size_of_val(data) as u64)?;
+        staging.write(0, data);
+        let mut commands = Commands::new(&device, "upload")?;
+        commands.copy_range(&staging, 0..size_of_val(data) as u64, self, offset_bytes);
+        commands.submit()?;
+        Ok(())
     }
 
     /// Writes `data` at a byte offset into mapped memory.
@@ -198,18 +208,28 @@ impl Buffer {
         out
     }
 
-    /// Brings a device buffer's content to the host, through a staging copy and a submission of its own.
+    /// Brings `count` elements from the start of a device buffer to the host, through a staging copy and a submission of its
+    /// own.
     ///
     /// # Errors
     /// As [`Buffer::new`].
     pub fn download<T: Pod>(&self, count: usize) -> Result<Vec<T>> {
+        self.download_range(0..(count * size_of::<T>()) as u64)
+    }
+
+    /// As [`Buffer::download`] for a byte range.
+    ///
+    /// # Errors
+    /// As [`Buffer::new`].
+    pub fn download_range<T: Pod>(&self, range: Range<u64>) -> Result<Vec<T>> {
         let device = self.device().clone();
-        let staging = Self::new(&device, "download", BufferKind::Readback, self.size_bytes)?;
+        let size = range.end - range.start;
+        let staging = Self::new(&device, "download", BufferKind::Readback, size)?;
         let mut commands = Commands::new(&device, "download")?;
-        commands.copy(self, &staging);
+        commands.copy_range(self, range, &staging, 0);
         commands.barrier(Access::TransferWrite, Access::HostRead);
         commands.submit()?;
-        Ok(staging.read(0, count))
+        Ok(staging.read(0, size as usize / size_of::<T>()))
     }
 
     /// The device that the buffer lives on.

@@ -171,10 +171,11 @@ impl<'m> Reader<'m> {
             if let Some(constant) = self.decoration(result, Decoration::SpecId) {
                 out.constants.push(Constant { name: self.name(result).to_owned(), id: literal(constant.first()) });
             }
-            let is_size = matches!(
-                self.decoration(result, Decoration::BuiltIn),
-                Some([Operand::BuiltIn(BuiltIn::WorkgroupSize)])
-            );
+            let is_size = instruction.class.opcode == Op::SpecConstantComposite
+                && matches!(
+                    self.decoration(result, Decoration::BuiltIn),
+                    Some([Operand::BuiltIn(BuiltIn::WorkgroupSize)])
+                );
             if is_size {
                 return Err(Error::Failed("the local size must be literal, not a specialisation constant".into()));
             }

@@ -48,7 +48,7 @@ pub struct Shader {
     pub name: String,
     /// Stage it was compiled for.
     pub stage: Stage,
-    /// SPIR-V 1.6 words.
+    /// SPIR-V 1.5 words.
     pub spirv: Vec<u32>,
     /// Bindings, blocks, local size, constants.
     pub reflection: Reflection,
@@ -125,7 +125,7 @@ fn key(source: &Source<'_>, includes: &BTreeMap<String, String>) -> String {
         hasher.update(text.as_bytes());
     };
     part(&format!(
-        "{:?} {:?} vulkan1.3 performance debug",
+        "{:?} {:?} vulkan1.3 spirv1.5 performance debug",
         COMPILER.get_or_init(shaderc::get_spirv_version),
         source.stage
     ));
@@ -147,7 +147,8 @@ fn compile(source: &Source<'_>, includes: &BTreeMap<String, String>) -> Result<V
     let compiler = shaderc::Compiler::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
     let mut options = shaderc::CompileOptions::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
-    options.set_target_spirv(shaderc::SpirvVersion::V1_6);
+    // 1.5: in 1.6 the local size becomes an id (ExecutionModeId), which the reader in rspirv 0.13 refuses.
+    options.set_target_spirv(shaderc::SpirvVersion::V1_5);
     options.set_optimization_level(shaderc::OptimizationLevel::Performance);
     // Names survive optimisation only with debug information; reflection needs them.
     options.set_generate_debug_info();

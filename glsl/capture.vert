@@ -1,0 +1,29 @@
+#version 460
+// One cube face seen from a sample point. Faces are axis-aligned, so right, down and forward are signed unit vectors and the
+// products below are exact.
+layout(location = 0) in vec3 position;
+#if RADIANCE
+layout(location = 1) in vec3 color;
+layout(location = 0) out vec3 radiance;
+#endif
+
+layout(push_constant) uniform Push {
+    vec4 eye;
+    vec4 right;
+    vec4 down;
+    vec4 forward;
+} push;
+
+void main() {
+    vec3 q = position - push.eye.xyz;
+    float w = dot(push.forward.xyz, q);
+#if RADIANCE
+    // Reversed depth w_near / w without a far plane; nothing closer than eye.w (in r) is seen.
+    float z = push.eye.w;
+    radiance = color;
+#else
+    // No depth is kept: z = w / 2 passes every clip test in front of the eye, so no near plane cuts the object.
+    float z = 0.5 * w;
+#endif
+    gl_Position = vec4(dot(push.right.xyz, q), dot(push.down.xyz, q), z, w);
+}

@@ -1,0 +1,16 @@
+#version 460
+// A lit vertex: emission plus radiosity, both radiance in linear Rec.709.
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 emission;
+layout(location = 2) in vec4 radiosity;
+layout(location = 0) out vec3 radiance;
+
+layout(push_constant) uniform Push {
+    mat4 clip_from_object;
+    vec4 emission;
+} push;
+
+void main() {
+    radiance = push.emission.rgb * emission + radiosity.rgb;
+    gl_Position = push.clip_from_object * vec4(position, 1.0);
+}

@@ -1,0 +1,111 @@
+#version 460
+#extension GL_EXT_samplerless_texture_functions : require
+// Cube faces to SH coefficients: one workgroup a sample. Every invocation sums its share of the texels, then one invocation a
+// coefficient sums the shares in order: the result does not depend on scheduling.
+#include "generated/basis.glsl"
+#if COSINE
+#include "generated/cosine.glsl"
+#endif
+
+layout(local_size_x = WORKGROUP) in;
+
+struct Job {
+    vec4 normal;   // COSINE: unit surface normal
+    uint slots[6]; // place of each face in the atlas; NONE where the object does not reach
+    uint target;   // sample that is written
+    float scale;   // factor before storing
+};
+
+layout(binding = 0) uniform texture2D atlas;
+layout(std430, binding = 1) readonly buffer Jobs { Job jobs[]; };
+// Per texel of a face: unit direction as (along right, along down, along forward), and solid angle.
+layout(binding = 2) uniform textureBuffer texels;
+layout(std430, binding = 3) writeonly buffer Samples { float samples[]; };
+
+layout(push_constant) uniform Push {
+    uint job_count;
+    uint face_px;
+    uint atlas_columns;
+} push;
+
+const uint NONE = 0xffffffffu;
+
+shared float shares[COEFFICIENTS * CHANNELS][WORKGROUP];
+
+vec3 to_object(uint face, vec3 d) {
+    switch (face) {
+        case 0: return vec3(d.z, -d.y, -d.x);
+        case 1: return vec3(-d.z, -d.y, d.x);
+        case 2: return vec3(d.x, d.z, d.y);
+        case 3: return vec3(d.x, -d.z, -d.y);
+        case 4: return vec3(d.x, -d.y, d.z);
+        default: return vec3(-d.x, -d.y, -d.z);
+    }
+}
+
+void main() {
+    uint job = gl_WorkGroupID.x;
+    uint lane = gl_LocalInvocationID.x;
+    float sums[COEFFICIENTS * CHANNELS];
+    for (uint k = 0; k < COEFFICIENTS * CHANNELS; k++) {
+        sums[k] = 0.0;
+    }
+    uint texel_count = push.face_px * push.face_px;
+    for (uint face = 0; face < 6; face++) {
+        uint slot = jobs[job].slots[face];
+        if (slot == NONE) {
+            continue;
+        }
+        ivec2 origin = ivec2(slot % push.atlas_columns, slot / push.atlas_columns) * int(push.face_px);
+        for (uint i = lane; i < texel_count; i += WORKGROUP) {
+            vec4 captured = texelFetch(atlas, origin + ivec2(i % push.face_px, i / push.face_px), 0);
+#if CHANNELS == 3
+            vec3 value = captured.rgb;
+            if (value == vec3(0.0)) {
+                continue;
+            }
+#else
+            float value = 1.0 - captured.r;
+            if (value == 0.0) {
+                continue;
+            }
+#endif
+            vec4 texel = texelFetch(texels, int(i));
+            vec3 direction = to_object(face, texel.xyz);
+            float weight = texel.w;
+#if COSINE
+            weight *= max(0.0, dot(jobs[job].normal.xyz, direction));
+#endif
+            float y[COEFFICIENTS];
+            sh_basis(direction, y);
+            for (uint k = 0; k < COEFFICIENTS; k++) {
+#if CHANNELS == 3
+                sums[k] += weight * value.r * y[k];
+                sums[COEFFICIENTS + k] += weight * value.g * y[k];
+                sums[2 * COEFFICIENTS + k] += weight * value.b * y[k];
+#else
+                sums[k] += weight * value * y[k];
+#endif
+            }
+        }
+    }
+    for (uint k = 0; k < COEFFICIENTS * CHANNELS; k++) {
+        shares[k][lane] = sums[k];
+    }
+    barrier();
+    for (uint k = lane; k < COEFFICIENTS * CHANNELS; k += WORKGROUP) {
+        float total = 0.0;
+        for (uint other = 0; other < WORKGROUP; other++) {
+            total += shares[k][other];
+        }
+        total *= jobs[job].scale;
+#if COSINE
+        // What the object's own geometry leaves of the whole cosine lobe.
+        float lobe[COEFFICIENTS];
+        sh_cosine(jobs[job].normal.xyz, lobe);
+        total = lobe[k] - total;
+#endif
+        uint channel = k / COEFFICIENTS;
+        samples[jobs[job].target * (STRIDE * CHANNELS) + channel * STRIDE + k % COEFFICIENTS] = total;
+    }
+}

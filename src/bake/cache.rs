@@ -1,0 +1,121 @@
+//! Baked fields and transfers on disk, found again by the content of the mesh and everything else that decides them.
+
+use super::{Baker, Progress, Report, TRANSFER_OFFSET};
+use crate::asset::mesh::Mesh;
+use crate::error::Result;
+use crate::field::file::{self, TRANSFER_MAGIC, VERSION};
+use crate::field::quantity::channel_stride;
+use crate::field::{Header, ShadowField};
+use crate::gpu::Buffer;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A folder of baked things; without one, everything is baked anew.
+#[derive(Clone, Debug, Default)]
+pub struct Cache {
+    folder: Option<PathBuf>,
+}
+
+/// Header of a cached transfer file.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct TransferHeader {
+    mesh_hash: String,
+    bands: usize,
+    face_px: u32,
+    offset: f32,
+    vertex_count: usize,
+}
+
+fn key(header: &impl Serialize) -> String {
+    let text = serde_json::to_vec(header).expect("headers are plain data");
+    blake3::Hasher::new().update(&VERSION.to_le_bytes()).update(&text).finalize().to_hex()[..32].to_owned()
+}
+
+impl Cache {
+    /// A cache below `folder`, or none.
+    pub fn new(folder: Option<&Path>) -> Self {
+        Cache { folder: folder.map(|f| f.join("fields")) }
+    }
+
+    fn path(&self, key: &str, ending: &str) -> Option<PathBuf> {
+        Some(self.folder.as_ref()?.join(format!("{key}.{ending}")))
+    }
+
+    /// Puts the field that `header` describes into `store` at `offset_bytes`: from disk, else baked and kept. Returns the
+    /// report of a bake, `None` when it was found.
+    ///
+    /// # Errors
+    /// As [`Baker::field`]. A damaged or unreadable cache file is baked anew.
+    pub fn field(
+        &self,
+        baker: &Baker,
+        mesh: &Mesh,
+        header: &mut Header,
+        (store, offset_bytes): (&mut Buffer, u64),
+        progress: Progress<'_>,
+    ) -> Result<Option<Report>> {
+        let path = self.path(&key(&Header { mesh: String::new(), ..header.clone() }), "sf");
+        if let Some(path) = path.as_ref().filter(|path| path.exists()) {
+            match ShadowField::read(path) {
+                Ok(found) if found.payload.len() as u64 == header.payload_bytes() => {
+                    header.filled_samples = found.header.filled_samples;
+                    store.fill(offset_bytes, &found.payload)?;
+                    return Ok(None);
+                }
+                Ok(_) => log::warn!("{}: does not fit its name; baking anew", path.display()),
+                Err(error) => log::warn!("{error}; baking anew"),
+            }
+        }
+        let report = baker.field(mesh, header, (store, offset_bytes), progress)?;
+        if let Some(path) = path {
+            let payload = store.download_range(offset_bytes..offset_bytes + header.payload_bytes())?;
+            let field = ShadowField { header: header.clone(), payload };
+            if let Err(error) = field.write(&path) {
+                log::warn!("{error}; the field was not cached");
+            }
+        }
+        Ok(Some(report))
+    }
+
+    /// The transfer vectors of a mesh: from disk, else baked and kept.
+    ///
+    /// # Errors
+    /// As [`Baker::transfer`].
+    pub fn transfer(
+        &self,
+        baker: &Baker,
+        mesh: &Mesh,
+        bands: usize,
+        face_px: u32,
+        progress: Progress<'_>,
+    ) -> Result<(Vec<f32>, Option<Report>)> {
+        let header = TransferHeader {
+            mesh_hash: mesh.content_hash().iter().map(|byte| format!("{byte:02x}")).collect(),
+            bands,
+            face_px,
+            offset: TRANSFER_OFFSET,
+            vertex_count: mesh.positions.len(),
+        };
+        let path = self.path(&key(&header), "transfer");
+        if let Some(path) = path.as_ref().filter(|path| path.exists()) {
+            match file::read::<TransferHeader>(path, TRANSFER_MAGIC) {
+                Ok((found, payload))
+                    if found == header && payload.len() == 4 * header.vertex_count * channel_stride(bands) =>
+                {
+                    let floats =
+                        payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes")));
+                    return Ok((floats.collect(), None));
+                }
+                Ok(_) => log::warn!("{}: does not fit its name; baking anew", path.display()),
+                Err(error) => log::warn!("{error}; baking anew"),
+            }
+        }
+        let (transfer, report) = baker.transfer(mesh, bands, face_px, progress)?;
+        if let Some(path) = path
+            && let Err(error) = file::write(&path, TRANSFER_MAGIC, &header, bytemuck::cast_slice(&transfer))
+        {
+            log::warn!("{error}; the transfer was not cached");
+        }
+        Ok((transfer, Some(report)))
+    }
+}

@@ -1,0 +1,300 @@
+//! Pass "capture": an object seen from sample points, six cube faces a point, many points a render pass.
+//!
+//! Inputs: the mesh in units of its bounding radius around its centre; eyes in the same frame. Output: an atlas of square
+//! faces. Occlusion: R8, white background, black object, no depth. Radiance: RGBA32F, black background, the mesh's colours,
+//! with depth. A face that the object's bounding sphere does not reach is not drawn and gets no place in the atlas; of the
+//! rest only the chunks of neighbouring triangles are drawn whose bounding spheres reach into the face.
+
+use crate::asset::mesh::Mesh;
+use crate::error::{Error, Result};
+use crate::gpu::memory::ImageShape;
+use crate::gpu::{Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
+use crate::gpu::commands::Target;
+use crate::sh::cube::{FACE_COUNT, face_basis, texel_st};
+use crate::shaders::{Library, Row};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Edge of the atlas in texels, where the device allows it: 1 024 faces of 64 px, 4 MB of coverage.
+const ATLAS_PX: u32 = 2048;
+/// Triangles in a chunk: small enough to be culled on its own, large enough that a draw call costs little beside it.
+const CHUNK_TRIANGLES: usize = 256;
+/// Nearest distance that a radiance capture sees, in r.
+const NEAR: f32 = 1e-4;
+/// Mark of a face that is not in the atlas.
+pub const NO_SLOT: u32 = u32::MAX;
+
+/// A run of triangles with the sphere around them, in r.
+#[derive(Clone, Debug)]
+struct Chunk {
+    indices: Range<u32>,
+    centre: Vec3,
+    radius: f32,
+}
+
+/// A mesh on the device, centred and scaled to bounding radius 1, with its triangles in spatial order.
+pub struct Model {
+    positions: Buffer,
+    colors: Option<Buffer>,
+    indices: Buffer,
+    chunks: Vec<Chunk>,
+    closed: bool,
+}
+
+impl Model {
+    /// Uploads a mesh; `with_colors` for a radiance capture (white where the mesh has none).
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn new(device: &Arc<Device>, mesh: &Mesh, with_colors: bool) -> Result<Self> {
+        let positions = unit_positions(mesh);
+        let (triangles, chunks) = chunk(&positions, &mesh.triangles);
+        let flat: Vec<[f32; 3]> = positions.iter().map(Vec3::to_array).collect();
+        let colors = with_colors
+            .then(|| {
+                let white = vec![Vec3::ONE; positions.len()];
+                let colors: Vec<[f32; 3]> =
+                    mesh.colors.as_ref().unwrap_or(&white).iter().map(Vec3::to_array).collect();
+                Buffer::with_data(device, "capture colors", &colors)
+            })
+            .transpose()?;
+        Ok(Model {
+            positions: Buffer::with_data(device, "capture positions", &flat)?,
+            colors,
+            indices: Buffer::with_data(device, "capture indices", &triangles)?,
+            chunks,
+            closed: mesh.is_closed(),
+        })
+    }
+}
+
+/// Positions in units of the bounding radius from the sphere's centre.
+pub fn unit_positions(mesh: &Mesh) -> Vec<Vec3> {
+    let (centre, radius_m) = mesh.bounding_sphere();
+    mesh.positions.iter().map(|p| ((p.as_dvec3() - centre.as_dvec3()) / f64::from(radius_m)).as_vec3()).collect()
+}
+
+/// Sorts triangles along a space-filling curve and cuts them into chunks.
+fn chunk(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<[u32; 3]>, Vec<Chunk>) {
+    let corners = |t: &[u32; 3]| t.map(|i| positions[i as usize]);
+    let mut order: Vec<_> = triangles.to_vec();
+    order.sort_by_cached_key(|t| morton(corners(t).iter().sum::<Vec3>() / 3.0));
+    let mut first = 0;
+    let chunks = order.chunks(CHUNK_TRIANGLES).map(|run| {
+        let (low, high) = run.iter().flat_map(&corners).fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(p), h.max(p)));
+        let centre = (low + high) / 2.0;
+        let radius = run.iter().flat_map(&corners).map(|p| p.distance(centre)).fold(0.0, f32::max);
+        let count = 3 * run.len() as u32;
+        first += count;
+        Chunk { indices: first - count..first, centre, radius }
+    });
+    let chunks = chunks.collect();
+    (order, chunks)
+}
+
+/// Interleaved bits of a point in [-1, 1]^3, ten an axis.
+fn morton(p: Vec3) -> u32 {
+    let spread = |x: f32| {
+        let cell = ((x + 1.0) * 512.0).clamp(0.0, 1023.0) as u32;
+        (0..10).fold(0, |bits, i| bits | (cell >> i & 1) << (3 * i))
+    };
+    spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
+}
+
+/// Whether a sphere reaches into the pyramid of a cube face seen from `eye`; never false for one that does.
+fn reaches(eye: Vec3, centre: Vec3, radius: f32, forward: Vec3, right: Vec3, down: Vec3) -> bool {
+    let q = centre - eye;
+    // Planes through the eye at 45 degrees: their unit normals are (forward +- side) / sqrt 2. The margin covers rounding.
+    let reach = -1.0001 * radius * std::f32::consts::SQRT_2 - 1e-6;
+    let (f, r, d) = (q.dot(forward), q.dot(right), q.dot(down));
+    f + r >= reach && f - r >= reach && f + d >= reach && f - d >= reach && f >= -1.0001 * radius - 1e-6
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    eye: [f32; 4],
+    right: [f32; 4],
+    down: [f32; 4],
+    forward: [f32; 4],
+}
+
+/// Which faces of which eye lie where in the atlas.
+pub type Slots = [u32; FACE_COUNT];
+
+/// The pipelines and the atlas that they draw into.
+pub struct Capture {
+    open: GraphicsPipeline,
+    closed: GraphicsPipeline,
+    /// Captured faces, row by row.
+    pub atlas: Image,
+    depth: Option<Image>,
+    /// Edge of a face in texels.
+    pub face_px: u32,
+    /// Faces in a row of the atlas.
+    pub columns: u32,
+    radiance: bool,
+}
+
+impl Capture {
+    /// Pipelines for faces of `face_px`, for occlusion or `radiance`.
+    ///
+    /// # Errors
+    /// `Input` when a face is larger than the device's images.
+    pub fn new(device: &Arc<Device>, library: &Library, face_px: u32, radiance: bool) -> Result<Self> {
+        let atlas_px = ATLAS_PX.min(device.limits.max_image_dimension2_d);
+        // Radiance texels are 20 times as large; six faces always fit.
+        let columns = (if radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3);
+        if columns * face_px > device.limits.max_image_dimension2_d {
+            return Err(Error::Input(format!("cube faces of {face_px} px are larger than the device's images allow")));
+        }
+        let color = if radiance { vk::Format::R32G32B32A32_SFLOAT } else { vk::Format::R8_UNORM };
+        let depth = radiance.then_some(vk::Format::D32_SFLOAT);
+        let shape = ImageShape { format: color, width: columns * face_px, height: columns * face_px, samples: 1 };
+        let vertex = library.shader(&Row::new("capture.vert", 4).define("RADIANCE", radiance))?;
+        let fragment = library.shader(&Row::new("capture.frag", 4).define("RADIANCE", radiance))?;
+        let pipeline = |cull| {
+            let state = GraphicsState { color, depth, samples: 1, cull };
+            GraphicsPipeline::new(device, "capture", &vertex, &fragment, state)
+        };
+        Ok(Capture {
+            open: pipeline(vk::CullModeFlags::NONE)?,
+            closed: pipeline(vk::CullModeFlags::BACK)?,
+            atlas: Image::new(device, "capture atlas", shape)?,
+            depth: depth
+                .map(|format| Image::new(device, "capture depth", ImageShape { format, ..shape }))
+                .transpose()?,
+            face_px,
+            columns,
+            radiance,
+        })
+    }
+
+    /// Faces that one render pass can hold.
+    pub fn capacity(&self) -> u32 {
+        self.columns * self.columns
+    }
+
+    /// Gives faces of the next eyes places in the atlas, until it is full. Returns a slot table for every eye that fitted,
+    /// at least one.
+    pub fn plan(&self, model: &Model, eyes: &[Vec3]) -> Vec<Slots> {
+        let mut used = 0;
+        let mut out = Vec::new();
+        for &eye in eyes {
+            if used + FACE_COUNT as u32 > self.capacity() {
+                break;
+            }
+            let mut slots = [NO_SLOT; FACE_COUNT];
+            for (face, slot) in slots.iter_mut().enumerate() {
+                let (forward, right, down) = face_axes(face);
+                if model.chunks.iter().any(|c| reaches(eye, c.centre, c.radius, forward, right, down)) {
+                    *slot = used;
+                    used += 1;
+                }
+            }
+            out.push(slots);
+        }
+        out
+    }
+
+    /// Draws every planned face. The atlas must be in the layout of [`crate::gpu::Access::ColorWrite`]. Back faces of closed
+    /// meshes are culled when `cull` is set.
+    ///
+    /// # Errors
+    /// What recording returns.
+    pub fn record<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        model: &'r Model,
+        eyes: &[Vec3],
+        plan: &[Slots],
+        cull: bool,
+    ) -> Result<()> {
+        let background = if self.radiance { [0.0, 0.0, 0.0, 1.0] } else { [1.0; 4] };
+        let target = Target { color: &self.atlas, clear: background, depth: self.depth.as_ref(), resolve: None };
+        let pipeline = if cull && model.closed { &self.closed } else { &self.open };
+        let mut vertices = vec![(&model.positions, 0)];
+        vertices.extend(model.colors.iter().filter(|_| self.radiance).map(|colors| (colors, 0)));
+        commands.render(&target, |drawing| {
+            drawing.bind(pipeline, &vertices, &model.indices);
+            for (&eye, slots) in eyes.iter().zip(plan) {
+                for (face, &slot) in slots.iter().enumerate().filter(|(_, slot)| **slot != NO_SLOT) {
+                    let (forward, right, down) = face_axes(face);
+                    let px = self.face_px;
+                    drawing.area(slot % self.columns * px, slot / self.columns * px, px, px);
+                    drawing.push(&Push {
+                        eye: eye.extend(NEAR).to_array(),
+                        right: right.extend(0.0).to_array(),
+                        down: down.extend(0.0).to_array(),
+                        forward: forward.extend(0.0).to_array(),
+                    });
+                    let visible = model
+                        .chunks
+                        .iter()
+                        .filter(|c| reaches(eye, c.centre, c.radius, forward, right, down))
+                        .map(|c| c.indices.clone());
+                    for run in joined(visible) {
+                        drawing.indexed(run);
+                    }
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// The depth image that [`Capture::record`] needs in the layout of [`crate::gpu::Access::DepthWrite`].
+    pub fn depth(&self) -> Option<&Image> {
+        self.depth.as_ref()
+    }
+}
+
+/// Forward, right and down of a face as single-precision vectors; their components are 0 and +-1.
+fn face_axes(face: usize) -> (Vec3, Vec3, Vec3) {
+    let (forward, right, down) = face_basis(face);
+    (forward.as_vec3(), right.as_vec3(), down.as_vec3())
+}
+
+/// Joins ranges that follow on one another.
+fn joined(ranges: impl Iterator<Item = Range<u32>>) -> Vec<Range<u32>> {
+    let mut out: Vec<Range<u32>> = Vec::new();
+    for range in ranges {
+        match out.last_mut() {
+            Some(last) if last.end == range.start => last.end = range.end,
+            _ => out.push(range),
+        }
+    }
+    out
+}
+
+/// The CPU twin, by another method: casts a ray through every texel centre of one face. Row-major, true where the object
+/// is hit. Slow; positions are those of [`unit_positions`].
+pub fn reference(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: usize, face_px: u32) -> Vec<bool> {
+    let (forward, right, down) = face_basis(face);
+    let px = face_px as usize;
+    let mut covered = vec![false; px * px];
+    for triangle in triangles {
+        // The triangle in the face's frame; a ray direction is (s, t, 1).
+        let [a, b, c] = triangle.map(|i| {
+            let q = positions[i as usize].as_dvec3() - eye;
+            DVec3::new(q.dot(right), q.dot(down), q.dot(forward))
+        });
+        // A ray hits when it lies on the same side of the three planes through the eye and an edge, and in front.
+        let edges = [a.cross(b), b.cross(c), c.cross(a)];
+        let plane = (b - a).cross(c - a);
+        let offset = plane.dot(a);
+        for y in 0..px {
+            for x in 0..px {
+                let ray = DVec3::new(texel_st(x, px), texel_st(y, px), 1.0);
+                let sides = edges.map(|edge| edge.dot(ray));
+                let same = sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0);
+                if same && offset * plane.dot(ray) > 0.0 {
+                    covered[y * px + x] = true;
+                }
+            }
+        }
+    }
+    covered
+}

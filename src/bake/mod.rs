@@ -1,0 +1,322 @@
+//! The bake: from a mesh to its field and to its transfer, every stage on the device.
+//!
+//! ```text
+//! sample points -> capture -> project -> (all batches) -> assemble -> field in the store
+//! vertices      -> capture -> project (times cosine)               -> transfer
+//! ```
+
+pub mod assemble;
+pub mod cache;
+pub mod capture;
+pub mod inside;
+pub mod project;
+
+use crate::asset::mesh::Mesh;
+use crate::error::{Error, Result};
+use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
+use crate::field::quantity::{Kind, Storage, channel_stride};
+use crate::field::{Header, Lattice};
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
+use crate::shaders::Library;
+use assemble::{Assemble, Sources};
+use capture::{Capture, Model, Slots, unit_positions};
+use glam::{DVec3, Vec3};
+use project::{Job, Project, Projection};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// What decides a field besides the mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Options {
+    /// SH bands of the stored factor.
+    pub bands: usize,
+    /// Number format.
+    pub storage: Storage,
+    /// Sample points; the first shell may be left to the bake.
+    pub lattice: Lattice,
+    /// Edge of a captured face in texels.
+    pub face_px: u32,
+}
+
+impl Default for Options {
+    /// 4 bands, f16, the default lattice, 64 px: a binary cap's error is .0033 at 64 px (DESIGN, section 3).
+    fn default() -> Self {
+        Options { bands: 4, storage: Storage::default(), lattice: Lattice::default(), face_px: 64 }
+    }
+}
+
+/// Where the eye of a transfer capture stands: this share of r off the surface, along the normal. Large enough that the
+/// surface's own facets stay below the horizon, small enough that contact shadows do not move visibly.
+pub const TRANSFER_OFFSET: f32 = 2e-3;
+
+/// Where the time of a bake went.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// Samples captured.
+    pub samples: u32,
+    /// Samples inside the solid, filled from neighbours.
+    pub filled: u32,
+    /// Device time in capture passes.
+    pub capture_ms: f64,
+    /// Device time in project passes.
+    pub project_ms: f64,
+    /// Device time in the assemble pass.
+    pub assemble_ms: f64,
+    /// Wall time of the whole bake.
+    pub total: Duration,
+}
+
+impl Report {
+    fn add(&mut self, timings: &[crate::gpu::Timing]) {
+        for timing in timings {
+            match timing.pass.as_str() {
+                "capture" => self.capture_ms += timing.milliseconds,
+                "project" => self.project_ms += timing.milliseconds,
+                _ => self.assemble_ms += timing.milliseconds,
+            }
+        }
+    }
+}
+
+/// Told how many of how many samples are done.
+pub type Progress<'p> = &'p dyn Fn(u32, u32);
+
+/// First shell that an object needs, in r: just off the bounding sphere if it fills it; the distance of its surface from the
+/// centre if that is inside the solid, since no receiver comes nearer; else well inside.
+pub fn first_shell(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
+    if inside::winding_number(positions, triangles, DVec3::ZERO) < 0.5 {
+        return ROOMY_INNER;
+    }
+    let nearest = triangles
+        .iter()
+        .map(|t| distance_to_triangle(t.map(|i| positions[i as usize].as_dvec3())))
+        .fold(f64::INFINITY, f64::min);
+    // A tessellated sphere's facets lie a few percent inside it.
+    if nearest > 0.93 { OUTSIDE_INNER } else { nearest.max(ROOMY_INNER) }
+}
+
+/// Distance of the origin from a triangle (Ericson, *Real-Time Collision Detection*, section 5.1.5, by regions).
+fn distance_to_triangle([a, b, c]: [DVec3; 3]) -> f64 {
+    let (ab, ac) = (b - a, c - a);
+    let normal = ab.cross(ac);
+    let along = |from: DVec3, edge: DVec3| {
+        let t = (-from.dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (from + t * edge).length()
+    };
+    let sides = [(a, ab), (b, c - b), (c, a - c)];
+    let inside = sides.iter().all(|(from, edge)| normal.dot(edge.cross(-*from)) >= 0.0);
+    if inside && normal != DVec3::ZERO {
+        return a.dot(normal.normalize()).abs();
+    }
+    sides.iter().map(|&(from, edge)| along(from, edge)).fold(f64::INFINITY, f64::min)
+}
+
+/// Header of the field that a bake of `mesh` would make.
+pub fn header(mesh: &Mesh, kind: Kind, options: &Options) -> Header {
+    let (centre, radius_m) = mesh.bounding_sphere();
+    let first = first_shell(&unit_positions(mesh), &mesh.triangles);
+    let brightest = mesh.colors.iter().flatten().map(|c| c.max_element()).fold(0.0, f32::max);
+    Header {
+        kind,
+        bands: options.bands,
+        storage: options.storage,
+        lattice: options.lattice.starting_at(first),
+        face_px: options.face_px,
+        filled_samples: 0,
+        centre_m: centre.to_array(),
+        radius_m,
+        radiance_scale: if kind == Kind::Radiance && mesh.colors.is_some() { brightest } else { 1.0 },
+        mesh: mesh.name.clone(),
+        mesh_hash: mesh.content_hash().iter().map(|byte| format!("{byte:02x}")).collect(),
+    }
+}
+
+/// Bakes on one device.
+pub struct Baker {
+    device: Arc<Device>,
+    library: Library,
+}
+
+/// One run of capture and project over many eyes.
+struct Sweep<'s> {
+    capture: &'s Capture,
+    project: &'s Project,
+    model: &'s Model,
+    cull: bool,
+}
+
+impl Baker {
+    /// A baker that compiles its shaders from `library`.
+    pub fn new(device: &Arc<Device>, library: &Library) -> Self {
+        Baker { device: device.clone(), library: library.clone() }
+    }
+
+    /// Bakes the field that `header` describes (see [`header`]) into `store` at `offset_bytes`, a multiple of 256.
+    ///
+    /// # Errors
+    /// `Input` when no sample point can see the object, or a buffer is larger than the device can hold or bind.
+    pub fn field(
+        &self,
+        mesh: &Mesh,
+        header: &mut Header,
+        (store, offset_bytes): (&Buffer, u64),
+        progress: Progress<'_>,
+    ) -> Result<Report> {
+        header.validate()?;
+        let started = Instant::now();
+        let lattice = header.lattice;
+        let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
+        let inside = inside::inside(&unit_positions(mesh), &mesh.triangles, &positions);
+        header.filled_samples = inside.iter().filter(|i| **i).count() as u32;
+        let sources = Sources::new(&lattice, &inside)?;
+
+        let radiance = header.kind == Kind::Radiance;
+        let capture = Capture::new(&self.device, &self.library, header.face_px, radiance)?;
+        let projection = if radiance { Projection::Radiance } else { Projection::Blocked };
+        let project = self.project(header.bands, projection, &capture)?;
+        let model = Model::new(&self.device, mesh, radiance)?;
+        let floats = u64::from(lattice.sample_count()) * header.sample_stride() as u64;
+        let captured = Buffer::new(&self.device, "captured samples", BufferKind::Device, 4 * floats)?;
+        let mut targets = Vec::new();
+        for (index, position) in positions.iter().enumerate().filter(|(index, _)| !inside[*index]) {
+            let scale = lattice.scale(position.length()) as f32;
+            targets.push((
+                position.as_vec3(),
+                Job { normal: [0.0; 4], slots: [0; 6], target: index as u32, scale },
+            ));
+        }
+        let sweep = Sweep { capture: &capture, project: &project, model: &model, cull: true };
+        let mut report = sweep.run(&self.device, &targets, &captured, progress)?;
+        report.samples = targets.len() as u32;
+        report.filled = header.filled_samples;
+
+        let assemble = Assemble::new(&self.device, &self.library, header.storage)?;
+        let offsets = Buffer::with_data(&self.device, "assemble offsets", &sources.offsets)?;
+        let list = Buffer::with_data(&self.device, "assemble sources", &sources.list)?;
+        let quads = (header.sample_stride() / 4) as u32;
+        let factor = if header.radiance_scale > 0.0 { 1.0 / header.radiance_scale } else { 1.0 };
+        let range = offset_bytes..offset_bytes + header.payload_bytes();
+        let mut commands = Commands::new(&self.device, "assemble")?;
+        commands.pass("assemble", |commands| {
+            let inputs = [&captured, &offsets, &list];
+            assemble.record(commands, inputs, (store, range), (lattice.stored_count(), quads), factor)
+        })?;
+        report.add(&commands.submit()?);
+        report.total = started.elapsed();
+        Ok(report)
+    }
+
+    /// Bakes the transfer vector of every vertex: `channel_stride(bands)` floats each, object's frame. A flat or convex mesh
+    /// has none to bake: there the cosine lobe of the normal is exact.
+    ///
+    /// # Errors
+    /// As [`Baker::field`].
+    pub fn transfer(
+        &self,
+        mesh: &Mesh,
+        bands: usize,
+        face_px: u32,
+        progress: Progress<'_>,
+    ) -> Result<(Vec<f32>, Report)> {
+        let started = Instant::now();
+        let capture = Capture::new(&self.device, &self.library, face_px, false)?;
+        let project = self.project(bands, Projection::Transfer, &capture)?;
+        let model = Model::new(&self.device, mesh, false)?;
+        let floats = mesh.positions.len() * channel_stride(bands);
+        let captured = Buffer::new(&self.device, "transfer", BufferKind::Device, 4 * floats as u64)?;
+        let positions = unit_positions(mesh);
+        let targets: Vec<(Vec3, Job)> = positions
+            .iter()
+            .zip(&mesh.normals)
+            .enumerate()
+            .map(|(index, (position, normal))| {
+                let job =
+                    Job { normal: normal.extend(0.0).to_array(), slots: [0; 6], target: index as u32, scale: 1.0 };
+                (position + TRANSFER_OFFSET * normal, job)
+            })
+            .collect();
+        let sweep = Sweep { capture: &capture, project: &project, model: &model, cull: true };
+        let mut report = sweep.run(&self.device, &targets, &captured, progress)?;
+        report.samples = targets.len() as u32;
+        let transfer = captured.download(floats)?;
+        report.total = started.elapsed();
+        Ok((transfer, report))
+    }
+
+    fn project(&self, bands: usize, projection: Projection, capture: &Capture) -> Result<Project> {
+        Project::new(&self.device, &self.library, bands, projection, capture.face_px, capture.columns)
+    }
+
+    /// The library that shaders come from.
+    pub fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// The device that the baker works on.
+    pub fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+}
+
+impl Sweep<'_> {
+    /// Captures every eye and projects it into `samples`, an atlas at a time.
+    fn run(
+        &self,
+        device: &Arc<Device>,
+        targets: &[(Vec3, Job)],
+        samples: &Buffer,
+        progress: Progress<'_>,
+    ) -> Result<Report> {
+        let eyes: Vec<Vec3> = targets.iter().map(|(eye, _)| *eye).collect();
+        let texels = self.project.texel_view()?;
+        let mut jobs = Project::job_buffer(device, self.capture.capacity())?;
+        let mut report = Report::default();
+        let mut done = 0;
+        while done < eyes.len() {
+            // An eye takes at least one job, and a job at most one capacity.
+            let rest = done..eyes.len().min(done + self.capture.capacity() as usize);
+            let plan: Vec<Slots> = self.capture.plan(self.model, &eyes[rest]);
+            let batch = done..done + plan.len();
+            let filled: Vec<Job> = targets[batch.clone()]
+                .iter()
+                .zip(&plan)
+                .map(|((_, job), slots)| Job { slots: *slots, ..*job })
+                .collect();
+            jobs.write(0, &filled);
+            report.add(&self.batch(device, &eyes[batch.clone()], &plan, &jobs, &texels, samples)?);
+            done = batch.end;
+            progress(done as u32, eyes.len() as u32);
+        }
+        Ok(report)
+    }
+
+    fn batch(
+        &self,
+        device: &Arc<Device>,
+        eyes: &[Vec3],
+        plan: &[Slots],
+        jobs: &Buffer,
+        texels: &crate::gpu::TexelView<'_>,
+        samples: &Buffer,
+    ) -> Result<Vec<crate::gpu::Timing>> {
+        let atlas = &self.capture.atlas;
+        let mut commands = Commands::new(device, "bake batch")?;
+        commands.image_barrier(atlas, None, Access::ColorWrite);
+        if let Some(depth) = self.capture.depth() {
+            commands.image_barrier(depth, None, Access::DepthWrite);
+        }
+        commands.pass("capture", |c| self.capture.record(c, self.model, eyes, plan, self.cull))?;
+        commands.image_barrier(atlas, Some(Access::ColorWrite), Access::ComputeSampled);
+        commands.pass("project", |c| self.project.record(c, atlas, jobs, texels, samples, plan.len() as u32))?;
+        commands.submit()
+    }
+}
+
+/// An error for a mesh that shines without being able to: used by callers that were told a colour.
+pub fn check_radiance(radiance: [f32; 3]) -> Result<()> {
+    if radiance.iter().all(|c| c.is_finite() && *c >= 0.0) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!("radiance {radiance:?}: three finite numbers of at least 0 are needed")))
+}

@@ -1,0 +1,195 @@
+//! Pass "project": captured cube faces to SH coefficients, one workgroup a sample.
+//!
+//! Inputs: the atlas of [`super::capture`], a [`Job`] a sample, the texel table. Output: `samples[target]` of `channels` x
+//! `channel_stride(bands)` floats: the blocked part (1 - texel), the radiance, or for transfer the clamped cosine of the
+//! normal less the part that the object's own geometry takes of it.
+
+use crate::error::{Error, Result};
+use crate::field::quantity::channel_stride;
+use crate::gpu::memory::TexelView;
+use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Image};
+use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
+use crate::sh::cube::{FACE_COUNT, direction, solid_angle, texel_st};
+use crate::sh::lobe::clamped_cosine;
+use crate::shaders::{Library, Row};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+use super::capture::{NO_SLOT, Slots};
+
+/// What is made of the faces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Projection {
+    /// Blocked part of an occlusion capture, one channel.
+    Blocked,
+    /// Radiance in three channels.
+    Radiance,
+    /// Self-visibility times cosine of an occlusion capture, one channel.
+    Transfer,
+}
+
+impl Projection {
+    /// Channels of a sample.
+    pub fn channels(self) -> usize {
+        if self == Projection::Radiance { 3 } else { 1 }
+    }
+}
+
+/// One sample to project.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Job {
+    /// Unit surface normal, for transfer.
+    pub normal: [f32; 4],
+    /// Place of each face in the atlas.
+    pub slots: Slots,
+    /// Index of the sample that is written.
+    pub target: u32,
+    /// Factor before storing.
+    pub scale: f32,
+}
+
+/// Invocations that share a sample's texels: two waves of the widest GPUs, and within every device's limits.
+const WORKGROUP: u32 = 64;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    job_count: u32,
+    face_px: u32,
+    atlas_columns: u32,
+}
+
+/// The pipeline with its texel table.
+pub struct Project {
+    pipeline: ComputePipeline,
+    texels: Buffer,
+    /// SH bands.
+    pub bands: usize,
+    /// What is made of the faces.
+    pub projection: Projection,
+    face_px: u32,
+    columns: u32,
+}
+
+impl Project {
+    /// A pipeline for faces of `face_px` in an atlas of `columns`.
+    ///
+    /// # Errors
+    /// `Input` when the texel table of such faces is larger than the device's views.
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        bands: usize,
+        projection: Projection,
+        face_px: u32,
+        columns: u32,
+    ) -> Result<Self> {
+        let row = Row::new("project.comp", bands)
+            .define("CHANNELS", projection.channels() as u32)
+            .define("COSINE", projection == Projection::Transfer)
+            .define("WORKGROUP", WORKGROUP);
+        let pipeline = ComputePipeline::new(device, "project", &library.shader(&row)?, &[])?;
+        let texels = Buffer::with_data(device, "project texels", &texel_table(face_px as usize))?;
+        if !TexelView::fits(device, TEXEL_FORMAT, texels.size_bytes) {
+            return Err(Error::Input(format!("cube faces of {face_px} px have more texels than the device's views hold")));
+        }
+        Ok(Project { pipeline, texels, bands, projection, face_px, columns })
+    }
+
+    /// The view of the texel table that [`Project::record`] wants.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn texel_view(&self) -> Result<TexelView<'_>> {
+        TexelView::new(&self.texels, TEXEL_FORMAT)
+    }
+
+    /// Room for `count` jobs that the host writes.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn job_buffer(device: &Arc<Device>, count: u32) -> Result<Buffer> {
+        Buffer::new(device, "project jobs", BufferKind::Upload, u64::from(count) * size_of::<Job>() as u64)
+    }
+
+    /// Projects the first `job_count` jobs.
+    ///
+    /// # Errors
+    /// What recording returns.
+    pub fn record<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        atlas: &'r Image,
+        jobs: &'r Buffer,
+        texels: &'r TexelView<'r>,
+        samples: &'r Buffer,
+        job_count: u32,
+    ) -> Result<()> {
+        let push = Push { job_count, face_px: self.face_px, atlas_columns: self.columns };
+        let resources = [Bind::Image(atlas), Bind::Buffer(jobs), Bind::Texel(texels), Bind::Buffer(samples)];
+        commands.dispatch(&self.pipeline, &resources, &push, [job_count * WORKGROUP, 1, 1])
+    }
+}
+
+const TEXEL_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+
+/// Per texel of a face: direction along right, down and forward, and solid angle.
+fn texel_table(face_px: usize) -> Vec<[f32; 4]> {
+    let weights = solid_angle(face_px);
+    (0..face_px * face_px)
+        .map(|i| {
+            let (s, t) = (texel_st(i % face_px, face_px), texel_st(i / face_px, face_px));
+            let d = DVec3::new(s, t, 1.0).normalize();
+            [d.x as f32, d.y as f32, d.z as f32, weights[i] as f32]
+        })
+        .collect()
+}
+
+/// The CPU twin: `texel(face, x, y)` is what was captured, per channel. Coefficients by channel, `channel_stride(bands)`
+/// apart.
+pub fn reference(
+    bands: usize,
+    projection: Projection,
+    face_px: usize,
+    normal: Vec3,
+    scale: f32,
+    texel: impl Fn(usize, usize, usize) -> [f32; 3],
+) -> Vec<f64> {
+    let stride = channel_stride(bands);
+    let mut out = vec![0.0; projection.channels() * stride];
+    let weights = solid_angle(face_px);
+    let normal = normal.as_dvec3();
+    for face in 0..FACE_COUNT {
+        for (i, weight) in weights.iter().enumerate() {
+            let (x, y) = (i % face_px, i / face_px);
+            let w = direction(face, texel_st(x, face_px), texel_st(y, face_px));
+            let mut basis = [0.0; MAX_COEFFICIENTS];
+            evaluate(bands, w, &mut basis);
+            let captured = texel(face, x, y).map(f64::from);
+            let values = match projection {
+                Projection::Radiance => captured,
+                Projection::Blocked => [1.0 - captured[0], 0.0, 0.0],
+                Projection::Transfer => [(1.0 - captured[0]) * normal.dot(w).max(0.0), 0.0, 0.0],
+            };
+            for (channel, value) in values.iter().enumerate().take(projection.channels()) {
+                for (k, y) in basis.iter().enumerate().take(coefficient_count(bands)) {
+                    out[channel * stride + k] += weight * value * y;
+                }
+            }
+        }
+    }
+    out.iter_mut().for_each(|c| *c *= f64::from(scale));
+    if projection == Projection::Transfer {
+        let lobe = clamped_cosine(bands, normal);
+        out.iter_mut().zip(lobe).for_each(|(blocked, whole)| *blocked = whole - *blocked);
+    }
+    out
+}
+
+/// Whether a slot table has any face at all.
+pub fn is_empty(slots: &Slots) -> bool {
+    slots.iter().all(|&slot| slot == NO_SLOT)
+}

@@ -1,0 +1,117 @@
+//! Every shader of the program: entry points and includes embedded in the binary, a folder that overrides them, and the text
+//! that is generated from the tables of [`crate::sh`].
+
+use crate::error::{Error, Result};
+use crate::field::quantity::channel_stride;
+use crate::gpu::shader::Source;
+use crate::gpu::{Shader, Stage};
+use crate::sh;
+use std::path::PathBuf;
+
+macro_rules! embedded {
+    ($($name:literal),* $(,)?) => {
+        /// File name and text of everything in `glsl/`.
+        pub const FILES: &[(&str, &str)] = &[$(($name, include_str!(concat!("../glsl/", $name)))),*];
+    };
+}
+
+embedded!(
+    "assemble.comp",
+    "capture.frag",
+    "capture.vert",
+    "draw.frag",
+    "draw.vert",
+    "field.glsl",
+    "merge.comp",
+    "merge_layout.glsl",
+    "project.comp",
+);
+
+/// One compilation of one entry point. Everything that changes the code is in here; the cache key is the whole row.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Row {
+    /// File in `glsl/`; its ending decides the stage.
+    pub file: &'static str,
+    /// SH bands that generated includes are made for; defines BANDS, COEFFICIENTS and STRIDE.
+    pub bands: usize,
+    /// Further macros.
+    pub defines: Vec<(&'static str, u32)>,
+}
+
+impl Row {
+    /// A row without further macros.
+    pub fn new(file: &'static str, bands: usize) -> Self {
+        Row { file, bands, defines: Vec::new() }
+    }
+
+    /// Adds a macro.
+    pub fn define(mut self, name: &'static str, value: impl Into<u32>) -> Self {
+        self.defines.push((name, value.into()));
+        self
+    }
+}
+
+/// Where shader text comes from and where compiled code is kept.
+#[derive(Clone, Debug, Default)]
+pub struct Library {
+    /// Files here are used instead of the embedded ones of the same name.
+    pub shader_dir: Option<PathBuf>,
+    /// Folder of the SPIR-V cache.
+    pub cache_dir: Option<PathBuf>,
+}
+
+impl Library {
+    /// Compiles a row, or takes it from the cache.
+    ///
+    /// # Errors
+    /// `Failed` with the compiler's lines; `Input` when a file of the override folder cannot be read.
+    pub fn shader(&self, row: &Row) -> Result<Shader> {
+        let stage = match row.file.rsplit('.').next() {
+            Some("comp") => Stage::Compute,
+            Some("vert") => Stage::Vertex,
+            Some("frag") => Stage::Fragment,
+            _ => return Err(Error::Failed(format!("{}: not the name of an entry point", row.file))),
+        };
+        let defines: Vec<(String, String)> = [
+            ("BANDS", row.bands),
+            ("COEFFICIENTS", sh::basis::coefficient_count(row.bands)),
+            ("STRIDE", channel_stride(row.bands)),
+        ]
+        .into_iter()
+        .map(|(name, value)| (name.to_owned(), value.to_string()))
+        .chain(row.defines.iter().map(|(name, value)| ((*name).to_owned(), value.to_string())))
+        .collect();
+        let include = |name: &str| match name.strip_prefix("generated/") {
+            Some(generated) => generate(generated, row.bands),
+            None => self.text(name).ok(),
+        };
+        let source =
+            Source { name: row.file, stage, text: self.text(row.file)?, defines: &defines, include: &include };
+        Shader::compile(&source, self.cache_dir.as_deref())
+    }
+
+    fn text(&self, name: &str) -> Result<String> {
+        if let Some(path) = self.shader_dir.as_ref().map(|folder| folder.join(name))
+            && path.exists()
+        {
+            return std::fs::read_to_string(&path)
+                .map_err(|error| Error::input(&path, format!("cannot be read: {error}")));
+        }
+        FILES
+            .iter()
+            .find(|(file, _)| *file == name)
+            .map(|(_, text)| (*text).to_owned())
+            .ok_or_else(|| Error::Failed(format!("there is no shader file \"{name}\"")))
+    }
+}
+
+/// Text of a generated include.
+fn generate(name: &str, bands: usize) -> Option<String> {
+    match name {
+        "basis.glsl" => Some(sh::basis::glsl_basis(bands)),
+        "cosine.glsl" => Some(sh::lobe::glsl_clamped_cosine(bands)),
+        "product.glsl" => Some(sh::product_program::glsl_product(bands)),
+        "rotate.glsl" => Some(sh::rotation::glsl_rotate(bands)),
+        _ => None,
+    }
+}

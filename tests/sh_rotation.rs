@@ -1,0 +1,105 @@
+//! Rotation of coefficients is rotation of the function.
+
+use std::f64::consts::PI;
+
+use fastrand::Rng;
+use glam::{DQuat, DVec3};
+use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, evaluate};
+use shadow_fields::sh::rotation::{Rotation, block_count, rotate_program};
+
+fn random(rng: &mut Rng, bands: usize) -> Vec<f64> {
+    (0..coefficient_count(bands)).map(|_| 2.0 * rng.f64() - 1.0).collect()
+}
+
+/// A uniform direction: all octants, no axes.
+fn random_direction(rng: &mut Rng) -> DVec3 {
+    let (z, azimuth) = (2.0 * rng.f64() - 1.0, 2.0 * PI * rng.f64());
+    let radius = (1.0 - z * z).sqrt();
+    DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z)
+}
+
+fn random_rotation(rng: &mut Rng) -> DQuat {
+    DQuat::from_axis_angle(random_direction(rng), 2.0 * PI * rng.f64())
+}
+
+fn apply(rotation: &Rotation, coefficients: &[f64]) -> Vec<f64> {
+    let mut out = vec![f64::NAN; coefficients.len()];
+    rotation.apply(coefficients, &mut out);
+    out
+}
+
+fn value(bands: usize, coefficients: &[f64], direction: DVec3) -> f64 {
+    let mut y = vec![0.0; coefficient_count(bands)];
+    evaluate(bands, direction, &mut y);
+    coefficients.iter().zip(&y).map(|(c, y)| c * y).sum()
+}
+
+/// Block elements are at most 1 and sums at most 15 terms, from f64 tables of 1e-15.
+fn assert_close(value: &[f64], expected: &[f64], what: &str) {
+    for (k, (x, y)) in value.iter().zip(expected).enumerate() {
+        assert!((x - y).abs() < 1e-12, "{what}, coefficient {k}: {x} {y}");
+    }
+}
+
+#[test]
+fn rotated_coefficients_are_the_rotated_function() {
+    let mut rng = Rng::with_seed(11);
+    for bands in 1..=MAX_BANDS {
+        for _ in 0..20 {
+            let (coefficients, turn) = (random(&mut rng, bands), random_rotation(&mut rng));
+            let rotated = apply(&Rotation::new(bands, turn), &coefficients);
+            for _ in 0..50 {
+                let direction = random_direction(&mut rng);
+                let expected = value(bands, &coefficients, turn.inverse() * direction);
+                let found = value(bands, &rotated, direction);
+                assert!((found - expected).abs() < 1e-12 * (1.0 + expected.abs()), "{bands}: {found} {expected}");
+            }
+        }
+    }
+}
+
+/// A quarter turn about +y takes +z to +x: the sense of rotation, in numbers.
+#[test]
+fn quarter_turn_about_y_takes_z_to_x() {
+    let rotated = apply(&Rotation::new(2, DQuat::from_rotation_y(PI / 2.0)), &[0.5, 0.0, 1.0, 0.0]);
+    // Y10 is +z, Y11 is -x.
+    assert_close(&rotated, &[0.5, 0.0, 0.0, -1.0], "quarter turn");
+}
+
+#[test]
+fn rotations_form_a_group_and_keep_the_norm() {
+    let mut rng = Rng::with_seed(12);
+    for bands in [2, 4, 6, 8] {
+        for _ in 0..20 {
+            let (p, q) = (random_rotation(&mut rng), random_rotation(&mut rng));
+            let coefficients = random(&mut rng, bands);
+            let [rp, rq, rpq] = [p, q, p * q].map(|turn| Rotation::new(bands, turn));
+            assert_close(&apply(&rp, &apply(&rq, &coefficients)), &apply(&rpq, &coefficients), "group law");
+            let back = Rotation::new(bands, p.inverse());
+            assert_close(&apply(&back, &apply(&rp, &coefficients)), &coefficients, "inverse");
+            assert_close(&apply(&Rotation::new(bands, DQuat::IDENTITY), &coefficients), &coefficients, "identity");
+            let norm = |c: &[f64]| c.iter().map(|c| c * c).sum::<f64>().sqrt();
+            assert_close(&[norm(&apply(&rp, &coefficients))], &[norm(&coefficients)], "norm");
+        }
+    }
+}
+
+#[test]
+fn blocks_are_as_many_as_known() {
+    for (bands, count) in [(1, 0), (2, 9), (3, 34), (4, 83), (5, 164)] {
+        assert_eq!(block_count(bands), count);
+        assert_eq!(Rotation::new(bands, DQuat::IDENTITY).blocks().len(), count);
+    }
+}
+
+#[test]
+fn the_program_that_is_printed_equals_the_rotation() {
+    let mut rng = Rng::with_seed(13);
+    for bands in 2..=6 {
+        let (coefficients, rotation) = (random(&mut rng, bands), Rotation::new(bands, random_rotation(&mut rng)));
+        let expected = apply(&rotation, &coefficients);
+        let mut out = vec![f64::NAN; coefficients.len() - 1];
+        rotate_program(bands).evaluate(&[coefficients.as_slice(), rotation.blocks()].concat(), &mut out);
+        assert_close(&out, &expected[1..], "program");
+    }
+}

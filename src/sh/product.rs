@@ -28,18 +28,29 @@ pub struct Entry {
 pub struct Tensor {
     bands: [usize; 3],
     entries: Vec<Entry>,
-    /// The same entries for [`Tensor::multiply`]: pairs of factors, each with the end of its run in `targets`.
+    /// The same entries for [`Tensor::multiply`]. Factors that both expansions have: `a_i b_j + a_j b_i` once, then its
+    /// run of targets.
     pairs: Vec<Pair>,
     targets: Vec<(u8, f64)>,
+    /// The others, `a_i b_j`, as a flat list: most have one target, and a loop of one mispredicts its end.
+    single: Vec<Single>,
 }
 
-/// `a_i b_j`, or `a_i b_j + a_j b_i` where both orders occur with the same targets.
+/// `a_i b_j + a_j b_i`, or `a_i b_i`, with the end of its run in `targets`.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
     i: u8,
     j: u8,
-    symmetric: bool,
     end: u16,
+}
+
+/// An [`Entry`] in 16 bytes.
+#[derive(Clone, Copy, Debug)]
+struct Single {
+    i: u8,
+    j: u8,
+    k: u8,
+    value: f64,
 }
 
 impl Tensor {
@@ -72,8 +83,12 @@ impl Tensor {
                 entries.extend(kept.map(|(k, &value)| Entry { i, j, k, value }));
             }
         }
-        let (pairs, targets) = pair_up(a_count.min(b_count), &entries);
-        Self { bands, entries, pairs, targets }
+        let shared = a_count.min(b_count);
+        let (both, others): (Vec<Entry>, Vec<Entry>) = entries.iter().partition(|entry| entry.i.max(entry.j) < shared);
+        let (pairs, targets) = pair_up(&both);
+        // Coefficients number at most 64.
+        let single = others.iter().map(|e| Single { i: e.i as u8, j: e.j as u8, k: e.k as u8, value: e.value });
+        Self { bands, pairs, targets, single: single.collect(), entries }
     }
 
     /// Bands of the first factor, the second factor and the product.
@@ -99,13 +114,16 @@ impl Tensor {
         let mut start = 0;
         for pair in &self.pairs {
             let (i, j) = (pair.i as usize & MASK, pair.j as usize & MASK);
-            let mirrored = if pair.symmetric { left[j] * right[i] } else { 0.0 };
+            let mirrored = if i == j { 0.0 } else { left[j] * right[i] };
             let product = left[i] * right[j] + mirrored;
             let (run, rest) = targets.split_at((pair.end - start) as usize);
             for &(k, value) in run {
                 sums[k as usize & MASK] += value * product;
             }
             (targets, start) = (rest, pair.end);
+        }
+        for &Single { i, j, k, value } in &self.single {
+            sums[k as usize & MASK] += value * (left[i as usize & MASK] * right[j as usize & MASK]);
         }
         out[..c_count].copy_from_slice(&sums[..c_count]);
     }
@@ -122,18 +140,13 @@ impl Tensor {
     }
 }
 
-/// Groups entries by unordered pair of factors; `shared` coefficients are common to both factors.
-fn pair_up(shared: usize, entries: &[Entry]) -> (Vec<Pair>, Vec<(u8, f64)>) {
+/// Entries with `i <= j` by pair of factors; each stands for its mirror image as well.
+fn pair_up(entries: &[Entry]) -> (Vec<Pair>, Vec<(u8, f64)>) {
     let (mut pairs, mut targets) = (Vec::new(), Vec::new());
-    for run in entries.chunk_by(|x, y| (x.i, x.j) == (y.i, y.j)) {
-        let (i, j) = (run[0].i, run[0].j);
-        let both = i < shared && j < shared;
-        if both && i > j {
-            continue; // its mirror image came first
-        }
+    for run in entries.chunk_by(|x, y| (x.i, x.j) == (y.i, y.j)).filter(|run| run[0].i <= run[0].j) {
         targets.extend(run.iter().map(|entry| (entry.k as u8, entry.value)));
         let end = u16::try_from(targets.len()).expect("8 bands have fewer than 65536 entries");
-        pairs.push(Pair { i: i as u8, j: j as u8, symmetric: both && i != j, end });
+        pairs.push(Pair { i: run[0].i as u8, j: run[0].j as u8, end });
     }
     (pairs, targets)
 }

@@ -5,6 +5,8 @@
 //! - products with coefficient 0 are a scaling by Y00, which is done once on `a_0` and `b_0`;
 //! - where several `c_k` contain two pairs in the same proportion, `p + ratio q` is formed once (the linear half of the
 //!   greedy factoring of reference 3 of [`crate::sh`]).
+//!
+//! At 4 bands that is 392 multiplications and 267 additions, 394 slots where multiply-adds fuse; plain pairs take 428 slots.
 
 use std::collections::BTreeMap;
 
@@ -102,7 +104,7 @@ impl Emitter<'_> {
     }
 }
 
-/// What a product program leaves behind.
+/// What a product program computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// `c = product(a, b)`: inputs a then b, outputs c.

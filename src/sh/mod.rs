@@ -13,7 +13,7 @@
 //! | [`basis`] | evaluation of the basis, and its GLSL |
 //! | [`quadrature`] | exact rules on the sphere |
 //! | [`cube`] | faces, texels, solid angles |
-//! | [`project`] | texels to coefficients |
+//! | [`mod@project`] | texels to coefficients |
 //! | [`product`] | the triple-product tensor, products, growth certificates |
 //! | [`product_program`] | the product as straight-line code, and its GLSL |
 //! | [`rotation`] | block-diagonal rotation, and its GLSL |

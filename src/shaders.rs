@@ -85,8 +85,7 @@ impl Library {
             Some(generated) => generate(generated, row.bands),
             None => self.text(name).ok(),
         };
-        let source =
-            Source { name: row.file, stage, text: self.text(row.file)?, defines: &defines, include: &include };
+        let source = Source { name: row.file, stage, text: self.text(row.file)?, defines: &defines, include: &include };
         Shader::compile(&source, self.cache_dir.as_deref())
     }
 

@@ -80,7 +80,8 @@ fn neighbours(lattice: &Lattice, sample: u32) -> Vec<u32> {
         Directions::Cube { .. } => lattice.cell_neighbours(direction),
         Directions::LatLon { latitudes, longitudes } => {
             let (y, x) = (direction / longitudes, direction % longitudes);
-            let mut around = vec![y * longitudes + (x + 1) % longitudes, y * longitudes + (x + longitudes - 1) % longitudes];
+            let mut around =
+                vec![y * longitudes + (x + 1) % longitudes, y * longitudes + (x + longitudes - 1) % longitudes];
             around.extend((y > 0).then(|| direction - longitudes));
             around.extend((y + 1 < latitudes).then(|| direction + longitudes));
             around
@@ -132,8 +133,7 @@ impl Assemble {
         factor: f32,
     ) -> Result<()> {
         let push = Push { quad_count: stored_count * sample_quads, sample_quads, factor };
-        let resources =
-            [Bind::Buffer(captured), Bind::Buffer(offsets), Bind::Buffer(list), Bind::Range(store, range)];
+        let resources = [Bind::Buffer(captured), Bind::Buffer(offsets), Bind::Buffer(list), Bind::Range(store, range)];
         commands.dispatch(&self.pipeline, &resources, &push, [push.quad_count, 1, 1])
     }
 }

@@ -102,8 +102,7 @@ impl Cache {
                 Ok((found, payload))
                     if found == header && payload.len() == 4 * header.vertex_count * channel_stride(bands) =>
                 {
-                    let floats =
-                        payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes")));
+                    let floats = payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes")));
                     return Ok((floats.collect(), None));
                 }
                 Ok(_) => log::warn!("{}: does not fit its name; baking anew", path.display()),

@@ -7,9 +7,9 @@
 
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
+use crate::gpu::commands::Target;
 use crate::gpu::memory::ImageShape;
 use crate::gpu::{Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
-use crate::gpu::commands::Target;
 use crate::sh::cube::{FACE_COUNT, face_basis, texel_st};
 use crate::shaders::{Library, Row};
 use ash::vk;
@@ -56,8 +56,7 @@ impl Model {
         let colors = with_colors
             .then(|| {
                 let white = vec![Vec3::ONE; positions.len()];
-                let colors: Vec<[f32; 3]> =
-                    mesh.colors.as_ref().unwrap_or(&white).iter().map(Vec3::to_array).collect();
+                let colors: Vec<[f32; 3]> = mesh.colors.as_ref().unwrap_or(&white).iter().map(Vec3::to_array).collect();
                 Buffer::with_data(device, "capture colors", &colors)
             })
             .transpose()?;

@@ -181,10 +181,7 @@ impl Baker {
         let mut targets = Vec::new();
         for (index, position) in positions.iter().enumerate().filter(|(index, _)| !inside[*index]) {
             let scale = lattice.scale(position.length()) as f32;
-            targets.push((
-                position.as_vec3(),
-                Job { normal: [0.0; 4], slots: [0; 6], target: index as u32, scale },
-            ));
+            targets.push((position.as_vec3(), Job { normal: [0.0; 4], slots: [0; 6], target: index as u32, scale }));
         }
         let sweep = Sweep { capture: &capture, project: &project, model: &model, cull: true };
         let mut report = sweep.run(&self.device, &targets, &captured, progress)?;

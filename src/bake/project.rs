@@ -94,7 +94,9 @@ impl Project {
         let pipeline = ComputePipeline::new(device, "project", &library.shader(&row)?, &[])?;
         let texels = Buffer::with_data(device, "project texels", &texel_table(face_px as usize))?;
         if !TexelView::fits(device, TEXEL_FORMAT, texels.size_bytes) {
-            return Err(Error::Input(format!("cube faces of {face_px} px have more texels than the device's views hold")));
+            return Err(Error::Input(format!(
+                "cube faces of {face_px} px have more texels than the device's views hold"
+            )));
         }
         Ok(Project { pipeline, texels, bands, projection, face_px, columns })
     }

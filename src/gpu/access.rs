@@ -249,6 +249,6 @@ mod tests {
             t.barrier(Access::ComputeSampled, Access::ColorWrite, Some(2));
             t.use_image(1, "i", Access::ColorWrite, "draw");
         });
-        assert_eq!(count, 2, "an image barrier is good for its own image only: layout and order");
+        assert_eq!(count, 3, "good for its own image only: layout, order after the read, order after the write");
     }
 }

@@ -4,9 +4,11 @@
 //! within range and of positive size.
 
 pub mod enclose;
+pub mod environment;
 pub mod generate;
 pub mod mesh;
 pub mod obj;
+pub mod picture;
 pub mod teapot;
 pub mod topology;
 

@@ -1,0 +1,282 @@
+//! Distant light: radiance that depends on direction only, as such and projected to spherical harmonics.
+
+use std::f64::consts::{PI, TAU};
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+use image::{ImageFormat, ImageReader, Limits};
+use serde::{Deserialize, Serialize};
+
+use super::picture::linear_from_srgb;
+use crate::error::{Error, Result};
+use crate::sh::{basis, lobe};
+
+/// Largest width of an environment image; its height may be half of it: 1.6 GB as f32 RGB.
+pub const WIDTH_LIMIT_PX: u32 = 16_384;
+/// Most memory in bytes that decoding an image may take.
+const DECODE_LIMIT_BYTES: u64 = 2 << 30;
+/// Intervals of Simpson's rule for the lobe of [`Key`]; its relative error is then below 1e-11.
+const LOBE_INTERVALS: usize = 1 << 14;
+
+/// Distant light as data: what is given adds up, nothing given is darkness. Radiances are linear RGB, W m^-2 sr^-1.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// The same radiance from everywhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uniform: Option<Vec3>,
+    /// A sky that brightens towards the zenith.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gradient: Option<Gradient>,
+    /// A soft directional light.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub key: Option<Key>,
+    /// An equirectangular picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub image: Option<Image>,
+}
+
+/// radiance * (base + rise * max(0, y)).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gradient {
+    /// Linear RGB at the zenith if base + rise = 1.
+    pub radiance: Vec3,
+    /// Share at and below the horizon, not negative.
+    #[serde(default = "Gradient::base")]
+    pub base: f32,
+    /// What the zenith has in addition, not negative.
+    #[serde(default = "Gradient::rise")]
+    pub rise: f32,
+}
+
+impl Gradient {
+    fn base() -> f32 {
+        0.2
+    }
+
+    fn rise() -> f32 {
+        0.8
+    }
+}
+
+/// radiance * exp(sharpness * (cos - 1)), cos being that of the angle to `toward`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Key {
+    /// Linear RGB at the middle of the lobe.
+    pub radiance: Vec3,
+    /// Direction towards the light, of any length but 0.
+    pub toward: Vec3,
+    /// 0 is uniform; half the radiance is left at an angle of about sqrt(1.4 / sharpness) radians. At most 1e5.
+    pub sharpness: f32,
+}
+
+/// An equirectangular HDR, OpenEXR (linear) or PNG (sRGB) picture around the scene.
+///
+/// The top row is +y. The middle column is -z, straight ahead for a viewer who looks along -z, and columns to its right are
+/// to the right, +x; the picture's left and right edges meet at +z.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Image {
+    /// Relative to the scene file.
+    pub file: PathBuf,
+    /// Factor on the picture's values.
+    #[serde(default = "Image::scale")]
+    pub scale: f32,
+}
+
+impl Image {
+    fn scale() -> f32 {
+        1.0
+    }
+}
+
+/// Distant light, ready for use.
+#[derive(Clone, Debug)]
+pub struct Environment {
+    source: Source,
+    picture: Option<Arc<Picture>>,
+}
+
+/// Linear radiance of texels, rows from +y.
+#[derive(Debug)]
+struct Picture {
+    width: usize,
+    height: usize,
+    texels: Vec<[f32; 3]>,
+}
+
+impl Environment {
+    /// Checks `source` and decodes its picture, whose bytes `read` supplies.
+    ///
+    /// # Errors
+    /// [`Error::Input`], one line: a negative or non-finite number, a direction without length, a picture that cannot be
+    /// read, is not HDR, EXR or PNG, is wider than [`WIDTH_LIMIT_PX`], or holds negative or non-finite radiance.
+    pub fn new(source: &Source, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Self> {
+        let amount = |what: &str, values: &[f32]| match values.iter().find(|v| !(v.is_finite() && **v >= 0.0)) {
+            Some(bad) => Err(Error::Input(format!("environment {what} {bad} is negative or not finite"))),
+            None => Ok(()),
+        };
+        source.uniform.map_or(Ok(()), |rgb| amount("uniform", &rgb.to_array()))?;
+        if let Some(gradient) = &source.gradient {
+            amount("gradient", &gradient.radiance.to_array())?;
+            amount("gradient", &[gradient.base, gradient.rise])?;
+        }
+        if let Some(key) = &source.key {
+            amount("key", &key.radiance.to_array())?;
+            amount("key sharpness", &[key.sharpness])?;
+            if key.sharpness > 1e5 {
+                return Err(Error::Input("environment key sharpness is over the limit of 1e5".into()));
+            }
+            if key.toward.as_dvec3().try_normalize().is_none() {
+                return Err(Error::Input("environment key has no direction towards it".into()));
+            }
+        }
+        let picture = source.image.as_ref().map(|image| {
+            amount("image scale", &[image.scale])?;
+            Picture::decode(&read(&image.file)?, image.scale).map(Arc::new).map_err(|e| e.context(image.file.display()))
+        });
+        Ok(Self { source: source.clone(), picture: picture.transpose()? })
+    }
+
+    /// Whether nothing shines.
+    pub fn is_none(&self) -> bool {
+        self.source == Source::default()
+    }
+
+    /// Linear RGB radiance from the unit vector `direction`, not projected.
+    pub fn radiance(&self, direction: DVec3) -> [f64; 3] {
+        let mut sum = DVec3::ZERO;
+        if let Some(rgb) = self.source.uniform {
+            sum += rgb.as_dvec3();
+        }
+        if let Some(g) = &self.source.gradient {
+            sum += g.radiance.as_dvec3() * (f64::from(g.base) + f64::from(g.rise) * direction.y.max(0.0));
+        }
+        if let Some(k) = &self.source.key {
+            let cosine = k.toward.as_dvec3().normalize().dot(direction);
+            sum += k.radiance.as_dvec3() * (f64::from(k.sharpness) * (cosine - 1.0)).exp();
+        }
+        if let Some(picture) = &self.picture {
+            sum += picture.at(direction);
+        }
+        sum.to_array()
+    }
+
+    /// Projection of each channel to `bands` bands, bands^2 coefficients. All but the picture is projected in closed form or
+    /// by a one-dimensional integral; texels are weighted with their exact solid angle.
+    pub fn coefficients(&self, bands: usize) -> [Vec<f64>; 3] {
+        let mut sum = [const { Vec::new() }; 3].map(|_: Vec<f64>| vec![0.0; bands * bands]);
+        let mut add = |rgb: Vec3, shape: &[f64]| {
+            for (channel, amount) in sum.iter_mut().zip(rgb.as_dvec3().to_array()) {
+                channel.iter_mut().zip(shape).for_each(|(c, s)| *c += amount * s);
+            }
+        };
+        let one = |amount: f64| {
+            let mut shape = vec![0.0; bands * bands];
+            shape[0] = amount * (4.0 * PI).sqrt();
+            shape
+        };
+        if let Some(rgb) = self.source.uniform {
+            add(rgb, &one(1.0));
+        }
+        if let Some(g) = &self.source.gradient {
+            add(g.radiance, &one(f64::from(g.base)));
+            add(g.radiance * g.rise, &lobe::clamped_cosine(bands, DVec3::Y));
+        }
+        if let Some(k) = &self.source.key {
+            add(
+                k.radiance,
+                &lobe::zonal(bands, &key_zonal(bands, f64::from(k.sharpness)), k.toward.as_dvec3().normalize()),
+            );
+        }
+        if let Some(picture) = &self.picture {
+            picture.project(bands, &mut sum);
+        }
+        sum
+    }
+}
+
+/// z_l = sqrt((2l + 1) / (4 pi)) * 2 pi * integral over c of exp(sharpness * (c - 1)) P_l(c), by Simpson's rule in 1 - c over the
+/// part where the exponential exceeds 1e-17.
+fn key_zonal(bands: usize, sharpness: f64) -> Vec<f64> {
+    let end = if sharpness > 20.0 { 40.0 / sharpness } else { 2.0 };
+    let step = end / LOBE_INTERVALS as f64;
+    let mut z = vec![0.0; bands];
+    for i in 0..=LOBE_INTERVALS {
+        let weight = if i == 0 || i == LOBE_INTERVALS {
+            1.0
+        } else if i % 2 == 1 {
+            4.0
+        } else {
+            2.0
+        };
+        let below = step * i as f64;
+        let value = weight * step / 3.0 * (-sharpness * below).exp();
+        let c = 1.0 - below;
+        let (mut previous, mut legendre) = (0.0, 1.0);
+        for (l, sum) in z.iter_mut().enumerate() {
+            *sum += value * legendre;
+            let degree = l as f64;
+            (previous, legendre) =
+                (legendre, ((2.0 * degree + 1.0) * c * legendre - degree * previous) / (degree + 1.0));
+        }
+    }
+    z.iter().enumerate().map(|(l, sum)| ((2.0 * l as f64 + 1.0) / (4.0 * PI)).sqrt() * TAU * sum).collect()
+}
+
+impl Picture {
+    fn decode(bytes: &[u8], scale: f32) -> Result<Self> {
+        let fail = |what: String| Error::Input(format!("environment image: {what}"));
+        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| fail(e.to_string()))?;
+        let format = reader.format();
+        if !matches!(format, Some(ImageFormat::Hdr | ImageFormat::OpenExr | ImageFormat::Png)) {
+            return Err(fail("not an HDR, EXR or PNG file".into()));
+        }
+        let mut limits = Limits::default();
+        limits.max_image_width = Some(WIDTH_LIMIT_PX);
+        limits.max_image_height = Some(WIDTH_LIMIT_PX / 2);
+        limits.max_alloc = Some(DECODE_LIMIT_BYTES);
+        reader.limits(limits);
+        let decoded = reader.decode().map_err(|e| {
+            let what = e.to_string().replace('\n', " ");
+            fail(format!("{what} (limits: {WIDTH_LIMIT_PX} x {} pixels)", WIDTH_LIMIT_PX / 2))
+        })?;
+        let rgb = decoded.into_rgb32f();
+        let linear = |c: f32| scale * if format == Some(ImageFormat::Png) { linear_from_srgb(c) } else { c };
+        let texels: Vec<[f32; 3]> = rgb.pixels().map(|p| p.0.map(linear)).collect();
+        if texels.is_empty() || texels.iter().flatten().any(|c| !(c.is_finite() && *c >= 0.0)) {
+            return Err(fail("no pixels, or a pixel that is negative or not finite".into()));
+        }
+        Ok(Self { width: rgb.width() as usize, height: rgb.height() as usize, texels })
+    }
+
+    /// The texel in `direction`, as [`Image`] states.
+    fn at(&self, direction: DVec3) -> DVec3 {
+        let column = (0.5 + direction.x.atan2(-direction.z) / TAU) * self.width as f64;
+        let row = direction.y.clamp(-1.0, 1.0).acos() / PI * self.height as f64;
+        // The right edge and the south pole round onto the last texel; a negative index saturates to 0.
+        let (x, y) = ((column as usize).min(self.width - 1), (row as usize).min(self.height - 1));
+        DVec3::from_array(self.texels[y * self.width + x].map(f64::from))
+    }
+
+    fn project(&self, bands: usize, sum: &mut [Vec<f64>; 3]) {
+        let mut values = vec![0.0; bands * bands];
+        for y in 0..self.height {
+            let polar = |edge: f64| PI * (y as f64 + edge) / self.height as f64;
+            let weight = (polar(0.0).cos() - polar(1.0).cos()) * TAU / self.width as f64;
+            let (sine, cosine) = polar(0.5).sin_cos();
+            for x in 0..self.width {
+                let (across, ahead) = (TAU * ((x as f64 + 0.5) / self.width as f64 - 0.5)).sin_cos();
+                basis::evaluate(bands, DVec3::new(sine * across, cosine, -sine * ahead), &mut values);
+                for (channel, texel) in sum.iter_mut().zip(self.texels[y * self.width + x]) {
+                    let amount = weight * f64::from(texel);
+                    channel.iter_mut().zip(&values).for_each(|(c, v)| *c += amount * v);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Pictures out: PNG with the exact sRGB curve, animated PNG, and linear OpenEXR.
+//!
+//! Rows run from the top, pixels from the left, three channels each. A file appears under its name only once it is complete:
+//! it is written beside it and renamed.
+
+use std::fs;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use image::ImageEncoder as _;
+
+use crate::error::{Error, Result};
+
+/// Linear Rec.709 channel to sRGB (IEC 61966-2-1), both 0 to 1; outside it is clamped, NaN gives 0.
+pub fn srgb_from_linear(linear: f32) -> f32 {
+    let x = if linear.is_nan() { 0.0 } else { linear.clamp(0.0, 1.0) };
+    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// sRGB channel to linear Rec.709, both 0 to 1: the inverse of [`srgb_from_linear`].
+pub fn linear_from_srgb(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+/// 8-bit sRGB of linear RGB after multiplication by 2^exposure_ev, clamped, rounded to nearest.
+pub fn encode_srgb(linear_rgb: &[f32], exposure_ev: f32) -> Vec<u8> {
+    let gain = exposure_ev.exp2();
+    linear_rgb.iter().map(|c| (srgb_from_linear(c * gain) * 255.0).round() as u8).collect()
+}
+
+/// Writes linear RGB as 8-bit sRGB PNG; a text chunk `Exposure` states the exposure in stops.
+///
+/// # Errors
+/// [`Error::Failed`] where the path cannot be written.
+pub fn write_png(path: &Path, width: u32, height: u32, linear_rgb: &[f32], exposure_ev: f32) -> Result<()> {
+    check_size(width, height, linear_rgb.len());
+    let pixels = encode_srgb(linear_rgb, exposure_ev);
+    write_whole(path, |file| {
+        let mut encoder = rgb8_encoder(file, width, height);
+        encoder.add_text_chunk("Exposure".into(), format!("{exposure_ev} EV"))?;
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&pixels)?;
+        Ok(writer.finish()?)
+    })
+}
+
+/// Writes 8-bit sRGB frames (see [`encode_srgb`]) as an animated PNG that repeats for ever, `fps` frames a second.
+///
+/// # Errors
+/// [`Error::Failed`] where the path cannot be written; [`Error::Usage`] without frames or with zero `fps`.
+pub fn write_apng(path: &Path, width: u32, height: u32, frames: &[Vec<u8>], fps: u16) -> Result<()> {
+    if frames.is_empty() || fps == 0 {
+        return Err(Error::Usage(format!("{}: an animation needs frames and a rate above 0", path.display())));
+    }
+    frames.iter().for_each(|f| check_size(width, height, f.len()));
+    write_whole(path, |file| {
+        let mut encoder = rgb8_encoder(file, width, height);
+        encoder.set_animated(frames.len() as u32, 0)?;
+        encoder.set_frame_delay(1, fps)?;
+        let mut writer = encoder.write_header()?;
+        for frame in frames {
+            writer.write_image_data(frame)?;
+        }
+        Ok(writer.finish()?)
+    })
+}
+
+/// Writes linear RGB as OpenEXR with 32-bit floats, bit for bit.
+///
+/// # Errors
+/// [`Error::Failed`] where the path cannot be written.
+pub fn write_exr(path: &Path, width: u32, height: u32, linear_rgb: &[f32]) -> Result<()> {
+    check_size(width, height, linear_rgb.len());
+    // The encoder seeks, so the file is made in memory.
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image::codecs::openexr::OpenExrEncoder::new(&mut bytes)
+        .write_image(bytemuck::cast_slice(linear_rgb), width, height, image::ExtendedColorType::Rgb32F)
+        .map_err(|e| Error::Failed(format!("{}: {e}", path.display())))?;
+    write_whole(path, |file| Ok(file.write_all(bytes.get_ref())?))
+}
+
+fn rgb8_encoder<'a, W: Write>(file: W, width: u32, height: u32) -> png::Encoder<'a, W> {
+    let mut encoder = png::Encoder::new(file, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    encoder
+}
+
+fn check_size(width: u32, height: u32, channel_count: usize) {
+    assert_eq!(
+        channel_count as u64,
+        3 * u64::from(width) * u64::from(height),
+        "channels of a {width} x {height} picture"
+    );
+}
+
+/// What can go wrong while a file is written.
+type WriteResult = std::result::Result<(), Box<dyn std::error::Error>>;
+
+/// Writes a file in its folder under another name and renames it, so that it is never seen half-written. What is not a
+/// regular file (a pipe, `/dev/stdout`) is written to as it stands.
+///
+/// # Errors
+/// [`Error::Failed`] with the path; nothing is left behind.
+pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> WriteResult) -> Result<()> {
+    let attempt = || -> WriteResult {
+        let special = fs::metadata(path).is_ok_and(|m| !m.is_file());
+        if special {
+            let mut file = BufWriter::new(fs::File::create(path)?);
+            write(&mut file)?;
+            return Ok(file.flush()?);
+        }
+        // A link keeps pointing where it did.
+        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut builder = tempfile::Builder::new();
+        // Like any created file, not private to its owner as temporary files are.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let mut file = BufWriter::new(builder.prefix(".unfinished-").tempfile_in(folder)?);
+        write(&mut file)?;
+        file.flush()?;
+        file.into_inner().map_err(|e| e.into_error())?.persist(&target)?;
+        Ok(())
+    };
+    attempt().map_err(|e| Error::Failed(format!("{}: cannot write: {e}", path.display())))
+}

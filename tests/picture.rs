@@ -1,0 +1,121 @@
+//! Pictures written and read back.
+
+use std::io::BufReader;
+use std::path::Path;
+
+use shadow_fields::asset::picture::{
+    encode_srgb, linear_from_srgb, srgb_from_linear, write_apng, write_exr, write_png, write_whole,
+};
+
+fn files(folder: &Path) -> Vec<String> {
+    std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+}
+
+#[test]
+fn srgb_curve() {
+    // IEC 61966-2-1 in f64: 18 % grey, both sides of the joint, and the ends.
+    for linear in [0.0, 0.001, 0.0031308, 0.0031309, 0.18, 0.5, 1.0f64] {
+        let expected = if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+        assert!((f64::from(srgb_from_linear(linear as f32)) - expected).abs() < 3e-7, "{linear}");
+    }
+    for code in 0..=255u8 {
+        let linear = linear_from_srgb(f32::from(code) / 255.0);
+        assert_eq!(encode_srgb(&[linear], 0.0), [code]);
+    }
+    assert_eq!(
+        encode_srgb(&[-1.0, 2.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.18], 0.0),
+        [0, 255, 0, 255, 0, 118]
+    );
+    assert_eq!(encode_srgb(&[0.09], 1.0), encode_srgb(&[0.18], 0.0));
+}
+
+#[test]
+fn png_reads_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.png");
+    let pixels: Vec<f32> = (0..5 * 3 * 3).map(|i| i as f32 / 20.0).collect();
+    write_png(&path, 5, 3, &pixels, -1.0).unwrap();
+    write_png(&path, 5, 3, &pixels, -1.0).unwrap();
+    assert_eq!(files(folder.path()), ["p.png"], "nothing else is left behind");
+    let mut reader = png::Decoder::new(BufReader::new(std::fs::File::open(&path).unwrap())).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    assert_eq!(
+        (info.width, info.height, info.color_type, info.bit_depth),
+        (5, 3, png::ColorType::Rgb, png::BitDepth::Eight)
+    );
+    let expected: Vec<u8> = pixels
+        .iter()
+        .map(|c| {
+            let x = (f64::from(*c) * 0.5).min(1.0);
+            let encoded = if x <= 0.0031308 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+            (encoded * 255.0).round() as u8
+        })
+        .collect();
+    assert_eq!(bytes, expected);
+    let text = &reader.info().uncompressed_latin1_text;
+    assert_eq!((text[0].keyword.as_str(), text[0].text.as_str()), ("Exposure", "-1 EV"));
+    assert!(reader.info().srgb.is_some());
+}
+
+#[test]
+fn exr_reads_back_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.exr");
+    let mut random = fastrand::Rng::with_seed(5);
+    let mut pixels: Vec<f32> =
+        (0..33 * 17 * 3).map(|_| (random.f32() - 0.5) * 10f32.powi(random.i32(-30..30))).collect();
+    pixels[..4].copy_from_slice(&[0.0, f32::MIN_POSITIVE, f32::MAX, f32::INFINITY]);
+    write_exr(&path, 33, 17, &pixels).unwrap();
+    let back = image::open(&path).unwrap().into_rgb32f();
+    assert_eq!(back.dimensions(), (33, 17));
+    let bits = |v: &[f32]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(back.as_raw()), bits(&pixels));
+}
+
+#[test]
+fn apng_has_its_frames() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.png");
+    let frames: Vec<Vec<u8>> = (0..7u8).map(|f| vec![f * 30; 4 * 2 * 3]).collect();
+    write_apng(&path, 4, 2, &frames, 25).unwrap();
+    let mut reader = png::Decoder::new(BufReader::new(std::fs::File::open(&path).unwrap())).read_info().unwrap();
+    let control = reader.info().animation_control.unwrap();
+    assert_eq!((control.num_frames, control.num_plays), (7, 0));
+    for frame in &frames {
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut bytes).unwrap();
+        assert_eq!(&bytes, frame);
+        let shown = reader.info().frame_control.unwrap();
+        assert_eq!((shown.delay_num, shown.delay_den), (1, 25));
+    }
+    assert_eq!(write_apng(&path, 4, 2, &[], 25).unwrap_err().exit_code(), 2);
+    assert_eq!(write_apng(&path, 4, 2, &frames, 0).unwrap_err().exit_code(), 2);
+}
+
+#[test]
+fn failure_leaves_what_was_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.png");
+    write_png(&path, 1, 1, &[0.5; 3], 0.0).unwrap();
+    let before = std::fs::read(&path).unwrap();
+    let error = write_whole(&path, |file| {
+        file.write_all(b"half")?;
+        Err("no more".into())
+    });
+    let message = error.unwrap_err().to_string();
+    assert!(message.contains("p.png: cannot write: no more"), "{message}");
+    assert_eq!(std::fs::read(&path).unwrap(), before);
+    assert_eq!(files(folder.path()), ["p.png"]);
+    for bad in [folder.path().join("none/p.png"), folder.path().to_owned()] {
+        let error = write_png(&bad, 1, 1, &[0.5; 3], 0.0).unwrap_err();
+        assert_eq!(error.exit_code(), 1);
+        assert!(error.to_string().starts_with(bad.to_str().unwrap()), "{error}");
+    }
+    // Not a regular file: written to, not replaced.
+    #[cfg(unix)]
+    {
+        write_png(Path::new("/dev/null"), 1, 1, &[0.5; 3], 0.0).unwrap();
+        assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
+    }
+}

@@ -26,6 +26,7 @@ pub mod field;
 #[allow(unsafe_code)]
 pub mod gpu;
 pub mod layout;
+pub mod scene;
 pub mod sh;
 pub mod shaders;
 

@@ -3,6 +3,7 @@
 //! Everything read from a file is checked here, once: the modules below may trust a [`mesh::Mesh`] to be finite, indexed
 //! within range and of positive size.
 
+pub mod embedded;
 pub mod enclose;
 pub mod environment;
 pub mod generate;

@@ -1,0 +1,63 @@
+//! Scenes and meshes compiled into the binary, so that it runs without this repository's folder.
+
+use std::path::{Component, Path};
+
+use crate::error::{Error, Result};
+
+macro_rules! files {
+    ($($path:literal),* $(,)?) => {
+        &[$(($path, include_bytes!(concat!("../../assets/", $path)))),*]
+    };
+}
+
+/// Paths below `assets/` and contents.
+const FILES: &[(&str, &[u8])] = files![
+    "meshes/cuboid.obj",
+    "meshes/plane.obj",
+    "meshes/sphere.obj",
+    "meshes/teapot.obj",
+    "meshes/torus.obj",
+    "meshes/torus_two_colour.obj",
+    "scenes/glowing_torus.toml",
+    "scenes/sphere_over_plane.toml",
+    "scenes/teapot_lights.toml",
+    "scenes/torus_over_plane.toml",
+    "scenes/twelve_instances.toml",
+];
+
+/// The folder that embedded paths stand in: `assets/scenes/NAME.toml`.
+pub const ROOT: &str = "assets";
+
+/// The contents of an embedded file, by its path from the repository's top (`assets/meshes/torus.obj`, also with `..` in it, as
+/// a scene's relative paths give).
+pub fn find(path: &Path) -> Option<&'static [u8]> {
+    let mut parts: Vec<&str> = Vec::new();
+    for component in path.components() {
+        match component {
+            Component::Normal(part) => parts.push(part.to_str()?),
+            Component::ParentDir => drop(parts.pop()?),
+            Component::CurDir => {}
+            Component::RootDir | Component::Prefix(_) => return None,
+        }
+    }
+    let wanted = parts.join("/");
+    let below = wanted.strip_prefix(ROOT)?.strip_prefix('/')?;
+    FILES.iter().find(|(name, _)| *name == below).map(|(_, bytes)| *bytes)
+}
+
+/// [`find`] as a reader of files.
+///
+/// # Errors
+/// [`Error::Input`] for a path that is not embedded.
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    find(path).map(<[u8]>::to_vec).ok_or_else(|| Error::input(path, "no such embedded file"))
+}
+
+/// Name (without folder and extension) and text of every embedded scene.
+pub fn scenes() -> Vec<(&'static str, &'static str)> {
+    let scene = |&(path, bytes): &(&'static str, &'static [u8])| {
+        let name = path.strip_prefix("scenes/")?.strip_suffix(".toml")?;
+        Some((name, std::str::from_utf8(bytes).ok()?))
+    };
+    FILES.iter().filter_map(scene).collect()
+}

@@ -1,0 +1,235 @@
+//! Where things are and how they move: functions of time alone.
+
+use std::f64::consts::TAU;
+
+use glam::{DQuat, DVec3, Quat, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::values;
+
+/// Object to world: scale, then rotation, then position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Metres.
+    pub position: Vec3,
+    /// Unit quaternion.
+    pub rotation: Quat,
+    /// Uniform and positive.
+    pub scale: f32,
+}
+
+/// A rotation as written: `{ axis = [0, 1, 0], angle_deg = 30 }` (right-handed) or `{ quaternion = [x, y, z, w] }` of any length
+/// but zero.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Written", into = "Written")]
+pub enum Rotation {
+    /// Turn about an axis of any length but zero.
+    AxisAngle {
+        /// Direction of the axis.
+        axis: Vec3,
+        /// Degrees.
+        angle_deg: f64,
+    },
+    /// x, y, z, w; not necessarily unit.
+    Quaternion([f32; 4]),
+}
+
+impl Default for Rotation {
+    fn default() -> Self {
+        Rotation::Quaternion([0.0, 0.0, 0.0, 1.0])
+    }
+}
+
+impl Rotation {
+    fn unit(self) -> DQuat {
+        match self {
+            Rotation::AxisAngle { axis, angle_deg } => {
+                DQuat::from_axis_angle(axis.as_dvec3().normalize(), angle_deg.to_radians())
+            }
+            Rotation::Quaternion(q) => DQuat::from_array(q.map(f64::from)).normalize(),
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    axis: Option<Vec<f32>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    angle_deg: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    quaternion: Option<Vec<f32>>,
+}
+
+impl TryFrom<Written> for Rotation {
+    type Error = String;
+
+    fn try_from(written: Written) -> Result<Self, String> {
+        let usable =
+            |v: &[f32]| v.iter().all(|x| x.abs() <= values::POSITION_LIMIT_M) && v.iter().any(|x| x.abs() > 1e-12);
+        match (written.axis.as_deref(), written.angle_deg, written.quaternion.as_deref()) {
+            (Some(&[x, y, z]), Some(angle_deg), None) if usable(&[x, y, z]) && angle_deg.abs() <= values::NUMBER_LIMIT => {
+                Ok(Rotation::AxisAngle { axis: Vec3::new(x, y, z), angle_deg })
+            }
+            (None, None, Some(&[x, y, z, w])) if usable(&[x, y, z, w]) => Ok(Rotation::Quaternion([x, y, z, w])),
+            _ => Err("a rotation is { axis = [x, y, z], angle_deg = a } or { quaternion = [x, y, z, w] }, finite and not zero".into()),
+        }
+    }
+}
+
+impl From<Rotation> for Written {
+    fn from(rotation: Rotation) -> Self {
+        match rotation {
+            Rotation::AxisAngle { axis, angle_deg } => {
+                Written { axis: Some(axis.to_array().to_vec()), angle_deg: Some(angle_deg), quaternion: None }
+            }
+            Rotation::Quaternion(q) => Written { axis: None, angle_deg: None, quaternion: Some(q.to_vec()) },
+        }
+    }
+}
+
+/// One movement. An entity's list is applied from first to last, each to what the ones before gave.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Motion {
+    /// Replaces the placement by an interpolated one; before the first and after the last keyframe it holds still.
+    Keyframes {
+        /// At least one, times increasing.
+        #[serde(deserialize_with = "keyframes")]
+        keys: Vec<Keyframe>,
+        /// Whether it starts over after the last keyframe's time, counted from the first one's.
+        #[serde(default)]
+        repeat: bool,
+    },
+    /// Carries the position around a line; the rotation stays as it is.
+    Orbit {
+        /// A point on the line, metres.
+        #[serde(deserialize_with = "values::position")]
+        centre: Vec3,
+        /// The line's direction; turns are right-handed about it.
+        #[serde(default = "up", deserialize_with = "values::direction")]
+        axis: Vec3,
+        /// Seconds a turn; negative turns the other way.
+        #[serde(deserialize_with = "values::period")]
+        period_s: f64,
+    },
+    /// Turns the entity in place about a world axis through its origin.
+    Spin {
+        /// Direction of the axis.
+        #[serde(default = "up", deserialize_with = "values::direction")]
+        axis: Vec3,
+        /// Seconds a turn; negative turns the other way.
+        #[serde(deserialize_with = "values::period")]
+        period_s: f64,
+    },
+    /// Moves the position to and fro: amplitude * sin(2 pi t / period + phase).
+    Bob {
+        /// Direction of the movement.
+        #[serde(default = "up", deserialize_with = "values::direction")]
+        axis: Vec3,
+        /// Metres to either side.
+        #[serde(deserialize_with = "values::number")]
+        amplitude_m: f64,
+        /// Seconds.
+        #[serde(deserialize_with = "values::period")]
+        period_s: f64,
+        /// Degrees.
+        #[serde(default, deserialize_with = "values::number")]
+        phase_deg: f64,
+    },
+}
+
+fn up() -> Vec3 {
+    Vec3::Y
+}
+
+/// A placement at a time; what is left out is as the entity has it at rest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Keyframe {
+    /// Seconds.
+    #[serde(deserialize_with = "values::number")]
+    pub time_s: f64,
+    /// Metres; moved in a straight line.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "values::maybe_position")]
+    pub position: Option<Vec3>,
+    /// Turned the short way at a steady rate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<Rotation>,
+    /// Grows at a steady rate.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "values::maybe_scale")]
+    pub scale: Option<f32>,
+}
+
+fn keyframes<'de, D: serde::Deserializer<'de>>(source: D) -> Result<Vec<Keyframe>, D::Error> {
+    let keys = Vec::<Keyframe>::deserialize(source)?;
+    if keys.is_empty() || keys.windows(2).any(|k| k[1].time_s <= k[0].time_s) {
+        return Err(serde::de::Error::custom("keyframes need at least one key, and times that increase"));
+    }
+    Ok(keys)
+}
+
+/// [`Placement`] in f64, between movements.
+#[derive(Clone, Copy)]
+pub(super) struct Exact {
+    position: DVec3,
+    rotation: DQuat,
+    scale: f64,
+}
+
+impl Exact {
+    pub(super) fn new(position: Vec3, rotation: Rotation, scale: f32) -> Self {
+        Self { position: position.as_dvec3(), rotation: rotation.unit(), scale: f64::from(scale) }
+    }
+
+    pub(super) fn rounded(self) -> Placement {
+        Placement {
+            position: self.position.as_vec3(),
+            rotation: self.rotation.normalize().as_quat(),
+            scale: self.scale as f32,
+        }
+    }
+
+    /// This placement after `motion`, with `rest` for what keyframes leave out.
+    pub(super) fn moved(mut self, motion: &Motion, rest: Exact, time_s: f64) -> Self {
+        // The fraction of a turn first: the angle stays small, so late times lose nothing.
+        let turn = |axis: Vec3, period_s: f64| {
+            DQuat::from_axis_angle(axis.as_dvec3().normalize(), TAU * (time_s / period_s).fract())
+        };
+        match motion {
+            Motion::Keyframes { keys, repeat } => return interpolate(keys, *repeat, rest, time_s),
+            Motion::Orbit { centre, axis, period_s } => {
+                let centre = centre.as_dvec3();
+                self.position = centre + turn(*axis, *period_s) * (self.position - centre);
+            }
+            Motion::Spin { axis, period_s } => self.rotation = turn(*axis, *period_s) * self.rotation,
+            Motion::Bob { axis, amplitude_m, period_s, phase_deg } => {
+                let angle = TAU * (time_s / period_s).fract() + phase_deg.to_radians();
+                self.position += axis.as_dvec3().normalize() * (amplitude_m * angle.sin());
+            }
+        }
+        self
+    }
+}
+
+fn interpolate(keys: &[Keyframe], repeat: bool, rest: Exact, time_s: f64) -> Exact {
+    let (first, last) = (keys[0].time_s, keys[keys.len() - 1].time_s);
+    let time = if repeat && last > first { first + (time_s - first).rem_euclid(last - first) } else { time_s };
+    let place = |key: &Keyframe| Exact {
+        position: key.position.map_or(rest.position, |p| p.as_dvec3()),
+        rotation: key.rotation.map_or(rest.rotation, Rotation::unit),
+        scale: key.scale.map_or(rest.scale, f64::from),
+    };
+    let next = keys.partition_point(|k| k.time_s <= time);
+    if next == 0 || next == keys.len() {
+        return place(&keys[next.saturating_sub(1)]);
+    }
+    let (from, to) = (place(&keys[next - 1]), place(&keys[next]));
+    let part = (time - keys[next - 1].time_s) / (keys[next].time_s - keys[next - 1].time_s);
+    Exact {
+        position: from.position.lerp(to.position, part),
+        rotation: from.rotation.slerp(to.rotation, part),
+        scale: from.scale + (to.scale - from.scale) * part,
+    }
+}

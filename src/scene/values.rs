@@ -1,0 +1,102 @@
+//! Numbers of a scene file, checked while they are read, so that a message names the line of the number.
+
+use glam::Vec3;
+use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+
+/// Largest magnitude of a coordinate in metres.
+pub const POSITION_LIMIT_M: f32 = 1e7;
+/// Scales lie between the inverse of this and this.
+pub const SCALE_LIMIT: f32 = 1e7;
+/// Largest radiance: its square still fits f32.
+pub const RADIANCE_LIMIT: f32 = 1e15;
+/// Largest angle in degrees and time in seconds; f64 keeps fractions of 1e-7 there.
+pub const NUMBER_LIMIT: f64 = 1e9;
+
+/// A list of exactly three numbers.
+fn three<'de, D: Deserializer<'de>>(source: D, what: &str, in_range: impl Fn(f32) -> bool) -> Result<Vec3, D::Error> {
+    let list = Vec::<f32>::deserialize(source)?;
+    let three: [f32; 3] =
+        list.try_into().map_err(|l: Vec<f32>| D::Error::custom(format!("{what} has 3 numbers, not {}", l.len())))?;
+    match three.iter().find(|v| !in_range(**v)) {
+        Some(bad) => Err(D::Error::custom(format!("{bad} is out of range for {what}"))),
+        None => Ok(Vec3::from_array(three)),
+    }
+}
+
+/// A place in metres.
+pub fn position<'de, D: Deserializer<'de>>(source: D) -> Result<Vec3, D::Error> {
+    three(source, "a position (finite, within 1e7 m)", |v| v.abs() <= POSITION_LIMIT_M)
+}
+
+/// A place that may be left out.
+pub fn maybe_position<'de, D: Deserializer<'de>>(source: D) -> Result<Option<Vec3>, D::Error> {
+    position(source).map(Some)
+}
+
+/// Linear reflectance.
+pub fn albedo<'de, D: Deserializer<'de>>(source: D) -> Result<Vec3, D::Error> {
+    three(source, "an albedo (0 to 1)", |v| (0.0..=1.0).contains(&v))
+}
+
+/// Linear radiance.
+pub fn radiance<'de, D: Deserializer<'de>>(source: D) -> Result<Vec3, D::Error> {
+    three(source, "a radiance (0 to 1e15)", |v| (0.0..=RADIANCE_LIMIT).contains(&v))
+}
+
+/// A direction of any length but zero, kept as written.
+pub fn direction<'de, D: Deserializer<'de>>(source: D) -> Result<Vec3, D::Error> {
+    let given = three(source, "a direction (finite, within 1e7)", |v| v.abs() <= POSITION_LIMIT_M)?;
+    if given.as_dvec3().try_normalize().is_none() {
+        return Err(D::Error::custom("a direction has no length"));
+    }
+    Ok(given)
+}
+
+/// A finite number of moderate size: a time, an angle.
+pub fn number<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
+    let value = f64::deserialize(source)?;
+    if value.abs() <= NUMBER_LIMIT {
+        Ok(value)
+    } else {
+        Err(D::Error::custom(format!("{value} is not finite or beyond 1e9")))
+    }
+}
+
+/// Seconds of one turn; negative turns the other way.
+pub fn period<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
+    let value = number(source)?;
+    if value.abs() >= 1e-6 { Ok(value) } else { Err(D::Error::custom(format!("a period of {value} s is too short"))) }
+}
+
+const SCALE: &str = "one scale, uniform and positive (1e-7 to 1e7)";
+
+/// One factor for all axes.
+pub fn scale<'de, D: Deserializer<'de>>(source: D) -> Result<f32, D::Error> {
+    struct Scale;
+    impl<'de> Visitor<'de> for Scale {
+        type Value = f32;
+        fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+            f.write_str(SCALE)
+        }
+        fn visit_f64<E: Error>(self, value: f64) -> Result<f32, E> {
+            let single = value as f32;
+            if (1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(&single) {
+                Ok(single)
+            } else {
+                Err(E::custom(format!("scale {value}: expected {SCALE}")))
+            }
+        }
+        fn visit_i64<E: Error>(self, value: i64) -> Result<f32, E> {
+            self.visit_f64(value as f64)
+        }
+        fn visit_seq<A: SeqAccess<'de>>(self, _: A) -> Result<f32, A::Error> {
+            Err(A::Error::custom(format!("a list of scales: expected {SCALE}")))
+        }
+    }
+    source.deserialize_any(Scale)
+}
+
+/// A scale that may be left out.
+pub fn maybe_scale<'de, D: Deserializer<'de>>(source: D) -> Result<Option<f32>, D::Error> {
+    scale(source).map(Some)
+}

@@ -1,0 +1,174 @@
+//! Scenes: the embedded ones, defaults, motion in closed form, and TOML there and back.
+
+use std::path::Path;
+
+use glam::{Quat, Vec3};
+use shadow_fields::Result;
+use shadow_fields::asset::embedded;
+use shadow_fields::scene::{Data, Placement, Scene};
+
+fn nothing(path: &Path) -> Result<Vec<u8>> {
+    Err(shadow_fields::Error::input(path, "this test has no files"))
+}
+
+/// A scene of one ball with the given lines in its entity.
+fn ball(lines: &str) -> Scene {
+    let text = format!(
+        "[camera]\neye = [0, 1, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"m\"\nsphere = {{ radius_m = 1, subdivisions = 1 }}\n\
+         [[entity]]\nmesh = \"m\"\n{lines}\n"
+    );
+    Scene::parse(&text, Path::new("ball.toml"), &nothing).unwrap()
+}
+
+fn near(a: Placement, position: Vec3, rotation: Quat) {
+    assert!(a.position.distance(position) < 1e-5, "{} is not {position}", a.position);
+    // q and -q are the same rotation.
+    assert!(a.rotation.dot(rotation).abs() > 1.0 - 1e-6, "{} is not {rotation}", a.rotation);
+}
+
+#[test]
+fn embedded_scenes_load_and_read_back() {
+    let scenes = embedded::scenes();
+    let names: Vec<&str> = scenes.iter().map(|s| s.0).collect();
+    assert_eq!(names, ["glowing_torus", "sphere_over_plane", "teapot_lights", "torus_over_plane", "twelve_instances"]);
+    for (name, text) in scenes {
+        let path = format!("assets/scenes/{name}.toml");
+        let scene = Scene::parse(text, Path::new(&path), &embedded::read).unwrap();
+        let again = Data::parse(&scene.to_toml(), Path::new("again.toml")).unwrap();
+        assert_eq!(again, scene.data, "{name}");
+        // From disk it is the same scene.
+        let disk = Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(&path)).unwrap();
+        assert_eq!(disk.data, scene.data);
+        assert_eq!(disk.entities, scene.entities);
+        for (a, b) in disk.meshes.iter().zip(&scene.meshes) {
+            assert_eq!(a.content_hash(), b.content_hash());
+        }
+        // Something lights, something occludes, the floor only receives, and nothing but the floor is below it.
+        assert!(scene.entities.iter().any(|e| e.emits) && scene.entities.iter().any(|e| e.occludes), "{name}");
+        assert!(!scene.entities[0].occludes && scene.entities[0].receives && !scene.entities[0].emits);
+        for step in 0..50 {
+            for (entity, place) in scene.entities.iter().zip(scene.at(f64::from(step) * 0.37)) {
+                let turned = |p: &Vec3| (place.rotation * (*p * place.scale) + place.position).y;
+                let lowest = scene.meshes[entity.mesh].positions.iter().map(turned).fold(f32::INFINITY, f32::min);
+                assert!(lowest > -1e-6, "{name}: {} reaches {lowest} m at step {step}", entity.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn twelve_instances_has_enough_receivers() {
+    let text = embedded::scenes().into_iter().find(|s| s.0 == "twelve_instances").unwrap().1;
+    let scene = Scene::parse(text, Path::new("assets/scenes/twelve_instances.toml"), &embedded::read).unwrap();
+    let vertices: usize =
+        scene.entities.iter().filter(|e| e.receives).map(|e| scene.meshes[e.mesh].positions.len()).sum();
+    assert!(vertices >= 60_000, "{vertices}");
+    assert_eq!(scene.entities.iter().filter(|e| e.occludes).count(), 12);
+}
+
+#[test]
+fn a_missing_path_may_be_embedded() {
+    assert!(Scene::load(Path::new("assets/scenes/../scenes/teapot_lights.toml")).is_ok());
+    assert!(embedded::find(Path::new("assets/scenes/../meshes/torus.obj")).is_some());
+    for other in ["meshes/torus.obj", "assets/../../assets/meshes/torus.obj", "/assets/meshes/torus.obj", "assets", ""]
+    {
+        assert!(embedded::find(Path::new(other)).is_none(), "{other}");
+    }
+}
+
+#[test]
+fn defaults() {
+    let scene = ball("");
+    let entity = &scene.entities[0];
+    assert_eq!((entity.emits, entity.occludes, entity.receives), (false, true, true));
+    assert_eq!((entity.albedo, entity.emission), (Vec3::splat(0.7), Vec3::ZERO));
+    assert_eq!(scene.at(3.0)[0], Placement { position: Vec3::ZERO, rotation: Quat::IDENTITY, scale: 1.0 });
+    assert_eq!((scene.data.camera.fov_deg, scene.data.output.width, scene.data.output.exposure_ev), (40.0, 960, 0.0));
+    assert!(scene.environment.is_none());
+    let light = &ball("emission = [1, 0, 0]").entities[0];
+    assert_eq!((light.emits, light.occludes, light.receives), (true, false, true));
+    let forced = &ball("emission = [1, 0, 0]\nemits = false\nreceives = false").entities[0];
+    assert_eq!((forced.emits, forced.occludes, forced.receives), (false, true, false));
+    let both = &ball("emission = [1, 0, 0]\noccludes = true").entities[0];
+    assert_eq!((both.emits, both.occludes), (true, true));
+}
+
+#[test]
+fn rotations() {
+    let turned = Quat::from_rotation_z(0.5);
+    let angle = 0.5f64.to_degrees();
+    near(ball(&format!("rotation = {{ axis = [0, 0, 7], angle_deg = {angle} }}")).at(0.0)[0], Vec3::ZERO, turned);
+    let (s, c) = 0.25f64.sin_cos();
+    near(
+        ball(&format!("rotation = {{ quaternion = [0, 0, {}, {}] }}", 3.0 * s, 3.0 * c)).at(9.0)[0],
+        Vec3::ZERO,
+        turned,
+    );
+}
+
+#[test]
+fn orbit_spin_and_bob_in_closed_form() {
+    // Right-handed about +y: a quarter turn takes +x to -z.
+    let orbit = ball("position = [3, 1, 0]\nmotion = [{ orbit = { centre = [1, 0, 0], period_s = 8 } }]");
+    near(orbit.at(0.0)[0], Vec3::new(3.0, 1.0, 0.0), Quat::IDENTITY);
+    near(orbit.at(2.0)[0], Vec3::new(1.0, 1.0, -2.0), Quat::IDENTITY);
+    near(orbit.at(4.0)[0], Vec3::new(-1.0, 1.0, 0.0), Quat::IDENTITY);
+    near(orbit.at(8e6 + 2.0)[0], Vec3::new(1.0, 1.0, -2.0), Quat::IDENTITY);
+    near(orbit.at(-2.0)[0], Vec3::new(1.0, 1.0, 2.0), Quat::IDENTITY);
+    let spin = ball(
+        "rotation = { axis = [1, 0, 0], angle_deg = 90 }\nmotion = [{ spin = { axis = [0, 2, 0], period_s = -4 } }]",
+    );
+    let tilt = Quat::from_rotation_x(std::f32::consts::FRAC_PI_2);
+    near(spin.at(1.0)[0], Vec3::ZERO, Quat::from_rotation_y(-std::f32::consts::FRAC_PI_2) * tilt);
+    let bob = ball("motion = [{ bob = { axis = [0, 0, 5], amplitude_m = 0.5, period_s = 4, phase_deg = 90 } }]");
+    near(bob.at(0.0)[0], Vec3::Z * 0.5, Quat::IDENTITY);
+    near(bob.at(2.0)[0], Vec3::Z * -0.5, Quat::IDENTITY);
+    // One after the other: the bob's offset is not orbited.
+    let both = ball(
+        "position = [1, 0, 0]\nmotion = [{ orbit = { centre = [0, 0, 0], period_s = 4 } }, \
+         { bob = { amplitude_m = 1, period_s = 4 } }]",
+    );
+    near(both.at(1.0)[0], Vec3::new(0.0, 1.0, -1.0), Quat::IDENTITY);
+}
+
+#[test]
+fn keyframes_interpolate_hold_and_repeat() {
+    let keys = "position = [9, 9, 9]\nscale = 2\nmotion = [{ keyframes = { REPEAT keys = [{ time_s = 1, position = [0, 0, 0] }, \
+                { time_s = 3, position = [4, 0, 0], rotation = { axis = [0, 1, 0], angle_deg = 90 }, scale = 4 }, \
+                { time_s = 4, rotation = { axis = [0, 1, 0], angle_deg = 90 } }] } }]";
+    let held = ball(&keys.replace("REPEAT", ""));
+    let quarter = Quat::from_rotation_y(std::f32::consts::FRAC_PI_2);
+    near(held.at(-5.0)[0], Vec3::ZERO, Quat::IDENTITY);
+    near(held.at(2.0)[0], Vec3::X * 2.0, Quat::from_rotation_y(std::f32::consts::FRAC_PI_4));
+    assert_eq!(held.at(2.0)[0].scale, 3.0);
+    near(held.at(3.0)[0], Vec3::X * 4.0, quarter);
+    near(held.at(99.0)[0], Vec3::splat(9.0), quarter);
+    assert_eq!(held.at(99.0)[0].scale, 2.0, "what a key leaves out is as at rest");
+    let repeated = ball(&keys.replace("REPEAT", "repeat = true,"));
+    for time in [1.25, 2.0, 3.5] {
+        for turns in [-2.0, 1.0, 5.0] {
+            let (a, b) = (repeated.at(time)[0], repeated.at(time + 3.0 * turns)[0]);
+            near(a, b.position, b.rotation);
+        }
+    }
+}
+
+#[test]
+fn time_alone_decides() {
+    let text = embedded::scenes().into_iter().find(|s| s.0 == "torus_over_plane").unwrap().1;
+    let scene = Scene::parse(text, Path::new("assets/scenes/torus_over_plane.toml"), &embedded::read).unwrap();
+    let before = scene.at(2.5);
+    (0..100).for_each(|i| drop(scene.at(f64::from(i) * 0.1)));
+    assert_eq!(scene.at(2.5), before);
+    assert_ne!(scene.at(2.6), before);
+}
+
+#[test]
+fn camera_up() {
+    let camera = |eye: &str| {
+        let text = format!("[camera]\neye = {eye}\ntarget = [0, 0, 0]\nfov_deg = 30\n");
+        Scene::parse(&text, Path::new("c.toml"), &nothing).unwrap().data.camera
+    };
+    assert_eq!(camera("[0, 1, 1]").up(), Vec3::Y);
+    assert_eq!(camera("[0, 4, 0]").up(), Vec3::NEG_Z);
+}

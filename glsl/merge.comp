@@ -112,9 +112,9 @@ void main() {
     if (v >= push.vertex_count) {
         return;
     }
-    uint vertex = push.vertex_first + v;
-    vec3 position = vertex_quad(2 * vertex).xyz; // object frame, metres, from the bounding sphere's centre
-    vec3 normal = vertex_quad(2 * vertex + 1).xyz;
+    uint at = 2 * (push.vertex_first + v);
+    vec3 position = vertex_quad(at).xyz; // object frame, metres, from the bounding sphere's centre
+    vec3 normal = vertex_quad(at + 1).xyz;
     uint receiver = uniformly(push.receiver);
     vec3 x = entities[receiver].to_object_x.xyz; // a row of the inverse rotation is a column of the rotation
     vec3 y = entities[receiver].to_object_y.xyz;
@@ -221,6 +221,6 @@ void main() {
         sum += light(light_3, position - entities[light_3].centre.xyz, t_3);
     }
 #endif
-    vec3 earlier = push.accumulate == 1 ? radiosity[vertex].rgb : vec3(0.0);
-    radiosity[vertex] = vec4(earlier + sum * entities[receiver].albedo.rgb, 0.0);
+    vec3 earlier = push.accumulate == 1 ? radiosity[v].rgb : vec3(0.0);
+    radiosity[v] = vec4(earlier + sum * entities[receiver].albedo.rgb, 0.0);
 }

@@ -15,7 +15,7 @@ struct Entity {
 };
 
 struct Push {
-    uint vertex_first;   // of the receiver in the vertex buffer
+    uint vertex_first;   // of the receiver's mesh in the vertex buffer
     uint vertex_count;
     uint transfer_first; // quad of the receiver's first transfer vector; NONE: the cosine of the normal
     uint receiver;       // entity that is lit

@@ -34,7 +34,7 @@ pub struct Entity {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Push {
-    /// First vertex of the receiver.
+    /// First vertex of the receiver's mesh in the vertex buffer.
     pub vertex_first: u32,
     /// Vertices of the receiver.
     pub vertex_count: u32,

@@ -23,9 +23,11 @@ pub mod asset;
 pub mod bake;
 pub mod error;
 pub mod field;
+pub mod frame;
 #[allow(unsafe_code)]
 pub mod gpu;
 pub mod layout;
+pub mod render;
 pub mod scene;
 pub mod sh;
 pub mod shaders;

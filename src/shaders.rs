@@ -35,7 +35,7 @@ pub struct Row {
     /// SH bands that generated includes are made for; defines BANDS, COEFFICIENTS and STRIDE.
     pub bands: usize,
     /// Further macros.
-    pub defines: Vec<(&'static str, u32)>,
+    pub defines: Vec<(&'static str, String)>,
 }
 
 impl Row {
@@ -46,7 +46,13 @@ impl Row {
 
     /// Adds a macro.
     pub fn define(mut self, name: &'static str, value: impl Into<u32>) -> Self {
-        self.defines.push((name, value.into()));
+        self.defines.push((name, value.into().to_string()));
+        self
+    }
+
+    /// Adds a macro that stands for an f32.
+    pub fn number(mut self, name: &'static str, value: f64) -> Self {
+        self.defines.push((name, format!("({:?})", value as f32)));
         self
     }
 }
@@ -79,7 +85,7 @@ impl Library {
         ]
         .into_iter()
         .map(|(name, value)| (name.to_owned(), value.to_string()))
-        .chain(row.defines.iter().map(|(name, value)| ((*name).to_owned(), value.to_string())))
+        .chain(row.defines.iter().map(|(name, value)| ((*name).to_owned(), value.clone())))
         .collect();
         let include = |name: &str| match name.strip_prefix("generated/") {
             Some(generated) => generate(generated, row.bands),

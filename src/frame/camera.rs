@@ -1,0 +1,15 @@
+//! The camera: world to clip space.
+
+use crate::scene::Camera;
+use glam::{DMat4, DVec3};
+
+/// World to Vulkan clip space: y down, reversed depth (1 at the near plane, 0 at infinity). `aspect` is width / height.
+///
+/// The near plane lies at a thousandth of the distance from eye to target.
+pub fn clip_from_world(camera: &Camera, aspect: f64) -> DMat4 {
+    let (eye, target) = (camera.eye.as_dvec3(), camera.target.as_dvec3());
+    let near = 1e-3 * eye.distance(target);
+    let view = DMat4::look_at_rh(eye, target, camera.up().as_dvec3());
+    let projection = DMat4::perspective_infinite_reverse_rh(f64::from(camera.fov_deg).to_radians(), aspect, near);
+    DMat4::from_scale(DVec3::new(1.0, -1.0, 1.0)) * projection * view
+}

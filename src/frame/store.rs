@@ -1,0 +1,214 @@
+//! What a scene keeps on the device from frame to frame: fields, transfer vectors, vertices, drawables. Only what its
+//! entities need is baked and uploaded.
+
+use crate::asset::mesh::Mesh;
+use crate::bake::cache::Cache;
+use crate::bake::{self, Baker, Report};
+use crate::error::{Error, Result};
+use crate::field::quantity::{Kind, Storage, channel_stride};
+use crate::field::{Header, ShadowField};
+use crate::gpu::{Buffer, BufferKind};
+use crate::layout::NONE;
+use crate::render::draw::Drawable;
+use crate::scene::Scene;
+use ash::vk;
+use glam::DVec3;
+use std::ops::Range;
+
+/// Alignment of everything that a pass may bind as a range: the largest that Vulkan lets a device ask for.
+pub const ALIGNMENT: u64 = 256;
+
+/// Told what is being baked and how far it is: name, samples done, samples in all.
+pub type Progress<'p> = &'p dyn Fn(&str, u32, u32);
+
+/// A field in the store.
+pub struct Slot {
+    /// Its parameters.
+    pub header: Header,
+    /// Its bytes in the store.
+    pub bytes: Range<u64>,
+}
+
+impl Slot {
+    /// First quad of the field, as shaders count.
+    pub fn quad(&self) -> u32 {
+        (self.bytes.start / (4 * self.header.storage.bytes() as u64)) as u32
+    }
+}
+
+/// One mesh of the scene.
+pub struct Geometry {
+    /// Its vertices in the vertex buffer.
+    pub vertices: Range<u32>,
+    /// First quad of its transfer vectors, or [`NONE`] where the cosine of the normal is exact.
+    pub transfer_first: u32,
+    /// Occlusion field, if an entity needs one.
+    pub blocked: Option<Slot>,
+    /// Radiance field, if an entity needs one.
+    pub radiance: Option<Slot>,
+    /// For drawing.
+    pub drawable: Drawable,
+    /// Centre of the bounding sphere, metres.
+    pub centre_m: DVec3,
+    /// Bounding radius, metres.
+    pub radius_m: f64,
+}
+
+/// What one bake cost.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Baked {
+    /// Mesh and kind.
+    pub what: String,
+    /// Report of the bake.
+    pub report: Report,
+}
+
+/// Device-resident data of a scene.
+pub struct Store {
+    /// All fields.
+    pub fields: Buffer,
+    /// Transfer vectors of all receivers' meshes.
+    pub transfers: Buffer,
+    /// Position and normal of all meshes, a quad each.
+    pub vertices: Buffer,
+    /// The scene's meshes.
+    pub geometries: Vec<Geometry>,
+    /// Bakes that were not found in the cache.
+    pub baked: Vec<Baked>,
+    /// Number format of the fields.
+    pub storage: Storage,
+    bands: usize,
+}
+
+/// Which fields the entities of a mesh need: none for what only receives, no radiance field for a light of one colour.
+fn needs(scene: &Scene, mesh: usize) -> [Option<Kind>; 2] {
+    let entities = || scene.entities.iter().filter(|e| e.mesh == mesh);
+    let coloured = scene.meshes[mesh].colors.is_some();
+    let blocked = entities().any(|e| e.occludes || (e.emits && !coloured));
+    let radiance = coloured && entities().any(|e| e.emits);
+    [blocked.then_some(Kind::Occlusion), radiance.then_some(Kind::Radiance)]
+}
+
+impl Store {
+    /// Bakes or finds everything that `scene` needs.
+    ///
+    /// # Errors
+    /// `Input` when the fields together are larger than the device can bind, or a mesh cannot be baked.
+    pub fn new(
+        baker: &Baker,
+        cache: &Cache,
+        scene: &Scene,
+        options: &bake::Options,
+        progress: Progress<'_>,
+    ) -> Result<Self> {
+        let device = baker.device();
+        let mut total = 0;
+        let mut slots: Vec<[Option<Slot>; 2]> = Vec::new();
+        for (index, mesh) in scene.meshes.iter().enumerate() {
+            slots.push(needs(scene, index).map(|kind| {
+                kind.map(|kind| {
+                    let header = bake::header(mesh, kind, options);
+                    let bytes = total..total + header.payload_bytes();
+                    total = bytes.end.next_multiple_of(ALIGNMENT);
+                    Slot { header, bytes }
+                })
+            }));
+        }
+        let most = u64::from(device.limits.max_storage_buffer_range);
+        if total > most {
+            return Err(Error::Input(format!(
+                "the scene's fields take {total} bytes, the device can bind {most}: use a smaller --lattice or f16 storage"
+            )));
+        }
+        let mut fields = Buffer::new(device, "fields", BufferKind::Device, total.max(ALIGNMENT))?;
+        let mut baked = Vec::new();
+        for (mesh, slot) in slots.iter_mut().zip(&scene.meshes).flat_map(|(pair, mesh)| {
+            pair.iter_mut().flatten().map(move |slot| (mesh, slot))
+        }) {
+            let what = format!("{} {}", mesh.name, if slot.header.kind == Kind::Radiance { "light" } else { "shadow" });
+            let done = |now, all| progress(&what, now, all);
+            let target = (&mut fields, slot.bytes.start);
+            if let Some(report) = cache.field(baker, mesh, &mut slot.header, target, &done)? {
+                baked.push(Baked { what, report });
+            }
+        }
+
+        let (mut transfers, mut vertices, mut geometries) = (Vec::new(), Vec::<[f32; 4]>::new(), Vec::new());
+        for (index, (mesh, [blocked, radiance])) in scene.meshes.iter().zip(slots).enumerate() {
+            let (centre, radius_m) = mesh.bounding_sphere();
+            let vertex_first = vertices.len() as u32;
+            for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
+                vertices.push((position - centre).extend(0.0).to_array());
+                vertices.push(normal.extend(0.0).to_array());
+            }
+            let receives = scene.entities.iter().any(|e| e.mesh == index && e.receives);
+            let transfer_first = if receives && bakes_transfer(mesh) {
+                let what = format!("{} transfer", mesh.name);
+                let done = |now, all| progress(&what, now, all);
+                let (floats, report) = cache.transfer(baker, mesh, options.bands, options.face_px, &done)?;
+                baked.extend(report.map(|report| Baked { what, report }));
+                let first = transfers.len() / 4;
+                transfers.extend(floats);
+                first as u32
+            } else {
+                NONE
+            };
+            geometries.push(Geometry {
+                vertices: vertex_first / 2..vertices.len() as u32 / 2,
+                transfer_first,
+                blocked,
+                radiance,
+                drawable: Drawable::new(device, mesh)?,
+                centre_m: centre.as_dvec3(),
+                radius_m: f64::from(radius_m),
+            });
+        }
+        if transfers.is_empty() {
+            transfers.resize(4, 0.0);
+        }
+        Ok(Store {
+            fields,
+            transfers: Buffer::with_data(device, "transfers", &transfers)?,
+            vertices: Buffer::with_data(device, "vertices", &vertices)?,
+            geometries,
+            baked,
+            storage: options.storage,
+            bands: options.bands,
+        })
+    }
+
+    /// Format of a texel view of the fields.
+    pub fn field_format(&self) -> vk::Format {
+        match self.storage {
+            Storage::F32 => vk::Format::R32G32B32A32_SFLOAT,
+            Storage::F16 => vk::Format::R16G16B16A16_SFLOAT,
+        }
+    }
+
+    /// A copy of one field in host memory, for the CPU twin.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn field(&self, slot: &Slot) -> Result<ShadowField> {
+        Ok(ShadowField { header: slot.header.clone(), payload: self.fields.download_range(slot.bytes.clone())? })
+    }
+
+    /// A copy of a mesh's transfer vectors: floats and their stride.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn transfer(&self, geometry: &Geometry) -> Result<Option<(Vec<f32>, usize)>> {
+        if geometry.transfer_first == NONE {
+            return Ok(None);
+        }
+        let stride = channel_stride(self.bands);
+        let first = u64::from(geometry.transfer_first) * 16;
+        let size = geometry.vertices.len() as u64 * stride as u64 * 4;
+        Ok(Some((self.transfers.download_range(first..first + size)?, stride)))
+    }
+}
+
+/// Whether a mesh can shadow itself; if not, its transfer is the cosine of the normal.
+pub fn bakes_transfer(mesh: &Mesh) -> bool {
+    !mesh.is_flat() && !mesh.is_convex()
+}

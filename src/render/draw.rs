@@ -1,0 +1,142 @@
+//! Pass "draw": lit vertices to a picture.
+//!
+//! Inputs: a mesh an entity (positions from its sphere's centre in metres, emission pattern, indices) and the entity's part
+//! of the radiosity buffer. Output: linear RGBA of `width` x `height`, multisampled with depth and resolved.
+
+use crate::asset::mesh::Mesh;
+use crate::error::Result;
+use crate::gpu::commands::Target;
+use crate::gpu::memory::ImageShape;
+use crate::gpu::{Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
+use crate::shaders::{Library, Row};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec3};
+use std::sync::Arc;
+
+/// Linear half floats: 11 bits are more than a PNG shows, at half the bandwidth of f32.
+const COLOR: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
+const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
+
+/// A mesh as it is drawn.
+pub struct Drawable {
+    positions: Buffer,
+    emission: Buffer,
+    indices: Buffer,
+    index_count: u32,
+}
+
+impl Drawable {
+    /// Uploads a mesh; without colours its emission pattern is white.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn new(device: &Arc<Device>, mesh: &Mesh) -> Result<Self> {
+        let (centre, _) = mesh.bounding_sphere();
+        let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| (p - centre).to_array()).collect();
+        let white = vec![Vec3::ONE; positions.len()];
+        let emission: Vec<[f32; 3]> = mesh.colors.as_ref().unwrap_or(&white).iter().map(Vec3::to_array).collect();
+        Ok(Drawable {
+            positions: Buffer::with_data(device, "draw positions", &positions)?,
+            emission: Buffer::with_data(device, "draw emission", &emission)?,
+            indices: Buffer::with_data(device, "draw indices", &mesh.triangles)?,
+            index_count: 3 * mesh.triangles.len() as u32,
+        })
+    }
+}
+
+/// One entity to draw.
+pub struct Item<'d> {
+    /// Its mesh.
+    pub drawable: &'d Drawable,
+    /// From the mesh's frame (metres from its sphere's centre) to clip space, reversed depth.
+    pub clip_from_object: Mat4,
+    /// Radiance factor of its emission pattern.
+    pub emission: Vec3,
+    /// Byte offset of its vertices in the radiosity buffer.
+    pub radiosity_offset: u64,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    clip_from_object: [f32; 16],
+    emission: [f32; 4],
+}
+
+/// The pipeline and its images.
+pub struct Draw {
+    pipeline: GraphicsPipeline,
+    samples: Option<Image>,
+    depth: Image,
+    /// The finished picture.
+    pub picture: Image,
+}
+
+impl Draw {
+    /// For pictures of `width` x `height`, with 4 samples a pixel where `multisample` is set and the device offers it.
+    ///
+    /// # Errors
+    /// `Input` when the picture is larger than the device's images.
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        [width, height]: [u32; 2],
+        multisample: bool,
+    ) -> Result<Self> {
+        let limits = &device.limits;
+        let offered = limits.framebuffer_color_sample_counts & limits.framebuffer_depth_sample_counts;
+        let samples = if multisample && offered.contains(vk::SampleCountFlags::TYPE_4) { 4 } else { 1 };
+        let shape = ImageShape { format: COLOR, width, height, samples: 1 };
+        let state = GraphicsState { color: COLOR, depth: Some(DEPTH), samples, cull: vk::CullModeFlags::NONE };
+        let vertex = library.shader(&Row::new("draw.vert", 4))?;
+        let fragment = library.shader(&Row::new("draw.frag", 4))?;
+        Ok(Draw {
+            pipeline: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
+            samples: (samples > 1)
+                .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))
+                .transpose()?,
+            depth: Image::new(device, "draw depth", ImageShape { format: DEPTH, samples, ..shape })?,
+            picture: Image::new(device, "picture", shape)?,
+        })
+    }
+
+    /// Images whose content is thrown away before each frame: colour ones first, the depth image last.
+    pub fn attachments(&self) -> impl Iterator<Item = &Image> {
+        self.samples.iter().chain([&self.picture, &self.depth])
+    }
+
+    /// Draws all items over a background of one colour.
+    ///
+    /// # Errors
+    /// What recording returns.
+    pub fn record<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        items: &[Item<'r>],
+        radiosity: &'r Buffer,
+        background: Vec3,
+    ) -> Result<()> {
+        let target = Target {
+            color: self.samples.as_ref().unwrap_or(&self.picture),
+            clear: background.extend(1.0).to_array(),
+            depth: Some(&self.depth),
+            resolve: self.samples.as_ref().map(|_| &self.picture),
+        };
+        let shape = self.picture.shape;
+        commands.render(&target, |drawing| {
+            for item in items {
+                let mesh = item.drawable;
+                let vertices = [(&mesh.positions, 0), (&mesh.emission, 0), (radiosity, item.radiosity_offset)];
+                drawing.bind(&self.pipeline, &vertices, &mesh.indices);
+                drawing.area(0, 0, shape.width, shape.height);
+                drawing.push(&Push {
+                    clip_from_object: item.clip_from_object.to_cols_array(),
+                    emission: item.emission.extend(0.0).to_array(),
+                });
+                drawing.indexed(0..mesh.index_count);
+            }
+            Ok(())
+        })
+    }
+}

@@ -1,0 +1,8 @@
+//! The passes of a frame, one file each.
+
+pub mod draw;
+pub mod merge;
+pub mod reference;
+pub mod variant;
+
+pub use variant::Variant;

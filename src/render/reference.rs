@@ -1,0 +1,132 @@
+//! The CPU twin of "merge", in f64 and vertex by vertex, from the same stored numbers.
+
+use crate::field::{Lookup, ShadowField};
+use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count};
+use crate::sh::lobe::clamped_cosine;
+use crate::sh::product::Tensor;
+use crate::sh::rotation::Rotation;
+use glam::{DQuat, DVec3};
+use rayon::prelude::*;
+
+/// One object, as the merge sees it.
+pub struct Object<'f> {
+    /// Centre of the bounding sphere in the world, metres.
+    pub centre: DVec3,
+    /// Rotation to the world.
+    pub rotation: DQuat,
+    /// Uniform scale.
+    pub scale: f64,
+    /// Bounding radius after scaling, metres.
+    pub radius_m: f64,
+    /// Albedo / pi.
+    pub albedo_over_pi: [f64; 3],
+    /// Radiance factor of its light.
+    pub emission: [f64; 3],
+    /// Occlusion field, if one was baked.
+    pub blocked: Option<&'f ShadowField>,
+    /// Radiance field, if its light varies over the surface.
+    pub radiance: Option<&'f ShadowField>,
+}
+
+/// One receiver under all lights.
+pub struct Task<'t> {
+    /// All objects.
+    pub objects: &'t [Object<'t>],
+    /// Index of the one that is lit.
+    pub receiver: usize,
+    /// Occluders in the order in which they are multiplied.
+    pub occluders: &'t [usize],
+    /// Lights.
+    pub lights: &'t [usize],
+    /// Red, green and blue of the distant light.
+    pub sky: Option<&'t [Vec<f64>; 3]>,
+    /// Positions in the receiver's frame, metres from its sphere's centre.
+    pub positions: &'t [DVec3],
+    /// Unit normals in the receiver's frame.
+    pub normals: &'t [DVec3],
+    /// Transfer vectors, `transfer_stride` floats apart; `None` for the cosine of the normal.
+    pub transfer: Option<(&'t [f32], usize)>,
+    /// SH bands.
+    pub bands: usize,
+    /// Which samples a lookup takes.
+    pub lookup: Lookup,
+}
+
+type Coefficients = [f64; MAX_COEFFICIENTS];
+
+impl Task<'_> {
+    /// Radiosity of every vertex: linear RGB radiance that leaves the surface, without emission.
+    pub fn run(&self) -> Vec<[f64; 3]> {
+        let tensor = Tensor::new(self.bands, self.bands, self.bands);
+        let rotations: Vec<Rotation> =
+            self.objects.iter().map(|o| Rotation::new(self.bands, o.rotation)).collect();
+        (0..self.positions.len()).into_par_iter().map(|v| self.vertex(v, &tensor, &rotations)).collect()
+    }
+
+    fn vertex(&self, v: usize, tensor: &Tensor, rotations: &[Rotation]) -> [f64; 3] {
+        let count = coefficient_count(self.bands);
+        let receiver = &self.objects[self.receiver];
+        let position = receiver.centre + receiver.rotation * (self.positions[v] * receiver.scale);
+        let transfer = self.transfer(v, &rotations[self.receiver]);
+
+        let factors: Vec<(usize, Coefficients)> =
+            self.occluders.iter().map(|&j| (j, self.field(j, position, None, rotations))).collect();
+        // The chain of the occluders that `precedes` admits.
+        let chain = |precedes: &dyn Fn(usize) -> bool| {
+            let mut t = transfer;
+            for (_, b) in factors.iter().filter(|(j, _)| precedes(*j)) {
+                let mut product = [0.0; MAX_COEFFICIENTS];
+                tensor.multiply(&t[..count], &b[..count], &mut product[..count]);
+                t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
+            }
+            t
+        };
+        let against = |s: &[f64], t: &Coefficients| s.iter().zip(t).take(count).map(|(s, t)| s * t).sum::<f64>();
+
+        let mut sum = [0.0; 3];
+        if let Some(sky) = self.sky {
+            let t = chain(&|_| true);
+            sum.iter_mut().zip(sky).for_each(|(sum, sky)| *sum += against(sky, &t));
+        }
+        let distance = |j: usize| self.objects[j].centre.distance(position);
+        for &light in self.lights.iter().filter(|&&l| l != self.receiver) {
+            let t = chain(&|j| (distance(j), j) < (distance(light), light));
+            for (channel, sum) in sum.iter_mut().enumerate() {
+                let s = self.field(light, position, Some(channel), rotations);
+                *sum += self.objects[light].emission[channel] * against(&s, &t);
+            }
+        }
+        std::array::from_fn(|channel| sum[channel] * receiver.albedo_over_pi[channel])
+    }
+
+    fn transfer(&self, v: usize, rotation: &Rotation) -> Coefficients {
+        let count = coefficient_count(self.bands);
+        let mut out = [0.0; MAX_COEFFICIENTS];
+        match self.transfer {
+            Some((floats, stride)) => {
+                let local: Vec<f64> = floats[v * stride..v * stride + count].iter().map(|&f| f.into()).collect();
+                rotation.apply(&local, &mut out[..count]);
+            }
+            None => {
+                let normal = self.objects[self.receiver].rotation * self.normals[v];
+                out[..count].copy_from_slice(&clamped_cosine(self.bands, normal));
+            }
+        }
+        out
+    }
+
+    /// The field of object `j` at a world position, in the world frame: radiance of a channel, or the blocked part.
+    fn field(&self, j: usize, position: DVec3, channel: Option<usize>, rotations: &[Rotation]) -> Coefficients {
+        let object = &self.objects[j];
+        let count = coefficient_count(self.bands);
+        let local = object.rotation.inverse() * (position - object.centre) / object.radius_m;
+        let (field, channel) = match (object.radiance, channel) {
+            (Some(field), Some(channel)) => (field, channel),
+            _ => (object.blocked.expect("what blocks or shines in one colour has an occlusion field"), 0),
+        };
+        let (mut found, mut out) = ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
+        field.lookup(local, self.lookup, channel, &mut found[..count]);
+        rotations[j].apply(&found[..count], &mut out[..count]);
+        out
+    }
+}

@@ -15,9 +15,9 @@ use crate::error::{Error, Result};
 /// Most halvings of the edges of an icosahedron: 1.3 million triangles.
 pub const SPHERE_SUBDIVISION_LIMIT: u32 = 8;
 /// Emission pattern of the x < 0 half of [`torus_two_colour`], linear RGB.
-pub const COOL: Vec3 = Vec3::new(0.08, 0.35, 1.0);
+pub const COOL: Vec3 = Vec3::new(0.02, 0.12, 1.0);
 /// Emission pattern of the x > 0 half of [`torus_two_colour`], linear RGB.
-pub const WARM: Vec3 = Vec3::new(1.0, 0.38, 0.08);
+pub const WARM: Vec3 = Vec3::new(1.0, 0.12, 0.02);
 /// Half the width of the blend between the two, as a share of the major radius: narrow, yet several segments wide.
 const BLEND: f64 = 0.15;
 

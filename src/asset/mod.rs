@@ -3,6 +3,12 @@
 //! Everything read from a file is checked here, once: the modules below may trust a [`mesh::Mesh`] to be finite, indexed
 //! within range and of positive size.
 
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+
 pub mod embedded;
 pub mod enclose;
 pub mod environment;
@@ -14,3 +20,18 @@ pub mod teapot;
 pub mod topology;
 
 pub use mesh::Mesh;
+
+/// Reads a file of at most `limit_bytes`, whatever length it claims.
+///
+/// # Errors
+/// [`Error::Input`] where it cannot be read or is larger.
+pub fn read_file(path: &Path, limit_bytes: u64) -> Result<Vec<u8>> {
+    let file = File::open(path).map_err(|e| Error::input(path, e))?;
+    let mut bytes = Vec::new();
+    // One byte past the limit tells an oversized file; pipes and devices state no length.
+    file.take(limit_bytes + 1).read_to_end(&mut bytes).map_err(|e| Error::input(path, e))?;
+    if bytes.len() as u64 > limit_bytes {
+        return Err(Error::input(path, format!("over the limit of {} MiB", limit_bytes >> 20)));
+    }
+    Ok(bytes)
+}

@@ -11,8 +11,6 @@
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::Read as _;
 use std::path::Path;
 
 use glam::Vec3;
@@ -28,11 +26,7 @@ pub const FILE_LIMIT_BYTES: u64 = 256 << 20;
 /// # Errors
 /// [`Error::Input`]: missing, over [`FILE_LIMIT_BYTES`], or as [`parse`].
 pub fn load(path: &Path) -> Result<Mesh> {
-    let file = File::open(path).map_err(|e| Error::input(path, e))?;
-    let mut bytes = Vec::new();
-    // One byte past the limit tells an oversized file; its stated length may be wrong, as for a pipe.
-    file.take(FILE_LIMIT_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::input(path, e))?;
-    parse(&bytes, path)
+    parse(&super::read_file(path, FILE_LIMIT_BYTES)?, path)
 }
 
 /// Reads OBJ text; see [`Mesh::parse`].

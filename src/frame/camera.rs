@@ -1,7 +1,8 @@
 //! The camera: world to clip space.
 
 use crate::scene::Camera;
-use glam::{DMat4, DVec3};
+use glam::DMat4;
+use glam::dcamera::rh::{proj::vulkan, view};
 
 /// World to Vulkan clip space: y down, reversed depth (1 at the near plane, 0 at infinity). `aspect` is width / height.
 ///
@@ -9,7 +10,6 @@ use glam::{DMat4, DVec3};
 pub fn clip_from_world(camera: &Camera, aspect: f64) -> DMat4 {
     let (eye, target) = (camera.eye.as_dvec3(), camera.target.as_dvec3());
     let near = 1e-3 * eye.distance(target);
-    let view = DMat4::look_at_rh(eye, target, camera.up().as_dvec3());
-    let projection = DMat4::perspective_infinite_reverse_rh(f64::from(camera.fov_deg).to_radians(), aspect, near);
-    DMat4::from_scale(DVec3::new(1.0, -1.0, 1.0)) * projection * view
+    let view = view::look_at_mat4(eye, target, camera.up().as_dvec3());
+    vulkan::perspective_infinite_reverse(f64::from(camera.fov_deg).to_radians(), aspect, near) * view
 }

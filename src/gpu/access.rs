@@ -65,11 +65,12 @@ impl Access {
         matches!(self, Access::TransferWrite | Access::ComputeWrite | Access::ColorWrite | Access::DepthWrite)
     }
 
-    /// Layout that an image is in while it is accessed so: GENERAL, except for attachments.
+    /// Layout that an image is in while it is accessed so: GENERAL, except for attachments and copies.
     pub(super) fn layout(self) -> vk::ImageLayout {
         match self {
             Access::ColorWrite => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
             Access::DepthWrite => vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
+            Access::TransferRead => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
             _ => vk::ImageLayout::GENERAL,
         }
     }

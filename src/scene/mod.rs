@@ -14,7 +14,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::asset::environment::Environment;
-use crate::asset::{Mesh, embedded, obj};
+use crate::asset::{Mesh, embedded, obj, read_file};
 use crate::error::{Error, Result};
 pub use data::{Camera, Data, EntityData, MeshData, Output};
 pub use motion::{Motion, Placement};
@@ -69,8 +69,8 @@ impl Scene {
             let bytes = embedded::read(path)?;
             return Self::parse(utf8(path, &bytes)?, path, &embedded::read);
         }
-        let bytes = read_file(path)?;
-        Self::parse(utf8(path, &bytes)?, path, &read_file)
+        let bytes = read_file(path, FILE_LIMIT_BYTES as u64)?;
+        Self::parse(utf8(path, &bytes)?, path, &read_named)
     }
 
     /// Reads a scene from text. `path` names it in messages; `read` is given the paths of files, which already start with
@@ -131,12 +131,9 @@ fn resolve(index: usize, data: &EntityData, mesh: usize, shape: &Mesh) -> Entity
     }
 }
 
-fn read_file(path: &Path) -> Result<Vec<u8>> {
-    let length = std::fs::metadata(path).map_err(|e| Error::input(path, e))?.len();
-    if length > obj::FILE_LIMIT_BYTES {
-        return Err(Error::input(path, format!("over the limit of {} MiB", obj::FILE_LIMIT_BYTES >> 20)));
-    }
-    std::fs::read(path).map_err(|e| Error::input(path, e))
+/// Files that a scene names: meshes and pictures.
+fn read_named(path: &Path) -> Result<Vec<u8>> {
+    read_file(path, obj::FILE_LIMIT_BYTES)
 }
 
 fn utf8<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a str> {

@@ -134,7 +134,7 @@ FieldPlace field_place(vec3 p, vec4 radial) {
 
     FieldPlace place;
 #if LOOKUP == 2
-    for (uint k = 0; k < 8; k++) {
+    [[unroll]] for (uint k = 0; k < 8; k++) {
         uint x = (k & 1) == 0 ? first.x : second.x;
         uint y = (k & 2) == 0 ? first.y : second.y;
         float wx = (k & 1) == 0 ? 1.0 - fraction.x : fraction.x;
@@ -161,16 +161,16 @@ FieldPlace field_place(vec3 p, vec4 radial) {
 // One channel of the field whose first quad is `base`; samples are `sample_quads` quads apart.
 void field_gather(FieldPlace place, uint base, uint sample_quads, out float b[COEFFICIENTS]) {
     vec4 sums[FIELD_QUADS];
-    for (uint q = 0; q < FIELD_QUADS; q++) {
+    [[unroll]] for (uint q = 0; q < FIELD_QUADS; q++) {
         sums[q] = vec4(0.0);
     }
-    for (uint k = 0; k < CORNERS; k++) {
+    [[unroll]] for (uint k = 0; k < CORNERS; k++) {
         uint at = base + place.corner[k] * sample_quads;
-        for (uint q = 0; q < FIELD_QUADS; q++) {
+        [[unroll]] for (uint q = 0; q < FIELD_QUADS; q++) {
             sums[q] += place.weight[k] * field_quad(at + q);
         }
     }
-    for (uint i = 0; i < COEFFICIENTS; i++) {
+    [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
         b[i] = sums[i / 4][i % 4];
     }
 }

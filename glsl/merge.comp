@@ -1,4 +1,5 @@
 #version 460
+#extension GL_EXT_control_flow_attributes : require
 // Light on one receiver: for every vertex, its transfer is multiplied by the visibility of every occluder, nearest list entry
 // first, and meets each light at its place in the order. There is one running product a light (of the occluders nearer than
 // it) and one for the sky (of all), so the entity loop is the same for every vertex of a workgroup.
@@ -9,8 +10,19 @@
 
 layout(local_size_x = WORKGROUP) in;
 
+const uint NONE = 0xffffffffu;
+const uint ROTATION_QUADS = ((BANDS * (4 * BANDS * BANDS - 1)) / 3 + 2) / 4;
+
+// What is the same for a whole workgroup.
+#if UNIFORM
+layout(std140, binding = 0) uniform Entities { Entity entities[ENTITY_LIMIT]; };
+layout(std140, binding = 1) uniform Rotations { vec4 rotations[ENTITY_LIMIT * ROTATION_QUADS]; };
+layout(std140, binding = 6) uniform Sky { vec4 sky[COEFFICIENTS]; };
+#else
 layout(std430, binding = 0) readonly buffer Entities { Entity entities[]; };
-layout(std430, binding = 1) readonly buffer Rotations { float rotations[]; };
+layout(std430, binding = 1) readonly buffer Rotations { vec4 rotations[]; };
+layout(std430, binding = 6) readonly buffer Sky { vec4 sky[]; };
+#endif
 layout(std430, binding = 2) readonly buffer List { uint list[]; };
 #define FIELD_BINDING 3
 #include "field.glsl"
@@ -33,25 +45,21 @@ vec4 vertex_quad(uint i) {
     return vertices[i];
 }
 #endif
-layout(std430, binding = 6) readonly buffer Sky { vec4 sky[]; };
 layout(std430, binding = 7) buffer Radiosity { vec4 radiosity[]; };
 
 layout(push_constant) uniform Pushed { Push push; };
 
-const uint NONE = 0xffffffffu;
-const uint ROTATION_STRIDE = ((BANDS * (4 * BANDS * BANDS - 1)) / 3 + 3) / 4 * 4;
-
-// The same number, for a value that is the same in a whole workgroup. A software driver that proves uniformity only of push
-// constants then loads entity data once a wave instead of once a lane.
+// The same number, for one that is the same in a whole workgroup. Mesa's software driver proves uniformity only of push
+// constants and what is computed from them; uniform blocks read at such an index are loaded once a wave, all else lane by lane.
 uint uniformly(uint x) {
-#if LAUNDER
+#if UNIFORM
     return push.digit[x & 15] | push.digit[(x >> 4) & 15] << 4 | push.digit[(x >> 8) & 15] << 8;
 #else
     return x;
 #endif
 }
 
-#define SH_ROTATION(k) rotations[instance + (k)]
+#define SH_ROTATION(k) rotations[instance + (k) / 4][(k) % 4]
 #include "generated/rotate.glsl"
 
 vec3 to_object(uint e, vec3 v) {
@@ -66,22 +74,22 @@ void transfer(uint v, vec3 normal_world, out float t[COEFFICIENTS]) {
         return;
     }
     uint at = push.transfer_first + v * FIELD_QUADS;
-    for (uint i = 0; i < COEFFICIENTS; i++) {
+    [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
         t[i] = transfer_quad(at + i / 4)[i % 4];
     }
-    sh_rotate(t, uniformly(push.receiver) * ROTATION_STRIDE);
+    sh_rotate(t, uniformly(push.receiver) * ROTATION_QUADS);
 }
 
 void occluder(uint e, vec3 from_world, out float b[COEFFICIENTS]) {
     vec3 p = to_object(e, from_world) * entities[e].centre.w;
     field_gather(field_place(p, entities[e].radial), entities[e].blocked_base, FIELD_QUADS, b);
-    sh_rotate(b, e * ROTATION_STRIDE);
+    sh_rotate(b, e * ROTATION_QUADS);
 }
 
 #if LIGHTS > 0
 float against(float s[COEFFICIENTS], float t[COEFFICIENTS]) {
     float sum = 0.0;
-    for (uint i = 0; i < COEFFICIENTS; i++) {
+    [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
         sum += s[i] * t[i];
     }
     return sum;
@@ -94,13 +102,13 @@ vec3 light(uint e, vec3 from_world, float t[COEFFICIENTS]) {
     if (entities[e].emission.w == 0.0) {
         // One colour: what it blocks is what shines.
         field_gather(place, entities[e].blocked_base, FIELD_QUADS, s);
-        sh_rotate(s, e * ROTATION_STRIDE);
+        sh_rotate(s, e * ROTATION_QUADS);
         return entities[e].emission.rgb * against(s, t);
     }
     vec3 sum;
-    for (uint channel = 0; channel < 3; channel++) {
+    [[unroll]] for (uint channel = 0; channel < 3; channel++) {
         field_gather(place, entities[e].radiance_base + channel * FIELD_QUADS, 3 * FIELD_QUADS, s);
-        sh_rotate(s, e * ROTATION_STRIDE);
+        sh_rotate(s, e * ROTATION_QUADS);
         sum[channel] = against(s, t);
     }
     return entities[e].emission.rgb * sum;
@@ -197,7 +205,7 @@ void main() {
 
     vec3 sum = vec3(0.0);
 #if SKY
-    for (uint i = 0; i < COEFFICIENTS; i++) {
+    [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
         sum += sky[i].rgb * t_sky[i];
     }
 #endif

@@ -17,7 +17,7 @@ use crate::layout;
 use crate::render::draw::{Draw, Item};
 use crate::render::merge::{Inputs, Job, Merge, Readable, rotation_stride};
 use crate::render::reference::{Object, Task};
-use crate::render::variant::{Form, MAX_LIGHTS, Variant};
+use crate::render::variant::{Form, MAX_LIGHTS, UNIFORM_ENTITIES, Variant};
 use crate::scene::{Placement, Scene};
 use crate::sh::basis::{Y00, coefficient_count};
 use crate::sh::rotation::Rotation;
@@ -79,16 +79,15 @@ impl Frame {
     ///
     /// # Errors
     /// As [`Store::new`], [`Merge::new`] and [`Draw::new`].
-    pub fn new(
-        baker: &Baker,
-        cache: &Cache,
-        scene: &Scene,
-        options: Options,
-        progress: Progress<'_>,
-    ) -> Result<Self> {
+    pub fn new(baker: &Baker, cache: &Cache, scene: &Scene, options: Options, progress: Progress<'_>) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
         let store = Store::new(baker, cache, scene, &options.bake, progress)?;
-        let variant = usable(device, &store, options.variant.unwrap_or_else(|| Variant::sane_default(device)));
+        let variant = usable(
+            device,
+            &store,
+            scene.entities.len(),
+            options.variant.unwrap_or_else(|| Variant::sane_default(device)),
+        );
 
         let lights: Vec<u32> = indices(scene, |e| e.emits);
         let occluder_count = scene.entities.iter().filter(|e| e.occludes).count() as u32;
@@ -120,7 +119,7 @@ impl Frame {
         let kinds: Vec<_> = jobs.iter().map(|job| (job.lights.len(), job.sky)).collect();
         let merge = Merge::new(device, library, form(&options, variant), &kinds)?;
         let draw = Draw::new(device, library, options.size, options.multisample)?;
-        let count = scene.entities.len().max(1) as u64;
+        let count = scene.entities.len().max(UNIFORM_ENTITIES as usize) as u64;
         let upload = |name: &str, bytes: u64| Buffer::new(device, name, BufferKind::Upload, bytes);
         let bands = options.bake.bands;
         let mut radiosity = Buffer::new(device, "radiosity", BufferKind::Device, radiosity_size.max(16))?;
@@ -318,8 +317,7 @@ impl Frame {
 
     fn items(&self, placements: &[Placement]) -> Vec<Item<'_>> {
         let [width, height] = self.options.size;
-        let clip_from_world =
-            camera::clip_from_world(&self.scene.data.camera, f64::from(width) / f64::from(height));
+        let clip_from_world = camera::clip_from_world(&self.scene.data.camera, f64::from(width) / f64::from(height));
         let items = placements.iter().enumerate().map(|(index, placement)| {
             let entity = &self.scene.entities[index];
             let world_from_object = DMat4::from_scale_rotation_translation(
@@ -409,17 +407,17 @@ fn split_lights(base: &Job, lights: &[u32]) -> Vec<Job> {
     groups.into_iter().enumerate().map(job).collect()
 }
 
-/// The variant, or its storage twin when a texel view of the device cannot hold the scene.
-fn usable(device: &Device, store: &Store, variant: Variant) -> Variant {
+/// The variant, less the texel views or uniform blocks that cannot hold the scene.
+fn usable(device: &Device, store: &Store, entity_count: usize, variant: Variant) -> Variant {
     let floats = vk::Format::R32G32B32A32_SFLOAT;
     let fits = TexelView::fits(device, store.field_format(), store.fields.size_bytes)
         && TexelView::fits(device, floats, store.transfers.size_bytes)
         && TexelView::fits(device, floats, store.vertices.size_bytes);
-    if variant.texel && !fits {
-        log::info!("the scene is larger than the device's texel views: reading storage blocks");
-        return variant.without_texels();
+    let chosen = variant.restricted(fits, entity_count <= UNIFORM_ENTITIES as usize);
+    if chosen != variant {
+        log::info!("the scene is too large for the variant \"{}\"; using \"{}\"", variant.name, chosen.name);
     }
-    variant
+    chosen
 }
 
 /// The form of the merge shader but for lights and sky.

@@ -122,9 +122,11 @@ impl Store {
         }
         let mut fields = Buffer::new(device, "fields", BufferKind::Device, total.max(ALIGNMENT))?;
         let mut baked = Vec::new();
-        for (mesh, slot) in slots.iter_mut().zip(&scene.meshes).flat_map(|(pair, mesh)| {
-            pair.iter_mut().flatten().map(move |slot| (mesh, slot))
-        }) {
+        for (mesh, slot) in slots
+            .iter_mut()
+            .zip(&scene.meshes)
+            .flat_map(|(pair, mesh)| pair.iter_mut().flatten().map(move |slot| (mesh, slot)))
+        {
             let what = format!("{} {}", mesh.name, if slot.header.kind == Kind::Radiance { "light" } else { "shadow" });
             let done = |now, all| progress(&what, now, all);
             let target = (&mut fields, slot.bytes.start);

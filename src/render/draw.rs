@@ -78,12 +78,7 @@ impl Draw {
     ///
     /// # Errors
     /// `Input` when the picture is larger than the device's images.
-    pub fn new(
-        device: &Arc<Device>,
-        library: &Library,
-        [width, height]: [u32; 2],
-        multisample: bool,
-    ) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, library: &Library, [width, height]: [u32; 2], multisample: bool) -> Result<Self> {
         let limits = &device.limits;
         let offered = limits.framebuffer_color_sample_counts & limits.framebuffer_depth_sample_counts;
         let samples = if multisample && offered.contains(vk::SampleCountFlags::TYPE_4) { 4 } else { 1 };

@@ -58,8 +58,7 @@ impl Task<'_> {
     /// Radiosity of every vertex: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self) -> Vec<[f64; 3]> {
         let tensor = Tensor::new(self.bands, self.bands, self.bands);
-        let rotations: Vec<Rotation> =
-            self.objects.iter().map(|o| Rotation::new(self.bands, o.rotation)).collect();
+        let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(self.bands, o.rotation)).collect();
         (0..self.positions.len()).into_par_iter().map(|v| self.vertex(v, &tensor, &rotations)).collect()
     }
 

@@ -13,18 +13,19 @@ pub struct Variant {
     pub name: &'static str,
     /// Fields, transfers and vertices are read through texel views rather than storage blocks.
     pub texel: bool,
-    /// Workgroup-uniform indices pass through push constants, so that Mesa's software driver sees that they are uniform.
-    pub launder: bool,
+    /// Entities, rotations and sky are uniform blocks, at indices that Mesa's software driver sees to be uniform; storage
+    /// blocks otherwise.
+    pub uniform: bool,
     /// Invocations a workgroup.
     pub workgroup: u32,
 }
 
 /// Every variant.
 pub const VARIANTS: &[Variant] = &[
-    Variant { name: "storage", texel: false, launder: false, workgroup: 64 },
-    Variant { name: "storage-push", texel: false, launder: true, workgroup: 64 },
-    Variant { name: "texel", texel: true, launder: false, workgroup: 64 },
-    Variant { name: "texel-push", texel: true, launder: true, workgroup: 64 },
+    Variant { name: "storage", texel: false, uniform: false, workgroup: 64 },
+    Variant { name: "storage-uniform", texel: false, uniform: true, workgroup: 64 },
+    Variant { name: "texel", texel: true, uniform: false, workgroup: 64 },
+    Variant { name: "texel-uniform", texel: true, uniform: true, workgroup: 64 },
 ];
 
 impl Variant {
@@ -42,15 +43,19 @@ impl Variant {
     /// What a device gets before anything was measured on it: texel reads are more than ten times faster than storage reads
     /// on a processor, and no slower than them on the GPUs that are known.
     pub fn sane_default(device: &Device) -> Self {
-        let name = if device.info.is_software() { "texel-push" } else { "storage" };
+        let name = if device.info.is_software() { "texel-uniform" } else { "storage" };
         Self::named(name).expect("the default is in the table")
     }
 
-    /// The same variant with storage reads, for data that no texel view of the device can hold.
-    pub fn without_texels(self) -> Self {
-        VARIANTS.iter().copied().find(|v| !v.texel && v.launder == self.launder).expect("each has a storage twin")
+    /// The variant that does without what a scene or device rules out.
+    pub fn restricted(self, texel: bool, uniform: bool) -> Self {
+        let (texel, uniform) = (self.texel && texel, self.uniform && uniform);
+        VARIANTS.iter().copied().find(|v| v.texel == texel && v.uniform == uniform).expect("every pair has a row")
     }
 }
+
+/// Entities that the uniform blocks hold: their 4-band rotations then take 16 128 of the 16 384 bytes that every device binds.
+pub const UNIFORM_ENTITIES: u32 = 48;
 
 /// What the merge shader is compiled for: a variant, the shape of the fields, and the lights of a dispatch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +91,8 @@ impl Form {
         let row = Row::new("merge.comp", self.bands)
             .define("WORKGROUP", self.variant.workgroup)
             .define("TEXEL", self.variant.texel)
-            .define("LAUNDER", self.variant.launder)
+            .define("UNIFORM", self.variant.uniform)
+            .define("ENTITY_LIMIT", UNIFORM_ENTITIES)
             .define("HALF", self.storage == Storage::F16)
             .define("LIGHTS", self.lights)
             .define("SKY", self.sky)
@@ -112,6 +118,9 @@ impl Form {
             .define("CELLS", cells)
             .define("LATITUDES", latitudes)
             .define("LONGITUDES", longitudes);
-        ["WARP_0", "WARP_1", "WARP_2"].into_iter().zip(CELL_WARP).fold(row, |row, (name, value)| row.number(name, value))
+        ["WARP_0", "WARP_1", "WARP_2"]
+            .into_iter()
+            .zip(CELL_WARP)
+            .fold(row, |row, (name, value)| row.number(name, value))
     }
 }

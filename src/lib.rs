@@ -19,6 +19,7 @@
 //! | light | linear Rec.709 radiance; radiosity B = albedo/pi * integral L V max(0, n.w) dw |
 //! | numbers | tables in f64, shaders in f32, field storage f16 or f32 |
 
+pub mod app;
 pub mod asset;
 pub mod bake;
 pub mod error;

@@ -1,4 +1,7 @@
-fn main() {
-    let c = shaderc::Compiler::new().unwrap();
-    let _ = c;
+//! The command-line program; everything it does is in the library.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    shadow_fields::app::main()
 }

@@ -156,11 +156,13 @@ impl Frame {
         })
     }
 
-    /// Lights every receiver and draws the picture; where `draw` is false only the former. Returns each pass's duration.
+    /// Lights every receiver, and draws the picture where `white` is given: radiance above it is brought down to it, hue kept,
+    /// before samples are averaged, so that edges of lights are smooth; infinity leaves radiance as it is. Returns each
+    /// pass's duration.
     ///
     /// # Errors
     /// `Device` when the device was lost, `Failed` when a barrier is missing.
-    pub fn render(&mut self, placements: &[Placement], draw: bool) -> Result<Vec<Timing>> {
+    pub fn render(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
         self.upload(placements);
         let inputs = self.inputs()?;
         let items = self.items(placements);
@@ -177,13 +179,13 @@ impl Frame {
             }
             Ok(())
         })?;
-        if draw {
+        if let Some(white) = white {
             commands.barrier(Access::ComputeWrite, Access::VertexRead);
             for image in self.draw.attachments() {
                 let depth = image.shape.format == vk::Format::D32_SFLOAT;
                 commands.image_barrier(image, None, if depth { Access::DepthWrite } else { Access::ColorWrite });
             }
-            commands.pass("draw", |c| self.draw.record(c, &items, &self.radiosity, self.background))?;
+            commands.pass("draw", |c| self.draw.record(c, &items, &self.radiosity, self.background, white))?;
             let picture = &self.draw.picture;
             commands.image_barrier(picture, Some(Access::ColorWrite), Access::TransferRead);
             commands.pass("read back", |commands| {

@@ -137,25 +137,38 @@ impl<'r> Commands<'r> {
         self.in_pass = true;
         let label_name = CString::new(name).unwrap_or_default();
         let label = vk::DebugUtilsLabelEXT::default().label_name(&label_name);
-        // SAFETY: the command buffer is recording; the queries were reset at its start.
+        // SAFETY: the command buffer is recording.
         unsafe {
             if let Some(names) = &self.device.names {
                 names.cmd_begin_debug_utils_label(self.buffer, &label);
             }
-            let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
-            self.device.handle.cmd_write_timestamp2(self.buffer, stage, self.queries, 2 * index);
         }
+        self.stamp(2 * index);
         let outcome = record(self);
+        self.stamp(2 * index + 1);
         // SAFETY: as above.
         unsafe {
-            let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
-            self.device.handle.cmd_write_timestamp2(self.buffer, stage, self.queries, 2 * index + 1);
             if let Some(names) = &self.device.names {
                 names.cmd_end_debug_utils_label(self.buffer);
             }
         }
         self.in_pass = false;
         outcome
+    }
+
+    /// Writes a timestamp once everything before is done.
+    fn stamp(&mut self, query: u32) {
+        let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
+        // SAFETY: the command buffer is recording and the query was reset at its start.
+        unsafe { self.device.handle.cmd_write_timestamp2(self.buffer, stage, self.queries, query) };
+        if self.device.info.is_software() {
+            // llvmpipe takes the time when it next rasterises or meets a barrier, not where the stamp stands among dispatches:
+            // an empty barrier settles it. It orders nothing that the passes' own barriers do not, and is not tracked.
+            let barriers = [vk::MemoryBarrier2::default().src_stage_mask(stage).dst_stage_mask(stage)];
+            let info = vk::DependencyInfo::default().memory_barriers(&barriers);
+            // SAFETY: the command buffer is recording and outside a render pass.
+            unsafe { self.device.handle.cmd_pipeline_barrier2(self.buffer, &info) };
+        }
     }
 
     fn pass_name(&self) -> String {

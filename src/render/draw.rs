@@ -61,7 +61,7 @@ pub struct Item<'d> {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
     clip_from_object: [f32; 16],
-    emission: [f32; 4],
+    emission_white: [f32; 4],
 }
 
 /// The pipeline and its images.
@@ -101,7 +101,7 @@ impl Draw {
         self.samples.iter().chain([&self.picture, &self.depth])
     }
 
-    /// Draws all items over a background of one colour.
+    /// Draws all items over a background of one colour. Radiance above `white` is brought down to it, hue kept.
     ///
     /// # Errors
     /// What recording returns.
@@ -111,6 +111,7 @@ impl Draw {
         items: &[Item<'r>],
         radiosity: &'r Buffer,
         background: Vec3,
+        white: f32,
     ) -> Result<()> {
         let target = Target {
             color: self.samples.as_ref().unwrap_or(&self.picture),
@@ -127,7 +128,7 @@ impl Draw {
                 drawing.area(0, 0, shape.width, shape.height);
                 drawing.push(&Push {
                     clip_from_object: item.clip_from_object.to_cols_array(),
-                    emission: item.emission.extend(0.0).to_array(),
+                    emission_white: item.emission.extend(white).to_array(),
                 });
                 drawing.indexed(0..mesh.index_count);
             }

@@ -1,0 +1,85 @@
+//! `shadow-fields bake`
+
+use super::context::{BakeArguments, Context};
+use super::{Global, output};
+use crate::asset::Mesh;
+use crate::bake;
+use crate::error::{Error, Result};
+use crate::field::{Kind, ShadowField};
+use crate::gpu::{Buffer, BufferKind};
+use clap::Args;
+use glam::Vec3;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Arguments of `bake`.
+#[derive(Args)]
+pub struct Arguments {
+    /// Mesh, Wavefront OBJ
+    mesh: PathBuf,
+    /// Field file to write
+    #[arg(short, long, value_name = "F.sf")]
+    output: PathBuf,
+    /// Bake a radiance field of a surface that shines with this colour (times the mesh's own colours, if it has them)
+    /// instead of an occlusion field
+    #[arg(long, value_name = "R,G,B", value_parser = color)]
+    radiance: Option<Vec3>,
+    #[command(flatten)]
+    bake: BakeArguments,
+}
+
+fn color(text: &str) -> std::result::Result<Vec3, String> {
+    let numbers: Vec<f32> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
+    match numbers[..] {
+        [r, g, b] if text.split(',').count() == 3 && numbers.iter().all(|c| c.is_finite() && *c >= 0.0) => {
+            Ok(Vec3::new(r, g, b))
+        }
+        _ => Err(format!("\"{text}\" is no radiance like 1,0.5,0.2: three finite numbers of at least 0")),
+    }
+}
+
+/// Bakes one field. The result does not depend on the cache, which is not used.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let mut mesh = Mesh::load(&arguments.mesh)?;
+    let kind = if arguments.radiance.is_some() { Kind::Radiance } else { Kind::Occlusion };
+    if let Some(radiance) = arguments.radiance {
+        let white = vec![Vec3::ONE; mesh.positions.len()];
+        let colors = mesh.colors.as_ref().unwrap_or(&white).iter().map(|c| *c * radiance).collect();
+        mesh = Mesh::new(mesh.name, mesh.positions, mesh.normals, Some(colors), mesh.triangles)?;
+    }
+    let context = Context::new(global)?;
+    let mut header = bake::header(&mesh, kind, &arguments.bake.options());
+    header.validate().map_err(|error| error.context(arguments.mesh.display()))?;
+    let store = Buffer::new(&context.device, "field", BufferKind::Device, header.payload_bytes())?;
+    let report = context
+        .baker
+        .field(&mesh, &mut header, (&store, 0), &|done, all| context.progress.show(&mesh.name, done, all))
+        .map_err(|error| error.context(arguments.mesh.display()))?;
+    let payload = store.download_range(0..header.payload_bytes())?;
+    let field = ShadowField { header, payload };
+    drop(store);
+    let result = json!({
+        "origin": context.origin(global), "file": arguments.output.display().to_string(),
+        "triangles": mesh.triangles.len(), "report": report, "header": field.header,
+    });
+    // A field that the validation layer objected to is not written.
+    context.finish()?;
+    field.write(&arguments.output).map_err(|error| match error {
+        Error::Input(message) => Error::Failed(message),
+        other => other,
+    })?;
+    if global.json {
+        output::say(result.to_string());
+    } else {
+        output::say(format!(
+            "{}: {} samples ({} filled), {} triangles, {} bytes, {:.2} s",
+            arguments.output.display(),
+            report.samples + report.filled,
+            report.filled,
+            mesh.triangles.len(),
+            field.payload.len(),
+            report.total.as_secs_f64()
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,179 @@
+//! Options that every subcommand has, and the device that they lead to.
+
+use super::output::{self, Progress};
+use crate::bake::{self, Baker, cache::Cache};
+use crate::error::{Error, Result};
+use crate::field::{Lattice, Lookup, Storage};
+use crate::frame;
+use crate::gpu::{self, Device, Validation};
+use crate::render::Variant;
+use crate::scene::Scene;
+use crate::shaders::Library;
+use clap::Args;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Options of every subcommand.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Everywhere")]
+pub struct Global {
+    /// Vulkan device by index, part of its name, or UUID (see `devices`); default: the first GPU, else a software device
+    #[arg(long, global = true, value_name = "INDEX|NAME|UUID")]
+    pub device: Option<String>,
+    /// Run under the Khronos validation layer; any message makes the run fail
+    #[arg(long, global = true, default_value = "off", value_name = "off|core|sync|gpu")]
+    pub validation: Validation,
+    /// Seed of everything random
+    #[arg(long, global = true, default_value_t = 1)]
+    pub seed: u64,
+    /// Print results as JSON
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Nothing on stderr but errors
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// More log lines on stderr; twice for all
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// No progress bars
+    #[arg(long, global = true)]
+    pub no_progress: bool,
+    /// Folder for baked fields and compiled shaders; default: shadow-fields in the XDG cache folder
+    #[arg(long, global = true, value_name = "DIR")]
+    pub cache_dir: Option<PathBuf>,
+    /// Keep and use nothing on disk
+    #[arg(long, global = true)]
+    pub no_cache: bool,
+    /// Folder whose shader files are used instead of the built-in ones of the same name
+    #[arg(long, global = true, value_name = "DIR")]
+    pub shader_dir: Option<PathBuf>,
+}
+
+/// Options of a bake.
+#[derive(Args, Clone, Copy, Debug)]
+#[command(next_help_heading = "Baking")]
+pub struct BakeArguments {
+    /// Sample points: cube:SHELLSxCELLS or latlon:SHELLSxLATITUDESxLONGITUDES, then optionally ,chord|log|linear (spacing of
+    /// shells) ,scaled|raw (what is interpolated) ,inner=R ,outer=R (in bounding radii)
+    #[arg(long, default_value_t = Lattice::default(), value_name = "LATTICE")]
+    pub lattice: Lattice,
+    /// Edge of a captured cube face in texels
+    #[arg(long, default_value_t = 64, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=1024))]
+    pub face_px: u32,
+    /// SH bands, 2 to 7; N bands are N^2 coefficients
+    #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7))]
+    pub bands: u32,
+    /// Number format of stored coefficients
+    #[arg(long, default_value = "f16", value_name = "f16|f32")]
+    pub storage: Storage,
+}
+
+impl BakeArguments {
+    /// As the bake wants them.
+    pub fn options(&self) -> bake::Options {
+        bake::Options {
+            bands: self.bands as usize,
+            storage: self.storage,
+            lattice: self.lattice,
+            face_px: self.face_px,
+        }
+    }
+}
+
+/// Options of a merge.
+#[derive(Args, Clone, Copy, Debug)]
+#[command(next_help_heading = "Merging")]
+pub struct MergeArguments {
+    /// Shader variant: storage, storage-uniform, texel or texel-uniform; default: the device's fastest
+    #[arg(long, value_name = "NAME", value_parser = Variant::named)]
+    pub variant: Option<Variant>,
+    /// Samples that a lookup takes
+    #[arg(long, default_value = "trilinear", value_name = "nearest|radial|trilinear")]
+    pub lookup: Lookup,
+}
+
+/// Width and height from `WxH`.
+pub fn size(text: &str) -> std::result::Result<[u32; 2], String> {
+    let pair = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    pair.filter(|[w, h]| (1..=16384).contains(w) && (1..=16384).contains(h))
+        .ok_or_else(|| format!("\"{text}\" is no size like 1280x720"))
+}
+
+/// An open device with what goes with it.
+pub struct Context {
+    /// The device.
+    pub device: Arc<Device>,
+    /// Bakes on it.
+    pub baker: Baker,
+    /// Baked things on disk.
+    pub cache: Cache,
+    /// Where bakes show how far they are.
+    pub progress: Progress,
+    validation: Validation,
+}
+
+impl Context {
+    /// Opens the device that the options choose.
+    ///
+    /// # Errors
+    /// `Unsupported` when there is none.
+    pub fn new(global: &Global) -> Result<Self> {
+        let cache_dir = match (global.no_cache, &global.cache_dir) {
+            (true, _) => None,
+            (false, Some(folder)) => Some(folder.clone()),
+            (false, None) => dirs::cache_dir().map(|folder| folder.join("shadow-fields")),
+        };
+        if let Some(folder) = &global.shader_dir
+            && !folder.is_dir()
+        {
+            return Err(Error::input(folder, "is no folder of shaders"));
+        }
+        let device = Device::new(&gpu::Options {
+            device: global.device.clone(),
+            validation: global.validation,
+            cache_dir: cache_dir.clone(),
+        })?;
+        if device.info.is_software() {
+            output::note(global, format!("note: {} is a software device", device.info.name));
+        }
+        let library = Library { shader_dir: global.shader_dir.clone(), cache_dir: cache_dir.clone() };
+        let cache = Cache::new(cache_dir.as_deref());
+        let baker = Baker::new(&device, &library);
+        Ok(Context { device, baker, cache, progress: Progress::new(global), validation: global.validation })
+    }
+
+    /// Prepares a scene for drawing.
+    ///
+    /// # Errors
+    /// As [`frame::Frame::new`].
+    pub fn frame(&self, scene: &Scene, options: frame::Options) -> Result<frame::Frame> {
+        frame::Frame::new(&self.baker, &self.cache, scene, options, &|what, done, all| {
+            self.progress.show(what, done, all);
+        })
+    }
+
+    /// Ends the work on the device: keeps its pipeline cache, and fails when the validation layer had something to say.
+    ///
+    /// # Errors
+    /// `Failed` that quotes the layer.
+    pub fn finish(self) -> Result<()> {
+        self.device.save_pipeline_cache();
+        if self.validation == Validation::Off {
+            return Ok(());
+        }
+        gpu::validation::Messages::into_result(self.device.take_validation_messages())
+    }
+
+    /// What a result file says of where it comes from.
+    pub fn origin(&self, global: &Global) -> serde_json::Value {
+        serde_json::json!({
+            "program": concat!("shadow-fields ", env!("CARGO_PKG_VERSION")),
+            "revision": env!("SHADOW_FIELDS_REVISION"),
+            "device": self.device.info.name,
+            "driver": self.device.info.driver,
+            "vulkan": self.device.info.api,
+            "seed": global.seed,
+            "command_line": std::env::args().skip(1).collect::<Vec<_>>(),
+        })
+    }
+}

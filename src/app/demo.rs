@@ -1,0 +1,215 @@
+//! `shadow-fields demo`
+
+use super::context::{Context, MergeArguments, size};
+use super::render::white;
+use super::{Global, output};
+use crate::asset::{embedded, picture};
+use crate::bake;
+use crate::error::{Error, Result};
+use crate::field::Lookup;
+use crate::frame::{Frame, Options};
+use crate::scene::Scene;
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Arguments of `demo`.
+#[derive(Args)]
+pub struct Arguments {
+    /// Folder for the pictures
+    #[arg(short, long, default_value = "out", value_name = "DIR")]
+    output: PathBuf,
+    /// Size of the pictures; default: each scene's own
+    #[arg(long, value_parser = size, value_name = "WxH")]
+    size: Option<[u32; 2]>,
+    /// Frames that are timed, after two to warm up
+    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    timed_frames: u32,
+    /// No animations
+    #[arg(long)]
+    no_animations: bool,
+    #[command(flatten)]
+    merge: MergeArguments,
+}
+
+/// The scenes in the order of the table, and whether each is animated too.
+const SCENES: [(&str, bool); 5] = [
+    ("sphere_over_plane", false),
+    ("torus_over_plane", true),
+    ("teapot_lights", false),
+    ("glowing_torus", false),
+    ("twelve_instances", true),
+];
+/// Pictures of an animation, and how many are shown a second: three seconds.
+const ANIMATION: (u32, u16) = (36, 12);
+/// Size of an animation's pictures.
+const ANIMATION_SIZE: [u32; 2] = [480, 320];
+/// Scene of the pictures with and without interpolation and without the occluder.
+const PAIR_SCENE: &str = "sphere_over_plane";
+
+/// Bakes and renders the built-in scenes.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let started = Instant::now();
+    let context = Context::new(global)?;
+    std::fs::create_dir_all(&arguments.output)
+        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", arguments.output.display())))?;
+    let mut written = Vec::new();
+    let mut rows = Vec::new();
+    for (name, animated) in SCENES {
+        let scene = load(name)?;
+        let row = still(&context, arguments, name, &scene, &mut written, started)?;
+        output::note(global, format!("{}: {:.0} ms a frame", written[written.len() - 1].display(), row.frame_ms));
+        rows.push(row);
+        if animated && !arguments.no_animations {
+            written.push(animation(&context, arguments, name, &scene)?);
+        }
+    }
+    written.extend(pair(&context, arguments)?);
+    let origin = context.origin(global);
+    context.finish()?;
+    if global.json {
+        let files: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
+        output::say(json!({ "origin": origin, "scenes": rows, "pictures": files }).to_string());
+        return Ok(());
+    }
+    let header = ["scene", "vertices", "entities", "bake s", "merge ms", "draw ms", "frame ms", "frames/s"];
+    output::table(&header, &rows.iter().map(Row::cells).collect::<Vec<_>>());
+    let first = rows.first().map_or(0.0, |row| row.first_picture_s);
+    output::say(format!("first picture after {first:.2} s, all after {:.1} s", started.elapsed().as_secs_f64()));
+    for path in written {
+        output::say(path.display().to_string());
+    }
+    Ok(())
+}
+
+/// One line of the table.
+#[derive(serde::Serialize)]
+struct Row {
+    scene: &'static str,
+    vertices: usize,
+    entities: usize,
+    bake_s: f64,
+    merge_ms: f64,
+    draw_ms: f64,
+    frame_ms: f64,
+    first_picture_s: f64,
+    variant: &'static str,
+}
+
+impl Row {
+    fn cells(&self) -> Vec<String> {
+        let bake = if self.bake_s > 0.0 { format!("{:.2}", self.bake_s) } else { "cached".into() };
+        vec![
+            self.scene.to_owned(),
+            self.vertices.to_string(),
+            self.entities.to_string(),
+            bake,
+            format!("{:.2}", self.merge_ms),
+            format!("{:.2}", self.draw_ms),
+            format!("{:.2}", self.frame_ms),
+            format!("{:.1}", 1e3 / self.frame_ms),
+        ]
+    }
+}
+
+fn load(name: &str) -> Result<Scene> {
+    let path = format!("assets/scenes/{name}.toml");
+    let (_, text) = embedded::scenes()
+        .into_iter()
+        .find(|(found, _)| *found == name)
+        .ok_or_else(|| Error::Failed(format!("there is no built-in scene {name}")))?;
+    Scene::parse(text, Path::new(&path), &embedded::read)
+}
+
+fn options(arguments: &Arguments, scene: &Scene) -> Options {
+    let shape = &scene.data.output;
+    Options {
+        bake: bake::Options::default(),
+        lookup: arguments.merge.lookup,
+        variant: arguments.merge.variant,
+        size: arguments.size.unwrap_or([shape.width, shape.height]),
+        multisample: true,
+    }
+}
+
+/// The scene's picture, and its frame time while it moves.
+fn still(
+    context: &Context,
+    arguments: &Arguments,
+    name: &'static str,
+    scene: &Scene,
+    written: &mut Vec<PathBuf>,
+    started: Instant,
+) -> Result<Row> {
+    let options = options(arguments, scene);
+    let mut frame = context.frame(scene, options)?;
+    let path = arguments.output.join(format!("{name}.png"));
+    draw(&mut frame, scene, options, &path)?;
+    let first_picture_s = started.elapsed().as_secs_f64();
+    written.push(path);
+
+    let (mut merge, mut drawn, mut whole) = (Vec::new(), Vec::new(), Vec::new());
+    for index in 0..arguments.timed_frames + 2 {
+        let placements = scene.at(f64::from(index) / 30.0);
+        let start = Instant::now();
+        let passes = frame.render(&placements, Some(white(scene.data.output.exposure_ev)))?;
+        let wall = start.elapsed().as_secs_f64() * 1e3;
+        if index >= 2 {
+            let of = |name: &str| passes.iter().find(|t| t.pass == name).map_or(0.0, |t| t.milliseconds);
+            merge.push(of("merge"));
+            drawn.push(of("draw"));
+            whole.push(wall);
+        }
+    }
+    Ok(Row {
+        scene: name,
+        vertices: frame.receiver_vertex_count(),
+        entities: scene.entities.len(),
+        bake_s: frame.store.baked.iter().map(|b| b.report.total.as_secs_f64()).sum(),
+        merge_ms: output::median(&merge),
+        draw_ms: output::median(&drawn),
+        frame_ms: output::median(&whole),
+        first_picture_s,
+        variant: frame.variant.name,
+    })
+}
+
+fn draw(frame: &mut Frame, scene: &Scene, options: Options, path: &Path) -> Result<()> {
+    let exposure_ev = scene.data.output.exposure_ev;
+    frame.render(&scene.at(0.0), Some(white(exposure_ev)))?;
+    picture::write_png(path, options.size[0], options.size[1], &frame.picture(), exposure_ev)
+}
+
+fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene) -> Result<PathBuf> {
+    let options = Options { size: ANIMATION_SIZE, ..options(arguments, scene) };
+    let exposure_ev = scene.data.output.exposure_ev;
+    let mut frame = context.frame(scene, options)?;
+    let (count, fps) = ANIMATION;
+    let mut pictures = Vec::new();
+    for index in 0..count {
+        frame.render(&scene.at(f64::from(index) / f64::from(fps)), Some(white(exposure_ev)))?;
+        pictures.push(picture::encode_srgb(&frame.picture(), exposure_ev));
+    }
+    let path = arguments.output.join(format!("{name}_animation.png"));
+    picture::write_apng(&path, options.size[0], options.size[1], &pictures, fps)?;
+    Ok(path)
+}
+
+/// One scene without interpolation beside the one with it, and without its occluder.
+fn pair(context: &Context, arguments: &Arguments) -> Result<Vec<PathBuf>> {
+    let scene = load(PAIR_SCENE)?;
+    let nearest = Options { lookup: Lookup::Nearest, ..options(arguments, &scene) };
+    let path = arguments.output.join(format!("{PAIR_SCENE}_nearest.png"));
+    draw(&mut context.frame(&scene, nearest)?, &scene, nearest, &path)?;
+
+    let mut bare = scene.data.clone();
+    let lit = |index: usize| !scene.entities[index].occludes;
+    bare.entities = bare.entities.iter().enumerate().filter(|(i, _)| lit(*i)).map(|(_, e)| e.clone()).collect();
+    let source = format!("assets/scenes/{PAIR_SCENE}.toml");
+    let bare = Scene::parse(&bare.to_toml(), Path::new(&source), &embedded::read)?;
+    let alone = arguments.output.join(format!("{PAIR_SCENE}_without_occluder.png"));
+    let options = options(arguments, &bare);
+    draw(&mut context.frame(&bare, options)?, &bare, options, &alone)?;
+    Ok(vec![path, alone])
+}

@@ -1,0 +1,189 @@
+//! `shadow-fields inspect`
+
+use super::context::Context;
+use super::sheet::{self, Cell};
+use super::{Global, output};
+use crate::asset::Mesh;
+use crate::bake::capture::snapshot;
+use crate::error::{Error, Result};
+use crate::field::{Kind, Lookup, ShadowField};
+use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
+use crate::sh::cube;
+use clap::Args;
+use glam::DVec3;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Arguments of `inspect`.
+#[derive(Args)]
+pub struct Arguments {
+    /// Field file
+    field: PathBuf,
+    /// Look the field up at this place in the mesh's frame, metres
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    at: Option<DVec3>,
+    /// Write contact sheets of cube faces over latitude, longitude and distance
+    #[arg(long, value_name = "OUT.png")]
+    faces: Option<PathBuf>,
+    /// With --faces: capture this mesh anew beside what the field's coefficients say
+    #[arg(long, value_name = "MESH.obj", requires = "faces")]
+    mesh: Option<PathBuf>,
+    /// With --at: samples that the lookup takes
+    #[arg(long, default_value = "trilinear", value_name = "nearest|radial|trilinear")]
+    lookup: Lookup,
+}
+
+fn place(text: &str) -> std::result::Result<DVec3, String> {
+    let numbers: Vec<f64> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y, z] if text.split(',').count() == 3 && numbers.iter().all(|n| n.is_finite()) => Ok(DVec3::new(x, y, z)),
+        _ => Err(format!("\"{text}\" is no place like 1,0.5,-2")),
+    }
+}
+
+/// Shows a field.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let field = ShadowField::read(&arguments.field)?;
+    let header = &field.header;
+    let mut result = json!({
+        "file": arguments.field.display().to_string(),
+        "header": header,
+        "samples": header.lattice.sample_count(),
+        "stored_samples": header.lattice.stored_count(),
+        "payload_bytes": field.payload.len(),
+    });
+    if let Some(position_m) = arguments.at {
+        result["at"] = lookup(&field, position_m, arguments.lookup);
+    }
+    if let Some(path) = &arguments.faces {
+        let mesh = arguments.mesh.as_ref().map(|path| Mesh::load(path)).transpose()?;
+        write_sheet(global, &field, mesh.as_ref(), path)?;
+    }
+    if global.json {
+        output::say(result.to_string());
+        return Ok(());
+    }
+    let lattice = header.lattice;
+    let shells: Vec<String> = (0..lattice.shells).map(|k| format!("{:.3}", lattice.shell(k))).collect();
+    let lines = [
+        ("kind", format!("{:?}", header.kind).to_lowercase()),
+        ("mesh", format!("{} ({})", header.mesh, &header.mesh_hash[..16.min(header.mesh_hash.len())])),
+        ("bounding sphere", format!("centre {:?} m, radius {} m", header.centre_m, header.radius_m)),
+        ("bands", format!("{} ({} coefficients a channel)", header.bands, header.bands * header.bands)),
+        ("lattice", lattice.to_string()),
+        ("shells", format!("{} r", shells.join(" "))),
+        ("samples", format!("{} ({} filled from neighbours)", lattice.sample_count(), header.filled_samples)),
+        ("stored", format!("{} samples, {:?}, {} bytes", lattice.stored_count(), header.storage, field.payload.len())),
+        ("face", format!("{0} x {0} texels", header.face_px)),
+    ];
+    for (name, value) in lines {
+        output::say(format!("{name:16} {value}"));
+    }
+    if header.kind == Kind::Radiance {
+        output::say(format!("{:16} {}", "radiance scale", header.radiance_scale));
+    }
+    if result["at"] != serde_json::Value::Null {
+        output::say(format!("{:16} {}", "at", result["at"]));
+    }
+    Ok(())
+}
+
+/// Coefficients at a place in the mesh's frame, metres.
+fn lookup(field: &ShadowField, position_m: DVec3, lookup: Lookup) -> serde_json::Value {
+    let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
+    let position = (position_m - centre) / f64::from(field.header.radius_m);
+    let channel = |channel| {
+        let mut out = vec![0.0; coefficient_count(field.header.bands)];
+        field.lookup(position, lookup, channel, &mut out);
+        out
+    };
+    match field.header.kind {
+        Kind::Occlusion => json!({ "position_m": position_m.to_array(), "blocked": channel(0) }),
+        Kind::Radiance => {
+            let channels = [0, 1, 2].map(channel);
+            json!({ "position_m": position_m.to_array(), "radiance": channels })
+        }
+    }
+}
+
+/// Edge of a face on the sheet in pixels.
+const FACE_PX: usize = 20;
+/// Directions of the sheet's columns.
+const LONGITUDES: usize = 8;
+/// Polar angle of the sheet's blocks of rows, degrees from the equator.
+const LATITUDES_DEG: [f64; 3] = [45.0, 0.0, -45.0];
+/// Shells of the sheet, as fractions of their number.
+const SHELLS: [f64; 4] = [0.0, 0.3, 0.6, 1.0];
+
+fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: &std::path::Path) -> Result<()> {
+    let lattice = field.header.lattice;
+    let mut rows = Vec::new();
+    let mut eyes = Vec::new();
+    for latitude_deg in LATITUDES_DEG {
+        for fraction in SHELLS {
+            let shell = (fraction * f64::from(lattice.shells - 1)).round() as u32;
+            let distance = lattice.shell(shell);
+            let latitude = latitude_deg.to_radians();
+            let mut cells = Vec::new();
+            for column in 0..LONGITUDES {
+                let longitude = std::f64::consts::TAU * column as f64 / LONGITUDES as f64;
+                let direction =
+                    DVec3::new(latitude.cos() * longitude.cos(), latitude.sin(), latitude.cos() * longitude.sin());
+                eyes.push(direction * distance);
+                cells.push(reconstruct(field, direction * distance));
+            }
+            rows.push((format!("{latitude_deg:+.0} deg, {distance:.2} r"), cells));
+        }
+    }
+    if let Some(mesh) = mesh {
+        let context = Context::new(global)?;
+        let radiance = field.header.kind == Kind::Radiance;
+        let faces = snapshot(&context.device, context.baker.library(), mesh, &eyes, FACE_PX as u32, radiance)?;
+        let mut captured = faces.chunks(LONGITUDES);
+        for (_, cells) in &mut rows {
+            let fresh = captured.next().ok_or_else(|| Error::Failed("a captured row is missing".into()))?;
+            *cells = fresh.iter().zip(&*cells).flat_map(|(a, b)| [a.clone(), b.clone()]).collect();
+        }
+        context.finish()?;
+    }
+    let columns: Vec<String> = (0..LONGITUDES).map(|c| format!("{} deg", 360 * c / LONGITUDES)).collect();
+    let per_column = if mesh.is_some() { 2 } else { 1 };
+    let brightest = rows.iter().flat_map(|(_, cells)| cells.iter().flatten()).fold(1.0_f32, |m, c| m.max(*c));
+    sheet::write(path, &columns, per_column, &rows, FACE_PX, brightest)?;
+    let pairs = if mesh.is_some() { ", each captured (left) and from the coefficients (right)" } else { "" };
+    output::note(
+        global,
+        format!("{}: cubes unfolded: -X +Z +X -Z in a row, +Y above, -Y below{pairs}", path.display()),
+    );
+    Ok(())
+}
+
+/// Six faces of what the field's coefficients say is seen from a place (in r): visibility, or radiance in linear RGB.
+fn reconstruct(field: &ShadowField, position: DVec3) -> Cell {
+    let bands = field.header.bands;
+    let count = coefficient_count(bands);
+    let channels = field.header.kind.channels();
+    let found: Vec<Vec<f64>> = (0..channels)
+        .map(|channel| {
+            let mut out = vec![0.0; count];
+            field.lookup(position, Lookup::Trilinear, channel, &mut out);
+            out
+        })
+        .collect();
+    let mut cell = Vec::with_capacity(18 * FACE_PX * FACE_PX);
+    for face in 0..cube::FACE_COUNT {
+        for y in 0..FACE_PX {
+            for x in 0..FACE_PX {
+                let w = cube::direction(face, cube::texel_st(x, FACE_PX), cube::texel_st(y, FACE_PX));
+                let mut basis = [0.0; MAX_COEFFICIENTS];
+                evaluate(bands, w, &mut basis);
+                let value = |channel: usize| -> f64 {
+                    let sum: f64 = found[channel].iter().zip(&basis).map(|(c, y)| c * y).sum();
+                    if field.header.kind == Kind::Occlusion { 1.0 - sum } else { sum }
+                };
+                cell.extend((0..3).map(|c| value(c.min(channels - 1)).max(0.0) as f32));
+            }
+        }
+    }
+    cell
+}

@@ -1,0 +1,72 @@
+//! The command line: one file a subcommand. Results go to stdout, logs and progress to stderr.
+
+mod bake;
+mod context;
+mod demo;
+mod devices;
+mod inspect;
+mod output;
+mod render;
+mod sheet;
+
+use crate::error::Result;
+use clap::{Parser, Subcommand};
+pub use context::Global;
+use std::process::ExitCode;
+
+/// Precomputed shadow fields: soft shadows of many moving objects under many moving lights, on Vulkan.
+///
+/// Start with `shadow-fields demo`: it bakes and renders the built-in scenes into out/.
+#[derive(Parser)]
+#[command(name = "shadow-fields", version, max_term_width = 110)]
+struct Cli {
+    #[command(flatten)]
+    global: Global,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Bake and render the built-in scenes into a folder and print a table of times
+    Demo(demo::Arguments),
+    /// Render a scene file to a picture, an animation or a table of vertices
+    Render(render::Arguments),
+    /// Bake the field of a mesh into an .sf file
+    Bake(bake::Arguments),
+    /// Show what is in an .sf file: header, one lookup, contact sheets
+    Inspect(inspect::Arguments),
+    /// List the Vulkan devices of this machine
+    Devices(devices::Arguments),
+}
+
+/// Runs the program on the process's arguments and returns its exit code.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    output::start_log(&cli.global);
+    match run(&cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::complain(&error);
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(cli: &Cli) -> Result<()> {
+    match &cli.command {
+        Command::Demo(arguments) => demo::run(&cli.global, arguments),
+        Command::Render(arguments) => render::run(&cli.global, arguments),
+        Command::Bake(arguments) => bake::run(&cli.global, arguments),
+        Command::Inspect(arguments) => inspect::run(&cli.global, arguments),
+        Command::Devices(arguments) => devices::run(&cli.global, arguments),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn command_line_is_consistent() {
+        <super::Cli as clap::CommandFactory>::command().debug_assert();
+    }
+}

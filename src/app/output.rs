@@ -1,0 +1,99 @@
+//! What the program says: results, logs, errors, progress bars, tables.
+
+use super::Global;
+use crate::error::Error;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::cell::RefCell;
+use std::io::Write;
+
+/// Writes one line of results to stdout. A reader that went away is no error.
+pub fn say(line: impl AsRef<str>) {
+    let _ = writeln!(std::io::stdout().lock(), "{}", line.as_ref());
+}
+
+/// Writes one line of an error to stderr.
+pub fn complain(error: &Error) {
+    let _ = writeln!(std::io::stderr().lock(), "shadow-fields: {error}");
+}
+
+/// Writes one line for people to stderr.
+pub fn note(global: &Global, line: impl AsRef<str>) {
+    if !global.quiet {
+        let _ = writeln!(std::io::stderr().lock(), "{}", line.as_ref());
+    }
+}
+
+/// Starts the log on stderr: warnings by default, more with `-v`, as RUST_LOG says where it is set.
+pub fn start_log(global: &Global) {
+    let level = match (global.quiet, global.verbose) {
+        (true, _) => "error",
+        (false, 0) => "warn",
+        (false, 1) => "info",
+        (false, _) => "debug",
+    };
+    let environment = env_logger::Env::default().default_filter_or(level);
+    let _ = env_logger::Builder::from_env(environment).format_timestamp(None).try_init();
+}
+
+/// A progress bar for one bake after another; nothing where stderr is no terminal or bars are not wanted.
+pub struct Progress {
+    hidden: bool,
+    current: RefCell<Option<(String, ProgressBar)>>,
+}
+
+impl Progress {
+    /// A bar as the global options want it.
+    pub fn new(global: &Global) -> Self {
+        Progress { hidden: global.no_progress || global.quiet, current: RefCell::new(None) }
+    }
+
+    /// Shows that `done` of `all` samples of `what` are baked.
+    pub fn show(&self, what: &str, done: u32, all: u32) {
+        if self.hidden {
+            return;
+        }
+        let mut current = self.current.borrow_mut();
+        if current.as_ref().is_none_or(|(name, _)| name != what) {
+            let bar = ProgressBar::with_draw_target(Some(all.into()), ProgressDrawTarget::stderr());
+            let style = ProgressStyle::with_template("baking {msg:24} [{bar:32}] {pos}/{len} samples, {eta} left");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+            bar.set_message(what.to_owned());
+            *current = Some((what.to_owned(), bar));
+        }
+        if let Some((_, bar)) = current.as_ref() {
+            bar.set_position(done.into());
+            if done == all {
+                bar.finish_and_clear();
+            }
+        }
+    }
+}
+
+/// Prints rows under a header: the first column flush left, the others flush right.
+pub fn table(header: &[&str], rows: &[Vec<String>]) {
+    let width = |column: usize| {
+        let cells = rows.iter().map(|row| row[column].chars().count());
+        cells.chain([header[column].chars().count()]).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..header.len()).map(width).collect();
+    let line = |cells: Vec<String>| {
+        let padded = cells.iter().zip(&widths).enumerate().map(|(column, (cell, &width))| match column {
+            0 => format!("{cell:<width$}"),
+            _ => format!("{cell:>width$}"),
+        });
+        say(padded.collect::<Vec<_>>().join("  ").trim_end());
+    };
+    line(header.iter().map(|h| (*h).to_owned()).collect());
+    rows.iter().for_each(|row| line(row.clone()));
+}
+
+/// The middle value; the mean of the two middle ones of an even count; 0 of none.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => 0.0,
+        n if n % 2 == 1 => sorted[n / 2],
+        n => (sorted[n / 2 - 1] + sorted[n / 2]) / 2.0,
+    }
+}

@@ -1,0 +1,200 @@
+//! `shadow-fields render`
+
+use super::context::{BakeArguments, Context, MergeArguments, size};
+use super::{Global, output};
+use crate::asset::picture;
+use crate::error::{Error, Result};
+use crate::frame::{Frame, Options};
+use crate::scene::Scene;
+use clap::Args;
+use serde_json::json;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Arguments of `render`.
+#[derive(Args)]
+pub struct Arguments {
+    /// Scene file (see assets/scenes for examples)
+    scene: PathBuf,
+    /// Picture to write; with --frames an animated PNG, or numbered pictures when the name has a run of #
+    #[arg(short, long, value_name = "P.png")]
+    output: PathBuf,
+    /// Also write linear f32 radiance
+    #[arg(long, value_name = "P.exr")]
+    exr: Option<PathBuf>,
+    /// Pictures of an animation
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    frames: u32,
+    /// Pictures a second of scene time
+    #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
+    fps: u16,
+    /// Scene time of the first picture, seconds
+    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
+    time: f64,
+    /// Size of the picture; default: the scene's
+    #[arg(long, value_parser = size, value_name = "WxH")]
+    size: Option<[u32; 2]>,
+    /// Also write a row a lit vertex: entity, position, normal (world), linear radiosity without emission
+    #[arg(long, value_name = "V.csv")]
+    vertices: Option<PathBuf>,
+    /// Also write times and counts
+    #[arg(long, value_name = "S.json")]
+    stats: Option<PathBuf>,
+    #[command(flatten)]
+    merge: MergeArguments,
+    #[command(flatten)]
+    bake: BakeArguments,
+}
+
+/// Renders a scene.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    if !arguments.time.is_finite() {
+        return Err(Error::Usage("--time wants a finite number of seconds".into()));
+    }
+    let numbered = Numbered::new(&arguments.output)?;
+    let scene = Scene::load(&arguments.scene)?;
+    let context = Context::new(global)?;
+    let started = Instant::now();
+    let shape = &scene.data.output;
+    let options = Options {
+        bake: arguments.bake.options(),
+        lookup: arguments.merge.lookup,
+        variant: arguments.merge.variant,
+        size: arguments.size.unwrap_or([shape.width, shape.height]),
+        multisample: true,
+    };
+    let mut frame = context.frame(&scene, options)?;
+    let prepared = started.elapsed();
+
+    let [width, height] = options.size;
+    let mut encoded = Vec::new();
+    let mut timings = Vec::new();
+    for index in 0..arguments.frames {
+        let time_s = arguments.time + f64::from(index) / f64::from(arguments.fps);
+        let placements = scene.at(time_s);
+        let start = Instant::now();
+        let passes = frame.render(&placements, Some(white(shape.exposure_ev)))?;
+        timings.push((time_s, start.elapsed(), passes));
+        let rgb = frame.picture();
+        match &numbered {
+            Some(numbered) => {
+                picture::write_png(&numbered.path(index), width, height, &rgb, shape.exposure_ev)?;
+            }
+            None if arguments.frames == 1 => {
+                picture::write_png(&arguments.output, width, height, &rgb, shape.exposure_ev)?;
+            }
+            None => encoded.push(picture::encode_srgb(&rgb, shape.exposure_ev)),
+        }
+    }
+    if !encoded.is_empty() {
+        picture::write_apng(&arguments.output, width, height, &encoded, arguments.fps)?;
+    }
+    let last = scene.at(timings.last().map_or(arguments.time, |(time_s, ..)| *time_s));
+    if let Some(path) = &arguments.exr {
+        frame.render(&last, Some(f32::INFINITY))?;
+        picture::write_exr(path, width, height, &frame.picture())?;
+    }
+    if let Some(path) = &arguments.vertices {
+        write_text(path, &vertex_table(&frame, &last)?)?;
+    }
+
+    let frames: Vec<_> = timings
+        .iter()
+        .map(|(time_s, wall, passes)| {
+            let passes: serde_json::Map<_, _> =
+                passes.iter().map(|t| (format!("{}_ms", t.pass.replace(' ', "_")), json!(t.milliseconds))).collect();
+            json!({ "time_s": time_s, "frame_ms": wall.as_secs_f64() * 1e3, "passes": passes })
+        })
+        .collect();
+    let report = json!({
+        "origin": context.origin(global),
+        "scene": arguments.scene.display().to_string(),
+        "entities": scene.entities.len(),
+        "receiver_vertices": frame.receiver_vertex_count(),
+        "variant": frame.variant.name,
+        "options": {
+            "bake": options.bake, "lattice": options.bake.lattice.to_string(), "lookup": options.lookup,
+            "size": options.size, "multisample": options.multisample,
+        },
+        "prepare_ms": prepared.as_secs_f64() * 1e3,
+        "baked": frame.store.baked,
+        "frames": frames,
+    });
+    if let Some(path) = &arguments.stats {
+        write_text(path, &format!("{report:#}\n"))?;
+    }
+    if global.json {
+        output::say(report.to_string());
+    } else {
+        let walls: Vec<f64> = timings.iter().map(|(_, wall, _)| wall.as_secs_f64() * 1e3).collect();
+        output::say(format!(
+            "{}: {} entities, {} lit vertices, prepared in {:.0} ms, {} in {:.1} ms (median), variant {}",
+            arguments.output.display(),
+            scene.entities.len(),
+            frame.receiver_vertex_count(),
+            prepared.as_secs_f64() * 1e3,
+            if arguments.frames == 1 { "a frame".into() } else { format!("{} frames, each", arguments.frames) },
+            output::median(&walls),
+            frame.variant.name
+        ));
+    }
+    drop(frame);
+    context.finish()
+}
+
+/// Radiance that the exposure shows as white.
+pub fn white(exposure_ev: f32) -> f32 {
+    (-exposure_ev).exp2()
+}
+
+fn write_text(path: &Path, text: &str) -> Result<()> {
+    crate::gpu::shader::write_atomically(path, text.as_bytes())
+        .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
+}
+
+/// An output name with a run of `#` that stands for the frame's number.
+struct Numbered {
+    before: String,
+    digits: usize,
+    after: String,
+}
+
+impl Numbered {
+    fn new(path: &Path) -> Result<Option<Self>> {
+        let text = path.to_str().ok_or_else(|| Error::Usage(format!("{}: the name is not UTF-8", path.display())))?;
+        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
+            return Err(Error::Usage(format!("{text}: pictures are written as .png (and --exr)")));
+        }
+        Ok(text.find('#').map(|at| {
+            let digits = text[at..].bytes().take_while(|b| *b == b'#').count();
+            Numbered { before: text[..at].into(), digits, after: text[at + digits..].into() }
+        }))
+    }
+
+    fn path(&self, index: u32) -> PathBuf {
+        format!("{}{index:0width$}{}", self.before, self.after, width = self.digits).into()
+    }
+}
+
+/// A row a vertex of every receiver, world frame.
+fn vertex_table(frame: &Frame, placements: &[crate::scene::Placement]) -> Result<String> {
+    let mut text = String::from("entity,x,y,z,nx,ny,nz,r,g,b\n");
+    for (index, entity) in frame.scene().entities.iter().enumerate().filter(|(_, e)| e.receives) {
+        let mesh = &frame.scene().meshes[entity.mesh];
+        let placement = &placements[index];
+        let name = if entity.name.contains([',', '"', '\n']) {
+            format!("\"{}\"", entity.name.replace('"', "\"\""))
+        } else {
+            entity.name.clone()
+        };
+        let rotation = placement.rotation.as_dquat().normalize();
+        for ((position, normal), [r, g, b]) in mesh.positions.iter().zip(&mesh.normals).zip(frame.radiosity(index)?) {
+            let p = placement.position.as_dvec3() + rotation * (position.as_dvec3() * f64::from(placement.scale));
+            let n = rotation * normal.as_dvec3();
+            let [p, n] = [p.as_vec3(), n.as_vec3()];
+            let _ = writeln!(text, "{name},{},{},{},{},{},{},{r},{g},{b}", p.x, p.y, p.z, n.x, n.y, n.z);
+        }
+    }
+    Ok(text)
+}

@@ -1,0 +1,102 @@
+//! Contact sheets: a grid of unfolded cubes with labels.
+
+use crate::asset::picture;
+use crate::error::Result;
+use std::path::Path;
+
+/// Six faces, +X -X +Y -Y +Z -Z, rows of RGB triples.
+pub type Cell = Vec<f32>;
+
+/// Space between cells in pixels.
+const GAP: usize = 6;
+/// Height of a line of text in pixels.
+const TEXT: usize = 12;
+/// Width of the labels on the left in pixels.
+const MARGIN: usize = 104;
+/// Where each face stands in the unfolded cube, in faces from the left and the top.
+const PLACES: [(usize, usize); 6] = [(2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (3, 1)];
+
+/// Glyphs of three by five pixels, a row in three bits, for the characters that labels use.
+const GLYPHS: &[(char, [u8; 5])] = &[
+    ('0', [7, 5, 5, 5, 7]),
+    ('1', [2, 6, 2, 2, 7]),
+    ('2', [7, 1, 7, 4, 7]),
+    ('3', [7, 1, 3, 1, 7]),
+    ('4', [5, 5, 7, 1, 1]),
+    ('5', [7, 4, 7, 1, 7]),
+    ('6', [7, 4, 7, 5, 7]),
+    ('7', [7, 1, 2, 2, 2]),
+    ('8', [7, 5, 7, 5, 7]),
+    ('9', [7, 5, 7, 1, 7]),
+    ('+', [0, 2, 7, 2, 0]),
+    ('-', [0, 0, 7, 0, 0]),
+    ('.', [0, 0, 0, 0, 2]),
+    (',', [0, 0, 0, 2, 4]),
+    ('d', [1, 1, 7, 5, 7]),
+    ('e', [7, 5, 7, 4, 7]),
+    ('g', [7, 5, 7, 1, 7]),
+    ('r', [0, 7, 4, 4, 4]),
+];
+
+struct Canvas {
+    width: usize,
+    height: usize,
+    rgb: Vec<f32>,
+}
+
+impl Canvas {
+    fn set(&mut self, x: usize, y: usize, rgb: [f32; 3]) {
+        if x < self.width && y < self.height {
+            self.rgb[3 * (y * self.width + x)..][..3].copy_from_slice(&rgb);
+        }
+    }
+
+    /// Text at twice the glyphs' size.
+    fn text(&mut self, x: usize, y: usize, text: &str) {
+        for (index, letter) in text.chars().enumerate() {
+            let Some((_, rows)) = GLYPHS.iter().find(|(c, _)| *c == letter) else { continue };
+            for dy in 0..10 {
+                for dx in (0..6).filter(|dx| rows[dy / 2] >> (2 - dx / 2) & 1 == 1) {
+                    self.set(x + 8 * index + dx, y + dy, [0.0; 3]);
+                }
+            }
+        }
+    }
+}
+
+/// Writes a sheet: `per_column` cells under each column's label, a row label on the left. Values up to `brightest` are shown.
+///
+/// # Errors
+/// As [`picture::write_png`].
+pub fn write(
+    path: &Path,
+    columns: &[String],
+    per_column: usize,
+    rows: &[(String, Vec<Cell>)],
+    face_px: usize,
+    brightest: f32,
+) -> Result<()> {
+    let (cell_width, cell_height) = (4 * face_px + GAP, 3 * face_px + GAP);
+    let width = MARGIN + columns.len() * per_column * cell_width;
+    let height = TEXT + GAP + rows.len() * cell_height;
+    let mut canvas = Canvas { width, height, rgb: vec![0.35; 3 * width * height] };
+    for (index, label) in columns.iter().enumerate() {
+        canvas.text(MARGIN + index * per_column * cell_width, 2, label);
+    }
+    for (row, (label, cells)) in rows.iter().enumerate() {
+        let top = TEXT + GAP + row * cell_height;
+        let mut lines = label.split(", ");
+        canvas.text(GAP, top + face_px, lines.next().unwrap_or_default());
+        canvas.text(GAP, top + face_px + TEXT + 2, lines.next().unwrap_or_default());
+        for (column, cell) in cells.iter().enumerate() {
+            let left = MARGIN + column * cell_width;
+            for (texel, rgb) in cell.chunks_exact(3).enumerate() {
+                let (face, x, y) = (texel / (face_px * face_px), texel % face_px, texel / face_px % face_px);
+                let (right, down) = PLACES[face];
+                let value = [rgb[0], rgb[1], rgb[2]].map(|c| c / brightest);
+                canvas.set(left + right * face_px + x, top + down * face_px + y, value);
+            }
+        }
+    }
+    picture::write_png(path, width as u32, height as u32, &canvas.rgb, 0.0)
+}

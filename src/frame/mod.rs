@@ -14,6 +14,7 @@ use crate::error::Result;
 use crate::field::Lookup;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, TexelView, Timing};
 use crate::layout;
+use crate::render::calibrate;
 use crate::render::draw::{Draw, Item};
 use crate::render::merge::{Inputs, Job, Merge, Readable, rotation_stride};
 use crate::render::reference::{Object, Task};
@@ -36,7 +37,7 @@ pub struct Options {
     pub bake: bake::Options,
     /// Which samples a lookup takes.
     pub lookup: Lookup,
-    /// How the merge is done; `None` takes the device's default.
+    /// How the merge is done; `None` takes what was measured to be the device's fastest.
     pub variant: Option<Variant>,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
@@ -82,12 +83,8 @@ impl Frame {
     pub fn new(baker: &Baker, cache: &Cache, scene: &Scene, options: Options, progress: Progress<'_>) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
         let store = Store::new(baker, cache, scene, &options.bake, progress)?;
-        let variant = usable(
-            device,
-            &store,
-            scene.entities.len(),
-            options.variant.unwrap_or_else(|| Variant::sane_default(device)),
-        );
+        let wanted = options.variant.map_or_else(|| calibrate::fastest(device, library), Ok)?;
+        let variant = usable(device, &store, scene.entities.len(), wanted);
 
         let lights: Vec<u32> = indices(scene, |e| e.emits);
         let occluder_count = scene.entities.iter().filter(|e| e.occludes).count() as u32;

@@ -1,5 +1,6 @@
 //! The passes of a frame, one file each.
 
+pub mod calibrate;
 pub mod draw;
 pub mod merge;
 pub mod reference;

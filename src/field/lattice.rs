@@ -397,7 +397,7 @@ impl Lattice {
     pub fn validate(&self) -> Result<()> {
         let bad = |what: String| Err(Error::Input(format!("lattice {self}: {what}")));
         let directions = match self.directions {
-            Directions::Cube { cells } => 6 * u64::from(cells).pow(2),
+            Directions::Cube { cells } => u64::from(cells).pow(2).saturating_mul(6),
             Directions::LatLon { latitudes, longitudes } => u64::from(latitudes) * u64::from(longitudes),
         };
         let samples = u64::from(self.shells).saturating_mul(directions);

@@ -11,7 +11,7 @@ use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Cells of a cube face have (almost) equal angles: cell coordinate u = s (c0 + c1 s^2 + c2 s^4) for s in [-1, 1]. This is
-/// (4/pi) atan(s) to 1e-3, matched in value at 1 and in slope at 0 and 1; a shader evaluates it with three multiply-adds.
+/// (4/pi) atan(s) to 4.3e-3, matched in value at 1 and in slope at 0 and 1; a shader evaluates it with three multiply-adds.
 pub const CELL_WARP: [f64; 3] = {
     let (slope_0, slope_1) = (4.0 / PI, 2.0 / PI);
     let c2 = (slope_1 - slope_0 - 3.0 * (1.0 - slope_0)) / 2.0;

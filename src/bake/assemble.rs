@@ -111,13 +111,18 @@ pub struct Assemble {
 }
 
 impl Assemble {
+    /// The row of the shader table.
+    pub fn row(storage: Storage) -> Row {
+        Row::new("assemble.comp", 4).define("HALF", storage == Storage::F16).define("WORKGROUP", WORKGROUP)
+    }
+
     /// A pipeline that stores `storage`.
     ///
     /// # Errors
     /// As every pipeline.
     pub fn new(device: &Arc<Device>, library: &Library, storage: Storage) -> Result<Self> {
-        let row = Row::new("assemble.comp", 4).define("HALF", storage == Storage::F16).define("WORKGROUP", WORKGROUP);
-        Ok(Assemble { pipeline: ComputePipeline::new(device, "assemble", &library.shader(&row)?, &[])? })
+        let shader = library.shader(&Self::row(storage))?;
+        Ok(Assemble { pipeline: ComputePipeline::new(device, "assemble", &shader, &[])? })
     }
 
     /// Writes `stored_count` samples of `sample_quads` quads, each multiplied by `factor`, into a byte range of `store`.

@@ -139,6 +139,11 @@ pub struct Capture {
 }
 
 impl Capture {
+    /// The rows of the shader table: vertex and fragment.
+    pub fn rows(radiance: bool) -> [Row; 2] {
+        ["capture.vert", "capture.frag"].map(|file| Row::new(file, 4).define("RADIANCE", radiance))
+    }
+
     /// Pipelines for faces of `face_px`, for occlusion or `radiance`.
     ///
     /// # Errors
@@ -153,8 +158,8 @@ impl Capture {
         let color = if radiance { vk::Format::R32G32B32A32_SFLOAT } else { vk::Format::R8_UNORM };
         let depth = radiance.then_some(vk::Format::D32_SFLOAT);
         let shape = ImageShape { format: color, width: columns * face_px, height: columns * face_px, samples: 1 };
-        let vertex = library.shader(&Row::new("capture.vert", 4).define("RADIANCE", radiance))?;
-        let fragment = library.shader(&Row::new("capture.frag", 4).define("RADIANCE", radiance))?;
+        let [vertex, fragment] = Self::rows(radiance);
+        let (vertex, fragment) = (library.shader(&vertex)?, library.shader(&fragment)?);
         let pipeline = |cull| {
             let state = GraphicsState { color, depth, samples: 1, cull };
             GraphicsPipeline::new(device, "capture", &vertex, &fragment, state)

@@ -75,6 +75,14 @@ pub struct Project {
 }
 
 impl Project {
+    /// The row of the shader table.
+    pub fn row(bands: usize, projection: Projection) -> Row {
+        Row::new("project.comp", bands)
+            .define("CHANNELS", projection.channels() as u32)
+            .define("COSINE", projection == Projection::Transfer)
+            .define("WORKGROUP", WORKGROUP)
+    }
+
     /// A pipeline for faces of `face_px` in an atlas of `columns`.
     ///
     /// # Errors
@@ -87,11 +95,8 @@ impl Project {
         face_px: u32,
         columns: u32,
     ) -> Result<Self> {
-        let row = Row::new("project.comp", bands)
-            .define("CHANNELS", projection.channels() as u32)
-            .define("COSINE", projection == Projection::Transfer)
-            .define("WORKGROUP", WORKGROUP);
-        let pipeline = ComputePipeline::new(device, "project", &library.shader(&row)?, &[])?;
+        let shader = library.shader(&Self::row(bands, projection))?;
+        let pipeline = ComputePipeline::new(device, "project", &shader, &[])?;
         let texels = Buffer::with_data(device, "project texels", &texel_table(face_px as usize))?;
         if !TexelView::fits(device, TEXEL_FORMAT, texels.size_bytes) {
             return Err(Error::Input(format!(

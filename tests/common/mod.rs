@@ -1,0 +1,111 @@
+//! What the GPU tests share: one validated device a test binary, used by one test at a time, and helpers that read images back.
+//!
+//! With SHADOW_FIELDS_REQUIRE_DEVICE=1 a missing device, validation layer or tool fails the tests; without it they are skipped
+//! with a line on stderr.
+
+#![allow(dead_code)] // every test binary uses its own part
+
+use bytemuck::Pod;
+use glam::Vec3;
+use shadow_fields::asset::{Mesh, teapot};
+use shadow_fields::bake::capture::{Capture, Model, Slots};
+use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, Device, Options, Validation};
+use shadow_fields::shaders::Library;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+
+/// Whether what is missing is a failure rather than a reason to skip.
+pub fn required() -> bool {
+    std::env::var_os("SHADOW_FIELDS_REQUIRE_DEVICE").is_some_and(|value| value == "1")
+}
+
+/// Says why a test does nothing, or fails where it has to do something.
+#[allow(clippy::print_stderr)]
+pub fn skip(reason: &str) {
+    assert!(!required(), "SHADOW_FIELDS_REQUIRE_DEVICE=1, but: {reason}");
+    eprintln!("skipped: {reason}");
+}
+
+/// A figure for people; seen with `--nocapture`.
+#[allow(clippy::print_stderr)]
+pub fn report(line: &str) {
+    eprintln!("{line}");
+}
+
+/// Folder that all tests share for compiled shaders and pipelines.
+pub fn cache_dir() -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache")
+}
+
+/// Where tests get their shaders.
+pub fn library() -> Library {
+    Library { shader_dir: None, cache_dir: Some(cache_dir()) }
+}
+
+/// Another device like the one that the tests share.
+pub fn open() -> shadow_fields::Result<Arc<Device>> {
+    Device::new(&Options { device: None, validation: Validation::Sync, cache_dir: Some(cache_dir()) })
+}
+
+/// The device of this test binary, held by one test. At the end it fails the test if the validation layer said anything.
+pub struct Gpu {
+    pub device: Arc<Device>,
+    pub library: Library,
+    _turn: MutexGuard<'static, ()>,
+}
+
+/// Waits for this test's turn with the device; `None` when the test is to be skipped.
+pub fn gpu() -> Option<Gpu> {
+    static DEVICE: OnceLock<Result<Arc<Device>, String>> = OnceLock::new();
+    static TURN: Mutex<()> = Mutex::new(());
+    let turn = TURN.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    match DEVICE.get_or_init(|| open().map_err(|error| error.to_string())) {
+        Ok(device) => Some(Gpu { device: device.clone(), library: library(), _turn: turn }),
+        Err(error) => {
+            skip(error);
+            None
+        }
+    }
+}
+
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        let messages = self.device.take_validation_messages();
+        self.device.save_pipeline_cache();
+        if !std::thread::panicking() {
+            assert!(messages.is_empty(), "the validation layer said: {}", messages.join("\n"));
+        }
+    }
+}
+
+impl Gpu {
+    /// Captures the planned faces and brings the atlas to the host; `C` values of `T` a texel.
+    pub fn atlas<T: Pod>(&self, capture: &Capture, model: &Model, eyes: &[Vec3], plan: &[Slots], cull: bool) -> Vec<T> {
+        let texels = u64::from(capture.atlas.shape.width) * u64::from(capture.atlas.shape.height);
+        let size = texels * size_of::<T>() as u64;
+        let buffer = Buffer::new(&self.device, "atlas on the host", BufferKind::Readback, size).unwrap();
+        let mut commands = Commands::new(&self.device, "capture to host").unwrap();
+        commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
+        if let Some(depth) = capture.depth() {
+            commands.image_barrier(depth, None, Access::DepthWrite);
+        }
+        commands.pass("capture", |c| capture.record(c, model, eyes, plan, cull)).unwrap();
+        commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
+        commands.copy_image(&capture.atlas, &buffer);
+        commands.barrier(Access::TransferWrite, Access::HostRead);
+        commands.submit().unwrap();
+        buffer.read(0, texels as usize)
+    }
+}
+
+/// Place of texel (x, y) of a slot in what [`Gpu::atlas`] returns.
+pub fn texel_index(capture: &Capture, slot: u32, x: usize, y: usize) -> usize {
+    let (columns, px) = (capture.columns as usize, capture.face_px as usize);
+    let (column, row) = (slot as usize % columns, slot as usize / columns);
+    (row * px + y) * columns * px + column * px + x
+}
+
+/// The teapot, cut more coarsely than the default: open, with handle and spout.
+pub fn pot(subdivisions: u32) -> Mesh {
+    teapot::teapot(teapot::CONTROL_TEXT, subdivisions).unwrap()
+}

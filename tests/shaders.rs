@@ -1,0 +1,166 @@
+//! Every shader that the program compiles does compile, and the SPIR-V is valid by the judgement of spirv-val.
+
+mod common;
+
+use common::{library, skip};
+use shadow_fields::bake::assemble::Assemble;
+use shadow_fields::bake::capture::Capture;
+use shadow_fields::bake::project::{Project, Projection};
+use shadow_fields::field::{Lattice, Lookup, Storage};
+use shadow_fields::render::variant::{Form, MAX_LIGHTS, VARIANTS};
+use shadow_fields::shaders::{FILES, Row};
+use std::collections::BTreeSet;
+use std::process::Command;
+
+const BANDS: std::ops::RangeInclusive<usize> = 2..=7;
+const PROJECTIONS: [Projection; 3] = [Projection::Blocked, Projection::Radiance, Projection::Transfer];
+
+fn baking() -> Vec<Row> {
+    let project = BANDS.flat_map(|bands| PROJECTIONS.map(|projection| Project::row(bands, projection)));
+    let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
+    let capture = [false, true].into_iter().flat_map(Capture::rows);
+    project.chain(assemble).chain(capture).collect()
+}
+
+fn drawing() -> Vec<Row> {
+    ["draw.vert", "draw.frag"].map(|file| Row::new(file, 4)).to_vec()
+}
+
+fn lattice(text: &str) -> Lattice {
+    text.parse().unwrap()
+}
+
+/// A usual form, everything that differs from it in one choice, all of lights x sky, and a few far from it.
+fn merging() -> Vec<Row> {
+    let usual = Form {
+        variant: VARIANTS[0],
+        bands: 4,
+        storage: Storage::F16,
+        lattice: Lattice::default().starting_at(1.02),
+        lookup: Lookup::Trilinear,
+        lights: 1,
+        sky: true,
+    };
+    let mut forms = vec![usual];
+    for lights in 0..=MAX_LIGHTS {
+        forms.extend([false, true].map(|sky| Form { lights, sky, ..usual }));
+    }
+    forms.extend(BANDS.map(|bands| Form { bands, ..usual }));
+    for &variant in VARIANTS {
+        forms.extend([Storage::F16, Storage::F32].map(|storage| Form { variant, storage, ..usual }));
+        forms.push(Form { variant, storage: Storage::F32, bands: 3, lights: 2, sky: false, ..usual });
+    }
+    let lattices = [
+        "cube:16x8,log,inner=0.25",
+        "cube:16x8,linear,inner=0.25",
+        "cube:16x8,raw,inner=0.25",
+        "cube:1x1,inner=1.02",
+        "latlon:8x4x4,linear,raw,inner=0.2",
+        "latlon:1x1x1,inner=1.02",
+    ];
+    for lookup in [Lookup::Nearest, Lookup::Radial, Lookup::Trilinear] {
+        forms.push(Form { lookup, ..usual });
+        forms.extend(lattices.map(|text| Form { lattice: lattice(text), lookup, ..usual }));
+    }
+    forms.push(Form {
+        variant: VARIANTS[VARIANTS.len() - 1],
+        lattice: lattice("latlon:8x4x4,log,raw,inner=0.2"),
+        lookup: Lookup::Nearest,
+        lights: MAX_LIGHTS,
+        ..usual
+    });
+    forms.iter().map(Form::row).collect()
+}
+
+/// What spirv-val says of the words: `Err` with its complaint.
+fn validate(words: &[u32]) -> Result<(), String> {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), bytemuck::cast_slice(words)).unwrap();
+    let output = Command::new("spirv-val").args(["--target-env", "vulkan1.3"]).arg(file.path()).output().unwrap();
+    let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    if output.status.success() { Ok(()) } else { Err(said) }
+}
+
+fn has_validator() -> bool {
+    let found = Command::new("spirv-val").arg("--version").output().is_ok_and(|output| output.status.success());
+    if !found {
+        skip("spirv-val is not on the path (Debian's package is spirv-tools)");
+    }
+    found
+}
+
+/// Compiles every row and validates what comes out, each different row once.
+fn check(rows: Vec<Row>) {
+    let has_validator = has_validator();
+    let mut done: Vec<Row> = Vec::new();
+    for row in rows {
+        if done.contains(&row) {
+            continue;
+        }
+        let shader = library().shader(&row).unwrap_or_else(|error| panic!("{row:?}: {error}"));
+        if has_validator {
+            validate(&shader.spirv).unwrap_or_else(|error| panic!("{row:?}: {error}"));
+        }
+        done.push(row);
+    }
+    common::report(&format!("{} rows", done.len()));
+}
+
+#[test]
+fn baking_shaders_are_valid() {
+    check(baking());
+}
+
+#[test]
+fn drawing_shaders_are_valid() {
+    check(drawing());
+}
+
+#[test]
+fn merge_shaders_are_valid() {
+    check(merging());
+}
+
+#[test]
+fn every_entry_point_is_among_the_rows() {
+    let compiled: BTreeSet<&str> = [baking(), drawing(), merging()].concat().iter().map(|row| row.file).collect();
+    let there: BTreeSet<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| !name.ends_with(".glsl")).collect();
+    assert_eq!(compiled, there);
+}
+
+#[test]
+fn the_validator_refuses_damage() {
+    if !has_validator() {
+        return;
+    }
+    let good = library().shader(&Assemble::row(Storage::F32)).unwrap().spirv;
+    assert_eq!(validate(&good), Ok(()));
+    // Word 3 bounds the ids of the module.
+    let mut damaged = good.clone();
+    damaged[3] = 2;
+    assert!(validate(&damaged).is_err());
+    // Without its last words, a function has no end.
+    assert!(validate(&good[..good.len() - 1]).is_err());
+}
+
+#[test]
+fn other_endings_and_missing_files_are_refused() {
+    for file in ["field.glsl", "absent.comp"] {
+        let error = library().shader(&Row::new(file, 4)).unwrap_err();
+        assert!(error.to_string().contains(file), "{error}");
+    }
+}
+
+#[test]
+fn a_folder_overrides_embedded_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "#version 460\nlayout(local_size_x = 3) in;\nvoid main() {}\n";
+    std::fs::write(folder.path().join("assemble.comp"), text).unwrap();
+    let mut library = library();
+    library.shader_dir = Some(folder.path().to_path_buf());
+    let overridden = library.shader(&Assemble::row(Storage::F32)).unwrap();
+    assert_eq!(overridden.reflection.local_size, [3, 1, 1]);
+    // What is not in the folder stays as embedded.
+    library.shader(&Assemble::row(Storage::F32)).unwrap();
+    assert!(library.shader(&Capture::rows(false)[0]).is_ok());
+}

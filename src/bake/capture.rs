@@ -166,7 +166,8 @@ impl Capture {
         };
         Ok(Capture {
             open: pipeline(vk::CullModeFlags::NONE)?,
-            closed: pipeline(vk::CullModeFlags::BACK)?,
+            // A cube face is a mirror image, which turns every triangle over: FRONT takes the object's back faces away.
+            closed: pipeline(vk::CullModeFlags::FRONT)?,
             atlas: Image::new(device, "capture atlas", shape)?,
             depth: depth
                 .map(|format| Image::new(device, "capture depth", ImageShape { format, ..shape }))

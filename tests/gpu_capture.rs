@@ -1,0 +1,272 @@
+//! Capture on the device against rays cast on the host: coverage, culling, faces left out, and colours on the right faces.
+
+mod common;
+
+use common::{Gpu, gpu, pot, report, texel_index};
+use glam::{DVec3, Quat, Vec3};
+use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::bake::capture::{Capture, Model, NO_SLOT, reference, unit_positions};
+
+const FACE_PX: u32 = 32;
+/// Texels whose centres lie so near an edge that f32 and f64 disagree: a share of all texels.
+const DIFFERING_LIMIT: f64 = 1e-3;
+
+/// Coverage of every eye's faces, true where the object is; faces without a slot are `None`.
+fn coverage(gpu: &Gpu, mesh: &Mesh, eyes: &[Vec3], cull: bool) -> Vec<[Option<Vec<bool>>; 6]> {
+    let model = Model::new(&gpu.device, mesh, false).unwrap();
+    let capture = Capture::new(&gpu.device, &gpu.library, FACE_PX, false).unwrap();
+    let plan = capture.plan(&model, eyes);
+    assert_eq!(plan.len(), eyes.len(), "all eyes fit one atlas");
+    let atlas: Vec<u8> = gpu.atlas(&capture, &model, eyes, &plan, cull);
+    let px = FACE_PX as usize;
+    plan.iter()
+        .map(|slots| {
+            slots.map(|slot| {
+                (slot != NO_SLOT).then(|| {
+                    (0..px * px)
+                        .map(|i| match atlas[texel_index(&capture, slot, i % px, i / px)] {
+                            0 => true,
+                            255 => false,
+                            other => panic!("a texel of {other}: neither object nor background"),
+                        })
+                        .collect()
+                })
+            })
+        })
+        .collect()
+}
+
+/// Whether a texel, or one that touches it, differs from it, or it lies on the face's rim, where neighbours are unknown.
+fn is_edge(covered: &[bool], x: usize, y: usize) -> bool {
+    let px = FACE_PX as usize;
+    if x == 0 || y == 0 || x + 1 == px || y + 1 == px {
+        return true;
+    }
+    let around = (y - 1..=y + 1).flat_map(|v| (x - 1..=x + 1).map(move |u| covered[v * px + u]));
+    let count = around.filter(|c| *c).count();
+    (1..9).contains(&count)
+}
+
+/// Eyes all around: on the axes, at odd angles, near and far.
+fn eyes_outside() -> Vec<Vec3> {
+    vec![
+        Vec3::new(1.02, 0.0, 0.0),
+        Vec3::new(0.0, -1.3, 0.01),
+        Vec3::new(0.7, 0.8, -0.4),
+        Vec3::new(-2.0, 1.1, 0.6),
+        Vec3::new(0.3, 0.2, 7.9),
+    ]
+}
+
+fn tilted_plane() -> Mesh {
+    let plane = generate::plane(2.0, 5);
+    let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
+    let positions = plane.positions.iter().map(|p| turn * *p + Vec3::new(0.3, -4.0, 1.0)).collect();
+    Mesh::new("tilted plane", positions, Vec::new(), None, plane.triangles.clone()).unwrap()
+}
+
+/// (mesh, eyes besides those outside).
+fn scenes() -> Vec<(Mesh, Vec<Vec3>)> {
+    let hole = vec![Vec3::ZERO, Vec3::new(0.2, 0.05, -0.1), Vec3::new(0.0, 0.3, 0.25)];
+    vec![
+        (generate::sphere(0.5, 3), vec![Vec3::new(0.58, -0.58, 0.58) * 1.01]),
+        (generate::torus(1.0, 0.3, 48, 24), hole),
+        (pot(4), vec![Vec3::new(0.0, 0.9, 0.0), Vec3::new(0.1, 0.0, 0.05)]),
+        (generate::cuboid(Vec3::new(0.4, 1.0, 0.7), 2), vec![Vec3::new(0.33, 0.0, 0.1), Vec3::new(0.0, 0.82, 0.0)]),
+        (tilted_plane(), vec![Vec3::new(0.01, 0.02, 0.01), Vec3::new(-0.1, 0.6, 0.1)]),
+    ]
+}
+
+#[test]
+fn coverage_is_what_rays_meet() {
+    let Some(gpu) = gpu() else { return };
+    for (mesh, more) in scenes() {
+        let eyes = [eyes_outside(), more].concat();
+        let positions = unit_positions(&mesh);
+        let found = coverage(&gpu, &mesh, &eyes, true);
+        let (mut differing, mut all, mut covered, mut left_out) = (0, 0, 0, 0);
+        for (eye, faces) in eyes.iter().zip(&found) {
+            for (face, texels) in faces.iter().enumerate() {
+                let wanted = reference(&positions, &mesh.triangles, eye.as_dvec3(), face, FACE_PX);
+                let Some(texels) = texels else {
+                    assert!(wanted.iter().all(|c| !c), "{}: face {face} from {eye} was left out", mesh.name);
+                    left_out += 1;
+                    continue;
+                };
+                for (i, (gpu, cpu)) in texels.iter().zip(&wanted).enumerate() {
+                    let (x, y) = (i % FACE_PX as usize, i / FACE_PX as usize);
+                    if gpu != cpu {
+                        differing += 1;
+                        assert!(is_edge(&wanted, x, y), "{}: {eye} face {face} texel {x} {y}: {gpu}", mesh.name);
+                    }
+                }
+                all += texels.len();
+                covered += texels.iter().filter(|c| **c).count();
+            }
+        }
+        report(&format!("{}: {differing} of {all} texels differ, {covered} covered, {left_out} faces out", mesh.name));
+        assert!(covered > all / 50 && covered < all, "{}: nothing to compare", mesh.name);
+        assert!(left_out > 0, "{}: no face was left out", mesh.name);
+        assert!((differing as f64) < DIFFERING_LIMIT * all as f64, "{}: {differing} of {all} differ", mesh.name);
+    }
+}
+
+#[test]
+fn culling_changes_nothing_on_closed_meshes() {
+    let Some(gpu) = gpu() else { return };
+    let mut compared = 0;
+    for (mesh, more) in scenes().into_iter().filter(|(mesh, _)| mesh.is_closed()) {
+        let eyes = [eyes_outside(), more].concat();
+        let (with, without) = (coverage(&gpu, &mesh, &eyes, true), coverage(&gpu, &mesh, &eyes, false));
+        assert_eq!(with, without, "{}", mesh.name);
+        compared += 1;
+    }
+    assert_eq!(compared, 3, "sphere, torus and cuboid are closed");
+}
+
+/// From inside a solid only back faces are seen: culled, they vanish. This is why samples inside are not captured, and shows
+/// that culling takes place at all.
+#[test]
+fn culled_from_inside_a_solid_nothing_is_left() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::cuboid(Vec3::ONE, 1);
+    let eyes = [Vec3::new(0.1, 0.2, -0.1)];
+    let covered = |cull| {
+        let faces = &coverage(&gpu, &mesh, &eyes, cull)[0];
+        faces.iter().flatten().flatten().filter(|c| **c).count()
+    };
+    assert_eq!(covered(true), 0);
+    assert_eq!(covered(false), 6 * (FACE_PX * FACE_PX) as usize);
+}
+
+/// One colour a direction, all components different.
+fn wall_color(direction: Vec3) -> Vec3 {
+    (direction + Vec3::splat(2.0)) * Vec3::new(1.0, 0.5, 4.0)
+}
+
+/// Walls of a box around the origin; `inner` is a small box of one colour in front of one wall, in either order.
+fn painted_box(inner_first: bool) -> Mesh {
+    let walls = generate::cuboid(Vec3::splat(2.0), 3);
+    let small = generate::cuboid(Vec3::splat(0.1), 1);
+    let painted = |mesh: &Mesh, offset: Vec3, color: &dyn Fn(Vec3) -> Vec3| {
+        let positions: Vec<Vec3> = mesh.positions.iter().map(|p| *p + offset).collect();
+        let colors: Vec<Vec3> = mesh.normals.iter().map(|n| color(*n)).collect();
+        (positions, colors, mesh.triangles.clone())
+    };
+    let mut parts = [
+        painted(&walls, Vec3::ZERO, &wall_color),
+        painted(&small, Vec3::new(0.0, 0.0, 0.6), &|_| Vec3::new(9.0, 0.0, 0.25)),
+    ];
+    if inner_first {
+        parts.reverse();
+    }
+    let (mut positions, mut colors, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    for (p, c, t) in parts {
+        let first = positions.len() as u32;
+        positions.extend(p);
+        colors.extend(c);
+        triangles.extend(t.iter().map(|t| t.map(|i| i + first)));
+    }
+    Mesh::new("painted box", positions, Vec::new(), Some(colors), triangles).unwrap()
+}
+
+#[test]
+fn colours_land_on_their_faces() {
+    let Some(gpu) = gpu() else { return };
+    let forward = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z].map(|d| d.as_vec3());
+    for inner_first in [false, true] {
+        let mesh = painted_box(inner_first);
+        let model = Model::new(&gpu.device, &mesh, true).unwrap();
+        let px = 9_u32;
+        let capture = Capture::new(&gpu.device, &gpu.library, px, true).unwrap();
+        let eyes = [Vec3::ZERO, Vec3::new(0.01, -0.02, 0.01)];
+        let plan = capture.plan(&model, &eyes);
+        let atlas: Vec<[f32; 4]> = gpu.atlas(&capture, &model, &eyes, &plan, false);
+        for slots in &plan {
+            for (face, &slot) in slots.iter().enumerate() {
+                assert_ne!(slot, NO_SLOT, "a wall in every direction");
+                let at = |x: usize, y: usize| {
+                    let [r, g, b, a] = atlas[texel_index(&capture, slot, x, y)];
+                    assert_eq!(a, 1.0);
+                    Vec3::new(r, g, b)
+                };
+                // The small box hides the middle of the wall at +z, whichever is drawn first; the corner is the wall's.
+                let (middle, corner) = (at(px as usize / 2, px as usize / 2), at(0, 0));
+                let wall = wall_color(forward[face]);
+                let wanted = if face == 4 { Vec3::new(9.0, 0.0, 0.25) } else { wall };
+                // Constant over the wall, but interpolated: a few f32 roundings.
+                assert!((middle - wanted).length() < 1e-5 * wanted.length(), "face {face}: {middle}, not {wanted}");
+                assert!((corner - wall).length() < 1e-5 * wall.length(), "face {face}: corner {corner}, not {wall}");
+            }
+        }
+    }
+}
+
+/// What is culled must be the back: a radiance capture from outside shows the near side of a closed mesh, culled or not.
+#[test]
+fn culling_keeps_the_near_side() {
+    let Some(gpu) = gpu() else { return };
+    let sphere = generate::sphere(1.0, 3);
+    let colors = sphere.normals.iter().map(|n| wall_color(*n)).collect();
+    let painted =
+        Mesh::new("painted sphere", sphere.positions, sphere.normals, Some(colors), sphere.triangles).unwrap();
+    for mesh in [painted, generate::torus_two_colour(0.5, 0.15, 48, 20)] {
+        assert!(mesh.is_closed());
+        let model = Model::new(&gpu.device, &mesh, true).unwrap();
+        let capture = Capture::new(&gpu.device, &gpu.library, FACE_PX, true).unwrap();
+        let eyes = eyes_outside();
+        let plan = capture.plan(&model, &eyes);
+        assert_eq!(plan.len(), eyes.len());
+        let [culled, whole] = [true, false].map(|cull| gpu.atlas::<[f32; 4]>(&capture, &model, &eyes, &plan, cull));
+        let lit = whole.iter().filter(|t| t[..3] != [0.0; 3]).count();
+        assert!(lit > 1000, "{lit} texels show the object");
+        // Where the silhouette grazes a texel centre the two sides are as near; none of these eyes has such a texel.
+        let differing = culled.iter().zip(&whole).filter(|(a, b)| a != b).count();
+        assert_eq!(differing, 0, "{}: {differing} of {lit} texels differ", mesh.name);
+    }
+}
+
+/// A colour that runs along an axis runs the same way on each face: s to the right, t down.
+#[test]
+fn faces_are_not_mirrored() {
+    let Some(gpu) = gpu() else { return };
+    let walls = generate::cuboid(Vec3::splat(2.0), 1);
+    let colors = walls.positions.iter().map(|p| *p + Vec3::splat(3.0)).collect();
+    let mesh =
+        Mesh::new("graded box", walls.positions.clone(), Vec::new(), Some(colors), walls.triangles.clone()).unwrap();
+    let model = Model::new(&gpu.device, &mesh, true).unwrap();
+    let px = 8;
+    let capture = Capture::new(&gpu.device, &gpu.library, px, true).unwrap();
+    let eyes = [Vec3::ZERO];
+    let plan = capture.plan(&model, &eyes);
+    let atlas: Vec<[f32; 4]> = gpu.atlas(&capture, &model, &eyes, &plan, false);
+    use shadow_fields::sh::cube::{direction, texel_st};
+    for (face, &slot) in plan[0].iter().enumerate() {
+        for (x, y) in [(0, 0), (7, 0), (1, 6), (4, 3)] {
+            let along = direction(face, texel_st(x, px as usize), texel_st(y, px as usize));
+            let hit = along / along.abs().max_element();
+            let [r, g, b, _] = atlas[texel_index(&capture, slot, x, y)];
+            let found = DVec3::new(r.into(), g.into(), b.into()) - DVec3::splat(3.0);
+            assert!((found - hit).length() < 1e-5, "face {face} texel {x} {y}: {found}, not {hit}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_fit_waits_for_the_next_pass() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::sphere(1.0, 1);
+    let model = Model::new(&gpu.device, &mesh, false).unwrap();
+    let capture = Capture::new(&gpu.device, &gpu.library, 512, false).unwrap();
+    let eyes = vec![Vec3::new(1.5, 0.0, 0.0); 100];
+    let plan = capture.plan(&model, &eyes);
+    assert!(!plan.is_empty() && plan.len() < eyes.len(), "{} of {} eyes", plan.len(), eyes.len());
+    let mut slots: Vec<u32> = plan.iter().flatten().copied().filter(|s| *s != NO_SLOT).collect();
+    assert!(slots.iter().all(|slot| *slot < capture.capacity()));
+    let count = slots.len();
+    slots.sort_unstable();
+    slots.dedup();
+    assert_eq!(slots.len(), count, "no two faces share a place");
+    let too_large = Capture::new(&gpu.device, &gpu.library, gpu.device.limits.max_image_dimension2_d, false);
+    assert_eq!(too_large.err().map(|error| error.exit_code()), Some(4));
+}

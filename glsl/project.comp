@@ -93,19 +93,22 @@ void main() {
         shares[k][lane] = sums[k];
     }
     barrier();
-    for (uint k = lane; k < COEFFICIENTS * CHANNELS; k += WORKGROUP) {
-        float total = 0.0;
-        for (uint other = 0; other < WORKGROUP; other++) {
-            total += shares[k][other];
-        }
-        total *= jobs[job].scale;
+    for (uint i = lane; i < STRIDE * CHANNELS; i += WORKGROUP) {
+        uint channel = i / STRIDE;
+        uint k = i % STRIDE;
+        float total = 0.0; // stays in what fills a channel up to whole quads
+        if (k < COEFFICIENTS) {
+            for (uint other = 0; other < WORKGROUP; other++) {
+                total += shares[channel * COEFFICIENTS + k][other];
+            }
+            total *= jobs[job].scale;
 #if COSINE
-        // What the object's own geometry leaves of the whole cosine lobe.
-        float lobe[COEFFICIENTS];
-        sh_cosine(jobs[job].normal.xyz, lobe);
-        total = lobe[k] - total;
+            // What the object's own geometry leaves of the whole cosine lobe.
+            float lobe[COEFFICIENTS];
+            sh_cosine(jobs[job].normal.xyz, lobe);
+            total = lobe[k] - total;
 #endif
-        uint channel = k / COEFFICIENTS;
-        samples[jobs[job].target * (STRIDE * CHANNELS) + channel * STRIDE + k % COEFFICIENTS] = total;
+        }
+        samples[jobs[job].target * (STRIDE * CHANNELS) + i] = total;
     }
 }

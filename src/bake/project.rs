@@ -51,8 +51,15 @@ pub struct Job {
     pub scale: f32,
 }
 
-/// Invocations that share a sample's texels: two waves of the widest GPUs, and within every device's limits.
-const WORKGROUP: u32 = 64;
+/// Bytes of shared memory that every device has (Vulkan 1.3, "Required Limits": maxComputeSharedMemorySize).
+const SHARED_BYTES: usize = 16_384;
+
+/// Invocations that share a sample's texels: one wave of the widest GPUs, fewer where their sums (a float a coefficient
+/// and channel each) would not fit [`SHARED_BYTES`]: 32 from 5 bands of radiance on, 16 for 7.
+fn workgroup(bands: usize, projection: Projection) -> u32 {
+    let sums = 4 * coefficient_count(bands) * projection.channels();
+    [64, 32].into_iter().find(|count| count * sums <= SHARED_BYTES).unwrap_or(16) as u32
+}
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -80,7 +87,7 @@ impl Project {
         Row::new("project.comp", bands)
             .define("CHANNELS", projection.channels() as u32)
             .define("COSINE", projection == Projection::Transfer)
-            .define("WORKGROUP", WORKGROUP)
+            .define("WORKGROUP", workgroup(bands, projection))
     }
 
     /// A pipeline for faces of `face_px` in an atlas of `columns`.
@@ -137,7 +144,7 @@ impl Project {
     ) -> Result<()> {
         let push = Push { job_count, face_px: self.face_px, atlas_columns: self.columns };
         let resources = [Bind::Image(atlas), Bind::Buffer(jobs), Bind::Texel(texels), Bind::Buffer(samples)];
-        commands.dispatch(&self.pipeline, &resources, &push, [job_count * WORKGROUP, 1, 1])
+        commands.dispatch(&self.pipeline, &resources, &push, [job_count * self.pipeline.local_size[0], 1, 1])
     }
 }
 

@@ -5,24 +5,29 @@ struct Entity {
     vec4 to_object_x;  // rows of the inverse rotation; w unused
     vec4 to_object_y;
     vec4 to_object_z;
-    vec4 emission;     // radiance factor of its light; w = whether the light has a radiance field of its own
+    vec4 emission;     // radiance factor of its light; w unused
     vec4 albedo;       // albedo / pi; w = uniform scale of the object
     vec4 radial;       // shell coordinate = x * spacing coordinate + y; z = inner, w = outer shell radius in r
     uint blocked_base; // first quad of the occlusion field
     uint radiance_base;// first quad of the radiance field
-    uint rank;         // decides between equal distances
+    uint spare_0;
+    uint spare_1;
+};
+
+// A workgroup's worth of neighbouring vertices.
+struct Cluster {
+    uint receiver;        // entity that is lit
+    uint vertex_first;    // in the vertex buffer
+    uint vertex_count;    // at most a workgroup
+    uint transfer_first;  // quad of its first transfer vector; NONE: the cosine of the normal
+    uint radiosity_first; // in the radiosity buffer
+    uint step_first;
+    uint step_count;      // at least 1
     uint spare;
 };
 
-struct Push {
-    uint vertex_first;   // of the receiver's mesh in the vertex buffer
-    uint vertex_count;
-    uint transfer_first; // quad of the receiver's first transfer vector; NONE: the cosine of the normal
-    uint receiver;       // entity that is lit
-    uint occluder_first; // in the list
-    uint occluder_count;
-    uint accumulate;     // 1: add to what an earlier dispatch with other lights left
-    uint spare;
-    uint light[4];       // entities of the lights of this dispatch
-    uint digit[16];      // 0 .. 15, see uniformly()
-};
+// A step: what one lookup is for. Bits 0-11: entity. Bits 12-23: the light whose chain this is, SKY_CHAIN for the sky's.
+const uint SKY_CHAIN = 0xfff;
+const uint STEP_LIGHT = 1u << 24;    // meets the light rather than multiplying an occluder
+const uint STEP_CHANNEL = 25;        // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour
+const uint STEP_LAST = 1u << 27;     // ends the chain: the next step begins anew from the transfer

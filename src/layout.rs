@@ -14,7 +14,7 @@ pub struct Entity {
     pub to_object_y: [f32; 4],
     /// Third row.
     pub to_object_z: [f32; 4],
-    /// Radiance factor of the entity's light; w = 1 with a radiance field of its own, 0 when it shares the occlusion field.
+    /// Radiance factor of the entity's light.
     pub emission: [f32; 4],
     /// Albedo / pi; w = uniform scale of the object.
     pub albedo: [f32; 4],
@@ -24,37 +24,73 @@ pub struct Entity {
     pub blocked_base: u32,
     /// First quad of the radiance field.
     pub radiance_base: u32,
-    /// Decides between equal distances: lower is nearer.
-    pub rank: u32,
     /// Not in use.
-    pub spare: u32,
+    pub spare_0: u32,
+    /// Not in use.
+    pub spare_1: u32,
 }
 
-/// Push constants of one merge dispatch.
+/// A workgroup's worth of neighbouring vertices of one receiver.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct Push {
-    /// First vertex of the receiver's mesh in the vertex buffer.
-    pub vertex_first: u32,
-    /// Vertices of the receiver.
-    pub vertex_count: u32,
-    /// First quad of the receiver's transfer vectors, or [`NONE`] for the cosine of the normal.
-    pub transfer_first: u32,
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Cluster {
     /// Entity that is lit.
     pub receiver: u32,
-    /// First occluder in the list.
-    pub occluder_first: u32,
-    /// Occluders in the list.
-    pub occluder_count: u32,
-    /// 1 to add to what an earlier dispatch left.
-    pub accumulate: u32,
+    /// First vertex in the vertex buffer.
+    pub vertex_first: u32,
+    /// Vertices, at most [`CLUSTER_VERTICES`].
+    pub vertex_count: u32,
+    /// First quad of the first vertex's transfer vector, or [`NONE`] for the cosine of the normal.
+    pub transfer_first: u32,
+    /// First vertex in the radiosity buffer.
+    pub radiosity_first: u32,
+    /// First step in the list.
+    pub step_first: u32,
+    /// Steps, at least 1.
+    pub step_count: u32,
     /// Not in use.
     pub spare: u32,
-    /// Lights of this dispatch.
-    pub light: [u32; 4],
-    /// The numbers 0 to 15.
-    pub digit: [u32; 16],
 }
 
 /// "No such thing" among indices.
 pub const NONE: u32 = u32::MAX;
+
+/// Vertices of a cluster, which is a workgroup: eight waves of llvmpipe, two of the commonest GPUs, and within every device's
+/// limits.
+pub const CLUSTER_VERTICES: u32 = 64;
+
+/// Entities that a step can name; the last number stands for the sky.
+pub const STEP_ENTITIES: u32 = 4095;
+
+/// What one lookup of the merge is for, packed into 32 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Multiply the chain of a light (`None`: of the sky) by the visibility past an entity.
+    Occlude {
+        /// The occluder.
+        entity: u32,
+        /// Whose chain it is.
+        light: Option<u32>,
+    },
+    /// Meet a light; `channel` is `None` for a light of one colour, which shares the occlusion field.
+    Shine {
+        /// The light.
+        entity: u32,
+        /// Channel of its radiance field.
+        channel: Option<u32>,
+        /// Whether the chain ends here and the next begins anew.
+        last: bool,
+    },
+}
+
+impl Step {
+    /// The 32 bits that `merge_layout.glsl` takes apart.
+    pub fn pack(self) -> u32 {
+        match self {
+            Step::Occlude { entity, light } => entity | light.unwrap_or(STEP_ENTITIES) << 12,
+            Step::Shine { entity, channel, last } => {
+                entity | entity << 12 | 1 << 24 | channel.unwrap_or(3) << 25 | u32::from(last) << 27
+            }
+        }
+    }
+}

@@ -23,6 +23,7 @@ embedded!(
     "draw.vert",
     "field.glsl",
     "merge.comp",
+    "merge_cone.glsl",
     "merge_layout.glsl",
     "project.comp",
 );

@@ -7,6 +7,7 @@ use crate::field::{Lattice, Lookup, Storage};
 use crate::frame;
 use crate::gpu::{self, Device, Validation};
 use crate::render::Variant;
+use crate::render::variant::Skip;
 use crate::scene::Scene;
 use crate::shaders::Library;
 use clap::Args;
@@ -90,6 +91,9 @@ pub struct MergeArguments {
     /// Samples that a lookup takes
     #[arg(long, default_value = "trilinear", value_name = "nearest|radial|trilinear")]
     pub lookup: Lookup,
+    /// Work to leave out where true visibility makes it zero: all, none, or a list of horizon, cones
+    #[arg(long, default_value = "all", value_name = "all|none|LIST")]
+    pub skip: Skip,
 }
 
 /// Width and height from `WxH`.

@@ -128,6 +128,7 @@ fn options(arguments: &Arguments, scene: &Scene) -> Options {
         bake: bake::Options::default(),
         lookup: arguments.merge.lookup,
         variant: arguments.merge.variant,
+        skip: arguments.merge.skip,
         size: arguments.size.unwrap_or([shape.width, shape.height]),
         multisample: true,
     }

@@ -61,6 +61,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         bake: arguments.bake.options(),
         lookup: arguments.merge.lookup,
         variant: arguments.merge.variant,
+        skip: arguments.merge.skip,
         size: arguments.size.unwrap_or([shape.width, shape.height]),
         multisample: true,
     };
@@ -114,7 +115,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "receiver_vertices": frame.receiver_vertex_count(),
         "variant": frame.variant.name,
         "options": {
-            "bake": options.bake, "lattice": options.bake.lattice.to_string(), "lookup": options.lookup,
+            "bake": options.bake, "lattice": options.bake.lattice.to_string(), "lookup": options.lookup, "skip": options.skip,
             "size": options.size, "multisample": options.multisample,
         },
         "prepare_ms": prepared.as_secs_f64() * 1e3,

@@ -95,7 +95,7 @@ fn chunk(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<[u32; 3]>, Vec<Chun
 }
 
 /// Interleaved bits of a point in [-1, 1]^3, ten an axis.
-fn morton(p: Vec3) -> u32 {
+pub fn morton(p: Vec3) -> u32 {
     let spread = |x: f32| {
         let cell = ((x + 1.0) * 512.0).clamp(0.0, 1023.0) as u32;
         (0..10).fold(0, |bits, i| bits | (cell >> i & 1) << (3 * i))

@@ -3,16 +3,18 @@
 
 use crate::asset::mesh::Mesh;
 use crate::bake::cache::Cache;
+use crate::bake::capture::{morton, unit_positions};
 use crate::bake::{self, Baker, Report};
 use crate::error::{Error, Result};
 use crate::field::quantity::{Kind, Storage, channel_stride};
 use crate::field::{Header, ShadowField};
 use crate::gpu::{Buffer, BufferKind};
-use crate::layout::NONE;
+use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::render::draw::Drawable;
+use crate::render::gather::Bounds;
 use crate::scene::Scene;
 use ash::vk;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::ops::Range;
 
 /// Alignment of everything that a pass may bind as a range: the largest that Vulkan lets a device ask for.
@@ -40,6 +42,10 @@ impl Slot {
 pub struct Geometry {
     /// Its vertices in the vertex buffer.
     pub vertices: Range<u32>,
+    /// Which vertex of the mesh stands at each place of that range: neighbours stand together.
+    pub order: Vec<u32>,
+    /// Bounds of every run of [`CLUSTER_VERTICES`] of them.
+    pub clusters: Vec<Bounds>,
     /// First quad of its transfer vectors, or [`NONE`] where the cosine of the normal is exact.
     pub transfer_first: u32,
     /// Occlusion field, if an entity needs one.
@@ -77,7 +83,8 @@ pub struct Store {
     pub baked: Vec<Baked>,
     /// Number format of the fields.
     pub storage: Storage,
-    bands: usize,
+    /// SH bands of fields and transfers.
+    pub bands: usize,
 }
 
 /// Which fields the entities of a mesh need: none for what only receives, no radiance field for a light of one colour.
@@ -139,9 +146,10 @@ impl Store {
         for (index, (mesh, [blocked, radiance])) in scene.meshes.iter().zip(slots).enumerate() {
             let (centre, radius_m) = mesh.bounding_sphere();
             let vertex_first = vertices.len() as u32;
-            for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
-                vertices.push((position - centre).extend(0.0).to_array());
-                vertices.push(normal.extend(0.0).to_array());
+            let order = spatial_order(mesh);
+            for &v in &order {
+                vertices.push((mesh.positions[v as usize] - centre).extend(0.0).to_array());
+                vertices.push(mesh.normals[v as usize].extend(0.0).to_array());
             }
             let receives = scene.entities.iter().any(|e| e.mesh == index && e.receives);
             let transfer_first = if receives && bakes_transfer(mesh) {
@@ -150,17 +158,20 @@ impl Store {
                 let (floats, report) = cache.transfer(baker, mesh, options.bands, options.face_px, &done)?;
                 baked.extend(report.map(|report| Baked { what, report }));
                 let first = transfers.len() / 4;
-                transfers.extend(floats);
+                let stride = channel_stride(options.bands);
+                transfers.extend(order.iter().flat_map(|&v| &floats[v as usize * stride..][..stride]));
                 first as u32
             } else {
                 NONE
             };
             geometries.push(Geometry {
                 vertices: vertex_first / 2..vertices.len() as u32 / 2,
+                clusters: cluster_bounds(mesh, &order),
                 transfer_first,
                 blocked,
                 radiance,
-                drawable: Drawable::new(device, mesh)?,
+                drawable: Drawable::new(device, mesh, &order)?,
+                order,
                 centre_m: centre.as_dvec3(),
                 radius_m: f64::from(radius_m),
             });
@@ -195,7 +206,7 @@ impl Store {
         Ok(ShadowField { header: slot.header.clone(), payload: self.fields.download_range(slot.bytes.clone())? })
     }
 
-    /// A copy of a mesh's transfer vectors: floats and their stride.
+    /// A copy of a mesh's transfer vectors in the mesh's order of vertices: floats and their stride.
     ///
     /// # Errors
     /// `Device` when memory ran out.
@@ -206,11 +217,39 @@ impl Store {
         let stride = channel_stride(self.bands);
         let first = u64::from(geometry.transfer_first) * 16;
         let size = geometry.vertices.len() as u64 * stride as u64 * 4;
-        Ok(Some((self.transfers.download_range(first..first + size)?, stride)))
+        let stored: Vec<f32> = self.transfers.download_range(first..first + size)?;
+        let mut floats = vec![0.0; stored.len()];
+        for (place, &v) in geometry.order.iter().enumerate() {
+            floats[v as usize * stride..][..stride].copy_from_slice(&stored[place * stride..][..stride]);
+        }
+        Ok(Some((floats, stride)))
     }
 }
 
 /// Whether a mesh can shadow itself; if not, its transfer is the cosine of the normal.
 pub fn bakes_transfer(mesh: &Mesh) -> bool {
     !mesh.is_flat() && !mesh.is_convex()
+}
+
+/// Vertices along a space-filling curve, those of different facing apart: runs of them are near one another.
+fn spatial_order(mesh: &Mesh) -> Vec<u32> {
+    let positions = unit_positions(mesh);
+    let mut order: Vec<u32> = (0..positions.len() as u32).collect();
+    order.sort_by_cached_key(|&v| {
+        let n = mesh.normals[v as usize];
+        let axis = n.abs().max_position();
+        (if mesh.is_flat() { 0 } else { 2 * axis + usize::from(n[axis] < 0.0) }, morton(positions[v as usize]), v)
+    });
+    order
+}
+
+/// Bounds of every run of [`CLUSTER_VERTICES`], relative to the bounding sphere's centre.
+fn cluster_bounds(mesh: &Mesh, order: &[u32]) -> Vec<Bounds> {
+    let (centre, _) = mesh.bounding_sphere();
+    let bounds = |run: &[u32]| {
+        let positions: Vec<Vec3> = run.iter().map(|&v| mesh.positions[v as usize] - centre).collect();
+        let normals: Vec<Vec3> = run.iter().map(|&v| mesh.normals[v as usize]).collect();
+        Bounds::new(&positions, &normals)
+    };
+    order.chunks(CLUSTER_VERTICES as usize).map(bounds).collect()
 }

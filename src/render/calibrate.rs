@@ -1,13 +1,13 @@
 //! Which variant of the merge is fastest on a device: measured once on a small made-up scene and kept in the cache folder.
 
-use super::merge::{Inputs, Job, Merge, Readable, rotation_stride};
-use super::variant::{Form, UNIFORM_ENTITIES, VARIANTS, Variant};
+use super::merge::{Inputs, Merge, Readable, rotation_stride};
+use super::variant::{Form, Skip, VARIANTS, Variant, uniform_entities};
 use crate::error::Result;
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::{Lattice, Lookup};
 use crate::gpu::shader::write_atomically;
 use crate::gpu::{Buffer, BufferKind, Commands, Device};
-use crate::layout::{Entity, NONE};
+use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, NONE, Step};
 use crate::shaders::Library;
 use ash::vk;
 use serde::{Deserialize, Serialize};
@@ -87,14 +87,27 @@ pub fn measure(device: &Arc<Device>, library: &Library) -> Result<Calibration> {
             [[place(v % edge), 0.0, place(v / edge), 0.0], [0.0, 1.0, 0.0, 0.0]]
         })
         .collect();
-    let padded = |name: &str, count: usize| {
-        Buffer::new(device, name, BufferKind::Upload, (UNIFORM_ENTITIES as usize * count) as u64)
+    let limit = uniform_entities(device, bands);
+    let padded = |name: &str, bytes: usize| {
+        let count = entities.len().max(limit as usize);
+        Buffer::new(device, name, BufferKind::Upload, (count * bytes) as u64)
     };
     let mut entity_buffer = padded("calibration entities", size_of::<Entity>())?;
     entity_buffer.write(0, &entities);
     let mut rotations = padded("calibration rotations", 4 * rotation_stride(bands))?;
     rotations.write(0, &vec![0.1_f32; entities.len() * rotation_stride(bands)]);
-    let list = Buffer::with_data(device, "calibration list", &(1..=OCCLUDERS).collect::<Vec<u32>>())?;
+    let list: Vec<u32> = (1..=OCCLUDERS).map(|entity| Step::Occlude { entity, light: None }.pack()).collect();
+    let steps = Buffer::with_data(device, "calibration steps", &list)?;
+    let cluster = |i: u32| Cluster {
+        vertex_first: i * CLUSTER_VERTICES,
+        vertex_count: CLUSTER_VERTICES,
+        transfer_first: NONE,
+        radiosity_first: i * CLUSTER_VERTICES,
+        step_count: OCCLUDERS,
+        ..Default::default()
+    };
+    let list: Vec<Cluster> = (0..VERTICES / CLUSTER_VERTICES).map(cluster).collect();
+    let clusters = Buffer::with_data(device, "calibration clusters", &list)?;
     let quads = lattice.stored_count() as usize * channel_stride(bands) / 4;
     // Small enough that the running product neither grows without end nor becomes denormal.
     let fields = Buffer::with_data(device, "calibration fields", &vec![[0x2000_2000_u32; 2]; quads])?;
@@ -102,36 +115,35 @@ pub fn measure(device: &Arc<Device>, library: &Library) -> Result<Calibration> {
     let vertices = Buffer::with_data(device, "calibration vertices", &vertices)?;
     let sky = Buffer::with_data(device, "calibration sky", &vec![[1.0_f32; 4]; bands * bands])?;
     let radiosity = Buffer::new(device, "calibration radiosity", BufferKind::Device, 16 * u64::from(VERTICES))?;
-    let job = Job {
-        receiver: 0,
-        vertices: 0..VERTICES,
-        transfer_first: NONE,
-        occluders: 0..OCCLUDERS,
-        lights: Vec::new(),
-        sky: true,
-        accumulate: false,
-        radiosity: 0..radiosity.size_bytes,
-    };
     let floats = vk::Format::R32G32B32A32_SFLOAT;
     let mut contenders = Vec::new();
     for &variant in VARIANTS {
-        let form =
-            Form { variant, bands, storage: Storage::F16, lattice, lookup: Lookup::Trilinear, lights: 0, sky: true };
+        let form = Form {
+            variant,
+            bands,
+            storage: Storage::F16,
+            lattice,
+            lookup: Lookup::Trilinear,
+            skip: Skip::NONE,
+            entity_limit: limit,
+        };
         let inputs = Inputs {
-            entities: &entity_buffer,
-            rotations: &rotations,
-            list: &list,
+            entities: Readable::shared(&entity_buffer, variant)?,
+            rotations: Readable::shared(&rotations, variant)?,
+            steps: &steps,
+            clusters: &clusters,
             fields: Readable::new(&fields, variant, vk::Format::R16G16B16A16_SFLOAT)?,
             transfers: Readable::new(&transfers, variant, floats)?,
             vertices: Readable::new(&vertices, variant, floats)?,
             sky: &sky,
         };
-        contenders.push((variant, Merge::new(device, library, form, &[(0, true)])?, inputs, f64::INFINITY));
+        contenders.push((variant, Merge::new(device, library, form)?, inputs, f64::INFINITY));
     }
     for run in 0..=RUNS {
         for (_, merge, inputs, least) in &mut contenders {
             let mut commands = Commands::new(device, "calibration")?;
-            commands.pass("merge", |commands| merge.record(commands, inputs, &radiosity, &job))?;
+            commands
+                .pass("merge", |commands| merge.record(commands, inputs, &radiosity, VERTICES / CLUSTER_VERTICES))?;
             let timings = commands.submit()?;
             // The first run compiles.
             if run > 0 {

@@ -27,20 +27,26 @@ pub struct Drawable {
 }
 
 impl Drawable {
-    /// Uploads a mesh; without colours its emission pattern is white.
+    /// Uploads a mesh, its vertices in `order`; without colours its emission pattern is white.
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn new(device: &Arc<Device>, mesh: &Mesh) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32]) -> Result<Self> {
         let (centre, _) = mesh.bounding_sphere();
-        let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| (p - centre).to_array()).collect();
-        let white = vec![Vec3::ONE; positions.len()];
-        let emission: Vec<[f32; 3]> = mesh.colors.as_ref().unwrap_or(&white).iter().map(Vec3::to_array).collect();
+        let color = |v: usize| mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[v]);
+        let positions: Vec<[f32; 3]> =
+            order.iter().map(|&v| (mesh.positions[v as usize] - centre).to_array()).collect();
+        let emission: Vec<[f32; 3]> = order.iter().map(|&v| color(v as usize).to_array()).collect();
+        let mut place = vec![0; order.len()];
+        for (at, &v) in order.iter().enumerate() {
+            place[v as usize] = at as u32;
+        }
+        let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(|t| t.map(|v| place[v as usize])).collect();
         Ok(Drawable {
             positions: Buffer::with_data(device, "draw positions", &positions)?,
             emission: Buffer::with_data(device, "draw emission", &emission)?,
-            indices: Buffer::with_data(device, "draw indices", &mesh.triangles)?,
-            index_count: 3 * mesh.triangles.len() as u32,
+            indices: Buffer::with_data(device, "draw indices", &triangles)?,
+            index_count: 3 * triangles.len() as u32,
         })
     }
 }

@@ -1,38 +1,16 @@
 //! Pass "merge": light on every vertex of every receiver.
 //!
-//! Inputs: entities and their rotations, a list of occluders, the field store, transfer vectors, vertices (position and
-//! normal, object frame, two quads each), the sky's coefficients. Output: `radiosity`, four floats a vertex: radiance that
-//! leaves the surface, albedo / pi times the integral of incoming light, without emission.
+//! Inputs: entities and their rotations, clusters and their steps (see [`super::gather`]), the field store, transfer vectors,
+//! vertices (position and normal, object frame, two quads each), the sky's coefficients. Output: `radiosity`, four floats a
+//! vertex: radiance that leaves the surface, albedo / pi times the integral of incoming light, without emission.
 
-use super::variant::{Form, MAX_LIGHTS, Variant};
+use super::variant::{Form, Variant};
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
-use crate::layout::{NONE, Push};
+use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::Library;
 use ash::vk;
-use std::ops::Range;
 use std::sync::Arc;
-
-/// One dispatch: a receiver under some of the lights.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Job {
-    /// Entity that is lit.
-    pub receiver: u32,
-    /// Its vertices in the vertex buffer.
-    pub vertices: Range<u32>,
-    /// First quad of its transfer vectors, or [`NONE`].
-    pub transfer_first: u32,
-    /// Its part of the occluder list.
-    pub occluders: Range<u32>,
-    /// Lights of this dispatch, at most [`MAX_LIGHTS`].
-    pub lights: Vec<u32>,
-    /// Whether the distant light is in this dispatch.
-    pub sky: bool,
-    /// Whether an earlier dispatch has written the same vertices.
-    pub accumulate: bool,
-    /// Byte range of the receiver's vertices in the radiosity buffer.
-    pub radiosity: Range<u64>,
-}
 
 /// A resource that a variant reads as a storage block or through a texel view.
 pub struct Readable<'b> {
@@ -50,6 +28,16 @@ impl<'b> Readable<'b> {
         Ok(Readable { buffer, view })
     }
 
+    /// As [`Readable::new`] for what is the same in a whole workgroup, which some variants read as uniform blocks.
+    ///
+    /// # Errors
+    /// As [`Readable::new`].
+    pub fn shared(buffer: &'b Buffer, variant: Variant) -> Result<Self> {
+        let texel = variant.texel && !variant.uniform;
+        let view = texel.then(|| TexelView::new(buffer, vk::Format::R32G32B32A32_SFLOAT)).transpose()?;
+        Ok(Readable { buffer, view })
+    }
+
     fn bind<'r>(&'r self) -> Bind<'r> {
         match &self.view {
             Some(view) => Bind::Texel(view),
@@ -61,18 +49,20 @@ impl<'b> Readable<'b> {
 /// Everything that a merge reads.
 pub struct Inputs<'b> {
     /// [`crate::layout::Entity`] of every entity.
-    pub entities: &'b Buffer,
+    pub entities: Readable<'b>,
     /// Rotation blocks of every entity, [`rotation_stride`] floats apart.
-    pub rotations: &'b Buffer,
-    /// Occluders of all jobs.
-    pub list: &'b Buffer,
+    pub rotations: Readable<'b>,
+    /// Steps of all clusters.
+    pub steps: &'b Buffer,
+    /// [`crate::layout::Cluster`] of every cluster.
+    pub clusters: &'b Buffer,
     /// Field store.
     pub fields: Readable<'b>,
     /// Transfer vectors.
     pub transfers: Readable<'b>,
     /// Positions and normals.
     pub vertices: Readable<'b>,
-    /// Four floats a coefficient: red, green, blue of the sky.
+    /// Four floats a coefficient: red, green, blue of the sky; zero without one.
     pub sky: &'b Buffer,
 }
 
@@ -81,70 +71,42 @@ pub fn rotation_stride(bands: usize) -> usize {
     crate::sh::rotation::block_count(bands).next_multiple_of(4)
 }
 
-/// A pipeline for every combination of lights and sky that a scene has.
+/// The pipeline.
 pub struct Merge {
-    pipelines: Vec<((usize, bool), ComputePipeline)>,
+    pipeline: ComputePipeline,
 }
 
 impl Merge {
-    /// Pipelines for the dispatches in `jobs`; `form` gives everything but lights and sky.
+    /// The pipeline of one form.
     ///
     /// # Errors
-    /// `Failed` when a shader does not compile.
-    pub fn new(device: &Arc<Device>, library: &Library, form: Form, kinds: &[(usize, bool)]) -> Result<Self> {
-        let mut pipelines: Vec<((usize, bool), ComputePipeline)> = Vec::new();
-        for &(lights, sky) in kinds {
-            assert!(lights as u32 <= MAX_LIGHTS, "{lights} lights in one dispatch");
-            if pipelines.iter().any(|(kind, _)| *kind == (lights, sky)) {
-                continue;
-            }
-            let shader = library.shader(&Form { lights: lights as u32, sky, ..form }.row())?;
-            pipelines.push(((lights, sky), ComputePipeline::new(device, "merge", &shader, &[])?));
-        }
-        Ok(Merge { pipelines })
+    /// `Failed` when the shader does not compile.
+    pub fn new(device: &Arc<Device>, library: &Library, form: Form) -> Result<Self> {
+        Ok(Merge { pipeline: ComputePipeline::new(device, "merge", &library.shader(&form.row())?, &[])? })
     }
 
-    /// Dispatches one job.
+    /// Lights the first `cluster_count` clusters.
     ///
     /// # Errors
-    /// `Input` when a buffer is larger than the device can bind.
-    ///
-    /// # Panics
-    /// When [`Merge::new`] was not told of the job's kind.
+    /// `Input` when a buffer is larger than the device can bind, or the clusters are more than it can dispatch.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
         inputs: &'r Inputs<'r>,
         radiosity: &'r Buffer,
-        job: &Job,
+        cluster_count: u32,
     ) -> Result<()> {
-        let kind = (job.lights.len(), job.sky);
-        let (_, pipeline) =
-            self.pipelines.iter().find(|(k, _)| *k == kind).unwrap_or_else(|| panic!("no merge pipeline for {kind:?}"));
-        let mut light = [NONE; MAX_LIGHTS as usize];
-        light[..job.lights.len()].copy_from_slice(&job.lights);
-        let push = Push {
-            vertex_first: job.vertices.start,
-            vertex_count: job.vertices.end - job.vertices.start,
-            transfer_first: job.transfer_first,
-            receiver: job.receiver,
-            occluder_first: job.occluders.start,
-            occluder_count: job.occluders.end - job.occluders.start,
-            accumulate: job.accumulate.into(),
-            spare: 0,
-            light,
-            digit: std::array::from_fn(|i| i as u32),
-        };
         let resources = [
-            Bind::Buffer(inputs.entities),
-            Bind::Buffer(inputs.rotations),
-            Bind::Buffer(inputs.list),
+            inputs.entities.bind(),
+            inputs.rotations.bind(),
+            Bind::Buffer(inputs.steps),
             inputs.fields.bind(),
             inputs.transfers.bind(),
             inputs.vertices.bind(),
             Bind::Buffer(inputs.sky),
-            Bind::Range(radiosity, job.radiosity.clone()),
+            Bind::Buffer(radiosity),
+            Bind::Buffer(inputs.clusters),
         ];
-        commands.dispatch(pipeline, &resources, &push, [push.vertex_count, 1, 1])
+        commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod calibrate;
 pub mod draw;
+pub mod gather;
 pub mod merge;
 pub mod reference;
 pub mod variant;

@@ -1,5 +1,6 @@
 //! The CPU twin of "merge", in f64 and vertex by vertex, from the same stored numbers.
 
+use super::variant::{SKIP_FADE_RAD, Skip};
 use crate::field::{Lookup, ShadowField};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count};
 use crate::sh::lobe::clamped_cosine;
@@ -50,6 +51,8 @@ pub struct Task<'t> {
     pub bands: usize,
     /// Which samples a lookup takes.
     pub lookup: Lookup,
+    /// What is left out.
+    pub skip: Skip,
 }
 
 type Coefficients = [f64; MAX_COEFFICIENTS];
@@ -68,14 +71,23 @@ impl Task<'_> {
         let position = receiver.centre + receiver.rotation * (self.positions[v] * receiver.scale);
         let transfer = self.transfer(v, &rotations[self.receiver]);
 
-        let factors: Vec<(usize, Coefficients)> =
-            self.occluders.iter().map(|&j| (j, self.field(j, position, None, rotations))).collect();
-        // The chain of the occluders that `precedes` admits.
-        let chain = |precedes: &dyn Fn(usize) -> bool| {
+        let normal = receiver.rotation * self.normals[v];
+        let cones: Vec<Cone> = self.objects.iter().map(|o| Cone::new(o, position)).collect();
+        let factors: Vec<(usize, Coefficients)> = self
+            .occluders
+            .iter()
+            .map(|&j| {
+                let reach = cones[j].above_horizon(normal, self.skip);
+                (j, self.field(j, position, None, rotations).map(|b| b * reach))
+            })
+            .collect();
+        // The chain of the occluders, each as much as `share` says.
+        let chain = |share: &dyn Fn(usize) -> f64| {
             let mut t = transfer;
-            for (_, b) in factors.iter().filter(|(j, _)| precedes(*j)) {
+            for (j, b) in &factors {
+                let part = b.map(|b| b * share(*j));
                 let mut product = [0.0; MAX_COEFFICIENTS];
-                tensor.multiply(&t[..count], &b[..count], &mut product[..count]);
+                tensor.multiply(&t[..count], &part[..count], &mut product[..count]);
                 t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
             }
             t
@@ -84,15 +96,16 @@ impl Task<'_> {
 
         let mut sum = [0.0; 3];
         if let Some(sky) = self.sky {
-            let t = chain(&|_| true);
+            let t = chain(&|_| 1.0);
             sum.iter_mut().zip(sky).for_each(|(sum, sky)| *sum += against(sky, &t));
         }
-        let distance = |j: usize| self.objects[j].centre.distance(position);
         for &light in self.lights.iter().filter(|&&l| l != self.receiver) {
-            let t = chain(&|j| (distance(j), j) < (distance(light), light));
+            let before = |j: usize| (cones[j].distance, j) < (cones[light].distance, light);
+            let t = chain(&|j| if before(j) { cones[j].overlap(&cones[light], self.skip) } else { 0.0 });
+            let reach = cones[light].above_horizon(normal, self.skip);
             for (channel, sum) in sum.iter_mut().enumerate() {
                 let s = self.field(light, position, Some(channel), rotations);
-                *sum += self.objects[light].emission[channel] * against(&s, &t);
+                *sum += reach * self.objects[light].emission[channel] * against(&s, &t);
             }
         }
         std::array::from_fn(|channel| sum[channel] * receiver.albedo_over_pi[channel])
@@ -128,4 +141,40 @@ impl Task<'_> {
         rotations[j].apply(&found[..count], &mut out[..count]);
         out
     }
+}
+
+/// What a bounding sphere covers of a vertex's view: the twin of `glsl/merge_cone.glsl`, in angles.
+struct Cone {
+    toward: DVec3,
+    distance: f64,
+    half_angle_rad: Option<f64>,
+}
+
+impl Cone {
+    fn new(object: &Object<'_>, position: DVec3) -> Self {
+        let to = object.centre - position;
+        let distance = to.length();
+        let sine = object.radius_m / distance;
+        Cone { toward: to.normalize_or_zero(), distance, half_angle_rad: (sine < 1.0).then(|| sine.asin()) }
+    }
+
+    fn above_horizon(&self, normal: DVec3, skip: Skip) -> f64 {
+        let sine = self.half_angle_rad.map_or(1.0, f64::sin);
+        if skip.horizon { smoothstep(-sine - SKIP_FADE_RAD.sin(), -sine, normal.dot(self.toward)) } else { 1.0 }
+    }
+
+    fn overlap(&self, other: &Cone, skip: Skip) -> f64 {
+        match (self.half_angle_rad, other.half_angle_rad) {
+            (Some(a), Some(b)) if skip.cones && (a + b + SKIP_FADE_RAD).cos() < (a + b).cos() => {
+                smoothstep((a + b + SKIP_FADE_RAD).cos(), (a + b).cos(), self.toward.dot(other.toward))
+            }
+            _ => 1.0,
+        }
+    }
+}
+
+/// 0 up to `low`, 1 from `high` on, smooth between.
+fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
 }

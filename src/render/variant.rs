@@ -1,9 +1,11 @@
 //! Variants of the merge shader that compute the same function, by name, and what else its code depends on.
 
+use super::merge::rotation_stride;
 use crate::error::{Error, Result};
 use crate::field::lattice::{CELL_WARP, Directions, Lattice, Lookup, Spacing};
 use crate::field::quantity::Storage;
 use crate::gpu::Device;
+use crate::layout::{CLUSTER_VERTICES, Entity};
 use crate::shaders::Row;
 
 /// How the merge is done, where that changes its speed and not its outcome.
@@ -13,19 +15,16 @@ pub struct Variant {
     pub name: &'static str,
     /// Fields, transfers and vertices are read through texel views rather than storage blocks.
     pub texel: bool,
-    /// Entities, rotations and sky are uniform blocks, at indices that Mesa's software driver sees to be uniform; storage
-    /// blocks otherwise.
+    /// Entities and rotations are uniform blocks; otherwise storage blocks or texels like the rest.
     pub uniform: bool,
-    /// Invocations a workgroup.
-    pub workgroup: u32,
 }
 
 /// Every variant.
 pub const VARIANTS: &[Variant] = &[
-    Variant { name: "storage", texel: false, uniform: false, workgroup: 64 },
-    Variant { name: "storage-uniform", texel: false, uniform: true, workgroup: 64 },
-    Variant { name: "texel", texel: true, uniform: false, workgroup: 64 },
-    Variant { name: "texel-uniform", texel: true, uniform: true, workgroup: 64 },
+    Variant { name: "storage", texel: false, uniform: false },
+    Variant { name: "storage-uniform", texel: false, uniform: true },
+    Variant { name: "texel", texel: true, uniform: false },
+    Variant { name: "texel-uniform", texel: true, uniform: true },
 ];
 
 impl Variant {
@@ -43,7 +42,7 @@ impl Variant {
     /// What a device gets before anything was measured on it: texel reads are more than ten times faster than storage reads
     /// on a processor, and no slower than them on the GPUs that are known.
     pub fn sane_default(device: &Device) -> Self {
-        let name = if device.info.is_software() { "texel-uniform" } else { "storage" };
+        let name = if device.info.is_software() { "texel" } else { "storage-uniform" };
         Self::named(name).expect("the default is in the table")
     }
 
@@ -54,10 +53,13 @@ impl Variant {
     }
 }
 
-/// Entities that the uniform blocks hold: their 4-band rotations then take 16 128 of the 16 384 bytes that every device binds.
-pub const UNIFORM_ENTITIES: u32 = 48;
+/// Entities whose rotations and places fit a uniform block of the device, at most 192 (64 KB at 4 bands, what most devices bind).
+pub fn uniform_entities(device: &Device, bands: usize) -> u32 {
+    let bytes = (4 * rotation_stride(bands)).max(size_of::<Entity>()) as u32;
+    (device.limits.max_uniform_buffer_range / bytes).min(192)
+}
 
-/// What the merge shader is compiled for: a variant, the shape of the fields, and the lights of a dispatch.
+/// What the merge shader is compiled for: a variant, the shape of the fields, and what is left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Form {
     /// How it is done.
@@ -70,14 +72,48 @@ pub struct Form {
     pub lattice: Lattice,
     /// Which samples a lookup takes.
     pub lookup: Lookup,
-    /// Local lights in a dispatch, 0 to [`MAX_LIGHTS`].
-    pub lights: u32,
-    /// Whether the distant light is in it.
-    pub sky: bool,
+    /// What is left out.
+    pub skip: Skip,
+    /// Entities that uniform blocks hold on the device, [`uniform_entities`].
+    pub entity_limit: u32,
 }
 
-/// Most local lights of one dispatch: each keeps a running product of 16 registers.
-pub const MAX_LIGHTS: u32 = 4;
+/// Work that the merge leaves out because true visibility makes it zero. The band-limited product is not zero there, so each
+/// skip fades out over [`SKIP_FADE_RAD`] beyond its threshold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+pub struct Skip {
+    /// Lights and occluders whose bounding spheres lie below the horizon of the receiving surface.
+    pub horizon: bool,
+    /// Occluders whose bounding spheres do not reach into a light's, as seen from the vertex.
+    pub cones: bool,
+}
+
+impl Skip {
+    /// Every skip.
+    pub const ALL: Skip = Skip { horizon: true, cones: true };
+    /// No skip.
+    pub const NONE: Skip = Skip { horizon: false, cones: false };
+}
+
+impl std::str::FromStr for Skip {
+    type Err = String;
+    /// `all`, `none`, or a list of `horizon` and `cones` with commas.
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "all" => return Ok(Skip::ALL),
+            "none" => return Ok(Skip::NONE),
+            _ => {}
+        }
+        text.split(',').try_fold(Skip::NONE, |skip, word| match word {
+            "horizon" => Ok(Skip { horizon: true, ..skip }),
+            "cones" => Ok(Skip { cones: true, ..skip }),
+            _ => Err(format!("unknown skip \"{word}\" (all, none, or a list of horizon, cones)")),
+        })
+    }
+}
+
+/// Angle over which a skip fades out: 10 degrees.
+pub const SKIP_FADE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
 impl Form {
     /// The row of the shader table.
@@ -89,13 +125,14 @@ impl Form {
         };
         let cube = matches!(lattice.directions, Directions::Cube { .. });
         let row = Row::new("merge.comp", self.bands)
-            .define("WORKGROUP", self.variant.workgroup)
+            .define("WORKGROUP", CLUSTER_VERTICES)
             .define("TEXEL", self.variant.texel)
             .define("UNIFORM", self.variant.uniform)
-            .define("ENTITY_LIMIT", UNIFORM_ENTITIES)
+            .define("ENTITY_LIMIT", self.entity_limit)
             .define("HALF", self.storage == Storage::F16)
-            .define("LIGHTS", self.lights)
-            .define("SKY", self.sky)
+            .define("SKIP_HORIZON", self.skip.horizon)
+            .define("SKIP_CONES", self.skip.cones)
+            .number("FADE", SKIP_FADE_RAD)
             .define(
                 "LOOKUP",
                 match self.lookup {

@@ -31,6 +31,11 @@ fn key(header: &impl Serialize) -> String {
     blake3::Hasher::new().update(&VERSION.to_le_bytes()).update(&text).finalize().to_hex()[..32].to_owned()
 }
 
+/// What decides a field: the header without the name for people and without what only the bake finds out.
+fn identity(header: &Header) -> Header {
+    Header { mesh: String::new(), filled_samples: 0, ..header.clone() }
+}
+
 impl Cache {
     /// A cache below `folder`, or none.
     pub fn new(folder: Option<&Path>) -> Self {
@@ -54,10 +59,10 @@ impl Cache {
         (store, offset_bytes): (&mut Buffer, u64),
         progress: Progress<'_>,
     ) -> Result<Option<Report>> {
-        let path = self.path(&key(&Header { mesh: String::new(), ..header.clone() }), "sf");
+        let path = self.path(&key(&identity(header)), "sf");
         if let Some(path) = path.as_ref().filter(|path| path.exists()) {
             match ShadowField::read(path) {
-                Ok(found) if found.payload.len() as u64 == header.payload_bytes() => {
+                Ok(found) if identity(&found.header) == identity(header) => {
                     header.filled_samples = found.header.filled_samples;
                     store.fill(offset_bytes, &found.payload)?;
                     return Ok(None);

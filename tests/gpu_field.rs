@@ -1,0 +1,512 @@
+//! Baked fields and transfers: against closed forms, against each other, and through the cache.
+
+mod common;
+
+use common::{Gpu, gpu, library, open, report};
+use fastrand::Rng;
+use glam::{DQuat, DVec3, Vec3};
+use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::bake::assemble::Sources;
+use shadow_fields::bake::cache::Cache;
+use shadow_fields::bake::capture::unit_positions;
+use shadow_fields::bake::inside::inside;
+use shadow_fields::bake::{self, Baker};
+use shadow_fields::field::quantity::channel_stride;
+use shadow_fields::field::{Header, Kind, Lookup, ShadowField, Storage};
+use shadow_fields::gpu::{Buffer, BufferKind, Device};
+use shadow_fields::sh::lobe;
+use shadow_fields::sh::rotation::Rotation;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+fn quiet(_: u32, _: u32) {}
+
+/// A small field for tests that are not about accuracy.
+fn small(lattice: &str, storage: Storage, bands: usize) -> bake::Options {
+    bake::Options { bands, storage, lattice: lattice.parse().unwrap(), face_px: 32 }
+}
+
+/// A store whose bytes are not those of a new one, so that what a bake leaves out shows.
+fn store(device: &Arc<Device>, header: &Header, fill: u8) -> Buffer {
+    Buffer::with_data(device, "store", &vec![fill; header.payload_bytes() as usize]).unwrap()
+}
+
+fn bake_field(device: &Arc<Device>, mesh: &Mesh, kind: Kind, options: &bake::Options) -> ShadowField {
+    let mut header = bake::header(mesh, kind, options);
+    let store = store(device, &header, 0xff);
+    let baker = Baker::new(device, &library());
+    let report = baker.field(mesh, &mut header, (&store, 0), &quiet).unwrap();
+    assert_eq!(report.samples + report.filled, header.lattice.sample_count());
+    let payload = store.download(header.payload_bytes() as usize).unwrap();
+    let field = ShadowField { header, payload };
+    assert_finite(&field);
+    field
+}
+
+/// 0xff in the store is NaN in f16 and f32: this also shows that every number was written.
+fn assert_finite(field: &ShadowField) {
+    let header = &field.header;
+    for sample in 0..header.lattice.stored_count() {
+        for number in 0..header.sample_stride() {
+            let value = field.stored(sample, 0, number);
+            assert!(value.is_finite(), "{}: sample {sample}, number {number} is {value}", header.mesh);
+        }
+    }
+}
+
+fn unit(rng: &mut Rng) -> DVec3 {
+    loop {
+        let v = DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0));
+        if (0.01..1.0).contains(&v.length_squared()) {
+            return v.normalize();
+        }
+    }
+}
+
+fn norm(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    norm(a.iter().zip(b).map(|(a, b)| a - b))
+}
+
+/// Receivers log-uniform in distance from 1.05 r to 8 r, uniform in direction.
+fn receivers(count: usize, seed: u64) -> Vec<DVec3> {
+    let mut rng = Rng::with_seed(seed);
+    (0..count).map(|_| unit(&mut rng) * 1.05 * (8.0_f64 / 1.05).powf(rng.f64())).collect()
+}
+
+/// The default field of a sphere, baked once: 6 144 samples at 64 px.
+fn sphere_field(gpu: &Gpu) -> &'static ShadowField {
+    static FIELD: OnceLock<ShadowField> = OnceLock::new();
+    FIELD.get_or_init(|| bake_field(&gpu.device, &generate::sphere(2.5, 4), Kind::Occlusion, &bake::Options::default()))
+}
+
+/// Mean and largest relative error of the blocked part of a sphere's field.
+fn sphere_error(field: &ShadowField, lookup: Lookup) -> (f64, f64) {
+    let receivers = receivers(1000, 5);
+    let errors: Vec<f64> = receivers
+        .iter()
+        .map(|&p| {
+            let mut found = [0.0; 16];
+            field.lookup(p, lookup, 0, &mut found);
+            let wanted = lobe::sphere(4, -p, 1.0);
+            difference(&found, &wanted) / norm(wanted)
+        })
+        .collect();
+    (errors.iter().sum::<f64>() / errors.len() as f64, errors.iter().copied().fold(0.0, f64::max))
+}
+
+#[test]
+fn sphere_has_its_closed_form() {
+    let Some(gpu) = gpu() else { return };
+    let field = sphere_field(&gpu);
+    assert_eq!(field.header.filled_samples, 0, "all shells lie outside");
+    let [trilinear, radial, nearest] =
+        [Lookup::Trilinear, Lookup::Radial, Lookup::Nearest].map(|lookup| sphere_error(field, lookup));
+    report(&format!(
+        "sphere, relative error of b, mean (max): trilinear {:.4} ({:.3}), radial {:.4} ({:.3}), nearest {:.4} ({:.3})",
+        trilinear.0, trilinear.1, radial.0, radial.1, nearest.0, nearest.1
+    ));
+    // DESIGN: .032 (.11) with 6 log shells; the default has 16 and interpolates b / (1 - c).
+    assert!(trilinear.0 < 0.035 && trilinear.1 < 0.12, "{trilinear:?}");
+    assert!(nearest.0 > 2.5 * trilinear.0, "the measure tells a bad lookup from a good one: {nearest:?}");
+    assert!(radial.0 > 1.5 * trilinear.0 && radial.0 <= nearest.0 * 1.001, "{radial:?}");
+}
+
+#[test]
+fn beyond_the_last_shell_the_sphere_fades() {
+    let Some(gpu) = gpu() else { return };
+    let field = sphere_field(&gpu);
+    let mut rng = Rng::with_seed(6);
+    for distance in [8.0, 8.01, 12.0, 30.0, 200.0] {
+        let p = distance * unit(&mut rng);
+        let mut found = [0.0; 16];
+        field.lookup(p, Lookup::Trilinear, 0, &mut found);
+        let wanted = lobe::sphere(4, -p, 1.0);
+        let error = difference(&found, &wanted) / norm(wanted);
+        // (R/d)^2 is within 1.4 %; interpolation between directions adds its own.
+        assert!(error < 0.08, "{distance} r: {error}");
+    }
+    let mut zero = [1.0; 16];
+    field.lookup(1e6 * DVec3::X, Lookup::Trilinear, 0, &mut zero);
+    assert!(norm(zero) < 1e-10);
+}
+
+/// A sphere that spins in place throws the same shadow. The field's samples turn with it, so that what is seen is the
+/// difference between two interpolations of the same function: at most twice the error of one.
+#[test]
+fn spinning_a_sphere_changes_little() {
+    let Some(gpu) = gpu() else { return };
+    let field = sphere_field(&gpu);
+    let mut rng = Rng::with_seed(7);
+    let (mut sum, mut largest, mut count) = (0.0, 0.0_f64, 0);
+    for turn in 0..20 {
+        let rotation = DQuat::from_axis_angle(unit(&mut rng), 0.1 + 0.3 * f64::from(turn));
+        let matrix = Rotation::new(4, rotation);
+        for p in receivers(50, 100 + turn as u64) {
+            let (mut still, mut turned, mut world) = ([0.0; 16], [0.0; 16], [0.0; 16]);
+            field.lookup(p, Lookup::Trilinear, 0, &mut still);
+            field.lookup(rotation.inverse() * p, Lookup::Trilinear, 0, &mut turned);
+            matrix.apply(&turned, &mut world);
+            let error = difference(&still, &world) / norm(still);
+            (sum, largest, count) = (sum + error, largest.max(error), count + 1);
+        }
+    }
+    let mean = sum / f64::from(count);
+    report(&format!("spinning sphere: blocked part changes by {mean:.4} on average, {largest:.3} at most"));
+    assert!(mean < 0.05 && largest < 0.2, "{mean} {largest}");
+    assert!(mean > 1e-4, "turning is a true change of samples");
+}
+
+fn torus() -> Mesh {
+    generate::torus(1.0, 0.35, 32, 16)
+}
+
+#[test]
+fn samples_in_the_tube_are_filled_from_outside() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = torus();
+    let field = bake_field(&gpu.device, &mesh, Kind::Occlusion, &small("cube:10x4", Storage::F32, 4));
+    let header = &field.header;
+    let lattice = header.lattice;
+    let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
+    let marks = inside(&unit_positions(&mesh), &mesh.triangles, &positions);
+    // Closed form: in the tube where the distance from the ring's circle is below its radius, in units of 1.35.
+    let from_circle = |p: DVec3| (DVec3::new(p.x, 0.0, p.z).length() - 1.0 / 1.35).hypot(p.y) * 1.35;
+    for (p, mark) in positions.iter().zip(&marks) {
+        let depth = 0.35 - from_circle(*p);
+        // The mesh's facets lie up to 2 % inside the tube.
+        assert!(depth.abs() < 0.02 || *mark == (depth > 0.0), "{p} is {depth} inside, marked {mark}");
+    }
+    let count = marks.iter().filter(|m| **m).count() as u32;
+    assert!(count > 0 && header.filled_samples == count, "{} of {count}", header.filled_samples);
+
+    // Where each captured sample stands among the stored ones.
+    let own: Vec<u32> = {
+        let planes = lattice.sources();
+        let find = |d: u32| planes.iter().position(|s| *s == [d]).unwrap() as u32;
+        (0..lattice.direction_count()).map(find).collect()
+    };
+    let directions = lattice.direction_count();
+    let stored_at =
+        |sample: u32| sample / directions * lattice.stored_direction_count() + own[(sample % directions) as usize];
+    let sources = Sources::new(&lattice, &marks).unwrap();
+    for sample in (0..lattice.sample_count()).filter(|s| marks[*s as usize]) {
+        let stored = stored_at(sample);
+        let list =
+            &sources.list[sources.offsets[stored as usize] as usize..sources.offsets[stored as usize + 1] as usize];
+        assert!(!list.is_empty() && list.iter().all(|s| !marks[*s as usize]), "sample {sample} is filled from inside");
+        for k in 0..16 {
+            let around: Vec<f64> = list.iter().map(|s| field.stored(stored_at(*s), 0, k)).collect();
+            let (low, high) =
+                (around.iter().copied().fold(f64::MAX, f64::min), around.iter().copied().fold(f64::MIN, f64::max));
+            let value = field.stored(stored, 0, k);
+            // One rounding of f32.
+            let slack = 1e-6 * (1.0 + high.abs().max(low.abs()));
+            assert!(value >= low - slack && value <= high + slack, "sample {sample}, {k}: {value} of {low}..{high}");
+        }
+        // Not the raw capture, which all of the tube surrounds: 1 - c = 2 would be stored divided by the cap's height.
+        let blocked = field.stored(stored, 0, 0) / lattice.scale(lattice.position(sample).length());
+        assert!(blocked < 0.9 * (4.0 * std::f64::consts::PI).sqrt(), "sample {sample} holds what is seen inside");
+    }
+    assert!(sources.list.iter().all(|s| !marks[*s as usize]), "no stored sample is made of one inside");
+}
+
+#[test]
+fn one_colour_shines_where_it_blocks() {
+    let Some(gpu) = gpu() else { return };
+    let color = Vec3::new(0.5, 2.0, 7.0);
+    for mesh in [torus(), common::pot(2)] {
+        let colors = Some(vec![color; mesh.positions.len()]);
+        let (name, triangles) = (mesh.name.clone(), mesh.triangles.clone());
+        let bright = Mesh::new(name, mesh.positions.clone(), mesh.normals.clone(), colors, triangles).unwrap();
+        let options = small("cube:5x3", Storage::F32, 4);
+        let blocked = bake_field(&gpu.device, &mesh, Kind::Occlusion, &options);
+        let radiance = bake_field(&gpu.device, &bright, Kind::Radiance, &options);
+        assert_eq!(radiance.header.radiance_scale, 7.0);
+        for sample in 0..blocked.header.lattice.stored_count() {
+            let b: Vec<f64> = (0..16).map(|k| blocked.stored(sample, 0, k)).collect();
+            for channel in 0..3 {
+                let scale = f64::from(color[channel]);
+                let wanted: Vec<f64> = b.iter().map(|b| scale * b).collect();
+                let found: Vec<f64> = (0..16).map(|k| radiance.stored(sample, channel, k)).collect();
+                let error = difference(&found, &wanted);
+                assert!(error < 1e-3 * norm(wanted), "{}: sample {sample} channel {channel}: {error}", mesh.name);
+            }
+        }
+    }
+}
+
+fn bake_transfer(gpu: &Gpu, mesh: &Mesh, bands: usize) -> Vec<f32> {
+    let (transfer, report) = Baker::new(&gpu.device, &gpu.library).transfer(mesh, bands, 64, &quiet).unwrap();
+    assert_eq!(report.samples as usize, mesh.positions.len());
+    assert_eq!(transfer.len(), mesh.positions.len() * channel_stride(bands));
+    assert!(transfer.iter().all(|t| t.is_finite()));
+    transfer
+}
+
+#[test]
+fn transfer_of_a_convex_mesh_is_the_cosine() {
+    let Some(gpu) = gpu() else { return };
+    for mesh in [generate::sphere(0.4, 3), generate::cuboid(Vec3::new(1.0, 0.5, 2.0), 4)] {
+        assert!(mesh.is_convex());
+        let transfer = bake_transfer(&gpu, &mesh, 4);
+        let errors: Vec<f64> = transfer
+            .chunks_exact(16)
+            .zip(&mesh.normals)
+            .map(|(found, normal)| {
+                let found: Vec<f64> = found.iter().map(|f| f64::from(*f)).collect();
+                let wanted = lobe::clamped_cosine(4, normal.as_dvec3());
+                difference(&found, &wanted) / norm(wanted)
+            })
+            .collect();
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        let largest = errors.iter().copied().fold(0.0, f64::max);
+        report(&format!("transfer of a {}: relative error mean {mean:.5}, max {largest:.4}", mesh.name));
+        assert!(mean < 2e-3 && largest < 2e-2, "{}: {mean} {largest}", mesh.name);
+    }
+}
+
+#[test]
+fn the_hole_of_a_torus_is_darker() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = torus();
+    let transfer = bake_transfer(&gpu, &mesh, 4);
+    let open = lobe::clamped_cosine(4, DVec3::Y)[0];
+    let (mut hole, mut rim, mut top) = (Vec::new(), Vec::new(), Vec::new());
+    for ((position, normal), t) in mesh.positions.iter().zip(&mesh.normals).zip(transfer.chunks_exact(16)) {
+        let outward = Vec3::new(position.x, 0.0, position.z).normalize().dot(*normal);
+        let under_uniform_sky = f64::from(t[0]) / open;
+        assert!((-1e-3..1.02).contains(&under_uniform_sky), "{under_uniform_sky} of the sky");
+        match outward {
+            o if o < -0.9 => hole.push(under_uniform_sky),
+            o if o > 0.9 => rim.push(under_uniform_sky),
+            o if o.abs() < 0.1 => top.push(under_uniform_sky),
+            _ => {}
+        }
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (hole, rim, top) = (mean(&hole), mean(&rim), mean(&top));
+    report(&format!("torus under a uniform sky: hole {hole:.3}, top {top:.3}, rim {rim:.3}"));
+    // The rim bends away from all of the torus, the top looks past it, the hole looks across at the other side.
+    assert!((rim - 1.0).abs() < 0.01 && hole < 0.85 && hole < top && top <= rim + 0.005, "{hole} {top} {rim}");
+}
+
+#[test]
+fn a_second_bake_has_the_same_bytes() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = torus();
+    // Three bands leave padding behind nine coefficients.
+    for (kind, storage, bands) in
+        [(Kind::Occlusion, Storage::F16, 3), (Kind::Radiance, Storage::F32, 5), (Kind::Radiance, Storage::F16, 4)]
+    {
+        let options = small("cube:4x3", storage, bands);
+        let first = bake_field(&gpu.device, &mesh, kind, &options);
+        let second = bake_field(&gpu.device, &mesh, kind, &options);
+        assert!(first == second, "{kind:?} {storage:?} {bands}");
+    }
+    let bits = |t: Vec<f32>| t.into_iter().map(f32::to_bits).collect::<Vec<_>>();
+    assert_eq!(bits(bake_transfer(&gpu, &mesh, 3)), bits(bake_transfer(&gpu, &mesh, 3)));
+}
+
+#[test]
+fn a_field_lands_at_its_offset() {
+    let Some(gpu) = gpu() else { return };
+    let (mesh, options) = (generate::sphere(1.0, 2), small("cube:3x2", Storage::F16, 4));
+    let alone = bake_field(&gpu.device, &mesh, Kind::Occlusion, &options);
+    let mut header = bake::header(&mesh, Kind::Occlusion, &options);
+    let size = header.payload_bytes() as usize;
+    let store = Buffer::with_data(&gpu.device, "store", &vec![0x5a_u8; size + 1024]).unwrap();
+    Baker::new(&gpu.device, &gpu.library).field(&mesh, &mut header, (&store, 512), &quiet).unwrap();
+    let bytes: Vec<u8> = store.download(size + 1024).unwrap();
+    assert!(bytes[512..512 + size] == alone.payload, "the same field");
+    assert!(bytes[..512].iter().chain(&bytes[512 + size..]).all(|b| *b == 0x5a), "and nothing beside it");
+}
+
+#[test]
+fn progress_is_told_up_to_the_end() {
+    let Some(gpu) = gpu() else { return };
+    let (mesh, options) = (generate::sphere(1.0, 1), small("cube:3x4", Storage::F16, 4));
+    let mut header = bake::header(&mesh, Kind::Occlusion, &options);
+    let store = store(&gpu.device, &header, 0);
+    let told = std::cell::RefCell::new(Vec::new());
+    let progress = |done, all| told.borrow_mut().push((done, all));
+    Baker::new(&gpu.device, &gpu.library).field(&mesh, &mut header, (&store, 0), &progress).unwrap();
+    let told = told.into_inner();
+    let count = header.lattice.sample_count();
+    assert_eq!(told.last(), Some(&(count, count)));
+    assert!(told.windows(2).all(|w| w[0].0 < w[1].0));
+}
+
+fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder.join("fields")) else { return Vec::new() };
+    let mut paths: Vec<_> = entries.map(|e| e.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|e| e == ending));
+    paths.sort();
+    paths
+}
+
+/// (whether it was baked, header, payload) of a field that comes through the cache.
+fn cached(device: &Arc<Device>, folder: &Path, mesh: &Mesh, header: &mut Header) -> (bool, Vec<u8>) {
+    let cache = Cache::new(Some(folder));
+    let mut store = store(device, header, 0xff);
+    let report = cache.field(&Baker::new(device, &library()), mesh, header, (&mut store, 0), &quiet).unwrap();
+    (report.is_some(), store.download(header.payload_bytes() as usize).unwrap())
+}
+
+#[test]
+fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
+    let Some(gpu) = gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, options) = (torus(), small("cube:10x4", Storage::F16, 4));
+    let fresh = || bake::header(&mesh, Kind::Occlusion, &options);
+    let mut header = fresh();
+    let (baked, bytes) = cached(&gpu.device, folder.path(), &mesh, &mut header);
+    assert!(baked && header.filled_samples > 0);
+    // The same header again, now with its count of filled samples, and a fresh one.
+    let mut again = header.clone();
+    assert_eq!(
+        cached(&gpu.device, folder.path(), &mesh, &mut again),
+        (false, bytes.clone()),
+        "the header as it came back"
+    );
+    let mut again = fresh();
+    assert_eq!(cached(&gpu.device, folder.path(), &mesh, &mut again), (false, bytes.clone()));
+    assert_eq!(again, header, "the count of filled samples comes from the file");
+    // The name of a mesh is for people; equal content is found under any name.
+    let mut renamed = mesh.clone();
+    renamed.name = "other".into();
+    let mut header_renamed = bake::header(&renamed, Kind::Occlusion, &options);
+    assert!(!cached(&gpu.device, folder.path(), &renamed, &mut header_renamed).0);
+
+    let paths = files(folder.path(), "sf");
+    assert_eq!(paths.len(), 1);
+    let whole = std::fs::read(&paths[0]).unwrap();
+    let damage: [&dyn Fn(&mut Vec<u8>); 3] = [
+        &|b| {
+            let middle = b.len() / 2;
+            b[middle] ^= 4;
+        },
+        &|b| b.truncate(b.len() - 1),
+        &|b| b.clear(),
+    ];
+    for edit in damage {
+        let mut bad = whole.clone();
+        edit(&mut bad);
+        std::fs::write(&paths[0], bad).unwrap();
+        assert_eq!(cached(&gpu.device, folder.path(), &mesh, &mut fresh()), (true, bytes.clone()), "baked anew");
+        assert!(std::fs::read(&paths[0]).unwrap() == whole, "and replaced");
+    }
+    // Everything that changes a field has a file of its own.
+    let others = [
+        bake::Options { bands: 3, ..options },
+        bake::Options { face_px: 16, ..options },
+        bake::Options { storage: Storage::F32, ..options },
+        small("cube:4x3,outer=7", Storage::F16, 4),
+    ];
+    for (i, other) in others.iter().enumerate() {
+        let mut header = bake::header(&mesh, Kind::Occlusion, other);
+        assert!(cached(&gpu.device, folder.path(), &mesh, &mut header).0, "{other:?}");
+        assert_eq!(files(folder.path(), "sf").len(), 2 + i);
+    }
+}
+
+#[test]
+fn a_file_under_another_name_is_not_believed() {
+    let Some(gpu) = gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let options = small("cube:3x2,inner=1.02", Storage::F16, 4);
+    let meshes = [torus(), generate::cuboid(Vec3::ONE, 2)];
+    let run = |mesh: &Mesh| {
+        let mut header = bake::header(mesh, Kind::Occlusion, &options);
+        cached(&gpu.device, folder.path(), mesh, &mut header)
+    };
+    let (_, first) = run(&meshes[0]);
+    let name = files(folder.path(), "sf").remove(0);
+    let (_, second) = run(&meshes[1]);
+    assert_ne!(first, second);
+    let other = files(folder.path(), "sf").into_iter().find(|path| *path != name).unwrap();
+    std::fs::copy(&other, &name).unwrap();
+    assert_eq!(run(&meshes[0]), (true, first), "a whole file, but another mesh's");
+}
+
+#[test]
+fn the_cache_keeps_transfers() {
+    let Some(gpu) = gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = generate::torus(1.0, 0.3, 12, 8);
+    let cache = Cache::new(Some(folder.path()));
+    let baker = Baker::new(&gpu.device, &gpu.library);
+    let run = |bands| cache.transfer(&baker, &mesh, bands, 16, &quiet).unwrap();
+    let (first, baked) = run(3);
+    assert!(baked.is_some());
+    let (second, found) = run(3);
+    assert!(found.is_none() && second == first);
+    let paths = files(folder.path(), "transfer");
+    assert_eq!(paths.len(), 1);
+    let mut bytes = std::fs::read(&paths[0]).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    std::fs::write(&paths[0], bytes).unwrap();
+    let (third, again) = run(3);
+    assert!(again.is_some() && third == first);
+    assert!(run(3).1.is_none(), "replaced");
+    assert!(run(4).1.is_some(), "other bands have their own");
+}
+
+#[test]
+fn without_a_folder_nothing_is_kept() {
+    let Some(gpu) = gpu() else { return };
+    let (mesh, options) = (generate::sphere(1.0, 1), small("cube:2x1", Storage::F16, 2));
+    for _ in 0..2 {
+        let mut header = bake::header(&mesh, Kind::Occlusion, &options);
+        let mut store = Buffer::new(&gpu.device, "store", BufferKind::Device, header.payload_bytes()).unwrap();
+        let baker = Baker::new(&gpu.device, &gpu.library);
+        assert!(Cache::new(None).field(&baker, &mesh, &mut header, (&mut store, 0), &quiet).unwrap().is_some());
+    }
+}
+
+/// As two processes would: each thread has its own instance and device, both the same cache folder.
+#[test]
+fn two_devices_bake_into_one_cache() {
+    let Some(_gpu) = gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, options) = (torus(), small("cube:6x3", Storage::F16, 4));
+    let outcomes = std::thread::scope(|scope| {
+        let threads = [0, 1].map(|_| {
+            scope.spawn(|| {
+                let device = open().unwrap();
+                let mut header = bake::header(&mesh, Kind::Occlusion, &options);
+                let (_, bytes) = cached(&device, folder.path(), &mesh, &mut header);
+                device.save_pipeline_cache();
+                (header, bytes, device.take_validation_messages())
+            })
+        });
+        threads.map(|thread| thread.join().unwrap())
+    });
+    assert!(outcomes[0] == outcomes[1], "the same header and bytes");
+    assert_eq!(outcomes[0].2, Vec::<String>::new());
+    let paths = files(folder.path(), "sf");
+    assert_eq!(paths.len(), 1);
+    let kept = ShadowField::read(&paths[0]).unwrap();
+    assert!(kept.payload == outcomes[0].1 && kept.header == outcomes[0].0);
+    assert_eq!(std::fs::read_dir(folder.path().join("fields")).unwrap().count(), 1, "no temporary file is left");
+}
+
+#[test]
+fn what_cannot_be_baked_is_bad_input() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::sphere(1.0, 2);
+    let baker = Baker::new(&gpu.device, &gpu.library);
+    let refused = |edit: &dyn Fn(&mut Header)| {
+        let mut header = bake::header(&mesh, Kind::Occlusion, &small("cube:2x2", Storage::F16, 4));
+        let store = store(&gpu.device, &header, 0);
+        edit(&mut header);
+        baker.field(&mesh, &mut header, (&store, 0), &quiet).expect_err("refused").exit_code()
+    };
+    assert_eq!(refused(&|h| h.bands = 9), 4);
+    assert_eq!(refused(&|h| h.face_px = 1), 4);
+    assert_eq!(refused(&|h| (h.lattice.inner, h.lattice.outer) = (0.2, 0.8)), 4, "every sample lies inside");
+}

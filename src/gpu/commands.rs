@@ -6,7 +6,7 @@
 use super::Checked;
 use super::access::{Access, Tracker};
 use super::device::Device;
-use super::memory::{Buffer, Image, TexelView, whole};
+use super::memory::{Buffer, BufferKind, Image, TexelView, whole};
 use super::pipeline::{ComputePipeline, GraphicsPipeline, Layout, descriptor_type};
 use super::reflect::BindingKind;
 use crate::error::{Error, Result};
@@ -70,6 +70,8 @@ pub struct Commands<'r> {
     passes: Vec<String>,
     in_pass: bool,
     tracker: Tracker,
+    /// Buffers that the host will read, with the ranges that were copied into them.
+    read_back: Vec<(&'r Buffer, Range<u64>)>,
     barrier_count: usize,
     borrows: PhantomData<&'r Buffer>,
 }
@@ -91,6 +93,7 @@ impl<'r> Commands<'r> {
             passes: Vec::new(),
             in_pass: false,
             tracker: Tracker::default(),
+            read_back: Vec::new(),
             barrier_count: 0,
             borrows: PhantomData,
         };
@@ -412,17 +415,25 @@ impl<'r> Commands<'r> {
         assert!(target.end <= to.size_bytes, "{}: copy into {target:?} of {}", to.name, to.size_bytes);
         let pass = self.pass_name();
         self.tracker.use_range(from.id, &from.name, range.clone(), Access::TransferRead, &pass);
-        self.tracker.use_range(to.id, &to.name, target, Access::TransferWrite, &pass);
+        self.copied_into(to, target, &pass);
         let regions = [vk::BufferCopy { src_offset: range.start, dst_offset: offset_bytes, size }];
         // SAFETY: both ranges are in bounds and both buffers are borrowed until the commands have run.
         unsafe { self.device.handle.cmd_copy_buffer(self.buffer, from.raw(), to.raw(), &regions) };
+    }
+
+    /// Notes a copy into `to`; what lies in a readback buffer is read by the host once the commands have run.
+    fn copied_into(&mut self, to: &'r Buffer, range: Range<u64>, pass: &str) {
+        self.tracker.use_range(to.id, &to.name, range.clone(), Access::TransferWrite, pass);
+        if to.kind == BufferKind::Readback {
+            self.read_back.push((to, range));
+        }
     }
 
     /// Copies a whole single-sampled image into a buffer, rows tightly packed.
     pub fn copy_image(&mut self, from: &'r Image, to: &'r Buffer) {
         let pass = self.pass_name();
         self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
-        self.tracker.use_range(to.id, &to.name, to.all(), Access::TransferWrite, &pass);
+        self.copied_into(to, to.all(), &pass);
         let range = whole(from.shape.format);
         let region = vk::BufferImageCopy::default()
             .image_subresource(vk::ImageSubresourceLayers {
@@ -495,7 +506,10 @@ impl<'r> Commands<'r> {
     ///
     /// # Errors
     /// `Failed` when the tracker found a barrier missing (nothing is submitted then); `Device` when the device was lost.
-    pub fn submit(self) -> Result<Vec<Timing>> {
+    pub fn submit(mut self) -> Result<Vec<Timing>> {
+        for (buffer, range) in std::mem::take(&mut self.read_back) {
+            self.tracker.use_range(buffer.id, &buffer.name, range, Access::HostRead, "host");
+        }
         self.tracker.verdict().map_err(|error| error.context(&self.name))?;
         let handle = &self.device.handle;
         let last = self.pass_name();

@@ -97,6 +97,7 @@ pub struct Buffer {
     handle: BufferHandle,
     memory: Memory,
     mapped: Option<*mut u8>,
+    pub(super) kind: BufferKind,
     /// Size in bytes.
     pub size_bytes: u64,
     /// Name shown in messages and debuggers.
@@ -148,7 +149,7 @@ impl Buffer {
             }
         };
         let id = device.next_resource.fetch_add(1, Ordering::Relaxed);
-        Ok(Buffer { handle, memory, mapped, size_bytes, name: name.to_owned(), id })
+        Ok(Buffer { handle, memory, mapped, kind, size_bytes, name: name.to_owned(), id })
     }
 
     /// A device buffer that holds `data`, copied directly where the host can see device memory, else through a staging

@@ -1,0 +1,239 @@
+//! Those who watch are watched: the validation layer hears deliberate errors, and the tracker objects to every barrier that is
+//! left out.
+
+mod common;
+
+use common::{Gpu, gpu, library, report};
+use glam::Vec3;
+use shadow_fields::asset::generate;
+use shadow_fields::bake::assemble::Assemble;
+use shadow_fields::bake::capture::{Capture, Model};
+use shadow_fields::bake::{self, Baker};
+use shadow_fields::field::{Kind, Storage};
+use shadow_fields::gpu::memory::ImageShape;
+use shadow_fields::gpu::validation::Messages;
+use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, Device, Image, Options};
+use shadow_fields::{Error, Result};
+
+/// Leaves out a barrier of every recording until it is dropped.
+struct Omission<'d>(&'d Device);
+
+impl<'d> Omission<'d> {
+    fn new(device: &'d Device, index: usize) -> Self {
+        device.omit_barrier(Some(index));
+        Omission(device)
+    }
+}
+
+impl Drop for Omission<'_> {
+    fn drop(&mut self) {
+        self.0.omit_barrier(None);
+    }
+}
+
+fn buffer(gpu: &Gpu, name: &str, kind: BufferKind) -> Buffer {
+    Buffer::new(&gpu.device, name, kind, 1024).unwrap()
+}
+
+#[test]
+fn the_layer_hears_an_overlapping_copy() {
+    let Some(gpu) = gpu() else { return };
+    let buffer = buffer(&gpu, "overlap", BufferKind::Device);
+    let mut commands = Commands::new(&gpu.device, "canary").unwrap();
+    commands.copy_range(&buffer, 0..512, &buffer, 256);
+    // The tracker refuses it too; the layer has spoken when it was recorded.
+    assert!(commands.submit().is_err());
+    let heard = gpu.device.take_validation_messages();
+    assert!(heard.iter().any(|m| m.contains("vkCmdCopyBuffer")), "{heard:?}");
+    assert!(Messages::into_result(heard).unwrap_err().to_string().contains("vkCmdCopyBuffer"));
+}
+
+#[test]
+fn the_layer_hears_a_hazard_between_copies() {
+    let Some(gpu) = gpu() else { return };
+    let [a, b, c] = ["a", "b", "c"].map(|name| buffer(&gpu, name, BufferKind::Device));
+    let mut commands = Commands::new(&gpu.device, "canary").unwrap();
+    commands.copy(&a, &b);
+    commands.copy(&b, &c);
+    assert!(commands.submit().is_err());
+    let heard = gpu.device.take_validation_messages();
+    assert!(heard.iter().any(|m| m.contains("SYNC-HAZARD-READ")), "synchronisation checks are off: {heard:?}");
+}
+
+#[test]
+fn the_layer_hears_a_wrong_layout() {
+    let Some(gpu) = gpu() else { return };
+    let shape = ImageShape { format: ash::vk::Format::R8_UNORM, width: 8, height: 8, samples: 1 };
+    let image = Image::new(&gpu.device, "never drawn", shape).unwrap();
+    let mut commands = Commands::new(&gpu.device, "canary").unwrap();
+    // It was in no layout at all before.
+    commands.image_barrier(&image, Some(Access::ColorWrite), Access::ComputeSampled);
+    let _ = commands.submit();
+    let heard = gpu.device.take_validation_messages();
+    assert!(heard.iter().any(|m| m.contains("ayout") && m.contains("never drawn")), "{heard:?}");
+}
+
+#[test]
+fn without_the_layer_nothing_is_heard() {
+    let Some(_gpu) = gpu() else { return };
+    let device = Device::new(&Options::default()).unwrap();
+    let buffer = Buffer::new(&device, "overlap", BufferKind::Device, 1024).unwrap();
+    let mut commands = Commands::new(&device, "canary").unwrap();
+    commands.copy_range(&buffer, 0..512, &buffer, 256);
+    assert!(commands.submit().is_err(), "the tracker needs no layer");
+    assert!(device.take_validation_messages().is_empty());
+}
+
+/// Two dispatches, the second reading what the first wrote, a copy of the outcome, and the host's reading of that: three
+/// barriers.
+fn chain(gpu: &Gpu) -> Result<Vec<f32>> {
+    let pass = Assemble::new(&gpu.device, &gpu.library, Storage::F32)?;
+    let input = Buffer::with_data(&gpu.device, "input", &(0..64).map(|i| i as f32).collect::<Vec<_>>())?;
+    let offsets = Buffer::with_data(&gpu.device, "offsets", &(0..=16).collect::<Vec<u32>>())?;
+    let list = Buffer::with_data(&gpu.device, "list", &(0..16).rev().collect::<Vec<u32>>())?;
+    let [middle, output] =
+        ["middle", "output"].map(|name| Buffer::with_data(&gpu.device, name, &[0.0_f32; 64]).unwrap());
+    let host = Buffer::new(&gpu.device, "host copy", BufferKind::Readback, 256)?;
+    let mut commands = Commands::new(&gpu.device, "chain")?;
+    commands.pass("first", |c| pass.record(c, [&input, &offsets, &list], (&middle, 0..256), (16, 1), 2.0))?;
+    commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+    commands.pass("second", |c| pass.record(c, [&middle, &offsets, &list], (&output, 0..256), (16, 1), 3.0))?;
+    commands.barrier(Access::ComputeWrite, Access::TransferRead);
+    commands.pass("third", |c| {
+        c.copy(&output, &host);
+        Ok(())
+    })?;
+    commands.barrier(Access::TransferWrite, Access::HostRead);
+    commands.submit()?;
+    Ok(host.read(0, 64))
+}
+
+fn objection<T>(outcome: Result<T>, words: &[&str]) {
+    let error = outcome.err().unwrap_or_else(|| panic!("nobody objects; {words:?} was to be named"));
+    assert!(matches!(error, Error::Failed(_)), "{error:?}");
+    let message = error.to_string();
+    assert!(message.contains("missing synchronisation"), "{message}");
+    for word in words {
+        assert!(message.contains(word), "\"{word}\" is not in: {message}");
+    }
+}
+
+#[test]
+fn every_barrier_of_a_chain_is_missed() {
+    let Some(gpu) = gpu() else { return };
+    let good = chain(&gpu).unwrap();
+    assert_eq!(good, (0..64).map(|i| 6.0 * i as f32).collect::<Vec<_>>(), "reversed twice, times six");
+    let named: [&[&str]; 3] = [
+        &["chain", "middle", "pass first", "pass second", "ComputeRead"],
+        &["chain", "output", "pass second", "pass third", "TransferRead"],
+        &["chain", "host copy", "pass third", "host", "HostRead"],
+    ];
+    for (index, words) in named.iter().enumerate() {
+        let omission = Omission::new(&gpu.device, index);
+        objection(chain(&gpu), words);
+        drop(omission);
+        let heard = gpu.device.take_validation_messages().len();
+        report(&format!("barrier {index} left out: the tracker objects; the layer said {heard} things"));
+    }
+    let _none = Omission::new(&gpu.device, 3);
+    assert_eq!(chain(&gpu).unwrap(), good, "there is no fourth barrier");
+}
+
+#[test]
+fn a_wrong_kind_of_barrier_is_no_barrier() {
+    let Some(gpu) = gpu() else { return };
+    let [a, b, c] = ["a", "b", "c"].map(|name| buffer(&gpu, name, BufferKind::Device));
+    for (from, to, good) in [
+        (Access::TransferWrite, Access::TransferRead, true),
+        (Access::ComputeWrite, Access::TransferRead, false),
+        (Access::TransferWrite, Access::ComputeRead, false),
+        (Access::TransferRead, Access::TransferWrite, false),
+    ] {
+        let mut commands = Commands::new(&gpu.device, "copies").unwrap();
+        commands.copy(&a, &b);
+        commands.barrier(from, to);
+        commands.copy(&b, &c);
+        let outcome = commands.submit();
+        assert_eq!(outcome.is_ok(), good, "{from:?} to {to:?}");
+        let heard = gpu.device.take_validation_messages();
+        assert_eq!(heard.is_empty(), good, "the layer agrees: {heard:?}");
+    }
+}
+
+#[test]
+fn the_barrier_of_a_bake_batch_is_missed() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::sphere(1.0, 1);
+    for kind in [Kind::Occlusion, Kind::Radiance] {
+        let options =
+            bake::Options { lattice: "cube:2x2".parse().unwrap(), face_px: 16, bands: 4, storage: Storage::F16 };
+        let bake = || {
+            let mut header = bake::header(&mesh, kind, &options);
+            let store = Buffer::new(&gpu.device, "store", BufferKind::Device, header.payload_bytes())?;
+            Baker::new(&gpu.device, &library()).field(&mesh, &mut header, (&store, 0), &|_, _| ())
+        };
+        bake().unwrap();
+        assert_eq!(gpu.device.take_validation_messages(), Vec::<String>::new());
+        let omission = Omission::new(&gpu.device, 0);
+        objection(bake(), &["bake batch", "capture atlas", "pass capture", "pass project"]);
+        drop(omission);
+        let _ = gpu.device.take_validation_messages();
+        // Nothing that fails leaves the device in disorder.
+        bake().unwrap();
+    }
+}
+
+#[test]
+fn every_barrier_of_a_picture_is_missed() {
+    let Some(gpu) = gpu() else { return };
+    let model = Model::new(&gpu.device, &generate::sphere(1.0, 1), false).unwrap();
+    let capture = Capture::new(&gpu.device, &gpu.library, 16, false).unwrap();
+    let eyes = [Vec3::new(1.5, 0.3, 0.2)];
+    let plan = capture.plan(&model, &eyes);
+    let host = Buffer::new(&gpu.device, "host picture", BufferKind::Readback, 4 << 20).unwrap();
+    let run = || {
+        let mut commands = Commands::new(&gpu.device, "picture")?;
+        commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
+        commands.pass("capture", |c| capture.record(c, &model, &eyes, &plan, true))?;
+        commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
+        commands.pass("copy", |c| {
+            c.copy_image(&capture.atlas, &host);
+            Ok(())
+        })?;
+        commands.barrier(Access::TransferWrite, Access::HostRead);
+        commands.submit()
+    };
+    let passes: Vec<String> = run().unwrap().into_iter().map(|timing| timing.pass).collect();
+    assert_eq!(passes, ["capture", "copy"]);
+    assert_eq!(gpu.device.take_validation_messages(), Vec::<String>::new());
+    let named: [&[&str]; 2] =
+        [&["capture atlas", "pass capture", "pass copy"], &["host picture", "pass copy", "HostRead"]];
+    for (index, words) in named.iter().enumerate() {
+        let omission = Omission::new(&gpu.device, index);
+        objection(run(), words);
+        drop(omission);
+        let _ = gpu.device.take_validation_messages();
+    }
+}
+
+/// A resource of the wrong kind or size is a programmer's mistake, told with pass and binding.
+#[test]
+fn wrong_resources_panic_with_names() {
+    let Some(gpu) = gpu() else { return };
+    let pass = Assemble::new(&gpu.device, &gpu.library, Storage::F32).unwrap();
+    let buffer = buffer(&gpu, "some buffer", BufferKind::Device);
+    let message = |range: std::ops::Range<u64>| {
+        let attempt = std::panic::AssertUnwindSafe(|| {
+            let mut commands = Commands::new(&gpu.device, "wrong").unwrap();
+            let inputs = [&buffer, &buffer, &buffer];
+            let _ = commands.pass("assemble", |c| pass.record(c, inputs, (&buffer, range.clone()), (1, 1), 1.0));
+        });
+        let panic = std::panic::catch_unwind(attempt).expect_err("a mistake went through");
+        panic.downcast_ref::<String>().cloned().unwrap_or_default()
+    };
+    for range in [0..4096, 3..512] {
+        let message = message(range.clone());
+        assert!(message.contains("assemble") && message.contains("binding 3"), "{range:?}: {message}");
+    }
+    let _ = gpu.device.take_validation_messages();
+}

@@ -70,7 +70,8 @@ impl Header {
             return bad(format!("faces of {} px, a field has 4 to 1024", self.face_px));
         }
         let finite = self.centre_m.iter().all(|c| c.is_finite()) && self.radiance_scale.is_finite();
-        if !finite || !(self.radius_m > 0.0 && self.radius_m.is_finite()) || self.radiance_scale < 0.0 {
+        let usable = finite && self.radius_m > 0.0 && self.radius_m.is_finite() && self.radiance_scale >= 0.0;
+        if !usable {
             return bad("centre, radius or radiance scale is not a usable number".into());
         }
         Ok(())

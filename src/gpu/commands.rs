@@ -103,7 +103,7 @@ impl<'r> Commands<'r> {
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         let queries =
             vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_PASSES);
-        // SAFETY (whole block): every handle is stored in `commands` as soon as it exists and destroyed in its `Drop`.
+        // SAFETY: for the whole block, every handle is stored in `commands` as soon as it exists and destroyed in its `Drop`.
         unsafe {
             commands.pool = handle.create_command_pool(&pool, None).checked("vkCreateCommandPool", name)?;
             commands.fence =
@@ -515,7 +515,7 @@ impl<'r> Commands<'r> {
         let last = self.pass_name();
         let count = 2 * self.passes.len();
         let mut stamps = vec![0_u64; count];
-        // SAFETY (whole block): the recording is complete, its resources are borrowed by `self`, and the queue is used by
+        // SAFETY: for the whole block, the recording is complete, its resources are borrowed by `self`, and the queue is used by
         // one submission at a time because each waits for its fence before it returns.
         unsafe {
             handle.end_command_buffer(self.buffer).checked("vkEndCommandBuffer", &self.name)?;

@@ -37,7 +37,7 @@ impl Instance {
         let entry = unsafe { ash::Entry::load() }.map_err(|error| {
             Error::Unsupported(format!("no Vulkan loader found ({error}); Debian's package is libvulkan1"))
         })?;
-        // SAFETY (the two enumerations): plain queries on a live entry.
+        // SAFETY: for the two enumerations, plain queries on a live entry.
         let version = unsafe { entry.try_enumerate_instance_version() }
             .checked("vkEnumerateInstanceVersion", "instance")?
             .unwrap_or(vk::API_VERSION_1_0);
@@ -323,8 +323,8 @@ fn physical_devices(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Cand
 }
 
 fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
-    // SAFETY (whole block): queries on live handles with structs that outlive the calls; the 1.3 structs are only chained
-    // where the device itself speaks 1.3.
+    // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are only
+    // chained where the device itself speaks 1.3.
     let (properties, unsuitable, identity, driver) = unsafe {
         let properties = instance.handle.get_physical_device_properties(physical);
         let mut identity = vk::PhysicalDeviceIDProperties::default();

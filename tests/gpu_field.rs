@@ -384,7 +384,8 @@ fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
     let paths = files(folder.path(), "sf");
     assert_eq!(paths.len(), 1);
     let whole = std::fs::read(&paths[0]).unwrap();
-    let damage: [&dyn Fn(&mut Vec<u8>); 3] = [
+    type Damage<'d> = &'d dyn Fn(&mut Vec<u8>);
+    let damage: [Damage<'_>; 3] = [
         &|b| {
             let middle = b.len() / 2;
             b[middle] ^= 4;

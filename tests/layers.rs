@@ -55,7 +55,7 @@ fn text(path: &Path) -> String {
 /// The text without what stands behind `//` outside a string.
 fn code(text: &str) -> String {
     let strip = |line: &str| {
-        let cut = line.match_indices("//").find(|(at, _)| line[..*at].matches('"').count() % 2 == 0);
+        let cut = line.match_indices("//").find(|(at, _)| line[..*at].matches('"').count().is_multiple_of(2));
         cut.map_or(line, |(at, _)| &line[..at]).to_owned()
     };
     text.lines().map(strip).collect::<Vec<_>>().join("\n")

@@ -7,7 +7,7 @@ use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::field::{Lattice, Lookup, Storage};
-use shadow_fields::render::variant::{Form, MAX_LIGHTS, VARIANTS};
+use shadow_fields::render::variant::{Form, Skip, VARIANTS};
 use shadow_fields::shaders::{FILES, Row};
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -37,23 +37,21 @@ fn usual_form() -> Form {
         storage: Storage::F16,
         lattice: Lattice::default().starting_at(1.02),
         lookup: Lookup::Trilinear,
-        lights: 1,
-        sky: true,
+        skip: Skip::ALL,
+        entity_limit: 48,
     }
 }
 
-/// A usual form, everything that differs from it in one choice, all of lights x sky, and a few far from it.
+/// A usual form, everything that differs from it in one choice, and a few far from it.
 fn merging() -> Vec<Row> {
     let usual = usual_form();
     let mut forms = vec![usual];
-    for lights in 0..=MAX_LIGHTS {
-        forms.extend([false, true].map(|sky| Form { lights, sky, ..usual }));
-    }
+    forms.extend(["none", "horizon", "cones"].map(|skip| Form { skip: skip.parse().unwrap(), ..usual }));
     // Seven bands take 33 s to optimise, six 5 s, four 0.6 s; see the ignored test.
     forms.extend((2..=6).map(|bands| Form { bands, ..usual }));
     for &variant in VARIANTS {
         forms.extend([Storage::F16, Storage::F32].map(|storage| Form { variant, storage, ..usual }));
-        forms.push(Form { variant, storage: Storage::F32, bands: 3, lights: 2, sky: false, ..usual });
+        forms.push(Form { variant, storage: Storage::F32, bands: 3, skip: Skip::NONE, ..usual });
     }
     let lattices = [
         "cube:16x8,log,inner=0.25",
@@ -71,7 +69,6 @@ fn merging() -> Vec<Row> {
         variant: VARIANTS[VARIANTS.len() - 1],
         lattice: lattice("latlon:8x4x4,log,raw,inner=0.2"),
         lookup: Lookup::Nearest,
-        lights: MAX_LIGHTS,
         ..usual
     });
     forms.iter().map(Form::row).collect()

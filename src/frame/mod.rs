@@ -152,20 +152,47 @@ impl Frame {
         commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))?;
         if let Some(white) = white {
             commands.barrier(Access::ComputeWrite, Access::VertexRead);
-            for image in self.draw.attachments() {
-                let depth = image.shape.format == vk::Format::D32_SFLOAT;
-                commands.image_barrier(image, None, if depth { Access::DepthWrite } else { Access::ColorWrite });
-            }
-            commands.pass("draw", |c| self.draw.record(c, &items, &self.radiosity, self.background, white))?;
-            let picture = &self.draw.picture;
-            commands.image_barrier(picture, Some(Access::ColorWrite), Access::TransferRead);
-            commands.pass("read back", |commands| {
-                commands.copy_image(picture, &self.readback);
-                Ok(())
-            })?;
-            commands.barrier(Access::TransferWrite, Access::HostRead);
+            self.record_draw(&mut commands, &items, white)?;
         }
         commands.submit()
+    }
+
+    /// Draws the picture from the radiosity as it stands, the last merge's or what [`Frame::set_radiosity`] put there.
+    ///
+    /// # Errors
+    /// As [`Frame::render`].
+    pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
+        let items = self.items(placements);
+        let mut commands = Commands::new(&self.device, "redraw")?;
+        self.record_draw(&mut commands, &items, white)?;
+        commands.submit()
+    }
+
+    fn record_draw<'f>(&'f self, commands: &mut Commands<'f>, items: &[Item<'f>], white: f32) -> Result<()> {
+        for image in self.draw.attachments() {
+            let depth = image.shape.format == vk::Format::D32_SFLOAT;
+            commands.image_barrier(image, None, if depth { Access::DepthWrite } else { Access::ColorWrite });
+        }
+        commands.pass("draw", |c| self.draw.record(c, items, &self.radiosity, self.background, white))?;
+        let picture = &self.draw.picture;
+        commands.image_barrier(picture, Some(Access::ColorWrite), Access::TransferRead);
+        commands.pass("read back", |commands| {
+            commands.copy_image(picture, &self.readback);
+            Ok(())
+        })?;
+        commands.barrier(Access::TransferWrite, Access::HostRead);
+        Ok(())
+    }
+
+    /// Replaces the radiosity of an entity's vertices until the next merge: for pictures of what was computed elsewhere.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn set_radiosity(&mut self, entity: usize, radiosity: &[[f32; 3]]) -> Result<()> {
+        let vertices = &self.store.geometries[self.scene.entities[entity].mesh].vertices;
+        assert_eq!(radiosity.len(), vertices.len(), "radiosity of entity {entity}");
+        let quads: Vec<[f32; 4]> = radiosity.iter().map(|&[r, g, b]| [r, g, b, 0.0]).collect();
+        self.radiosity.fill(self.radiosity_offsets[entity], &quads)
     }
 
     /// The last picture: linear RGB, three floats a pixel, rows from the top.

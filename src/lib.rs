@@ -32,5 +32,6 @@ pub mod render;
 pub mod scene;
 pub mod sh;
 pub mod shaders;
+pub mod truth;
 
 pub use error::{Error, Result};

@@ -1,0 +1,127 @@
+//! T1: the chain of the merge on exact factors: every occluder's visibility and every light's radiance as seen from the
+//! vertex itself, by ray casting, projected to SH and multiplied in f64.
+
+use super::Vertex;
+use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
+use super::world::{Sight, View, World};
+use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
+use crate::sh::lobe::clamped_cosine;
+use crate::sh::product::Tensor;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+type Coefficients = [f64; MAX_COEFFICIENTS];
+
+/// How factors are projected.
+#[derive(Clone, Copy, Debug)]
+pub struct Exact {
+    /// SH bands of transfer, light and every product.
+    pub bands: usize,
+    /// SH bands of an occluder's visibility.
+    pub visibility_bands: usize,
+    /// Rays a factor. Powers of two serve best.
+    pub rays: u32,
+    /// Decides the points.
+    pub seed: u64,
+}
+
+impl Default for Exact {
+    /// 4 bands throughout, 4096 rays a factor.
+    fn default() -> Self {
+        Exact { bands: 4, visibility_bands: 4, rays: 4096, seed: 2 }
+    }
+}
+
+impl Exact {
+    /// Radiosity of the given vertices: linear RGB radiance that leaves the surface, without emission.
+    pub fn run(&self, world: &World<'_>, vertices: &[Vertex]) -> Vec<[f64; 3]> {
+        let tensor = Tensor::new(self.bands, self.visibility_bands, self.bands);
+        let sky = world.scene.environment.coefficients(self.bands);
+        vertices.par_iter().map(|&vertex| self.vertex(world, &tensor, &sky, vertex)).collect()
+    }
+
+    fn vertex(&self, world: &World<'_>, tensor: &Tensor, sky: &[Vec<f64>; 3], vertex: Vertex) -> [f64; 3] {
+        let count = coefficient_count(self.bands);
+        let view = world.view(vertex);
+        let points = |stream: usize| {
+            Sequence::new(self.seed, [u64::MAX, vertex.entity as u64, (vertex.index as u64) << 16 | stream as u64])
+        };
+        let transfer = self.transfer(world, &view, points(0));
+        let centre = world.bodies[vertex.entity].centre;
+        let mut occluders = world.occluders(&view);
+        let from_centre = |sight: &Sight| world.bodies[sight.entity].centre.distance(centre);
+        occluders.sort_by(|a, b| from_centre(a).total_cmp(&from_centre(b)).then(a.entity.cmp(&b.entity)));
+        let factors: Vec<(Sight, Coefficients)> = occluders
+            .into_iter()
+            .map(|occluder| (occluder, self.blocked(world, &occluder, points(1 + occluder.entity))))
+            .collect();
+        let chain = |precedes: &dyn Fn(&Sight) -> bool| {
+            let mut t = transfer;
+            for (_, blocked) in factors.iter().filter(|(occluder, _)| precedes(occluder)) {
+                let mut product = [0.0; MAX_COEFFICIENTS];
+                tensor.multiply(&t, blocked, &mut product);
+                t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
+            }
+            t
+        };
+        let against = |s: &[f64], t: &Coefficients| s.iter().zip(t).take(count).map(|(s, t)| s * t).sum::<f64>();
+
+        let through = chain(&|_| true);
+        let mut sum = DVec3::from_array(sky.each_ref().map(|channel| against(channel, &through)));
+        for light in world.lights(&view) {
+            let t = chain(&|occluder| occluder.precedes(&light));
+            let radiance = self.radiance(world, &light, points(1 + light.entity));
+            let emission = world.scene.entities[light.entity].emission.as_dvec3();
+            sum += emission * DVec3::from_array(radiance.each_ref().map(|channel| against(channel, &t)));
+        }
+        (sum * world.scene.entities[vertex.entity].albedo.as_dvec3() / PI).to_array()
+    }
+
+    /// Self-visibility times cosine.
+    fn transfer(&self, world: &World<'_>, view: &View, points: Sequence) -> Coefficients {
+        let mut out = [0.0; MAX_COEFFICIENTS];
+        if !view.shadows_itself() {
+            let count = coefficient_count(self.bands);
+            out[..count].copy_from_slice(&clamped_cosine(self.bands, view.normal));
+            return out;
+        }
+        let (axes, mut basis) = (Axes::new(view.normal), [0.0; MAX_COEFFICIENTS]);
+        for ray in 0..self.rays {
+            let direction = axes.cosine(points.point(ray));
+            if !world.blocks_itself(view, direction) {
+                evaluate(self.bands, direction, &mut basis);
+                out.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += y);
+            }
+        }
+        out.map(|sum| sum * COSINE_INTEGRAL / f64::from(self.rays))
+    }
+
+    fn blocked(&self, world: &World<'_>, occluder: &Sight, points: Sequence) -> Coefficients {
+        let cone = occluder.cone();
+        let (mut out, mut basis) = ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
+        for ray in 0..self.rays {
+            let direction = cone.axes.cone(points.point(ray), cone.height);
+            if world.blocks(occluder, direction) {
+                evaluate(self.visibility_bands, direction, &mut basis);
+                out.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += y);
+            }
+        }
+        out.map(|sum| sum * cone_solid_angle(cone.height) / f64::from(self.rays))
+    }
+
+    fn radiance(&self, world: &World<'_>, light: &Sight, points: Sequence) -> [Coefficients; 3] {
+        let cone = light.cone();
+        let (mut out, mut basis) = ([[0.0; MAX_COEFFICIENTS]; 3], [0.0; MAX_COEFFICIENTS]);
+        for ray in 0..self.rays {
+            let direction = cone.axes.cone(points.point(ray), cone.height);
+            if let Some(pattern) = world.emission(light, direction) {
+                evaluate(self.bands, direction, &mut basis);
+                for (channel, amount) in out.iter_mut().zip(pattern.to_array()) {
+                    channel.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += amount * y);
+                }
+            }
+        }
+        out.map(|channel| channel.map(|sum| sum * cone_solid_angle(cone.height) / f64::from(self.rays)))
+    }
+}

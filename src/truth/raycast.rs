@@ -1,0 +1,189 @@
+//! T0: radiosity by ray casting, and what a user would pick instead of shadow fields.
+//!
+//! The distant light is sampled in proportion to the cosine, local lights uniformly in the cone around their bounding
+//! sphere. Sums are in f64, rays in f32 (in units of each occluder's radius, so that scales do not matter). A vertex's
+//! points are scrambled by itself; several runs tell the standard error.
+
+use super::Vertex;
+use super::sequence::{COSINE_INTEGRAL, Sequence, cone_solid_angle};
+use super::world::{Sight, View, World};
+use crate::asset::environment::Environment;
+use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Which distant light is integrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Distant {
+    /// As it was described.
+    Exact,
+    /// Its projection to that many bands: for a light that is defined by it.
+    Bands(usize),
+}
+
+/// How many rays are cast.
+#[derive(Clone, Copy, Debug)]
+pub struct RayCast {
+    /// Rays a vertex for the distant light, and again for every local light; at least `runs`. Powers of two serve best.
+    pub rays: u32,
+    /// Independent runs that the rays are split into, at least 1; the standard error needs 2.
+    pub runs: u32,
+    /// Decides the points.
+    pub seed: u64,
+    /// Distant light.
+    pub distant: Distant,
+    /// Whether anything blocks; if not, what is found is the unoccluded value.
+    pub shadows: bool,
+}
+
+impl Default for RayCast {
+    /// 4096 rays in 8 runs.
+    fn default() -> Self {
+        RayCast { rays: 4096, runs: 8, seed: 1, distant: Distant::Exact, shadows: true }
+    }
+}
+
+/// Radiosity of a vertex.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Estimate {
+    /// Linear RGB radiance that leaves the surface, without emission.
+    pub radiosity: [f64; 3],
+    /// Its standard error; 0 after a single run.
+    pub error: [f64; 3],
+}
+
+/// Root mean square of the standard errors over that of the values.
+pub fn relative_error(estimates: &[Estimate]) -> f64 {
+    let square = |of: &dyn Fn(&Estimate) -> [f64; 3]| estimates.iter().flat_map(of).map(|c| c * c).sum::<f64>();
+    (square(&|e| e.error) / square(&|e| e.radiosity).max(f64::MIN_POSITIVE)).sqrt()
+}
+
+/// The distant light, ready for many directions.
+enum Radiance<'e> {
+    None,
+    Exact(&'e Environment),
+    Bands(usize, Box<[Vec<f64>; 3]>),
+}
+
+impl Radiance<'_> {
+    fn at(&self, direction: DVec3) -> DVec3 {
+        match self {
+            Radiance::None => DVec3::ZERO,
+            Radiance::Exact(environment) => DVec3::from_array(environment.radiance(direction)),
+            Radiance::Bands(bands, coefficients) => {
+                let mut basis = [0.0; MAX_COEFFICIENTS];
+                evaluate(*bands, direction, &mut basis);
+                let sum = |channel: &Vec<f64>| channel.iter().zip(&basis).map(|(c, y)| c * y).sum();
+                DVec3::from_array(coefficients.each_ref().map(sum))
+            }
+        }
+    }
+}
+
+impl RayCast {
+    /// Radiosity of the given vertices.
+    pub fn run(&self, world: &World<'_>, vertices: &[Vertex]) -> Vec<Estimate> {
+        assert!(self.runs >= 1 && self.rays >= self.runs, "{} rays in {} runs", self.rays, self.runs);
+        let environment = &world.scene.environment;
+        let radiance = match self.distant {
+            _ if environment.is_none() => Radiance::None,
+            Distant::Exact => Radiance::Exact(environment),
+            Distant::Bands(bands) => Radiance::Bands(bands, Box::new(environment.coefficients(bands))),
+        };
+        vertices.par_iter().map(|&vertex| self.vertex(world, &radiance, vertex)).collect()
+    }
+
+    fn vertex(&self, world: &World<'_>, radiance: &Radiance<'_>, vertex: Vertex) -> Estimate {
+        let view = world.view(vertex);
+        let mut occluders = world.occluders(&view);
+        occluders.retain(|occluder| occluder.rises_above(view.normal));
+        // Near ones first: they are the likeliest to end a ray.
+        occluders.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+        if !self.shadows {
+            occluders.clear();
+        }
+        let lights: Vec<(Sight, Vec<Sight>)> = world
+            .lights(&view)
+            .into_iter()
+            .filter(|light| light.rises_above(view.normal))
+            .map(|light| {
+                let between = occluders.iter().filter(|o| o.precedes(&light) && o.overlaps(&light));
+                (light, between.copied().collect())
+            })
+            .collect();
+
+        let albedo = world.scene.entities[vertex.entity].albedo.as_dvec3();
+        let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+        for run in 0..self.runs {
+            let sequence = |stream: usize| {
+                Sequence::new(
+                    self.seed,
+                    [u64::from(run), vertex.entity as u64, (vertex.index as u64) << 16 | stream as u64],
+                )
+            };
+            let mut found = self.sky(world, &view, &occluders, radiance, sequence(0));
+            for (stream, (light, between)) in lights.iter().enumerate() {
+                found += self.light(world, &view, light, between, sequence(1 + stream));
+            }
+            found *= albedo / PI;
+            sum += found;
+            squares += found * found;
+        }
+        let runs = f64::from(self.runs);
+        let mean = sum / runs;
+        let variance = (squares / runs - mean * mean).max(DVec3::ZERO) / (runs - 1.0).max(1.0);
+        Estimate { radiosity: mean.to_array(), error: variance.to_array().map(f64::sqrt) }
+    }
+
+    fn rays_a_run(&self) -> u32 {
+        self.rays / self.runs
+    }
+
+    /// Irradiance of the distant light.
+    fn sky(
+        &self,
+        world: &World<'_>,
+        view: &View,
+        occluders: &[Sight],
+        radiance: &Radiance<'_>,
+        points: Sequence,
+    ) -> DVec3 {
+        if matches!(radiance, Radiance::None) {
+            return DVec3::ZERO;
+        }
+        let axes = super::sequence::Axes::new(view.normal);
+        let mut sum = DVec3::ZERO;
+        for ray in 0..self.rays_a_run() {
+            let direction = axes.cosine(points.point(ray));
+            if !self.blocked(world, view, occluders, direction) {
+                sum += radiance.at(direction);
+            }
+        }
+        sum * (COSINE_INTEGRAL / f64::from(self.rays_a_run()))
+    }
+
+    /// Irradiance of a local light behind the occluders that precede it.
+    fn light(&self, world: &World<'_>, view: &View, light: &Sight, between: &[Sight], points: Sequence) -> DVec3 {
+        let cone = light.cone();
+        let mut sum = DVec3::ZERO;
+        for ray in 0..self.rays_a_run() {
+            let direction = cone.axes.cone(points.point(ray), cone.height);
+            let cosine = direction.dot(view.normal);
+            if cosine > 0.0
+                && let Some(pattern) = world.emission(light, direction)
+                && !self.blocked(world, view, between, direction)
+            {
+                sum += cosine * pattern;
+            }
+        }
+        let emission = world.scene.entities[light.entity].emission.as_dvec3();
+        sum * emission * (cone_solid_angle(cone.height) / f64::from(self.rays_a_run()))
+    }
+
+    fn blocked(&self, world: &World<'_>, view: &View, occluders: &[Sight], direction: DVec3) -> bool {
+        self.shadows
+            && (occluders.iter().any(|occluder| world.blocks(occluder, direction))
+                || world.blocks_itself(view, direction))
+    }
+}

@@ -1,0 +1,97 @@
+//! Meshes as rays meet them, in units of the bounding radius from the sphere's centre.
+
+use crate::asset::mesh::Mesh;
+use crate::bake::capture::unit_positions;
+use crate::bake::first_shell;
+use crate::field::lattice::ROOMY_INNER;
+use crate::frame::store::bakes_transfer;
+use crate::scene::Scene;
+use glam::{Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
+use obvhs::ray::{Ray, RayHit};
+use obvhs::triangle::Triangle;
+use rayon::prelude::*;
+use std::time::Duration;
+
+/// One mesh with its hierarchy.
+pub struct Shape {
+    hierarchy: CwBvh,
+    /// Triangles in the order of the hierarchy's leaves.
+    triangles: Vec<Triangle>,
+    /// Colours of their corners, where the mesh has any.
+    colors: Option<Vec<[Vec3; 3]>>,
+    /// Cosine-free measure of the largest sphere around the centre that lies within a convex mesh; 0 for all others.
+    pub inner_radius: f32,
+    /// Whether it can shadow itself.
+    pub self_shadowing: bool,
+}
+
+/// The meshes of a scene, in its order.
+pub struct Shapes(pub Vec<Shape>);
+
+impl Shapes {
+    /// Builds every hierarchy; milliseconds a mesh.
+    pub fn new(scene: &Scene) -> Self {
+        Shapes(scene.meshes.par_iter().map(|mesh| Shape::new(mesh)).collect())
+    }
+}
+
+impl Shape {
+    /// Builds the hierarchy of one mesh.
+    pub fn new(mesh: &Mesh) -> Self {
+        let positions = unit_positions(mesh);
+        let corner = |i: u32| Vec3A::from(positions[i as usize]);
+        let unsorted: Vec<Triangle> =
+            mesh.triangles.iter().map(|t| Triangle { v0: corner(t[0]), v1: corner(t[1]), v2: corner(t[2]) }).collect();
+        let hierarchy = build_cwbvh_from_tris(&unsorted, BvhBuildParams::slow_build(), &mut Duration::default());
+        let order = hierarchy.primitive_indices.iter().map(|&i| i as usize);
+        let colors = mesh
+            .colors
+            .as_ref()
+            .map(|colors| order.clone().map(|i| mesh.triangles[i].map(|corner| colors[corner as usize])).collect());
+        let inner = if mesh.is_convex() { first_shell(&positions, &mesh.triangles) } else { ROOMY_INNER };
+        Shape {
+            triangles: order.map(|i| unsorted[i]).collect(),
+            hierarchy,
+            colors,
+            // `first_shell` answers with a shell off the surface where the mesh nearly fills its sphere.
+            inner_radius: if inner > ROOMY_INNER { inner.min(0.93) as f32 } else { 0.0 },
+            self_shadowing: bakes_transfer(mesh),
+        }
+    }
+
+    /// Whether a ray meets the mesh.
+    pub fn blocks(&self, origin: Vec3A, direction: Vec3A) -> bool {
+        let ray = Ray::new_inf(origin, direction);
+        !self.hierarchy.ray_traverse_miss(ray, |ray, id| self.triangles[id].intersect_embree(ray))
+    }
+
+    /// Whether its emission is the same all over.
+    pub fn is_plain(&self) -> bool {
+        self.colors.is_none()
+    }
+
+    /// Emission pattern where a ray first meets the mesh: white without colours; `None` where it misses.
+    pub fn emission(&self, origin: Vec3A, direction: Vec3A) -> Option<Vec3> {
+        let Some(colors) = &self.colors else {
+            return self.blocks(origin, direction).then_some(Vec3::ONE);
+        };
+        let (ray, mut hit) = (Ray::new_inf(origin, direction), RayHit::none());
+        if !self.hierarchy.ray_traverse(ray, &mut hit, |ray, id| self.triangles[id].intersect_embree(ray)) {
+            return None;
+        }
+        let triangle = &self.triangles[hit.primitive_id as usize];
+        let at = origin + hit.t * direction;
+        let (a, b, c) = (triangle.v0 - at, triangle.v1 - at, triangle.v2 - at);
+        // Areas of the three parts that the point cuts the triangle into.
+        let weights = [b.cross(c).length(), c.cross(a).length(), a.cross(b).length()];
+        let total: f32 = weights.iter().sum();
+        let corners = &colors[hit.primitive_id as usize];
+        Some(if total > 0.0 {
+            corners.iter().zip(weights).map(|(color, weight)| *color * (weight / total)).sum()
+        } else {
+            corners[0]
+        })
+    }
+}

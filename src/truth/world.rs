@@ -1,0 +1,216 @@
+//! A scene at one moment, as rays and exact visibility see it.
+
+use super::Vertex;
+use super::sequence::Axes;
+use super::shape::{Shape, Shapes};
+use crate::bake::TRANSFER_OFFSET;
+use crate::field::lattice::cap_height;
+use crate::scene::{Placement, Scene};
+use glam::{DMat3, DVec3, Mat3A, Vec3A};
+
+/// An entity at its place.
+pub struct Body<'s> {
+    /// Its mesh.
+    pub shape: &'s Shape,
+    /// Centre of the bounding sphere, metres.
+    pub centre: DVec3,
+    /// Bounding radius, metres.
+    pub radius_m: f64,
+    /// Rotation to the world.
+    pub rotation: glam::DQuat,
+    to_object: Mat3A,
+}
+
+/// A scene at one moment.
+pub struct World<'s> {
+    /// What does not move.
+    pub scene: &'s Scene,
+    /// Its entities, in order.
+    pub bodies: Vec<Body<'s>>,
+    /// Entities that occlude.
+    pub occluders: Vec<usize>,
+    /// Entities that emit.
+    pub lights: Vec<usize>,
+}
+
+/// What a vertex sees of the world.
+pub struct View {
+    /// Metres.
+    pub position: DVec3,
+    /// Unit.
+    pub normal: DVec3,
+    /// Where its own mesh's visibility is judged from, and that mesh; `None` where it cannot shadow itself.
+    own: Option<Sight>,
+    entity: usize,
+}
+
+/// A body as seen from a point: everything that all rays from there share.
+#[derive(Clone, Copy)]
+pub struct Sight {
+    /// Entity.
+    pub entity: usize,
+    /// Distance of the sphere's centre, metres.
+    pub distance_m: f64,
+    /// To the sphere's centre, in r.
+    toward: Vec3A,
+    beyond: f32,
+    origin: Vec3A,
+    to_object: Mat3A,
+}
+
+/// The cone around a body's bounding sphere.
+#[derive(Clone, Copy)]
+pub struct Cone {
+    /// Around its axis.
+    pub axes: Axes,
+    /// 1 - cosine of its half angle; 2, all directions, from inside the sphere.
+    pub height: f64,
+}
+
+impl<'s> World<'s> {
+    /// The scene with its entities at `placements`.
+    pub fn new(scene: &'s Scene, shapes: &'s Shapes, placements: &[Placement]) -> Self {
+        let body = |(entity, placement): (&crate::scene::Entity, &Placement)| {
+            let (centre, radius_m) = scene.meshes[entity.mesh].bounding_sphere();
+            let rotation = placement.rotation.as_dquat().normalize();
+            let scale = f64::from(placement.scale);
+            Body {
+                shape: &shapes.0[entity.mesh],
+                centre: placement.position.as_dvec3() + rotation * (centre.as_dvec3() * scale),
+                radius_m: f64::from(radius_m) * scale,
+                rotation,
+                to_object: Mat3A::from(DMat3::from_quat(rotation.inverse()).as_mat3()),
+            }
+        };
+        let having = |switch: &dyn Fn(&crate::scene::Entity) -> bool| {
+            (0..scene.entities.len()).filter(|&j| switch(&scene.entities[j])).collect()
+        };
+        World {
+            scene,
+            bodies: scene.entities.iter().zip(placements).map(body).collect(),
+            occluders: having(&|e| e.occludes),
+            lights: having(&|e| e.emits),
+        }
+    }
+
+    /// The world from a vertex.
+    pub fn view(&self, vertex: Vertex) -> View {
+        let body = &self.bodies[vertex.entity];
+        let mesh = &self.scene.meshes[self.scene.entities[vertex.entity].mesh];
+        let (centre, radius_m) = mesh.bounding_sphere();
+        let local = (mesh.positions[vertex.index].as_dvec3() - centre.as_dvec3()) / f64::from(radius_m);
+        let normal = mesh.normals[vertex.index].as_dvec3();
+        let place = |local: DVec3| body.centre + body.rotation * (local * body.radius_m);
+        let own = body.shape.self_shadowing.then(|| {
+            let eye = local + f64::from(TRANSFER_OFFSET) * normal;
+            Sight { origin: eye.as_vec3a(), ..self.sight(vertex.entity, place(eye)) }
+        });
+        View { position: place(local), normal: (body.rotation * normal).normalize(), own, entity: vertex.entity }
+    }
+
+    /// A body from a point.
+    pub fn sight(&self, entity: usize, from: DVec3) -> Sight {
+        let body = &self.bodies[entity];
+        let toward = (body.centre - from) / body.radius_m;
+        Sight {
+            entity,
+            distance_m: body.centre.distance(from),
+            toward: toward.as_vec3a(),
+            beyond: (toward.length_squared() - 1.0) as f32,
+            origin: body.to_object * (-toward).as_vec3a(),
+            to_object: body.to_object,
+        }
+    }
+
+    /// Every occluder of a vertex but its own entity, in the order of indices.
+    pub fn occluders(&self, view: &View) -> Vec<Sight> {
+        let others = self.occluders.iter().filter(|&&j| j != view.entity);
+        others.map(|&j| self.sight(j, view.position)).collect()
+    }
+
+    /// Every light of a vertex but its own entity.
+    pub fn lights(&self, view: &View) -> Vec<Sight> {
+        let others = self.lights.iter().filter(|&&j| j != view.entity);
+        others.map(|&j| self.sight(j, view.position)).collect()
+    }
+
+    /// Whether the body blocks a ray (unit direction).
+    pub fn blocks(&self, sight: &Sight, direction: DVec3) -> bool {
+        let direction = direction.as_vec3a();
+        if !sight.meets_sphere(direction) {
+            return false;
+        }
+        let shape = self.bodies[sight.entity].shape;
+        sight.meets_inner(direction, shape.inner_radius) || shape.blocks(sight.origin, sight.to_object * direction)
+    }
+
+    /// Whether the receiver's own mesh blocks a ray.
+    pub fn blocks_itself(&self, view: &View, direction: DVec3) -> bool {
+        view.own.as_ref().is_some_and(|own| {
+            let local = own.to_object * direction.as_vec3a();
+            self.bodies[own.entity].shape.blocks(own.origin, local)
+        })
+    }
+
+    /// Radiance of a body's emission along a ray, without its factor; `None` where the ray misses.
+    pub fn emission(&self, sight: &Sight, direction: DVec3) -> Option<DVec3> {
+        let direction = direction.as_vec3a();
+        if !sight.meets_sphere(direction) {
+            return None;
+        }
+        let shape = self.bodies[sight.entity].shape;
+        if shape.is_plain() && sight.meets_inner(direction, shape.inner_radius) {
+            return Some(DVec3::ONE);
+        }
+        shape.emission(sight.origin, sight.to_object * direction).map(|color| color.as_dvec3())
+    }
+}
+
+impl View {
+    /// Whether the receiver can shadow itself.
+    pub fn shadows_itself(&self) -> bool {
+        self.own.is_some()
+    }
+}
+
+impl Sight {
+    /// Whether this occluder precedes a light: the merge's order.
+    pub fn precedes(&self, light: &Sight) -> bool {
+        (self.distance_m, self.entity) < (light.distance_m, light.entity)
+    }
+
+    /// Whether any of the bounding sphere lies above the plane through the point.
+    pub fn rises_above(&self, normal: DVec3) -> bool {
+        self.toward.as_dvec3().dot(normal) > -1.0
+    }
+
+    /// The cone around the bounding sphere.
+    pub fn cone(&self) -> Cone {
+        let toward = self.toward.as_dvec3();
+        match toward.try_normalize() {
+            Some(axis) if self.beyond > 0.0 => Cone { axes: Axes::new(axis), height: cap_height(toward.length()) },
+            _ => Cone { axes: Axes::new(DVec3::Z), height: 2.0 },
+        }
+    }
+
+    /// Whether the cones around two bounding spheres have a direction in common.
+    pub fn overlaps(&self, other: &Sight) -> bool {
+        if self.beyond <= 0.0 || other.beyond <= 0.0 {
+            return true;
+        }
+        let half_angle = |sight: &Sight| (1.0 / sight.toward.as_dvec3().length()).asin();
+        self.toward.as_dvec3().angle_between(other.toward.as_dvec3()) < half_angle(self) + half_angle(other)
+    }
+
+    fn meets_sphere(&self, direction: Vec3A) -> bool {
+        let along = self.toward.dot(direction);
+        self.beyond <= 0.0 || (along > 0.0 && along * along >= self.beyond)
+    }
+
+    /// Whether a ray meets a sphere of that radius (in r) around the centre, and so a convex mesh around it.
+    fn meets_inner(&self, direction: Vec3A, radius: f32) -> bool {
+        let along = self.toward.dot(direction);
+        let beyond = self.beyond + 1.0 - radius * radius;
+        radius > 0.0 && beyond > 0.0 && along > 0.0 && along * along > beyond
+    }
+}

@@ -1,0 +1,180 @@
+//! Ray casting and the exact chain against closed forms, and against each other.
+
+use glam::{DVec3, Vec3};
+use shadow_fields::scene::Scene;
+use shadow_fields::sh::basis::MAX_COEFFICIENTS;
+use shadow_fields::sh::lobe;
+use shadow_fields::sh::product::Tensor;
+use shadow_fields::truth::raycast::{Distant, RayCast, relative_error};
+use shadow_fields::truth::{Exact, Shapes, Vertex, World, receiver_vertices, sample_vertices};
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// A ball of radius .5 m, 1 m above a floor of 81 vertices and albedo .6.
+fn scene(rest: &str) -> Scene {
+    let text = format!(
+        r#"
+        [camera]
+        eye = [0, 3, 6]
+        target = [0, 0, 0]
+        [[mesh]]
+        name = "floor"
+        plane = {{ size_m = 4, cells = 8 }}
+        [[mesh]]
+        name = "ball"
+        sphere = {{ radius_m = 0.5, subdivisions = 5 }}
+        [[entity]]
+        mesh = "floor"
+        albedo = [0.6, 0.6, 0.6]
+        {rest}"#
+    );
+    Scene::parse(&text, Path::new("test.toml"), &|_| unreachable!("no files")).unwrap()
+}
+
+const BALL: &str = "[[entity]]\nmesh = \"ball\"\nposition = [0, 1, 0]\nreceives = false\n";
+const SKY: &str = "[environment]\nuniform = [1, 2, 3]\n";
+
+fn floor_positions(scene: &Scene) -> Vec<(Vertex, DVec3)> {
+    let place = |v: Vertex| (v, scene.meshes[0].positions[v.index].as_dvec3());
+    receiver_vertices(scene).into_iter().filter(|v| v.entity == 0).map(place).collect()
+}
+
+/// Share of a horizontal plane's irradiance under a uniform sky that a sphere wholly above it takes: sin^2 of its half
+/// angle times the cosine towards it.
+fn taken(position: DVec3) -> f64 {
+    let to = DVec3::Y - position;
+    0.25 / to.length_squared() * to.normalize().y
+}
+
+#[test]
+fn a_ball_under_a_uniform_sky_takes_its_closed_form() {
+    let scene = scene(&format!("{BALL}{SKY}"));
+    let shapes = Shapes::new(&scene);
+    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let (vertices, positions): (Vec<_>, Vec<_>) = floor_positions(&scene).into_iter().unzip();
+    let lit = RayCast::default().run(&world, &vertices);
+    for (position, estimate) in positions.iter().zip(&lit) {
+        for (channel, radiance) in [1.0, 2.0, 3.0].into_iter().enumerate() {
+            let truth = 0.6 * radiance * (1.0 - taken(*position));
+            // .5 % of what is taken for the tessellation, and five standard errors.
+            let tolerance = 0.005 * 0.6 * radiance * taken(*position) + 5.0 * estimate.error[channel];
+            assert!((estimate.radiosity[channel] - truth).abs() < tolerance, "{position}: {estimate:?}, {truth}");
+        }
+    }
+    assert!(relative_error(&lit) < 2e-3 && relative_error(&lit) > 1e-6, "{}", relative_error(&lit));
+    let unoccluded = RayCast { shadows: false, ..Default::default() }.run(&world, &vertices);
+    // The albedo .6 is an f32.
+    assert!(unoccluded.iter().all(|e| (e.radiosity[1] - 1.2).abs() < 1e-7), "a uniform sky has no noise");
+}
+
+#[test]
+fn a_sphere_light_shines_as_its_closed_form_and_is_hidden_by_what_is_nearer() {
+    let light =
+        "[[entity]]\nmesh = \"ball\"\nposition = [0, 2.5, 0]\nscale = 0.4\nemission = [9, 9, 9]\nreceives = false\n";
+    let open = scene(light);
+    let shapes = Shapes::new(&open);
+    let world = World::new(&open, &shapes, &open.at(0.0));
+    let (vertices, positions): (Vec<_>, Vec<_>) = floor_positions(&open).into_iter().unzip();
+    let lit = RayCast::default().run(&world, &vertices);
+    for (position, estimate) in positions.iter().zip(&lit) {
+        let to = DVec3::new(0.0, 2.5, 0.0) - *position;
+        let truth = 0.6 * 9.0 * 0.04 / to.length_squared() * to.normalize().y;
+        // The inscribed mesh covers .3 % less than its sphere.
+        assert!(
+            (estimate.radiosity[0] / truth - 1.0).abs() < 5e-3,
+            "{position}: {} against {truth}",
+            estimate.radiosity[0]
+        );
+    }
+    // Below the ball the light is wholly hidden; from above it, not.
+    let hidden = scene(&format!("{BALL}{light}"));
+    let shapes = Shapes::new(&hidden);
+    let centre = Vertex { entity: 0, index: positions.iter().position(|p| p.length() < 1e-6).unwrap() };
+    let dark = RayCast::default().run(&World::new(&hidden, &shapes, &hidden.at(0.0)), &[centre]);
+    assert_eq!(dark[0].radiosity, [0.0; 3]);
+    let mut swapped = hidden.at(0.0);
+    (swapped[1].position, swapped[2].position) = (Vec3::new(0.0, 2.5, 0.0), Vec3::new(0.0, 1.0, 0.0));
+    let bright = RayCast::default().run(&World::new(&hidden, &shapes, &swapped), &[centre]);
+    assert!(bright[0].radiosity[0] > 0.1, "{bright:?}");
+}
+
+#[test]
+fn the_exact_chain_of_balls_is_that_of_their_closed_forms() {
+    let second = "[[entity]]\nmesh = \"ball\"\nposition = [0.9, 1.4, 0.3]\nscale = 0.8\nreceives = false\n";
+    let scene = scene(&format!("{BALL}{second}{SKY}"));
+    let shapes = Shapes::new(&scene);
+    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let (vertices, positions): (Vec<_>, Vec<_>) = floor_positions(&scene).into_iter().unzip();
+    for bands in [4, 5] {
+        let exact = Exact { bands, visibility_bands: bands, ..Default::default() }.run(&world, &vertices);
+        let tensor = Tensor::new(bands, bands, bands);
+        for (position, found) in positions.iter().zip(&exact) {
+            let mut t = [0.0; MAX_COEFFICIENTS];
+            t[..bands * bands].copy_from_slice(&lobe::clamped_cosine(bands, DVec3::Y));
+            let balls = [(DVec3::new(0.0, 1.0, 0.0), 0.5), (DVec3::new(0.9, 1.4, 0.3), 0.4)];
+            for (centre, radius) in balls {
+                let (blocked, mut product) = (lobe::sphere(bands, centre - *position, radius), [0.0; MAX_COEFFICIENTS]);
+                tensor.multiply(&t, &blocked, &mut product);
+                t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
+            }
+            let truth = 0.6 / PI * t[0] * (4.0 * PI).sqrt();
+            // Tessellation and 4096 rays: under .3 % of a blocked part of at most a quarter.
+            assert!((found[0] - truth).abs() < 1e-3, "{bands} bands, {position}: {} against {truth}", found[0]);
+        }
+    }
+}
+
+#[test]
+fn a_receiver_shadows_itself_only_where_it_bends_inwards() {
+    let text = r#"
+        [camera]
+        eye = [0, 3, 6]
+        target = [0, 0, 0]
+        [environment]
+        uniform = [1, 1, 1]
+        [[mesh]]
+        name = "torus"
+        torus = { major_m = 1, minor_m = 0.4, segments = 48, sides = 24 }
+        [[entity]]
+        mesh = "torus"
+        albedo = [1, 1, 1]"#;
+    let scene = match Scene::parse(text, Path::new("test.toml"), &|_| unreachable!("no files")) {
+        Ok(scene) => scene,
+        Err(error) => panic!("{error}"),
+    };
+    let shapes = Shapes::new(&scene);
+    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let vertices = receiver_vertices(&scene);
+    let (cast, exact) = (RayCast::default().run(&world, &vertices), Exact::default().run(&world, &vertices));
+    let mesh = &scene.meshes[0];
+    let (mut outer, mut inner) = (0, 0);
+    for (vertex, (t0, t1)) in vertices.iter().zip(cast.iter().zip(&exact)) {
+        let (position, normal) = (mesh.positions[vertex.index], mesh.normals[vertex.index]);
+        let radial = Vec3::new(position.x, 0.0, position.z).normalize_or_zero().dot(normal);
+        if radial > 0.5 {
+            outer += 1;
+            assert!(t0.radiosity[0] > 0.97, "on the outside only the tessellation dims: {t0:?}");
+        } else if radial < -0.9 {
+            inner += 1;
+            assert!(t0.radiosity[0] < 0.9, "the hole dims: {t0:?}");
+        }
+        // Uniform light meets one factor: four bands lose nothing.
+        assert!((t0.radiosity[0] - t1[0]).abs() < 2e-3 + 5.0 * t0.error[0], "{t0:?} against {t1:?}");
+    }
+    assert!(outer > 100 && inner > 50, "{outer}, {inner}");
+}
+
+#[test]
+fn runs_repeat_and_seeds_differ() {
+    let scene = scene(&format!("{BALL}{SKY}"));
+    let shapes = Shapes::new(&scene);
+    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let vertices = sample_vertices(&scene, 40, 9);
+    assert_eq!(vertices.len(), 40);
+    assert_eq!(vertices, sample_vertices(&scene, 40, 9));
+    let run =
+        |seed| RayCast { rays: 64, runs: 4, seed, distant: Distant::Bands(4), shadows: true }.run(&world, &vertices);
+    let text = |lit: &[shadow_fields::truth::Estimate]| format!("{lit:?}");
+    assert_eq!(text(&run(3)), text(&run(3)));
+    assert_ne!(text(&run(3)), text(&run(4)));
+}

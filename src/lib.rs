@@ -22,6 +22,7 @@
 pub mod app;
 pub mod asset;
 pub mod bake;
+pub mod bench;
 pub mod error;
 pub mod field;
 pub mod frame;

@@ -1,0 +1,110 @@
+//! What is measured: the embedded scenes, and a teapot over a plane under one kind of light at a time.
+
+use crate::asset::{Mesh, embedded};
+use crate::error::Result;
+use crate::scene::Scene;
+use crate::truth::raycast::Distant;
+use std::path::Path;
+
+/// A scene at a moment under the light that its reference integrates.
+pub struct Case {
+    /// For tables.
+    pub name: String,
+    /// The scene.
+    pub scene: Scene,
+    /// Scene time in seconds.
+    pub time_s: f64,
+    /// Distant light of the reference.
+    pub distant: Distant,
+}
+
+/// Direction of the key light and of the sphere lights.
+const TOWARD: [f64; 3] = [0.5, 0.707, 0.5];
+/// Gap between floor and teapot, in bounding radii.
+const GAP: f64 = 0.02;
+/// Distance of the sphere lights from the teapot's centre, in bounding radii.
+const LIGHT_DISTANCE: f64 = 5.0;
+
+/// The embedded scenes at their start.
+///
+/// # Errors
+/// None that a test does not show.
+pub fn scenes() -> Result<Vec<Case>> {
+    let names = embedded::scenes().into_iter().map(|(name, _)| name);
+    names.map(scene).collect()
+}
+
+/// An embedded scene by name.
+///
+/// # Errors
+/// `Input` when there is none.
+pub fn scene(name: &str) -> Result<Case> {
+    let path = Path::new(embedded::ROOT).join("scenes").join(format!("{name}.toml"));
+    Ok(Case { name: name.to_owned(), scene: Scene::load(&path)?, time_s: 0.0, distant: Distant::Exact })
+}
+
+/// Teapot of bounding radius 1 over a floor of 40 x 40 vertices and 6 x 6 m that alone is lit, under one light at a time:
+/// (a) a uniform sky, (b) a sky that brightens upwards, (c) a soft key light that is defined by its 4 bands, (d) a sphere
+/// light seen from the teapot's centre under a half angle of 15 and of 7.5 degrees.
+///
+/// # Errors
+/// None that a test does not show.
+pub fn teapot_lights() -> Result<Vec<Case>> {
+    let mesh = Mesh::parse(&embedded::read(Path::new("assets/meshes/teapot.obj"))?, Path::new("teapot.obj"))?;
+    let (centre, radius_m) = mesh.bounding_sphere();
+    let (centre, scale) = (centre.as_dvec3(), 1.0 / f64::from(radius_m));
+    let lowest = mesh.positions.iter().map(|p| f64::from(p.y)).fold(f64::INFINITY, f64::min);
+    let place = [-centre.x * scale, GAP - lowest * scale, -centre.z * scale];
+    let middle_y = place[1] + centre.y * scale;
+    let head = format!(
+        r#"
+        [camera]
+        eye = [0, 3, 6]
+        target = [0, 0.5, 0]
+        [[mesh]]
+        name = "floor"
+        plane = {{ size_m = 6, cells = 39 }}
+        [[mesh]]
+        name = "teapot"
+        file = "../meshes/teapot.obj"
+        [[mesh]]
+        name = "bulb"
+        sphere = {{ radius_m = 1, subdivisions = 4 }}
+        [[entity]]
+        mesh = "floor"
+        [[entity]]
+        mesh = "teapot"
+        position = {place:?}
+        scale = {scale}
+        receives = false
+        "#
+    );
+    let bulb = |half_angle_deg: f64| {
+        let length = TOWARD.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let at = TOWARD.map(|c| c * LIGHT_DISTANCE / length);
+        let scale = LIGHT_DISTANCE * half_angle_deg.to_radians().sin();
+        // As bright at the centre as a unit of cosine-weighted irradiance over pi.
+        let radiance = half_angle_deg.to_radians().sin().powi(-2);
+        format!(
+            "[[entity]]\nmesh = \"bulb\"\nreceives = false\nscale = {scale}\nposition = [{}, {}, {}]\nemission = [{radiance}, {radiance}, {radiance}]",
+            at[0], at[1] + middle_y, at[2]
+        )
+    };
+    let lights = [
+        ("teapot, (a) uniform sky", "[environment]\nuniform = [1, 1, 1]".to_owned(), Distant::Exact),
+        ("teapot, (b) sky gradient", "[environment]\ngradient = { radiance = [1, 1, 1] }".to_owned(), Distant::Exact),
+        (
+            "teapot, (c) key of 4 bands",
+            format!("[environment]\nkey = {{ radiance = [1, 1, 1], toward = {TOWARD:?}, sharpness = 4 }}"),
+            Distant::Bands(4),
+        ),
+        ("teapot, (d) sphere light of 15 degrees", bulb(15.0), Distant::Exact),
+        ("teapot, (d) sphere light of 7.5 degrees", bulb(7.5), Distant::Exact),
+    ];
+    let case = |(name, light, distant): (&str, String, Distant)| {
+        let path = Path::new("assets/scenes/teapot_over_plane.toml");
+        let scene = Scene::parse(&format!("{head}{light}"), path, &embedded::read)?;
+        Ok(Case { name: name.to_owned(), scene, time_s: 0.0, distant })
+    };
+    lights.into_iter().map(case).collect()
+}

@@ -1,0 +1,97 @@
+//! Errors over vertices and times over rounds.
+
+use serde::Serialize;
+
+/// Radiosity a vertex: linear RGB.
+pub type Radiosity = [f64; 3];
+
+/// How far two sets of vertices are apart, in units of a given value. A vertex's error is the root mean square over its
+/// three channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Difference {
+    /// Root mean square over vertices.
+    pub rms: f64,
+    /// What 99 of 100 vertices stay below.
+    pub p99: f64,
+    /// The worst vertex.
+    pub max: f64,
+}
+
+/// Root mean square over vertices and channels.
+pub fn rms(values: &[Radiosity]) -> f64 {
+    let squares: f64 = values.iter().flatten().map(|c| c * c).sum();
+    (squares / (3 * values.len()).max(1) as f64).sqrt()
+}
+
+/// The difference of two sets of the same vertices in units of `unit`.
+pub fn difference(a: &[Radiosity], b: &[Radiosity], unit: f64) -> Difference {
+    assert_eq!(a.len(), b.len(), "sets of vertices");
+    let apart: Vec<Radiosity> = a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| a[c] - b[c])).collect();
+    let mut sorted: Vec<f64> = apart.iter().map(|d| rms(&[*d])).collect();
+    sorted.sort_by(f64::total_cmp);
+    let at = |share: f64| sorted.get(((sorted.len() as f64 * share).ceil() as usize).saturating_sub(1)).copied();
+    Difference { rms: rms(&apart) / unit, p99: at(0.99).unwrap_or(0.0) / unit, max: at(1.0).unwrap_or(0.0) / unit }
+}
+
+/// Median and quartiles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// A quarter of the values lies below.
+    pub lower: f64,
+    /// The middle value.
+    pub median: f64,
+    /// A quarter of the values lies above.
+    pub upper: f64,
+}
+
+/// Quartiles by linear interpolation between ranks.
+pub fn spread(values: &[f64]) -> Spread {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let at = |share: f64| {
+        let rank = share * (sorted.len().max(1) - 1) as f64;
+        let (low, part) = (rank as usize, rank.fract());
+        match (sorted.get(low), sorted.get(low + 1)) {
+            (Some(a), Some(b)) => a + part * (b - a),
+            (Some(a), None) => *a,
+            _ => 0.0,
+        }
+    };
+    Spread { lower: at(0.25), median: at(0.5), upper: at(0.75) }
+}
+
+/// Where a falling curve of (x, y) reaches `y`, straight in logarithms between its points and, beyond its ends, on from the
+/// nearest two; `None` with fewer than two points or where it does not fall.
+pub fn crossing(curve: &[(f64, f64)], y: f64) -> Option<f64> {
+    let logs: Vec<(f64, f64)> = curve.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+    let target = y.ln();
+    let pair = logs.windows(2).find(|pair| pair[1].1 <= target).or(logs.windows(2).last())?;
+    let slope = (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0);
+    (slope < 0.0).then(|| (pair[0].0 + (target - pair[0].1) / slope).exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_in_the_given_unit() {
+        let a: Vec<Radiosity> = (0..100).map(|i| [f64::from(i); 3]).collect();
+        let b = vec![[0.0; 3]; 100];
+        let found = difference(&a, &b, 2.0);
+        assert_eq!((found.p99, found.max), (49.0, 49.5));
+        assert!((found.rms - (328_350.0_f64 / 100.0).sqrt() / 2.0).abs() < 1e-12, "sum of squares to 99: {found:?}");
+    }
+
+    #[test]
+    fn quartiles_and_crossings() {
+        assert_eq!(spread(&[4.0, 1.0, 3.0, 2.0, 5.0]), Spread { lower: 2.0, median: 3.0, upper: 4.0 });
+        assert_eq!(spread(&[]), Spread::default());
+        // y = 1 / x, inside and beyond the ends.
+        let curve = [(1.0, 1.0), (10.0, 0.1), (100.0, 0.01)];
+        for y in [2.0, 0.5, 0.05, 0.001] {
+            assert!((crossing(&curve, y).unwrap() * y - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(crossing(&[(1.0, 1.0), (2.0, 1.0)], 0.5), None);
+    }
+}

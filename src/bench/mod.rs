@@ -1,0 +1,59 @@
+//! Measurements behind the figures in the documentation: what a picture's error is made of, what run time buys, and what
+//! keeps the numbers bounded.
+
+pub mod budget;
+pub mod cases;
+pub mod figures;
+pub mod plot;
+pub mod rival;
+pub mod sweep;
+pub mod text;
+pub mod time_error;
+
+use crate::bake::Baker;
+use crate::bake::cache::Cache;
+use crate::error::Result;
+use crate::frame::{self, Frame};
+use crate::scene::Scene;
+use serde_json::Value;
+
+/// What every measurement needs.
+pub struct Bench<'b> {
+    /// Bakes on the device that is measured.
+    pub baker: &'b Baker,
+    /// Baked things on disk.
+    pub cache: &'b Cache,
+    /// Told what is being done now.
+    pub progress: &'b dyn Fn(&str),
+    /// Whether to end within a minute on two cores rather than to be thorough.
+    pub quick: bool,
+    /// Decides vertices and rays.
+    pub seed: u64,
+    /// Device, driver, version, options and revision, for the head of every result file.
+    pub origin: Value,
+}
+
+impl Bench<'_> {
+    /// A scene on the device.
+    ///
+    /// # Errors
+    /// As [`Frame::new`].
+    pub fn frame(&self, scene: &Scene, options: frame::Options) -> Result<Frame> {
+        Frame::new(self.baker, self.cache, scene, options, &|what, done, all| {
+            if done == all {
+                (self.progress)(&format!("baked {what}"));
+            }
+        })
+    }
+}
+
+/// The options that sweeps vary: the program's defaults, and a picture too small to matter.
+pub fn default_options() -> frame::Options {
+    frame::Options {
+        bake: crate::bake::Options::default(),
+        lookup: crate::field::Lookup::default(),
+        variant: None,
+        size: [16, 16],
+        multisample: false,
+    }
+}

@@ -1,0 +1,207 @@
+//! What the choices in bake and merge cost and give, one axis at a time round the default.
+
+use super::budget::{Truth, device_radiosity};
+use super::cases::Case;
+use super::figures::{Difference, Spread, difference, spread};
+use super::{Bench, default_options};
+use crate::error::Result;
+use crate::field::{Lookup, Storage};
+use crate::frame::{self, Frame};
+use crate::gpu::Timing;
+use crate::scene::Placement;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Frames that are thrown away before any is timed, the first dispatch apart.
+const WARM_UP: usize = 2;
+
+/// One setting that is measured.
+pub struct Variation {
+    /// What is varied.
+    pub axis: &'static str,
+    /// Its setting.
+    pub name: String,
+    /// Everything.
+    pub options: frame::Options,
+}
+
+/// What was measured of it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Point {
+    /// Scene and light.
+    pub case: String,
+    /// What is varied.
+    pub axis: &'static str,
+    /// Its setting.
+    pub name: String,
+    /// Bytes of all fields of the scene.
+    pub field_bytes: u64,
+    /// Device time of the bakes, milliseconds; none where all was in the cache.
+    pub bake_ms: Option<f64>,
+    /// Device time of the first merge, shader compilation by the driver included, milliseconds.
+    pub first_merge_ms: f64,
+    /// Device time of the merge pass, milliseconds.
+    pub merge_ms: Spread,
+    /// Merge time over that of the default in the same round: median over rounds.
+    pub time_per_default: f64,
+    /// T0 to T3.
+    pub total: Difference,
+    /// T1 (of 4 bands) to T3.
+    pub below_bands: Difference,
+}
+
+/// The settings, the default first.
+pub fn variations(quick: bool) -> Vec<Variation> {
+    let base = default_options();
+    let mut all = vec![Variation { axis: "default", name: base.bake.lattice.to_string(), options: base }];
+    let mut add = |axis, name: &str, change: &dyn Fn(&mut frame::Options)| {
+        let mut options = base;
+        change(&mut options);
+        all.push(Variation { axis, name: name.to_owned(), options });
+    };
+    add("lookup", "nearest", &|o| o.lookup = Lookup::Nearest);
+    add("lookup", "radial", &|o| o.lookup = Lookup::Radial);
+    add("storage", "f32", &|o| o.bake.storage = Storage::F32);
+    let lattices: &[(&'static str, &str)] = &[
+        ("lattice", "latlon:8x4x4,linear,raw,inner=0.2"),
+        ("lattice", "cube:8x4"),
+        ("lattice", "cube:16x4,linear,raw,inner=0.2"),
+        ("lattice", "cube:16x4"),
+        ("lattice", "latlon:20x16x16,linear,raw,inner=0.2"),
+        ("lattice", "cube:8x8"),
+        ("lattice", "cube:12x6"),
+        ("lattice", "cube:16x12"),
+        ("lattice", "cube:32x8"),
+        ("spacing", "cube:16x8,chord,raw"),
+        ("spacing", "cube:16x8,chord,scaled"),
+        ("spacing", "cube:16x8,log,scaled"),
+        ("spacing", "cube:16x8,log,raw"),
+        ("spacing", "cube:16x8,linear,scaled"),
+        ("spacing", "cube:16x8,linear,raw"),
+    ];
+    for (axis, text) in &lattices[..if quick { 3 } else { lattices.len() }] {
+        let lattice = text.parse().expect("a lattice in the table");
+        if lattice != base.bake.lattice {
+            add(axis, text, &|o| o.bake.lattice = lattice);
+        }
+    }
+    let faces: &[u32] = if quick { &[16] } else { &[8, 16, 32, 128] };
+    for &face_px in faces {
+        add("face", &format!("{face_px} px"), &|o| o.bake.face_px = face_px);
+    }
+    if !quick {
+        for bands in [3, 5, 6] {
+            add("bands", &format!("{bands} bands"), &|o| o.bake.bands = bands);
+        }
+        let student = "latlon:8x4x4,linear,raw,inner=0.2".parse().expect("a lattice");
+        add("together", "8x4x4, nearest, f32, 32 px", &|o| {
+            (o.bake.lattice, o.bake.storage, o.bake.face_px, o.lookup) = (student, Storage::F32, 32, Lookup::Nearest);
+        });
+        let small = "cube:8x4".parse().expect("a lattice");
+        add("together", "cube:8x4, 16 px", &|o| (o.bake.lattice, o.bake.face_px) = (small, 16));
+    }
+    all
+}
+
+/// Device time of the merge in milliseconds.
+pub fn merge_ms(timings: &[Timing]) -> f64 {
+    timings.iter().filter(|t| t.pass == "merge").map(|t| t.milliseconds).sum()
+}
+
+/// Renders one frame after another in rounds, so that whatever else the machine does meets all alike: merge times in
+/// milliseconds, by frame and round.
+///
+/// # Errors
+/// As [`Frame::render`].
+pub fn interleaved(frames: &mut [Frame], placements: &[Placement], rounds: usize) -> Result<Vec<Vec<f64>>> {
+    let mut times = vec![Vec::with_capacity(rounds); frames.len()];
+    for round in 0..WARM_UP + rounds {
+        for (frame, times) in frames.iter_mut().zip(&mut times) {
+            let took = merge_ms(&frame.render(placements, None)?);
+            if round >= WARM_UP {
+                times.push(took);
+            }
+        }
+    }
+    Ok(times)
+}
+
+/// Measures every variation on one case.
+///
+/// # Errors
+/// As [`Frame::new`] and [`Frame::render`].
+pub fn sweep(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variation]) -> Result<Vec<Point>> {
+    let placements = case.scene.at(case.time_s);
+    let (mut frames, mut first) = (Vec::new(), Vec::new());
+    for variation in variations {
+        let started = Instant::now();
+        let mut frame = bench.frame(&case.scene, variation.options)?;
+        first.push(merge_ms(&frame.render(&placements, None)?));
+        frames.push(frame);
+        let seconds = started.elapsed().as_secs_f64();
+        (bench.progress)(&format!("{}: {} {} prepared in {seconds:.1} s", case.name, variation.axis, variation.name));
+    }
+    let times = interleaved(&mut frames, &placements, if bench.quick { 9 } else { 25 })?;
+    let mut points = Vec::new();
+    for (index, (variation, frame)) in variations.iter().zip(&frames).enumerate() {
+        let t3 = device_radiosity(frame, &truth.vertices)?;
+        let ratios: Vec<f64> = times[index].iter().zip(&times[0]).map(|(t, default)| t / default).collect();
+        let baked = &frame.store.baked;
+        let bake_ms = baked.iter().map(|b| b.report.capture_ms + b.report.project_ms + b.report.assemble_ms);
+        points.push(Point {
+            case: case.name.clone(),
+            axis: variation.axis,
+            name: variation.name.clone(),
+            field_bytes: frame.store.fields.size_bytes,
+            bake_ms: (!baked.is_empty()).then(|| bake_ms.sum()),
+            first_merge_ms: first[index],
+            merge_ms: spread(&times[index]),
+            time_per_default: spread(&ratios).median,
+            total: truth.error(&t3),
+            below_bands: difference(&t3, &truth.t1, truth.unit),
+        });
+    }
+    Ok(points)
+}
+
+/// Indices of the points that no other beats in both numbers (smaller is better), by the first.
+pub fn pareto(points: &[(f64, f64)]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|&a, &b| points[a].0.total_cmp(&points[b].0).then(points[a].1.total_cmp(&points[b].1)));
+    let mut best = f64::INFINITY;
+    order.retain(|&i| {
+        let kept = points[i].1 < best;
+        best = best.min(points[i].1);
+        kept
+    });
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_is_what_nothing_beats() {
+        assert_eq!(pareto(&[(1.0, 9.0), (2.0, 3.0), (2.0, 4.0), (3.0, 3.0), (4.0, 1.0), (0.5, 10.0)]), [5, 0, 1, 4]);
+        assert!(pareto(&[]).is_empty());
+    }
+
+    #[test]
+    fn every_variation_can_be_baked_and_differs_from_the_default() {
+        for quick in [true, false] {
+            let all = variations(quick);
+            assert_eq!(all[0].axis, "default");
+            for variation in &all[1..] {
+                variation.options.bake.lattice.starting_at(0.5).validate().unwrap();
+                assert_ne!(
+                    format!("{:?}", variation.options),
+                    format!("{:?}", all[0].options),
+                    "{} {}",
+                    variation.axis,
+                    variation.name
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Result files: CSV with its origin in the first line.
+
+use crate::error::{Error, Result};
+use serde_json::Value;
+use std::path::Path;
+
+/// Writes a text file, whole or not at all.
+///
+/// # Errors
+/// `Failed` that names the file.
+pub fn write(path: &Path, text: &str) -> Result<()> {
+    crate::gpu::shader::write_atomically(path, text.as_bytes())
+        .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
+}
+
+/// Serialisable rows as CSV: nested numbers get names joined by `_`, lists of objects are left out, and the first line, after
+/// `#`, is `origin` as JSON.
+pub fn csv(origin: &Value, rows: &[Value]) -> String {
+    let flat: Vec<Vec<(String, String)>> = rows.iter().map(|row| flatten("", row)).collect();
+    let mut text = format!("# {origin}\n");
+    if let Some(first) = flat.first() {
+        let line = |cells: Vec<String>| cells.iter().map(|c| quote(c)).collect::<Vec<_>>().join(",") + "\n";
+        text += &line(first.iter().map(|(name, _)| name.clone()).collect());
+        for row in flat {
+            text += &line(row.into_iter().map(|(_, value)| value).collect());
+        }
+    }
+    text
+}
+
+fn flatten(prefix: &str, value: &Value) -> Vec<(String, String)> {
+    match value {
+        Value::Object(map) => {
+            let join = |key: &str| if prefix.is_empty() { key.to_owned() } else { format!("{prefix}_{key}") };
+            map.iter().flat_map(|(key, value)| flatten(&join(key), value)).collect()
+        }
+        Value::Array(_) => Vec::new(),
+        Value::Null => vec![(prefix.to_owned(), String::new())],
+        Value::String(text) => vec![(prefix.to_owned(), text.clone())],
+        other => vec![(prefix.to_owned(), other.to_string())],
+    }
+}
+
+fn quote(cell: &str) -> String {
+    if cell.contains([',', '"', '\n']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
+}
+
+/// A number with three significant digits.
+pub fn three(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return x.to_string();
+    }
+    let digits = (2 - x.abs().log10().floor() as i32).clamp(0, 8) as usize;
+    let text = format!("{x:.digits$}");
+    text.strip_prefix("0.").map_or(text.clone(), |rest| format!(".{rest}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn rows_become_columns() {
+        let rows = [
+            json!({"case": "a, b", "error": {"rms": 0.5, "max": 2}, "list": [1], "gone": null}),
+            json!({"case": "c", "error": {"rms": 1e-9, "max": 0}, "list": [], "gone": 3}),
+        ];
+        let text = csv(&json!({"device": "d"}), &rows);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[0], "# {\"device\":\"d\"}");
+        assert_eq!(lines.len(), 4);
+        let column = lines[1].split(',').position(|c| c == "error_rms").unwrap();
+        assert_eq!(lines[3].split(',').nth(column).unwrap().parse::<f64>().unwrap(), 1e-9);
+        assert!(lines[2].contains("\"a, b\""));
+    }
+
+    #[test]
+    fn three_digits() {
+        let shown: Vec<String> = [0.012_345, 123.4, 0.0, 9876.5, 1.0, -0.5].map(three).to_vec();
+        assert_eq!(shown, [".0123", "123", "0", "9876", "1.00", "-0.500"]);
+    }
+}

@@ -79,16 +79,12 @@ void field_plane(vec3 p, out uint base, out vec2 cell) {
 FieldPlace field_place(vec3 p, vec4 radial) {
     float d = sqrt(dot(p, p));
     float near = clamp(d, radial.z, radial.w);
-    // c: cosine of the half-angle of the bounding sphere; h = 1 - c without cancellation.
-    float c, h;
-    if (near >= 1.0) {
-        float x = 1.0 / near;
-        c = sqrt(max(0.0, (1.0 - x) * (1.0 + x)));
-        h = x * x / (1.0 + c);
-    } else {
-        c = -sqrt((1.0 - near) * (1.0 + near));
-        h = 1.0 - c;
-    }
+    // c: cosine of the half-angle of the bounding sphere, or of what stands for it inside (Lattice::reach);
+    // h = 1 - c without cancellation.
+    float edge = min(radial.z, 1.0);
+    float reach = near * near + (1.0 - edge * edge);
+    float c = sqrt(max(0.0, (near - edge) * (near + edge) / reach));
+    float h = 1.0 / (reach * (1.0 + c));
 #if SPACING == 0
     float coordinate = sqrt(0.5 * h);
 #elif SPACING == 1

@@ -192,6 +192,26 @@ fn nearest_takes_a_near_sample() {
 }
 
 #[test]
+fn shells_of_a_roomy_object_are_dense_from_the_first_on() {
+    let roomy = Lattice::default().starting_at(0.4);
+    let radii: Vec<f64> = (0..roomy.shells).map(|i| roomy.shell(i)).collect();
+    assert!((radii[0] - 0.4).abs() < 1e-12 && (radii[15] - 8.0).abs() < 1e-9, "{radii:?}");
+    // No gap is wider than what is in proportion to the distance, and none collapses where d = 1, where nothing happens.
+    for pair in radii.windows(2) {
+        assert!(pair[1] > pair[0] && pair[1] - pair[0] < 0.45 * pair[1], "{radii:?}");
+    }
+    let step_at = |d: f64| radii.windows(2).find(|p| p[1] >= d).map(|p| p[1] - p[0]).unwrap();
+    assert!(step_at(1.0) > step_at(0.7) && step_at(1.0) > 0.1, "{radii:?}");
+    // Where the first shell lies outside the sphere, the half-angle is the sphere's own.
+    let outside = Lattice::default().starting_at(OUTSIDE_INNER);
+    for d in [1.02, 1.5, 3.0, 9.0] {
+        assert!((outside.reach(d) - d).abs() < 1e-12);
+        assert!(roomy.reach(d) >= d && roomy.scale(d) > 0.0);
+    }
+    assert!((roomy.reach(0.4) - 1.0).abs() < 1e-12);
+}
+
+#[test]
 fn linear_in_the_shell_coordinate_is_exact() {
     let mut rng = Rng::with_seed(5);
     for lattice in lattices() {
@@ -201,7 +221,7 @@ fn linear_in_the_shell_coordinate_is_exact() {
         let (slope, offset) = lattice.radial_map();
         for _ in 0..500 {
             let d = lattice.inner + (lattice.outer - lattice.inner) * rng.f64();
-            let wanted = 3.0 - 0.25 * (slope * lattice.spacing.coordinate(d) + offset);
+            let wanted = 3.0 - 0.25 * (slope * lattice.coordinate(d) + offset);
             for lookup in [Lookup::Radial, Lookup::Trilinear] {
                 let value = interpolate(&lattice, &stored, d * unit(&mut rng), lookup);
                 assert!((value - wanted).abs() < ROUNDING, "{lattice} {d}: {value}, not {wanted}");
@@ -225,7 +245,7 @@ fn interpolation_is_continuous() {
         let stored = store(&lattice, &noise(&lattice, &mut rng));
         let (slope, offset) = lattice.radial_map();
         let last = f64::from(lattice.shells - 1);
-        let shell_at = |d: f64| (slope * lattice.spacing.coordinate(d) + offset).clamp(0.0, last);
+        let shell_at = |d: f64| (slope * lattice.coordinate(d) + offset).clamp(0.0, last);
         let at = |p: DVec3| interpolate(&lattice, &stored, p, Lookup::Trilinear) * lattice.unscale(p.length());
         let mut paths: Vec<(DVec3, DVec3)> = (0..12).map(|_| (unit(&mut rng), unit(&mut rng))).collect();
         // Across corners, along edges, and along them on either side.

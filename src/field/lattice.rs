@@ -44,7 +44,7 @@ pub enum Directions {
 #[serde(rename_all = "lowercase")]
 pub enum Spacing {
     /// q = sin(theta / 2), theta being the half-angle under which the bounding sphere is seen: cos theta = c(d) of
-    /// [`cap_cosine`]. Nearly equal steps of half-angle, dense around d = 1 where the blocked part varies fastest, and two
+    /// [`cap_cosine`], taken at [`Lattice::reach`]. Nearly equal steps of half-angle, dense around d = 1 where the blocked part varies fastest, and two
     /// square roots in a shader.
     Chord,
     /// ln d.
@@ -79,7 +79,7 @@ pub struct Lattice {
     pub spacing: Spacing,
     /// Directions of every shell.
     pub directions: Directions,
-    /// Whether b / (1 - c(d)) is what is stored and interpolated (see [`cap_height`]) rather than b itself.
+    /// Whether b / (1 - c) is what is stored and interpolated rather than b itself: [`cap_height`] at [`Lattice::reach`].
     pub scaled: bool,
 }
 
@@ -179,12 +179,12 @@ impl Spacing {
 }
 
 impl Lattice {
-    /// Shell coordinate t in [0, shells - 1] is `slope * coordinate(d) + offset`, clamped.
+    /// Shell coordinate t in [0, shells - 1] is `slope * self.coordinate(d) + offset`, clamped.
     pub fn radial_map(&self) -> (f64, f64) {
         if self.shells == 1 {
             return (0.0, 0.0);
         }
-        let (from, to) = (self.spacing.coordinate(self.inner), self.spacing.coordinate(self.outer));
+        let (from, to) = (self.coordinate(self.inner), self.coordinate(self.outer));
         let slope = f64::from(self.shells - 1) / (to - from);
         (slope, -slope * from)
     }
@@ -195,7 +195,28 @@ impl Lattice {
             return self.inner;
         }
         let (slope, offset) = self.radial_map();
-        self.spacing.distance((f64::from(index) - offset) / slope)
+        let distance = self.spacing.distance((f64::from(index) - offset) / slope);
+        match self.spacing {
+            Spacing::Chord => (distance * distance - self.room()).max(0.0).sqrt(),
+            Spacing::Log | Spacing::Linear => distance,
+        }
+    }
+
+    /// What is added to squared distances before [`cap_cosine`] is taken, so that it is 0 on the first shell of an object with
+    /// room in its sphere: 1 - inner^2, or 0 where the first shell lies outside the sphere. The cosine proper has a kink at
+    /// d = 1, where nothing happens to such an object.
+    fn room(&self) -> f64 {
+        (1.0 - self.inner * self.inner).max(0.0)
+    }
+
+    /// The distance whose [`cap_height`] stands for a distance of at least `inner`.
+    pub fn reach(&self, d: f64) -> f64 {
+        (d * d + self.room()).sqrt()
+    }
+
+    /// Coordinate in which shells are equally spaced, of a distance of at least `inner`.
+    pub fn coordinate(&self, d: f64) -> f64 {
+        self.spacing.coordinate(if self.spacing == Spacing::Chord { self.reach(d) } else { d })
     }
 
     /// This lattice with its first shell at `inner` (in r), unless it was chosen before.
@@ -208,14 +229,14 @@ impl Lattice {
 
     /// Factor by which the blocked part captured at distance d is multiplied before it is stored.
     pub fn scale(&self, d: f64) -> f64 {
-        if self.scaled { 1.0 / cap_height(d) } else { 1.0 }
+        if self.scaled { 1.0 / cap_height(self.reach(d)) } else { 1.0 }
     }
 
     /// Factor by which an interpolated value is multiplied at distance d to give the blocked part. Inside the first shell
     /// the first shell holds, beyond the last the value falls off as (outer / d)^2.
     pub fn unscale(&self, d: f64) -> f64 {
         let near = d.clamp(self.inner, self.outer);
-        let within = if self.scaled { cap_height(near) } else { 1.0 };
+        let within = if self.scaled { cap_height(self.reach(near)) } else { 1.0 };
         within * (self.outer / d.max(self.outer)).powi(2)
     }
 
@@ -335,7 +356,7 @@ impl Lattice {
         let direction = if d > 0.0 { position / d } else { DVec3::X };
         let (slope, offset) = self.radial_map();
         let last = f64::from(self.shells - 1);
-        let mut t = (slope * self.spacing.coordinate(d) + offset).clamp(0.0, last);
+        let mut t = (slope * self.coordinate(d.max(self.inner)) + offset).clamp(0.0, last);
         if lookup == Lookup::Nearest {
             t = t.round();
         }

@@ -52,6 +52,7 @@ pub fn default_options() -> frame::Options {
     frame::Options {
         bake: crate::bake::Options::default(),
         lookup: crate::field::Lookup::default(),
+        skip: crate::render::variant::Skip::ALL,
         variant: None,
         size: [16, 16],
         multisample: false,

@@ -79,6 +79,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     for (name, value) in lines {
         output::say(format!("{name:16} {value}"));
     }
+    if header.kind == Kind::Occlusion {
+        output::say(format!("{:16} at most {:.4} times a product", "growth", header.growth));
+    }
     if header.kind == Kind::Radiance {
         output::say(format!("{:16} {}", "radiance scale", header.radiance_scale));
     }

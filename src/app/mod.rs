@@ -1,6 +1,7 @@
 //! The command line: one file a subcommand. Results go to stdout, logs and progress to stderr.
 
 mod bake;
+mod bench;
 mod context;
 mod demo;
 mod devices;
@@ -36,6 +37,8 @@ enum Command {
     Bake(bake::Arguments),
     /// Show what is in an .sf file: header, one lookup, contact sheets
     Inspect(inspect::Arguments),
+    /// Measure error, time and stability and write tables and plots
+    Bench(bench::Arguments),
     /// List the Vulkan devices of this machine
     Devices(devices::Arguments),
 }
@@ -59,6 +62,7 @@ fn run(cli: &Cli) -> Result<()> {
         Command::Render(arguments) => render::run(&cli.global, arguments),
         Command::Bake(arguments) => bake::run(&cli.global, arguments),
         Command::Inspect(arguments) => inspect::run(&cli.global, arguments),
+        Command::Bench(arguments) => bench::run(&cli.global, arguments),
         Command::Devices(arguments) => devices::run(&cli.global, arguments),
     }
 }

@@ -87,7 +87,9 @@ pub fn teapot_lights() -> Result<Vec<Case>> {
         let radiance = half_angle_deg.to_radians().sin().powi(-2);
         format!(
             "[[entity]]\nmesh = \"bulb\"\nreceives = false\nscale = {scale}\nposition = [{}, {}, {}]\nemission = [{radiance}, {radiance}, {radiance}]",
-            at[0], at[1] + middle_y, at[2]
+            at[0],
+            at[1] + middle_y,
+            at[2]
         )
     };
     let lights = [

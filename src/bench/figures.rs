@@ -60,14 +60,15 @@ pub fn spread(values: &[f64]) -> Spread {
     Spread { lower: at(0.25), median: at(0.5), upper: at(0.75) }
 }
 
-/// Where a falling curve of (x, y) reaches `y`, straight in logarithms between its points and, beyond its ends, on from the
-/// nearest two; `None` with fewer than two points or where it does not fall.
+/// Where a falling curve of (x, y) comes down to `y`, straight in logarithms between its points and on beyond the last two. A
+/// curve that starts below `y` answers with its first x: there it is at least as good. `None` with fewer than two points
+/// or where it does not fall.
 pub fn crossing(curve: &[(f64, f64)], y: f64) -> Option<f64> {
     let logs: Vec<(f64, f64)> = curve.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
     let target = y.ln();
     let pair = logs.windows(2).find(|pair| pair[1].1 <= target).or(logs.windows(2).last())?;
     let slope = (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0);
-    (slope < 0.0).then(|| (pair[0].0 + (target - pair[0].1) / slope).exp())
+    (slope < 0.0).then(|| (pair[0].0 + (target - pair[0].1) / slope).exp().max(curve[0].0))
 }
 
 #[cfg(test)]
@@ -87,11 +88,12 @@ mod tests {
     fn quartiles_and_crossings() {
         assert_eq!(spread(&[4.0, 1.0, 3.0, 2.0, 5.0]), Spread { lower: 2.0, median: 3.0, upper: 4.0 });
         assert_eq!(spread(&[]), Spread::default());
-        // y = 1 / x, inside and beyond the ends.
+        // y = 1 / x, between points and beyond the last.
         let curve = [(1.0, 1.0), (10.0, 0.1), (100.0, 0.01)];
-        for y in [2.0, 0.5, 0.05, 0.001] {
+        for y in [0.5, 0.05, 0.001] {
             assert!((crossing(&curve, y).unwrap() * y - 1.0).abs() < 1e-12);
         }
+        assert_eq!(crossing(&curve, 2.0), Some(1.0), "already better at its first point");
         assert_eq!(crossing(&[(1.0, 1.0), (2.0, 1.0)], 0.5), None);
     }
 }

@@ -104,7 +104,12 @@ impl Plot {
         }
         for (i, dot) in self.dots.iter().enumerate() {
             let color = self.color(&dot.group);
-            text(x.at(dot.x) + 6.0, y.at(dot.y) - 5.0, &format!("fill=\"{color}\" font-size=\"10\""), &format!("{}", i + 1));
+            text(
+                x.at(dot.x) + 6.0,
+                y.at(dot.y) - 5.0,
+                &format!("fill=\"{color}\" font-size=\"10\""),
+                &format!("{}", i + 1),
+            );
             let legend = format!("{}  {}", i + 1, dot.label);
             text(RIGHT + 24.0, TOP + 15.0 * i as f64, &format!("fill=\"{color}\" font-size=\"11\""), &legend);
         }

@@ -43,7 +43,8 @@ pub struct Comparison {
     pub merge_error: Difference,
     /// The rival at rising numbers of rays.
     pub rival: Vec<RivalPoint>,
-    /// Wall time in which the rival has the merge's root mean square error, between or beyond its points, milliseconds.
+    /// Wall time in which the rival has the merge's root mean square error, milliseconds: between its points, beyond its last,
+    /// or at one ray where that is already better.
     pub rival_ms_at_equal_rms: Option<f64>,
     /// Rays at which it has it.
     pub rays_at_equal_rms: Option<f64>,
@@ -59,7 +60,7 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparis
     let placements = case.scene.at(case.time_s);
     let mut frame = bench.frame(&case.scene, default_options())?;
     let shapes = Shapes::new(&case.scene);
-    let rays: &[u32] = if bench.quick { &[16, 64, 256] } else { &[16, 64, 256, 1024, 4096] };
+    let rays: &[u32] = if bench.quick { &[1, 4, 16, 64, 256] } else { &[1, 4, 16, 64, 256, 1024, 4096] };
     let vertices = frame.receiver_vertex_count();
     let share = vertices as f64 / truth.vertices.len() as f64;
     let (mut walls, mut merges) = (Vec::new(), Vec::new());

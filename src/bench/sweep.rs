@@ -141,7 +141,7 @@ pub fn sweep(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variat
         let seconds = started.elapsed().as_secs_f64();
         (bench.progress)(&format!("{}: {} {} prepared in {seconds:.1} s", case.name, variation.axis, variation.name));
     }
-    let times = interleaved(&mut frames, &placements, if bench.quick { 9 } else { 25 })?;
+    let times = interleaved(&mut frames, &placements, if bench.quick { 15 } else { 31 })?;
     let mut points = Vec::new();
     for (index, (variation, frame)) in variations.iter().zip(&frames).enumerate() {
         let t3 = device_radiosity(frame, &truth.vertices)?;

@@ -1,0 +1,27 @@
+//! `shadow-fields bench`: the measurements behind the documentation's figures.
+
+mod time_error;
+
+use super::Global;
+use crate::error::Result;
+use clap::{Args, Subcommand};
+
+/// Arguments of `bench`.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// What a picture's error is made of, what run time buys, and ray casting beside the merge
+    TimeError(time_error::Arguments),
+}
+
+/// Runs a measurement.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    match &arguments.what {
+        What::TimeError(arguments) => time_error::run(global, arguments),
+    }
+}

@@ -1,0 +1,71 @@
+//! `shadow-fields bench time-error`
+
+use crate::app::context::Context;
+use crate::app::{Global, output};
+use crate::bench::{Bench, text::three, time_error};
+use crate::error::Result;
+use clap::Args;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Arguments of `bench time-error`.
+#[derive(Args)]
+pub struct Arguments {
+    /// A minute on two cores instead of a quarter of an hour: fewer scenes, settings and rays
+    #[arg(long)]
+    quick: bool,
+    /// Folder for budget.csv, sweep.csv, rival.csv, time-error.json, time-error.txt and plots
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Measures and prints the budget and the comparison.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let context = Context::new(global)?;
+    let started = Instant::now();
+    let show = |what: &str| {
+        if !global.no_progress {
+            output::note(global, format!("{:6.1} s  {what}", started.elapsed().as_secs_f64()));
+        }
+    };
+    let bench = Bench {
+        baker: &context.baker,
+        cache: &context.cache,
+        progress: &show,
+        quick: arguments.quick,
+        seed: global.seed,
+        origin: context.origin(global),
+    };
+    let outcome = time_error::run(&bench, &arguments.out)?;
+    if global.json {
+        output::say(serde_json::to_value(&outcome).expect("results are plain data").to_string());
+        return context.finish();
+    }
+    output::say("Relative RMS error over vertices, by cause (p99 and max of the total)");
+    let rows: Vec<Vec<String>> = outcome
+        .budgets
+        .iter()
+        .map(|b| {
+            let mut row = vec![b.case.clone()];
+            row.extend([b.bands.rms, b.sampling.rms, b.arithmetic_and_storage.rms, b.total.rms].map(three));
+            row.extend([b.total.p99, b.total.max, b.t0_error].map(three));
+            row
+        })
+        .collect();
+    output::table(&["scene", "bands", "sampling", "storage", "total", "p99", "max", "T0 error"], &rows);
+    output::say("\nFrame against ray casting with as many threads");
+    let rows: Vec<Vec<String>> = outcome
+        .comparisons
+        .iter()
+        .map(|c| {
+            let or_none = |x: Option<f64>| x.map_or("-".into(), three);
+            let mut row = vec![c.case.clone()];
+            row.extend([c.frame_wall_ms.median, c.merge_error.rms].map(three));
+            row.extend([c.rays_at_equal_rms, c.rival_ms_at_equal_rms, c.speed_up_at_equal_rms].map(or_none));
+            row
+        })
+        .collect();
+    output::table(&["scene", "frame ms", "error", "rays", "rays ms", "times faster"], &rows);
+    output::say(format!("\n{}: {} settings measured", arguments.out.display(), outcome.points.len()));
+    context.finish()
+}

@@ -64,6 +64,7 @@ impl Cache {
             match ShadowField::read(path) {
                 Ok(found) if identity(&found.header) == identity(header) => {
                     header.filled_samples = found.header.filled_samples;
+                    header.growth = found.header.growth;
                     store.fill(offset_bytes, &found.payload)?;
                     return Ok(None);
                 }

@@ -15,7 +15,7 @@ use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
 use crate::field::quantity::{Kind, Storage, channel_stride};
-use crate::field::{Header, Lattice};
+use crate::field::{Header, Lattice, ShadowField, growth};
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
@@ -124,6 +124,7 @@ pub fn header(mesh: &Mesh, kind: Kind, options: &Options) -> Header {
         lattice: options.lattice.starting_at(first),
         face_px: options.face_px,
         filled_samples: 0,
+        growth: 0.0,
         centre_m: centre.to_array(),
         radius_m,
         radiance_scale: if kind == Kind::Radiance && mesh.colors.is_some() { brightest } else { 1.0 },
@@ -200,6 +201,10 @@ impl Baker {
             assemble.record(commands, inputs, (store, range), (lattice.stored_count(), quads), factor)
         })?;
         report.add(&commands.submit()?);
+        if header.kind == Kind::Occlusion {
+            let payload = store.download_range(offset_bytes..offset_bytes + header.payload_bytes())?;
+            header.growth = growth::growth(&ShadowField { header: header.clone(), payload });
+        }
         report.total = started.elapsed();
         Ok(report)
     }

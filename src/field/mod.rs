@@ -1,6 +1,7 @@
 //! A baked field: where it is sampled ([`lattice`]), what is stored, and its file ([`file`]).
 
 pub mod file;
+pub mod growth;
 pub mod lattice;
 pub mod quantity;
 
@@ -28,6 +29,9 @@ pub struct Header {
     pub face_px: u32,
     /// Samples that lay inside the solid and were filled from their neighbours.
     pub filled_samples: u32,
+    /// Occlusion fields: what one product may lengthen a transfer vector by at most (see [`growth`]), from the stored numbers;
+    /// 0 before the bake, and in radiance fields, which are not multiplied.
+    pub growth: f64,
     /// Centre of the bounding sphere in the mesh's own frame, metres.
     pub centre_m: [f32; 3],
     /// Radius of the bounding sphere, metres.

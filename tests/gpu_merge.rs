@@ -1,0 +1,284 @@
+//! The merge on the device against its twin in f64, which reads the same stored numbers; and the barriers of a frame.
+
+mod common;
+#[path = "common/stage.rs"]
+mod stage;
+
+use common::report;
+use shadow_fields::asset::embedded;
+use shadow_fields::asset::generate::Generator;
+use shadow_fields::field::{Lookup, Storage};
+use shadow_fields::frame::{Frame, Options};
+use shadow_fields::render::variant::VARIANTS;
+use shadow_fields::scene::{Placement, Scene};
+use stage::{Stage, scene, small, stage};
+use std::path::Path;
+
+/// Differences of f32 arithmetic between device and twin: some 20 products and rotations of numbers around the brightest
+/// radiosity, each off by 6e-8 of it. The stored numbers are the same in both, f16 or not.
+const ARITHMETIC: f64 = 1e-5;
+
+/// Largest difference between device and twin, as a share of 1 + the scene's brightest radiosity, and the share of vertices
+/// that are off by more than [`ARITHMETIC`].
+fn against_twin(frame: &mut Frame, placements: &[Placement]) -> (f64, f64) {
+    frame.render(placements, None).unwrap();
+    let reference = frame.reference(placements).unwrap();
+    assert!(!reference.is_empty());
+    let (mut worst, mut off, mut count) = (0.0_f64, 0, 0);
+    let brightest = reference.iter().flat_map(|(_, v)| v.iter().flatten()).fold(0.0_f64, |m, b| m.max(b.abs()));
+    assert!(brightest > 0.01, "the scene is dark: nothing is tested");
+    for (entity, expected) in &reference {
+        let found = frame.radiosity(*entity).unwrap();
+        assert_eq!(found.len(), expected.len());
+        for (found, expected) in found.iter().zip(expected) {
+            let error = (0..3).map(|c| (f64::from(found[c]) - expected[c]).abs()).fold(0.0, f64::max);
+            assert!(error.is_finite());
+            worst = worst.max(error / (1.0 + brightest));
+            off += usize::from(error > ARITHMETIC * (1.0 + brightest));
+            count += 1;
+        }
+    }
+    (worst, off as f64 / f64::from(count))
+}
+
+fn agrees_within(tolerance: f64, what: &str, frame: &mut Frame, placements: &[Placement]) {
+    let (worst, _) = against_twin(frame, placements);
+    report(&format!("{what}: {worst:.1e}"));
+    assert!(worst < tolerance, "{what}: {worst:e} of the brightest radiosity");
+}
+
+fn agrees(what: &str, frame: &mut Frame, placements: &[Placement]) {
+    agrees_within(ARITHMETIC, what, frame, placements);
+}
+
+/// A built-in scene, its floor made coarse.
+fn built_in(name: &str, text: &str) -> Scene {
+    let path = format!("assets/scenes/{name}.toml");
+    let mut scene = Scene::parse(text, Path::new(&path), &embedded::read).unwrap();
+    for mesh in &mut scene.data.meshes {
+        if let Some(Generator::Plane { cells, .. }) = &mut mesh.generator {
+            *cells = 24;
+        }
+    }
+    Scene::parse(&scene.data.to_toml(), Path::new(&path), &embedded::read).unwrap()
+}
+
+#[test]
+fn built_in_scenes() {
+    let Some(stage) = stage() else { return };
+    let scenes = embedded::scenes();
+    assert_eq!(scenes.len(), 5);
+    for (name, text) in scenes {
+        let scene = built_in(name, text);
+        let options =
+            Options { bake: shadow_fields::bake::Options { storage: Storage::F16, ..small().bake }, ..small() };
+        let mut frame = stage.frame(&scene, options);
+        for time_s in [0.0, 1.7] {
+            agrees(&format!("{name} at {time_s} s"), &mut frame, &scene.at(time_s));
+        }
+    }
+}
+
+/// A floor, a ball that is lit and shades itself with a ring, two lights of which one has colours of its own, and a sky.
+/// Positions are odd, so that no vertex lies on a border between samples.
+const MIXED: &str = r#"
+environment = { uniform = [0.1, 0.12, 0.2], key = { radiance = [2, 1.5, 1], toward = [1, 2, 0.5], sharpness = 3 } }
+[[mesh]]
+name = "floor"
+plane = { size_m = 7, cells = 20 }
+[[mesh]]
+name = "ball"
+sphere = { radius_m = 0.5, subdivisions = 2 }
+[[mesh]]
+name = "ring"
+torus = { major_m = 0.5, minor_m = 0.2, segments = 16, sides = 8 }
+[[mesh]]
+name = "glow"
+torus_two_colour = { major_m = 0.4, minor_m = 0.1, segments = 16, sides = 8 }
+[[entity]]
+mesh = "floor"
+[[entity]]
+mesh = "ball"
+position = [-0.713, 0.667, 0.119]
+[[entity]]
+mesh = "ring"
+position = [0.613, 0.871, -0.379]
+rotation = { axis = [1, 0.3, -0.4], angle_deg = 67 }
+scale = 0.8
+[[entity]]
+mesh = "glow"
+position = [0.177, 1.731, 0.913]
+rotation = { axis = [0.2, 0.9, 0.5], angle_deg = 41 }
+emission = [5, 6, 7]
+[[entity]]
+mesh = "ball"
+position = [1.513, 2.177, 0.691]
+scale = 0.4
+emission = [20, 15, 10]
+"#;
+
+#[test]
+fn variants_lookups_lattices_and_bands() {
+    let Some(stage) = stage() else { return };
+    let scene = scene(MIXED);
+    let placements = scene.at(0.0);
+    let base = small();
+    let mut first: Option<Vec<Vec<[f32; 3]>>> = None;
+    for &variant in VARIANTS {
+        let mut frame = stage.frame(&scene, Options { variant: Some(variant), ..base });
+        assert_eq!(frame.variant, variant, "the scene is small enough for each");
+        agrees(variant.name, &mut frame, &placements);
+        let light = stage.light(&mut frame, &placements);
+        for (a, b) in light.iter().zip(first.get_or_insert_with(|| light.clone())) {
+            let (worst, brightest) = stage::difference(a, b);
+            // The same operations, perhaps fused otherwise.
+            assert!(worst <= 2e-6 * (1.0 + brightest), "{}: {worst:e} from the first variant", variant.name);
+        }
+    }
+    for lookup in [Lookup::Nearest, Lookup::Radial] {
+        let mut frame = stage.frame(&scene, Options { lookup, ..base });
+        let (worst, off) = against_twin(&mut frame, &placements);
+        report(&format!("{lookup:?}: {worst:.1e}, {:.2} % of vertices beyond {ARITHMETIC:e}", 1e2 * off));
+        // Rounding decides which sample is nearest where two are equally near: there the whole step between them shows.
+        assert!(off < 2e-3, "{lookup:?}: {off} of the vertices differ");
+    }
+    let lattices = ["latlon:5x4x6", "latlon:4x1x3,linear,raw", "cube:5x3,log,raw,inner=0.5,outer=5", "cube:1x1"];
+    for lattice in lattices {
+        let bake = shadow_fields::bake::Options { lattice: lattice.parse().unwrap(), ..base.bake };
+        let mut frame = stage.frame(&scene, Options { bake, ..base });
+        // Vulkan lets a device be off by 4096 units in the last place in atan and acos: 2.4e-4 of an angle.
+        let tolerance = if lattice.starts_with("latlon") { 3e-4 } else { ARITHMETIC };
+        agrees_within(tolerance, lattice, &mut frame, &placements);
+    }
+    for bands in [2, 3, 5] {
+        let bake = shadow_fields::bake::Options { bands, ..base.bake };
+        agrees(&format!("{bands} bands"), &mut stage.frame(&scene, Options { bake, ..base }), &placements);
+    }
+}
+
+const FLOOR_AND_BALL: &str = r#"
+[[mesh]]
+name = "floor"
+plane = { size_m = 4, cells = 20 }
+[[mesh]]
+name = "ball"
+sphere = { radius_m = 0.5, subdivisions = 2 }
+[[entity]]
+mesh = "floor"
+"#;
+
+/// Six lights around a ball: two dispatches a receiver.
+fn six_lights() -> Scene {
+    let mut text = format!("environment = {{ uniform = [0.1, 0.2, 0.3] }}\n{FLOOR_AND_BALL}");
+    text += "[[entity]]\nmesh = \"ball\"\nposition = [0.113, 0.817, 0.029]\n";
+    for i in 0..6 {
+        let (z, x) = (f64::from(i) * 1.1).sin_cos();
+        let emission = [8 * (i % 3), 3 + i, 9 - i];
+        text += &format!(
+            "[[entity]]\nmesh = \"ball\"\nscale = 0.3\nposition = [{}, {}, {}]\nemission = {emission:?}\n",
+            1.6 * x,
+            1.3 + 0.1 * f64::from(i),
+            1.6 * z
+        );
+    }
+    scene(&text)
+}
+
+#[test]
+fn more_lights_than_one_dispatch_takes() {
+    let Some(stage) = stage() else { return };
+    let scene = six_lights();
+    let mut frame = stage.frame(&scene, small());
+    let placements = scene.at(0.0);
+    agrees("six lights", &mut frame, &placements);
+    let once = stage.light(&mut frame, &placements);
+    assert_eq!(once, stage.light(&mut frame, &placements), "a frame leaves nothing to the next");
+}
+
+#[test]
+fn emitters_that_occlude_and_receive() {
+    let Some(stage) = stage() else { return };
+    let entity = |more: &str| format!("[[entity]]\nmesh = \"ball\"\n{more}\n");
+    let two = |switches: &str| {
+        let lit = entity(&format!("position = [-0.617, 0.731, 0.113]\nemission = [9, 7, 5]\n{switches}"));
+        let far = entity("position = [1.3, 2.1, 0.2]\nscale = 0.5\nemission = [30, 40, 60]");
+        scene(&format!("{FLOOR_AND_BALL}{lit}{far}"))
+    };
+    let (shining, blocking) = (two(""), two("occludes = true"));
+    let placements = blocking.at(0.0);
+    let mut frame = stage.frame(&blocking, small());
+    agrees("emitter that occludes", &mut frame, &placements);
+    let blocked = stage.light(&mut frame, &placements);
+    let open = stage.light(&mut stage.frame(&shining, small()), &placements);
+    let sum = |light: &[[f32; 3]]| light.iter().map(|v| v[2]).sum::<f32>();
+    assert!(sum(&blocked[0]) < 0.98 * sum(&open[0]), "it takes the other light's place on the floor");
+    assert_eq!(blocked[1], open[1], "it does not shade itself: the other light still falls on it");
+    assert!(sum(&open[1]) > 0.0 && sum(&open[2]) > 0.0, "lights are lit by each other");
+
+    let alone = scene(&format!("{FLOOR_AND_BALL}{}", entity("position = [0, 0.9, 0]\nemission = [9, 7, 5]")));
+    let light = stage.light(&mut stage.frame(&alone, small()), &alone.at(0.0));
+    assert!(light[1].iter().flatten().all(|b| *b == 0.0), "nothing is lit by its own light");
+    assert!(sum(&light[0]) > 0.0);
+}
+
+/// On the line x = 0 of the floor, a light and its mirror image, an occluder, are equally far, bit for bit: their order in
+/// the file decides whether the occluder counts.
+#[test]
+fn ties_go_by_index() {
+    let Some(stage) = stage() else { return };
+    let light = "[[entity]]\nmesh = \"ball\"\nposition = [0.55, 0.75, 0]\nemission = [9, 7, 5]\n";
+    let block = "[[entity]]\nmesh = \"ball\"\nposition = [-0.55, 0.75, 0]\n";
+    let line = |text: &str| {
+        let scene = scene(&format!("{FLOOR_AND_BALL}{text}"));
+        let mut frame = stage.frame(&scene, small());
+        agrees("tie", &mut frame, &scene.at(0.0));
+        let floor = stage.light(&mut frame, &scene.at(0.0)).swap_remove(0);
+        let positions = &scene.meshes[0].positions;
+        let on_line: Vec<_> = (0..floor.len()).filter(|&v| positions[v].x == 0.0).map(|v| floor[v]).collect();
+        assert_eq!(on_line.len(), 21);
+        on_line
+    };
+    let (before, after) = (line(&format!("{block}{light}")), line(&format!("{light}{block}")));
+    let alone = line(light);
+    assert_eq!(after, alone, "an occluder behind the light changes nothing");
+    let (worst, _) = stage::difference(&before, &alone);
+    assert!(worst > 1e-3, "an occluder before the light counts: {worst:e}");
+    // Two occluders equally far: swapping them changes the order of two products that commute but for truncation.
+    let again = line(&format!("{block}{light}{block}"));
+    assert_eq!(again, before, "of two equal occluders the one behind the light changes nothing");
+}
+
+/// Every barrier of a frame is needed: left out, the frame is refused with pass and resource named, and nothing runs.
+#[test]
+fn every_barrier_is_needed() {
+    let Some(stage) = stage() else { return };
+    let scene = six_lights();
+    let mut frame = stage.frame(&scene, small());
+    let (rest, mut moved) = (scene.at(0.0), scene.at(0.0));
+    moved.iter_mut().for_each(|p| p.position.x += 0.3);
+    frame.render(&rest, Some(1.0)).unwrap();
+    let (light, picture) = (frame.radiosity(0).unwrap(), frame.picture());
+    let refused = |frame: &mut Frame, stage: &Stage, index: usize| {
+        stage.gpu.device.omit_barrier(Some(index));
+        let outcome = frame.render(&moved, Some(1.0));
+        stage.gpu.device.omit_barrier(None);
+        // The layer hears most of these while they are recorded, but not a dispatch after a dispatch on one buffer.
+        let heard = stage.gpu.device.take_validation_messages().len();
+        report(&format!("without barrier {index}: {heard} messages of the layer"));
+        outcome.err().map(|error| error.to_string())
+    };
+    let expected = [
+        ("radiosity", "pass merge and pass merge"),
+        ("radiosity", "pass merge and pass draw"),
+        ("picture", "pass draw and pass read back"),
+        ("readback", "pass read back and pass host"),
+    ];
+    for (index, (resource, passes)) in expected.into_iter().enumerate() {
+        let message = refused(&mut frame, &stage, index).unwrap_or_else(|| panic!("barrier {index} is not missed"));
+        assert!(message.contains(resource) && message.contains(passes), "barrier {index}: {message}");
+        assert_eq!(frame.radiosity(0).unwrap(), light, "nothing was submitted");
+        assert_eq!(frame.picture(), picture, "nothing was submitted");
+    }
+    assert_eq!(refused(&mut frame, &stage, expected.len()), None, "there are no more barriers than these");
+    assert_ne!(frame.radiosity(0).unwrap(), light, "with all barriers it runs");
+}

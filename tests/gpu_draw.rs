@@ -1,0 +1,163 @@
+//! Pictures: what stands where, what hides what, and in which colour.
+
+mod common;
+#[path = "common/stage.rs"]
+mod stage;
+
+use common::report;
+use shadow_fields::frame::Options;
+use shadow_fields::scene::{Placement, Scene};
+use stage::{at, scene, small, stage};
+
+const WIDTH: usize = 96;
+const HEIGHT: usize = 64;
+
+fn options(multisample: bool) -> Options {
+    Options { size: [WIDTH as u32, HEIGHT as u32], multisample, ..small() }
+}
+
+/// Balls of radius .4 m that shine and are not lit, seen from z = 5 m along -z.
+fn balls(environment: &str, emissions: &[[f32; 3]]) -> Scene {
+    let mut text =
+        format!("{environment}\n[[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.4, subdivisions = 3 }}\n");
+    for emission in emissions {
+        text += &format!("[[entity]]\nmesh = \"ball\"\nreceives = false\nemission = {emission:?}\n");
+    }
+    scene(&text)
+}
+
+type Picture = Vec<[f32; 3]>;
+
+fn draw(stage: &stage::Stage, scene: &Scene, places: &[[f32; 3]], multisample: bool, white: f32) -> Picture {
+    let placements: Vec<_> = places.iter().map(|&[x, y, z]| at(x, y, z)).collect();
+    let mut frame = stage.frame(scene, options(multisample));
+    frame.render(&placements, Some(white)).unwrap();
+    let picture = frame.picture();
+    assert_eq!(picture.len(), 3 * WIDTH * HEIGHT);
+    picture.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
+}
+
+/// Middle of what has a channel, in pixels from the left and the top, and its area in pixels.
+fn middle(picture: &Picture, channel: usize) -> [f32; 3] {
+    let mut sum = [0.0; 3];
+    for (i, pixel) in picture.iter().enumerate() {
+        let weight = pixel[channel];
+        let place = [(i % WIDTH) as f32 + 0.5, (i / WIDTH) as f32 + 0.5, 1.0];
+        (0..3).for_each(|k| sum[k] += weight * place[k]);
+    }
+    [sum[0] / sum[2], sum[1] / sum[2], sum[2]]
+}
+
+const RED: [f32; 3] = [1.0, 0.0, 0.0];
+const BLUE: [f32; 3] = [0.0, 0.0, 1.0];
+
+#[test]
+fn things_stand_where_they_should() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("", &[RED]);
+    // 40 degrees over 64 pixels at 5 m: 17.58 pixels a metre.
+    let px_per_m = HEIGHT as f32 / (2.0 * 5.0 * 20_f32.to_radians().tan());
+    let see = |place| middle(&draw(&stage, &scene, &[place], true, 1.0), 0);
+    for (place, x, y) in [
+        ([0.0, 0.0, 0.0], 0.0, 0.0),
+        ([1.0, 0.0, 0.0], 1.0, 0.0),
+        ([0.0, 1.0, 0.0], 0.0, -1.0),
+        ([-1.5, -0.8, 0.0], -1.5, 0.8),
+    ] {
+        let [found_x, found_y, area] = see(place);
+        let expected = [WIDTH as f32 / 2.0 + px_per_m * x, HEIGHT as f32 / 2.0 + px_per_m * y];
+        report(&format!("{place:?}: at {found_x:.2}, {found_y:.2} for {expected:?}, {area:.1} pixels"));
+        // A sphere off the axis is seen as an ellipse whose middle lies a little further out.
+        let tolerance = 0.1 + 0.25 * (x * x + y * y);
+        assert!((found_x - expected[0]).abs() < tolerance && (found_y - expected[1]).abs() < tolerance);
+        let disc = std::f32::consts::PI * (0.4 * px_per_m).powi(2);
+        assert!((area / disc - 1.0).abs() < 0.08, "{area} of {disc} pixels");
+    }
+    let larger = see([0.0, 0.0, 2.5])[2] / see([0.0, 0.0, 0.0])[2];
+    assert!((3.6..4.4).contains(&larger), "half as far, four times the area: {larger}");
+}
+
+#[test]
+fn nearer_hides_farther() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("", &[RED, BLUE]);
+    let centre = WIDTH / 2 + HEIGHT / 2 * WIDTH;
+    for (places, front) in [([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], RED), ([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], BLUE)] {
+        let picture = draw(&stage, &scene, &places, true, 1.0);
+        assert_eq!(picture[centre], front, "places {places:?}");
+        let back = if front == RED { 2 } else { 0 };
+        assert_eq!(middle(&picture, back)[2].max(0.0), 0.0, "the nearer ball covers the farther one");
+    }
+    // Large balls 300 m away, 1 cm one behind the other: reversed depth in f32 tells them apart.
+    let mut frame = stage.frame(&scene, options(true));
+    let far = |z| Placement { scale: 40.0, ..at(0.0, 0.0, z) };
+    for (placements, front) in [([far(-300.0), far(-300.01)], RED), ([far(-300.01), far(-300.0)], BLUE)] {
+        frame.render(&placements, Some(1.0)).unwrap();
+        assert_eq!(frame.picture()[3 * centre..][..3], front);
+    }
+    let behind = draw(&stage, &scene, &[[0.0, 0.0, 7.0], [0.0, 0.0, 6.0]], true, 1.0);
+    assert!(behind.iter().flatten().all(|c| *c == 0.0), "what is behind the camera is not seen");
+}
+
+#[test]
+fn background_is_the_mean_of_the_sky() {
+    let Some(stage) = stage() else { return };
+    // The gradient's mean: base .2 + rise .8 / 4.
+    let sky = "environment = { uniform = [0.1, 0.2, 0.3], gradient = { radiance = [1, 0.5, 0] } }";
+    let picture = draw(&stage, &balls(sky, &[RED]), &[[0.0, 0.0, 0.0]], true, 1.0);
+    for corner in [0, WIDTH - 1, WIDTH * (HEIGHT - 1), WIDTH * HEIGHT - 1] {
+        for (found, expected) in picture[corner].iter().zip([0.5, 0.4, 0.3]) {
+            // Half floats: 11 bits.
+            assert!((found - expected).abs() < 1e-3, "{:?}", picture[corner]);
+        }
+    }
+}
+
+#[test]
+fn edges_are_smooth_with_samples_only() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("", &[[1.0, 1.0, 1.0]]);
+    let between = |multisample| {
+        let picture = draw(&stage, &scene, &[[0.0, 0.0, 0.0]], multisample, 1.0);
+        // Rounded: interpolated vertex attributes and half floats are off by 5e-4.
+        let mut levels: Vec<i32> = picture.iter().map(|p| (400.0 * p[0]).round() as i32).collect();
+        levels.sort_unstable();
+        levels.dedup();
+        levels
+    };
+    assert_eq!(between(false), [0, 400]);
+    assert_eq!(between(true), [0, 100, 200, 300, 400], "quarters, from four samples a pixel");
+}
+
+#[test]
+fn white_keeps_hue() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("", &[[8.0, 4.0, 2.0], [0.25, 0.5, 0.125]]);
+    let places = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
+    let centre = |picture: &Picture, x: f32| picture[(48.0 + 17.58 * x) as usize + HEIGHT / 2 * WIDTH];
+    for (white, bright) in [(1.0, [1.0, 0.5, 0.25]), (4.0, [4.0, 2.0, 1.0]), (f32::INFINITY, [8.0, 4.0, 2.0])] {
+        let picture = draw(&stage, &scene, &places, true, white);
+        for (x, expected) in [(-1.0, bright), (1.0, [0.25, 0.5, 0.125])] {
+            let found = centre(&picture, x);
+            // Two half-float steps.
+            let near = found.iter().zip(expected).all(|(f, e)| (f - e).abs() <= 2e-3 * e);
+            assert!(near, "white {white}: {found:?} for {expected:?}");
+        }
+    }
+}
+
+/// Drawn radiance is emission plus radiosity: a floor under a white sky is as bright as its albedo.
+#[test]
+fn lit_surfaces_have_their_radiosity() {
+    let Some(stage) = stage() else { return };
+    let text = "environment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"wall\"\nplane = { size_m = 9, cells = 3 }\n\
+        [[entity]]\nmesh = \"wall\"\nalbedo = [0.25, 0.5, 0.75]\nemission = [0.5, 0, 0]\nemits = false\n\
+        rotation = { axis = [1, 0, 0], angle_deg = 90 }\n";
+    let scene = scene(text);
+    let mut frame = stage.frame(&scene, options(true));
+    frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
+    let picture = frame.picture();
+    for (found, expected) in picture.chunks_exact(3).flatten().zip([0.75_f32, 0.5, 0.75].iter().cycle()) {
+        assert!((found - expected).abs() < 1e-3, "{found} for {expected}");
+    }
+}

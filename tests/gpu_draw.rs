@@ -93,7 +93,8 @@ fn nearer_hides_farther() {
     let far = |z| Placement { scale: 40.0, ..at(0.0, 0.0, z) };
     for (placements, front) in [([far(-300.0), far(-300.01)], RED), ([far(-300.01), far(-300.0)], BLUE)] {
         frame.render(&placements, Some(1.0)).unwrap();
-        assert_eq!(frame.picture()[3 * centre..][..3], front);
+        let found = frame.picture()[3 * centre..][..3].iter().map(|c| c.round()).collect::<Vec<_>>();
+        assert_eq!(found, front);
     }
     let behind = draw(&stage, &scene, &[[0.0, 0.0, 7.0], [0.0, 0.0, 6.0]], true, 1.0);
     assert!(behind.iter().flatten().all(|c| *c == 0.0), "what is behind the camera is not seen");

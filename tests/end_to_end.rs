@@ -1,0 +1,318 @@
+//! The program as a user runs it: what it writes, where, and that it is what it should be.
+
+#[path = "common/cli.rs"]
+mod cli;
+mod common;
+
+use cli::{SMALL, cache, command, finish, good, has_device, names};
+use serde_json::Value;
+use std::path::Path;
+
+const SCENE: &str = "assets/scenes/sphere_over_plane.toml";
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("no JSON ({error}): {text}"))
+}
+
+fn read(folder: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// A PNG of a size that is not of one colour.
+fn picture(folder: &Path, name: &str, [width, height]: [u32; 2]) -> image::RgbImage {
+    let picture = image::load_from_memory(&read(folder, name)).unwrap().into_rgb8();
+    assert_eq!(picture.dimensions(), (width, height), "{name}");
+    let levels: std::collections::HashSet<_> = picture.pixels().map(|p| p.0).collect();
+    assert!(levels.len() > 50, "{name}: flat");
+    picture
+}
+
+fn small<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
+    [arguments, &SMALL].concat()
+}
+
+#[test]
+fn render_writes_what_it_is_asked_for() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let files = ["-o", "p.png", "--exr", "p.exr", "--vertices", "v.csv", "--stats", "s.json", "--variant", "storage"];
+    let arguments = small(&[&["render", SCENE, "--seed", "7"], &files[..]].concat());
+    let ran = good(folder, &arguments);
+    assert_eq!(names(folder), ["p.exr", "p.png", "s.json", "v.csv"]);
+    assert_eq!(ran.stdout.lines().count(), 1, "{}", ran.stdout);
+
+    // The PNG is the EXR in sRGB, except where a sample of the pixel is brighter than white: near what is.
+    let png = picture(folder, "p.png", [96, 64]);
+    let exr = image::load_from_memory(&read(folder, "p.exr")).unwrap().into_rgb32f();
+    assert_eq!(exr.dimensions(), (96, 64));
+    let brightest = exr.pixels().flat_map(|p| p.0).fold(0.0_f32, f32::max);
+    assert!((100.0..200.0).contains(&brightest), "the light itself is seen, unclamped: {brightest}");
+    let (mut same, mut clamped) = (0, 0);
+    for (x, y, p) in png.enumerate_pixels() {
+        let linear = exr.get_pixel(x, y).0;
+        let around = (y.saturating_sub(1)..(y + 2).min(64))
+            .flat_map(|y| (x.saturating_sub(1)..(x + 2).min(96)).map(move |x| (x, y)));
+        if around.flat_map(|(x, y)| exr.get_pixel(x, y).0).all(|c| c < 0.95) {
+            for (shown, linear) in p.0.iter().zip(linear) {
+                let srgb =
+                    255.0 * if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+                assert!((f32::from(*shown) - srgb).abs() <= 1.0, "pixel {x}, {y}: {shown} for {srgb}");
+            }
+            same += 1;
+        } else {
+            clamped += 1;
+        }
+    }
+    assert!(same > 5000 && clamped > 5, "{same} pixels below white, {clamped} not");
+
+    let text = String::from_utf8(read(folder, "v.csv")).unwrap();
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("entity,x,y,z,nx,ny,nz,r,g,b"));
+    let rows: Vec<(&str, Vec<f32>)> = lines
+        .map(|line| {
+            let (entity, numbers) = line.split_once(',').unwrap();
+            (entity, numbers.split(',').map(|n| n.parse().unwrap()).collect())
+        })
+        .collect();
+    assert!(rows.iter().all(|(_, n)| n.len() == 9 && n.iter().all(|n| n.is_finite())));
+    let count = |name| rows.iter().filter(|(entity, _)| *entity == name).count();
+    assert_eq!([count("floor"), count("ball"), count("light")], [65 * 65, 2562, 2562]);
+    for (entity, n) in &rows {
+        let ball = [n[0] + 0.2, n[1] - 0.65, n[2]];
+        match *entity {
+            "floor" => assert!(n[1] == 0.0 && n[4] == 1.0, "{n:?}"),
+            "ball" => assert!((ball.iter().map(|c| c * c).sum::<f32>().sqrt() - 0.5).abs() < 1e-4, "{n:?}"),
+            _ => assert!(n[1] > 1.8, "{n:?}"),
+        }
+    }
+
+    let stats = json(&String::from_utf8(read(folder, "s.json")).unwrap());
+    let origin = &stats["origin"];
+    for key in ["program", "revision", "device", "driver", "vulkan"] {
+        assert!(origin[key].as_str().is_some_and(|s| !s.is_empty()), "{key}: {origin}");
+    }
+    assert_eq!(origin["seed"], 7);
+    assert_eq!(stats["variant"], "storage");
+    assert_eq!(stats["receiver_vertices"], rows.len());
+    assert_eq!(stats["options"]["lattice"], "cube:4x3,chord,scaled,outer=8");
+    assert_eq!(stats["options"]["size"], serde_json::json!([96, 64]));
+    let passes = &stats["frames"][0]["passes"];
+    for pass in ["merge_ms", "draw_ms", "read_back_ms"] {
+        assert!(passes[pass].as_f64().is_some_and(|ms| ms > 0.0), "{pass}: {passes}");
+    }
+
+    // Again: the same bytes, and everything is found in the cache.
+    let first: Vec<_> = ["p.png", "p.exr", "v.csv"].iter().map(|name| read(folder, name)).collect();
+    good(folder, &arguments);
+    let second: Vec<_> = ["p.png", "p.exr", "v.csv"].iter().map(|name| read(folder, name)).collect();
+    assert!(first == second, "the same command gives the same bytes");
+    let stats = json(&String::from_utf8(read(folder, "s.json")).unwrap());
+    assert_eq!(stats["baked"], serde_json::json!([]), "a second run bakes nothing");
+}
+
+#[test]
+fn animations_are_one_file_or_numbered() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let render = |output| small(&["render", SCENE, "--frames", "3", "--fps", "4", "-o", output, "--json"]);
+    let ran = good(folder, &render("n_##.png"));
+    assert_eq!(names(folder), ["n_00.png", "n_01.png", "n_02.png"]);
+    assert_eq!(json(&ran.stdout)["frames"].as_array().unwrap().len(), 3);
+    good(folder, &render("a.png"));
+    let frames: Vec<_> = names(folder)[1..].iter().map(|name| picture(folder, name, [96, 64])).collect();
+    assert!(frames[0] != frames[1] && frames[1] != frames[2], "the light moves");
+    let apng = image::codecs::png::PngDecoder::new(std::io::Cursor::new(read(folder, "a.png"))).unwrap();
+    assert!(apng.is_apng().unwrap());
+    let animated: Vec<_> = image::AnimationDecoder::into_frames(apng.apng().unwrap()).map(Result::unwrap).collect();
+    assert_eq!(animated.len(), 3);
+    for (animated, numbered) in animated.iter().zip(&frames) {
+        assert_eq!(animated.delay().numer_denom_ms().0 / animated.delay().numer_denom_ms().1, 250);
+        let rgb = image::DynamicImage::from(animated.buffer().clone()).into_rgb8();
+        assert!(rgb == *numbered, "the same frame in both");
+    }
+}
+
+/// Three bands of the cap that a sphere of radius 1 blocks: DESIGN's closed form, written out.
+fn cap(distance: f64, [x, y, z]: [f64; 3]) -> [f64; 9] {
+    let pi = std::f64::consts::PI;
+    let c = (1.0 - distance.powi(-2)).sqrt();
+    let z_l = [pi.sqrt() * (1.0 - c), (0.75 * pi).sqrt() * (1.0 - c * c), (1.25 * pi).sqrt() * (c - c * c * c)];
+    let basis = [
+        [0.282_094_8, 0.0, 0.0, 0.0, 0.0],
+        [-0.488_602_5 * y, 0.488_602_5 * z, -0.488_602_5 * x, 0.0, 0.0],
+        [
+            1.092_548_4 * x * y,
+            -1.092_548_4 * y * z,
+            0.315_391_6 * (3.0 * z * z - 1.0),
+            -1.092_548_4 * x * z,
+            0.546_274_2 * (x * x - y * y),
+        ],
+    ];
+    let mut out = [0.0; 9];
+    for l in 0..3 {
+        for m in 0..=2 * l {
+            out[l * l + m] = (4.0 * pi / (2.0 * l as f64 + 1.0)).sqrt() * z_l[l] * basis[l][m];
+        }
+    }
+    out
+}
+
+#[test]
+fn bake_and_inspect_a_sphere() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mesh = shadow_fields::asset::generate::sphere(0.5, 3);
+    std::fs::write(folder.join("ball.obj"), shadow_fields::asset::obj::write_obj(&mesh)).unwrap();
+    let bake = ["bake", "ball.obj", "-o", "f.sf", "--lattice", "cube:12x6", "--face-px", "32"];
+    let ran = good(folder, &bake);
+    assert!(ran.stdout.starts_with("f.sf: 2592 samples"), "{}", ran.stdout);
+    let first = read(folder, "f.sf");
+    good(folder, &bake);
+    assert_eq!(first, read(folder, "f.sf"), "the same command gives the same bytes");
+
+    // Seen from P, the ball lies towards -P.
+    let at = [0.9, -0.7, 1.1];
+    let ran = good(folder, &["inspect", "f.sf", "--json", "--at", "0.9,-0.7,1.1"]);
+    let result = json(&ran.stdout);
+    assert_eq!(result["at"]["position_m"], serde_json::json!(at));
+    assert_eq!(result["header"]["kind"], "occlusion");
+    assert_eq!(ran.stderr, "", "no device is opened");
+    let blocked: Vec<f64> = result["at"]["blocked"].as_array().unwrap().iter().map(|c| c.as_f64().unwrap()).collect();
+    assert_eq!(blocked.len(), 16);
+    let distance = at.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let expected = cap(distance / 0.5, at.map(|c| -c / distance));
+    let norm = expected.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let error = expected.iter().zip(&blocked).map(|(e, b)| (e - b).powi(2)).sum::<f64>().sqrt() / norm;
+    // Faces of 32 px and shells in coarse steps: some percent of the blocked part.
+    assert!(error < 0.05, "{error} of the blocked part: {blocked:?} for {expected:?}");
+    let text = good(folder, &["inspect", "f.sf"]).stdout;
+    for word in ["kind", "occlusion", "ball", "radius 0.5", "cube:12x6", "f16", "32 x 32"] {
+        assert!(text.contains(word), "no {word} in {text}");
+    }
+
+    good(folder, &["inspect", "f.sf", "--faces", "plain.png"]);
+    good(folder, &["inspect", "f.sf", "--faces", "pair.png", "--mesh", "ball.obj"]);
+    let [plain, pair] = ["plain.png", "pair.png"].map(|name| image::load_from_memory(&read(folder, name)).unwrap());
+    assert!(pair.width() > plain.width() + 500 && pair.height() == plain.height());
+
+    good(
+        folder,
+        &["bake", "ball.obj", "-o", "r.sf", "--lattice", "cube:4x3", "--face-px", "16", "--radiance", "4,2,0.5"],
+    );
+    let result = json(&good(folder, &["inspect", "r.sf", "--json", "--at", "0,2,0"]).stdout);
+    assert_eq!(result["header"]["kind"], "radiance");
+    let mean = |channel: usize| result["at"]["radiance"][channel][0].as_f64().unwrap();
+    assert!((mean(0) / mean(1) - 2.0).abs() < 1e-3 && (mean(1) / mean(2) - 4.0).abs() < 1e-3, "{result}");
+    // A cap of cos c and radiance 4 has 4 sqrt(pi) (1 - c) in band 0; 16 px see it within some percent.
+    let expected = 4.0 * cap(4.0, [0.0, -1.0, 0.0])[0];
+    assert!((mean(0) / expected - 1.0).abs() < 0.15, "{} for {expected}", mean(0));
+    assert_eq!(names(folder), ["ball.obj", "f.sf", "pair.png", "plain.png", "r.sf"]);
+}
+
+#[test]
+fn devices_lists_the_one_that_is_taken() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let list = json(&good(folder.path(), &["devices", "--json"]).stdout);
+    let chosen: Vec<_> = list.as_array().unwrap().iter().filter(|d| d["chosen"] == true).collect();
+    let [device] = &chosen[..] else { panic!("{list}") };
+    for key in ["name", "kind", "vulkan", "driver", "uuid"] {
+        assert!(device[key].as_str().is_some_and(|s| !s.is_empty()), "{key}: {device}");
+    }
+    let table = good(folder.path(), &["devices"]).stdout;
+    assert!(table.contains(device["name"].as_str().unwrap()) && table.contains("chosen"), "{table}");
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
+fn demo_writes_pictures_and_a_table() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let ran = good(folder, &["demo", "--timed-frames", "1", "--no-animations", "--size", "96x64", "-o", "made/out"]);
+    let scenes = ["sphere_over_plane", "torus_over_plane", "teapot_lights", "glowing_torus", "twelve_instances"];
+    let mut expected: Vec<String> = scenes.iter().map(|s| format!("{s}.png")).collect();
+    expected.extend(["nearest", "without_occluder"].map(|s| format!("sphere_over_plane_{s}.png")));
+    expected.sort();
+    let out = folder.join("made/out");
+    assert_eq!(names(&out), expected);
+    let pictures: Vec<_> = expected.iter().map(|name| picture(&out, name, [96, 64])).collect();
+    assert!((0..pictures.len()).all(|i| (0..i).all(|j| pictures[i] != pictures[j])), "two pictures are equal");
+    let rows: Vec<&str> = ran.stdout.lines().collect();
+    assert!(rows[0].starts_with("scene") && rows[0].ends_with("frames/s"), "{}", ran.stdout);
+    for (scene, row) in scenes.iter().zip(&rows[1..]) {
+        let cells: Vec<&str> = row.split_whitespace().collect();
+        assert!(cells[0] == *scene && cells.len() == 8, "{row}");
+        assert!(cells[5..].iter().all(|c| c.parse::<f64>().is_ok_and(|v| v > 0.0)), "{row}");
+    }
+    assert!(expected.iter().all(|name| ran.stdout.contains(&format!("made/out/{name}"))), "{}", ran.stdout);
+}
+
+#[test]
+fn quiet_and_no_cache() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut quiet = command(folder, &small(&["render", SCENE, "-o", "p.png", "--quiet"]));
+    assert_eq!(finish(&mut quiet).stderr, "");
+    // Nothing is kept: neither in the named folder nor where the cache would be.
+    let (named, home) = (folder.join("named"), folder.join("home"));
+    let arguments = small(&["render", SCENE, "-o", "p.png", "--no-cache", "--lookup", "nearest"]);
+    let mut bare = std::process::Command::new(env!("CARGO_BIN_EXE_shadow-fields"));
+    bare.current_dir(folder).args(&arguments).arg("--cache-dir").arg(&named);
+    bare.env("XDG_CACHE_HOME", &home).env("MESA_SHADER_CACHE_DISABLE", "true");
+    let ran = finish(&mut bare);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stderr.lines().count() <= 1, "only the note on the device: {}", ran.stderr);
+    assert_eq!(names(folder), ["p.png"]);
+    // With it, the XDG folder is what is used.
+    let mut usual = std::process::Command::new(env!("CARGO_BIN_EXE_shadow-fields"));
+    let arguments = ["bake", "assets/none.obj", "-o", "f.sf"];
+    usual.current_dir(folder).args(arguments).env("XDG_CACHE_HOME", &home);
+    assert_eq!(finish(&mut usual).code, 4);
+    assert!(cache().join("fields").is_dir() && cache().join("spirv").is_dir());
+}
+
+#[test]
+fn shaders_can_be_replaced() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::create_dir(folder.join("glsl")).unwrap();
+    let source = include_str!("../glsl/merge.comp");
+    let render = |output| small(&["render", SCENE, "--shader-dir", "glsl", "-o", output]);
+    good(folder, &render("plain.png"));
+    let last = "sum * entities[receiver].albedo.rgb";
+    assert!(source.contains(last));
+    let edited = source.replace(last, &format!("vec3(0.5, 0.25, 0.0) * {last}"));
+    std::fs::write(folder.join("glsl/merge.comp"), edited).unwrap();
+    good(folder, &render("edited.png"));
+    let [plain, edited] = ["plain.png", "edited.png"].map(|name| picture(folder, name, [96, 64]));
+    let sum = |picture: &image::RgbImage, c: usize| picture.pixels().map(|p| u64::from(p.0[c])).sum::<u64>();
+    assert!(sum(&edited, 0) < sum(&plain, 0) && sum(&edited, 2) < sum(&plain, 2) / 2);
+
+    std::fs::write(folder.join("glsl/merge.comp"), source.replace(last, "sum * nonsense")).unwrap();
+    let line = 1 + source.lines().position(|l| l.contains(last)).unwrap();
+    let ran = finish(&mut command(folder, &render("broken.png")));
+    assert_eq!(ran.code, 1, "{}", ran.stderr);
+    let place = format!("merge.comp:{line}: ");
+    assert!(ran.stderr.contains(&place) && ran.stderr.contains("nonsense"), "no {place} in {}", ran.stderr);
+    assert_eq!(names(folder), ["edited.png", "glsl", "plain.png"]);
+}

@@ -65,6 +65,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     let lattice = header.lattice;
     let shells: Vec<String> = (0..lattice.shells).map(|k| format!("{:.3}", lattice.shell(k))).collect();
+    let storage = format!("{:?}", header.storage).to_lowercase();
     let lines = [
         ("kind", format!("{:?}", header.kind).to_lowercase()),
         ("mesh", format!("{} ({})", header.mesh, &header.mesh_hash[..16.min(header.mesh_hash.len())])),
@@ -73,7 +74,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("lattice", lattice.to_string()),
         ("shells", format!("{} r", shells.join(" "))),
         ("samples", format!("{} ({} filled from neighbours)", lattice.sample_count(), header.filled_samples)),
-        ("stored", format!("{} samples, {:?}, {} bytes", lattice.stored_count(), header.storage, field.payload.len())),
+        ("stored", format!("{} samples, {storage}, {} bytes", lattice.stored_count(), field.payload.len())),
         ("face", format!("{0} x {0} texels", header.face_px)),
     ];
     for (name, value) in lines {

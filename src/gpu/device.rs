@@ -83,7 +83,11 @@ impl Instance {
             create = create.push_next(&mut features);
         }
         // SAFETY: every pointer in `create` outlives the call; the handle is destroyed in `Drop` after its children.
-        let handle = unsafe { entry.create_instance(&create, None) }.checked("vkCreateInstance", "instance")?;
+        let handle = match unsafe { entry.create_instance(&create, None) } {
+            // The loader's way to say that it has no driver to ask.
+            Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => return Err(no_driver()),
+            other => other.checked("vkCreateInstance", "instance")?,
+        };
         let mut instance = Instance { entry, handle, debug: None, has_debug_utils, messages: Box::default() };
         if validation != Validation::Off {
             instance.listen()?;
@@ -110,6 +114,17 @@ impl Instance {
         self.debug = Some((loader, messenger));
         Ok(())
     }
+}
+
+fn no_driver() -> Error {
+    let variable = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].into_iter().find_map(|name| {
+        let value = std::env::var_os(name)?;
+        Some(format!("; {name} is {}", value.to_string_lossy()))
+    });
+    Error::Unsupported(format!(
+        "no Vulkan driver found (a software driver is in Debian's package mesa-vulkan-drivers{})",
+        variable.unwrap_or_default()
+    ))
 }
 
 impl Drop for Instance {

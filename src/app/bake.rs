@@ -50,6 +50,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let context = Context::new(global)?;
     let mut header = bake::header(&mesh, kind, &arguments.bake.options());
     header.validate().map_err(|error| error.context(arguments.mesh.display()))?;
+    context.baker.fits(&header).map_err(|error| error.context(arguments.mesh.display()))?;
     let store = Buffer::new(&context.device, "field", BufferKind::Device, header.payload_bytes())?;
     let report = context
         .baker

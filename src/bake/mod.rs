@@ -133,6 +133,11 @@ pub fn header(mesh: &Mesh, kind: Kind, options: &Options) -> Header {
     }
 }
 
+/// Bytes of the samples of a field before they are put into its stored order and number format.
+fn captured_bytes(header: &Header) -> u64 {
+    4 * u64::from(header.lattice.sample_count()) * header.sample_stride() as u64
+}
+
 /// Bakes on one device.
 pub struct Baker {
     device: Arc<Device>,
@@ -153,6 +158,24 @@ impl Baker {
         Baker { device: device.clone(), library: library.clone() }
     }
 
+    /// Checks that the device can bind the field that `header` describes, and what it is baked from.
+    ///
+    /// # Errors
+    /// `Input` with both numbers of bytes.
+    pub fn fits(&self, header: &Header) -> Result<()> {
+        let (needed, most) = (
+            header.payload_bytes().max(captured_bytes(header)),
+            u64::from(self.device.limits.max_storage_buffer_range),
+        );
+        if needed > most {
+            return Err(Error::Input(format!(
+                "lattice {}: {needed} bytes while it is baked, the device can bind {most}: use a smaller --lattice",
+                header.lattice
+            )));
+        }
+        Ok(())
+    }
+
     /// Bakes the field that `header` describes (see [`header`]) into `store` at `offset_bytes`, a multiple of 256.
     ///
     /// # Errors
@@ -167,6 +190,7 @@ impl Baker {
         header.validate()?;
         let started = Instant::now();
         let lattice = header.lattice;
+        self.fits(header)?;
         let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
         let inside = inside::inside(&unit_positions(mesh), &mesh.triangles, &positions);
         header.filled_samples = inside.iter().filter(|i| **i).count() as u32;
@@ -177,8 +201,7 @@ impl Baker {
         let projection = if radiance { Projection::Radiance } else { Projection::Blocked };
         let project = self.project(header.bands, projection, &capture)?;
         let model = Model::new(&self.device, mesh, radiance)?;
-        let floats = u64::from(lattice.sample_count()) * header.sample_stride() as u64;
-        let captured = Buffer::new(&self.device, "captured samples", BufferKind::Device, 4 * floats)?;
+        let captured = Buffer::new(&self.device, "captured samples", BufferKind::Device, captured_bytes(header))?;
         let mut targets = Vec::new();
         for (index, position) in positions.iter().enumerate().filter(|(index, _)| !inside[*index]) {
             let scale = lattice.scale(position.length()) as f32;

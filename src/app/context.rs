@@ -127,6 +127,13 @@ impl Context {
             (false, Some(folder)) => Some(folder.clone()),
             (false, None) => dirs::cache_dir().map(|folder| folder.join("shadow-fields")),
         };
+        let cache_dir = cache_dir.filter(|folder| match std::fs::create_dir_all(folder) {
+            Ok(()) => true,
+            Err(error) => {
+                log::warn!("{}: the cache folder cannot be made ({error}); nothing is kept", folder.display());
+                false
+            }
+        });
         if let Some(folder) = &global.shader_dir
             && !folder.is_dir()
         {

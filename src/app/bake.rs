@@ -40,6 +40,7 @@ fn color(text: &str) -> std::result::Result<Vec3, String> {
 
 /// Bakes one field. The result does not depend on the cache, which is not used.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    output::check_folder(&arguments.output)?;
     let mut mesh = Mesh::load(&arguments.mesh)?;
     let kind = if arguments.radiance.is_some() { Kind::Radiance } else { Kind::Occlusion };
     if let Some(radiance) = arguments.radiance {

@@ -43,6 +43,7 @@ fn place(text: &str) -> std::result::Result<DVec3, String> {
 
 /// Shows a field.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    arguments.faces.as_deref().map_or(Ok(()), output::check_folder)?;
     let field = ShadowField::read(&arguments.field)?;
     let header = &field.header;
     let mut result = json!({

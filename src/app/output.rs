@@ -1,10 +1,11 @@
 //! What the program says: results, logs, errors, progress bars, tables.
 
 use super::Global;
-use crate::error::Error;
+use crate::error::{Error, Result};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::cell::RefCell;
 use std::io::Write;
+use std::path::Path;
 
 /// Writes one line of results to stdout. A reader that went away is no error.
 pub fn say(line: impl AsRef<str>) {
@@ -20,6 +21,19 @@ pub fn complain(error: &Error) {
 pub fn note(global: &Global, line: impl AsRef<str>) {
     if !global.quiet {
         let _ = writeln!(std::io::stderr().lock(), "{}", line.as_ref());
+    }
+}
+
+/// Fails where a file could not be written because its folder is missing: told before work is done, not after.
+///
+/// # Errors
+/// `Failed` with the file's name.
+pub fn check_folder(path: &Path) -> Result<()> {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            Err(Error::Failed(format!("{}: cannot write: there is no folder {}", path.display(), folder.display())))
+        }
+        _ => Ok(()),
     }
 }
 

@@ -53,6 +53,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         return Err(Error::Usage("--time wants a finite number of seconds".into()));
     }
     let numbered = Numbered::new(&arguments.output)?;
+    let others = [&arguments.exr, &arguments.vertices, &arguments.stats];
+    for path in others.into_iter().flatten().chain([&arguments.output]) {
+        output::check_folder(path)?;
+    }
     let scene = Scene::load(&arguments.scene)?;
     let context = Context::new(global)?;
     let started = Instant::now();
@@ -65,7 +69,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         size: arguments.size.unwrap_or([shape.width, shape.height]),
         multisample: true,
     };
-    let mut frame = context.frame(&scene, options)?;
+    let mut frame = context.frame(&scene, options).map_err(|error| match error {
+        Error::Input(_) => error.context(arguments.scene.display()),
+        other => other,
+    })?;
     let prepared = started.elapsed();
 
     let [width, height] = options.size;

@@ -33,7 +33,7 @@ fn key(header: &impl Serialize) -> String {
 
 /// What decides a field: the header without the name for people and without what only the bake finds out.
 fn identity(header: &Header) -> Header {
-    Header { mesh: String::new(), filled_samples: 0, ..header.clone() }
+    Header { mesh: String::new(), filled_samples: 0, growth: 0.0, ..header.clone() }
 }
 
 impl Cache {

@@ -79,7 +79,7 @@ fn render_writes_what_it_is_asked_for() {
         .collect();
     assert!(rows.iter().all(|(_, n)| n.len() == 9 && n.iter().all(|n| n.is_finite())));
     let count = |name| rows.iter().filter(|(entity, _)| *entity == name).count();
-    assert_eq!([count("floor"), count("ball"), count("light")], [65 * 65, 2562, 2562]);
+    assert_eq!([count("floor"), count("ball"), count("light")], [113 * 113, 2562, 2562]);
     for (entity, n) in &rows {
         let ball = [n[0] + 0.2, n[1] - 0.65, n[2]];
         match *entity {

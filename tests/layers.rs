@@ -22,7 +22,6 @@ const LINE_LIMIT: usize = 400;
 const LONG_FILES: &[(&str, &str)] = &[
     ("src/field/lattice.rs", "sample points, weights and the text form of one type; half of it is documentation"),
     ("src/frame/mod.rs", "the sequence of a frame lives in one place"),
-    ("src/gpu/commands.rs", "one type: a recording with every command that is recorded"),
     ("src/gpu/memory.rs", "buffers, views and images share their memory's owner"),
 ];
 

@@ -5,10 +5,10 @@
 
 use super::Checked;
 use super::access::{Access, Tracker};
+use super::descriptors::Bind;
 use super::device::Device;
-use super::memory::{Buffer, BufferKind, Image, TexelView, whole};
-use super::pipeline::{ComputePipeline, GraphicsPipeline, Layout, descriptor_type};
-use super::reflect::BindingKind;
+use super::memory::{Buffer, BufferKind, Image, whole};
+use super::pipeline::ComputePipeline;
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -16,21 +16,6 @@ use std::ffi::CString;
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// A resource given to a pass; its position in the list is its binding number.
-#[derive(Clone)]
-pub enum Bind<'r> {
-    /// A whole buffer, as storage or uniform block.
-    Buffer(&'r Buffer),
-    /// A byte range of a buffer. Its start keeps the device's offset alignment (at most 256 bytes).
-    Range(&'r Buffer, Range<u64>),
-    /// A texel view.
-    Texel(&'r TexelView<'r>),
-    /// An image that is read with `texelFetch`.
-    Image(&'r Image),
-    /// Nothing: the variant in use does not have this binding.
-    None,
-}
 
 /// Duration of one pass on the device.
 #[derive(Clone, Debug)]
@@ -41,35 +26,20 @@ pub struct Timing {
     pub milliseconds: f64,
 }
 
-/// What a render pass draws into. The colour image is cleared, and resolved into `resolve` where one is given.
-pub struct Target<'r> {
-    /// Colour attachment.
-    pub color: &'r Image,
-    /// Colour that it starts with.
-    pub clear: [f32; 4],
-    /// Depth attachment, cleared to 0 (the far end of reversed depth).
-    pub depth: Option<&'r Image>,
-    /// Single-sampled image that the multisampled colour is averaged into.
-    pub resolve: Option<&'r Image>,
-}
-
 /// Timed passes in one recording; a pass takes two timestamps.
 const MAX_PASSES: u32 = 64;
-/// Descriptor sets in one pool; another pool is made when it is full.
-const SETS_PER_POOL: u32 = 256;
-
 /// A recording in progress. Borrows what it uses until [`Commands::submit`] has waited for the device.
 pub struct Commands<'r> {
-    device: Arc<Device>,
-    name: String,
+    pub(super) device: Arc<Device>,
+    pub(super) name: String,
     pool: vk::CommandPool,
-    buffer: vk::CommandBuffer,
+    pub(super) buffer: vk::CommandBuffer,
     fence: vk::Fence,
     queries: vk::QueryPool,
-    descriptors: Vec<(vk::DescriptorPool, u32)>,
+    pub(super) descriptors: Vec<(vk::DescriptorPool, u32)>,
     passes: Vec<String>,
     in_pass: bool,
-    tracker: Tracker,
+    pub(super) tracker: Tracker,
     /// Buffers that the host will read, with the ranges that were copied into them.
     read_back: Vec<(&'r Buffer, Range<u64>)>,
     barrier_count: usize,
@@ -174,7 +144,7 @@ impl<'r> Commands<'r> {
         }
     }
 
-    fn pass_name(&self) -> String {
+    pub(super) fn pass_name(&self) -> String {
         self.passes.last().unwrap_or(&self.name).clone()
     }
 
@@ -263,139 +233,6 @@ impl<'r> Commands<'r> {
         Ok(())
     }
 
-    fn push<P: Pod>(&mut self, layout: &Layout, name: &str, push: &P) {
-        let bytes = bytemuck::bytes_of(push);
-        assert!(
-            bytes.len() >= layout.push_bytes as usize && (layout.push_bytes > 0 || bytes.is_empty()),
-            "{name}: {} bytes of push constants given, the shader has {}",
-            bytes.len(),
-            layout.push_bytes
-        );
-        if layout.push_bytes > 0 {
-            let bytes = &bytes[..layout.push_bytes as usize];
-            // SAFETY: size and stages are the layout's own.
-            unsafe {
-                self.device.handle.cmd_push_constants(self.buffer, layout.pipeline, layout.push_stages, 0, bytes);
-            }
-        }
-    }
-
-    /// Writes a descriptor set for `resources` and binds it; tells the tracker what the shader does with each.
-    fn bind(
-        &mut self,
-        layout: &Layout,
-        name: &str,
-        point: vk::PipelineBindPoint,
-        resources: &[Bind<'r>],
-    ) -> Result<()> {
-        if layout.bindings.is_empty() {
-            return Ok(());
-        }
-        let set = self.descriptor_set(layout)?;
-        let pass = self.pass_name();
-        for binding in &layout.bindings {
-            let resource = resources.get(binding.index as usize).unwrap_or(&Bind::None);
-            let complain =
-                |what: &str| -> ! { panic!("pass {name}, binding {} ({}): {what}", binding.index, binding.name) };
-            let mut write = vk::WriteDescriptorSet::default()
-                .dst_set(set)
-                .dst_binding(binding.index)
-                .descriptor_type(descriptor_type(binding.kind))
-                .descriptor_count(1);
-            let (mut buffers, mut views, mut images) =
-                ([Default::default()], [Default::default()], [Default::default()]);
-            match (binding.kind, resource) {
-                (BindingKind::Storage | BindingKind::Uniform, Bind::Buffer(_) | Bind::Range(..)) => {
-                    let (buffer, range) = match resource {
-                        Bind::Range(buffer, range) => (*buffer, range.clone()),
-                        Bind::Buffer(buffer) => (*buffer, buffer.all()),
-                        _ => unreachable!("matched above"),
-                    };
-                    let size = range.end - range.start;
-                    let (most, alignment) = if binding.kind == BindingKind::Storage {
-                        let limits = &self.device.limits;
-                        (limits.max_storage_buffer_range, limits.min_storage_buffer_offset_alignment)
-                    } else {
-                        let limits = &self.device.limits;
-                        (limits.max_uniform_buffer_range, limits.min_uniform_buffer_offset_alignment)
-                    };
-                    if size > u64::from(most) {
-                        return Err(Error::Input(format!(
-                            "{}: {size} bytes in one buffer, the device can bind {most}",
-                            buffer.name
-                        )));
-                    }
-                    if range.end > buffer.size_bytes || size < u64::from(binding.block_bytes) {
-                        complain("the buffer is smaller than the shader's block or the range is outside it");
-                    }
-                    if !range.start.is_multiple_of(alignment) {
-                        complain("the range does not start at the device's offset alignment");
-                    }
-                    let access = match (binding.kind, binding.writes) {
-                        (BindingKind::Storage, true) => Access::ComputeWrite,
-                        _ => Access::ComputeRead,
-                    };
-                    self.tracker.use_range(buffer.id, &buffer.name, range.clone(), access, &pass);
-                    buffers = [vk::DescriptorBufferInfo { buffer: buffer.raw(), offset: range.start, range: size }];
-                    write = write.buffer_info(&buffers);
-                }
-                (BindingKind::Texel, Bind::Texel(view)) => {
-                    let buffer = view.buffer;
-                    self.tracker.use_range(buffer.id, &buffer.name, buffer.all(), Access::ComputeSampled, &pass);
-                    views = [view.handle];
-                    write = write.texel_buffer_view(&views);
-                }
-                (BindingKind::Image, Bind::Image(image)) => {
-                    self.tracker.use_image(image.id, &image.name, Access::ComputeSampled, &pass);
-                    images = [vk::DescriptorImageInfo {
-                        sampler: vk::Sampler::null(),
-                        image_view: image.view(),
-                        image_layout: Access::ComputeSampled.layout(),
-                    }];
-                    write = write.image_info(&images);
-                }
-                _ => complain("another kind of resource, or none, was given"),
-            }
-            // SAFETY: the set is fresh and not yet in use; every resource is borrowed until the commands have run.
-            unsafe { self.device.handle.update_descriptor_sets(&[write], &[]) };
-            let _ = (buffers, views, images);
-        }
-        // SAFETY: the command buffer is recording and the set matches the layout.
-        unsafe {
-            self.device.handle.cmd_bind_descriptor_sets(self.buffer, point, layout.pipeline, 0, &[set], &[]);
-        }
-        Ok(())
-    }
-
-    fn descriptor_set(&mut self, layout: &Layout) -> Result<vk::DescriptorSet> {
-        let handle = &self.device.handle;
-        if self.descriptors.last().is_none_or(|(_, used)| *used == SETS_PER_POOL) {
-            // Twelve bindings of a kind in a set is more than any pass has.
-            let sizes = [
-                vk::DescriptorType::STORAGE_BUFFER,
-                vk::DescriptorType::UNIFORM_BUFFER,
-                vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
-                vk::DescriptorType::SAMPLED_IMAGE,
-            ]
-            .map(|ty| vk::DescriptorPoolSize { ty, descriptor_count: 12 * SETS_PER_POOL });
-            let create = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
-            // SAFETY: destroyed in `Drop`, after the commands that use its sets have run.
-            let pool = unsafe { handle.create_descriptor_pool(&create, None) }
-                .checked("vkCreateDescriptorPool", &self.name)?;
-            self.device.name(pool, &self.name);
-            self.descriptors.push((pool, 0));
-        }
-        let (pool, used) = self.descriptors.last_mut().expect("a pool was just made");
-        *used += 1;
-        let layouts = [layout.set];
-        let allocate = vk::DescriptorSetAllocateInfo::default().descriptor_pool(*pool).set_layouts(&layouts);
-        // SAFETY: the pool has room (counted); freed with it.
-        let sets =
-            unsafe { handle.allocate_descriptor_sets(&allocate) }.checked("vkAllocateDescriptorSets", &self.name)?;
-        self.device.name(sets[0], &self.name);
-        Ok(sets[0])
-    }
-
     /// Copies the whole of `from` to the start of `to`.
     ///
     /// # Panics
@@ -448,58 +285,6 @@ impl<'r> Commands<'r> {
             let layout = Access::TransferRead.layout();
             self.device.handle.cmd_copy_image_to_buffer(self.buffer, from.raw(), layout, to.raw(), &[region]);
         }
-    }
-
-    /// Renders into `target`: everything that `record` draws, in order.
-    ///
-    /// # Errors
-    /// What `record` returns.
-    pub fn render(
-        &mut self,
-        target: &Target<'r>,
-        record: impl FnOnce(&mut Drawing<'_, 'r>) -> Result<()>,
-    ) -> Result<()> {
-        let pass = self.pass_name();
-        let shape = target.color.shape;
-        self.tracker.use_image(target.color.id, &target.color.name, Access::ColorWrite, &pass);
-        let mut color = vk::RenderingAttachmentInfo::default()
-            .image_view(target.color.view())
-            .image_layout(Access::ColorWrite.layout())
-            .load_op(vk::AttachmentLoadOp::CLEAR)
-            .store_op(vk::AttachmentStoreOp::STORE)
-            .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: target.clear } });
-        if let Some(resolve) = target.resolve {
-            self.tracker.use_image(resolve.id, &resolve.name, Access::ColorWrite, &pass);
-            color = color
-                .store_op(vk::AttachmentStoreOp::DONT_CARE)
-                .resolve_mode(vk::ResolveModeFlags::AVERAGE)
-                .resolve_image_view(resolve.view())
-                .resolve_image_layout(Access::ColorWrite.layout());
-        }
-        let depth = target.depth.map(|depth| {
-            self.tracker.use_image(depth.id, &depth.name, Access::DepthWrite, &pass);
-            vk::RenderingAttachmentInfo::default()
-                .image_view(depth.view())
-                .image_layout(Access::DepthWrite.layout())
-                .load_op(vk::AttachmentLoadOp::CLEAR)
-                .store_op(vk::AttachmentStoreOp::DONT_CARE)
-                .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } })
-        });
-        let colors = [color];
-        let extent = vk::Extent2D { width: shape.width, height: shape.height };
-        let mut info = vk::RenderingInfo::default()
-            .render_area(vk::Rect2D { offset: vk::Offset2D::default(), extent })
-            .layer_count(1)
-            .color_attachments(&colors);
-        if let Some(depth) = &depth {
-            info = info.depth_attachment(depth);
-        }
-        // SAFETY: the attachments are borrowed until the commands have run and in the layouts stated (tracked).
-        unsafe { self.device.handle.cmd_begin_rendering(self.buffer, &info) };
-        let outcome = record(&mut Drawing { commands: self, pipeline: None });
-        // SAFETY: begun above.
-        unsafe { self.device.handle.cmd_end_rendering(self.buffer) };
-        outcome
     }
 
     /// Ends the recording, runs it and waits. Returns the duration of each pass, in order.
@@ -556,83 +341,6 @@ impl Drop for Commands<'_> {
             handle.destroy_query_pool(self.queries, None);
             handle.destroy_fence(self.fence, None);
             handle.destroy_command_pool(self.pool, None);
-        }
-    }
-}
-
-/// Inside a render pass.
-pub struct Drawing<'c, 'r> {
-    commands: &'c mut Commands<'r>,
-    pipeline: Option<&'r GraphicsPipeline>,
-}
-
-impl<'r> Drawing<'_, 'r> {
-    /// Selects the pipeline and its vertex buffers, in order of location, and the index buffer (32-bit).
-    ///
-    /// # Panics
-    /// When the number of vertex buffers is not the shader's number of inputs.
-    pub fn bind(&mut self, pipeline: &'r GraphicsPipeline, vertices: &[(&'r Buffer, u64)], indices: &'r Buffer) {
-        assert_eq!(vertices.len(), pipeline.inputs.len(), "{}: vertex buffers against shader inputs", pipeline.name);
-        let pass = self.commands.pass_name();
-        let tracker = &mut self.commands.tracker;
-        for (buffer, offset) in vertices {
-            tracker.use_range(buffer.id, &buffer.name, *offset..buffer.size_bytes, Access::VertexRead, &pass);
-        }
-        tracker.use_range(indices.id, &indices.name, indices.all(), Access::VertexRead, &pass);
-        let handle = &self.commands.device.handle;
-        let buffer = self.commands.buffer;
-        // SAFETY: everything is borrowed until the commands have run.
-        unsafe {
-            handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
-            for (input, (vertex, offset)) in pipeline.inputs.iter().zip(vertices) {
-                handle.cmd_bind_vertex_buffers(buffer, input.location, &[vertex.raw()], &[*offset]);
-            }
-            handle.cmd_bind_index_buffer(buffer, indices.raw(), 0, vk::IndexType::UINT32);
-        }
-        self.pipeline = Some(pipeline);
-    }
-
-    /// Restricts drawing to a rectangle in pixels: viewport and scissor.
-    pub fn area(&mut self, x: u32, y: u32, width: u32, height: u32) {
-        let viewport = vk::Viewport {
-            x: x as f32,
-            y: y as f32,
-            width: width as f32,
-            height: height as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        };
-        let scissor = vk::Rect2D {
-            offset: vk::Offset2D { x: x.cast_signed(), y: y.cast_signed() },
-            extent: vk::Extent2D { width, height },
-        };
-        let handle = &self.commands.device.handle;
-        // SAFETY: the command buffer is recording.
-        unsafe {
-            handle.cmd_set_viewport(self.commands.buffer, 0, &[viewport]);
-            handle.cmd_set_scissor(self.commands.buffer, 0, &[scissor]);
-        }
-    }
-
-    /// Sets the bound pipeline's push constants.
-    ///
-    /// # Panics
-    /// Before [`Drawing::bind`].
-    pub fn push<P: Pod>(&mut self, push: &P) {
-        let pipeline = self.pipeline.expect("a pipeline is bound before its push constants");
-        self.commands.push(&pipeline.layout, &pipeline.name, push);
-    }
-
-    /// Draws the indices of a range, three a triangle.
-    ///
-    /// # Panics
-    /// Before [`Drawing::bind`].
-    pub fn indexed(&mut self, range: Range<u32>) {
-        assert!(self.pipeline.is_some(), "a pipeline is bound before drawing");
-        // SAFETY: the index buffer covers the range (its owner made both); values were checked when the mesh was read.
-        unsafe {
-            let count = range.end - range.start;
-            self.commands.device.handle.cmd_draw_indexed(self.commands.buffer, count, 1, range.start, 0, 0);
         }
     }
 }

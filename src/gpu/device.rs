@@ -1,11 +1,11 @@
 //! Instance, logical device and queue: the root that every other Vulkan object keeps alive.
 
 use super::Checked;
-use super::select::{Candidate, choose};
+use super::select::{Candidate, choose, physical_devices, queue_family, version_text};
 use super::validation::{LAYER, Messages, Validation, on_message};
 use crate::error::{Error, Result};
 use ash::vk;
-use std::ffi::{CStr, CString};
+use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -169,7 +169,7 @@ impl Device {
     /// `Unsupported` without a loader.
     pub fn list() -> Result<Vec<Candidate>> {
         let instance = Instance::new(Validation::Off)?;
-        Ok(physical_devices(&instance)?.into_iter().map(|(_, candidate)| candidate).collect())
+        Ok(physical_devices(&instance.handle)?.into_iter().map(|(_, candidate)| candidate).collect())
     }
 
     /// Opens the chosen device with Vulkan 1.3 core features and no extension.
@@ -178,7 +178,7 @@ impl Device {
     /// `Unsupported` without a loader, a suitable device, or the validation layer that was asked for.
     pub fn new(options: &Options) -> Result<Arc<Self>> {
         let instance = Instance::new(options.validation)?;
-        let devices = physical_devices(&instance)?;
+        let devices = physical_devices(&instance.handle)?;
         let candidates: Vec<_> = devices.iter().map(|(_, candidate)| candidate.clone()).collect();
         let info = choose(&candidates, options.device.as_deref())?.clone();
         let physical = devices[info.index].0;
@@ -312,82 +312,6 @@ fn cache_header_fits(data: &[u8], properties: &vk::PhysicalDeviceProperties) -> 
         && word(8) == Some(properties.vendor_id)
         && word(12) == Some(properties.device_id)
         && data.get(16..32) == Some(&properties.pipeline_cache_uuid[..])
-}
-
-fn queue_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
-    let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
-    families
-        .iter()
-        .position(|f| f.queue_flags.contains(needed) && f.timestamp_valid_bits > 0)
-        .and_then(|index| u32::try_from(index).ok())
-}
-
-fn version_text(version: u32) -> String {
-    let (major, minor, patch) =
-        (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version));
-    format!("{major}.{minor}.{patch}")
-}
-
-fn physical_devices(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Candidate)>> {
-    // SAFETY: a query on a live instance. No driver at all is an empty list to the caller.
-    let handles = match unsafe { instance.handle.enumerate_physical_devices() } {
-        Err(vk::Result::ERROR_INITIALIZATION_FAILED | vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Vec::new(),
-        other => other.checked("vkEnumeratePhysicalDevices", "instance")?,
-    };
-    Ok(handles.into_iter().enumerate().map(|(index, handle)| (handle, describe(instance, index, handle))).collect())
-}
-
-fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
-    // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are only
-    // chained where the device itself speaks 1.3.
-    let (properties, unsuitable, identity, driver) = unsafe {
-        let properties = instance.handle.get_physical_device_properties(physical);
-        let mut identity = vk::PhysicalDeviceIDProperties::default();
-        let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut both = vk::PhysicalDeviceProperties2::default().push_next(&mut identity).push_next(&mut driver);
-        if properties.api_version >= vk::API_VERSION_1_2 {
-            instance.handle.get_physical_device_properties2(physical, &mut both);
-        }
-        let mut unsuitable = None;
-        if properties.api_version < vk::API_VERSION_1_3 {
-            unsuitable = Some(format!("speaks Vulkan {}, 1.3 is needed", version_text(properties.api_version)));
-        } else {
-            let mut core_1_3 = vk::PhysicalDeviceVulkan13Features::default();
-            let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut core_1_3);
-            instance.handle.get_physical_device_features2(physical, &mut features);
-            let families = instance.handle.get_physical_device_queue_family_properties(physical);
-            let missing = [
-                (core_1_3.dynamic_rendering, "dynamicRendering"),
-                (core_1_3.synchronization2, "synchronization2"),
-                (core_1_3.maintenance4, "maintenance4"),
-            ];
-            if let Some((_, feature)) = missing.iter().find(|(present, _)| *present == vk::FALSE) {
-                unsuitable = Some(format!("lacks the feature {feature}"));
-            } else if queue_family(&families).is_none() {
-                unsuitable = Some("has no queue with graphics, compute and timestamps".into());
-            }
-        }
-        (properties, unsuitable, identity, driver)
-    };
-    let text = |chars: &[std::ffi::c_char]| {
-        let bytes: Vec<u8> = chars.iter().map(|&c| c.cast_unsigned()).collect();
-        CStr::from_bytes_until_nul(&bytes).map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
-    };
-    let (driver_name, driver_info) = (text(&driver.driver_name), text(&driver.driver_info));
-    let driver = match (driver_name.is_empty(), driver_info.is_empty()) {
-        (true, _) => format!("driver version {}", properties.driver_version),
-        (false, true) => driver_name,
-        (false, false) => format!("{driver_name}, {driver_info}"),
-    };
-    Candidate {
-        index,
-        name: text(&properties.device_name),
-        kind: properties.device_type,
-        api: version_text(properties.api_version),
-        driver,
-        uuid: identity.device_uuid.iter().map(|byte| format!("{byte:02x}")).collect(),
-        unsuitable,
-    }
 }
 
 #[cfg(test)]

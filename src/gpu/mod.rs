@@ -5,7 +5,9 @@
 
 pub mod access;
 pub mod commands;
+pub mod descriptors;
 pub mod device;
+pub mod drawing;
 pub mod memory;
 pub mod pipeline;
 pub mod reflect;
@@ -14,8 +16,10 @@ pub mod shader;
 pub mod validation;
 
 pub use access::Access;
-pub use commands::{Bind, Commands, Timing};
+pub use commands::{Commands, Timing};
+pub use descriptors::Bind;
 pub use device::{Device, Options};
+pub use drawing::{Drawing, Target};
 pub use memory::{Buffer, BufferKind, Image, TexelView};
 pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState};
 pub use shader::{Shader, Stage};

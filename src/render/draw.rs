@@ -5,7 +5,7 @@
 
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
-use crate::gpu::commands::Target;
+use crate::gpu::Target;
 use crate::gpu::memory::ImageShape;
 use crate::gpu::{Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
 use crate::shaders::{Library, Row};

@@ -1,0 +1,165 @@
+//! Resources of a dispatch: descriptor sets written in binding order, checked against the shader, told to the tracker.
+
+use super::Checked;
+use super::access::Access;
+use super::commands::Commands;
+use super::memory::{Buffer, Image, TexelView};
+use super::pipeline::{Layout, descriptor_type};
+use super::reflect::BindingKind;
+use crate::error::{Error, Result};
+use ash::vk;
+use bytemuck::Pod;
+use std::ops::Range;
+
+/// A resource given to a pass; its position in the list is its binding number.
+#[derive(Clone)]
+pub enum Bind<'r> {
+    /// A whole buffer, as storage or uniform block.
+    Buffer(&'r Buffer),
+    /// A byte range of a buffer. Its start keeps the device's offset alignment (at most 256 bytes).
+    Range(&'r Buffer, Range<u64>),
+    /// A texel view.
+    Texel(&'r TexelView<'r>),
+    /// An image that is read with `texelFetch`.
+    Image(&'r Image),
+    /// Nothing: the variant in use does not have this binding.
+    None,
+}
+
+/// Descriptor sets in one pool; another pool is made when it is full.
+const SETS_PER_POOL: u32 = 256;
+
+impl<'r> Commands<'r> {
+    pub(super) fn push<P: Pod>(&mut self, layout: &Layout, name: &str, push: &P) {
+        let bytes = bytemuck::bytes_of(push);
+        assert!(
+            bytes.len() >= layout.push_bytes as usize && (layout.push_bytes > 0 || bytes.is_empty()),
+            "{name}: {} bytes of push constants given, the shader has {}",
+            bytes.len(),
+            layout.push_bytes
+        );
+        if layout.push_bytes > 0 {
+            let bytes = &bytes[..layout.push_bytes as usize];
+            // SAFETY: size and stages are the layout's own.
+            unsafe {
+                self.device.handle.cmd_push_constants(self.buffer, layout.pipeline, layout.push_stages, 0, bytes);
+            }
+        }
+    }
+
+    /// Writes a descriptor set for `resources` and binds it; tells the tracker what the shader does with each.
+    pub(super) fn bind(
+        &mut self,
+        layout: &Layout,
+        name: &str,
+        point: vk::PipelineBindPoint,
+        resources: &[Bind<'r>],
+    ) -> Result<()> {
+        if layout.bindings.is_empty() {
+            return Ok(());
+        }
+        let set = self.descriptor_set(layout)?;
+        let pass = self.pass_name();
+        for binding in &layout.bindings {
+            let resource = resources.get(binding.index as usize).unwrap_or(&Bind::None);
+            let complain =
+                |what: &str| -> ! { panic!("pass {name}, binding {} ({}): {what}", binding.index, binding.name) };
+            let mut write = vk::WriteDescriptorSet::default()
+                .dst_set(set)
+                .dst_binding(binding.index)
+                .descriptor_type(descriptor_type(binding.kind))
+                .descriptor_count(1);
+            let (mut buffers, mut views, mut images) =
+                ([Default::default()], [Default::default()], [Default::default()]);
+            match (binding.kind, resource) {
+                (BindingKind::Storage | BindingKind::Uniform, Bind::Buffer(_) | Bind::Range(..)) => {
+                    let (buffer, range) = match resource {
+                        Bind::Range(buffer, range) => (*buffer, range.clone()),
+                        Bind::Buffer(buffer) => (*buffer, buffer.all()),
+                        _ => unreachable!("matched above"),
+                    };
+                    let size = range.end - range.start;
+                    let (most, alignment) = if binding.kind == BindingKind::Storage {
+                        let limits = &self.device.limits;
+                        (limits.max_storage_buffer_range, limits.min_storage_buffer_offset_alignment)
+                    } else {
+                        let limits = &self.device.limits;
+                        (limits.max_uniform_buffer_range, limits.min_uniform_buffer_offset_alignment)
+                    };
+                    if size > u64::from(most) {
+                        return Err(Error::Input(format!(
+                            "{}: {size} bytes in one buffer, the device can bind {most}",
+                            buffer.name
+                        )));
+                    }
+                    if range.end > buffer.size_bytes || size < u64::from(binding.block_bytes) {
+                        complain("the buffer is smaller than the shader's block or the range is outside it");
+                    }
+                    if !range.start.is_multiple_of(alignment) {
+                        complain("the range does not start at the device's offset alignment");
+                    }
+                    let access = match (binding.kind, binding.writes) {
+                        (BindingKind::Storage, true) => Access::ComputeWrite,
+                        _ => Access::ComputeRead,
+                    };
+                    self.tracker.use_range(buffer.id, &buffer.name, range.clone(), access, &pass);
+                    buffers = [vk::DescriptorBufferInfo { buffer: buffer.raw(), offset: range.start, range: size }];
+                    write = write.buffer_info(&buffers);
+                }
+                (BindingKind::Texel, Bind::Texel(view)) => {
+                    let buffer = view.buffer;
+                    self.tracker.use_range(buffer.id, &buffer.name, buffer.all(), Access::ComputeSampled, &pass);
+                    views = [view.handle];
+                    write = write.texel_buffer_view(&views);
+                }
+                (BindingKind::Image, Bind::Image(image)) => {
+                    self.tracker.use_image(image.id, &image.name, Access::ComputeSampled, &pass);
+                    images = [vk::DescriptorImageInfo {
+                        sampler: vk::Sampler::null(),
+                        image_view: image.view(),
+                        image_layout: Access::ComputeSampled.layout(),
+                    }];
+                    write = write.image_info(&images);
+                }
+                _ => complain("another kind of resource, or none, was given"),
+            }
+            // SAFETY: the set is fresh and not yet in use; every resource is borrowed until the commands have run.
+            unsafe { self.device.handle.update_descriptor_sets(&[write], &[]) };
+            let _ = (buffers, views, images);
+        }
+        // SAFETY: the command buffer is recording and the set matches the layout.
+        unsafe {
+            self.device.handle.cmd_bind_descriptor_sets(self.buffer, point, layout.pipeline, 0, &[set], &[]);
+        }
+        Ok(())
+    }
+
+    fn descriptor_set(&mut self, layout: &Layout) -> Result<vk::DescriptorSet> {
+        let handle = &self.device.handle;
+        if self.descriptors.last().is_none_or(|(_, used)| *used == SETS_PER_POOL) {
+            // Twelve bindings of a kind in a set is more than any pass has.
+            let sizes = [
+                vk::DescriptorType::STORAGE_BUFFER,
+                vk::DescriptorType::UNIFORM_BUFFER,
+                vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+                vk::DescriptorType::SAMPLED_IMAGE,
+            ]
+            .map(|ty| vk::DescriptorPoolSize { ty, descriptor_count: 12 * SETS_PER_POOL });
+            let create = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
+            // SAFETY: destroyed in `Drop`, after the commands that use its sets have run.
+            let pool = unsafe { handle.create_descriptor_pool(&create, None) }
+                .checked("vkCreateDescriptorPool", &self.name)?;
+            self.device.name(pool, &self.name);
+            self.descriptors.push((pool, 0));
+        }
+        let (pool, used) = self.descriptors.last_mut().expect("a pool was just made");
+        *used += 1;
+        let layouts = [layout.set];
+        let allocate = vk::DescriptorSetAllocateInfo::default().descriptor_pool(*pool).set_layouts(&layouts);
+        // SAFETY: the pool has room (counted); freed with it.
+        let sets =
+            unsafe { handle.allocate_descriptor_sets(&allocate) }.checked("vkAllocateDescriptorSets", &self.name)?;
+        self.device.name(sets[0], &self.name);
+        Ok(sets[0])
+    }
+}

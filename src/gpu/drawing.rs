@@ -1,0 +1,153 @@
+//! Render passes: what they draw into, and what is drawn.
+
+use super::access::Access;
+use super::commands::Commands;
+use super::memory::{Buffer, Image};
+use super::pipeline::GraphicsPipeline;
+use crate::error::Result;
+use ash::vk;
+use bytemuck::Pod;
+use std::ops::Range;
+
+/// What a render pass draws into. The colour image is cleared, and resolved into `resolve` where one is given.
+pub struct Target<'r> {
+    /// Colour attachment.
+    pub color: &'r Image,
+    /// Colour that it starts with.
+    pub clear: [f32; 4],
+    /// Depth attachment, cleared to 0 (the far end of reversed depth).
+    pub depth: Option<&'r Image>,
+    /// Single-sampled image that the multisampled colour is averaged into.
+    pub resolve: Option<&'r Image>,
+}
+
+impl<'r> Commands<'r> {
+    /// Renders into `target`: everything that `record` draws, in order.
+    ///
+    /// # Errors
+    /// What `record` returns.
+    pub fn render(
+        &mut self,
+        target: &Target<'r>,
+        record: impl FnOnce(&mut Drawing<'_, 'r>) -> Result<()>,
+    ) -> Result<()> {
+        let pass = self.pass_name();
+        let shape = target.color.shape;
+        self.tracker.use_image(target.color.id, &target.color.name, Access::ColorWrite, &pass);
+        let mut color = vk::RenderingAttachmentInfo::default()
+            .image_view(target.color.view())
+            .image_layout(Access::ColorWrite.layout())
+            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .store_op(vk::AttachmentStoreOp::STORE)
+            .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: target.clear } });
+        if let Some(resolve) = target.resolve {
+            self.tracker.use_image(resolve.id, &resolve.name, Access::ColorWrite, &pass);
+            color = color
+                .store_op(vk::AttachmentStoreOp::DONT_CARE)
+                .resolve_mode(vk::ResolveModeFlags::AVERAGE)
+                .resolve_image_view(resolve.view())
+                .resolve_image_layout(Access::ColorWrite.layout());
+        }
+        let depth = target.depth.map(|depth| {
+            self.tracker.use_image(depth.id, &depth.name, Access::DepthWrite, &pass);
+            vk::RenderingAttachmentInfo::default()
+                .image_view(depth.view())
+                .image_layout(Access::DepthWrite.layout())
+                .load_op(vk::AttachmentLoadOp::CLEAR)
+                .store_op(vk::AttachmentStoreOp::DONT_CARE)
+                .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } })
+        });
+        let colors = [color];
+        let extent = vk::Extent2D { width: shape.width, height: shape.height };
+        let mut info = vk::RenderingInfo::default()
+            .render_area(vk::Rect2D { offset: vk::Offset2D::default(), extent })
+            .layer_count(1)
+            .color_attachments(&colors);
+        if let Some(depth) = &depth {
+            info = info.depth_attachment(depth);
+        }
+        // SAFETY: the attachments are borrowed until the commands have run and in the layouts stated (tracked).
+        unsafe { self.device.handle.cmd_begin_rendering(self.buffer, &info) };
+        let outcome = record(&mut Drawing { commands: self, pipeline: None });
+        // SAFETY: begun above.
+        unsafe { self.device.handle.cmd_end_rendering(self.buffer) };
+        outcome
+    }
+}
+
+/// Inside a render pass.
+pub struct Drawing<'c, 'r> {
+    commands: &'c mut Commands<'r>,
+    pipeline: Option<&'r GraphicsPipeline>,
+}
+
+impl<'r> Drawing<'_, 'r> {
+    /// Selects the pipeline and its vertex buffers, in order of location, and the index buffer (32-bit).
+    ///
+    /// # Panics
+    /// When the number of vertex buffers is not the shader's number of inputs.
+    pub fn bind(&mut self, pipeline: &'r GraphicsPipeline, vertices: &[(&'r Buffer, u64)], indices: &'r Buffer) {
+        assert_eq!(vertices.len(), pipeline.inputs.len(), "{}: vertex buffers against shader inputs", pipeline.name);
+        let pass = self.commands.pass_name();
+        let tracker = &mut self.commands.tracker;
+        for (buffer, offset) in vertices {
+            tracker.use_range(buffer.id, &buffer.name, *offset..buffer.size_bytes, Access::VertexRead, &pass);
+        }
+        tracker.use_range(indices.id, &indices.name, indices.all(), Access::VertexRead, &pass);
+        let handle = &self.commands.device.handle;
+        let buffer = self.commands.buffer;
+        // SAFETY: everything is borrowed until the commands have run.
+        unsafe {
+            handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
+            for (input, (vertex, offset)) in pipeline.inputs.iter().zip(vertices) {
+                handle.cmd_bind_vertex_buffers(buffer, input.location, &[vertex.raw()], &[*offset]);
+            }
+            handle.cmd_bind_index_buffer(buffer, indices.raw(), 0, vk::IndexType::UINT32);
+        }
+        self.pipeline = Some(pipeline);
+    }
+
+    /// Restricts drawing to a rectangle in pixels: viewport and scissor.
+    pub fn area(&mut self, x: u32, y: u32, width: u32, height: u32) {
+        let viewport = vk::Viewport {
+            x: x as f32,
+            y: y as f32,
+            width: width as f32,
+            height: height as f32,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        };
+        let scissor = vk::Rect2D {
+            offset: vk::Offset2D { x: x.cast_signed(), y: y.cast_signed() },
+            extent: vk::Extent2D { width, height },
+        };
+        let handle = &self.commands.device.handle;
+        // SAFETY: the command buffer is recording.
+        unsafe {
+            handle.cmd_set_viewport(self.commands.buffer, 0, &[viewport]);
+            handle.cmd_set_scissor(self.commands.buffer, 0, &[scissor]);
+        }
+    }
+
+    /// Sets the bound pipeline's push constants.
+    ///
+    /// # Panics
+    /// Before [`Drawing::bind`].
+    pub fn push<P: Pod>(&mut self, push: &P) {
+        let pipeline = self.pipeline.expect("a pipeline is bound before its push constants");
+        self.commands.push(&pipeline.layout, &pipeline.name, push);
+    }
+
+    /// Draws the indices of a range, three a triangle.
+    ///
+    /// # Panics
+    /// Before [`Drawing::bind`].
+    pub fn indexed(&mut self, range: Range<u32>) {
+        assert!(self.pipeline.is_some(), "a pipeline is bound before drawing");
+        // SAFETY: the index buffer covers the range (its owner made both); values were checked when the mesh was read.
+        unsafe {
+            let count = range.end - range.start;
+            self.commands.device.handle.cmd_draw_indexed(self.commands.buffer, count, 1, range.start, 0, 0);
+        }
+    }
+}

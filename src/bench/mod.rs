@@ -6,6 +6,7 @@ pub mod cases;
 pub mod figures;
 pub mod plot;
 pub mod rival;
+pub mod stability;
 pub mod sweep;
 pub mod text;
 pub mod time_error;

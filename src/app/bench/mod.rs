@@ -1,5 +1,6 @@
 //! `shadow-fields bench`: the measurements behind the documentation's figures.
 
+mod stability;
 mod time_error;
 
 use super::Global;
@@ -17,11 +18,14 @@ pub struct Arguments {
 enum What {
     /// What a picture's error is made of, what run time buys, and ray casting beside the merge
     TimeError(time_error::Arguments),
+    /// What long chains, odd places and odd numbers do to the merge; exit code 1 where one goes wrong
+    Stability(stability::Arguments),
 }
 
 /// Runs a measurement.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     match &arguments.what {
         What::TimeError(arguments) => time_error::run(global, arguments),
+        What::Stability(arguments) => stability::run(global, arguments),
     }
 }

@@ -1,0 +1,70 @@
+//! `shadow-fields bench stability`
+
+use crate::app::context::Context;
+use crate::app::{Global, output};
+use crate::bench::{Bench, stability, text::three};
+use crate::error::{Error, Result};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `bench stability`.
+#[derive(Args)]
+pub struct Arguments {
+    /// Chains of up to 64 factors instead of 1000
+    #[arg(long)]
+    quick: bool,
+    /// Folder for chains.csv, trials.csv and stability.json
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Measures, prints both tables, and fails where a trial did.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let context = Context::new(global)?;
+    let bench = Bench {
+        baker: &context.baker,
+        cache: &context.cache,
+        progress: &|_| {},
+        quick: arguments.quick,
+        seed: global.seed,
+        origin: context.origin(global),
+    };
+    let outcome = stability::run(&bench, &arguments.out)?;
+    if global.json {
+        output::say(serde_json::to_value(&outcome).expect("results are plain data").to_string());
+    } else {
+        output::say("Irradiance behind chains of caps (1 where nothing blocks)");
+        let rows: Vec<Vec<String>> = outcome
+            .chains
+            .iter()
+            .map(|c| {
+                let numbers = [c.truth, c.plain, c.guarded, c.f32, c.f16, c.bands_5, c.bands_6, c.bands_7];
+                [c.caps.to_owned(), c.count.to_string()].into_iter().chain(numbers.map(three)).collect()
+            })
+            .collect();
+        let header = ["caps", "count", "truth", "plain", "guarded", "f32", "f16", "5 bands", "6 bands", "7 bands"];
+        output::table(&header, &rows);
+        output::say("\nOdd scenes");
+        let yes = |good: bool| if good { "yes" } else { "NO" }.to_owned();
+        let rows: Vec<Vec<String>> = outcome
+            .trials
+            .iter()
+            .map(|t| {
+                vec![
+                    t.name.to_owned(),
+                    yes(t.finite),
+                    yes(t.repeatable),
+                    three(t.largest),
+                    format!("{:.1e}", t.twin_error),
+                    yes(t.passed),
+                ]
+            })
+            .collect();
+        output::table(&["scene", "finite", "repeatable", "largest", "against f64", "passed"], &rows);
+    }
+    context.finish()?;
+    match outcome.trials.iter().filter(|t| !t.passed).count() {
+        0 => Ok(()),
+        failed => Err(Error::Failed(format!("{failed} of {} scenes failed", outcome.trials.len()))),
+    }
+}

@@ -9,7 +9,7 @@ use shadow_fields::asset::embedded;
 use shadow_fields::asset::generate::Generator;
 use shadow_fields::field::{Lookup, Storage};
 use shadow_fields::frame::{Frame, Options};
-use shadow_fields::render::variant::VARIANTS;
+use shadow_fields::render::variant::{Skip, VARIANTS};
 use shadow_fields::scene::{Placement, Scene};
 use stage::{Stage, scene, small, stage};
 use std::path::Path;
@@ -135,6 +135,10 @@ fn variants_lookups_lattices_and_bands() {
             assert!(worst <= 2e-6 * (1.0 + brightest), "{}: {worst:e} from the first variant", variant.name);
         }
     }
+    for skip in [Skip::NONE, Skip { horizon: true, cones: false }, Skip { horizon: false, cones: true }] {
+        let mut frame = stage.frame(&scene, Options { skip, ..base });
+        agrees(&format!("{skip:?}"), &mut frame, &placements);
+    }
     for lookup in [Lookup::Nearest, Lookup::Radial] {
         let mut frame = stage.frame(&scene, Options { lookup, ..base });
         let (worst, off) = against_twin(&mut frame, &placements);
@@ -167,7 +171,7 @@ sphere = { radius_m = 0.5, subdivisions = 2 }
 mesh = "floor"
 "#;
 
-/// Six lights around a ball: two dispatches a receiver.
+/// Six lights around a ball.
 fn six_lights() -> Scene {
     let mut text = format!("environment = {{ uniform = [0.1, 0.2, 0.3] }}\n{FLOOR_AND_BALL}");
     text += "[[entity]]\nmesh = \"ball\"\nposition = [0.113, 0.817, 0.029]\n";
@@ -185,7 +189,7 @@ fn six_lights() -> Scene {
 }
 
 #[test]
-fn more_lights_than_one_dispatch_takes() {
+fn six_lights_add_up() {
     let Some(stage) = stage() else { return };
     let scene = six_lights();
     let mut frame = stage.frame(&scene, small());
@@ -268,7 +272,6 @@ fn every_barrier_is_needed() {
         outcome.err().map(|error| error.to_string())
     };
     let expected = [
-        ("radiosity", "pass merge and pass merge"),
         ("radiosity", "pass merge and pass draw"),
         ("picture", "pass draw and pass read back"),
         ("readback", "pass read back and pass host"),

@@ -9,6 +9,7 @@ use shadow_fields::bake::{self, Baker};
 use shadow_fields::field::{Lookup, Storage};
 use shadow_fields::frame::{Frame, Options};
 use shadow_fields::render::Variant;
+use shadow_fields::render::variant::Skip;
 use shadow_fields::scene::{Placement, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -41,7 +42,8 @@ pub fn small() -> Options {
     Options {
         bake: bake::Options { bands: 4, storage: Storage::F32, lattice, face_px: 16 },
         lookup: Lookup::Trilinear,
-        variant: Some(Variant::named("texel-uniform").unwrap()),
+        variant: Some(Variant::named("texel").unwrap()),
+        skip: Skip::ALL,
         size: [64, 48],
         multisample: true,
     }

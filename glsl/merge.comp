@@ -101,46 +101,49 @@ void main() {
     }
     float t[COEFFICIENTS] = t_start;
     vec3 sum = vec3(0.0);
-    uint i = 0;
-    // Tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the loop.
-    do {
-        uint packed = steps[cluster.step_first + i];
-        uint e = packed & 0xfff;
-        uint l = (packed >> 12) & 0xfff;
-        bool shines = (packed & STEP_LIGHT) != 0;
-        uint channel = (packed >> STEP_CHANNEL) & 3;
-        bool of_radiance = shines && channel != 3;
+    // Nothing may be read without a step: the scene may have no field at all.
+    if (cluster.step_count > 0) {
+        uint i = 0;
+        // Tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the loop.
+        do {
+            uint packed = steps[cluster.step_first + i];
+            uint e = packed & 0xfff;
+            uint l = (packed >> 12) & 0xfff;
+            bool shines = (packed & STEP_LIGHT) != 0;
+            uint channel = (packed >> STEP_CHANNEL) & 3;
+            bool of_radiance = shines && channel != 3;
 
-        Entity entity = ENTITY(e);
-        Cone cone = cone_of(entity.centre, position);
-        float weight = e == cluster.receiver ? 0.0 : above_horizon(cone, normal);
-        // The sky's chain has no light; any entity will do to keep the read in bounds.
-        Cone light = cone_of(ENTITY(l == SKY_CHAIN ? e : l).centre, position);
-        if (!shines && l != SKY_CHAIN) {
-            weight *= before(e, cone, l, light);
-        }
-        vec3 from = (position - entity.centre.xyz) * entity.centre.w;
-        vec3 p = vec3(dot(entity.to_object_x.xyz, from), dot(entity.to_object_y.xyz, from), dot(entity.to_object_z.xyz, from));
-        uint base = of_radiance ? entity.radiance_base + channel * FIELD_QUADS : entity.blocked_base;
-        float b[COEFFICIENTS];
-        field_gather(field_place(p, entity.radial), base, of_radiance ? 3 * FIELD_QUADS : FIELD_QUADS, b);
-        sh_rotate(b, e * ROTATION_QUADS);
+            Entity entity = ENTITY(e);
+            Cone cone = cone_of(entity.centre, position);
+            float weight = above_horizon(cone, normal);
+            // The sky's chain has no light; any entity will do to keep the read in bounds.
+            Cone light = cone_of(ENTITY(l == SKY_CHAIN ? e : l).centre, position);
+            if (!shines && l != SKY_CHAIN) {
+                weight *= before(e, cone, l, light);
+            }
+            vec3 from = (position - entity.centre.xyz) * entity.centre.w;
+            vec3 p = vec3(dot(entity.to_object_x.xyz, from), dot(entity.to_object_y.xyz, from), dot(entity.to_object_z.xyz, from));
+            uint base = of_radiance ? entity.radiance_base + channel * FIELD_QUADS : entity.blocked_base;
+            float b[COEFFICIENTS];
+            field_gather(field_place(p, entity.radial), base, of_radiance ? 3 * FIELD_QUADS : FIELD_QUADS, b);
+            sh_rotate(b, e * ROTATION_QUADS);
 
-        float met = 0.0;
-        float share = shines ? 0.0 : weight;
-        [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
-            met += b[k] * t[k];
-            b[k] *= share;
-        }
-        vec3 color = of_radiance ? vec3(channel == 0, channel == 1, channel == 2) : vec3(1.0);
-        sum += (shines ? weight * met : 0.0) * color * entity.emission.rgb;
-        sh_subtract_product(t, b);
-        bool anew = (packed & STEP_LAST) != 0;
-        [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
-            t[k] = anew ? t_start[k] : t[k];
-        }
-        i++;
-    } while (i < cluster.step_count);
+            float met = 0.0;
+            float share = shines ? 0.0 : weight;
+            [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
+                met += b[k] * t[k];
+                b[k] *= share;
+            }
+            vec3 color = of_radiance ? vec3(channel == 0, channel == 1, channel == 2) : vec3(1.0);
+            sum += (shines ? weight * met : 0.0) * color * entity.emission.rgb;
+            sh_subtract_product(t, b);
+            bool anew = (packed & STEP_LAST) != 0;
+            [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
+                t[k] = anew ? t_start[k] : t[k];
+            }
+            i++;
+        } while (i < cluster.step_count);
+    }
 
     [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
         sum += sky[k].rgb * t[k];

@@ -123,7 +123,6 @@ pub fn steps(bounds: &Bounds, pose: &Pose, bodies: &[Body], sky: bool, skip: Ski
         View { index, to, distance, spread_rad, below }
     };
     let occluders: Vec<View> = pose.occluders.iter().map(|&j| view(j)).collect();
-    let first = out.len();
 
     for light in (0..bodies.len()).filter(|&l| bodies[l].emits && l != pose.entity).map(view) {
         let channels = if bodies[light.index].coloured { 3 } else { 1 };
@@ -158,10 +157,6 @@ pub fn steps(bounds: &Bounds, pose: &Pose, bodies: &[Body], sky: bool, skip: Ski
         counts.below_horizon += occluders.iter().filter(|o| o.below).count() as u64;
         let steps = occluders.iter().filter(|o| !o.below);
         out.extend(steps.map(|o| Step::Occlude { entity: o.index as u32, light: None }.pack()));
-    }
-    if out.len() == first {
-        // The merge's loop runs at least once; the receiver itself weighs nothing.
-        out.push(Step::Occlude { entity: pose.entity as u32, light: None }.pack());
     }
     counts
 }

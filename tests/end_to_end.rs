@@ -44,19 +44,21 @@ fn render_writes_what_it_is_asked_for() {
     assert_eq!(names(folder), ["p.exr", "p.png", "s.json", "v.csv"]);
     assert_eq!(ran.stdout.lines().count(), 1, "{}", ran.stdout);
 
-    // The PNG is the EXR in sRGB, except where a sample of the pixel is brighter than white: near what is.
+    // The PNG is the EXR in sRGB at the scene's exposure, except where a sample of the pixel is brighter than white: near what is.
     let png = picture(folder, "p.png", [96, 64]);
     let exr = image::load_from_memory(&read(folder, "p.exr")).unwrap().into_rgb32f();
     assert_eq!(exr.dimensions(), (96, 64));
     let brightest = exr.pixels().flat_map(|p| p.0).fold(0.0_f32, f32::max);
     assert!((100.0..200.0).contains(&brightest), "the light itself is seen, unclamped: {brightest}");
+    let scene = shadow_fields::scene::Scene::load(Path::new(SCENE)).unwrap();
+    let gain = scene.data.output.exposure_ev.exp2();
     let (mut same, mut clamped) = (0, 0);
     for (x, y, p) in png.enumerate_pixels() {
         let linear = exr.get_pixel(x, y).0;
         let around = (y.saturating_sub(1)..(y + 2).min(64))
             .flat_map(|y| (x.saturating_sub(1)..(x + 2).min(96)).map(move |x| (x, y)));
-        if around.flat_map(|(x, y)| exr.get_pixel(x, y).0).all(|c| c < 0.95) {
-            for (shown, linear) in p.0.iter().zip(linear) {
+        if around.flat_map(|(x, y)| exr.get_pixel(x, y).0).all(|c| gain * c < 0.95) {
+            for (shown, linear) in p.0.iter().zip(linear.map(|c| gain * c)) {
                 let srgb =
                     255.0 * if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
                 assert!((f32::from(*shown) - srgb).abs() <= 1.0, "pixel {x}, {y}: {shown} for {srgb}");
@@ -79,7 +81,9 @@ fn render_writes_what_it_is_asked_for() {
         .collect();
     assert!(rows.iter().all(|(_, n)| n.len() == 9 && n.iter().all(|n| n.is_finite())));
     let count = |name| rows.iter().filter(|(entity, _)| *entity == name).count();
-    assert_eq!([count("floor"), count("ball"), count("light")], [113 * 113, 2562, 2562]);
+    for entity in &scene.entities {
+        assert_eq!(count(&entity.name), scene.meshes[entity.mesh].positions.len(), "{}", entity.name);
+    }
     for (entity, n) in &rows {
         let ball = [n[0] + 0.2, n[1] - 0.65, n[2]];
         match *entity {
@@ -206,15 +210,15 @@ fn bake_and_inspect_a_sphere() {
 
     good(
         folder,
-        &["bake", "ball.obj", "-o", "r.sf", "--lattice", "cube:4x3", "--face-px", "16", "--radiance", "4,2,0.5"],
+        &["bake", "ball.obj", "-o", "r.sf", "--lattice", "cube:8x4", "--face-px", "32", "--radiance", "4,2,0.5"],
     );
     let result = json(&good(folder, &["inspect", "r.sf", "--json", "--at", "0,2,0"]).stdout);
     assert_eq!(result["header"]["kind"], "radiance");
     let mean = |channel: usize| result["at"]["radiance"][channel][0].as_f64().unwrap();
     assert!((mean(0) / mean(1) - 2.0).abs() < 1e-3 && (mean(1) / mean(2) - 4.0).abs() < 1e-3, "{result}");
-    // A cap of cos c and radiance 4 has 4 sqrt(pi) (1 - c) in band 0; 16 px see it within some percent.
+    // A cap of cos c and radiance 4 has 4 sqrt(pi) (1 - c) in band 0; 32 px see it within some percent.
     let expected = 4.0 * cap(4.0, [0.0, -1.0, 0.0])[0];
-    assert!((mean(0) / expected - 1.0).abs() < 0.15, "{} for {expected}", mean(0));
+    assert!((mean(0) / expected - 1.0).abs() < 0.08, "{} for {expected}", mean(0));
     assert_eq!(names(folder), ["ball.obj", "f.sf", "pair.png", "plain.png", "r.sf"]);
 }
 
@@ -299,7 +303,7 @@ fn shaders_can_be_replaced() {
     let source = include_str!("../glsl/merge.comp");
     let render = |output| small(&["render", SCENE, "--shader-dir", "glsl", "-o", output]);
     good(folder, &render("plain.png"));
-    let last = "sum * entities[receiver].albedo.rgb";
+    let last = "sum * receiver.albedo.rgb";
     assert!(source.contains(last));
     let edited = source.replace(last, &format!("vec3(0.5, 0.25, 0.0) * {last}"));
     std::fs::write(folder.join("glsl/merge.comp"), edited).unwrap();

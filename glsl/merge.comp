@@ -90,7 +90,8 @@ void main() {
     vec3 normal = vertex_quad(at + 1).xyz;
     // A row of the inverse rotation is a column of the rotation.
     mat3 to_world = mat3(receiver.to_object_x.xyz, receiver.to_object_y.xyz, receiver.to_object_z.xyz);
-    position = receiver.centre.xyz + receiver.albedo.w * (to_world * position);
+    // World axes, but from the receiver's centre: far from the world's origin f32 positions would be too coarse.
+    position = receiver.albedo.w * (to_world * position);
     normal = to_world * normal;
 
     float t_start[COEFFICIENTS];
@@ -114,10 +115,13 @@ void main() {
             bool of_radiance = shines && channel != 3;
 
             Entity entity = ENTITY(e);
+            entity.centre.xyz -= receiver.centre.xyz;
             Cone cone = cone_of(entity.centre, position);
             float weight = above_horizon(cone, normal);
             // The sky's chain has no light; any entity will do to keep the read in bounds.
-            Cone light = cone_of(ENTITY(l == SKY_CHAIN ? e : l).centre, position);
+            vec4 light_centre = ENTITY(l == SKY_CHAIN ? e : l).centre;
+            light_centre.xyz -= receiver.centre.xyz;
+            Cone light = cone_of(light_centre, position);
             if (!shines && l != SKY_CHAIN) {
                 weight *= before(e, cone, l, light);
             }

@@ -72,7 +72,7 @@ impl Task<'_> {
         let transfer = self.transfer(v, &rotations[self.receiver]);
 
         let normal = receiver.rotation * self.normals[v];
-        let cones: Vec<Cone> = self.objects.iter().map(|o| Cone::new(o, position)).collect();
+        let cones: Vec<Cone> = self.objects.iter().map(|o| Cone::new(o.centre, o.radius_m, position)).collect();
         let factors: Vec<(usize, Coefficients)> = self
             .occluders
             .iter()
@@ -144,26 +144,31 @@ impl Task<'_> {
 }
 
 /// What a bounding sphere covers of a vertex's view: the twin of `glsl/merge_cone.glsl`, in angles.
-struct Cone {
+#[derive(Clone, Copy, Debug)]
+pub struct Cone {
     toward: DVec3,
-    distance: f64,
+    /// Distance of the sphere's centre, metres.
+    pub distance: f64,
     half_angle_rad: Option<f64>,
 }
 
 impl Cone {
-    fn new(object: &Object<'_>, position: DVec3) -> Self {
-        let to = object.centre - position;
+    /// The cone of a sphere as seen from `position`, metres.
+    pub fn new(centre: DVec3, radius_m: f64, position: DVec3) -> Self {
+        let to = centre - position;
         let distance = to.length();
-        let sine = object.radius_m / distance;
+        let sine = radius_m / distance;
         Cone { toward: to.normalize_or_zero(), distance, half_angle_rad: (sine < 1.0).then(|| sine.asin()) }
     }
 
-    fn above_horizon(&self, normal: DVec3, skip: Skip) -> f64 {
+    /// Share with which it counts above a horizon: 1 where any of the sphere rises above it, fading to 0 below.
+    pub fn above_horizon(&self, normal: DVec3, skip: Skip) -> f64 {
         let sine = self.half_angle_rad.map_or(1.0, f64::sin);
         if skip.horizon { smoothstep(-sine - SKIP_FADE_RAD.sin(), -sine, normal.dot(self.toward)) } else { 1.0 }
     }
 
-    fn overlap(&self, other: &Cone, skip: Skip) -> f64 {
+    /// Share with which an occluder counts before a light: 1 where their spheres overlap, fading to 0 beside each other.
+    pub fn overlap(&self, other: &Cone, skip: Skip) -> f64 {
         match (self.half_angle_rad, other.half_angle_rad) {
             (Some(a), Some(b)) if skip.cones && (a + b + SKIP_FADE_RAD).cos() < (a + b).cos() => {
                 smoothstep((a + b + SKIP_FADE_RAD).cos(), (a + b).cos(), self.toward.dot(other.toward))

@@ -4,6 +4,8 @@
 use super::Vertex;
 use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
 use super::world::{Sight, View, World};
+use crate::render::reference::Cone;
+use crate::render::variant::Skip;
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::product::Tensor;
@@ -24,12 +26,14 @@ pub struct Exact {
     pub rays: u32,
     /// Decides the points.
     pub seed: u64,
+    /// What the chain leaves out, by the merge's rules: where true visibility is zero the band-limited product is not.
+    pub skip: Skip,
 }
 
 impl Default for Exact {
-    /// 4 bands throughout, 4096 rays a factor.
+    /// 4 bands throughout, 4096 rays a factor, every skip.
     fn default() -> Self {
-        Exact { bands: 4, visibility_bands: 4, rays: 4096, seed: 2 }
+        Exact { bands: 4, visibility_bands: 4, rays: 4096, seed: 2, skip: Skip::ALL }
     }
 }
 
@@ -49,31 +53,44 @@ impl Exact {
         };
         let transfer = self.transfer(world, &view, points(0));
         let centre = world.bodies[vertex.entity].centre;
+        let cone = |sight: &Sight| {
+            let body = &world.bodies[sight.entity];
+            Cone::new(body.centre, body.radius_m, view.position)
+        };
         let mut occluders = world.occluders(&view);
         let from_centre = |sight: &Sight| world.bodies[sight.entity].centre.distance(centre);
         occluders.sort_by(|a, b| from_centre(a).total_cmp(&from_centre(b)).then(a.entity.cmp(&b.entity)));
         let factors: Vec<(Sight, Coefficients)> = occluders
             .into_iter()
-            .map(|occluder| (occluder, self.blocked(world, &occluder, points(1 + occluder.entity))))
+            .map(|occluder| {
+                let share = cone(&occluder).above_horizon(view.normal, self.skip);
+                let blocked = self.blocked(world, &occluder, points(1 + occluder.entity));
+                (occluder, blocked.map(|b| b * share))
+            })
             .collect();
-        let chain = |precedes: &dyn Fn(&Sight) -> bool| {
+        // The chain of the occluders, each as much as `share` says.
+        let chain = |share: &dyn Fn(&Sight) -> f64| {
             let mut t = transfer;
-            for (_, blocked) in factors.iter().filter(|(occluder, _)| precedes(occluder)) {
-                let mut product = [0.0; MAX_COEFFICIENTS];
-                tensor.multiply(&t, blocked, &mut product);
+            for (occluder, blocked) in &factors {
+                let (share, mut product) = (share(occluder), [0.0; MAX_COEFFICIENTS]);
+                tensor.multiply(&t, &blocked.map(|b| b * share), &mut product);
                 t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
             }
             t
         };
         let against = |s: &[f64], t: &Coefficients| s.iter().zip(t).take(count).map(|(s, t)| s * t).sum::<f64>();
 
-        let through = chain(&|_| true);
+        let through = chain(&|_| 1.0);
         let mut sum = DVec3::from_array(sky.each_ref().map(|channel| against(channel, &through)));
         for light in world.lights(&view) {
-            let t = chain(&|occluder| occluder.precedes(&light));
+            let behind = cone(&light);
+            let t = chain(&|occluder| {
+                if occluder.precedes(&light) { cone(occluder).overlap(&behind, self.skip) } else { 0.0 }
+            });
+            let reach = behind.above_horizon(view.normal, self.skip);
             let radiance = self.radiance(world, &light, points(1 + light.entity));
             let emission = world.scene.entities[light.entity].emission.as_dvec3();
-            sum += emission * DVec3::from_array(radiance.each_ref().map(|channel| against(channel, &t)));
+            sum += reach * emission * DVec3::from_array(radiance.each_ref().map(|channel| against(channel, &t)));
         }
         (sum * world.scene.entities[vertex.entity].albedo.as_dvec3() / PI).to_array()
     }

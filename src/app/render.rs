@@ -6,6 +6,7 @@ use crate::asset::picture;
 use crate::error::{Error, Result};
 use crate::frame::{Frame, Options};
 use crate::scene::Scene;
+use crate::truth::{self, raycast::RayCast};
 use clap::Args;
 use serde_json::json;
 use std::fmt::Write;
@@ -41,6 +42,12 @@ pub struct Arguments {
     /// Also write times and counts
     #[arg(long, value_name = "S.json")]
     stats: Option<PathBuf>,
+    /// Light by ray casting instead of shadow fields: slow, and what the fields are judged by
+    #[arg(long)]
+    reference: bool,
+    /// With --reference: rays a vertex for the sky and for each light
+    #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
+    rays: u32,
     #[command(flatten)]
     merge: MergeArguments,
     #[command(flatten)]
@@ -78,11 +85,17 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let [width, height] = options.size;
     let mut encoded = Vec::new();
     let mut timings = Vec::new();
+    let mut worst_error = 0.0_f64;
     for index in 0..arguments.frames {
         let time_s = arguments.time + f64::from(index) / f64::from(arguments.fps);
         let placements = scene.at(time_s);
         let start = Instant::now();
-        let passes = frame.render(&placements, Some(white(shape.exposure_ev)))?;
+        let passes = if arguments.reference {
+            worst_error = light_by_rays(&mut frame, &placements, arguments.rays, global.seed)?.max(worst_error);
+            frame.redraw(&placements, white(shape.exposure_ev))?
+        } else {
+            frame.render(&placements, Some(white(shape.exposure_ev)))?
+        };
         timings.push((time_s, start.elapsed(), passes));
         let rgb = frame.picture();
         match &numbered {
@@ -100,7 +113,11 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     let last = scene.at(timings.last().map_or(arguments.time, |(time_s, ..)| *time_s));
     if let Some(path) = &arguments.exr {
-        frame.render(&last, Some(f32::INFINITY))?;
+        if arguments.reference {
+            frame.redraw(&last, f32::INFINITY)?;
+        } else {
+            frame.render(&last, Some(f32::INFINITY))?;
+        }
         picture::write_exr(path, width, height, &frame.picture())?;
     }
     if let Some(path) = &arguments.vertices {
@@ -121,6 +138,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "entities": scene.entities.len(),
         "receiver_vertices": frame.receiver_vertex_count(),
         "variant": frame.variant.name,
+        "lookups": frame.counts,
+        "reference_standard_error": arguments.reference.then_some(worst_error),
         "options": {
             "bake": options.bake, "lattice": options.bake.lattice.to_string(), "lookup": options.lookup, "skip": options.skip,
             "size": options.size, "multisample": options.multisample,
@@ -144,11 +163,25 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             prepared.as_secs_f64() * 1e3,
             if arguments.frames == 1 { "a frame".into() } else { format!("{} frames, each", arguments.frames) },
             output::median(&walls),
-            frame.variant.name
+            if arguments.reference {
+                format!("none: {} rays, relative standard error {worst_error:.1e}", arguments.rays)
+            } else {
+                frame.variant.name.into()
+            }
         ));
     }
     drop(frame);
     context.finish()
+}
+
+/// Replaces what the merge would find by what rays find. Returns the relative standard error.
+fn light_by_rays(frame: &mut Frame, placements: &[crate::scene::Placement], rays: u32, seed: u64) -> Result<f64> {
+    let cast = RayCast { rays, seed, ..Default::default() };
+    let (lit, error) = truth::picture(frame.scene(), placements, &cast);
+    for (entity, radiosity) in lit {
+        frame.set_radiosity(entity, &radiosity)?;
+    }
+    Ok(error)
 }
 
 /// Radiance that the exposure shows as white.

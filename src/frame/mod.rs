@@ -184,14 +184,18 @@ impl Frame {
         Ok(())
     }
 
-    /// Replaces the radiosity of an entity's vertices until the next merge: for pictures of what was computed elsewhere.
+    /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what was computed elsewhere.
     ///
     /// # Errors
     /// `Device` when memory ran out.
     pub fn set_radiosity(&mut self, entity: usize, radiosity: &[[f32; 3]]) -> Result<()> {
-        let vertices = &self.store.geometries[self.scene.entities[entity].mesh].vertices;
-        assert_eq!(radiosity.len(), vertices.len(), "radiosity of entity {entity}");
-        let quads: Vec<[f32; 4]> = radiosity.iter().map(|&[r, g, b]| [r, g, b, 0.0]).collect();
+        let order = &self.store.geometries[self.scene.entities[entity].mesh].order;
+        assert_eq!(radiosity.len(), order.len(), "radiosity of entity {entity}");
+        let quad = |&v: &u32| {
+            let [r, g, b] = radiosity[v as usize];
+            [r, g, b, 0.0]
+        };
+        let quads: Vec<[f32; 4]> = order.iter().map(quad).collect();
         self.radiosity.fill(self.radiosity_offsets[entity], &quads)
     }
 
@@ -202,8 +206,8 @@ impl Frame {
         halves.chunks_exact(4).flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
     }
 
-    /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without emission; zero where it does
-    /// not receive.
+    /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without emission;
+    /// zero where it does not receive.
     ///
     /// # Errors
     /// `Device` when memory ran out.

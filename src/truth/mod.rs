@@ -54,14 +54,17 @@ pub fn sample_vertices(scene: &Scene, count: usize, seed: u64) -> Vec<Vertex> {
     all
 }
 
+/// An entity and the radiosity of its vertices.
+pub type EntityRadiosity = (usize, Vec<[f32; 3]>);
+
 /// T0 of a whole scene, for pictures: radiosity of every receiver's vertices by entity, as `Frame::set_radiosity` takes
 /// it, and the root mean square of its standard error relative to that of the radiosity.
-pub fn picture(scene: &Scene, placements: &[Placement], cast: &RayCast) -> (Vec<(usize, Vec<[f32; 3]>)>, f64) {
+pub fn picture(scene: &Scene, placements: &[Placement], cast: &RayCast) -> (Vec<EntityRadiosity>, f64) {
     let shapes = Shapes::new(scene);
     let world = World::new(scene, &shapes, placements);
     let vertices = receiver_vertices(scene);
     let lit = cast.run(&world, &vertices);
-    let mut out: Vec<(usize, Vec<[f32; 3]>)> = Vec::new();
+    let mut out: Vec<EntityRadiosity> = Vec::new();
     for (vertex, estimate) in vertices.iter().zip(&lit) {
         if out.last().is_none_or(|(entity, _)| *entity != vertex.entity) {
             out.push((vertex.entity, Vec::new()));

@@ -25,6 +25,7 @@ pub mod bake;
 pub mod bench;
 pub mod error;
 pub mod field;
+pub mod files;
 pub mod frame;
 #[allow(unsafe_code)]
 pub mod gpu;

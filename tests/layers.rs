@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 /// `field` stands before `shaders` because a shader's STRIDE is the stride of stored channels, and before `asset` and `bake`
 /// because it is plain data; `scene` only needs `asset`, and stands after `render` since neither uses the other.
 const ORDER: &[&str] = &[
-    "error", "sh", "layout", "gpu", "field", "shaders", "asset", "bake", "render", "scene", "frame", "truth", "bench",
-    "app", "main",
+    "error", "files", "sh", "layout", "gpu", "field", "shaders", "asset", "bake", "render", "scene", "frame", "truth",
+    "bench", "app", "main",
 ];
 
 /// The only modules that `gpu` may use: it knows nothing of what it is for.
-const GPU_USES: &[&str] = &["error"];
+const GPU_USES: &[&str] = &["error", "files"];
 
 /// Lines that a file may have; STYLE asks why above it.
 const LINE_LIMIT: usize = 400;

@@ -3,6 +3,7 @@
 use super::context::{BakeArguments, Context, MergeArguments, size};
 use super::{Global, output};
 use crate::asset::picture;
+use crate::bench::text;
 use crate::error::{Error, Result};
 use crate::frame::{Frame, Options};
 use crate::scene::Scene;
@@ -121,7 +122,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         picture::write_exr(path, width, height, &frame.picture())?;
     }
     if let Some(path) = &arguments.vertices {
-        write_text(path, &vertex_table(&frame, &last)?)?;
+        text::write(path, &vertex_table(&frame, &last)?)?;
     }
 
     let frames: Vec<_> = timings
@@ -149,7 +150,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "frames": frames,
     });
     if let Some(path) = &arguments.stats {
-        write_text(path, &format!("{report:#}\n"))?;
+        text::write(path, &format!("{report:#}\n"))?;
     }
     if global.json {
         output::say(report.to_string());
@@ -187,11 +188,6 @@ fn light_by_rays(frame: &mut Frame, placements: &[crate::scene::Placement], rays
 /// Radiance that the exposure shows as white.
 pub fn white(exposure_ev: f32) -> f32 {
     (-exposure_ev).exp2()
-}
-
-fn write_text(path: &Path, text: &str) -> Result<()> {
-    crate::gpu::shader::write_atomically(path, text.as_bytes())
-        .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
 }
 
 /// An output name with a run of `#` that stands for the frame's number.

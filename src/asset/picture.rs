@@ -3,13 +3,13 @@
 //! Rows run from the top, pixels from the left, three channels each. A file appears under its name only once it is complete:
 //! it is written beside it and renamed.
 
-use std::fs;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
 use image::ImageEncoder as _;
 
 use crate::error::{Error, Result};
+use crate::files;
 
 /// Linear Rec.709 channel to sRGB (IEC 61966-2-1), both 0 to 1; outside it is clamped, NaN gives 0.
 pub fn srgb_from_linear(linear: f32) -> f32 {
@@ -104,25 +104,5 @@ type WriteResult = std::result::Result<(), Box<dyn std::error::Error>>;
 /// # Errors
 /// [`Error::Failed`] with the path; nothing is left behind.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> WriteResult) -> Result<()> {
-    let attempt = || -> WriteResult {
-        let special = fs::metadata(path).is_ok_and(|m| !m.is_file());
-        if special {
-            let mut file = BufWriter::new(fs::File::create(path)?);
-            write(&mut file)?;
-            return Ok(file.flush()?);
-        }
-        // A link keeps pointing where it did.
-        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut builder = tempfile::Builder::new();
-        // Like any created file, not private to its owner as temporary files are.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut file = BufWriter::new(builder.prefix(".unfinished-").tempfile_in(folder)?);
-        write(&mut file)?;
-        file.flush()?;
-        file.into_inner().map_err(|e| e.into_error())?.persist(&target)?;
-        Ok(())
-    };
-    attempt().map_err(|e| Error::Failed(format!("{}: cannot write: {e}", path.display())))
+    files::replace_with(path, write).map_err(|e| Error::Failed(format!("{}: cannot write: {e}", path.display())))
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 /// # Errors
 /// `Failed` that names the file.
 pub fn write(path: &Path, text: &str) -> Result<()> {
-    crate::gpu::shader::write_atomically(path, text.as_bytes())
+    crate::files::replace(path, text.as_bytes())
         .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
 }
 

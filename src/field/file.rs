@@ -50,8 +50,7 @@ pub fn write<H: Serialize>(path: &Path, magic: [u8; 8], header: &H, payload: &[u
     bytes.extend(hash);
     bytes.extend(&header);
     bytes.extend(payload);
-    crate::gpu::shader::write_atomically(path, &bytes)
-        .map_err(|error| Error::input(path, format!("cannot be written: {error}")))
+    crate::files::replace(path, &bytes).map_err(|error| Error::input(path, format!("cannot be written: {error}")))
 }
 
 /// Reads what [`write`] wrote. Lengths are checked against the file's size before anything is allocated for them.

@@ -276,7 +276,7 @@ impl Device {
         let Some(path) = self.pipeline_cache_path() else { return };
         // SAFETY: the cache is alive.
         let Ok(data) = (unsafe { self.handle.get_pipeline_cache_data(self.pipeline_cache) }) else { return };
-        if let Err(error) = super::shader::write_atomically(&path, &data) {
+        if let Err(error) = crate::files::replace(&path, &data) {
             log::warn!("{}: the pipeline cache was not saved: {error}", path.display());
         }
     }

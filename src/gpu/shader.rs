@@ -3,7 +3,7 @@
 use super::reflect::Reflection;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::OnceLock;
 
 /// Part of the pipeline that a shader is for; the file ending of its entry point.
@@ -77,7 +77,7 @@ impl Shader {
         }
         let spirv = compile(source, &includes)?;
         if let Some(path) = path
-            && let Err(error) = write_atomically(&path, &seal(&spirv))
+            && let Err(error) = crate::files::replace(&path, &seal(&spirv))
         {
             log::warn!("{}: the compiled shader was not saved: {error}", path.display());
         }
@@ -179,17 +179,6 @@ fn words(sealed: &[u8]) -> Option<Vec<u32>> {
     let (hash, bytes) = sealed.split_at_checked(32)?;
     (blake3::hash(bytes).as_bytes() == hash && bytes.len() % 4 == 0)
         .then(|| bytes.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes"))).collect())
-}
-
-/// Writes a file so that another process sees the old one or the new one, never a part; folders are made as needed.
-pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let folder = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
-    let folder = if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder };
-    std::fs::create_dir_all(&folder)?;
-    let mut file = tempfile::NamedTempFile::new_in(&folder)?;
-    std::io::Write::write_all(&mut file, bytes)?;
-    file.persist(path).map_err(|error| error.error)?;
-    Ok(())
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@ use super::variant::{Form, Skip, VARIANTS, Variant, uniform_entities};
 use crate::error::Result;
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::{Lattice, Lookup};
-use crate::gpu::shader::write_atomically;
 use crate::gpu::{Buffer, BufferKind, Commands, Device};
 use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, NONE, Step};
 use crate::shaders::Library;
@@ -55,7 +54,7 @@ pub fn fastest(device: &Arc<Device>, library: &Library) -> Result<Variant> {
         log::info!("calibration: {name} {milliseconds:.3} ms");
     }
     let bytes = serde_json::to_vec_pretty(&calibration).expect("a calibration is plain data");
-    if let Err(error) = write_atomically(&path, &bytes) {
+    if let Err(error) = crate::files::replace(&path, &bytes) {
         log::warn!("{}: the calibration was not kept: {error}", path.display());
     }
     Variant::named(&calibration.fastest)

@@ -18,6 +18,13 @@
 //! | scale | uniform and positive |
 //! | light | linear Rec.709 radiance; radiosity B = albedo/pi * integral L V max(0, n.w) dw |
 //! | numbers | tables in f64, shaders in f32, field storage f16 or f32 |
+//!
+//! # Layers
+//!
+//! A module uses only modules before it in this list, and a test holds it to that: [`error`], [`files`], [`sh`] (the maths, and
+//! the GLSL made from it), [`layout`] (structs that shaders read), [`gpu`] (Vulkan, all `unsafe`), [`field`] (what is sampled
+//! where, and its file), [`shaders`] (every entry point), [`asset`] (meshes, distant light, pictures), [`bake`], [`render`] (the
+//! passes of a frame), [`scene`], [`frame`] (their sequence), [`truth`] (ray casting and the exact chain), [`bench`], [`app`].
 
 pub mod app;
 pub mod asset;

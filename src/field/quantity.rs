@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub enum Kind {
     /// Object occlusion field: the blocked part b = P[1 - V], one channel.
     Occlusion,
-    /// Source radiance field: P[L] in red, green and blue.
+    /// Source radiance field: `P[L]` in red, green and blue.
     Radiance,
 }
 

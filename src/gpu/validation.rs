@@ -54,7 +54,7 @@ impl Validation {
     }
 }
 
-/// What the layer reported so far, filled by [`on_message`]; lives as long as the instance.
+/// What the layer reported so far, filled by the debug messenger; lives as long as the instance.
 #[derive(Default)]
 pub struct Messages(Mutex<Vec<String>>);
 

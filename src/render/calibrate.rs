@@ -60,7 +60,7 @@ pub fn fastest(device: &Arc<Device>, library: &Library) -> Result<Variant> {
     Variant::named(&calibration.fastest)
 }
 
-/// Times every variant on a made-up scene: a sky, [`OCCLUDERS`] turned occluders with fields of default shape.
+/// Times every variant on a made-up scene: a sky and some turned occluders with fields of default shape.
 ///
 /// # Errors
 /// `Failed` when a shader does not compile, `Device` when the device is lost.

@@ -446,7 +446,7 @@ struct Plane {
 }
 
 impl std::fmt::Display for Lattice {
-    /// In the words of [`Lattice::from_str`].
+    /// In the words that the parser takes.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.directions {
             Directions::Cube { cells } => write!(f, "cube:{}x{cells}", self.shells)?,

@@ -1,4 +1,4 @@
-//! A baked field: where it is sampled ([`lattice`]), what is stored, and its file ([`file`]).
+//! A baked field: where it is sampled ([`lattice`]), what is stored, and its file ([`mod@file`]).
 
 pub mod file;
 pub mod growth;

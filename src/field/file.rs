@@ -53,7 +53,7 @@ pub fn write<H: Serialize>(path: &Path, magic: [u8; 8], header: &H, payload: &[u
     crate::files::replace(path, &bytes).map_err(|error| Error::input(path, format!("cannot be written: {error}")))
 }
 
-/// Reads what [`write`] wrote. Lengths are checked against the file's size before anything is allocated for them.
+/// Reads what [`write()`] wrote. Lengths are checked against the file's size before anything is allocated for them.
 ///
 /// # Errors
 /// `Input` when the file is missing, of another kind or version, cut, damaged, or its header is malformed.
@@ -97,7 +97,7 @@ impl ShadowField {
     /// Writes the field to an `.sf` file.
     ///
     /// # Errors
-    /// As [`write`].
+    /// As [`write()`].
     pub fn write(&self, path: &Path) -> Result<()> {
         write(path, FIELD_MAGIC, &self.header, &self.payload)
     }

@@ -23,7 +23,6 @@ layout(binding = 2) uniform textureBuffer texels;
 layout(std430, binding = 3) writeonly buffer Samples { float samples[]; };
 
 layout(push_constant) uniform Push {
-    uint job_count;
     uint face_px;
     uint atlas_columns;
 } push;

@@ -337,11 +337,3 @@ impl Sweep<'_> {
         commands.submit()
     }
 }
-
-/// An error for a mesh that shines without being able to: used by callers that were told a colour.
-pub fn check_radiance(radiance: [f32; 3]) -> Result<()> {
-    if radiance.iter().all(|c| c.is_finite() && *c >= 0.0) {
-        return Ok(());
-    }
-    Err(Error::Usage(format!("radiance {radiance:?}: three finite numbers of at least 0 are needed")))
-}

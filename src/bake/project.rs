@@ -17,7 +17,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-use super::capture::{NO_SLOT, Slots};
+use super::capture::Slots;
 
 /// What is made of the faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,7 +64,6 @@ fn workgroup(bands: usize, projection: Projection) -> u32 {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
-    job_count: u32,
     face_px: u32,
     atlas_columns: u32,
 }
@@ -142,7 +141,7 @@ impl Project {
         samples: &'r Buffer,
         job_count: u32,
     ) -> Result<()> {
-        let push = Push { job_count, face_px: self.face_px, atlas_columns: self.columns };
+        let push = Push { face_px: self.face_px, atlas_columns: self.columns };
         let resources = [Bind::Image(atlas), Bind::Buffer(jobs), Bind::Texel(texels), Bind::Buffer(samples)];
         commands.dispatch(&self.pipeline, &resources, &push, [job_count * self.pipeline.local_size[0], 1, 1])
     }
@@ -201,9 +200,4 @@ pub fn reference(
         out.iter_mut().zip(lobe).for_each(|(blocked, whole)| *blocked = whole - *blocked);
     }
     out
-}
-
-/// Whether a slot table has any face at all.
-pub fn is_empty(slots: &Slots) -> bool {
-    slots.iter().all(|&slot| slot == NO_SLOT)
 }

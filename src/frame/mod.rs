@@ -268,6 +268,7 @@ impl Frame {
     /// Lists the steps of every cluster at this moment.
     fn gather(&mut self, placements: &[Placement]) -> Result<()> {
         let bodies: Vec<Body> = placements.iter().enumerate().map(|(index, p)| self.body(index, p)).collect();
+        let centres: Vec<DVec3> = bodies.iter().map(|b| b.centre).collect();
         let poses: Vec<Pose> = placements
             .iter()
             .enumerate()
@@ -276,7 +277,11 @@ impl Frame {
                 centre: bodies[entity].centre,
                 rotation: placement.rotation.as_dquat().normalize(),
                 scale: placement.scale.into(),
-                occluders: self.occluders(placements, entity),
+                occluders: if self.scene.entities[entity].receives {
+                    self.occluders(&centres, entity)
+                } else {
+                    Vec::new()
+                },
             })
             .collect();
         let (sky, skip) = (!self.scene.environment.is_none(), self.options.skip);
@@ -368,11 +373,10 @@ impl Frame {
     /// Occluders of a receiver, near to far from its bounding sphere's centre, ties by index; itself left out. One order for
     /// the whole receiver: products truncated in another order differ (by up to .006 over twelve occluders), which would show
     /// as seams between clusters.
-    fn occluders(&self, placements: &[Placement], receiver: usize) -> Vec<usize> {
-        let from = self.centre(receiver, &placements[receiver]);
-        let mut order: Vec<(f64, usize)> = (0..placements.len())
+    fn occluders(&self, centres: &[DVec3], receiver: usize) -> Vec<usize> {
+        let mut order: Vec<(f64, usize)> = (0..centres.len())
             .filter(|&j| self.scene.entities[j].occludes && j != receiver)
-            .map(|j| (self.centre(j, &placements[j]).distance(from), j))
+            .map(|j| (centres[j].distance(centres[receiver]), j))
             .collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         order.into_iter().map(|(_, j)| j).collect()
@@ -429,6 +433,7 @@ impl Frame {
             .collect();
         let lights = indices(&self.scene, |e| e.emits);
         let sky = self.scene.environment.coefficients(self.options.bake.bands);
+        let centres: Vec<DVec3> = objects.iter().map(|o| o.centre).collect();
         let mut out = Vec::new();
         for receiver in indices(&self.scene, |e| e.receives) {
             let mesh_index = self.scene.entities[receiver].mesh;
@@ -440,7 +445,7 @@ impl Frame {
             let task = Task {
                 objects: &objects,
                 receiver,
-                occluders: &self.occluders(placements, receiver),
+                occluders: &self.occluders(&centres, receiver),
                 lights: &lights,
                 sky: (!self.scene.environment.is_none()).then_some(&sky),
                 positions: &positions,

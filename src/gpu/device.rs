@@ -149,7 +149,6 @@ pub struct Device {
     pub(super) memory: vk::PhysicalDeviceMemoryProperties,
     pub(super) names: Option<ash::ext::debug_utils::Device>,
     pub(super) pipeline_cache: vk::PipelineCache,
-    pub(super) physical: vk::PhysicalDevice,
     /// Limits of the physical device.
     pub limits: vk::PhysicalDeviceLimits,
     /// Name, driver, kind.
@@ -213,7 +212,6 @@ impl Device {
             memory,
             names,
             pipeline_cache: vk::PipelineCache::null(),
-            physical,
             limits: properties.limits,
             info,
             cache_dir: options.cache_dir.clone(),
@@ -238,13 +236,6 @@ impl Device {
 
     pub(super) fn omitted_barrier(&self) -> usize {
         self.omitted_barrier.load(Ordering::Relaxed)
-    }
-
-    /// Whether optimal-tiling images of `format` support `features`.
-    pub fn supports(&self, format: vk::Format, features: vk::FormatFeatureFlags) -> bool {
-        // SAFETY: a query on a live handle.
-        let properties = unsafe { self.instance.handle.get_physical_device_format_properties(self.physical, format) };
-        properties.optimal_tiling_features.contains(features)
     }
 
     /// Gives a Vulkan object the name that debuggers and the validation layer show.
@@ -279,15 +270,6 @@ impl Device {
         if let Err(error) = crate::files::replace(&path, &data) {
             log::warn!("{}: the pipeline cache was not saved: {error}", path.display());
         }
-    }
-
-    /// Waits until the queue has finished everything.
-    ///
-    /// # Errors
-    /// `Device` when the device was lost.
-    pub fn wait_idle(&self) -> Result<()> {
-        // SAFETY: the queue is used from one thread at a time by construction of `Commands::submit`.
-        unsafe { self.handle.device_wait_idle() }.checked("vkDeviceWaitIdle", &self.info.name)
     }
 }
 

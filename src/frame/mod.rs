@@ -5,30 +5,27 @@
 //! ```
 
 pub mod camera;
+mod pose;
 pub mod store;
+mod twin;
 
+use crate::bake;
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::error::Result;
 use crate::field::Lookup;
-use crate::field::quantity::channel_stride;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, TexelView, Timing};
-use crate::layout::{self, CLUSTER_VERTICES, NONE};
+use crate::layout;
 use crate::render::calibrate;
 use crate::render::draw::{Draw, Item};
-use crate::render::gather::{self, Body, Bounds, Counts, Pose};
+use crate::render::gather::{Bounds, Counts};
 use crate::render::merge::{Inputs, Merge, Readable, rotation_stride};
-use crate::render::reference::{Object, Task};
 use crate::render::variant::{Form, Skip, Variant, uniform_entities};
 use crate::scene::{Placement, Scene};
 use crate::sh::basis::{Y00, coefficient_count};
-use crate::sh::rotation::Rotation;
-use crate::{bake, field};
 use ash::vk;
 use glam::{DMat4, DVec3, Vec3};
 use half::f16;
-use rayon::prelude::*;
-use std::f64::consts::PI;
 use std::sync::Arc;
 use store::{Progress, Store};
 
@@ -92,7 +89,7 @@ impl Frame {
             let geometry = &store.geometries[entity.mesh];
             radiosity_offsets.push(radiosity_size);
             if entity.receives {
-                cluster_table.extend(clusters(index, geometry, radiosity_size / 16, options.bake.bands));
+                cluster_table.extend(pose::clusters(index, geometry, radiosity_size / 16, options.bake.bands));
             }
             radiosity_size += 16 * geometry.vertices.len() as u64;
         }
@@ -247,141 +244,6 @@ impl Frame {
         })
     }
 
-    /// Writes entities, rotations and the clusters' steps of this moment.
-    fn upload(&mut self, placements: &[Placement]) -> Result<()> {
-        let bands = self.options.bake.bands;
-        let stride = rotation_stride(bands);
-        let mut entities = Vec::new();
-        let mut rotations = vec![0.0_f32; stride * placements.len()];
-        for (index, placement) in placements.iter().enumerate() {
-            entities.push(self.entity(index, placement));
-            let blocks = Rotation::new(bands, placement.rotation.as_dquat().normalize());
-            for (to, from) in rotations[index * stride..].iter_mut().zip(blocks.blocks()) {
-                *to = *from as f32;
-            }
-        }
-        self.entities.write(0, &entities);
-        self.rotations.write(0, &rotations);
-        self.gather(placements)
-    }
-
-    /// Lists the steps of every cluster at this moment.
-    fn gather(&mut self, placements: &[Placement]) -> Result<()> {
-        let bodies: Vec<Body> = placements.iter().enumerate().map(|(index, p)| self.body(index, p)).collect();
-        let centres: Vec<DVec3> = bodies.iter().map(|b| b.centre).collect();
-        let poses: Vec<Pose> = placements
-            .iter()
-            .enumerate()
-            .map(|(entity, placement)| Pose {
-                entity,
-                centre: bodies[entity].centre,
-                rotation: placement.rotation.as_dquat().normalize(),
-                scale: placement.scale.into(),
-                occluders: if self.scene.entities[entity].receives {
-                    self.occluders(&centres, entity)
-                } else {
-                    Vec::new()
-                },
-            })
-            .collect();
-        let (sky, skip) = (!self.scene.environment.is_none(), self.options.skip);
-        // Some hundred clusters make a job that is worth handing to another core.
-        let parts: Vec<(Vec<u32>, Vec<u32>, Counts)> = self
-            .cluster_table
-            .par_chunks(256)
-            .map(|clusters| {
-                let (mut steps, mut lengths, mut counts) = (Vec::new(), Vec::new(), Counts::default());
-                for (cluster, bounds) in clusters {
-                    let first = steps.len();
-                    let pose = &poses[cluster.receiver as usize];
-                    counts += gather::steps(bounds, pose, &bodies, sky, skip, &mut steps);
-                    lengths.push((steps.len() - first) as u32);
-                }
-                (steps, lengths, counts)
-            })
-            .collect();
-        self.counts = Counts::default();
-        let (mut steps, mut clusters) = (Vec::new(), Vec::with_capacity(self.cluster_table.len()));
-        for (part, lengths, counts) in parts {
-            self.counts += counts;
-            for step_count in lengths {
-                let cluster = self.cluster_table[clusters.len()].0;
-                let step_first = clusters.last().map_or(0, |c: &layout::Cluster| c.step_first + c.step_count);
-                clusters.push(layout::Cluster { step_first, step_count, ..cluster });
-            }
-            steps.extend(part);
-        }
-        if 4 * steps.len() as u64 > self.steps.size_bytes {
-            // Half as much again, so that a moving scene does not come back each frame.
-            self.steps = Buffer::new(&self.device, "steps", BufferKind::Upload, 6 * steps.len() as u64)?;
-        }
-        self.steps.write(0, &steps);
-        self.clusters.write(0, &clusters);
-        Ok(())
-    }
-
-    fn body(&self, index: usize, placement: &Placement) -> Body {
-        let entity = &self.scene.entities[index];
-        let geometry = &self.store.geometries[entity.mesh];
-        Body {
-            centre: self.centre(index, placement),
-            radius_m: geometry.radius_m * f64::from(placement.scale),
-            emits: entity.emits,
-            coloured: geometry.radiance.is_some() && entity.emits,
-        }
-    }
-
-    fn entity(&self, index: usize, placement: &Placement) -> layout::Entity {
-        let entity = &self.scene.entities[index];
-        let geometry = &self.store.geometries[entity.mesh];
-        let rotation = placement.rotation.as_dquat().normalize();
-        let rows = glam::DMat3::from_quat(rotation.inverse()).transpose();
-        let centre = self.centre(index, placement).as_vec3();
-        let radius_m = geometry.radius_m * f64::from(placement.scale);
-        let emission = match &geometry.radiance {
-            Some(slot) if entity.emits => entity.emission * slot.header.radiance_scale,
-            _ => entity.emission,
-        };
-        let slot = geometry.blocked.as_ref().or(geometry.radiance.as_ref());
-        // Both fields of a mesh have the same shells.
-        let radial = slot.map_or([0.0; 4], |slot| {
-            let lattice = slot.header.lattice;
-            let (slope, offset) = lattice.radial_map();
-            [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32]
-        });
-        layout::Entity {
-            centre: centre.extend((1.0 / radius_m) as f32).to_array(),
-            to_object_x: rows.x_axis.as_vec3().extend(0.0).to_array(),
-            to_object_y: rows.y_axis.as_vec3().extend(0.0).to_array(),
-            to_object_z: rows.z_axis.as_vec3().extend(0.0).to_array(),
-            emission: emission.extend(0.0).to_array(),
-            albedo: (entity.albedo.as_dvec3() / PI).as_vec3().extend(placement.scale).to_array(),
-            radial,
-            blocked_base: geometry.blocked.as_ref().map_or(0, store::Slot::quad),
-            radiance_base: geometry.radiance.as_ref().map_or(0, store::Slot::quad),
-            ..Default::default()
-        }
-    }
-
-    /// Centre of an entity's bounding sphere in the world, metres.
-    fn centre(&self, index: usize, placement: &Placement) -> DVec3 {
-        let centre_m = self.store.geometries[self.scene.entities[index].mesh].centre_m;
-        let rotation = placement.rotation.as_dquat().normalize();
-        placement.position.as_dvec3() + rotation * (centre_m * f64::from(placement.scale))
-    }
-
-    /// Occluders of a receiver, near to far from its bounding sphere's centre, ties by index; itself left out. One order for
-    /// the whole receiver: products truncated in another order differ (by up to .006 over twelve occluders), which would show
-    /// as seams between clusters.
-    fn occluders(&self, centres: &[DVec3], receiver: usize) -> Vec<usize> {
-        let mut order: Vec<(f64, usize)> = (0..centres.len())
-            .filter(|&j| self.scene.entities[j].occludes && j != receiver)
-            .map(|j| (centres[j].distance(centres[receiver]), j))
-            .collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        order.into_iter().map(|(_, j)| j).collect()
-    }
-
     fn items(&self, placements: &[Placement]) -> Vec<Item<'_>> {
         let [width, height] = self.options.size;
         let clip_from_world = camera::clip_from_world(&self.scene.data.camera, f64::from(width) / f64::from(height));
@@ -401,95 +263,6 @@ impl Frame {
         });
         items.collect()
     }
-
-    /// The CPU twin of the merge in f64: radiosity of every receiver's vertices, by entity. Reads the fields back.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    pub fn reference(&self, placements: &[Placement]) -> Result<Vec<(usize, Vec<[f64; 3]>)>> {
-        let mut fields: Vec<[Option<field::ShadowField>; 2]> = Vec::new();
-        for geometry in &self.store.geometries {
-            let load = |slot: &Option<store::Slot>| slot.as_ref().map(|slot| self.store.field(slot)).transpose();
-            fields.push([load(&geometry.blocked)?, load(&geometry.radiance)?]);
-        }
-        let objects: Vec<Object<'_>> = placements
-            .iter()
-            .enumerate()
-            .map(|(index, placement)| {
-                let entity = &self.scene.entities[index];
-                let [blocked, radiance] = &fields[entity.mesh];
-                let over_pi = entity.albedo.as_dvec3() / PI;
-                Object {
-                    centre: self.centre(index, placement),
-                    rotation: placement.rotation.as_dquat().normalize(),
-                    scale: placement.scale.into(),
-                    radius_m: self.store.geometries[entity.mesh].radius_m * f64::from(placement.scale),
-                    albedo_over_pi: over_pi.to_array(),
-                    emission: entity.emission.as_dvec3().to_array(),
-                    blocked: blocked.as_ref(),
-                    radiance: radiance.as_ref().filter(|_| entity.emits),
-                }
-            })
-            .collect();
-        let lights = indices(&self.scene, |e| e.emits);
-        let sky = self.scene.environment.coefficients(self.options.bake.bands);
-        let centres: Vec<DVec3> = objects.iter().map(|o| o.centre).collect();
-        let mut out = Vec::new();
-        for receiver in indices(&self.scene, |e| e.receives) {
-            let mesh_index = self.scene.entities[receiver].mesh;
-            let mesh = &self.scene.meshes[mesh_index];
-            let geometry = &self.store.geometries[mesh_index];
-            let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3() - geometry.centre_m).collect();
-            let normals: Vec<DVec3> = mesh.normals.iter().map(|n| n.as_dvec3()).collect();
-            let transfer = self.store.transfer(geometry)?;
-            let task = Task {
-                objects: &objects,
-                receiver,
-                occluders: &self.occluders(&centres, receiver),
-                lights: &lights,
-                sky: (!self.scene.environment.is_none()).then_some(&sky),
-                positions: &positions,
-                normals: &normals,
-                transfer: transfer.as_ref().map(|(floats, stride)| (&floats[..], *stride)),
-                bands: self.options.bake.bands,
-                lookup: self.options.lookup,
-                skip: self.options.skip,
-            };
-            out.push((receiver, task.run()));
-        }
-        Ok(out)
-    }
-}
-
-/// Entities that satisfy a condition.
-fn indices(scene: &Scene, condition: impl Fn(&crate::scene::Entity) -> bool) -> Vec<usize> {
-    (0..scene.entities.len()).filter(|&i| condition(&scene.entities[i])).collect()
-}
-
-/// Clusters of one receiver, without steps; `radiosity_first` is its first vertex in the radiosity buffer.
-fn clusters(
-    receiver: usize,
-    geometry: &store::Geometry,
-    radiosity_first: u64,
-    bands: usize,
-) -> Vec<(layout::Cluster, Bounds)> {
-    let transfer_quads = (channel_stride(bands) / 4) as u32;
-    let cluster = |(i, bounds): (usize, &Bounds)| {
-        let first = i as u32 * CLUSTER_VERTICES;
-        let cluster = layout::Cluster {
-            receiver: receiver as u32,
-            vertex_first: geometry.vertices.start + first,
-            vertex_count: (geometry.vertices.len() as u32 - first).min(CLUSTER_VERTICES),
-            transfer_first: match geometry.transfer_first {
-                NONE => NONE,
-                quad => quad + first * transfer_quads,
-            },
-            radiosity_first: radiosity_first as u32 + first,
-            ..Default::default()
-        };
-        (cluster, *bounds)
-    };
-    geometry.clusters.iter().enumerate().map(cluster).collect()
 }
 
 /// The variant, less the texel views or uniform blocks that cannot hold the scene.

@@ -1,0 +1,74 @@
+//! The CPU twin of a frame's merge.
+
+use super::{Frame, store};
+use crate::error::Result;
+use crate::field;
+use crate::render::reference::{Object, Task};
+use crate::scene::{Placement, Scene};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+impl Frame {
+    /// The CPU twin of the merge in f64: radiosity of every receiver's vertices, by entity. Reads the fields back.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn reference(&self, placements: &[Placement]) -> Result<Vec<(usize, Vec<[f64; 3]>)>> {
+        let mut fields: Vec<[Option<field::ShadowField>; 2]> = Vec::new();
+        for geometry in &self.store.geometries {
+            let load = |slot: &Option<store::Slot>| slot.as_ref().map(|slot| self.store.field(slot)).transpose();
+            fields.push([load(&geometry.blocked)?, load(&geometry.radiance)?]);
+        }
+        let objects: Vec<Object<'_>> = placements
+            .iter()
+            .enumerate()
+            .map(|(index, placement)| {
+                let entity = &self.scene.entities[index];
+                let [blocked, radiance] = &fields[entity.mesh];
+                let over_pi = entity.albedo.as_dvec3() / PI;
+                Object {
+                    centre: self.centre(index, placement),
+                    rotation: placement.rotation.as_dquat().normalize(),
+                    scale: placement.scale.into(),
+                    radius_m: self.store.geometries[entity.mesh].radius_m * f64::from(placement.scale),
+                    albedo_over_pi: over_pi.to_array(),
+                    emission: entity.emission.as_dvec3().to_array(),
+                    blocked: blocked.as_ref(),
+                    radiance: radiance.as_ref().filter(|_| entity.emits),
+                }
+            })
+            .collect();
+        let lights = indices(&self.scene, |e| e.emits);
+        let sky = self.scene.environment.coefficients(self.options.bake.bands);
+        let centres: Vec<DVec3> = objects.iter().map(|o| o.centre).collect();
+        let mut out = Vec::new();
+        for receiver in indices(&self.scene, |e| e.receives) {
+            let mesh_index = self.scene.entities[receiver].mesh;
+            let mesh = &self.scene.meshes[mesh_index];
+            let geometry = &self.store.geometries[mesh_index];
+            let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3() - geometry.centre_m).collect();
+            let normals: Vec<DVec3> = mesh.normals.iter().map(|n| n.as_dvec3()).collect();
+            let transfer = self.store.transfer(geometry)?;
+            let task = Task {
+                objects: &objects,
+                receiver,
+                occluders: &self.occluders(&centres, receiver),
+                lights: &lights,
+                sky: (!self.scene.environment.is_none()).then_some(&sky),
+                positions: &positions,
+                normals: &normals,
+                transfer: transfer.as_ref().map(|(floats, stride)| (&floats[..], *stride)),
+                bands: self.options.bake.bands,
+                lookup: self.options.lookup,
+                skip: self.options.skip,
+            };
+            out.push((receiver, task.run()));
+        }
+        Ok(out)
+    }
+}
+
+/// Entities that satisfy a condition.
+fn indices(scene: &Scene, condition: impl Fn(&crate::scene::Entity) -> bool) -> Vec<usize> {
+    (0..scene.entities.len()).filter(|&i| condition(&scene.entities[i])).collect()
+}

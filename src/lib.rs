@@ -24,7 +24,8 @@
 //! A module uses only modules before it in this list, and a test holds it to that: [`error`], [`files`], [`sh`] (the maths, and
 //! the GLSL made from it), [`layout`] (structs that shaders read), [`gpu`] (Vulkan, all `unsafe`), [`field`] (what is sampled
 //! where, and its file), [`shaders`] (every entry point), [`asset`] (meshes, distant light, pictures), [`bake`], [`render`] (the
-//! passes of a frame), [`scene`], [`frame`] (their sequence), [`truth`] (ray casting and the exact chain), [`mod@bench`], [`app`].
+//! passes of a frame), [`scene`], [`frame`] (their sequence), [`truth`] (ray casting and the exact chain), [`mod@bench`], [`view`] (the
+//! state behind the window), [`app`].
 
 pub mod app;
 pub mod asset;
@@ -42,5 +43,6 @@ pub mod scene;
 pub mod sh;
 pub mod shaders;
 pub mod truth;
+pub mod view;
 
 pub use error::{Error, Result};

@@ -5,25 +5,34 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3};
 use image::{ImageFormat, ImageReader, Limits};
 use serde::{Deserialize, Serialize};
 
 use super::picture::linear_from_srgb;
 use crate::error::{Error, Result};
+use crate::sh::rotation::Rotation;
 use crate::sh::{basis, lobe};
 
 /// Largest width of an environment image; its height may be half of it: 1.6 GB as f32 RGB.
 pub const WIDTH_LIMIT_PX: u32 = 16_384;
 /// Most memory in bytes that decoding an image may take.
 const DECODE_LIMIT_BYTES: u64 = 2 << 30;
+/// Largest angle that the whole may be turned by: f32 keeps hundredths of a degree there.
+const TURN_LIMIT_DEG: f32 = 1e5;
 /// Intervals of Simpson's rule for the lobe of [`Key`]; its relative error is then below 1e-11.
 const LOBE_INTERVALS: usize = 1 << 14;
 
 /// Distant light as data: what is given adds up, nothing given is darkness. Radiances are linear RGB, W m^-2 sr^-1.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
+    /// Factor on everything, 0 to 1e15.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub strength: f32,
+    /// All of it turned about +y, degrees, counter-clockwise seen from above.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub turn_deg: f32,
     /// The same radiance from everywhere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uniform: Option<Vec3>,
@@ -36,6 +45,62 @@ pub struct Source {
     /// An equirectangular picture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image: Option<Image>,
+}
+
+impl Default for Source {
+    /// Darkness.
+    fn default() -> Self {
+        Source { strength: 1.0, turn_deg: 0.0, uniform: None, gradient: None, key: None, image: None }
+    }
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn is_one(value: &f32) -> bool {
+    *value == 1.0
+}
+
+fn is_zero(value: &f32) -> bool {
+    *value == 0.0
+}
+
+impl Source {
+    fn check(&self) -> Result<()> {
+        let amount = |what: &str, values: &[f32]| match values.iter().find(|v| !(v.is_finite() && **v >= 0.0)) {
+            Some(bad) => Err(Error::Input(format!("environment {what} {bad} is negative or not finite"))),
+            None => Ok(()),
+        };
+        amount("strength", &[self.strength])?;
+        if !(self.turn_deg.abs() <= TURN_LIMIT_DEG) {
+            return Err(Error::Input(format!(
+                "environment turn_deg {} is not within {TURN_LIMIT_DEG:e}",
+                self.turn_deg
+            )));
+        }
+        self.uniform.map_or(Ok(()), |rgb| amount("uniform", &rgb.to_array()))?;
+        if let Some(gradient) = &self.gradient {
+            amount("gradient", &gradient.radiance.to_array())?;
+            amount("gradient", &[gradient.base, gradient.rise])?;
+        }
+        if let Some(key) = &self.key {
+            amount("key", &key.radiance.to_array())?;
+            amount("key sharpness", &[key.sharpness])?;
+            if key.sharpness > 1e5 {
+                return Err(Error::Input("environment key sharpness is over the limit of 1e5".into()));
+            }
+            if key.toward.as_dvec3().try_normalize().is_none() {
+                return Err(Error::Input("environment key has no direction towards it".into()));
+            }
+        }
+        self.image.as_ref().map_or(Ok(()), |image| amount("image scale", &[image.scale]))
+    }
+
+    /// Whether nothing shines, whatever the strength.
+    pub fn is_empty(&self) -> bool {
+        self.uniform.is_none() && self.gradient.is_none() && self.key.is_none() && self.image.is_none()
+    }
 }
 
 /// radiance * (base + rise * max(0, y)).
@@ -84,14 +149,8 @@ pub struct Image {
     /// Relative to the scene file.
     pub file: PathBuf,
     /// Factor on the picture's values.
-    #[serde(default = "Image::scale")]
+    #[serde(default = "one")]
     pub scale: f32,
-}
-
-impl Image {
-    fn scale() -> f32 {
-        1.0
-    }
 }
 
 /// Distant light, ready for use.
@@ -116,39 +175,44 @@ impl Environment {
     /// [`Error::Input`], one line: a negative or non-finite number, a direction without length, a picture that cannot be
     /// read, is not HDR, EXR or PNG, is wider than [`WIDTH_LIMIT_PX`], or holds negative or non-finite radiance.
     pub fn new(source: &Source, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Self> {
-        let amount = |what: &str, values: &[f32]| match values.iter().find(|v| !(v.is_finite() && **v >= 0.0)) {
-            Some(bad) => Err(Error::Input(format!("environment {what} {bad} is negative or not finite"))),
-            None => Ok(()),
-        };
-        source.uniform.map_or(Ok(()), |rgb| amount("uniform", &rgb.to_array()))?;
-        if let Some(gradient) = &source.gradient {
-            amount("gradient", &gradient.radiance.to_array())?;
-            amount("gradient", &[gradient.base, gradient.rise])?;
-        }
-        if let Some(key) = &source.key {
-            amount("key", &key.radiance.to_array())?;
-            amount("key sharpness", &[key.sharpness])?;
-            if key.sharpness > 1e5 {
-                return Err(Error::Input("environment key sharpness is over the limit of 1e5".into()));
-            }
-            if key.toward.as_dvec3().try_normalize().is_none() {
-                return Err(Error::Input("environment key has no direction towards it".into()));
-            }
-        }
+        source.check()?;
         let picture = source.image.as_ref().map(|image| {
-            amount("image scale", &[image.scale])?;
-            Picture::decode(&read(&image.file)?, image.scale).map(Arc::new).map_err(|e| e.context(image.file.display()))
+            Picture::decode(&read(&image.file)?).map(Arc::new).map_err(|e| e.context(image.file.display()))
         });
         Ok(Self { source: source.clone(), picture: picture.transpose()? })
     }
 
+    /// The same picture under another description, which must name it too if it names one.
+    ///
+    /// # Errors
+    /// As [`Environment::new`], and where it names another picture.
+    pub fn with(&self, source: &Source) -> Result<Self> {
+        source.check()?;
+        let file = |source: &Source| source.image.as_ref().map(|image| image.file.clone());
+        if let Some(other) = file(source).filter(|other| file(&self.source).as_ref() != Some(other)) {
+            return Err(Error::Input(format!("environment image {} was not read", other.display())));
+        }
+        let picture = self.picture.clone().filter(|_| source.image.is_some());
+        Ok(Self { source: source.clone(), picture })
+    }
+
+    /// Its description.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
     /// Whether nothing shines.
     pub fn is_none(&self) -> bool {
-        self.source == Source::default()
+        self.source.is_empty() || self.source.strength == 0.0
+    }
+
+    fn turn(&self) -> DQuat {
+        DQuat::from_rotation_y(f64::from(self.source.turn_deg).to_radians())
     }
 
     /// Linear RGB radiance from the unit vector `direction`, not projected.
     pub fn radiance(&self, direction: DVec3) -> [f64; 3] {
+        let direction = if self.source.turn_deg == 0.0 { direction } else { self.turn().inverse() * direction };
         let mut sum = DVec3::ZERO;
         if let Some(rgb) = self.source.uniform {
             sum += rgb.as_dvec3();
@@ -161,14 +225,25 @@ impl Environment {
             sum += k.radiance.as_dvec3() * (f64::from(k.sharpness) * (cosine - 1.0)).exp();
         }
         if let Some(picture) = &self.picture {
-            sum += picture.at(direction);
+            sum += picture.at(direction) * f64::from(self.source.image.as_ref().map_or(1.0, |image| image.scale));
         }
-        sum.to_array()
+        (sum * f64::from(self.source.strength)).to_array()
     }
 
     /// Projection of each channel to `bands` bands, bands^2 coefficients. All but the picture is projected in closed form or
     /// by a one-dimensional integral; texels are weighted with their exact solid angle.
     pub fn coefficients(&self, bands: usize) -> [Vec<f64>; 3] {
+        let turn = Rotation::new(bands, self.turn());
+        self.unturned(bands).map(|channel| {
+            let mut out = vec![0.0; channel.len()];
+            turn.apply(&channel, &mut out);
+            out.iter_mut().for_each(|c| *c *= f64::from(self.source.strength));
+            out
+        })
+    }
+
+    /// [`Environment::coefficients`] at strength 1, not turned.
+    fn unturned(&self, bands: usize) -> [Vec<f64>; 3] {
         let mut sum = [const { Vec::new() }; 3].map(|_: Vec<f64>| vec![0.0; bands * bands]);
         let mut add = |rgb: Vec3, shape: &[f64]| {
             for (channel, amount) in sum.iter_mut().zip(rgb.as_dvec3().to_array()) {
@@ -194,7 +269,12 @@ impl Environment {
             );
         }
         if let Some(picture) = &self.picture {
-            picture.project(bands, &mut sum);
+            let mut texels = [(); 3].map(|()| vec![0.0; bands * bands]);
+            picture.project(bands, &mut texels);
+            let scale = f64::from(self.source.image.as_ref().map_or(1.0, |image| image.scale));
+            for (channel, texels) in sum.iter_mut().zip(texels) {
+                channel.iter_mut().zip(texels).for_each(|(c, t)| *c += scale * t);
+            }
         }
         sum
     }
@@ -229,7 +309,7 @@ fn key_zonal(bands: usize, sharpness: f64) -> Vec<f64> {
 }
 
 impl Picture {
-    fn decode(bytes: &[u8], scale: f32) -> Result<Self> {
+    fn decode(bytes: &[u8]) -> Result<Self> {
         let fail = |what: String| Error::Input(format!("environment image: {what}"));
         let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| fail(e.to_string()))?;
         let format = reader.format();
@@ -246,7 +326,7 @@ impl Picture {
             fail(format!("{what} (limits: {WIDTH_LIMIT_PX} x {} pixels)", WIDTH_LIMIT_PX / 2))
         })?;
         let rgb = decoded.into_rgb32f();
-        let linear = |c: f32| scale * if format == Some(ImageFormat::Png) { linear_from_srgb(c) } else { c };
+        let linear = |c: f32| if format == Some(ImageFormat::Png) { linear_from_srgb(c) } else { c };
         let texels: Vec<[f32; 3]> = rgb.pixels().map(|p| p.0.map(linear)).collect();
         if texels.is_empty() || texels.iter().flatten().any(|c| !(c.is_finite() && *c >= 0.0)) {
             return Err(fail("no pixels, or a pixel that is negative or not finite".into()));

@@ -88,7 +88,7 @@ pub struct Store {
 }
 
 /// Which fields the entities of a mesh need: none for what only receives, no radiance field for a light of one colour.
-fn needs(scene: &Scene, mesh: usize) -> [Option<Kind>; 2] {
+pub fn needs(scene: &Scene, mesh: usize) -> [Option<Kind>; 2] {
     let entities = || scene.entities.iter().filter(|e| e.mesh == mesh);
     let coloured = scene.meshes[mesh].colors.is_some();
     let blocked = entities().any(|e| e.occludes || (e.emits && !coloured));

@@ -4,7 +4,7 @@
 
 pub mod data;
 pub mod motion;
-mod values;
+pub mod values;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use glam::Vec3;
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::asset::environment::Environment;
+use crate::asset::environment::{Environment, Source};
 use crate::asset::{Mesh, embedded, obj, read_file};
 use crate::error::{Error, Result};
 pub use data::{Camera, Data, EntityData, MeshData, Output};
@@ -108,6 +108,23 @@ impl Scene {
     /// Where every entity is at `time_s` seconds, in order. It depends on the time alone, not on the frames before.
     pub fn at(&self, time_s: f64) -> Vec<Placement> {
         self.data.entities.iter().map(|e| e.at(time_s)).collect()
+    }
+
+    /// Replaces what the file says of an entity, whose mesh stays.
+    pub fn set_entity(&mut self, index: usize, data: EntityData) {
+        let mesh = self.entities[index].mesh;
+        self.entities[index] = resolve(index, &data, mesh, &self.meshes[mesh]);
+        self.data.entities[index] = data;
+    }
+
+    /// Replaces what the file says of the distant light; its picture stays.
+    ///
+    /// # Errors
+    /// As [`Environment::new`].
+    pub fn set_environment(&mut self, source: &Source) -> Result<()> {
+        self.environment = self.environment.with(source)?;
+        self.data.environment = source.clone();
+        Ok(())
     }
 
     /// The scene file as text, which reads back as equal [`Data`]; comments are not kept.

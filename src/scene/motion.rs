@@ -41,7 +41,8 @@ impl Default for Rotation {
 }
 
 impl Rotation {
-    fn unit(self) -> DQuat {
+    /// The unit quaternion.
+    pub fn unit(self) -> DQuat {
         match self {
             Rotation::AxisAngle { axis, angle_deg } => {
                 DQuat::from_axis_angle(axis.as_dvec3().normalize(), angle_deg.to_radians())

@@ -1,0 +1,58 @@
+//! Changes of one entity that hold at all times: the whole of its motion is moved, turned or scaled along.
+
+use crate::scene::data::EntityData;
+use crate::scene::motion::{Motion, Rotation};
+use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
+use glam::{DQuat, DVec3, Vec3};
+
+/// The entity `by` metres further at all times; `None` where that leaves the range of a scene file.
+pub fn moved(entity: &EntityData, by: DVec3) -> Option<EntityData> {
+    let mut out = entity.clone();
+    let shift = |p: &mut Vec3| {
+        *p = (p.as_dvec3() + by).as_vec3();
+        p.abs().max_element() <= POSITION_LIMIT_M
+    };
+    let mut fits = shift(&mut out.position);
+    for motion in &mut out.motion {
+        match motion {
+            Motion::Orbit { centre, .. } => fits &= shift(centre),
+            Motion::Keyframes { keys, .. } => {
+                keys.iter_mut().filter_map(|k| k.position.as_mut()).for_each(|p| fits &= shift(p));
+            }
+            Motion::Spin { .. } | Motion::Bob { .. } => {}
+        }
+    }
+    fits.then_some(out)
+}
+
+/// The entity larger by a factor at all times; `None` where that leaves the range of a scene file.
+pub fn scaled(entity: &EntityData, by: f64) -> Option<EntityData> {
+    let mut out = entity.clone();
+    let grow = |s: &mut f32| {
+        *s = (f64::from(*s) * by) as f32;
+        (1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(s)
+    };
+    let mut fits = grow(&mut out.scale);
+    for motion in &mut out.motion {
+        if let Motion::Keyframes { keys, .. } = motion {
+            keys.iter_mut().filter_map(|k| k.scale.as_mut()).for_each(|s| fits &= grow(s));
+        }
+    }
+    fits.then_some(out)
+}
+
+/// The entity turned by a world rotation about its own origin at all times: axes that it spins about turn along, its path
+/// does not.
+pub fn turned(entity: &EntityData, by: DQuat) -> EntityData {
+    let mut out = entity.clone();
+    let turn = |r: &mut Rotation| *r = Rotation::Quaternion((by * r.unit()).normalize().as_quat().to_array());
+    turn(&mut out.rotation);
+    for motion in &mut out.motion {
+        match motion {
+            Motion::Spin { axis, .. } => *axis = (by * axis.as_dvec3().normalize()).as_vec3(),
+            Motion::Keyframes { keys, .. } => keys.iter_mut().filter_map(|k| k.rotation.as_mut()).for_each(turn),
+            Motion::Orbit { .. } | Motion::Bob { .. } => {}
+        }
+    }
+    out
+}

@@ -1,0 +1,290 @@
+//! The state behind the window.
+
+use super::command::{Changed, Command, Effect, Request};
+use super::history::History;
+use super::orbit::Orbit;
+use crate::asset::embedded;
+use crate::error::Result;
+use crate::field::quantity;
+use crate::frame::store;
+use crate::scene::{Camera, Placement, Scene};
+use glam::{DVec3, Vec3};
+use std::path::{Path, PathBuf};
+
+/// Everything that `view` shows, and how it changes.
+pub struct Editor {
+    pub(super) scene: Scene,
+    path: PathBuf,
+    pub(super) orbit: Orbit,
+    size: [u32; 2],
+    pub(super) selection: Option<usize>,
+    time_s: f64,
+    running: bool,
+    reference: bool,
+    error: bool,
+    overlay: bool,
+    variant: Option<&'static str>,
+    pub(super) history: History,
+    /// Emission that an entity had before it stopped being a light.
+    pub(super) former_emission: Vec<Option<Vec3>>,
+}
+
+impl Editor {
+    /// The state in which a scene is first shown: as its file says, running, nothing selected. `path` is the scene's file.
+    pub fn new(scene: Scene, path: &Path) -> Self {
+        Editor {
+            orbit: Orbit::new(&scene.data.camera),
+            size: [scene.data.output.width, scene.data.output.height],
+            selection: None,
+            time_s: 0.0,
+            running: true,
+            reference: false,
+            error: false,
+            overlay: true,
+            variant: None,
+            history: History::default(),
+            former_emission: vec![None; scene.entities.len()],
+            path: path.to_owned(),
+            scene,
+        }
+    }
+
+    /// The scene as it is edited: entities' switches and emission, the distant light, the camera.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// File that the scene came from.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// From where it is seen.
+    pub fn camera(&self) -> &Camera {
+        &self.scene.data.camera
+    }
+
+    /// Where entities are now, in order.
+    pub fn placements(&self) -> Vec<Placement> {
+        self.scene.at(self.time_s)
+    }
+
+    /// Width and height of the picture in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The selected entity; `None` means all.
+    pub fn selection(&self) -> Option<usize> {
+        self.selection
+    }
+
+    /// Scene time in seconds.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// Whether time goes on.
+    pub fn is_running(&self) -> bool {
+        self.running
+    }
+
+    /// Whether the ray-cast reference is shown beside the merged picture.
+    pub fn shows_reference(&self) -> bool {
+        self.reference
+    }
+
+    /// Whether the error is shown in false colour.
+    pub fn shows_error(&self) -> bool {
+        self.error
+    }
+
+    /// Whether the overlay is shown.
+    pub fn shows_overlay(&self) -> bool {
+        self.overlay
+    }
+
+    /// Merge variant that was chosen; `None` is the device's fastest.
+    pub fn variant(&self) -> Option<&'static str> {
+        self.variant
+    }
+
+    /// Exposure in stops.
+    pub fn exposure_ev(&self) -> f32 {
+        self.scene.data.output.exposure_ev
+    }
+
+    /// Strength of the distant light.
+    pub fn sky(&self) -> f32 {
+        self.scene.data.environment.strength
+    }
+
+    /// Angle of the distant light, degrees, -180 to 180.
+    pub fn sky_turn_deg(&self) -> f32 {
+        self.scene.data.environment.turn_deg
+    }
+
+    /// How many changes Ctrl-Z can take back.
+    pub fn undo_count(&self) -> usize {
+        self.history.len()
+    }
+
+    /// Fields that a mesh needs as its entities are: occlusion, radiance. What the frame's store lacks is to be baked.
+    pub fn needs(&self, mesh: usize) -> [Option<quantity::Kind>; 2] {
+        store::needs(&self.scene, mesh)
+    }
+
+    /// Lets time pass, if it runs. Where things are depends on the sum of all `dt_s` alone.
+    pub fn advance(&mut self, dt_s: f64) -> Effect {
+        if !(self.running && dt_s.is_finite() && dt_s > 0.0) {
+            return Effect::default();
+        }
+        self.time_s += dt_s;
+        let moves = self.scene.data.entities.iter().any(|e| !e.motion.is_empty());
+        Changed { placements: moves, ..Changed::default() }.into()
+    }
+
+    /// Does what a command says.
+    pub fn apply(&mut self, command: Command) -> Effect {
+        let unchanged = Changed::default();
+        match command {
+            Command::Resize(size) if size.contains(&0) || size == self.size => Effect::default(),
+            Command::Resize(size) => {
+                self.size = size;
+                Changed { camera: true, ..unchanged }.into()
+            }
+            Command::Orbit(drag) => self.see(|orbit, [_, height], _| orbit.turn(drag, height)),
+            Command::Pan(drag) => self.see(|orbit, [_, height], _| orbit.pan(drag, height)),
+            Command::Zoom(notches) => self.see(|orbit, _, (_, radius_m)| orbit.zoom(notches, radius_m)),
+            Command::Home => self.see(|orbit, [width, height], (centre, radius_m)| {
+                orbit.frame(centre, radius_m, f64::from(width) / f64::from(height));
+            }),
+            Command::SelectNext => self.cycle(1),
+            Command::SelectPrevious => self.cycle(-1),
+            Command::SelectNone => self.select(None),
+            Command::Pick(_) | Command::DragStart(_) | Command::DragTo(_) | Command::DragEnd => Effect::default(),
+            Command::NextScene => self.next_scene(),
+            Command::ToggleRunning => {
+                self.running = !self.running;
+                Changed { display: true, ..unchanged }.into()
+            }
+            Command::ToggleReference => {
+                self.reference = !self.reference;
+                Changed { display: true, ..unchanged }.into()
+            }
+            Command::ToggleError => {
+                self.error = !self.error;
+                Changed { display: true, ..unchanged }.into()
+            }
+            Command::ToggleOverlay => {
+                self.overlay = !self.overlay;
+                Changed { display: true, ..unchanged }.into()
+            }
+            Command::EndSlide => {
+                self.history.close();
+                Effect::default()
+            }
+            Command::SetVariant(name) => {
+                self.variant = name;
+                Changed { variant: true, ..unchanged }.into()
+            }
+            Command::Screenshot => Request::Screenshot.into(),
+            Command::Save => Request::Save.into(),
+            Command::Quit => Request::Quit.into(),
+            edit => self.change(edit),
+        }
+    }
+
+    /// Centre and radius of a sphere around what casts shadows or shines now, in metres; around everything where nothing does.
+    pub fn bounds(&self) -> (DVec3, f64) {
+        let placements = self.placements();
+        let spheres: Vec<(DVec3, f64)> = self.affected_of(None).map(|i| self.sphere(i, &placements[i])).collect();
+        let (low, high) = spheres.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), (centre, r)| {
+            (low.min(*centre - *r), high.max(*centre + *r))
+        });
+        if spheres.is_empty() {
+            return (self.orbit.target, self.orbit.distance_m);
+        }
+        let centre = (low + high) / 2.0;
+        (centre, spheres.iter().map(|(c, r)| c.distance(centre) + r).fold(0.0, f64::max))
+    }
+
+    /// Bounding sphere of an entity at a placement, metres.
+    pub fn sphere(&self, entity: usize, placement: &Placement) -> (DVec3, f64) {
+        let (centre, radius_m) = self.scene.meshes[self.scene.entities[entity].mesh].bounding_sphere();
+        let scale = f64::from(placement.scale);
+        let rotation = placement.rotation.as_dquat().normalize();
+        (placement.position.as_dvec3() + rotation * (centre.as_dvec3() * scale), f64::from(radius_m) * scale)
+    }
+
+    /// Entities that a step concerns: the selected one; else all that occlude or emit, and where none does, all.
+    pub(super) fn affected_of(&self, selection: Option<usize>) -> impl Iterator<Item = usize> {
+        let entities = &self.scene.entities;
+        let acts = |i: &usize| entities[*i].occludes || entities[*i].emits;
+        let any = (0..entities.len()).any(|i| acts(&i));
+        let chosen: Vec<usize> = match selection {
+            Some(entity) => vec![entity],
+            None => (0..entities.len()).filter(|i| !any || acts(i)).collect(),
+        };
+        chosen.into_iter()
+    }
+
+    fn see(&mut self, change: impl FnOnce(&mut Orbit, [u32; 2], (DVec3, f64))) -> Effect {
+        let (size, bounds) = (self.size, self.bounds());
+        let before = self.orbit;
+        change(&mut self.orbit, size, bounds);
+        if self.orbit == before {
+            return Effect::default();
+        }
+        self.scene.data.camera = self.orbit.camera();
+        Changed { camera: true, ..Changed::default() }.into()
+    }
+
+    fn select(&mut self, selection: Option<usize>) -> Effect {
+        let changed = self.selection != selection;
+        self.selection = selection;
+        self.history.close();
+        Changed { selection: changed, ..Changed::default() }.into()
+    }
+
+    fn cycle(&mut self, by: isize) -> Effect {
+        let count = self.scene.entities.len();
+        if count == 0 {
+            return Effect::default();
+        }
+        let next = match self.selection {
+            Some(now) => now.wrapping_add_signed(by).wrapping_add(count) % count,
+            None if by > 0 => 0,
+            None => count - 1,
+        };
+        self.select(Some(next))
+    }
+
+    fn next_scene(&mut self) -> Effect {
+        match self.load_next() {
+            Ok((scene, path)) => {
+                let next = Editor::new(scene, &path);
+                *self = Editor {
+                    size: self.size,
+                    running: self.running,
+                    reference: self.reference,
+                    error: self.error,
+                    overlay: self.overlay,
+                    variant: self.variant,
+                    ..next
+                };
+                Changed { scene: true, ..Changed::default() }.into()
+            }
+            Err(error) => Effect { message: Some(error.to_string()), ..Effect::default() },
+        }
+    }
+
+    /// The built-in scene after this one; the first where this is none of them.
+    fn load_next(&self) -> Result<(Scene, PathBuf)> {
+        let scenes = embedded::scenes();
+        let now = self.path.file_stem().and_then(|stem| scenes.iter().position(|(name, _)| stem == *name));
+        let (name, text) = scenes[now.map_or(0, |now| (now + 1) % scenes.len())];
+        let path = Path::new(embedded::ROOT).join("scenes").join(name).with_extension("toml");
+        Ok((Scene::parse(text, &path, &embedded::read)?, path))
+    }
+}

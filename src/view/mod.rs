@@ -1,0 +1,15 @@
+//! What `shadow-fields view` shows and what can be done with it, without a window or a device: commands in, state out.
+//!
+//! [`Editor`] owns the scene, the camera and the clock. The window turns events into a [`Command`], hands it to
+//! [`Editor::apply`], and does what the returned [`Effect`] says: merge again, bake a field, write a picture. Everything here
+//! runs in tests without a display.
+
+mod change;
+pub mod command;
+pub mod edit;
+pub mod editor;
+pub mod history;
+pub mod orbit;
+
+pub use command::{Changed, Command, Effect, Request, Step};
+pub use editor::Editor;

@@ -1,0 +1,117 @@
+//! A camera that turns around a point.
+
+use crate::scene::Camera;
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
+
+/// Largest angle of the eye above or below the target: up in the picture is +y there still.
+const PITCH_LIMIT_RAD: f64 = 89.0 * PI / 180.0;
+/// What a notch of the wheel divides the distance by.
+const NOTCH: f64 = 1.15;
+/// Distances lie between 1 / this and this many scene radii.
+const DISTANCE_RANGE: f64 = 1e3;
+/// Targets stay within this many metres of the origin: what a scene file can hold.
+const TARGET_LIMIT_M: f64 = 9e6;
+
+/// Where the eye is seen from the target. All methods leave it finite, whatever they are given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orbit {
+    /// What is looked at, metres.
+    pub target: DVec3,
+    /// Angle about +y of the eye from +z, radians, -pi to pi.
+    pub yaw_rad: f64,
+    /// Angle of the eye above the horizon, radians.
+    pub pitch_rad: f64,
+    /// Metres, above 0.
+    pub distance_m: f64,
+    /// Vertical field of view in degrees.
+    pub fov_deg: f32,
+}
+
+impl Orbit {
+    /// The camera of a scene.
+    pub fn new(camera: &Camera) -> Self {
+        let (eye, target) = (camera.eye.as_dvec3(), camera.target.as_dvec3());
+        let offset = eye - target;
+        let distance_m = offset.length();
+        let pitch_rad = (offset.y / distance_m).clamp(-1.0, 1.0).asin();
+        // Seen from straight above or below, what is up in the picture tells where the eye would lean to.
+        let lean = if camera.up() == glam::Vec3::Y { offset } else { -camera.up().as_dvec3() * offset.y.signum() };
+        let yaw_rad = lean.x.atan2(lean.z);
+        Orbit { target, yaw_rad, pitch_rad, distance_m, fov_deg: camera.fov_deg }
+    }
+
+    /// From the target to the eye, unit.
+    pub fn outward(&self) -> DVec3 {
+        let (sin, cos) = self.yaw_rad.sin_cos();
+        let (up, out) = self.pitch_rad.sin_cos();
+        DVec3::new(sin * out, up, cos * out)
+    }
+
+    /// Right in the picture, unit, level.
+    pub fn right(&self) -> DVec3 {
+        let (sin, cos) = self.yaw_rad.sin_cos();
+        DVec3::new(cos, 0.0, -sin)
+    }
+
+    /// Away from the camera in the ground plane, unit.
+    pub fn ahead(&self) -> DVec3 {
+        let (sin, cos) = self.yaw_rad.sin_cos();
+        DVec3::new(-sin, 0.0, -cos)
+    }
+
+    /// Up in the picture, unit.
+    pub fn up(&self) -> DVec3 {
+        self.outward().cross(self.right())
+    }
+
+    /// As a scene has it.
+    pub fn camera(&self) -> Camera {
+        let eye = self.target + self.distance_m * self.outward();
+        Camera { eye: eye.as_vec3(), target: self.target.as_vec3(), fov_deg: self.fov_deg }
+    }
+
+    /// A drag across a picture of that height; dragging across all of it is half a turn.
+    pub fn turn(&mut self, drag_px: [f32; 2], height_px: u32) {
+        let [dx, dy] = drag_px.map(|d| f64::from(d) * PI / f64::from(height_px.max(1)));
+        if dx.is_finite() && dy.is_finite() {
+            self.yaw_rad = (self.yaw_rad - dx + PI).rem_euclid(TAU) - PI;
+            self.pitch_rad = (self.pitch_rad + dy).clamp(-PITCH_LIMIT_RAD, PITCH_LIMIT_RAD);
+        }
+    }
+
+    /// Moves the target so that it stays under the pointer.
+    pub fn pan(&mut self, drag_px: [f32; 2], height_px: u32) {
+        let height_m = 2.0 * self.distance_m * (f64::from(self.fov_deg).to_radians() / 2.0).tan();
+        let [dx, dy] = drag_px.map(|d| f64::from(d) * height_m / f64::from(height_px.max(1)));
+        let target = self.target - dx * self.right() + dy * self.up();
+        if target.is_finite() {
+            self.target = target.clamp(DVec3::splat(-TARGET_LIMIT_M), DVec3::splat(TARGET_LIMIT_M));
+        }
+    }
+
+    /// Comes nearer by notches of a wheel, in a scene of that radius.
+    pub fn zoom(&mut self, notches: f32, scene_radius_m: f64) {
+        if notches.is_finite() {
+            let notches = f64::from(notches).clamp(-100.0, 100.0);
+            self.distance_m = limited(self.distance_m * NOTCH.powf(-notches), scene_radius_m);
+        }
+    }
+
+    /// Looks at a sphere so that it fills the picture, from the side it is seen from now. `aspect` is width / height.
+    pub fn frame(&mut self, centre: DVec3, radius_m: f64, aspect: f64) {
+        let half = (f64::from(self.fov_deg).to_radians() / 2.0).tan() * aspect.min(1.0);
+        let distance_m = radius_m / half.atan().sin();
+        if centre.is_finite() && distance_m.is_finite() && distance_m > 0.0 {
+            self.target = centre.clamp(DVec3::splat(-TARGET_LIMIT_M), DVec3::splat(TARGET_LIMIT_M));
+            self.distance_m = limited(distance_m, radius_m);
+            self.pitch_rad = self.pitch_rad.clamp(-PITCH_LIMIT_RAD, PITCH_LIMIT_RAD);
+        }
+    }
+}
+
+fn limited(distance_m: f64, scene_radius_m: f64) -> f64 {
+    // The eye's offset must not vanish in the f32 of a scene file, nor its place leave the file's range.
+    let radius_m = if scene_radius_m.is_finite() { scene_radius_m.max(1e-6) } else { 1.0 };
+    distance_m.clamp((radius_m / DISTANCE_RANGE).max(1e-5), (radius_m * DISTANCE_RANGE).min(1e6))
+}

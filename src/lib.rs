@@ -24,13 +24,14 @@
 //! A module uses only modules before it in this list, and a test holds it to that: [`error`], [`files`], [`sh`] (the maths, and
 //! the GLSL made from it), [`layout`] (structs that shaders read), [`gpu`] (Vulkan, all `unsafe`), [`field`] (what is sampled
 //! where, and its file), [`shaders`] (every entry point), [`asset`] (meshes, distant light, pictures), [`bake`], [`render`] (the
-//! passes of a frame), [`scene`], [`frame`] (their sequence), [`truth`] (ray casting and the exact chain), [`mod@bench`], [`view`] (the
-//! state behind the window), [`app`].
+//! passes of a frame), [`scene`], [`frame`] (their sequence), [`truth`] (ray casting and the exact chain), [`check`] (every pass
+//! against its twin), [`mod@bench`], [`view`] (the state behind the window), [`app`].
 
 pub mod app;
 pub mod asset;
 pub mod bake;
 pub mod bench;
+pub mod check;
 pub mod error;
 pub mod field;
 pub mod files;

@@ -2,60 +2,25 @@
 
 mod common;
 
-use common::{Gpu, gpu, pot, report, texel_index};
+use common::{Gpu, gpu, pot, report};
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::asset::{Mesh, generate};
-use shadow_fields::bake::capture::{Capture, Model, NO_SLOT, reference, unit_positions};
+use shadow_fields::bake::capture::{Capture, Model, NO_SLOT};
+use shadow_fields::check::capture::{self as check, DIFFERING_LIMIT, eyes_outside, faces, texel_index};
 
 const FACE_PX: u32 = 32;
-/// Texels whose centres lie so near an edge that f32 and f64 disagree: a share of all texels.
-const DIFFERING_LIMIT: f64 = 1e-3;
-
 /// Coverage of every eye's faces, true where the object is; faces without a slot are `None`.
 fn coverage(gpu: &Gpu, mesh: &Mesh, eyes: &[Vec3], cull: bool) -> Vec<[Option<Vec<bool>>; 6]> {
-    let model = Model::new(&gpu.device, mesh, false).unwrap();
-    let capture = Capture::new(&gpu.device, &gpu.library, FACE_PX, false).unwrap();
-    let plan = capture.plan(&model, eyes);
-    assert_eq!(plan.len(), eyes.len(), "all eyes fit one atlas");
-    let atlas: Vec<u8> = gpu.atlas(&capture, &model, eyes, &plan, cull);
-    let px = FACE_PX as usize;
-    plan.iter()
-        .map(|slots| {
-            slots.map(|slot| {
-                (slot != NO_SLOT).then(|| {
-                    (0..px * px)
-                        .map(|i| match atlas[texel_index(&capture, slot, i % px, i / px)] {
-                            0 => true,
-                            255 => false,
-                            other => panic!("a texel of {other}: neither object nor background"),
-                        })
-                        .collect()
-                })
-            })
-        })
+    let is_object = |texel: &u8| match texel {
+        0 => true,
+        255 => false,
+        other => panic!("a texel of {other}: neither object nor background"),
+    };
+    let found = faces::<u8>(&gpu.baker(), mesh, eyes, (FACE_PX, false, cull)).unwrap();
+    found
+        .iter()
+        .map(|faces| faces.each_ref().map(|face| face.as_ref().map(|t| t.iter().map(is_object).collect())))
         .collect()
-}
-
-/// Whether a texel, or one that touches it, differs from it, or it lies on the face's rim, where neighbours are unknown.
-fn is_edge(covered: &[bool], x: usize, y: usize) -> bool {
-    let px = FACE_PX as usize;
-    if x == 0 || y == 0 || x + 1 == px || y + 1 == px {
-        return true;
-    }
-    let around = (y - 1..=y + 1).flat_map(|v| (x - 1..=x + 1).map(move |u| covered[v * px + u]));
-    let count = around.filter(|c| *c).count();
-    (1..9).contains(&count)
-}
-
-/// Eyes all around: on the axes, at odd angles, near and far.
-fn eyes_outside() -> Vec<Vec3> {
-    vec![
-        Vec3::new(1.02, 0.0, 0.0),
-        Vec3::new(0.0, -1.3, 0.01),
-        Vec3::new(0.7, 0.8, -0.4),
-        Vec3::new(-2.0, 1.1, 0.6),
-        Vec3::new(0.3, 0.2, 7.9),
-    ]
 }
 
 fn tilted_plane() -> Mesh {
@@ -82,32 +47,12 @@ fn coverage_is_what_rays_meet() {
     let Some(gpu) = gpu() else { return };
     for (mesh, more) in scenes() {
         let eyes = [eyes_outside(), more].concat();
-        let positions = unit_positions(&mesh);
-        let found = coverage(&gpu, &mesh, &eyes, true);
-        let (mut differing, mut all, mut covered, mut left_out) = (0, 0, 0, 0);
-        for (eye, faces) in eyes.iter().zip(&found) {
-            for (face, texels) in faces.iter().enumerate() {
-                let wanted = reference(&positions, &mesh.triangles, eye.as_dvec3(), face, FACE_PX);
-                let Some(texels) = texels else {
-                    assert!(wanted.iter().all(|c| !c), "{}: face {face} from {eye} was left out", mesh.name);
-                    left_out += 1;
-                    continue;
-                };
-                for (i, (gpu, cpu)) in texels.iter().zip(&wanted).enumerate() {
-                    let (x, y) = (i % FACE_PX as usize, i / FACE_PX as usize);
-                    if gpu != cpu {
-                        differing += 1;
-                        assert!(is_edge(&wanted, x, y), "{}: {eye} face {face} texel {x} {y}: {gpu}", mesh.name);
-                    }
-                }
-                all += texels.len();
-                covered += texels.iter().filter(|c| **c).count();
-            }
-        }
-        report(&format!("{}: {differing} of {all} texels differ, {covered} covered, {left_out} faces out", mesh.name));
-        assert!(covered > all / 50 && covered < all, "{}: nothing to compare", mesh.name);
-        assert!(left_out > 0, "{}: no face was left out", mesh.name);
-        assert!((differing as f64) < DIFFERING_LIMIT * all as f64, "{}: {differing} of {all} differ", mesh.name);
+        let found = check::coverage(&gpu.baker(), &mesh, &eyes, FACE_PX).unwrap();
+        report(&format!("{}: {found:?}", mesh.name));
+        assert_eq!(found.off_edge, 0, "{}: texels differ where there is no edge", mesh.name);
+        assert_eq!(found.left_out_wrongly, 0, "{}: a face was left out that shows the object", mesh.name);
+        assert!(found.left_out > 0, "{}: no face was left out", mesh.name);
+        assert!(found.error() < DIFFERING_LIMIT, "{}: {found:?}", mesh.name);
     }
 }
 
@@ -168,6 +113,17 @@ fn painted_box(inner_first: bool) -> Mesh {
         triangles.extend(t.iter().map(|t| t.map(|i| i + first)));
     }
     Mesh::new("painted box", positions, Vec::new(), Some(colors), triangles).unwrap()
+}
+
+/// Colours of the nearest surface, as rays find them: on a mesh that hides parts of itself.
+#[test]
+fn colours_are_what_rays_meet() {
+    let Some(gpu) = gpu() else { return };
+    for mesh in [painted_box(true), generate::torus_two_colour(0.5, 0.15, 48, 20)] {
+        let off = check::colors(&gpu.baker(), &mesh, &eyes_outside(), FACE_PX).unwrap();
+        report(&format!("{}: {off:.1e} of the texels differ", mesh.name));
+        assert!(off < 2.0 * DIFFERING_LIMIT, "{}: {off} of the texels differ", mesh.name);
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// because it is plain data; `scene` only needs `asset`, and stands after `render` since neither uses the other.
 const ORDER: &[&str] = &[
     "error", "files", "sh", "layout", "gpu", "field", "shaders", "asset", "bake", "render", "scene", "frame", "truth",
-    "bench", "view", "app", "main",
+    "check", "bench", "view", "app", "main",
 ];
 
 /// The only modules that `gpu` may use: it knows nothing of what it is for.

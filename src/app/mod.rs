@@ -2,6 +2,7 @@
 
 mod bake;
 mod bench;
+mod check;
 mod context;
 mod demo;
 mod devices;
@@ -39,6 +40,8 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Measure error, time and stability and write tables and plots
     Bench(bench::Arguments),
+    /// Hold every pass against its CPU twin on the chosen device; exit code 1 where one is off
+    Check(check::Arguments),
     /// List the Vulkan devices of this machine
     Devices(devices::Arguments),
 }
@@ -63,6 +66,7 @@ fn run(cli: &Cli) -> Result<()> {
         Command::Bake(arguments) => bake::run(&cli.global, arguments),
         Command::Inspect(arguments) => inspect::run(&cli.global, arguments),
         Command::Bench(arguments) => bench::run(&cli.global, arguments),
+        Command::Check(arguments) => check::run(&cli.global, arguments),
         Command::Devices(arguments) => devices::run(&cli.global, arguments),
     }
 }

@@ -277,9 +277,41 @@ fn joined(ranges: impl Iterator<Item = Range<u32>>) -> Vec<Range<u32>> {
 /// The CPU twin, by another method: casts a ray through every texel centre of one face. Row-major, true where the object
 /// is hit. Slow; positions are those of [`unit_positions`].
 pub fn reference(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: usize, face_px: u32) -> Vec<bool> {
+    let mut covered = vec![false; (face_px * face_px) as usize];
+    rays(positions, triangles, eye, face, face_px, |texel, _, _| covered[texel] = true);
+    covered
+}
+
+/// The same for a radiance capture: the colour of the nearest thing that each ray meets, black where there is none.
+pub fn reference_colors(
+    (positions, colors): (&[Vec3], &[Vec3]),
+    triangles: &[[u32; 3]],
+    eye: DVec3,
+    face: usize,
+    face_px: u32,
+) -> Vec<DVec3> {
+    let mut nearest = vec![(f64::INFINITY, DVec3::ZERO); (face_px * face_px) as usize];
+    rays(positions, triangles, eye, face, face_px, |texel, triangle, (distance, weights)| {
+        if distance < nearest[texel].0 {
+            let corners = triangle.map(|i| colors[i as usize].as_dvec3());
+            nearest[texel] = (distance, corners.iter().zip(weights).map(|(color, weight)| *color * weight).sum());
+        }
+    });
+    nearest.into_iter().map(|(_, color)| color).collect()
+}
+
+/// Tells of every texel's ray and triangle that meet: how far away in units of the ray's (s, t, 1), and where among the
+/// triangle's corners.
+fn rays(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    eye: DVec3,
+    face: usize,
+    face_px: u32,
+    mut met: impl FnMut(usize, &[u32; 3], (f64, [f64; 3])),
+) {
     let (forward, right, down) = face_basis(face);
     let px = face_px as usize;
-    let mut covered = vec![false; px * px];
     for triangle in triangles {
         // The triangle in the face's frame; a ray direction is (s, t, 1).
         let [a, b, c] = triangle.map(|i| {
@@ -287,7 +319,7 @@ pub fn reference(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: u
             DVec3::new(q.dot(right), q.dot(down), q.dot(forward))
         });
         // A ray hits when it lies on the same side of the three planes through the eye and an edge, and in front.
-        let edges = [a.cross(b), b.cross(c), c.cross(a)];
+        let edges = [b.cross(c), c.cross(a), a.cross(b)];
         let plane = (b - a).cross(c - a);
         let offset = plane.dot(a);
         for y in 0..px {
@@ -295,13 +327,14 @@ pub fn reference(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: u
                 let ray = DVec3::new(texel_st(x, px), texel_st(y, px), 1.0);
                 let sides = edges.map(|edge| edge.dot(ray));
                 let same = sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0);
-                if same && offset * plane.dot(ray) > 0.0 {
-                    covered[y * px + x] = true;
+                let along = plane.dot(ray);
+                if same && offset * along > 0.0 {
+                    let sum: f64 = sides.iter().sum();
+                    met(y * px + x, triangle, (offset / along, sides.map(|side| side / sum)));
                 }
             }
         }
     }
-    covered
 }
 
 /// Captures six faces from every eye (in r) and brings them to the host: RGB triples, faces +X -X +Y -Y +Z -Z in rows of

@@ -5,6 +5,7 @@
 //! ```
 
 pub mod camera;
+mod draw_twin;
 mod pose;
 pub mod store;
 mod twin;

@@ -102,6 +102,11 @@ impl Draw {
         })
     }
 
+    /// Samples a pixel.
+    pub fn samples(&self) -> u32 {
+        self.samples.as_ref().map_or(1, |image| image.shape.samples)
+    }
+
     /// Images whose content is thrown away before each frame: colour ones first, the depth image last.
     pub fn attachments(&self) -> impl Iterator<Item = &Image> {
         self.samples.iter().chain([&self.picture, &self.depth])

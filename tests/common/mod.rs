@@ -8,8 +8,10 @@
 use bytemuck::Pod;
 use glam::Vec3;
 use shadow_fields::asset::{Mesh, teapot};
+use shadow_fields::bake::Baker;
 use shadow_fields::bake::capture::{Capture, Model, Slots};
-use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, Device, Options, Validation};
+use shadow_fields::check;
+use shadow_fields::gpu::{Device, Options, Validation};
 use shadow_fields::shaders::Library;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
@@ -79,30 +81,15 @@ impl Drop for Gpu {
 }
 
 impl Gpu {
+    /// A baker on the shared device.
+    pub fn baker(&self) -> Baker {
+        Baker::new(&self.device, &self.library)
+    }
+
     /// Captures the planned faces and brings the atlas to the host; `C` values of `T` a texel.
     pub fn atlas<T: Pod>(&self, capture: &Capture, model: &Model, eyes: &[Vec3], plan: &[Slots], cull: bool) -> Vec<T> {
-        let texels = u64::from(capture.atlas.shape.width) * u64::from(capture.atlas.shape.height);
-        let size = texels * size_of::<T>() as u64;
-        let buffer = Buffer::new(&self.device, "atlas on the host", BufferKind::Readback, size).unwrap();
-        let mut commands = Commands::new(&self.device, "capture to host").unwrap();
-        commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
-        if let Some(depth) = capture.depth() {
-            commands.image_barrier(depth, None, Access::DepthWrite);
-        }
-        commands.pass("capture", |c| capture.record(c, model, eyes, plan, cull)).unwrap();
-        commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
-        commands.copy_image(&capture.atlas, &buffer);
-        commands.barrier(Access::TransferWrite, Access::HostRead);
-        commands.submit().unwrap();
-        buffer.read(0, texels as usize)
+        check::capture::atlas(&self.device, capture, model, eyes, plan, cull).unwrap()
     }
-}
-
-/// Place of texel (x, y) of a slot in what [`Gpu::atlas`] returns.
-pub fn texel_index(capture: &Capture, slot: u32, x: usize, y: usize) -> usize {
-    let (columns, px) = (capture.columns as usize, capture.face_px as usize);
-    let (column, row) = (slot as usize % columns, slot as usize / columns);
-    (row * px + y) * columns * px + column * px + x
 }
 
 /// The teapot, cut more coarsely than the default: open, with handle and spout.

@@ -4,12 +4,9 @@
 
 use super::common::{Gpu, gpu};
 use glam::{Quat, Vec3};
+use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
-use shadow_fields::bake::{self, Baker};
-use shadow_fields::field::{Lookup, Storage};
 use shadow_fields::frame::{Frame, Options};
-use shadow_fields::render::Variant;
-use shadow_fields::render::variant::Skip;
 use shadow_fields::scene::{Placement, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -38,15 +35,7 @@ pub fn stage() -> Option<Stage> {
 
 /// Few samples of few texels in f32: quick, and all that a comparison with a twin needs. The variant is pinned.
 pub fn small() -> Options {
-    let lattice = "cube:6x4".parse().unwrap();
-    Options {
-        bake: bake::Options { bands: 4, storage: Storage::F32, lattice, face_px: 16 },
-        lookup: Lookup::Trilinear,
-        variant: Some(Variant::named("texel").unwrap()),
-        skip: Skip::ALL,
-        size: [64, 48],
-        multisample: true,
-    }
+    shadow_fields::check::merge::options()
 }
 
 impl Stage {

@@ -1,0 +1,199 @@
+//! "capture" against rays cast through the centres of its texels.
+
+use super::Row;
+use crate::asset::{Mesh, generate};
+use crate::bake::Baker;
+use crate::bake::capture::{self, Capture, Model, NO_SLOT, Slots, unit_positions};
+use crate::error::Result;
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
+use crate::sh::cube::FACE_COUNT;
+use bytemuck::Pod;
+use glam::Vec3;
+use std::sync::Arc;
+
+/// Texels whose centres lie so near an edge that f32 and f64 disagree: a share of all texels.
+pub const DIFFERING_LIMIT: f64 = 1e-3;
+/// Colours interpolated in f32, relative: a few roundings, of which those near a silhouette are the largest.
+const COLOR: f64 = 1e-4;
+
+/// Captures the planned faces and brings the atlas to the host: one `T` a texel.
+///
+/// # Errors
+/// As [`Capture::record`].
+pub fn atlas<T: Pod>(
+    device: &Arc<Device>,
+    capture: &Capture,
+    model: &Model,
+    eyes: &[Vec3],
+    plan: &[Slots],
+    cull: bool,
+) -> Result<Vec<T>> {
+    let texels = u64::from(capture.atlas.shape.width) * u64::from(capture.atlas.shape.height);
+    let buffer = Buffer::new(device, "atlas on the host", BufferKind::Readback, texels * size_of::<T>() as u64)?;
+    let mut commands = Commands::new(device, "capture to host")?;
+    commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
+    if let Some(depth) = capture.depth() {
+        commands.image_barrier(depth, None, Access::DepthWrite);
+    }
+    commands.pass("capture", |c| capture.record(c, model, eyes, plan, cull))?;
+    commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
+    commands.copy_image(&capture.atlas, &buffer);
+    commands.barrier(Access::TransferWrite, Access::HostRead);
+    commands.submit()?;
+    Ok(buffer.read(0, texels as usize))
+}
+
+/// Place of texel (x, y) of a slot in what [`atlas`] returns.
+pub fn texel_index(capture: &Capture, slot: u32, x: usize, y: usize) -> usize {
+    let (columns, px) = (capture.columns as usize, capture.face_px as usize);
+    let (column, row) = (slot as usize % columns, slot as usize / columns);
+    (row * px + y) * columns * px + column * px + x
+}
+
+/// Texels of one eye's faces in rows; `None` where the face was not drawn.
+pub type Faces<T> = [Option<Vec<T>>; FACE_COUNT];
+
+/// Captures every eye's faces.
+///
+/// # Errors
+/// As [`Capture::new`].
+pub fn faces<T: Pod>(
+    baker: &Baker,
+    mesh: &Mesh,
+    eyes: &[Vec3],
+    (face_px, radiance, cull): (u32, bool, bool),
+) -> Result<Vec<Faces<T>>> {
+    let model = Model::new(baker.device(), mesh, radiance)?;
+    let capture = Capture::new(baker.device(), baker.library(), face_px, radiance)?;
+    let plan = capture.plan(&model, eyes);
+    assert_eq!(plan.len(), eyes.len(), "all eyes fit one atlas");
+    let atlas: Vec<T> = atlas(baker.device(), &capture, &model, eyes, &plan, cull)?;
+    let px = face_px as usize;
+    let face = |slot: u32| {
+        let texels = (0..px * px).map(|i| atlas[texel_index(&capture, slot, i % px, i / px)]);
+        (slot != NO_SLOT).then(|| texels.collect())
+    };
+    Ok(plan.iter().map(|slots| slots.map(face)).collect())
+}
+
+/// How captured coverage and rays agree.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Coverage {
+    /// Texels of all drawn faces.
+    pub texels: usize,
+    /// Of them covered by the object.
+    pub covered: usize,
+    /// On which the two disagree.
+    pub differing: usize,
+    /// Of those the ones that lie on no edge of the object: never right.
+    pub off_edge: usize,
+    /// Faces that were not drawn.
+    pub left_out: usize,
+    /// Of those the ones where rays meet the object: never right.
+    pub left_out_wrongly: usize,
+}
+
+impl Coverage {
+    /// Share of differing texels; infinite where anything is wrong that no rounding explains, or nothing was seen.
+    pub fn error(&self) -> f64 {
+        let wrong = self.off_edge + self.left_out_wrongly > 0;
+        let nothing = self.covered <= self.texels / 50 || self.covered == self.texels;
+        if wrong || nothing { f64::INFINITY } else { self.differing as f64 / self.texels as f64 }
+    }
+}
+
+/// Whether a texel, or one that touches it, differs from it, or it lies on the face's rim, where neighbours are unknown.
+fn is_edge(covered: &[bool], px: usize, x: usize, y: usize) -> bool {
+    if x == 0 || y == 0 || x + 1 == px || y + 1 == px {
+        return true;
+    }
+    let around = (y - 1..=y + 1).flat_map(|v| (x - 1..=x + 1).map(move |u| covered[v * px + u]));
+    let count = around.filter(|c| *c).count();
+    (1..9).contains(&count)
+}
+
+/// Captures coverage and casts the rays.
+///
+/// # Errors
+/// As [`Capture::new`].
+pub fn coverage(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result<Coverage> {
+    let positions = unit_positions(mesh);
+    let mut out = Coverage::default();
+    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, false, true))?) {
+        for (face, texels) in faces.iter().enumerate() {
+            let wanted = capture::reference(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
+            let Some(texels) = texels else {
+                out.left_out += 1;
+                out.left_out_wrongly += usize::from(wanted.iter().any(|c| *c));
+                continue;
+            };
+            let px = face_px as usize;
+            for (i, (texel, wanted_here)) in texels.iter().zip(&wanted).enumerate() {
+                // 0 is the object, 255 the background; nothing between them is written.
+                let agrees = *texel == if *wanted_here { 0 } else { 255 };
+                let explained = matches!(texel, 0 | 255) && is_edge(&wanted, px, i % px, i / px);
+                out.differing += usize::from(!agrees);
+                out.off_edge += usize::from(!agrees && !explained);
+            }
+            out.texels += texels.len();
+            out.covered += texels.iter().filter(|t| **t == 0).count();
+        }
+    }
+    Ok(out)
+}
+
+/// Share of the texels whose captured colour is farther than a few roundings from that of the nearest thing that a ray
+/// meets. Infinite where nothing was seen.
+///
+/// # Errors
+/// As [`Capture::new`].
+pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result<f64> {
+    let positions = unit_positions(mesh);
+    let white = vec![Vec3::ONE; positions.len()];
+    let colors = mesh.colors.as_ref().unwrap_or(&white);
+    let (mut texels, mut differing, mut lit) = (0, 0, 0);
+    for (eye, faces) in eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, true, true))?) {
+        for (face, found) in faces.iter().enumerate() {
+            let wanted =
+                capture::reference_colors((&positions, colors), &mesh.triangles, eye.as_dvec3(), face, face_px);
+            for (i, wanted) in wanted.iter().enumerate() {
+                let found = found.as_ref().map_or([0.0; 3], |texels| [texels[i][0], texels[i][1], texels[i][2]]);
+                let found = Vec3::from_array(found).as_dvec3();
+                // Written so that what is no number differs.
+                let agrees = (found - *wanted).length() <= COLOR * (1.0 + wanted.length());
+                differing += usize::from(!agrees);
+                lit += usize::from(wanted.length() > 0.0);
+                texels += 1;
+            }
+        }
+    }
+    Ok(if lit == 0 { f64::INFINITY } else { f64::from(differing as u32) / texels as f64 })
+}
+
+/// Eyes all around: on the axes, at odd angles, near and far.
+pub fn eyes_outside() -> Vec<Vec3> {
+    vec![
+        Vec3::new(1.02, 0.0, 0.0),
+        Vec3::new(0.0, -1.3, 0.01),
+        Vec3::new(0.7, 0.8, -0.4),
+        Vec3::new(-2.0, 1.1, 0.6),
+        Vec3::new(0.3, 0.2, 7.9),
+    ]
+}
+
+/// The comparisons of `check`.
+///
+/// # Errors
+/// As [`Capture::new`].
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
+    let measure = "share of texels";
+    for mesh in [generate::sphere(0.5, 3), generate::torus(1.0, 0.3, 32, 16)] {
+        let found = coverage(baker, &mesh, &eyes_outside(), 32)?;
+        add(Row::new("capture", format!("coverage, {}", mesh.name), measure, found.error(), DIFFERING_LIMIT));
+    }
+    let mesh = generate::torus_two_colour(0.5, 0.15, 32, 16);
+    let found = colors(baker, &mesh, &eyes_outside(), 32)?;
+    // Silhouettes and the seams where two colours meet count here too.
+    add(Row::new("capture", format!("radiance, {}", mesh.name), measure, found, 2.0 * DIFFERING_LIMIT));
+    Ok(())
+}

@@ -1,0 +1,57 @@
+//! "draw" against its twin, which casts a ray through every sample of a picture.
+
+use super::Row;
+use super::merge::{MIXED, options, scene};
+use crate::bake::Baker;
+use crate::bake::cache::Cache;
+use crate::error::Result;
+use crate::frame::{Frame, Options};
+use crate::scene::Placement;
+
+/// Two half-float steps, and two roundings of interpolated f32.
+pub const HALF: f64 = 2e-3;
+/// Pixels whose samples lie so near an edge that f32 and f64 see different triangles there: a share of all.
+pub const EDGES: f64 = 2e-3;
+
+/// Draws what the last merge left, on the device and by its twin: the share of pixels that differ by more than [`HALF`] of
+/// 1 + what is wanted. Infinite where the picture is of one colour.
+///
+/// # Errors
+/// As [`Frame::render`].
+pub fn against_twin(frame: &mut Frame, placements: &[Placement], white: f32) -> Result<f64> {
+    frame.render(placements, Some(white))?;
+    let found = frame.picture();
+    let wanted = frame.reference_picture(placements, white)?;
+    assert_eq!(found.len(), 3 * wanted.len(), "pixels");
+    let mut differing = 0;
+    for (found, wanted) in found.chunks_exact(3).zip(&wanted) {
+        let agrees = (0..3).all(|c| (f64::from(found[c]) - wanted[c]).abs() <= HALF * (1.0 + wanted[c].abs()));
+        differing += usize::from(!agrees);
+    }
+    let plain = wanted.iter().all(|pixel| pixel == &wanted[0]);
+    Ok(if plain { f64::INFINITY } else { f64::from(differing as u32) / wanted.len() as f64 })
+}
+
+/// The comparisons of `check`.
+///
+/// # Errors
+/// As [`Frame::new`] and [`Frame::render`].
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
+    let scene = scene(MIXED)?;
+    let placements = scene.at(0.0);
+    for multisample in [false, true] {
+        let mut options = Options { size: [96, 64], multisample, ..options() };
+        options.bake.lattice = "cube:2x1".parse().expect("a lattice");
+        let mut frame = Frame::new(baker, &Cache::default(), &scene, options, &|_, _, _| ())?;
+        for white in [1.0, f32::INFINITY] {
+            let worst = against_twin(&mut frame, &placements, white)?;
+            let what = format!(
+                "{} sample{} a pixel, white {white}",
+                frame.samples(),
+                if frame.samples() > 1 { "s" } else { "" }
+            );
+            add(Row::new("draw", what, "share of pixels", worst, EDGES));
+        }
+    }
+    Ok(())
+}

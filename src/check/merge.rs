@@ -1,0 +1,187 @@
+//! "merge" against its twin in f64, which reads the same stored numbers: every variant, lookup, skip, number format and kind
+//! of lattice.
+
+use super::Row;
+use crate::asset::embedded;
+use crate::bake::cache::Cache;
+use crate::bake::{self, Baker};
+use crate::error::Result;
+use crate::field::{Lookup, Storage};
+use crate::frame::{Frame, Options};
+use crate::render::Variant;
+use crate::render::variant::{Skip, VARIANTS};
+use crate::scene::{Placement, Scene};
+use std::path::Path;
+
+/// Differences of f32 arithmetic between device and twin: some 20 products and rotations of numbers around the brightest
+/// radiosity, each off by 6e-8 of it. The stored numbers are the same in both, f16 or not.
+pub const ARITHMETIC: f64 = 1e-5;
+/// Vulkan lets a device be off by 4096 units in the last place in atan and acos: 2.4e-4 of an angle.
+pub const ANGLES: f64 = 3e-4;
+/// Rounding decides which sample is nearest where two are equally near, and there the whole step between them shows: the share
+/// of vertices for which that may happen.
+pub const TIES: f64 = 2e-3;
+
+/// A floor, a ball that is lit and shades itself with a ring, two lights of which one has colours of its own, and a sky.
+/// Positions are odd, so that no vertex lies on a border between samples.
+pub const MIXED: &str = r#"
+environment = { uniform = [0.1, 0.12, 0.2], key = { radiance = [2, 1.5, 1], toward = [1, 2, 0.5], sharpness = 3 } }
+[[mesh]]
+name = "floor"
+plane = { size_m = 7, cells = 20 }
+[[mesh]]
+name = "ball"
+sphere = { radius_m = 0.5, subdivisions = 2 }
+[[mesh]]
+name = "ring"
+torus = { major_m = 0.5, minor_m = 0.2, segments = 16, sides = 8 }
+[[mesh]]
+name = "glow"
+torus_two_colour = { major_m = 0.4, minor_m = 0.1, segments = 16, sides = 8 }
+[[entity]]
+mesh = "floor"
+[[entity]]
+mesh = "ball"
+position = [-0.713, 0.667, 0.119]
+[[entity]]
+mesh = "ring"
+position = [0.613, 0.871, -0.379]
+rotation = { axis = [1, 0.3, -0.4], angle_deg = 67 }
+scale = 0.8
+[[entity]]
+mesh = "glow"
+position = [0.177, 1.731, 0.913]
+rotation = { axis = [0.2, 0.9, 0.5], angle_deg = 41 }
+emission = [5, 6, 7]
+[[entity]]
+mesh = "ball"
+position = [1.513, 2.177, 0.691]
+scale = 0.4
+emission = [20, 15, 10]
+"#;
+
+/// A scene from the text of its meshes, entities and sky; a camera is added.
+///
+/// # Errors
+/// `Input` as [`Scene::parse`].
+pub fn scene(text: &str) -> Result<Scene> {
+    let text = format!("{text}\n[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n");
+    Scene::parse(&text, Path::new("assets/scenes/check.toml"), &embedded::read)
+}
+
+/// Few samples of few texels in f32: quick, and all that a comparison with a twin needs. The variant is pinned.
+pub fn options() -> Options {
+    let lattice = "cube:6x4".parse().expect("a lattice");
+    Options {
+        bake: bake::Options { storage: Storage::F32, lattice, face_px: 16, ..Default::default() },
+        lookup: Lookup::Trilinear,
+        variant: Some(Variant::named("texel").expect("a variant")),
+        skip: Skip::ALL,
+        size: [64, 48],
+        multisample: true,
+    }
+}
+
+/// How device and twin agree on every lit vertex.
+#[derive(Clone, Copy, Debug)]
+pub struct Agreement {
+    /// Largest difference as a share of 1 + the brightest radiosity; infinite where a number is not finite.
+    pub worst: f64,
+    /// Share of vertices that are off by more than [`ARITHMETIC`].
+    pub off: f64,
+    /// The brightest radiosity.
+    pub brightest: f64,
+}
+
+/// Lights the scene on the device and in f64.
+///
+/// # Errors
+/// As [`Frame::render`].
+pub fn against_twin(frame: &mut Frame, placements: &[Placement]) -> Result<Agreement> {
+    frame.render(placements, None)?;
+    let reference = frame.reference(placements)?;
+    let (mut worst, mut off, mut count) = (0.0_f64, 0, 0);
+    let brightest = reference.iter().flat_map(|(_, v)| v.iter().flatten()).fold(0.0_f64, |m, b| m.max(b.abs()));
+    for (entity, expected) in &reference {
+        let found = frame.radiosity(*entity)?;
+        assert_eq!(found.len(), expected.len(), "vertices of entity {entity}");
+        for (found, expected) in found.iter().zip(expected) {
+            let difference = |c: usize| (f64::from(found[c]) - expected[c]).abs() / (1.0 + brightest);
+            let error =
+                (0..3).map(difference).fold(0.0, |m, e| if e.is_nan() { f64::INFINITY } else { f64::max(m, e) });
+            worst = worst.max(error);
+            off += usize::from(error > ARITHMETIC);
+            count += 1;
+        }
+    }
+    // A dark scene shows nothing.
+    let worst = if brightest > 0.01 { worst } else { f64::INFINITY };
+    Ok(Agreement { worst, off: f64::from(off as u32) / f64::from(count.max(1)), brightest })
+}
+
+/// The lattices that are tried besides the pinned one, with what each is allowed to be off by.
+pub const LATTICES: [(&str, f64); 4] = [
+    ("latlon:5x4x6", ANGLES),
+    ("latlon:4x1x3,linear,raw", ANGLES),
+    ("cube:5x3,log,raw,inner=0.5,outer=5", ARITHMETIC),
+    ("cube:1x1", ARITHMETIC),
+];
+
+/// The comparisons of `check`.
+///
+/// # Errors
+/// As [`Frame::new`] and [`Frame::render`].
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
+    let scene = scene(MIXED)?;
+    let placements = scene.at(0.0);
+    // Fields are baked once for all rows, by the device under test; nothing is read from disk.
+    let folder = tempfile::tempdir()
+        .map_err(|error| crate::error::Error::Failed(format!("no folder for temporary files: {error}")))?;
+    let cache = Cache::new(Some(folder.path()));
+    let mut compare = |what: String, options: Options| -> Result<()> {
+        let mut frame = Frame::new(baker, &cache, &scene, options, &|_, _, _| ())?;
+        let found = against_twin(&mut frame, &placements)?;
+        let what = if options.variant.is_none_or(|v| v == frame.variant) {
+            what
+        } else {
+            format!("{what} (as {}: the device's limits)", frame.variant.name)
+        };
+        let (tolerance, near) = match options.bake.lattice.directions {
+            crate::field::lattice::Directions::LatLon { .. } => (ANGLES, true),
+            crate::field::lattice::Directions::Cube { .. } => (ARITHMETIC, options.lookup == Lookup::Trilinear),
+        };
+        add(if near {
+            Row::new("merge", what, "of 1 + brightest", found.worst, tolerance)
+        } else {
+            let off = if found.worst.is_finite() { found.off } else { f64::INFINITY };
+            Row::new("merge", what, "share of vertices", off, TIES)
+        });
+        Ok(())
+    };
+    let base = options();
+    for &variant in VARIANTS {
+        for storage in [Storage::F32, Storage::F16] {
+            let bake = bake::Options { storage, ..base.bake };
+            let what = format!("{}, {}", variant.name, format!("{storage:?}").to_lowercase());
+            compare(what, Options { variant: Some(variant), bake, ..base })?;
+        }
+    }
+    for skip in [Skip::NONE, Skip { horizon: true, cones: false }, Skip { horizon: false, cones: true }] {
+        let what = if skip == Skip::NONE {
+            "no skip"
+        } else if skip.horizon {
+            "skip horizon"
+        } else {
+            "skip cones"
+        };
+        compare(what.into(), Options { skip, ..base })?;
+    }
+    for lookup in [Lookup::Nearest, Lookup::Radial] {
+        compare(format!("lookup {lookup:?}").to_lowercase(), Options { lookup, ..base })?;
+    }
+    for (lattice, _) in LATTICES {
+        let bake = bake::Options { lattice: lattice.parse().expect("a lattice in the table"), ..base.bake };
+        compare(lattice.into(), Options { bake, ..base })?;
+    }
+    Ok(())
+}

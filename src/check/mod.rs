@@ -1,0 +1,91 @@
+//! Every pass held against its CPU twin on one device: what `check` prints and what the tests of the passes assert.
+//!
+//! A comparison answers with a [`Row`]: its worst error beside the tolerance and the reason for it. Nothing is read but the
+//! embedded scenes and shaders (or those that replace them), and fields are baked anew.
+
+pub mod assemble;
+pub mod capture;
+pub mod draw;
+pub mod merge;
+pub mod project;
+
+use crate::bake::Baker;
+use crate::error::Result;
+use serde::Serialize;
+
+/// One comparison.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Pass, by the one word that names it everywhere.
+    pub pass: &'static str,
+    /// What it was given.
+    pub what: String,
+    /// What the error is measured in.
+    pub measure: &'static str,
+    /// The worst error; infinite where an outcome is no number, differs from run to run or shows nothing to compare.
+    #[serde(serialize_with = "finite_or_text")]
+    pub worst: f64,
+    /// The largest error that passes.
+    pub tolerance: f64,
+    /// Whether it passed.
+    pub passed: bool,
+}
+
+/// JSON knows no infinity.
+fn finite_or_text<S: serde::Serializer>(value: &f64, to: S) -> std::result::Result<S::Ok, S::Error> {
+    if value.is_finite() { to.serialize_f64(*value) } else { to.serialize_str("infinite") }
+}
+
+impl Row {
+    /// A comparison's outcome. An error that is no number does not pass.
+    pub fn new(pass: &'static str, what: impl Into<String>, measure: &'static str, worst: f64, tolerance: f64) -> Self {
+        let worst = if worst.is_nan() { f64::INFINITY } else { worst };
+        Row { pass, what: what.into(), measure, worst, tolerance, passed: worst <= tolerance }
+    }
+
+    /// The row as a line for people.
+    pub fn line(&self) -> String {
+        format!("{} {}: {:.1e} of {:.0e} ({})", self.pass, self.what, self.worst, self.tolerance, self.measure)
+    }
+}
+
+/// The comparisons of one pass, each told as it comes.
+type Part = fn(&Baker, &mut dyn FnMut(Row)) -> Result<()>;
+
+/// Every pass, by the one word that names it everywhere.
+pub const PASSES: [(&str, Part); 5] = [
+    ("capture", capture::rows),
+    ("project", project::rows),
+    ("assemble", assemble::rows),
+    ("merge", merge::rows),
+    ("draw", draw::rows),
+];
+
+/// Runs every comparison of the given passes; `told` hears each row as it comes.
+///
+/// # Errors
+/// What a pass returns when it cannot be run at all: a shader that does not compile, a lost device.
+pub fn run(baker: &Baker, passes: &[&str], told: &dyn Fn(&Row)) -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    for (_, part) in PASSES.iter().filter(|(name, _)| passes.contains(name)) {
+        part(baker, &mut |row| {
+            told(&row);
+            rows.push(row);
+        })?;
+    }
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_numbers_within_the_tolerance_pass() {
+        let passed = |worst| Row::new("merge", "", "", worst, 1e-3).passed;
+        assert!(passed(0.0) && passed(1e-3));
+        assert!(!passed(1.1e-3) && !passed(f64::NAN) && !passed(f64::INFINITY));
+        let json = serde_json::to_string(&Row::new("merge", "", "", f64::NAN, 1e-3)).unwrap();
+        assert!(json.contains("\"infinite\"") && json.contains("false"), "{json}");
+    }
+}

@@ -1,0 +1,129 @@
+//! The CPU twin of "draw" in f64: a picture of a frame by asking of every sample which triangle lies nearest.
+
+use super::{Frame, camera};
+use crate::error::Result;
+use crate::scene::Placement;
+use glam::{DMat3, DVec2, DVec3, DVec4};
+use rayon::prelude::*;
+
+/// Vulkan's standard places of four samples in a pixel ("Standard sample locations"), and of one.
+const FOUR: [DVec2; 4] =
+    [DVec2::new(0.375, 0.125), DVec2::new(0.875, 0.375), DVec2::new(0.125, 0.625), DVec2::new(0.625, 0.875)];
+const ONE: [DVec2; 1] = [DVec2::new(0.5, 0.5)];
+
+/// A triangle on its way to the screen.
+struct Corners {
+    /// From (x, y, 1) in clip space, before the division, to the corners' weights over w.
+    weights: DMat3,
+    /// Radiance at the corners: emission and radiosity.
+    radiance: [DVec3; 3],
+    /// Pixels that it may touch: from and to, in x and y.
+    pixels: [[f64; 2]; 2],
+}
+
+impl Frame {
+    /// Samples a pixel of its pictures.
+    pub fn samples(&self) -> u32 {
+        self.draw.samples()
+    }
+
+    /// The picture that the radiosity on the device should give, rows from the top; `white` as in [`Frame::render`].
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn reference_picture(&self, placements: &[Placement], white: f32) -> Result<Vec<[f64; 3]>> {
+        let [width, height] = self.options.size;
+        let triangles = self.triangles(placements)?;
+        let samples: &[DVec2] = if self.samples() > 1 { &FOUR } else { &ONE };
+        let shade = |pixel: u32| {
+            let corner = DVec2::new(f64::from(pixel % width), f64::from(pixel / width));
+            let clip =
+                |at: DVec2| DVec3::new(2.0 * at.x / f64::from(width) - 1.0, 2.0 * at.y / f64::from(height) - 1.0, 1.0);
+            let near: Vec<&Corners> = triangles.iter().filter(|t| t.may_touch(corner)).collect();
+            let mut sum = DVec3::ZERO;
+            for sample in samples {
+                let at = clip(corner + *sample);
+                let seen = near.iter().filter_map(|t| Some((t.nearness(at)?, t)));
+                sum += match seen.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                    // The shader runs once a pixel, at its centre, for all samples that a triangle covers.
+                    Some((_, triangle)) => shown(triangle.at(clip(corner + DVec2::splat(0.5))), f64::from(white)),
+                    None => self.background.as_dvec3(),
+                };
+            }
+            (sum / samples.len() as f64).to_array()
+        };
+        Ok((0..width * height).into_par_iter().map(shade).collect())
+    }
+
+    /// Every triangle of the scene.
+    fn triangles(&self, placements: &[Placement]) -> Result<Vec<Corners>> {
+        let [width, height] = self.options.size.map(f64::from);
+        let clip_from_world = camera::clip_from_world(&self.scene.data.camera, width / height);
+        let mut out = Vec::new();
+        for (index, placement) in placements.iter().enumerate() {
+            let entity = &self.scene.entities[index];
+            let mesh = &self.scene.meshes[entity.mesh];
+            let radiosity = self.radiosity(index)?;
+            let rotation = placement.rotation.as_dquat().normalize();
+            let corner = |&i: &u32| {
+                let v = i as usize;
+                let world = placement.position.as_dvec3()
+                    + rotation * (mesh.positions[v].as_dvec3() * f64::from(placement.scale));
+                let pattern = mesh.colors.as_ref().map_or(glam::Vec3::ONE, |colors| colors[v]);
+                let emitted = (entity.emission * pattern).as_dvec3();
+                (clip_from_world * world.extend(1.0), emitted + glam::Vec3::from_array(radiosity[v]).as_dvec3())
+            };
+            for triangle in &mesh.triangles {
+                let [a, b, c] = [corner(&triangle[0]), corner(&triangle[1]), corner(&triangle[2])];
+                out.extend(Corners::new([a.0, b.0, c.0], [a.1, b.1, c.1], [width, height]));
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// What the fragment shader makes of radiance.
+fn shown(radiance: DVec3, white: f64) -> DVec3 {
+    let shown = radiance.max(DVec3::ZERO);
+    if shown.max_element() > white { shown * (white / shown.max_element()) } else { shown }
+}
+
+impl Corners {
+    /// `None` for a triangle that is seen from its edge.
+    fn new(clip: [DVec4; 3], radiance: [DVec3; 3], size: [f64; 2]) -> Option<Self> {
+        let matrix = DMat3::from_cols_array_2d(&clip.map(|c| [c.x, c.y, c.w]));
+        let weights = matrix.inverse();
+        if !weights.is_finite() || matrix.determinant() == 0.0 {
+            return None;
+        }
+        let in_front = clip.iter().all(|c| c.w > 0.0);
+        let range = |axis: usize| {
+            let places = clip.map(|c| (c[axis] / c.w + 1.0) / 2.0 * size[axis]);
+            // A triangle that reaches behind the eye may be anywhere.
+            let whole = [0.0, size[axis]];
+            if in_front {
+                [places.iter().copied().fold(f64::MAX, f64::min), places.iter().copied().fold(f64::MIN, f64::max)]
+            } else {
+                whole
+            }
+        };
+        Some(Corners { weights, radiance, pixels: [range(0), range(1)] })
+    }
+
+    /// Whether it may cover any of the pixel whose corner is given.
+    fn may_touch(&self, corner: DVec2) -> bool {
+        (0..2).all(|axis| corner[axis] + 1.0 >= self.pixels[axis][0] && corner[axis] <= self.pixels[axis][1])
+    }
+
+    /// One over its distance along the camera's axis at a place on the screen, where it covers it in front of the eye.
+    fn nearness(&self, at: DVec3) -> Option<f64> {
+        let weights = self.weights * at;
+        (weights.min_element() >= 0.0).then(|| weights.element_sum())
+    }
+
+    /// Its radiance at a place on the screen, also beyond its edges.
+    fn at(&self, at: DVec3) -> DVec3 {
+        let weights = self.weights * at;
+        self.radiance.iter().zip(weights.to_array()).map(|(r, w)| *r * w).sum::<DVec3>() / weights.element_sum()
+    }
+}

@@ -1,0 +1,75 @@
+//! `check`: every pass against its twin, from anywhere, and exit code 1 where one is off.
+
+#[path = "common/cli.rs"]
+mod cli;
+mod common;
+
+use cli::{command, finish, has_device};
+use serde_json::Value;
+use shadow_fields::shaders::FILES;
+use std::path::Path;
+
+const PASSES: [&str; 5] = ["capture", "project", "assemble", "merge", "draw"];
+
+fn check(folder: &Path, pass: Option<&str>, shaders: Option<&Path>) -> (i32, Value, String) {
+    let mut command = command(folder, &["check", "--json", "--no-progress"]);
+    command.args(pass);
+    if let Some(shaders) = shaders {
+        command.arg("--shader-dir").arg(shaders);
+    }
+    let ran = finish(&mut command);
+    (ran.code, serde_json::from_str(&ran.stdout).unwrap_or(Value::Null), ran.stderr)
+}
+
+fn failed(report: &Value) -> Vec<String> {
+    let rows = report["rows"].as_array().unwrap();
+    let bad = rows.iter().filter(|row| row["passed"] == false);
+    bad.map(|row| row["pass"].as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn every_pass_is_compared_and_passes() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (code, report, stderr) = check(folder.path(), None, None);
+    assert_eq!((code, &report["passed"]), (0, &Value::Bool(true)), "{stderr}");
+    let rows = report["rows"].as_array().unwrap();
+    for pass in PASSES {
+        assert!(rows.iter().any(|row| row["pass"] == pass), "{pass} is not compared");
+    }
+    assert!(rows.iter().all(|row| row["worst"].as_f64().unwrap() <= row["tolerance"].as_f64().unwrap()));
+    assert!(!report["origin"]["device"].as_str().unwrap().is_empty());
+    assert!(cli::names(folder.path()).is_empty(), "it leaves nothing where it ran");
+}
+
+/// A hair's breadth wrong in one shader at a time: the pass that runs it must be named.
+#[test]
+fn a_wrong_shader_is_found() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let wrong = [
+        ("capture.vert", "vec3 q = position - push.eye.xyz;", "vec3 q = position - push.eye.xyz + 0.02;", "capture"),
+        ("project.comp", "total *= jobs[job].scale;", "total *= 1.0001 * jobs[job].scale;", "project"),
+        ("assemble.comp", "vec4 mean = sum", "vec4 mean = 1.01 * sum", "assemble"),
+        ("merge.comp", "float weight = above_horizon", "float weight = 0.999 * above_horizon", "merge"),
+        ("draw.frag", "color = vec4(shown,", "color = vec4(1.01 * shown,", "draw"),
+    ];
+    for (file, from, to, pass) in wrong {
+        let text = FILES.iter().find(|(name, _)| *name == file).unwrap().1;
+        assert!(text.contains(from), "{file} no longer says \"{from}\"");
+        let shaders = tempfile::tempdir().unwrap();
+        std::fs::write(shaders.path().join(file), text.replace(from, to)).unwrap();
+        let (code, report, stderr) = check(folder.path(), Some(pass), Some(shaders.path()));
+        assert_eq!((code, &report["passed"]), (1, &Value::Bool(false)), "{file}: {stderr}");
+        assert!(
+            !failed(&report).is_empty() && failed(&report).iter().all(|row| row == pass),
+            "{file}: {:?}",
+            failed(&report)
+        );
+        assert!(stderr.contains("comparisons failed"), "{stderr}");
+    }
+}

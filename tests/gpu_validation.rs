@@ -10,7 +10,7 @@ use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::{Capture, Model};
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::field::{Kind, Storage};
-use shadow_fields::gpu::memory::ImageShape;
+use shadow_fields::gpu::image::ImageShape;
 use shadow_fields::gpu::validation::Messages;
 use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, Device, Image, Options};
 use shadow_fields::{Error, Result};

@@ -7,8 +7,8 @@
 
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
+use crate::gpu::ImageShape;
 use crate::gpu::Target;
-use crate::gpu::memory::ImageShape;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, GraphicsPipeline, GraphicsState, Image};
 use crate::sh::cube::{FACE_COUNT, face_basis, texel_st};
 use crate::shaders::{Library, Row};

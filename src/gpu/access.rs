@@ -24,12 +24,16 @@ pub enum Access {
     ComputeWrite,
     /// A compute shader reads a texel buffer or a sampled image.
     ComputeSampled,
+    /// A fragment shader reads an image with `texelFetch`.
+    FragmentSampled,
     /// Vertex attributes and indices.
     VertexRead,
     /// Colour attachment of a render pass, resolve included.
     ColorWrite,
     /// Depth attachment of a render pass.
     DepthWrite,
+    /// The window system shows the image, once a semaphore says so.
+    Present,
 }
 
 impl Access {
@@ -39,9 +43,12 @@ impl Access {
             Access::HostRead => Stage::HOST,
             Access::TransferRead | Access::TransferWrite => Stage::ALL_TRANSFER,
             Access::ComputeRead | Access::ComputeWrite | Access::ComputeSampled => Stage::COMPUTE_SHADER,
+            Access::FragmentSampled => Stage::FRAGMENT_SHADER,
             Access::VertexRead => Stage::VERTEX_INPUT,
             Access::ColorWrite => Stage::COLOR_ATTACHMENT_OUTPUT,
             Access::DepthWrite => Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS,
+            // The semaphore that follows orders and makes visible; the barrier only changes the layout.
+            Access::Present => Stage::NONE,
         }
     }
 
@@ -53,10 +60,11 @@ impl Access {
             Access::TransferWrite => Mask::TRANSFER_WRITE,
             Access::ComputeRead => Mask::SHADER_STORAGE_READ | Mask::UNIFORM_READ,
             Access::ComputeWrite => Mask::SHADER_STORAGE_READ | Mask::SHADER_STORAGE_WRITE,
-            Access::ComputeSampled => Mask::SHADER_SAMPLED_READ,
+            Access::ComputeSampled | Access::FragmentSampled => Mask::SHADER_SAMPLED_READ,
             Access::VertexRead => Mask::VERTEX_ATTRIBUTE_READ | Mask::INDEX_READ,
             Access::ColorWrite => Mask::COLOR_ATTACHMENT_READ | Mask::COLOR_ATTACHMENT_WRITE,
             Access::DepthWrite => Mask::DEPTH_STENCIL_ATTACHMENT_READ | Mask::DEPTH_STENCIL_ATTACHMENT_WRITE,
+            Access::Present => Mask::NONE,
         }
     }
 
@@ -71,6 +79,7 @@ impl Access {
             Access::ColorWrite => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
             Access::DepthWrite => vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
             Access::TransferRead => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            Access::Present => vk::ImageLayout::PRESENT_SRC_KHR,
             _ => vk::ImageLayout::GENERAL,
         }
     }

@@ -1,13 +1,14 @@
 //! Recording and submitting: dispatches, draws, copies, barriers, timers and labels.
 //!
-//! A [`Commands`] borrows every resource that is recorded into it; `submit` waits for the device, so nothing that the
-//! device still uses can be dropped.
+//! A [`Commands`] borrows every resource that is recorded into it. `submit` waits for the device; `launch` does not, and then
+//! dropping a resource waits for whatever is under way ([`Device::settle`]): nothing that the device still uses goes.
 
-use super::Checked;
 use super::access::{Access, Tracker};
 use super::descriptors::Bind;
 use super::device::Device;
-use super::memory::{Buffer, BufferKind, Image, whole};
+use super::flight::{Flight, MAX_PASSES, Recording, Signals};
+use super::image::{Image, whole};
+use super::memory::{Buffer, BufferKind};
 use super::pipeline::ComputePipeline;
 use crate::error::{Error, Result};
 use ash::vk;
@@ -26,18 +27,9 @@ pub struct Timing {
     pub milliseconds: f64,
 }
 
-/// Timed passes in one recording; a pass takes two timestamps.
-const MAX_PASSES: u32 = 64;
-/// A recording in progress. Borrows what it uses until [`Commands::submit`] has waited for the device.
+/// A recording in progress. Borrows what it uses until it is submitted.
 pub struct Commands<'r> {
-    pub(super) device: Arc<Device>,
-    pub(super) name: String,
-    pool: vk::CommandPool,
-    pub(super) buffer: vk::CommandBuffer,
-    fence: vk::Fence,
-    queries: vk::QueryPool,
-    pub(super) descriptors: Vec<(vk::DescriptorPool, u32)>,
-    passes: Vec<String>,
+    pub(super) recording: Recording,
     in_pass: bool,
     pub(super) tracker: Tracker,
     /// Buffers that the host will read, with the ranges that were copied into them.
@@ -52,47 +44,14 @@ impl<'r> Commands<'r> {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, name: &str) -> Result<Self> {
-        let mut commands = Commands {
-            device: device.clone(),
-            name: name.to_owned(),
-            pool: vk::CommandPool::null(),
-            buffer: vk::CommandBuffer::null(),
-            fence: vk::Fence::null(),
-            queries: vk::QueryPool::null(),
-            descriptors: Vec::new(),
-            passes: Vec::new(),
+        Ok(Commands {
+            recording: Recording::new(device, name)?,
             in_pass: false,
             tracker: Tracker::default(),
             read_back: Vec::new(),
             barrier_count: 0,
             borrows: PhantomData,
-        };
-        let handle = &device.handle;
-        let pool = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(device.queue_family)
-            .flags(vk::CommandPoolCreateFlags::TRANSIENT);
-        let queries =
-            vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_PASSES);
-        // SAFETY: for the whole block, every handle is stored in `commands` as soon as it exists and destroyed in its `Drop`.
-        unsafe {
-            commands.pool = handle.create_command_pool(&pool, None).checked("vkCreateCommandPool", name)?;
-            commands.fence =
-                handle.create_fence(&vk::FenceCreateInfo::default(), None).checked("vkCreateFence", name)?;
-            commands.queries = handle.create_query_pool(&queries, None).checked("vkCreateQueryPool", name)?;
-            let allocate = vk::CommandBufferAllocateInfo::default()
-                .command_pool(commands.pool)
-                .level(vk::CommandBufferLevel::PRIMARY)
-                .command_buffer_count(1);
-            commands.buffer = handle.allocate_command_buffers(&allocate).checked("vkAllocateCommandBuffers", name)?[0];
-            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-            handle.begin_command_buffer(commands.buffer, &begin).checked("vkBeginCommandBuffer", name)?;
-            handle.cmd_reset_query_pool(commands.buffer, commands.queries, 0, 2 * MAX_PASSES);
-        }
-        device.name(commands.pool, name);
-        device.name(commands.buffer, name);
-        device.name(commands.fence, name);
-        device.name(commands.queries, name);
-        Ok(commands)
+        })
     }
 
     /// Runs `record` as one labelled, timed pass.
@@ -103,17 +62,17 @@ impl<'r> Commands<'r> {
     /// # Panics
     /// When passes nest or a recording has more than 64 of them.
     pub fn pass(&mut self, name: &str, record: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
-        assert!(!self.in_pass, "{}: pass {name} starts inside another", self.name);
-        let index = self.passes.len() as u32;
-        assert!(index < MAX_PASSES, "{}: more than {MAX_PASSES} passes", self.name);
-        self.passes.push(name.to_owned());
+        assert!(!self.in_pass, "{}: pass {name} starts inside another", self.recording.name);
+        let index = self.recording.passes.len() as u32;
+        assert!(index < MAX_PASSES, "{}: more than {MAX_PASSES} passes", self.recording.name);
+        self.recording.passes.push(name.to_owned());
         self.in_pass = true;
         let label_name = CString::new(name).unwrap_or_default();
         let label = vk::DebugUtilsLabelEXT::default().label_name(&label_name);
         // SAFETY: the command buffer is recording.
         unsafe {
-            if let Some(names) = &self.device.names {
-                names.cmd_begin_debug_utils_label(self.buffer, &label);
+            if let Some(names) = &self.recording.device.names {
+                names.cmd_begin_debug_utils_label(self.recording.buffer, &label);
             }
         }
         self.stamp(2 * index);
@@ -121,8 +80,8 @@ impl<'r> Commands<'r> {
         self.stamp(2 * index + 1);
         // SAFETY: as above.
         unsafe {
-            if let Some(names) = &self.device.names {
-                names.cmd_end_debug_utils_label(self.buffer);
+            if let Some(names) = &self.recording.device.names {
+                names.cmd_end_debug_utils_label(self.recording.buffer);
             }
         }
         self.in_pass = false;
@@ -133,19 +92,26 @@ impl<'r> Commands<'r> {
     fn stamp(&mut self, query: u32) {
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         // SAFETY: the command buffer is recording and the query was reset at its start.
-        unsafe { self.device.handle.cmd_write_timestamp2(self.buffer, stage, self.queries, query) };
-        if self.device.info.is_software() {
+        unsafe {
+            self.recording.device.handle.cmd_write_timestamp2(
+                self.recording.buffer,
+                stage,
+                self.recording.queries,
+                query,
+            )
+        };
+        if self.recording.device.info.is_software() {
             // llvmpipe takes the time when it next rasterises or meets a barrier, not where the stamp stands among dispatches:
             // an empty barrier settles it. It orders nothing that the passes' own barriers do not, and is not tracked.
             let barriers = [vk::MemoryBarrier2::default().src_stage_mask(stage).dst_stage_mask(stage)];
             let info = vk::DependencyInfo::default().memory_barriers(&barriers);
             // SAFETY: the command buffer is recording and outside a render pass.
-            unsafe { self.device.handle.cmd_pipeline_barrier2(self.buffer, &info) };
+            unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
         }
     }
 
     pub(super) fn pass_name(&self) -> String {
-        self.passes.last().unwrap_or(&self.name).clone()
+        self.recording.passes.last().unwrap_or(&self.recording.name).clone()
     }
 
     /// Makes what `from` did before complete and visible to `to` after, for every buffer.
@@ -161,7 +127,7 @@ impl<'r> Commands<'r> {
             .dst_access_mask(to.mask())];
         let info = vk::DependencyInfo::default().memory_barriers(&barriers);
         // SAFETY: the command buffer is recording and outside a render pass.
-        unsafe { self.device.handle.cmd_pipeline_barrier2(self.buffer, &info) };
+        unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
     }
 
     /// As [`Commands::barrier`] for one image, moving it to the layout that `to` needs. `from` of `None` throws its
@@ -191,13 +157,13 @@ impl<'r> Commands<'r> {
             .dst_access_mask(to.mask())];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
         // SAFETY: the command buffer is recording and outside a render pass; the image is borrowed until it has run.
-        unsafe { self.device.handle.cmd_pipeline_barrier2(self.buffer, &info) };
+        unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
     }
 
     /// Counts a barrier and says whether a test wants it left out.
     fn skip_barrier(&mut self) -> bool {
         self.barrier_count += 1;
-        self.barrier_count - 1 == self.device.omitted_barrier()
+        self.barrier_count - 1 == self.recording.device.omitted_barrier()
     }
 
     /// Runs a compute pipeline over `elements` invocations in x, y and z; `resources` stand at their binding numbers.
@@ -215,7 +181,7 @@ impl<'r> Commands<'r> {
         elements: [u32; 3],
     ) -> Result<()> {
         let groups = [0, 1, 2].map(|axis| elements[axis].div_ceil(pipeline.local_size[axis]));
-        let most = self.device.limits.max_compute_work_group_count;
+        let most = self.recording.device.limits.max_compute_work_group_count;
         if (0..3).any(|axis| groups[axis] > most[axis]) {
             return Err(Error::Input(format!("{}: {groups:?} workgroups, the device takes {most:?}", pipeline.name)));
         }
@@ -226,9 +192,9 @@ impl<'r> Commands<'r> {
         self.push(&pipeline.layout, &pipeline.name, push);
         // SAFETY: pipeline and resources are borrowed until the commands have run; limits were checked above.
         unsafe {
-            let handle = &self.device.handle;
-            handle.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
-            handle.cmd_dispatch(self.buffer, groups[0], groups[1], groups[2]);
+            let handle = &self.recording.device.handle;
+            handle.cmd_bind_pipeline(self.recording.buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
+            handle.cmd_dispatch(self.recording.buffer, groups[0], groups[1], groups[2]);
         }
         Ok(())
     }
@@ -255,7 +221,7 @@ impl<'r> Commands<'r> {
         self.copied_into(to, target, &pass);
         let regions = [vk::BufferCopy { src_offset: range.start, dst_offset: offset_bytes, size }];
         // SAFETY: both ranges are in bounds and both buffers are borrowed until the commands have run.
-        unsafe { self.device.handle.cmd_copy_buffer(self.buffer, from.raw(), to.raw(), &regions) };
+        unsafe { self.recording.device.handle.cmd_copy_buffer(self.recording.buffer, from.raw(), to.raw(), &regions) };
     }
 
     /// Notes a copy into `to`; what lies in a readback buffer is read by the host once the commands have run.
@@ -283,7 +249,13 @@ impl<'r> Commands<'r> {
         // SAFETY: both are borrowed until the commands have run; the layout is that of a transfer read (tracked).
         unsafe {
             let layout = Access::TransferRead.layout();
-            self.device.handle.cmd_copy_image_to_buffer(self.buffer, from.raw(), layout, to.raw(), &[region]);
+            self.recording.device.handle.cmd_copy_image_to_buffer(
+                self.recording.buffer,
+                from.raw(),
+                layout,
+                to.raw(),
+                &[region],
+            );
         }
     }
 
@@ -291,56 +263,40 @@ impl<'r> Commands<'r> {
     ///
     /// # Errors
     /// `Failed` when the tracker found a barrier missing (nothing is submitted then); `Device` when the device was lost.
-    pub fn submit(mut self) -> Result<Vec<Timing>> {
+    pub fn submit(self) -> Result<Vec<Timing>> {
+        self.end()?.run(Signals::default())?.wait()
+    }
+
+    /// Ends the recording and starts it without waiting. The recording has to begin with [`Commands::after_flights`], because
+    /// what it uses may be in use by the ones before.
+    ///
+    /// # Errors
+    /// As [`Commands::submit`].
+    ///
+    /// # Panics
+    /// When [`FLIGHTS`](super::FLIGHTS) recordings are under way already.
+    pub fn launch(self) -> Result<Flight> {
+        self.end()?.launch(Signals::default())
+    }
+
+    /// Orders everything that follows behind everything that was launched before.
+    pub fn after_flights(&mut self) {
+        let barriers = [vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)];
+        let info = vk::DependencyInfo::default().memory_barriers(&barriers);
+        // SAFETY: the command buffer is recording and outside a render pass.
+        unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
+    }
+
+    /// Asks the tracker for its verdict and gives up the borrows.
+    pub(super) fn end(mut self) -> Result<Recording> {
         for (buffer, range) in std::mem::take(&mut self.read_back) {
             self.tracker.use_range(buffer.id, &buffer.name, range, Access::HostRead, "host");
         }
-        self.tracker.verdict().map_err(|error| error.context(&self.name))?;
-        let handle = &self.device.handle;
-        let last = self.pass_name();
-        let count = 2 * self.passes.len();
-        let mut stamps = vec![0_u64; count];
-        // SAFETY: for the whole block, the recording is complete, its resources are borrowed by `self`, and the queue is used by
-        // one submission at a time because each waits for its fence before it returns.
-        unsafe {
-            handle.end_command_buffer(self.buffer).checked("vkEndCommandBuffer", &self.name)?;
-            let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.buffer)];
-            let submit = [vk::SubmitInfo2::default().command_buffer_infos(&buffers)];
-            handle
-                .queue_submit2(self.device.queue, &submit, self.fence)
-                .checked("vkQueueSubmit2", &format!("{}, last pass {last}", self.name))?;
-            handle
-                .wait_for_fences(&[self.fence], true, u64::MAX)
-                .checked("vkWaitForFences", &format!("{}, last pass {last}", self.name))?;
-            if count > 0 {
-                let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-                handle
-                    .get_query_pool_results(self.queries, 0, &mut stamps, flags)
-                    .checked("vkGetQueryPoolResults", &self.name)?;
-            }
-        }
-        let period_ns = f64::from(self.device.limits.timestamp_period);
-        let passes = self.passes.iter().zip(stamps.chunks_exact(2));
-        Ok(passes
-            .map(|(pass, pair)| Timing {
-                pass: pass.clone(),
-                milliseconds: pair[1].saturating_sub(pair[0]) as f64 * period_ns * 1e-6,
-            })
-            .collect())
-    }
-}
-
-impl Drop for Commands<'_> {
-    fn drop(&mut self) {
-        let handle = &self.device.handle;
-        // SAFETY: `submit` waited for the device, or nothing was ever submitted; a handle that was never made is null.
-        unsafe {
-            for (pool, _) in &self.descriptors {
-                handle.destroy_descriptor_pool(*pool, None);
-            }
-            handle.destroy_query_pool(self.queries, None);
-            handle.destroy_fence(self.fence, None);
-            handle.destroy_command_pool(self.pool, None);
-        }
+        self.tracker.verdict().map_err(|error| error.context(&self.recording.name))?;
+        Ok(self.recording)
     }
 }

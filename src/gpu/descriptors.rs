@@ -3,7 +3,8 @@
 use super::Checked;
 use super::access::Access;
 use super::commands::Commands;
-use super::memory::{Buffer, Image, TexelView};
+use super::image::Image;
+use super::memory::{Buffer, TexelView};
 use super::pipeline::{Layout, descriptor_type};
 use super::reflect::BindingKind;
 use crate::error::{Error, Result};
@@ -42,7 +43,13 @@ impl<'r> Commands<'r> {
             let bytes = &bytes[..layout.push_bytes as usize];
             // SAFETY: size and stages are the layout's own.
             unsafe {
-                self.device.handle.cmd_push_constants(self.buffer, layout.pipeline, layout.push_stages, 0, bytes);
+                self.recording.device.handle.cmd_push_constants(
+                    self.recording.buffer,
+                    layout.pipeline,
+                    layout.push_stages,
+                    0,
+                    bytes,
+                );
             }
         }
     }
@@ -80,10 +87,10 @@ impl<'r> Commands<'r> {
                     };
                     let size = range.end - range.start;
                     let (most, alignment) = if binding.kind == BindingKind::Storage {
-                        let limits = &self.device.limits;
+                        let limits = &self.recording.device.limits;
                         (limits.max_storage_buffer_range, limits.min_storage_buffer_offset_alignment)
                     } else {
-                        let limits = &self.device.limits;
+                        let limits = &self.recording.device.limits;
                         (limits.max_uniform_buffer_range, limits.min_uniform_buffer_offset_alignment)
                     };
                     if size > u64::from(most) {
@@ -113,30 +120,42 @@ impl<'r> Commands<'r> {
                     write = write.texel_buffer_view(&views);
                 }
                 (BindingKind::Image, Bind::Image(image)) => {
-                    self.tracker.use_image(image.id, &image.name, Access::ComputeSampled, &pass);
+                    let access = if point == vk::PipelineBindPoint::GRAPHICS {
+                        Access::FragmentSampled
+                    } else {
+                        Access::ComputeSampled
+                    };
+                    self.tracker.use_image(image.id, &image.name, access, &pass);
                     images = [vk::DescriptorImageInfo {
                         sampler: vk::Sampler::null(),
                         image_view: image.view(),
-                        image_layout: Access::ComputeSampled.layout(),
+                        image_layout: access.layout(),
                     }];
                     write = write.image_info(&images);
                 }
                 _ => complain("another kind of resource, or none, was given"),
             }
             // SAFETY: the set is fresh and not yet in use; every resource is borrowed until the commands have run.
-            unsafe { self.device.handle.update_descriptor_sets(&[write], &[]) };
+            unsafe { self.recording.device.handle.update_descriptor_sets(&[write], &[]) };
             let _ = (buffers, views, images);
         }
         // SAFETY: the command buffer is recording and the set matches the layout.
         unsafe {
-            self.device.handle.cmd_bind_descriptor_sets(self.buffer, point, layout.pipeline, 0, &[set], &[]);
+            self.recording.device.handle.cmd_bind_descriptor_sets(
+                self.recording.buffer,
+                point,
+                layout.pipeline,
+                0,
+                &[set],
+                &[],
+            );
         }
         Ok(())
     }
 
     fn descriptor_set(&mut self, layout: &Layout) -> Result<vk::DescriptorSet> {
-        let handle = &self.device.handle;
-        if self.descriptors.last().is_none_or(|(_, used)| *used == SETS_PER_POOL) {
+        let handle = &self.recording.device.handle;
+        if self.recording.descriptors.last().is_none_or(|(_, used)| *used == SETS_PER_POOL) {
             // Twelve bindings of a kind in a set is more than any pass has.
             let sizes = [
                 vk::DescriptorType::STORAGE_BUFFER,
@@ -148,18 +167,18 @@ impl<'r> Commands<'r> {
             let create = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
             // SAFETY: destroyed in `Drop`, after the commands that use its sets have run.
             let pool = unsafe { handle.create_descriptor_pool(&create, None) }
-                .checked("vkCreateDescriptorPool", &self.name)?;
-            self.device.name(pool, &self.name);
-            self.descriptors.push((pool, 0));
+                .checked("vkCreateDescriptorPool", &self.recording.name)?;
+            self.recording.device.name(pool, &self.recording.name);
+            self.recording.descriptors.push((pool, 0));
         }
-        let (pool, used) = self.descriptors.last_mut().expect("a pool was just made");
+        let (pool, used) = self.recording.descriptors.last_mut().expect("a pool was just made");
         *used += 1;
         let layouts = [layout.set];
         let allocate = vk::DescriptorSetAllocateInfo::default().descriptor_pool(*pool).set_layouts(&layouts);
         // SAFETY: the pool has room (counted); freed with it.
-        let sets =
-            unsafe { handle.allocate_descriptor_sets(&allocate) }.checked("vkAllocateDescriptorSets", &self.name)?;
-        self.device.name(sets[0], &self.name);
+        let sets = unsafe { handle.allocate_descriptor_sets(&allocate) }
+            .checked("vkAllocateDescriptorSets", &self.recording.name)?;
+        self.recording.device.name(sets[0], &self.recording.name);
         Ok(sets[0])
     }
 }

@@ -5,10 +5,10 @@ use super::select::{Candidate, choose, physical_devices, queue_family, version_t
 use super::validation::{LAYER, Messages, Validation, on_message};
 use crate::error::{Error, Result};
 use ash::vk;
-use std::ffi::CString;
+use std::ffi::{CStr, CString};
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// What the caller decides about a device.
 #[derive(Clone, Debug, Default)]
@@ -22,9 +22,9 @@ pub struct Options {
 }
 
 /// Instance-level objects; dropped after the logical device.
-struct Instance {
-    entry: ash::Entry,
-    handle: ash::Instance,
+pub(super) struct Instance {
+    pub(super) entry: ash::Entry,
+    pub(super) handle: ash::Instance,
     debug: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     has_debug_utils: bool,
     /// Boxed: the messenger holds its address.
@@ -32,7 +32,8 @@ struct Instance {
 }
 
 impl Instance {
-    fn new(validation: Validation) -> Result<Self> {
+    /// `surface` lists the extensions that a window needs.
+    fn new(validation: Validation, surface: &[&'static CStr]) -> Result<Self> {
         // SAFETY: loading the system's Vulkan loader runs its initialisers, which are trusted like any shared library.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| {
             Error::Unsupported(format!("no Vulkan loader found ({error}); Debian's package is libvulkan1"))
@@ -65,8 +66,16 @@ impl Instance {
             .application_name(c"shadow-fields")
             .engine_name(c"shadow-fields")
             .api_version(vk::API_VERSION_1_3);
+        if let Some(missing) =
+            surface.iter().find(|name| !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(*name)))
+        {
+            let missing = missing.to_string_lossy();
+            return Err(Error::Unsupported(format!(
+                "the Vulkan driver opens no windows here (it lacks {missing}); `shadow-fields render` needs none"
+            )));
+        }
         let mut layer_names = Vec::new();
-        let mut extension_names = Vec::new();
+        let mut extension_names: Vec<_> = surface.iter().map(|name| name.as_ptr()).collect();
         if has_debug_utils {
             extension_names.push(ash::ext::debug_utils::NAME.as_ptr());
         }
@@ -144,7 +153,10 @@ impl Drop for Instance {
 /// Cheap to share: everything that owns a Vulkan object holds an `Arc<Device>`.
 pub struct Device {
     pub(super) handle: ash::Device,
-    pub(super) queue: vk::Queue,
+    pub(super) physical: vk::PhysicalDevice,
+    pub(super) queue: Mutex<vk::Queue>,
+    /// Fences of launched recordings; see `flight`.
+    pub(super) flights: Mutex<Vec<vk::Fence>>,
     pub(super) queue_family: u32,
     pub(super) memory: vk::PhysicalDeviceMemoryProperties,
     pub(super) names: Option<ash::ext::debug_utils::Device>,
@@ -158,7 +170,7 @@ pub struct Device {
     pub(super) next_resource: AtomicU64,
     omitted_barrier: AtomicUsize,
     /// Last: the instance outlives the device.
-    instance: Instance,
+    pub(super) instance: Instance,
 }
 
 impl Device {
@@ -167,7 +179,7 @@ impl Device {
     /// # Errors
     /// `Unsupported` without a loader.
     pub fn list() -> Result<Vec<Candidate>> {
-        let instance = Instance::new(Validation::Off)?;
+        let instance = Instance::new(Validation::Off, &[])?;
         Ok(physical_devices(&instance.handle)?.into_iter().map(|(_, candidate)| candidate).collect())
     }
 
@@ -176,7 +188,16 @@ impl Device {
     /// # Errors
     /// `Unsupported` without a loader, a suitable device, or the validation layer that was asked for.
     pub fn new(options: &Options) -> Result<Arc<Self>> {
-        let instance = Instance::new(options.validation)?;
+        Self::with_extensions(options, &[], &[])
+    }
+
+    /// As [`Device::new`] with what a window needs of instance and device.
+    pub(super) fn with_extensions(
+        options: &Options,
+        surface: &[&'static CStr],
+        swapchain: &[&'static CStr],
+    ) -> Result<Arc<Self>> {
+        let instance = Instance::new(options.validation, surface)?;
         let devices = physical_devices(&instance.handle)?;
         let candidates: Vec<_> = devices.iter().map(|(_, candidate)| candidate.clone()).collect();
         let info = choose(&candidates, options.device.as_deref())?.clone();
@@ -198,7 +219,11 @@ impl Device {
             .dynamic_rendering(true)
             .synchronization2(true)
             .maintenance4(true);
-        let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut core_1_3);
+        let extension_names: Vec<_> = swapchain.iter().map(|name| name.as_ptr()).collect();
+        let create = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&extension_names)
+            .push_next(&mut core_1_3);
         // SAFETY: the features were checked in `physical_devices`; destroyed in `Drop`, before the instance.
         let handle =
             unsafe { instance.handle.create_device(physical, &create, None) }.checked("vkCreateDevice", &info.name)?;
@@ -207,7 +232,9 @@ impl Device {
         let names = instance.has_debug_utils.then(|| ash::ext::debug_utils::Device::new(&instance.handle, &handle));
         let mut device = Device {
             handle,
-            queue,
+            physical,
+            queue: Mutex::new(queue),
+            flights: Mutex::default(),
             queue_family,
             memory,
             names,

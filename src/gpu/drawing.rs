@@ -2,7 +2,9 @@
 
 use super::access::Access;
 use super::commands::Commands;
-use super::memory::{Buffer, Image};
+use super::descriptors::Bind;
+use super::image::Image;
+use super::memory::Buffer;
 use super::pipeline::GraphicsPipeline;
 use crate::error::Result;
 use ash::vk;
@@ -67,10 +69,10 @@ impl<'r> Commands<'r> {
             info = info.depth_attachment(depth);
         }
         // SAFETY: the attachments are borrowed until the commands have run and in the layouts stated (tracked).
-        unsafe { self.device.handle.cmd_begin_rendering(self.buffer, &info) };
+        unsafe { self.recording.device.handle.cmd_begin_rendering(self.recording.buffer, &info) };
         let outcome = record(&mut Drawing { commands: self, pipeline: None });
         // SAFETY: begun above.
-        unsafe { self.device.handle.cmd_end_rendering(self.buffer) };
+        unsafe { self.recording.device.handle.cmd_end_rendering(self.recording.buffer) };
         outcome
     }
 }
@@ -94,8 +96,8 @@ impl<'r> Drawing<'_, 'r> {
             tracker.use_range(buffer.id, &buffer.name, *offset..buffer.size_bytes, Access::VertexRead, &pass);
         }
         tracker.use_range(indices.id, &indices.name, indices.all(), Access::VertexRead, &pass);
-        let handle = &self.commands.device.handle;
-        let buffer = self.commands.buffer;
+        let handle = &self.commands.recording.device.handle;
+        let buffer = self.commands.recording.buffer;
         // SAFETY: everything is borrowed until the commands have run.
         unsafe {
             handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
@@ -105,6 +107,32 @@ impl<'r> Drawing<'_, 'r> {
             handle.cmd_bind_index_buffer(buffer, indices.raw(), 0, vk::IndexType::UINT32);
         }
         self.pipeline = Some(pipeline);
+    }
+
+    /// Draws one triangle that covers the area, with a pipeline whose vertex shader makes it from `gl_VertexIndex`; `resources`
+    /// are images that its fragment shader reads, at their binding numbers.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    ///
+    /// # Panics
+    /// When resources or push constants are not what the shaders declare.
+    pub fn screen<P: Pod>(&mut self, pipeline: &'r GraphicsPipeline, resources: &[Bind<'r>], push: &P) -> Result<()> {
+        assert!(pipeline.inputs.is_empty(), "{}: makes its own vertices", pipeline.name);
+        self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)?;
+        self.commands.push(&pipeline.layout, &pipeline.name, push);
+        let (handle, buffer) = (&self.commands.recording.device.handle, self.commands.recording.buffer);
+        // SAFETY: pipeline and resources are borrowed until the commands are submitted; the vertex shader reads no buffer.
+        unsafe {
+            handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
+            handle.cmd_draw(buffer, 3, 1, 0, 0);
+        }
+        Ok(())
+    }
+
+    #[cfg(feature = "view")]
+    pub(super) fn raw(&self) -> vk::CommandBuffer {
+        self.commands.recording.buffer
     }
 
     /// Restricts drawing to a rectangle in pixels: viewport and scissor.
@@ -121,11 +149,11 @@ impl<'r> Drawing<'_, 'r> {
             offset: vk::Offset2D { x: x.cast_signed(), y: y.cast_signed() },
             extent: vk::Extent2D { width, height },
         };
-        let handle = &self.commands.device.handle;
+        let handle = &self.commands.recording.device.handle;
         // SAFETY: the command buffer is recording.
         unsafe {
-            handle.cmd_set_viewport(self.commands.buffer, 0, &[viewport]);
-            handle.cmd_set_scissor(self.commands.buffer, 0, &[scissor]);
+            handle.cmd_set_viewport(self.commands.recording.buffer, 0, &[viewport]);
+            handle.cmd_set_scissor(self.commands.recording.buffer, 0, &[scissor]);
         }
     }
 
@@ -147,7 +175,14 @@ impl<'r> Drawing<'_, 'r> {
         // SAFETY: the index buffer covers the range (its owner made both); values were checked when the mesh was read.
         unsafe {
             let count = range.end - range.start;
-            self.commands.device.handle.cmd_draw_indexed(self.commands.buffer, count, 1, range.start, 0, 0);
+            self.commands.recording.device.handle.cmd_draw_indexed(
+                self.commands.recording.buffer,
+                count,
+                1,
+                range.start,
+                0,
+                0,
+            );
         }
     }
 }

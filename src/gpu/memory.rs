@@ -1,4 +1,4 @@
-//! Buffers, texel views and images, each with the memory it owns.
+//! Buffers with the memory they own, and texel views of them.
 
 use super::device::Device;
 use super::{Access, Checked, Commands};
@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
 use std::ops::Range;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
 
 /// Where a buffer lives and who touches it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub enum BufferKind {
 
 impl BufferKind {
     /// Wanted memory properties, best first.
-    fn preferences(self) -> &'static [vk::MemoryPropertyFlags] {
+    pub(super) fn preferences(self) -> &'static [vk::MemoryPropertyFlags] {
         use vk::MemoryPropertyFlags as Flags;
         const COHERENT: Flags = Flags::from_raw(Flags::HOST_VISIBLE.as_raw() | Flags::HOST_COHERENT.as_raw());
         const UPLOAD: Flags = Flags::from_raw(COHERENT.as_raw() | Flags::DEVICE_LOCAL.as_raw());
@@ -38,14 +38,14 @@ impl BufferKind {
 }
 
 /// One allocation, bound to one buffer or image.
-struct Memory {
+pub(super) struct Memory {
     device: Arc<Device>,
-    handle: vk::DeviceMemory,
+    pub(super) handle: vk::DeviceMemory,
     host_coherent: bool,
 }
 
 impl Memory {
-    fn new(
+    pub(super) fn new(
         device: &Arc<Device>,
         name: &str,
         needs: vk::MemoryRequirements,
@@ -82,13 +82,25 @@ impl Drop for Memory {
     }
 }
 
-/// Destroys a buffer handle before its memory goes.
-struct BufferHandle(Arc<Device>, vk::Buffer);
+/// Destroys a buffer handle and the views of it before its memory goes.
+struct BufferHandle {
+    device: Arc<Device>,
+    buffer: vk::Buffer,
+    /// Every texel view that was asked for.
+    views: Mutex<Vec<(vk::Format, vk::BufferView)>>,
+}
 
 impl Drop for BufferHandle {
     fn drop(&mut self) {
-        // SAFETY: recordings that use the buffer borrow it until the device has finished with them.
-        unsafe { self.0.handle.destroy_buffer(self.1, None) };
+        self.device.settle();
+        let views = self.views.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
+        // SAFETY: recordings that use the buffer borrow it until they are submitted, and no submission is under way (settled).
+        unsafe {
+            for (_, view) in views.drain(..) {
+                self.device.handle.destroy_buffer_view(view, None);
+            }
+            self.device.handle.destroy_buffer(self.buffer, None);
+        }
     }
 }
 
@@ -130,14 +142,14 @@ impl Buffer {
         );
         // SAFETY: destroyed by `BufferHandle`.
         let handle = unsafe { device.handle.create_buffer(&create, None) }.checked("vkCreateBuffer", name)?;
-        let handle = BufferHandle(device.clone(), handle);
-        device.name(handle.1, name);
+        let handle = BufferHandle { device: device.clone(), buffer: handle, views: Mutex::default() };
+        device.name(handle.buffer, name);
         // SAFETY: the handle is alive.
-        let needs = unsafe { device.handle.get_buffer_memory_requirements(handle.1) };
+        let needs = unsafe { device.handle.get_buffer_memory_requirements(handle.buffer) };
         let memory = Memory::new(device, name, needs, kind.preferences())?;
         // SAFETY: fresh buffer and memory of sufficient size; the whole allocation is mapped once and unmapped by freeing.
         let mapped = unsafe {
-            device.handle.bind_buffer_memory(handle.1, memory.handle, 0).checked("vkBindBufferMemory", name)?;
+            device.handle.bind_buffer_memory(handle.buffer, memory.handle, 0).checked("vkBindBufferMemory", name)?;
             if memory.host_coherent {
                 let pointer = device
                     .handle
@@ -163,12 +175,14 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// Writes `data` at a byte offset (a multiple of 4), directly or through a staging buffer as the memory allows.
+    /// Writes `data` at a byte offset (a multiple of 4), directly or through a staging buffer as the memory allows, once the
+    /// device has finished what is under way.
     ///
     /// # Errors
     /// As [`Buffer::new`].
     pub fn fill<T: Pod>(&mut self, offset_bytes: u64, data: &[T]) -> Result<()> {
         if self.mapped.is_some() {
+            self.device().settle();
             self.write(offset_bytes, data);
             return Ok(());
         }
@@ -181,7 +195,8 @@ impl Buffer {
         Ok(())
     }
 
-    /// Writes `data` at a byte offset into mapped memory.
+    /// Writes `data` at a byte offset into mapped memory. What a launched recording reads ([`Commands::launch`]) is left alone
+    /// until its flight has ended: an owner keeps one buffer a flight.
     ///
     /// # Panics
     /// When the buffer is not visible to the host or the data does not fit: a programmer's mistake.
@@ -194,12 +209,13 @@ impl Buffer {
         unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), pointer.add(offset_bytes as usize), bytes.len()) };
     }
 
-    /// Copies `count` elements from a byte offset of mapped memory.
+    /// Copies `count` elements from a byte offset of mapped memory, once the device has finished what is under way.
     ///
     /// # Panics
     /// When the buffer is not visible to the host or the range is outside it.
     pub fn read<T: Pod>(&self, offset_bytes: u64, count: usize) -> Vec<T> {
         let pointer = self.mapped.unwrap_or_else(|| panic!("{} is not visible to the host", self.name));
+        self.device().settle();
         let end = offset_bytes + (count * size_of::<T>()) as u64;
         assert!(end <= self.size_bytes, "{}: read to byte {end} of {}", self.name, self.size_bytes);
         let mut out = vec![T::zeroed(); count];
@@ -239,7 +255,7 @@ impl Buffer {
     }
 
     pub(super) fn raw(&self) -> vk::Buffer {
-        self.handle.1
+        self.handle.buffer
     }
 
     pub(super) fn all(&self) -> Range<u64> {
@@ -247,7 +263,7 @@ impl Buffer {
     }
 }
 
-/// A typed window on a whole buffer, read by shaders as `textureBuffer`.
+/// A typed window on a whole buffer, read by shaders as `textureBuffer`. The buffer keeps it, so that it is made once.
 pub struct TexelView<'b> {
     pub(super) handle: vk::BufferView,
     pub(super) buffer: &'b Buffer,
@@ -280,126 +296,17 @@ impl<'b> TexelView<'b> {
                 buffer.name, buffer.size_bytes, device.limits.max_texel_buffer_elements
             )));
         }
+        let mut views = buffer.handle.views.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if let Some((_, handle)) = views.iter().find(|(known, _)| *known == format) {
+            return Ok(TexelView { handle: *handle, buffer });
+        }
         let range = buffer.size_bytes / Self::texel_bytes(format) * Self::texel_bytes(format);
         let create = vk::BufferViewCreateInfo::default().buffer(buffer.raw()).format(format).range(range);
-        // SAFETY: the view borrows the buffer, so it goes first; destroyed in `Drop`.
+        // SAFETY: the buffer is alive and destroys the view before itself.
         let handle =
             unsafe { device.handle.create_buffer_view(&create, None) }.checked("vkCreateBufferView", &buffer.name)?;
         device.name(handle, &buffer.name);
+        views.push((format, handle));
         Ok(TexelView { handle, buffer })
-    }
-}
-
-impl Drop for TexelView<'_> {
-    fn drop(&mut self) {
-        // SAFETY: recordings that use the view borrow it until the device has finished with them.
-        unsafe { self.buffer.device().handle.destroy_buffer_view(self.handle, None) };
-    }
-}
-
-/// What an image is made for.
-#[derive(Clone, Copy, Debug)]
-pub struct ImageShape {
-    /// Texel format.
-    pub format: vk::Format,
-    /// Width in texels.
-    pub width: u32,
-    /// Height in texels.
-    pub height: u32,
-    /// Samples a texel: 1 or 4.
-    pub samples: u32,
-}
-
-/// Destroys an image's handles before its memory goes.
-struct ImageHandle(Arc<Device>, vk::Image, vk::ImageView);
-
-impl Drop for ImageHandle {
-    fn drop(&mut self) {
-        // SAFETY: recordings that use the image borrow it until the device has finished with them.
-        unsafe {
-            self.0.handle.destroy_image_view(self.2, None);
-            self.0.handle.destroy_image(self.1, None);
-        }
-    }
-}
-
-/// A two-dimensional image that passes draw into and read.
-pub struct Image {
-    handle: ImageHandle,
-    _memory: Memory,
-    /// Format and size.
-    pub shape: ImageShape,
-    /// Name shown in messages and debuggers.
-    pub name: String,
-    pub(super) id: u64,
-}
-
-impl Image {
-    /// An image without content. Depth formats become depth attachments, all else colour attachments.
-    ///
-    /// # Errors
-    /// `Input` when it is larger than the device's images can be, `Device` when memory ran out.
-    pub fn new(device: &Arc<Device>, name: &str, shape: ImageShape) -> Result<Self> {
-        use vk::ImageUsageFlags as Use;
-        let most = device.limits.max_image_dimension2_d.min(device.limits.max_framebuffer_width);
-        if shape.width == 0 || shape.height == 0 || shape.width > most || shape.height > most {
-            let (width, height) = (shape.width, shape.height);
-            return Err(Error::Input(format!("{name}: {width}x{height} is outside the device's 1..={most}")));
-        }
-        let depth = shape.format == vk::Format::D32_SFLOAT;
-        let usage = match (depth, shape.samples > 1) {
-            (true, _) => Use::DEPTH_STENCIL_ATTACHMENT,
-            (false, true) => Use::COLOR_ATTACHMENT,
-            (false, false) => Use::COLOR_ATTACHMENT | Use::SAMPLED | Use::TRANSFER_SRC,
-        };
-        let create = vk::ImageCreateInfo::default()
-            .image_type(vk::ImageType::TYPE_2D)
-            .format(shape.format)
-            .extent(vk::Extent3D { width: shape.width, height: shape.height, depth: 1 })
-            .mip_levels(1)
-            .array_layers(1)
-            .samples(vk::SampleCountFlags::from_raw(shape.samples))
-            .usage(usage);
-        // SAFETY: destroyed by `ImageHandle`.
-        let image = unsafe { device.handle.create_image(&create, None) }.checked("vkCreateImage", name)?;
-        let mut handle = ImageHandle(device.clone(), image, vk::ImageView::null());
-        device.name(image, name);
-        // SAFETY: the handle is alive.
-        let needs = unsafe { device.handle.get_image_memory_requirements(image) };
-        let memory = Memory::new(device, name, needs, BufferKind::Device.preferences())?;
-        let view = vk::ImageViewCreateInfo::default()
-            .image(image)
-            .view_type(vk::ImageViewType::TYPE_2D)
-            .format(shape.format)
-            .subresource_range(whole(shape.format));
-        // SAFETY: fresh image and memory of sufficient size; the view is destroyed by `ImageHandle`.
-        unsafe {
-            device.handle.bind_image_memory(image, memory.handle, 0).checked("vkBindImageMemory", name)?;
-            handle.2 = device.handle.create_image_view(&view, None).checked("vkCreateImageView", name)?;
-        }
-        device.name(handle.2, name);
-        let id = device.next_resource.fetch_add(1, Ordering::Relaxed);
-        Ok(Image { handle, _memory: memory, shape, name: name.to_owned(), id })
-    }
-
-    pub(super) fn raw(&self) -> vk::Image {
-        self.handle.1
-    }
-
-    pub(super) fn view(&self) -> vk::ImageView {
-        self.handle.2
-    }
-}
-
-/// The one mip level and layer of an image of `format`.
-pub(super) fn whole(format: vk::Format) -> vk::ImageSubresourceRange {
-    let aspect =
-        if format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
-    vk::ImageSubresourceRange {
-        aspect_mask: aspect,
-        base_mip_level: 0,
-        level_count: 1,
-        base_array_layer: 0,
-        layer_count: 1,
     }
 }

@@ -8,22 +8,35 @@ pub mod commands;
 pub mod descriptors;
 pub mod device;
 pub mod drawing;
+pub mod flight;
+pub mod image;
 pub mod memory;
+#[cfg(feature = "view")]
+pub mod overlay;
 pub mod pipeline;
 pub mod reflect;
 pub mod select;
 pub mod shader;
 pub mod validation;
+#[cfg(feature = "view")]
+pub mod window;
 
 pub use access::Access;
 pub use commands::{Commands, Timing};
 pub use descriptors::Bind;
 pub use device::{Device, Options};
 pub use drawing::{Drawing, Target};
-pub use memory::{Buffer, BufferKind, Image, TexelView};
+pub use flight::{FLIGHTS, Flight};
+pub use image::{Image, ImageShape};
+pub use memory::{Buffer, BufferKind, TexelView};
 pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState};
 pub use shader::{Shader, Stage};
 pub use validation::Validation;
+
+#[cfg(feature = "view")]
+pub use overlay::{Overlay, Paint};
+#[cfg(feature = "view")]
+pub use window::{PresentMode, Shot, Window};
 
 use crate::error::{Error, Result};
 use ash::vk;

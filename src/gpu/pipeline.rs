@@ -75,7 +75,8 @@ impl Layout {
 
 impl Drop for Layout {
     fn drop(&mut self) {
-        // SAFETY: recordings that use the pipeline borrow it until the device has finished with them.
+        self.device.settle();
+        // SAFETY: recordings that use the pipeline borrow it until they are submitted, and no submission is under way (settled).
         unsafe {
             self.device.handle.destroy_pipeline_layout(self.pipeline, None);
             self.device.handle.destroy_descriptor_set_layout(self.set, None);
@@ -126,7 +127,8 @@ struct PipelineHandle(Arc<Device>, vk::Pipeline);
 
 impl Drop for PipelineHandle {
     fn drop(&mut self) {
-        // SAFETY: recordings that use the pipeline borrow it until the device has finished with them.
+        self.0.settle();
+        // SAFETY: as for its layout.
         unsafe { self.0.handle.destroy_pipeline(self.1, None) };
     }
 }

@@ -5,8 +5,8 @@
 
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
+use crate::gpu::ImageShape;
 use crate::gpu::Target;
-use crate::gpu::memory::ImageShape;
 use crate::gpu::{Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
 use crate::shaders::{Library, Row};
 use ash::vk;

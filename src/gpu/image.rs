@@ -1,0 +1,144 @@
+//! Images that passes draw into and read, each with the memory it owns.
+
+use super::Checked;
+use super::device::Device;
+use super::memory::{BufferKind, Memory};
+use crate::error::{Error, Result};
+use ash::vk;
+use std::any::Any;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// What an image is made for.
+#[derive(Clone, Copy, Debug)]
+pub struct ImageShape {
+    /// Texel format.
+    pub format: vk::Format,
+    /// Width in texels.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// Samples a texel: 1 or 4.
+    pub samples: u32,
+}
+
+/// Destroys an image's handles before its memory goes.
+struct ImageHandle {
+    device: Arc<Device>,
+    image: vk::Image,
+    view: vk::ImageView,
+    /// Owner of the image where that is not this handle but a swapchain.
+    owner: Option<Arc<dyn Any + Send + Sync>>,
+}
+
+impl Drop for ImageHandle {
+    fn drop(&mut self) {
+        self.device.settle();
+        // SAFETY: recordings that use the image borrow it until they are submitted, and no submission is under way (settled).
+        unsafe {
+            self.device.handle.destroy_image_view(self.view, None);
+            if self.owner.is_none() {
+                self.device.handle.destroy_image(self.image, None);
+            }
+        }
+    }
+}
+
+/// A two-dimensional image that passes draw into and read.
+pub struct Image {
+    handle: ImageHandle,
+    _memory: Option<Memory>,
+    /// Format and size.
+    pub shape: ImageShape,
+    /// Name shown in messages and debuggers.
+    pub name: String,
+    pub(super) id: u64,
+}
+
+impl Image {
+    /// An image without content. Depth formats become depth attachments, all else colour attachments.
+    ///
+    /// # Errors
+    /// `Input` when it is larger than the device's images can be, `Device` when memory ran out.
+    pub fn new(device: &Arc<Device>, name: &str, shape: ImageShape) -> Result<Self> {
+        use vk::ImageUsageFlags as Use;
+        let most = device.limits.max_image_dimension2_d.min(device.limits.max_framebuffer_width);
+        if shape.width == 0 || shape.height == 0 || shape.width > most || shape.height > most {
+            let (width, height) = (shape.width, shape.height);
+            return Err(Error::Input(format!("{name}: {width}x{height} is outside the device's 1..={most}")));
+        }
+        let depth = shape.format == vk::Format::D32_SFLOAT;
+        let usage = match (depth, shape.samples > 1) {
+            (true, _) => Use::DEPTH_STENCIL_ATTACHMENT,
+            (false, true) => Use::COLOR_ATTACHMENT,
+            (false, false) => Use::COLOR_ATTACHMENT | Use::SAMPLED | Use::TRANSFER_SRC,
+        };
+        let create = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(shape.format)
+            .extent(vk::Extent3D { width: shape.width, height: shape.height, depth: 1 })
+            .mip_levels(1)
+            .array_layers(1)
+            .samples(vk::SampleCountFlags::from_raw(shape.samples))
+            .usage(usage);
+        // SAFETY: destroyed by `ImageHandle`.
+        let image = unsafe { device.handle.create_image(&create, None) }.checked("vkCreateImage", name)?;
+        let handle = ImageHandle { device: device.clone(), image, view: vk::ImageView::null(), owner: None };
+        device.name(image, name);
+        // SAFETY: the handle is alive.
+        let needs = unsafe { device.handle.get_image_memory_requirements(image) };
+        let memory = Memory::new(device, name, needs, BufferKind::Device.preferences())?;
+        // SAFETY: fresh image and memory of sufficient size.
+        unsafe { device.handle.bind_image_memory(image, memory.handle, 0) }.checked("vkBindImageMemory", name)?;
+        Self::with_view(handle, Some(memory), name, shape)
+    }
+
+    /// An image of a swapchain, which is kept alive.
+    #[cfg(feature = "view")]
+    pub(super) fn of_swapchain(
+        device: &Arc<Device>,
+        owner: Arc<dyn Any + Send + Sync>,
+        image: vk::Image,
+        shape: ImageShape,
+    ) -> Result<Self> {
+        let name = "window";
+        device.name(image, name);
+        let handle = ImageHandle { device: device.clone(), image, view: vk::ImageView::null(), owner: Some(owner) };
+        Self::with_view(handle, None, name, shape)
+    }
+
+    fn with_view(mut handle: ImageHandle, memory: Option<Memory>, name: &str, shape: ImageShape) -> Result<Self> {
+        let device = handle.device.clone();
+        let view = vk::ImageViewCreateInfo::default()
+            .image(handle.image)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(shape.format)
+            .subresource_range(whole(shape.format));
+        // SAFETY: the image is alive and has its memory; the view is destroyed by `ImageHandle`.
+        handle.view = unsafe { device.handle.create_image_view(&view, None) }.checked("vkCreateImageView", name)?;
+        device.name(handle.view, name);
+        let id = device.next_resource.fetch_add(1, Ordering::Relaxed);
+        Ok(Image { handle, _memory: memory, shape, name: name.to_owned(), id })
+    }
+
+    pub(super) fn raw(&self) -> vk::Image {
+        self.handle.image
+    }
+
+    pub(super) fn view(&self) -> vk::ImageView {
+        self.handle.view
+    }
+}
+
+/// The one mip level and layer of an image of `format`.
+pub(super) fn whole(format: vk::Format) -> vk::ImageSubresourceRange {
+    let aspect =
+        if format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
+    vk::ImageSubresourceRange {
+        aspect_mask: aspect,
+        base_mip_level: 0,
+        level_count: 1,
+        base_array_layer: 0,
+        layer_count: 1,
+    }
+}

@@ -1,0 +1,136 @@
+//! What egui drew, on top of a picture: textures, and a pass's commands.
+
+use super::device::Device;
+use super::drawing::Drawing;
+use super::{Checked, FLIGHTS, Image};
+use crate::error::{Error, Result};
+use ash::vk;
+use egui::epaint::{ClippedPrimitive, ImageDelta};
+use egui::{ColorImage, ImageData, TextureId, TexturesDelta};
+use egui_ash_renderer::allocator::DefaultAllocator;
+use egui_ash_renderer::{DynamicRendering, RenderMode, Renderer, RendererError};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// One frame of egui, ready to be drawn.
+pub struct Paint {
+    /// Triangles with clip rectangles, in points.
+    pub primitives: Vec<ClippedPrimitive>,
+    /// Pixels a point.
+    pub pixels_per_point: f32,
+}
+
+/// Draws egui into images of one format.
+pub struct Overlay {
+    renderer: Renderer<DefaultAllocator>,
+    pool: CommandPool,
+    /// Every texture as it stands. Changes of a part are sent as the whole: the renderer's way to change a part throws the rest
+    /// of the image away by its layout.
+    textures: HashMap<TextureId, ColorImage>,
+    /// To free once what draws with them has ended.
+    retired: Vec<TextureId>,
+}
+
+struct CommandPool(Arc<Device>, vk::CommandPool);
+
+impl Drop for CommandPool {
+    fn drop(&mut self) {
+        // SAFETY: the renderer waits for each of its uploads.
+        unsafe { self.0.handle.destroy_command_pool(self.1, None) };
+    }
+}
+
+fn failed(error: RendererError) -> Error {
+    match error {
+        RendererError::Vulkan(code) => Err::<(), _>(code).checked("drawing", "overlay").expect_err("it is one"),
+        other => Error::Failed(format!("overlay: {other}")),
+    }
+}
+
+impl Overlay {
+    /// For images of `format`, the only attachment of their pass; `encodes_srgb` as the format is.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn new(device: &Arc<Device>, format: vk::Format, encodes_srgb: bool) -> Result<Self> {
+        let create = vk::CommandPoolCreateInfo::default()
+            .queue_family_index(device.queue_family)
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT);
+        // SAFETY: destroyed by `CommandPool`.
+        let pool =
+            unsafe { device.handle.create_command_pool(&create, None) }.checked("vkCreateCommandPool", "overlay")?;
+        device.name(pool, "overlay");
+        let pool = CommandPool(device.clone(), pool);
+        let target = DynamicRendering {
+            color_attachment_format: format,
+            depth_attachment_format: None,
+            stencil_attachment_format: None,
+        };
+        let options = egui_ash_renderer::Options {
+            in_flight_frames: FLIGHTS,
+            srgb_framebuffer: encodes_srgb,
+            ..Default::default()
+        };
+        let mode = RenderMode::DynamicRendering(target);
+        let renderer =
+            Renderer::with_allocator(DefaultAllocator::new(device.memory), device.handle.clone(), mode, options)
+                .map_err(failed)?;
+        Ok(Overlay { renderer, pool, textures: HashMap::new(), retired: Vec::new() })
+    }
+
+    /// Takes over changes of textures, before the frame that needs them is drawn.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn update(&mut self, mut delta: TexturesDelta) -> Result<()> {
+        if delta.set.is_empty() && delta.free.is_empty() && self.retired.is_empty() {
+            return Ok(());
+        }
+        let device = self.pool.0.clone();
+        device.settle();
+        for id in self.retired.drain(..) {
+            self.renderer.free_texture(id).map_err(failed)?;
+            self.textures.remove(&id);
+        }
+        for (id, changes) in delta.set.drain() {
+            for change in changes {
+                let options = change.options;
+                let ImageData::Color(image) = change.image;
+                match (change.pos, self.textures.get_mut(&id)) {
+                    (Some([x, y]), Some(whole)) => {
+                        for row in 0..image.height() {
+                            let at = (y + row) * whole.width() + x;
+                            let from = &image.pixels[row * image.width()..][..image.width()];
+                            whole.pixels[at..at + image.width()].copy_from_slice(from);
+                        }
+                    }
+                    _ => drop(self.textures.insert(id, (*image).clone())),
+                }
+                let whole = ImageDelta::full(self.textures[&id].clone(), options);
+                let queue = device.queue();
+                self.renderer.set_texture(*queue, self.pool.1, id, &whole).map_err(failed)?;
+            }
+        }
+        // Freed after the frame that is about to be drawn, as egui wants it.
+        self.retired.extend(delta.free.drain());
+        Ok(())
+    }
+}
+
+impl Drop for Overlay {
+    fn drop(&mut self) {
+        self.pool.0.settle(); // before the renderer destroys what it draws with
+    }
+}
+
+impl<'r> Drawing<'_, 'r> {
+    /// Draws egui's triangles over what is there.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn overlay(&mut self, overlay: &'r mut Overlay, image: &Image, paint: &Paint) -> Result<()> {
+        let extent = vk::Extent2D { width: image.shape.width, height: image.shape.height };
+        let buffer = self.raw();
+        overlay.renderer.cmd_draw(buffer, extent, paint.pixels_per_point, &paint.primitives).map_err(failed)
+    }
+}

@@ -1,0 +1,431 @@
+//! Surface and swapchain: images that a window shows, made anew whenever they no longer fit it.
+
+use super::device::{Device, Options};
+use super::flight::{FLIGHTS, Flight, Signals};
+use super::image::{Image, ImageShape};
+use super::{Checked, Commands};
+use crate::error::{Error, Result};
+use ash::{khr, vk};
+use raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle};
+use std::ffi::CStr;
+use std::sync::Arc;
+
+/// When a finished frame is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PresentMode {
+    /// At the display's next refresh, in order; every device has it.
+    #[default]
+    Fifo,
+    /// As FIFO, but a late frame is shown at once.
+    FifoRelaxed,
+    /// At the next refresh, a newer frame replacing one that waits.
+    Mailbox,
+    /// At once, with tearing.
+    Immediate,
+}
+
+/// Names on the command line.
+const MODES: [(&str, PresentMode); 4] = [
+    ("fifo", PresentMode::Fifo),
+    ("fifo-relaxed", PresentMode::FifoRelaxed),
+    ("mailbox", PresentMode::Mailbox),
+    ("immediate", PresentMode::Immediate),
+];
+
+impl std::str::FromStr for PresentMode {
+    type Err = String;
+    fn from_str(word: &str) -> std::result::Result<Self, String> {
+        let found = MODES.iter().find(|(name, _)| *name == word);
+        found.map(|(_, mode)| *mode).ok_or_else(|| {
+            let names: Vec<_> = MODES.iter().map(|(name, _)| *name).collect();
+            format!("unknown present mode \"{word}\" ({})", names.join(", "))
+        })
+    }
+}
+
+impl PresentMode {
+    fn raw(self) -> vk::PresentModeKHR {
+        match self {
+            PresentMode::Fifo => vk::PresentModeKHR::FIFO,
+            PresentMode::FifoRelaxed => vk::PresentModeKHR::FIFO_RELAXED,
+            PresentMode::Mailbox => vk::PresentModeKHR::MAILBOX,
+            PresentMode::Immediate => vk::PresentModeKHR::IMMEDIATE,
+        }
+    }
+}
+
+impl Device {
+    /// As [`Device::new`], with what windows of a display need.
+    ///
+    /// # Errors
+    /// As [`Device::new`]; `Unsupported` too when the driver opens no windows on that display.
+    pub fn for_display(options: &Options, display: RawDisplayHandle) -> Result<Arc<Self>> {
+        let names = ash_window::enumerate_required_extensions(display)
+            .checked("surface extensions", "display")
+            .map_err(|error| error.context("Vulkan opens no windows on this display"))?;
+        // SAFETY: ash-window lists static strings.
+        let names: Vec<&'static CStr> = names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect();
+        Self::with_extensions(options, &names, &[khr::swapchain::NAME])
+    }
+}
+
+/// What Vulkan draws into a window with. Keeps the window alive.
+struct Surface {
+    device: Arc<Device>,
+    loader: khr::surface::Instance,
+    handle: vk::SurfaceKHR,
+    /// Last: the window outlives its surface.
+    _window: Box<dyn std::any::Any>,
+}
+
+impl Surface {
+    fn new<W: HasDisplayHandle + HasWindowHandle + 'static>(device: &Arc<Device>, window: &Arc<W>) -> Result<Self> {
+        let gone = |error| Error::Unsupported(format!("the window cannot be drawn into: {error}"));
+        let display = window.display_handle().map_err(gone)?.as_raw();
+        let handle = window.window_handle().map_err(gone)?.as_raw();
+        let (entry, instance) = (&device.instance.entry, &device.instance.handle);
+        let loader = khr::surface::Instance::new(entry, instance);
+        // SAFETY: the handles are those of a live window, which this surface keeps alive; destroyed in `Drop`, before the
+        // instance, which the device keeps alive.
+        let handle = unsafe { ash_window::create_surface(entry, instance, display, handle, None) }
+            .checked("vkCreateSurfaceKHR", "window")?;
+        let surface = Surface { device: device.clone(), loader, handle, _window: Box::new(window.clone()) };
+        // SAFETY: physical device and surface are alive.
+        let supported = unsafe {
+            surface.loader.get_physical_device_surface_support(device.physical, device.queue_family, surface.handle)
+        }
+        .checked("vkGetPhysicalDeviceSurfaceSupportKHR", "window")?;
+        if !supported {
+            return Err(Error::Unsupported(format!(
+                "{} cannot draw into windows of this display; `shadow-fields render` needs none",
+                device.info.name
+            )));
+        }
+        Ok(surface)
+    }
+}
+
+impl Drop for Surface {
+    fn drop(&mut self) {
+        // SAFETY: its swapchain is gone (field order of `Window`).
+        unsafe { self.loader.destroy_surface(self.handle, None) };
+        let _ = &self.device;
+    }
+}
+
+/// A semaphore with its owner.
+struct Semaphore(Arc<Device>, vk::Semaphore);
+
+impl Semaphore {
+    fn new(device: &Arc<Device>, name: &str) -> Result<Self> {
+        // SAFETY: destroyed in `Drop`.
+        let handle = unsafe { device.handle.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }
+            .checked("vkCreateSemaphore", name)?;
+        device.name(handle, name);
+        Ok(Semaphore(device.clone(), handle))
+    }
+}
+
+impl Drop for Semaphore {
+    fn drop(&mut self) {
+        // SAFETY: their owners, `Chain` and `Window`, wait for the device first.
+        unsafe { self.0.handle.destroy_semaphore(self.1, None) };
+    }
+}
+
+/// Destroys a swapchain; its images keep it alive.
+struct ChainHandle {
+    device: Arc<Device>,
+    loader: khr::swapchain::Device,
+    handle: vk::SwapchainKHR,
+}
+
+impl ChainHandle {
+    /// Waits until the queue shows nothing any more.
+    fn settle(&self) {
+        let queue = self.device.queue();
+        // SAFETY: device and queue are alive; a lost device shows nothing.
+        let _ = unsafe { self.device.handle.queue_wait_idle(*queue) };
+    }
+}
+
+impl Drop for ChainHandle {
+    fn drop(&mut self) {
+        self.settle();
+        // SAFETY: views of its images went before, and the queue is idle.
+        unsafe { self.loader.destroy_swapchain(self.handle, None) };
+    }
+}
+
+/// A swapchain of one size with its images.
+struct Chain {
+    images: Vec<Arc<Image>>,
+    /// Signalled when an image is drawn; one an image, because only acquiring it again says that its showing has begun.
+    drawn: Vec<Semaphore>,
+    handle: Arc<ChainHandle>,
+}
+
+impl Drop for Chain {
+    fn drop(&mut self) {
+        // Before the semaphores go.
+        self.handle.settle();
+    }
+}
+
+/// An image to draw into, which has to be presented.
+pub struct Shot {
+    /// The image; its content is undefined.
+    pub image: Arc<Image>,
+    index: u32,
+    acquired: vk::Semaphore,
+}
+
+/// A window's surface and its swapchain of the moment.
+pub struct Window {
+    device: Arc<Device>,
+    /// Before the surface.
+    chain: Option<Chain>,
+    /// Signalled when an image may be drawn into; one more than flights, since one may be acquired ahead of them.
+    acquired: Vec<Semaphore>,
+    next: usize,
+    format: vk::SurfaceFormatKHR,
+    mode: PresentMode,
+    size: [u32; 2],
+    /// Swapchains made so far.
+    pub chain_count: usize,
+    surface: Surface,
+}
+
+impl Window {
+    /// Prepares to draw into a window of `size` pixels.
+    ///
+    /// # Errors
+    /// `Unsupported` when the device cannot draw into it or has no such present mode.
+    pub fn new<W: HasDisplayHandle + HasWindowHandle + 'static>(
+        device: &Arc<Device>,
+        window: &Arc<W>,
+        size: [u32; 2],
+        mode: PresentMode,
+    ) -> Result<Self> {
+        let surface = Surface::new(device, window)?;
+        // SAFETY: for both queries, physical device and surface are alive.
+        let (modes, formats) = unsafe {
+            (
+                surface.loader.get_physical_device_surface_present_modes(device.physical, surface.handle),
+                surface.loader.get_physical_device_surface_formats(device.physical, surface.handle),
+            )
+        };
+        let modes = modes.checked("vkGetPhysicalDeviceSurfacePresentModesKHR", "window")?;
+        let formats = formats.checked("vkGetPhysicalDeviceSurfaceFormatsKHR", "window")?;
+        if !modes.contains(&mode.raw()) {
+            let known = MODES.iter().filter(|(_, m)| modes.contains(&m.raw())).map(|(name, _)| *name);
+            let known: Vec<_> = known.collect();
+            return Err(Error::Unsupported(format!(
+                "this display has no such present mode; it has {}",
+                known.join(", ")
+            )));
+        }
+        let acquired = (0..=FLIGHTS).map(|_| Semaphore::new(device, "acquired")).collect::<Result<_>>()?;
+        Ok(Window {
+            device: device.clone(),
+            chain: None,
+            acquired,
+            next: 0,
+            format: best_format(&formats)?,
+            mode,
+            size,
+            chain_count: 0,
+            surface,
+        })
+    }
+
+    /// Format of the images. One that is not sRGB wants encoded colours.
+    pub fn format(&self) -> vk::Format {
+        self.format.format
+    }
+
+    /// Whether the device encodes linear colours that are drawn.
+    pub fn encodes_srgb(&self) -> bool {
+        is_srgb(self.format.format)
+    }
+
+    /// Notes the window's size in pixels; the swapchain follows at the next frame. Without pixels nothing is shown.
+    pub fn resize(&mut self, size: [u32; 2]) {
+        if size != self.size {
+            self.size = size;
+            self.chain = None;
+        }
+    }
+
+    /// Takes the next image, making the swapchain anew where it no longer fits the window. `None`: nothing can be shown now, as
+    /// in a minimised window.
+    ///
+    /// # Errors
+    /// `Device` when the device or the surface was lost.
+    pub fn acquire(&mut self) -> Result<Option<Shot>> {
+        // A window that is dragged changes again while its swapchain is made.
+        for _ in 0..8 {
+            if self.chain.is_none() && !self.rebuild()? {
+                return Ok(None);
+            }
+            let chain = self.chain.as_ref().expect("made above");
+            let swapchain = &chain.handle;
+            let semaphore = self.acquired[self.next].1;
+            // SAFETY: the semaphore was waited for by a flight that has ended, since there are more of them than flights.
+            match unsafe {
+                swapchain.loader.acquire_next_image(swapchain.handle, u64::MAX, semaphore, vk::Fence::null())
+            } {
+                // A suboptimal image is drawn and shown all the same; presenting it says so again.
+                Ok((index, _suboptimal)) => {
+                    self.next = (self.next + 1) % self.acquired.len();
+                    let image = chain.images[index as usize].clone();
+                    return Ok(Some(Shot { image, index, acquired: semaphore }));
+                }
+                Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.chain = None,
+                Err(code) => return Err(code).checked("vkAcquireNextImageKHR", "window"),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Launches a recording that draws into the shot's image and leaves it as [`Access::Present`](super::Access::Present), and
+    /// shows it. A swapchain that no longer fits is made anew at the next [`Window::acquire`].
+    ///
+    /// # Errors
+    /// As [`Commands::launch`]; `Device` when the surface was lost.
+    ///
+    /// # Panics
+    /// When the shot is of another swapchain: [`Window::resize`] came between.
+    pub fn present(&mut self, commands: Commands<'_>, shot: &Shot) -> Result<Flight> {
+        let chain = self.chain.as_ref().expect("a shot is presented before the window changes");
+        assert!(Arc::ptr_eq(&chain.images[shot.index as usize], &shot.image), "a shot of another swapchain");
+        let drawn = chain.drawn[shot.index as usize].1;
+        let flight = commands.end()?.launch(Signals { wait: Some(shot.acquired), signal: Some(drawn) })?;
+        let (semaphores, swapchains, indices) = ([drawn], [chain.handle.handle], [shot.index]);
+        let info =
+            vk::PresentInfoKHR::default().wait_semaphores(&semaphores).swapchains(&swapchains).image_indices(&indices);
+        let queue = self.device.queue();
+        // SAFETY: swapchain and semaphore are alive until the queue is idle (`Chain`); the queue is locked.
+        let outcome = unsafe { chain.handle.loader.queue_present(*queue, &info) };
+        drop(queue);
+        match outcome {
+            Ok(false) => {}
+            Ok(true) | Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.chain = None,
+            Err(code) => return Err(code).checked("vkQueuePresentKHR", "window"),
+        }
+        Ok(flight)
+    }
+
+    /// Makes the swapchain anew; false where the window has no pixels.
+    fn rebuild(&mut self) -> Result<bool> {
+        let surface = self.surface.handle;
+        // SAFETY: physical device and surface are alive.
+        let can =
+            unsafe { self.surface.loader.get_physical_device_surface_capabilities(self.device.physical, surface) }
+                .checked("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", "window")?;
+        let Some([width, height]) = extent(&can, self.size) else { return Ok(false) };
+        let most = if can.max_image_count == 0 { u32::MAX } else { can.max_image_count };
+        let opaque = vk::CompositeAlphaFlagsKHR::OPAQUE;
+        let alpha =
+            if can.supported_composite_alpha.contains(opaque) { opaque } else { vk::CompositeAlphaFlagsKHR::INHERIT };
+        let create = vk::SwapchainCreateInfoKHR::default()
+            .surface(surface)
+            // One is shown, one waits to be, one is drawn.
+            .min_image_count((can.min_image_count + 1).max(3).min(most))
+            .image_format(self.format.format)
+            .image_color_space(self.format.color_space)
+            .image_extent(vk::Extent2D { width, height })
+            .image_array_layers(1)
+            .image_usage(vk::ImageUsageFlags::COLOR_ATTACHMENT)
+            .pre_transform(can.current_transform)
+            .composite_alpha(alpha)
+            .present_mode(self.mode.raw())
+            .clipped(true);
+        let loader = khr::swapchain::Device::new(&self.device.instance.handle, &self.device.handle);
+        // SAFETY: the surface is alive and has no other swapchain (`chain` is `None`); destroyed by `ChainHandle`.
+        let handle = unsafe { loader.create_swapchain(&create, None) }.checked("vkCreateSwapchainKHR", "window")?;
+        self.device.name(handle, "window");
+        let handle = Arc::new(ChainHandle { device: self.device.clone(), loader, handle });
+        // SAFETY: the swapchain is alive.
+        let images = unsafe { handle.loader.get_swapchain_images(handle.handle) };
+        let shape = ImageShape { format: self.format.format, width, height, samples: 1 };
+        let image = |image| Ok(Arc::new(Image::of_swapchain(&self.device, handle.clone(), image, shape)?));
+        let images: Vec<_> =
+            images.checked("vkGetSwapchainImagesKHR", "window")?.into_iter().map(image).collect::<Result<_>>()?;
+        let drawn = images.iter().map(|_| Semaphore::new(&self.device, "drawn")).collect::<Result<_>>()?;
+        log::info!("swapchain of {width}x{height}, {} images, {:?}", images.len(), self.format.format);
+        self.chain = Some(Chain { images, drawn, handle });
+        self.chain_count += 1;
+        Ok(true)
+    }
+}
+
+impl Drop for Window {
+    fn drop(&mut self) {
+        self.device.settle(); // before the semaphores go
+        self.chain = None;
+    }
+}
+
+/// The swapchain's size: what the surface says, else the window's within the surface's bounds; `None` without pixels.
+fn extent(can: &vk::SurfaceCapabilitiesKHR, size: [u32; 2]) -> Option<[u32; 2]> {
+    let (least, most) = (can.min_image_extent, can.max_image_extent);
+    let own = can.current_extent;
+    let [width, height] = if own.width == u32::MAX { size } else { [own.width, own.height] };
+    if width == 0 || height == 0 || size.contains(&0) || most.width == 0 || most.height == 0 {
+        return None;
+    }
+    Some([width.clamp(least.width, most.width), height.clamp(least.height, most.height)])
+}
+
+fn is_srgb(format: vk::Format) -> bool {
+    matches!(format, vk::Format::B8G8R8A8_SRGB | vk::Format::R8G8B8A8_SRGB)
+}
+
+/// sRGB if there is any: the device encodes exactly and blends linearly. Else 8 bits that the shader encodes for.
+fn best_format(formats: &[vk::SurfaceFormatKHR]) -> Result<vk::SurfaceFormatKHR> {
+    let plain = |f: &vk::SurfaceFormatKHR| matches!(f.format, vk::Format::B8G8R8A8_UNORM | vk::Format::R8G8B8A8_UNORM);
+    let shown = || formats.iter().filter(|f| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR);
+    let found = shown().find(|f| is_srgb(f.format)).or_else(|| shown().find(|f| plain(f)));
+    found.copied().ok_or_else(|| Error::Unsupported("this display has no 8-bit sRGB colours".into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn present_modes_go_by_name() {
+        for (name, mode) in MODES {
+            assert_eq!(name.parse::<PresentMode>(), Ok(mode));
+        }
+        assert!("vsync".parse::<PresentMode>().unwrap_err().contains("mailbox"));
+    }
+
+    #[test]
+    fn a_window_without_pixels_has_no_swapchain() {
+        let most = vk::Extent2D { width: 4096, height: 4096 };
+        let own = |width, height| vk::SurfaceCapabilitiesKHR {
+            current_extent: vk::Extent2D { width, height },
+            max_image_extent: most,
+            ..Default::default()
+        };
+        assert_eq!(extent(&own(640, 480), [1, 1]), Some([640, 480]), "the surface knows best");
+        assert_eq!(
+            extent(&own(u32::MAX, u32::MAX), [800, 9000]),
+            Some([800, 4096]),
+            "the window decides, within bounds"
+        );
+        assert_eq!(extent(&own(0, 0), [640, 480]), None);
+        assert_eq!(extent(&own(640, 480), [0, 0]), None, "minimised");
+    }
+
+    #[test]
+    fn srgb_before_plain_before_none() {
+        let of = |format| vk::SurfaceFormatKHR { format, color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR };
+        let (plain, srgb) = (of(vk::Format::B8G8R8A8_UNORM), of(vk::Format::B8G8R8A8_SRGB));
+        assert_eq!(best_format(&[plain, srgb]).unwrap().format, srgb.format);
+        assert_eq!(best_format(&[plain]).unwrap().format, plain.format);
+        assert_eq!(best_format(&[of(vk::Format::R5G6B5_UNORM_PACK16)]).unwrap_err().exit_code(), 3);
+    }
+}

@@ -14,6 +14,8 @@ pub mod memory;
 #[cfg(feature = "view")]
 pub mod overlay;
 pub mod pipeline;
+#[cfg(feature = "view")]
+pub mod present;
 pub mod reflect;
 pub mod select;
 pub mod shader;
@@ -36,7 +38,9 @@ pub use validation::Validation;
 #[cfg(feature = "view")]
 pub use overlay::{Overlay, Paint};
 #[cfg(feature = "view")]
-pub use window::{PresentMode, Shot, Window};
+pub use present::PresentMode;
+#[cfg(feature = "view")]
+pub use window::{Shot, Window};
 
 use crate::error::{Error, Result};
 use ash::vk;

@@ -3,56 +3,13 @@
 use super::device::{Device, Options};
 use super::flight::{FLIGHTS, Flight, Signals};
 use super::image::{Image, ImageShape};
+use super::present::{MODES, PresentMode, best_format, extent, is_srgb};
 use super::{Checked, Commands};
 use crate::error::{Error, Result};
 use ash::{khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle};
 use std::ffi::CStr;
 use std::sync::Arc;
-
-/// When a finished frame is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PresentMode {
-    /// At the display's next refresh, in order; every device has it.
-    #[default]
-    Fifo,
-    /// As FIFO, but a late frame is shown at once.
-    FifoRelaxed,
-    /// At the next refresh, a newer frame replacing one that waits.
-    Mailbox,
-    /// At once, with tearing.
-    Immediate,
-}
-
-/// Names on the command line.
-const MODES: [(&str, PresentMode); 4] = [
-    ("fifo", PresentMode::Fifo),
-    ("fifo-relaxed", PresentMode::FifoRelaxed),
-    ("mailbox", PresentMode::Mailbox),
-    ("immediate", PresentMode::Immediate),
-];
-
-impl std::str::FromStr for PresentMode {
-    type Err = String;
-    fn from_str(word: &str) -> std::result::Result<Self, String> {
-        let found = MODES.iter().find(|(name, _)| *name == word);
-        found.map(|(_, mode)| *mode).ok_or_else(|| {
-            let names: Vec<_> = MODES.iter().map(|(name, _)| *name).collect();
-            format!("unknown present mode \"{word}\" ({})", names.join(", "))
-        })
-    }
-}
-
-impl PresentMode {
-    fn raw(self) -> vk::PresentModeKHR {
-        match self {
-            PresentMode::Fifo => vk::PresentModeKHR::FIFO,
-            PresentMode::FifoRelaxed => vk::PresentModeKHR::FIFO_RELAXED,
-            PresentMode::Mailbox => vk::PresentModeKHR::MAILBOX,
-            PresentMode::Immediate => vk::PresentModeKHR::IMMEDIATE,
-        }
-    }
-}
 
 impl Device {
     /// As [`Device::new`], with what windows of a display need.
@@ -364,68 +321,5 @@ impl Drop for Window {
     fn drop(&mut self) {
         self.device.settle(); // before the semaphores go
         self.chain = None;
-    }
-}
-
-/// The swapchain's size: what the surface says, else the window's within the surface's bounds; `None` without pixels.
-fn extent(can: &vk::SurfaceCapabilitiesKHR, size: [u32; 2]) -> Option<[u32; 2]> {
-    let (least, most) = (can.min_image_extent, can.max_image_extent);
-    let own = can.current_extent;
-    let [width, height] = if own.width == u32::MAX { size } else { [own.width, own.height] };
-    if width == 0 || height == 0 || size.contains(&0) || most.width == 0 || most.height == 0 {
-        return None;
-    }
-    Some([width.clamp(least.width, most.width), height.clamp(least.height, most.height)])
-}
-
-fn is_srgb(format: vk::Format) -> bool {
-    matches!(format, vk::Format::B8G8R8A8_SRGB | vk::Format::R8G8B8A8_SRGB)
-}
-
-/// sRGB if there is any: the device encodes exactly and blends linearly. Else 8 bits that the shader encodes for.
-fn best_format(formats: &[vk::SurfaceFormatKHR]) -> Result<vk::SurfaceFormatKHR> {
-    let plain = |f: &vk::SurfaceFormatKHR| matches!(f.format, vk::Format::B8G8R8A8_UNORM | vk::Format::R8G8B8A8_UNORM);
-    let shown = || formats.iter().filter(|f| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR);
-    let found = shown().find(|f| is_srgb(f.format)).or_else(|| shown().find(|f| plain(f)));
-    found.copied().ok_or_else(|| Error::Unsupported("this display has no 8-bit sRGB colours".into()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn present_modes_go_by_name() {
-        for (name, mode) in MODES {
-            assert_eq!(name.parse::<PresentMode>(), Ok(mode));
-        }
-        assert!("vsync".parse::<PresentMode>().unwrap_err().contains("mailbox"));
-    }
-
-    #[test]
-    fn a_window_without_pixels_has_no_swapchain() {
-        let most = vk::Extent2D { width: 4096, height: 4096 };
-        let own = |width, height| vk::SurfaceCapabilitiesKHR {
-            current_extent: vk::Extent2D { width, height },
-            max_image_extent: most,
-            ..Default::default()
-        };
-        assert_eq!(extent(&own(640, 480), [1, 1]), Some([640, 480]), "the surface knows best");
-        assert_eq!(
-            extent(&own(u32::MAX, u32::MAX), [800, 9000]),
-            Some([800, 4096]),
-            "the window decides, within bounds"
-        );
-        assert_eq!(extent(&own(0, 0), [640, 480]), None);
-        assert_eq!(extent(&own(640, 480), [0, 0]), None, "minimised");
-    }
-
-    #[test]
-    fn srgb_before_plain_before_none() {
-        let of = |format| vk::SurfaceFormatKHR { format, color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR };
-        let (plain, srgb) = (of(vk::Format::B8G8R8A8_UNORM), of(vk::Format::B8G8R8A8_SRGB));
-        assert_eq!(best_format(&[plain, srgb]).unwrap().format, srgb.format);
-        assert_eq!(best_format(&[plain]).unwrap().format, plain.format);
-        assert_eq!(best_format(&[of(vk::Format::R5G6B5_UNORM_PACK16)]).unwrap_err().exit_code(), 3);
     }
 }

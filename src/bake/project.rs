@@ -142,7 +142,7 @@ impl Project {
         job_count: u32,
     ) -> Result<()> {
         let push = Push { face_px: self.face_px, atlas_columns: self.columns };
-        let resources = [Bind::Image(atlas), Bind::Buffer(jobs), Bind::Texel(texels), Bind::Buffer(samples)];
+        let resources = [Bind::Image(atlas), Bind::Buffer(jobs), Bind::Texel(*texels), Bind::Buffer(samples)];
         commands.dispatch(&self.pipeline, &resources, &push, [job_count * self.pipeline.local_size[0], 1, 1])
     }
 }

@@ -15,7 +15,7 @@ use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::error::Result;
 use crate::field::Lookup;
-use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, TexelView, Timing};
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, TexelView, Timing, Upload};
 use crate::layout;
 use crate::render::calibrate;
 use crate::render::draw::{Draw, Item};
@@ -58,11 +58,11 @@ pub struct Frame {
     pub variant: Variant,
     merge: Merge,
     draw: Draw,
-    entities: Buffer,
-    rotations: Buffer,
-    clusters: Buffer,
-    steps: Buffer,
-    sky: Buffer,
+    entities: Upload,
+    rotations: Upload,
+    clusters: Upload,
+    steps: Upload,
+    sky: Upload,
     radiosity: Buffer,
     radiosity_offsets: Vec<u64>,
     readback: Buffer,
@@ -98,7 +98,7 @@ impl Frame {
         let merge = Merge::new(device, library, form(&options, variant, entity_limit))?;
         let draw = Draw::new(device, library, options.size, options.multisample)?;
         let count = scene.entities.len().max(entity_limit as usize) as u64;
-        let upload = |name: &str, bytes: u64| Buffer::new(device, name, BufferKind::Upload, bytes);
+        let upload = |name: &str, bytes: u64| Upload::new(device, name, bytes);
         let bands = options.bake.bands;
         let mut radiosity = Buffer::new(device, "radiosity", BufferKind::Device, radiosity_size.max(16))?;
         radiosity.fill(0, &vec![0.0_f32; radiosity.size_bytes as usize / 4])?;
@@ -107,7 +107,7 @@ impl Frame {
         let quads: Vec<[f32; 4]> = (0..coefficient_count(bands))
             .map(|k| [channels[0][k] as f32, channels[1][k] as f32, channels[2][k] as f32, 0.0])
             .collect();
-        sky.write(0, &quads);
+        sky.write(&quads)?;
         Ok(Frame {
             device: device.clone(),
             scene: scene.clone(),

@@ -3,7 +3,6 @@
 use super::{Frame, store};
 use crate::error::Result;
 use crate::field::quantity::channel_stride;
-use crate::gpu::{Buffer, BufferKind};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
 use crate::render::gather::{self, Body, Bounds, Counts, Pose};
 use crate::render::merge::rotation_stride;
@@ -27,8 +26,8 @@ impl Frame {
                 *to = *from as f32;
             }
         }
-        self.entities.write(0, &entities);
-        self.rotations.write(0, &rotations);
+        self.entities.write(&entities)?;
+        self.rotations.write(&rotations)?;
         self.gather(placements)
     }
 
@@ -78,13 +77,8 @@ impl Frame {
             }
             steps.extend(part);
         }
-        if 4 * steps.len() as u64 > self.steps.size_bytes {
-            // Half as much again, so that a moving scene does not come back each frame.
-            self.steps = Buffer::new(&self.device, "steps", BufferKind::Upload, 6 * steps.len() as u64)?;
-        }
-        self.steps.write(0, &steps);
-        self.clusters.write(0, &clusters);
-        Ok(())
+        self.steps.write(&steps)?;
+        self.clusters.write(&clusters)
     }
 
     fn body(&self, index: usize, placement: &Placement) -> Body {

@@ -20,7 +20,7 @@ pub enum Bind<'r> {
     /// A byte range of a buffer. Its start keeps the device's offset alignment (at most 256 bytes).
     Range(&'r Buffer, Range<u64>),
     /// A texel view.
-    Texel(&'r TexelView<'r>),
+    Texel(TexelView<'r>),
     /// An image that is read with `texelFetch`.
     Image(&'r Image),
     /// Nothing: the variant in use does not have this binding.

@@ -153,6 +153,7 @@ impl Drop for Instance {
 /// Cheap to share: everything that owns a Vulkan object holds an `Arc<Device>`.
 pub struct Device {
     pub(super) handle: ash::Device,
+    #[cfg_attr(not(feature = "view"), allow(dead_code))] // windows ask it
     pub(super) physical: vk::PhysicalDevice,
     pub(super) queue: Mutex<vk::Queue>,
     /// Fences of launched recordings; see `flight`.

@@ -264,6 +264,7 @@ impl Buffer {
 }
 
 /// A typed window on a whole buffer, read by shaders as `textureBuffer`. The buffer keeps it, so that it is made once.
+#[derive(Clone, Copy)]
 pub struct TexelView<'b> {
     pub(super) handle: vk::BufferView,
     pub(super) buffer: &'b Buffer,

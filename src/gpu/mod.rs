@@ -19,6 +19,7 @@ pub mod present;
 pub mod reflect;
 pub mod select;
 pub mod shader;
+pub mod upload;
 pub mod validation;
 #[cfg(feature = "view")]
 pub mod window;
@@ -33,6 +34,7 @@ pub use image::{Image, ImageShape};
 pub use memory::{Buffer, BufferKind, TexelView};
 pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState};
 pub use shader::{Shader, Stage};
+pub use upload::Upload;
 pub use validation::Validation;
 
 #[cfg(feature = "view")]

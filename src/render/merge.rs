@@ -38,8 +38,8 @@ impl<'b> Readable<'b> {
         Ok(Readable { buffer, view })
     }
 
-    fn bind<'r>(&'r self) -> Bind<'r> {
-        match &self.view {
+    fn bind(&self) -> Bind<'b> {
+        match self.view {
             Some(view) => Bind::Texel(view),
             None => Bind::Buffer(self.buffer),
         }
@@ -92,7 +92,7 @@ impl Merge {
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
-        inputs: &'r Inputs<'r>,
+        inputs: &Inputs<'r>,
         radiosity: &'r Buffer,
         cluster_count: u32,
     ) -> Result<()> {

@@ -180,3 +180,22 @@ fn runs_repeat_and_seeds_differ() {
     assert_eq!(text(&run(3)), text(&run(3)));
     assert_ne!(text(&run(3)), text(&run(4)));
 }
+
+#[test]
+fn a_ray_meets_the_nearest_side_first() {
+    let side = shadow_fields::asset::generate::torus_two_colour(0.5, 0.2, 64, 32);
+    let shape = shadow_fields::truth::shape::Shape::new(&side);
+    // Along x both colours lie behind one another; in units of the bounding radius, .7 m.
+    for (sign, color) in [(1.0, shadow_fields::asset::generate::WARM), (-1.0, shadow_fields::asset::generate::COOL)] {
+        for height in [0.0, 0.05, 0.15] {
+            let origin = Vec3::new(sign * 3.0, height / 0.7, 0.01);
+            let direction = Vec3::new(-sign, 0.0, 0.0);
+            let found = shape.emission(origin.into(), direction.into()).unwrap();
+            assert!(found.distance(color) < 1e-3, "{found} is not {color}");
+            let surface = (0.5 + (0.04_f32 - height * height).sqrt()) / 0.7;
+            let along = shape.first_hit(origin.into(), direction.into()).unwrap();
+            assert!((along - (3.0 - surface)).abs() < 5e-3, "{along}");
+        }
+    }
+    assert!(shape.first_hit(Vec3::new(3.0, 1.0, 0.0).into(), Vec3::NEG_X.into()).is_none());
+}

@@ -67,6 +67,17 @@ impl Shape {
         !self.hierarchy.ray_traverse_miss(ray, |ray, id| self.triangles[id].intersect_embree(ray))
     }
 
+    /// How far along a ray it first meets the mesh.
+    pub fn first_hit(&self, origin: Vec3A, direction: Vec3A) -> Option<f32> {
+        self.nearest(origin, direction).map(|hit| hit.t)
+    }
+
+    fn nearest(&self, origin: Vec3A, direction: Vec3A) -> Option<RayHit> {
+        let (ray, mut hit) = (Ray::new_inf(origin, direction), RayHit::none());
+        // Not `intersect_embree`, whose distance is in a unit of the triangle's own: good for yes or no only.
+        self.hierarchy.ray_traverse(ray, &mut hit, |ray, id| self.triangles[id].intersect(ray)).then_some(hit)
+    }
+
     /// Whether its emission is the same all over.
     pub fn is_plain(&self) -> bool {
         self.colors.is_none()
@@ -77,10 +88,7 @@ impl Shape {
         let Some(colors) = &self.colors else {
             return self.blocks(origin, direction).then_some(Vec3::ONE);
         };
-        let (ray, mut hit) = (Ray::new_inf(origin, direction), RayHit::none());
-        if !self.hierarchy.ray_traverse(ray, &mut hit, |ray, id| self.triangles[id].intersect_embree(ray)) {
-            return None;
-        }
+        let hit = self.nearest(origin, direction)?;
         let triangle = &self.triangles[hit.primitive_id as usize];
         let at = origin + hit.t * direction;
         let (a, b, c) = (triangle.v0 - at, triangle.v1 - at, triangle.v2 - at);

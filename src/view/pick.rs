@@ -1,0 +1,165 @@
+//! Rays from the picture into the scene: what is seen at a pixel, and what is dragged there.
+
+use super::command::{Changed, Command, Effect};
+use super::edit;
+use super::editor::Editor;
+use super::history::{Kind, Snapshot};
+use crate::frame::camera::clip_from_world;
+use crate::scene::{EntityData, Placement};
+use crate::truth::shape::Shape;
+use glam::{DVec3, DVec4};
+use std::sync::OnceLock;
+
+/// A drag follows no farther than this many scene radii from the eye: near the horizon a pixel is kilometres.
+const REACH: f64 = 30.0;
+
+/// Hierarchies of the scene's meshes, each built when a ray first comes near its mesh.
+#[derive(Default)]
+pub struct Picker {
+    shapes: Vec<OnceLock<Shape>>,
+}
+
+impl Picker {
+    /// For that many meshes.
+    pub fn new(mesh_count: usize) -> Self {
+        Picker { shapes: (0..mesh_count).map(|_| OnceLock::new()).collect() }
+    }
+}
+
+/// What is being dragged.
+pub struct Drag {
+    entity: usize,
+    /// The entity as it was.
+    before: EntityData,
+    /// Where it was grabbed, metres.
+    anchor: DVec3,
+    moved: bool,
+}
+
+/// A half line in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Metres.
+    pub origin: DVec3,
+    /// Unit.
+    pub direction: DVec3,
+}
+
+impl Editor {
+    /// The ray through a place of the picture (pixels; centres of pixels lie at halves).
+    pub fn ray(&self, at: [f32; 2]) -> Ray {
+        let [width, height] = self.size().map(f64::from);
+        let camera = self.camera();
+        let across = |p: f32, of: f64| 2.0 * f64::from(p) / of - 1.0;
+        // Depth 1 is the near plane; any point of it but the eye will do.
+        let near = DVec4::new(across(at[0], width), across(at[1], height), 1.0, 1.0);
+        let world = clip_from_world(camera, width / height).inverse() * near;
+        let origin = camera.eye.as_dvec3();
+        Ray { origin, direction: (world.truncate() / world.w - origin).normalize() }
+    }
+
+    /// The entity seen at a place of the picture, and the point of it in the world.
+    pub fn hit(&self, at: [f32; 2]) -> Option<(usize, DVec3)> {
+        let ray = self.ray(at);
+        if !ray.direction.is_finite() {
+            return None;
+        }
+        let placements = self.placements();
+        let mut near: Vec<(f64, usize)> = (0..placements.len())
+            .filter_map(|entity| {
+                let (centre, radius_m) = self.sphere(entity, &placements[entity]);
+                Some((ray.enters(centre, radius_m)?, entity))
+            })
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut best: Option<(f64, usize)> = None;
+        for (enters_m, entity) in near {
+            // Spheres come near to far: what lies behind the best hit cannot be nearer.
+            if best.is_some_and(|(distance_m, _)| distance_m < enters_m) {
+                break;
+            }
+            if let Some(distance_m) = self.meets(entity, &placements[entity], ray, enters_m)
+                && best.is_none_or(|(least_m, _)| distance_m < least_m)
+            {
+                best = Some((distance_m, entity));
+            }
+        }
+        best.map(|(distance_m, entity)| (entity, ray.origin + distance_m * ray.direction))
+    }
+
+    /// Distance at which a ray that enters the bounding sphere at `enters_m` meets the mesh.
+    fn meets(&self, entity: usize, placement: &Placement, ray: Ray, enters_m: f64) -> Option<f64> {
+        let mesh = self.scene.entities[entity].mesh;
+        let shape = self.picker.shapes[mesh].get_or_init(|| Shape::new(&self.scene.meshes[mesh]));
+        let (centre, radius_m) = self.sphere(entity, placement);
+        let to_object = placement.rotation.as_dquat().normalize().inverse();
+        // From the sphere on, in its radii: f32 keeps its precision however far the camera is.
+        let start = to_object * (ray.origin + enters_m * ray.direction - centre) / radius_m;
+        let hit = shape.first_hit(start.as_vec3a(), (to_object * ray.direction).as_vec3a())?;
+        Some(enters_m + f64::from(hit) * radius_m)
+    }
+
+    /// Whether a drag from there moves the selected entity rather than the camera: it is seen there, and is no mere ground.
+    pub fn grabs(&self, at: [f32; 2]) -> bool {
+        self.selection().is_some_and(|selected| {
+            let entity = &self.scene.entities[selected];
+            (entity.occludes || entity.emits) && self.hit(at).is_some_and(|(seen, _)| seen == selected)
+        })
+    }
+
+    /// Does a command of the pointer.
+    pub(super) fn point(&mut self, command: Command) -> Effect {
+        match command {
+            Command::Pick(at) => {
+                let seen = self.hit(at).map(|(entity, _)| entity);
+                self.select(seen)
+            }
+            Command::DragStart(at) => {
+                self.drag = None;
+                if self.grabs(at)
+                    && let Some((entity, anchor)) = self.hit(at)
+                {
+                    let before = self.scene.data.entities[entity].clone();
+                    self.drag = Some(Drag { entity, before, anchor, moved: false });
+                }
+                Effect::default()
+            }
+            Command::DragTo(at) => self.drag_to(at),
+            _ => {
+                self.drag = None;
+                self.history.close();
+                Effect::default()
+            }
+        }
+    }
+
+    fn drag_to(&mut self, at: [f32; 2]) -> Effect {
+        let reach_m = REACH * self.bounds().1.max(self.orbit.distance_m);
+        let ray = self.ray(at);
+        let Some(drag) = &mut self.drag else { return Effect::default() };
+        let along = (drag.anchor.y - ray.origin.y) / ray.direction.y;
+        if !(along > 0.0 && along < reach_m) {
+            return Effect::default();
+        }
+        let by = (ray.origin + along * ray.direction - drag.anchor) * DVec3::new(1.0, 0.0, 1.0);
+        let Some(after) = edit::moved(&drag.before, by) else { return Effect::default() };
+        let (entity, joins) = (drag.entity, drag.moved);
+        drag.moved = true;
+        let before = || Snapshot { entities: vec![(entity, drag.before.clone())], ..Snapshot::default() };
+        self.history.note(Kind::Drag, Some(entity), joins, before);
+        self.scene.set_entity(entity, after);
+        Changed { placements: true, ..Changed::default() }.into()
+    }
+}
+
+impl Ray {
+    /// Distance at which it enters a sphere: 0 from inside, `None` where it misses.
+    fn enters(&self, centre: DVec3, radius_m: f64) -> Option<f64> {
+        let toward = centre - self.origin;
+        let along = toward.dot(self.direction);
+        let beside = (toward - along * self.direction).length_squared();
+        // A hair more than the sphere: its radius is rounded to f32, and so is the mesh in it.
+        let half = (radius_m * (1.0 + 1e-6)).powi(2) - beside;
+        (half >= 0.0 && along + half.sqrt() >= 0.0).then(|| (along - half.sqrt()).max(0.0))
+    }
+}

@@ -127,9 +127,8 @@ fn zoom_is_bounded_and_home_frames_what_matters() {
         editor.apply(Command::Home);
         let placements = editor.placements();
         let mut farthest = 0.0_f32;
-        for entity in 1..3 {
+        for (entity, place) in placements.iter().enumerate().skip(1) {
             let mesh = &editor.scene().meshes[editor.scene().entities[entity].mesh];
-            let place = placements[entity];
             for p in &mesh.positions {
                 let [x, y] = picture_place(&editor, (place.rotation * (*p * place.scale) + place.position).as_dvec3());
                 let across = [x / size[0] as f32, y / size[1] as f32].map(|c| (c - 0.5).abs());
@@ -411,8 +410,8 @@ fn picking_finds_what_is_seen() {
         let right = ahead.cross(DVec3::Y).normalize();
         let up = right.cross(ahead);
         let half = (f64::from(camera.fov_deg).to_radians() / 2.0).tan();
-        for y in (0..64).step_by(if name == "twelve_instances" { 9 } else { 5 }) {
-            for x in (0..96).step_by(if name == "twelve_instances" { 9 } else { 5 }) {
+        for y in (0..64).step_by(9) {
+            for x in (0..96).step_by(9) {
                 let at = [x as f32 + 0.5, y as f32 + 0.5];
                 let (h, v) = ((f64::from(at[0]) - 48.0) / 32.0, (32.0 - f64::from(at[1])) / 32.0);
                 let direction = (ahead + half * (h * right + v * up)).normalize();
@@ -422,8 +421,7 @@ fn picking_finds_what_is_seen() {
                     (Some((entity, along)), Some((picked, point))) if entity == picked => {
                         hits += 1;
                         seen.insert(entity);
-                        if (point - eye - along * direction).length() > 1e-4 * along { println!("{name} {at:?} {} {along} {direction}", (point - eye - along * direction).length()); }
-                        assert!((point - eye - along * direction).length() < 1e-1 * along, "{name} {at:?}");
+                        assert!((point - eye - along * direction).length() < 1e-4 * along, "{name} {at:?}");
                     }
                     (None, None) => {}
                     // A ray along an edge may fall to either side.
@@ -435,7 +433,7 @@ fn picking_finds_what_is_seen() {
                 }
             }
         }
-        assert!(hits > 40 && disagree == 0, "{name}: {hits} hits, {disagree} not");
+        assert!(hits > 30 && disagree == 0, "{name}: {hits} hits, {disagree} not");
         assert!(seen.len() >= 3, "{name}: {seen:?}");
     }
 }
@@ -709,7 +707,6 @@ fn the_pointer_clicks_turns_pans_and_drags() {
     assert_eq!(input.commands(Event::Release(Button::Left), &editor), []);
     assert_eq!(input.commands(Event::Move(ball), &editor), []);
     // Selected: it is dragged from where it was grabbed.
-    println!("{:?} {:?}", ball, editor.ray(ball));
     editor.apply(Command::Pick(ball));
     assert_eq!(editor.selection(), Some(1));
     input.commands(Event::Press(Button::Left, ball), &editor);

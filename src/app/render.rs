@@ -31,9 +31,9 @@ pub struct Arguments {
     /// Pictures a second of scene time
     #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
     fps: u16,
-    /// Scene time of the first picture, seconds
-    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
-    time: f64,
+    /// Scene time of the first picture, seconds; default: the scene's, which is 0 unless it says otherwise
+    #[arg(long, value_name = "SECONDS")]
+    time: Option<f64>,
     /// Size of the picture; default: the scene's
     #[arg(long, value_parser = size, value_name = "WxH")]
     size: Option<[u32; 2]>,
@@ -57,7 +57,7 @@ pub struct Arguments {
 
 /// Renders a scene.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    if !arguments.time.is_finite() {
+    if arguments.time.is_some_and(|time| !time.is_finite()) {
         return Err(Error::Usage("--time wants a finite number of seconds".into()));
     }
     let numbered = Numbered::new(&arguments.output)?;
@@ -69,6 +69,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let context = Context::new(global)?;
     let started = Instant::now();
     let shape = &scene.data.output;
+    let first_s = arguments.time.unwrap_or(shape.time_s);
     let options = Options {
         bake: arguments.bake.options(),
         lookup: arguments.merge.lookup,
@@ -88,7 +89,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let mut timings = Vec::new();
     let mut worst_error = 0.0_f64;
     for index in 0..arguments.frames {
-        let time_s = arguments.time + f64::from(index) / f64::from(arguments.fps);
+        let time_s = first_s + f64::from(index) / f64::from(arguments.fps);
         let placements = scene.at(time_s);
         let start = Instant::now();
         let passes = if arguments.reference {
@@ -112,7 +113,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if !encoded.is_empty() {
         picture::write_apng(&arguments.output, width, height, &encoded, arguments.fps)?;
     }
-    let last = scene.at(timings.last().map_or(arguments.time, |(time_s, ..)| *time_s));
+    let last = scene.at(timings.last().map_or(first_s, |(time_s, ..)| *time_s));
     if let Some(path) = &arguments.exr {
         if arguments.reference {
             frame.redraw(&last, f32::INFINITY)?;

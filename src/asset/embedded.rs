@@ -31,6 +31,15 @@ pub const ROOT: &str = "assets";
 /// The contents of an embedded file, by its path from the repository's top (`assets/meshes/torus.obj`, also with `..` in it, as
 /// a scene's relative paths give).
 pub fn find(path: &Path) -> Option<&'static [u8]> {
+    entry(path).map(|(_, bytes)| *bytes)
+}
+
+/// The plain path of an embedded file, without `..`: `assets/meshes/torus.obj`.
+pub fn name(path: &Path) -> Option<String> {
+    entry(path).map(|(name, _)| format!("{ROOT}/{name}"))
+}
+
+fn entry(path: &Path) -> Option<&'static (&'static str, &'static [u8])> {
     let mut parts: Vec<&str> = Vec::new();
     for component in path.components() {
         match component {
@@ -42,7 +51,7 @@ pub fn find(path: &Path) -> Option<&'static [u8]> {
     }
     let wanted = parts.join("/");
     let below = wanted.strip_prefix(ROOT)?.strip_prefix('/')?;
-    FILES.iter().find(|(name, _)| *name == below).map(|(_, bytes)| *bytes)
+    FILES.iter().find(|(name, _)| *name == below)
 }
 
 /// [`find`] as a reader of files.

@@ -73,7 +73,7 @@ impl Source {
             None => Ok(()),
         };
         amount("strength", &[self.strength])?;
-        if !(self.turn_deg.abs() <= TURN_LIMIT_DEG) {
+        if !(-TURN_LIMIT_DEG..=TURN_LIMIT_DEG).contains(&self.turn_deg) {
             return Err(Error::Input(format!(
                 "environment turn_deg {} is not within {TURN_LIMIT_DEG:e}",
                 self.turn_deg

@@ -109,11 +109,18 @@ pub struct Output {
     pub height: u32,
     /// Stops by which radiance is brightened before it is encoded.
     pub exposure_ev: f32,
+    /// Scene time of the first picture, seconds.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub time_s: f64,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 impl Default for Output {
     fn default() -> Self {
-        Self { width: 960, height: 640, exposure_ev: 0.0 }
+        Self { width: 960, height: 640, exposure_ev: 0.0, time_s: 0.0 }
     }
 }
 
@@ -123,6 +130,8 @@ struct OutputWritten {
     width: Option<u32>,
     height: Option<u32>,
     exposure_ev: Option<f32>,
+    #[serde(default, deserialize_with = "values::number")]
+    time_s: f64,
 }
 
 impl TryFrom<OutputWritten> for Output {
@@ -138,7 +147,7 @@ impl TryFrom<OutputWritten> for Output {
         if !(-32.0..=32.0).contains(&exposure_ev) {
             return Err(format!("exposure_ev {exposure_ev} is not within -32 to 32"));
         }
-        Ok(Self { width, height, exposure_ev })
+        Ok(Self { width, height, exposure_ev, time_s: written.time_s })
     }
 }
 
@@ -147,7 +156,7 @@ impl TryFrom<OutputWritten> for Output {
 pub struct MeshData {
     /// What entities call it; unique.
     pub name: String,
-    /// Wavefront OBJ file, relative to the scene file.
+    /// Wavefront OBJ file, relative to the scene file; where there is none, a built-in mesh as `assets/meshes/torus.obj`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// Its generator, written as `plane = {...}`, `sphere = {...}` and so on.

@@ -74,7 +74,7 @@ impl Scene {
     }
 
     /// Reads a scene from text. `path` names it in messages; `read` is given the paths of files, which already start with
-    /// the folder of `path`.
+    /// the folder of `path`. A file that it does not have is looked for among the embedded ones, as `assets/meshes/torus.obj`.
     ///
     /// # Errors
     /// As [`Scene::load`].
@@ -82,7 +82,12 @@ impl Scene {
         let data = Data::parse(text, path)?;
         let lines = Lines::read(text);
         let folder = path.parent().unwrap_or(Path::new(""));
-        let read = |file: &Path| read(&folder.join(file));
+        // What is not on disk may be in the binary, under its own name from wherever the scene stands.
+        let read = |file: &Path| {
+            let full = folder.join(file);
+            read(&full)
+                .or_else(|error| embedded::find(file).filter(|_| !full.exists()).map(<[u8]>::to_vec).ok_or(error))
+        };
 
         let mut meshes: Vec<Arc<Mesh>> = Vec::with_capacity(data.meshes.len());
         for (i, mesh) in data.meshes.iter().enumerate() {

@@ -18,6 +18,7 @@ pub const MOVE_STEP: f64 = 0.02;
 impl Editor {
     /// Does a command that changes the scene.
     pub(super) fn change(&mut self, command: Command) -> Effect {
+        self.drag = None;
         match command {
             Command::Step { step, repeat } => self.step(step, repeat),
             Command::ToggleLight => self.toggle_light(),

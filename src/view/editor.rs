@@ -3,6 +3,7 @@
 use super::command::{Changed, Command, Effect, Request};
 use super::history::History;
 use super::orbit::Orbit;
+use super::pick::{Drag, Picker};
 use crate::asset::embedded;
 use crate::error::Result;
 use crate::field::quantity;
@@ -27,6 +28,8 @@ pub struct Editor {
     pub(super) history: History,
     /// Emission that an entity had before it stopped being a light.
     pub(super) former_emission: Vec<Option<Vec3>>,
+    pub(super) picker: Picker,
+    pub(super) drag: Option<Drag>,
 }
 
 impl Editor {
@@ -36,7 +39,7 @@ impl Editor {
             orbit: Orbit::new(&scene.data.camera),
             size: [scene.data.output.width, scene.data.output.height],
             selection: None,
-            time_s: 0.0,
+            time_s: scene.data.output.time_s,
             running: true,
             reference: false,
             error: false,
@@ -44,6 +47,8 @@ impl Editor {
             variant: None,
             history: History::default(),
             former_emission: vec![None; scene.entities.len()],
+            picker: Picker::new(scene.meshes.len()),
+            drag: None,
             path: path.to_owned(),
             scene,
         }
@@ -162,7 +167,7 @@ impl Editor {
             Command::SelectNext => self.cycle(1),
             Command::SelectPrevious => self.cycle(-1),
             Command::SelectNone => self.select(None),
-            Command::Pick(_) | Command::DragStart(_) | Command::DragTo(_) | Command::DragEnd => Effect::default(),
+            Command::Pick(_) | Command::DragStart(_) | Command::DragTo(_) | Command::DragEnd => self.point(command),
             Command::NextScene => self.next_scene(),
             Command::ToggleRunning => {
                 self.running = !self.running;
@@ -240,9 +245,10 @@ impl Editor {
         Changed { camera: true, ..Changed::default() }.into()
     }
 
-    fn select(&mut self, selection: Option<usize>) -> Effect {
+    pub(super) fn select(&mut self, selection: Option<usize>) -> Effect {
         let changed = self.selection != selection;
         self.selection = selection;
+        self.drag = None;
         self.history.close();
         Changed { selection: changed, ..Changed::default() }.into()
     }

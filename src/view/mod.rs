@@ -9,7 +9,11 @@ pub mod command;
 pub mod edit;
 pub mod editor;
 pub mod history;
+pub mod input;
 pub mod orbit;
+pub mod pick;
+mod save;
 
 pub use command::{Changed, Command, Effect, Request, Step};
 pub use editor::Editor;
+pub use input::{Event, Input};

@@ -67,7 +67,9 @@ impl Orbit {
 
     /// As a scene has it.
     pub fn camera(&self) -> Camera {
-        let eye = self.target + self.distance_m * self.outward();
+        // Far from the origin, f32 holds no eye that is nearer to the target.
+        let distance_m = self.distance_m.max(1e-5 * self.target.abs().max_element());
+        let eye = self.target + distance_m * self.outward();
         Camera { eye: eye.as_vec3(), target: self.target.as_vec3(), fov_deg: self.fov_deg }
     }
 

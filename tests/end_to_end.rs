@@ -320,3 +320,35 @@ fn shaders_can_be_replaced() {
     assert!(ran.stderr.contains(&place) && ran.stderr.contains("nonsense"), "no {place} in {}", ran.stderr);
     assert_eq!(names(folder), ["edited.png", "glsl", "plain.png"]);
 }
+
+/// Wrong on purpose: a lookup of the nearest of few samples errs more than the default, and the picture says by how much.
+#[test]
+fn errors_are_shown_in_false_colour() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let shown = |name: &str, more: &[&str]| {
+        let files = ["render", SCENE, "-o", "p.png", "--error", name, "--rays", "32", "--json"];
+        let ran = good(folder, &[&small(&files)[..], more].concat());
+        let report = json(&ran.stdout);
+        (image::load_from_memory(&read(folder, name)).unwrap().into_rgb8(), report["error"].clone())
+    };
+    let (picture, error) = shown("signed.png", &["--error-limit", "0.25"]);
+    assert_eq!(error["scale"]["limit"], 0.25);
+    assert!(picture.width() == 96 && picture.height() > 64, "a scale bar stands below the picture");
+    let rms = error["rms"].as_f64().unwrap();
+    assert!((0.005..0.3).contains(&rms), "{rms}");
+    let (_, nearest) = shown("nearest.png", &["--lookup", "nearest", "--error-scheme", "absolute"]);
+    assert!(nearest["rms"].as_f64().unwrap() > 1.2 * rms, "{nearest} against {rms}");
+    for (arguments, words) in [
+        (&["--error", "e.png", "--reference"][..], "cannot be used with"),
+        (&["--error", "e.png", "--error-limit", "0"], "no number above 0"),
+        (&["--error", "e.png", "--error-scheme", "loud"], "signed or absolute"),
+    ] {
+        let ran = finish(&mut command(folder, &small(&[&["render", SCENE, "-o", "q.png"], arguments].concat())));
+        assert!(ran.code == 2 && ran.stderr.contains(words), "{arguments:?}: {}", ran.stderr);
+    }
+    assert!(!names(folder).contains(&"q.png".to_owned()));
+}

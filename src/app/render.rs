@@ -2,12 +2,13 @@
 
 use super::context::{BakeArguments, Context, MergeArguments, size};
 use super::{Global, output};
+use crate::asset::false_color::Scheme;
 use crate::asset::picture;
 use crate::bench::text;
 use crate::error::{Error, Result};
 use crate::frame::{Frame, Options};
 use crate::scene::Scene;
-use crate::truth::{self, raycast::RayCast};
+use crate::truth::{self, ErrorMap, error_map, raycast::RayCast};
 use clap::Args;
 use serde_json::json;
 use std::fmt::Write;
@@ -46,7 +47,17 @@ pub struct Arguments {
     /// Light by ray casting instead of shadow fields: slow, and what the fields are judged by
     #[arg(long)]
     reference: bool,
-    /// With --reference: rays a vertex for the sky and for each light
+    /// Also write the error of the last picture's vertices against ray casting in false colour, with a scale bar
+    #[arg(long, value_name = "E.png", conflicts_with = "reference")]
+    error: Option<PathBuf>,
+    /// With --error: blue too dark and red too bright, or dark right and light wrong
+    #[arg(long, default_value = "signed", value_name = "signed|absolute")]
+    error_scheme: Scheme,
+    /// With --error: the error with the last colour, relative to the root mean square of the radiosity; default: the 99th
+    /// percentile, rounded up
+    #[arg(long, value_name = "X", value_parser = positive)]
+    error_limit: Option<f64>,
+    /// With --reference or --error: rays a vertex for the sky and for each light
     #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
     rays: u32,
     #[command(flatten)]
@@ -61,7 +72,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         return Err(Error::Usage("--time wants a finite number of seconds".into()));
     }
     let numbered = Numbered::new(&arguments.output)?;
-    let others = [&arguments.exr, &arguments.vertices, &arguments.stats];
+    let others = [&arguments.exr, &arguments.vertices, &arguments.stats, &arguments.error];
     for path in others.into_iter().flatten().chain([&arguments.output]) {
         output::check_folder(path)?;
     }
@@ -126,6 +137,15 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         text::write(path, &vertex_table(&frame, &last)?)?;
     }
 
+    let error = arguments.error.as_ref().map(|path| {
+        frame.render(&last, None)?;
+        let cast = RayCast { rays: arguments.rays, seed: global.seed, ..Default::default() };
+        let (reference, noise) = truth::picture(&scene, &last, &cast);
+        let map = ErrorMap::new(&error_map::radiosity(&frame)?, &reference, arguments.error_scheme);
+        map.write(path, &mut frame, &last, arguments.error_limit, noise)
+    });
+    let error = error.transpose()?;
+
     let frames: Vec<_> = timings
         .iter()
         .map(|(time_s, wall, passes)| {
@@ -142,6 +162,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "variant": frame.variant.name,
         "lookups": frame.counts,
         "reference_standard_error": arguments.reference.then_some(worst_error),
+        "error": error,
         "options": {
             "bake": options.bake, "lattice": options.bake.lattice.to_string(), "lookup": options.lookup, "skip": options.skip,
             "size": options.size, "multisample": options.multisample,
@@ -184,6 +205,12 @@ fn light_by_rays(frame: &mut Frame, placements: &[crate::scene::Placement], rays
         frame.set_radiosity(entity, &radiosity)?;
     }
     Ok(error)
+}
+
+/// A number above 0.
+fn positive(text: &str) -> std::result::Result<f64, String> {
+    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+    number.ok_or_else(|| format!("\"{text}\" is no number above 0"))
 }
 
 /// Radiance that the exposure shows as white.

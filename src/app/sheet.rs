@@ -1,6 +1,6 @@
 //! Contact sheets: a grid of unfolded cubes with labels.
 
-use crate::asset::picture;
+use crate::asset::{lettering, picture};
 use crate::error::Result;
 use std::path::Path;
 
@@ -16,28 +16,6 @@ const MARGIN: usize = 104;
 /// Where each face stands in the unfolded cube, in faces from the left and the top.
 const PLACES: [(usize, usize); 6] = [(2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (3, 1)];
 
-/// Glyphs of three by five pixels, a row in three bits, for the characters that labels use.
-const GLYPHS: &[(char, [u8; 5])] = &[
-    ('0', [7, 5, 5, 5, 7]),
-    ('1', [2, 6, 2, 2, 7]),
-    ('2', [7, 1, 7, 4, 7]),
-    ('3', [7, 1, 3, 1, 7]),
-    ('4', [5, 5, 7, 1, 1]),
-    ('5', [7, 4, 7, 1, 7]),
-    ('6', [7, 4, 7, 5, 7]),
-    ('7', [7, 1, 2, 2, 2]),
-    ('8', [7, 5, 7, 5, 7]),
-    ('9', [7, 5, 7, 1, 7]),
-    ('+', [0, 2, 7, 2, 0]),
-    ('-', [0, 0, 7, 0, 0]),
-    ('.', [0, 0, 0, 0, 2]),
-    (',', [0, 0, 0, 2, 4]),
-    ('d', [1, 1, 7, 5, 7]),
-    ('e', [7, 5, 7, 4, 7]),
-    ('g', [7, 4, 5, 5, 7]),
-    ('r', [0, 7, 4, 4, 4]),
-];
-
 struct Canvas {
     width: usize,
     height: usize,
@@ -51,16 +29,8 @@ impl Canvas {
         }
     }
 
-    /// Text at twice the glyphs' size.
     fn text(&mut self, x: usize, y: usize, text: &str) {
-        for (index, letter) in text.chars().enumerate() {
-            let Some((_, rows)) = GLYPHS.iter().find(|(c, _)| *c == letter) else { continue };
-            for dy in 0..10 {
-                for dx in (0..6).filter(|dx| rows[dy / 2] >> (2 - dx / 2) & 1 == 1) {
-                    self.set(x + 8 * index + dx, y + dy, [0.0; 3]);
-                }
-            }
-        }
+        lettering::write(&mut self.rgb, self.width, (x, y), 1, [0.0; 3], text);
     }
 }
 

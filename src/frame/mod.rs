@@ -150,7 +150,7 @@ impl Frame {
         commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))?;
         if let Some(white) = white {
             commands.barrier(Access::ComputeWrite, Access::VertexRead);
-            self.record_draw(&mut commands, &items, white)?;
+            self.record_draw(&mut commands, &items, self.background, white)?;
         }
         commands.submit()
     }
@@ -162,16 +162,34 @@ impl Frame {
     pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
         let items = self.items(placements);
         let mut commands = Commands::new(&self.device, "redraw")?;
-        self.record_draw(&mut commands, &items, white)?;
+        self.record_draw(&mut commands, &items, self.background, white)?;
         commands.submit()
     }
 
-    fn record_draw<'f>(&'f self, commands: &mut Commands<'f>, items: &[Item<'f>], white: f32) -> Result<()> {
+    /// As [`Frame::redraw`] for numbers that are no light: nothing shines, nothing is brought down, and the background is given.
+    ///
+    /// # Errors
+    /// As [`Frame::render`].
+    pub fn redraw_unlit(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
+        let mut items = self.items(placements);
+        items.iter_mut().for_each(|item| item.emission = Vec3::ZERO);
+        let mut commands = Commands::new(&self.device, "redraw unlit")?;
+        self.record_draw(&mut commands, &items, background.into(), f32::INFINITY)?;
+        commands.submit()
+    }
+
+    fn record_draw<'f>(
+        &'f self,
+        commands: &mut Commands<'f>,
+        items: &[Item<'f>],
+        background: Vec3,
+        white: f32,
+    ) -> Result<()> {
         for image in self.draw.attachments() {
             let depth = image.shape.format == vk::Format::D32_SFLOAT;
             commands.image_barrier(image, None, if depth { Access::DepthWrite } else { Access::ColorWrite });
         }
-        commands.pass("draw", |c| self.draw.record(c, items, &self.radiosity, self.background, white))?;
+        commands.pass("draw", |c| self.draw.record(c, items, &self.radiosity, background, white))?;
         let picture = &self.draw.picture;
         commands.image_barrier(picture, Some(Access::ColorWrite), Access::TransferRead);
         commands.pass("read back", |commands| {
@@ -224,6 +242,11 @@ impl Frame {
     /// The scene that the frame was built for.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Width and height of its pictures in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.options.size
     }
 
     /// Vertices that are lit.

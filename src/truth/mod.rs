@@ -14,12 +14,14 @@
 //! itself if it is neither flat nor convex, seen from [`crate::bake::TRANSFER_OFFSET`] off its surface; a light that does
 //! not occlude is transparent, and none lights itself.
 
+pub mod error_map;
 pub mod exact;
 pub mod raycast;
 pub mod sequence;
 pub mod shape;
 pub mod world;
 
+pub use error_map::ErrorMap;
 pub use exact::Exact;
 pub use raycast::{Estimate, RayCast};
 pub use shape::Shapes;

@@ -1,0 +1,44 @@
+//! Text in pictures, in glyphs of 8 x 8 pixels.
+
+use font8x8::UnicodeFonts;
+
+/// Edge of a glyph in pixels, its space included, at size 1.
+pub const GLYPH: usize = 8;
+
+/// Width of a text in pixels.
+pub fn width(text: &str, size: usize) -> usize {
+    GLYPH * size * text.chars().count()
+}
+
+/// Writes one line into a picture of RGB triples, `picture_width` pixels wide, its upper left corner at (x, y). What lies outside
+/// is left out, and so is a character without a glyph.
+pub fn write(rgb: &mut [f32], picture_width: usize, (x, y): (usize, usize), size: usize, color: [f32; 3], text: &str) {
+    for (index, letter) in text.chars().enumerate() {
+        let rows = font8x8::BASIC_FONTS.get(letter).or_else(|| font8x8::GREEK_FONTS.get(letter)).unwrap_or_default();
+        for place in 0..(GLYPH * size).pow(2) {
+            let (dx, dy) = (place % (GLYPH * size), place / (GLYPH * size));
+            let (px, py) = (x + index * GLYPH * size + dx, y + dy);
+            let at = 3 * (py * picture_width + px);
+            if rows[dy / size] >> (dx / size) & 1 == 1 && px < picture_width && at + 3 <= rgb.len() {
+                rgb[at..at + 3].copy_from_slice(&color);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_stand_where_they_should() {
+        let (width, height) = (40, 20);
+        let mut rgb = vec![0.0; 3 * width * height];
+        write(&mut rgb, width, (10, 2), 1, [1.0; 3], "-");
+        let lit: Vec<(usize, usize)> =
+            (0..width * height).filter(|i| rgb[3 * i] == 1.0).map(|i| (i % width, i / width)).collect();
+        assert!(!lit.is_empty() && lit.iter().all(|(x, y)| (10..18).contains(x) && (2..10).contains(y)), "{lit:?}");
+        assert_eq!(lit.iter().map(|(_, y)| *y).collect::<std::collections::BTreeSet<_>>().len(), 1, "a dash is a row");
+        write(&mut rgb, width, (36, 16), 2, [1.0; 3], "MM");
+    }
+}

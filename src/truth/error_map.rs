@@ -1,0 +1,155 @@
+//! The error of every lit vertex, and a frame that shows it in false colour.
+
+use super::EntityRadiosity;
+use crate::asset::false_color::{BACKGROUND, NEUTRAL, Scale, Scheme};
+use crate::asset::picture;
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::scene::Placement;
+use serde::Serialize;
+use std::path::Path;
+
+/// What an error picture shows.
+#[derive(Clone, Debug, Serialize)]
+pub struct Shown {
+    /// File.
+    pub picture: String,
+    /// Which error has which colour.
+    pub scale: Scale,
+    /// Root mean square over all lit vertices, relative to that of the reference.
+    pub rms: f64,
+    /// The reference's own relative standard error.
+    pub reference_error: f64,
+}
+
+/// How far the vertices of a frame are from a reference.
+#[derive(Clone, Debug)]
+pub struct ErrorMap {
+    /// By entity, a number a vertex in units of `unit`: the mean over channels of what is too much, or, for
+    /// [`Scheme::Absolute`], the root mean square over channels.
+    pub errors: Vec<(usize, Vec<f64>)>,
+    /// What the numbers tell.
+    pub scheme: Scheme,
+    /// Root mean square of the reference over vertices and channels, linear radiance.
+    pub unit: f64,
+}
+
+impl ErrorMap {
+    /// Compares radiosity by entity (linear RGB a vertex) with a reference for the same entities, as [`super::picture`] gives it.
+    pub fn new(found: &[EntityRadiosity], reference: &[EntityRadiosity], scheme: Scheme) -> Self {
+        let squares = || reference.iter().flat_map(|(_, v)| v.iter().flatten()).map(|c| f64::from(*c).powi(2));
+        let unit = (squares().sum::<f64>() / squares().count().max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
+        let of = |found: &[f32; 3], wanted: &[f32; 3]| {
+            let apart: [f64; 3] = std::array::from_fn(|c| (f64::from(found[c]) - f64::from(wanted[c])) / unit);
+            match scheme {
+                Scheme::Signed => apart.iter().sum::<f64>() / 3.0,
+                Scheme::Absolute => (apart.iter().map(|d| d * d).sum::<f64>() / 3.0).sqrt(),
+            }
+        };
+        let entity = |((entity, found), (other, wanted)): (&EntityRadiosity, &EntityRadiosity)| {
+            assert_eq!((entity, found.len()), (other, wanted.len()), "entity and vertices");
+            (*entity, found.iter().zip(wanted).map(|(f, w)| of(f, w)).collect())
+        };
+        ErrorMap { errors: found.iter().zip(reference).map(entity).collect(), scheme, unit }
+    }
+
+    /// Root mean square over vertices, in units of `unit`.
+    pub fn rms(&self) -> f64 {
+        let all = || self.errors.iter().flat_map(|(_, errors)| errors);
+        (all().map(|e| e * e).sum::<f64>() / all().count().max(1) as f64).sqrt()
+    }
+
+    /// What a picture of it shows, in words.
+    pub fn title(&self, reference_error: f64) -> String {
+        let what = match self.scheme {
+            Scheme::Signed => "blue: too dark, red: too bright",
+            Scheme::Absolute => "magnitude",
+        };
+        format!(
+            "error of radiosity / RMS radiosity by ray casting; {what}; RMS {:.4}, of the rays themselves {reference_error:.4}",
+            self.rms()
+        )
+    }
+
+    /// A scale that fits: see [`Scale::fitting`].
+    pub fn scale(&self) -> Scale {
+        Scale::fitting(self.scheme, self.errors.iter().flat_map(|(_, errors)| errors.iter().copied()))
+    }
+
+    /// Colours a vertex, by entity, as [`Frame::set_radiosity`] takes them.
+    pub fn colors(&self, scale: &Scale) -> Vec<EntityRadiosity> {
+        self.errors.iter().map(|(entity, errors)| (*entity, errors.iter().map(|e| scale.color(*e)).collect())).collect()
+    }
+
+    /// Draws a frame in the errors' colours; what is not lit is grey, and nothing shines. The frame's radiosity is replaced until
+    /// the next merge.
+    ///
+    /// # Errors
+    /// As [`Frame::redraw`].
+    pub fn draw(&self, frame: &mut Frame, placements: &[Placement], scale: &Scale) -> Result<()> {
+        for entity in 0..frame.scene().entities.len() {
+            let count = frame.scene().meshes[frame.scene().entities[entity].mesh].positions.len();
+            frame.set_radiosity(entity, &vec![NEUTRAL; count])?;
+        }
+        for (entity, colors) in self.colors(scale) {
+            frame.set_radiosity(entity, &colors)?;
+        }
+        frame.redraw_unlit(placements, BACKGROUND)?;
+        Ok(())
+    }
+
+    /// Draws it and writes the picture with its scale bar; `limit` instead of the fitting one, and the reference's own standard
+    /// error for the title. Returns what it shows.
+    ///
+    /// # Errors
+    /// As [`Frame::redraw`], and `Failed` when the file cannot be written.
+    pub fn write(
+        &self,
+        path: &Path,
+        frame: &mut Frame,
+        placements: &[Placement],
+        limit: Option<f64>,
+        reference_error: f64,
+    ) -> Result<Shown> {
+        let fitting = self.scale();
+        let scale = Scale { limit: limit.unwrap_or(fitting.limit), ..fitting };
+        self.draw(frame, placements, &scale)?;
+        let [width, _] = frame.size();
+        let (picture, rows) = scale.with_bar(&frame.picture(), width as usize, &self.title(reference_error));
+        picture::write_png(path, width, rows as u32, &picture, 0.0)?;
+        Ok(Shown { picture: path.display().to_string(), scale, rms: self.rms(), reference_error })
+    }
+}
+
+/// The radiosity that a frame holds, by receiving entity: what [`super::picture`] is compared with.
+///
+/// # Errors
+/// `Device` when memory ran out.
+pub fn radiosity(frame: &Frame) -> Result<Vec<EntityRadiosity>> {
+    let receives = |entity: &usize| frame.scene().entities[*entity].receives;
+    let entities = (0..frame.scene().entities.len()).filter(receives);
+    entities.map(|entity| Ok((entity, frame.radiosity(entity)?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_in_units_of_the_reference() {
+        let reference = vec![(2, vec![[3.0, 3.0, 3.0], [4.0, 4.0, 4.0], [0.0; 3]])];
+        let found = vec![(2, vec![[3.0, 3.0, 3.0], [4.5, 4.0, 3.5], [0.0, 0.0, -3.0]])];
+        let unit = (25.0_f64 / 3.0).sqrt();
+        let signed = ErrorMap::new(&found, &reference, Scheme::Signed);
+        assert!((signed.unit - unit).abs() < 1e-12);
+        assert_eq!(signed.errors[0].0, 2);
+        let wanted = [0.0, 0.0, -1.0 / unit];
+        assert!(signed.errors[0].1.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{signed:?}");
+        let absolute = ErrorMap::new(&found, &reference, Scheme::Absolute);
+        let wanted = [0.0, (0.5_f64 / 3.0).sqrt() / unit, 3.0_f64.sqrt() / unit];
+        assert!(absolute.errors[0].1.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{absolute:?}");
+        let colors = absolute.colors(&absolute.scale());
+        assert_eq!(colors[0].1.len(), 3);
+        assert_ne!(colors[0].1[0], colors[0].1[2]);
+    }
+}

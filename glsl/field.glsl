@@ -2,7 +2,10 @@
 // ShadowField::lookup. A quad is four coefficients: vec4, or four halves.
 // DIRECTIONS 0 cube, 1 latitude-longitude; SPACING 0 chord, 1 log, 2 linear; LOOKUP 0 nearest, 1 radial, 2 trilinear.
 
-#if TEXEL
+#if PACKED
+// Two quads of halves a texel: as many bytes a read as a texel can have.
+layout(binding = FIELD_BINDING) uniform utextureBuffer field_quads;
+#elif TEXEL
 layout(binding = FIELD_BINDING) uniform textureBuffer field_quads;
 vec4 field_quad(uint i) {
     return texelFetch(field_quads, int(i));
@@ -162,9 +165,17 @@ void field_gather(FieldPlace place, uint base, uint sample_quads, out float b[CO
     }
     [[unroll]] for (uint k = 0; k < CORNERS; k++) {
         uint at = base + place.corner[k] * sample_quads;
+#if PACKED
+        [[unroll]] for (uint q = 0; q < FIELD_QUADS; q += 2) {
+            uvec4 halves = texelFetch(field_quads, int((at + q) / 2));
+            sums[q] += place.weight[k] * vec4(unpackHalf2x16(halves.x), unpackHalf2x16(halves.y));
+            sums[q + 1] += place.weight[k] * vec4(unpackHalf2x16(halves.z), unpackHalf2x16(halves.w));
+        }
+#else
         [[unroll]] for (uint q = 0; q < FIELD_QUADS; q++) {
             sums[q] += place.weight[k] * field_quad(at + q);
         }
+#endif
     }
     [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
         b[i] = sums[i / 4][i % 4];

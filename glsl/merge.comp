@@ -11,40 +11,35 @@
 
 layout(local_size_x = WORKGROUP) in;
 
-layout(std430, binding = 2) readonly buffer Steps { uint steps[]; };
-layout(std430, binding = 8) readonly buffer Clusters { Cluster clusters[]; };
+layout(std430, binding = 1) readonly buffer Steps { uint steps[]; };
+layout(std430, binding = 2) readonly buffer Clusters { Cluster clusters[]; };
 const uint NONE = 0xffffffffu;
-const uint ROTATION_QUADS = ((BANDS * (4 * BANDS * BANDS - 1)) / 3 + 2) / 4;
 
-// Entities, rotations and sky are the same for a whole workgroup: uniform or storage blocks on a GPU, which loads them once; on
+// Entities and sky are the same for a whole workgroup: uniform or storage blocks on a GPU, which loads them once; on
 // a processor, which loads lane by lane, texel reads bring four numbers at a time.
 #if UNIFORM
 layout(std140, binding = 0) uniform Entities { Entity entities[ENTITY_LIMIT]; };
-layout(std140, binding = 1) uniform Rotations { vec4 rotations[ENTITY_LIMIT * ROTATION_QUADS]; };
 #define ENTITY(e) entities[e]
-#define ROTATION(i) rotations[i]
 #elif TEXEL
 layout(binding = 0) uniform textureBuffer entities;
-layout(binding = 1) uniform textureBuffer rotations;
 Entity entity_at(uint e) {
-    int at = int(e) * 8;
-    uvec4 last = floatBitsToUint(texelFetch(entities, at + 7));
-    return Entity(texelFetch(entities, at), texelFetch(entities, at + 1), texelFetch(entities, at + 2),
-        texelFetch(entities, at + 3), texelFetch(entities, at + 4), texelFetch(entities, at + 5),
-        texelFetch(entities, at + 6), last.x, last.y, last.z, last.w);
+    int at = int(e) * 6;
+    vec4 third = texelFetch(entities, at + 2);
+    return Entity(texelFetch(entities, at), texelFetch(entities, at + 1), third.xy, floatBitsToUint(third.z),
+        floatBitsToUint(third.w), texelFetch(entities, at + 3), texelFetch(entities, at + 4), texelFetch(entities, at + 5));
 }
 #define ENTITY(e) entity_at(e)
-#define ROTATION(i) texelFetch(rotations, int(i))
 #else
 layout(std430, binding = 0) readonly buffer Entities { Entity entities[]; };
-layout(std430, binding = 1) readonly buffer Rotations { vec4 rotations[]; };
 #define ENTITY(e) entities[e]
-#define ROTATION(i) rotations[i]
 #endif
-layout(std140, binding = 6) uniform Sky { vec4 sky[COEFFICIENTS]; };
 #define FIELD_BINDING 3
 #include "field.glsl"
 #if TEXEL
+layout(binding = 6) uniform textureBuffer sky;
+vec4 sky_quad(uint i) {
+    return texelFetch(sky, int(i));
+}
 layout(binding = 4) uniform textureBuffer transfers;
 vec4 transfer_quad(uint i) {
     return texelFetch(transfers, int(i));
@@ -54,6 +49,10 @@ vec4 vertex_quad(uint i) {
     return texelFetch(vertices, int(i));
 }
 #else
+layout(std140, binding = 6) uniform Sky { vec4 sky[3 * FIELD_QUADS]; };
+vec4 sky_quad(uint i) {
+    return sky[i];
+}
 layout(std430, binding = 4) readonly buffer Transfers { vec4 transfers[]; };
 vec4 transfer_quad(uint i) {
     return transfers[i];
@@ -65,17 +64,16 @@ vec4 vertex_quad(uint i) {
 #endif
 layout(std430, binding = 7) writeonly buffer Radiosity { vec4 radiosity[]; };
 
-#define SH_ROTATION(k) ROTATION(instance + (k) / 4)[(k) % 4]
 #include "generated/rotate.glsl"
 
 #include "merge_cone.glsl"
 
 // Transfer in the world frame: the receiver's own shadow times cosine. `at` is its first quad.
-void transfer(uint at, uint receiver, out float t[COEFFICIENTS]) {
+void transfer(uint at, Entity receiver, out float t[COEFFICIENTS]) {
     [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
         t[i] = transfer_quad(at + i / 4)[i % 4];
     }
-    sh_rotate(t, receiver * ROTATION_QUADS);
+    sh_rotate(t, receiver.alpha_beta, receiver.gamma);
 }
 
 void main() {
@@ -88,17 +86,15 @@ void main() {
     uint at = 2 * (cluster.vertex_first + v);
     vec3 position = vertex_quad(at).xyz; // object frame, metres, from the bounding sphere's centre
     vec3 normal = vertex_quad(at + 1).xyz;
-    // A row of the inverse rotation is a column of the rotation.
-    mat3 to_world = mat3(receiver.to_object_x.xyz, receiver.to_object_y.xyz, receiver.to_object_z.xyz);
     // World axes, but from the receiver's centre: far from the world's origin f32 positions would be too coarse.
-    position = receiver.albedo.w * (to_world * position);
-    normal = to_world * normal;
+    position = receiver.albedo.w * to_world(receiver, position);
+    normal = to_world(receiver, normal);
 
     float t_start[COEFFICIENTS];
     if (cluster.transfer_first == NONE) {
         sh_cosine(normal, t_start);
     } else {
-        transfer(cluster.transfer_first + v * FIELD_QUADS, cluster.receiver, t_start);
+        transfer(cluster.transfer_first + v * FIELD_QUADS, receiver, t_start);
     }
     float t[COEFFICIENTS] = t_start;
     vec3 sum = vec3(0.0);
@@ -125,12 +121,11 @@ void main() {
             if (!shines && l != SKY_CHAIN) {
                 weight *= before(e, cone, l, light);
             }
-            vec3 from = (position - entity.centre.xyz) * entity.centre.w;
-            vec3 p = vec3(dot(entity.to_object_x.xyz, from), dot(entity.to_object_y.xyz, from), dot(entity.to_object_z.xyz, from));
+            vec3 p = to_object(entity, (position - entity.centre.xyz) * entity.centre.w);
             uint base = of_radiance ? entity.radiance_base + channel * FIELD_QUADS : entity.blocked_base;
             float b[COEFFICIENTS];
             field_gather(field_place(p, entity.radial), base, of_radiance ? 3 * FIELD_QUADS : FIELD_QUADS, b);
-            sh_rotate(b, e * ROTATION_QUADS);
+            sh_rotate(b, entity.alpha_beta, entity.gamma);
 
             float met = 0.0;
             float share = shines ? 0.0 : weight;
@@ -149,8 +144,10 @@ void main() {
         } while (i < cluster.step_count);
     }
 
-    [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
-        sum += sky[k].rgb * t[k];
+    [[unroll]] for (uint channel = 0; channel < 3; channel++) {
+        [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
+            sum[channel] += sky_quad(channel * FIELD_QUADS + k / 4)[k % 4] * t[k];
+        }
     }
     radiosity[cluster.radiosity_first + v] = vec4(sum * receiver.albedo.rgb, 0.0);
 }

@@ -2,17 +2,34 @@
 
 struct Entity {
     vec4 centre;       // world, metres; w = 1 / (scale x bounding radius), 1/m
-    vec4 to_object_x;  // rows of the inverse rotation; w unused
-    vec4 to_object_y;
-    vec4 to_object_z;
-    vec4 emission;     // radiance factor of its light; w unused
-    vec4 albedo;       // albedo / pi; w = uniform scale of the object
-    vec4 radial;       // shell coordinate = x * spacing coordinate + y; z = inner, w = outer shell radius in r
+    vec4 alpha_beta;   // cosine and sine of both; the rotation to the world is Rz(alpha) Ry(beta) Rz(gamma)
+    vec2 gamma;        // cosine and sine
     uint blocked_base; // first quad of the occlusion field
     uint radiance_base;// first quad of the radiance field
-    uint spare_0;
-    uint spare_1;
+    vec4 radial;       // shell coordinate = x * spacing coordinate + y; z = inner, w = outer shell radius in r
+    vec4 emission;     // radiance factor of its light; w unused
+    vec4 albedo;       // albedo / pi; w = uniform scale of the object
 };
+
+// The rotation that a cosine and sine stand for, applied to two coordinates, and its inverse.
+vec2 turn(vec2 turned_by, vec2 p) {
+    return vec2(turned_by.x * p.x - turned_by.y * p.y, turned_by.y * p.x + turned_by.x * p.y);
+}
+vec2 turn_back(vec2 turned_by, vec2 p) {
+    return vec2(turned_by.x * p.x + turned_by.y * p.y, turned_by.x * p.y - turned_by.y * p.x);
+}
+vec3 to_world(Entity entity, vec3 p) {
+    p.xy = turn(entity.gamma, p.xy);
+    p.zx = turn(entity.alpha_beta.zw, p.zx);
+    p.xy = turn(entity.alpha_beta.xy, p.xy);
+    return p;
+}
+vec3 to_object(Entity entity, vec3 p) {
+    p.xy = turn_back(entity.alpha_beta.xy, p.xy);
+    p.zx = turn_back(entity.alpha_beta.zw, p.zx);
+    p.xy = turn_back(entity.gamma, p.xy);
+    return p;
+}
 
 // A workgroup's worth of neighbouring vertices.
 struct Cluster {

@@ -8,26 +8,20 @@ use bytemuck::{Pod, Zeroable};
 pub struct Entity {
     /// Centre of the bounding sphere in the world, metres; w = 1 / (scale x bounding radius).
     pub centre: [f32; 4],
-    /// First row of the inverse rotation.
-    pub to_object_x: [f32; 4],
-    /// Second row.
-    pub to_object_y: [f32; 4],
-    /// Third row.
-    pub to_object_z: [f32; 4],
-    /// Radiance factor of the entity's light.
-    pub emission: [f32; 4],
-    /// Albedo / pi; w = uniform scale of the object.
-    pub albedo: [f32; 4],
-    /// Slope and offset of the shell coordinate, inner and outer shell radius in r.
-    pub radial: [f32; 4],
+    /// Cosine and sine of alpha and of beta; the rotation to the world is Rz(alpha) Ry(beta) Rz(gamma).
+    pub alpha_beta: [f32; 4],
+    /// Cosine and sine of gamma.
+    pub gamma: [f32; 2],
     /// First quad of the occlusion field.
     pub blocked_base: u32,
     /// First quad of the radiance field.
     pub radiance_base: u32,
-    /// Not in use.
-    pub spare_0: u32,
-    /// Not in use.
-    pub spare_1: u32,
+    /// Slope and offset of the shell coordinate, inner and outer shell radius in r.
+    pub radial: [f32; 4],
+    /// Radiance factor of the entity's light.
+    pub emission: [f32; 4],
+    /// Albedo / pi; w = uniform scale of the object.
+    pub albedo: [f32; 4],
 }
 
 /// A workgroup's worth of neighbouring vertices of one receiver.

@@ -249,7 +249,7 @@ fn usage() {
     let case = case(&[("s.toml", &format!("{CAMERA}{BALL}"))]);
     let render = ["render", "s.toml", "-o", "p.png"];
     for (option, word, part) in [
-        ("--variant", "fast", "texel-uniform"),
+        ("--variant", "fast", "texel-packed"),
         ("--lookup", "far", "trilinear"),
         ("--size", "10", "1280x720"),
         ("--size", "0x10", "1280x720"),

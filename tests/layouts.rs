@@ -55,26 +55,14 @@ fn entities_and_clusters_of_the_merge() {
         );
         assert_eq!(reflection.strides.get("Cluster"), Some(&(size_of::<Cluster>() as u32)));
         // The texel variant takes entities apart by the quad; that it agrees with the others is tested where they merge.
-        if variant == "texel" {
+        if variant.starts_with("texel") {
             continue;
         }
         let entity = same_layout!(
             reflection,
-            Entity {
-                centre,
-                to_object_x,
-                to_object_y,
-                to_object_z,
-                emission,
-                albedo,
-                radial,
-                blocked_base,
-                radiance_base,
-                spare_0,
-                spare_1,
-            }
+            Entity { centre, alpha_beta, gamma, blocked_base, radiance_base, radial, emission, albedo }
         );
-        assert_eq!(entity.len(), 11);
+        assert_eq!(entity.len(), 8);
         assert_eq!(reflection.strides.get("Entity"), Some(&(size_of::<Entity>() as u32)));
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use fastrand::Rng;
 use glam::{DQuat, DVec3};
 use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, evaluate};
-use shadow_fields::sh::rotation::{Rotation, block_count, rotate_program};
+use shadow_fields::sh::rotation::{Rotation, block_count, rotate_program, turns};
 
 fn random(rng: &mut Rng, bands: usize) -> Vec<f64> {
     (0..coefficient_count(bands)).map(|_| 2.0 * rng.f64() - 1.0).collect()
@@ -95,11 +95,29 @@ fn blocks_are_as_many_as_known() {
 #[test]
 fn the_program_that_is_printed_equals_the_rotation() {
     let mut rng = Rng::with_seed(13);
+    let mut rotations: Vec<DQuat> = (0..20).map(|_| random_rotation(&mut rng)).collect();
+    // Where the angles are not unique, and near it.
+    rotations.extend([0.0, 1e-9, PI - 1e-9, PI].into_iter().flat_map(|angle| {
+        [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| DQuat::from_axis_angle(axis, angle) * DQuat::from_rotation_z(0.7))
+    }));
     for bands in 2..=6 {
-        let (coefficients, rotation) = (random(&mut rng, bands), Rotation::new(bands, random_rotation(&mut rng)));
-        let expected = apply(&rotation, &coefficients);
-        let mut out = vec![f64::NAN; coefficients.len() - 1];
-        rotate_program(bands).evaluate(&[coefficients.as_slice(), rotation.blocks()].concat(), &mut out);
-        assert_close(&out, &expected[1..], "program");
+        for &rotation in &rotations {
+            let coefficients = random(&mut rng, bands);
+            let expected = apply(&Rotation::new(bands, rotation), &coefficients);
+            let mut out = vec![f64::NAN; coefficients.len() - 1];
+            rotate_program(bands).evaluate(&[coefficients.as_slice(), &turns(rotation)].concat(), &mut out);
+            assert_close(&out, &expected[1..], "program");
+        }
+    }
+}
+
+#[test]
+fn turns_are_cosines_and_sines_of_the_same_rotation() {
+    let mut rng = Rng::with_seed(14);
+    for _ in 0..100 {
+        let rotation = random_rotation(&mut rng);
+        let [a, b, c] = [0, 2, 4].map(|i| turns(rotation)[i + 1].atan2(turns(rotation)[i]));
+        let composed = DQuat::from_rotation_z(a) * DQuat::from_rotation_y(b) * DQuat::from_rotation_z(c);
+        assert!(composed.dot(rotation).abs() > 1.0 - 1e-12, "{rotation} {composed}");
     }
 }

@@ -85,7 +85,7 @@ impl BakeArguments {
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "Merging")]
 pub struct MergeArguments {
-    /// Shader variant: storage, storage-uniform, texel or texel-uniform; default: the device's fastest
+    /// Shader variant: storage, storage-uniform, texel or texel-packed; default: the device's fastest
     #[arg(long, value_name = "NAME", value_parser = Variant::named)]
     pub variant: Option<Variant>,
     /// Samples that a lookup takes

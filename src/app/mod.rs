@@ -8,6 +8,7 @@ mod demo;
 mod devices;
 mod inspect;
 mod output;
+mod profile;
 mod render;
 mod sheet;
 
@@ -42,6 +43,8 @@ enum Command {
     Bench(bench::Arguments),
     /// Hold every pass against its CPU twin on the chosen device; exit code 1 where one is off
     Check(check::Arguments),
+    /// Time every pass and every variant of the merge shader on this device
+    Profile(profile::Arguments),
     /// List the Vulkan devices of this machine
     Devices(devices::Arguments),
 }
@@ -67,6 +70,7 @@ fn run(cli: &Cli) -> Result<()> {
         Command::Inspect(arguments) => inspect::run(&cli.global, arguments),
         Command::Bench(arguments) => bench::run(&cli.global, arguments),
         Command::Check(arguments) => check::run(&cli.global, arguments),
+        Command::Profile(arguments) => profile::run(&cli.global, arguments),
         Command::Devices(arguments) => devices::run(&cli.global, arguments),
     }
 }

@@ -15,12 +15,13 @@ use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::error::Result;
 use crate::field::Lookup;
+use crate::field::quantity::channel_stride;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, TexelView, Timing, Upload};
 use crate::layout;
 use crate::render::calibrate;
 use crate::render::draw::{Draw, Item};
 use crate::render::gather::{Bounds, Counts};
-use crate::render::merge::{Inputs, Merge, Readable, rotation_stride};
+use crate::render::merge::{Inputs, Merge, Readable};
 use crate::render::variant::{Form, Skip, Variant, uniform_entities};
 use crate::scene::{Placement, Scene};
 use crate::sh::basis::{Y00, coefficient_count};
@@ -56,10 +57,10 @@ pub struct Frame {
     pub store: Store,
     /// Variant in use.
     pub variant: Variant,
+    form: Form,
     merge: Merge,
     draw: Draw,
     entities: Upload,
-    rotations: Upload,
     clusters: Upload,
     steps: Upload,
     sky: Upload,
@@ -82,7 +83,8 @@ impl Frame {
         let (device, library) = (baker.device(), baker.library());
         let store = Store::new(baker, cache, scene, &options.bake, progress)?;
         let wanted = options.variant.map_or_else(|| calibrate::fastest(device, library), Ok)?;
-        let variant = usable(device, &store, scene.entities.len(), wanted);
+        let form = usable(device, &store, scene.entities.len(), form(&options, wanted, uniform_entities(device)));
+        let (variant, entity_limit) = (form.variant, form.entity_limit);
 
         let mut radiosity_offsets = Vec::new();
         let (mut radiosity_size, mut cluster_table) = (0, Vec::new());
@@ -94,29 +96,30 @@ impl Frame {
             }
             radiosity_size += 16 * geometry.vertices.len() as u64;
         }
-        let entity_limit = uniform_entities(device, options.bake.bands);
-        let merge = Merge::new(device, library, form(&options, variant, entity_limit))?;
+        let merge = Merge::new(device, library, form)?;
         let draw = Draw::new(device, library, options.size, options.multisample)?;
         let count = scene.entities.len().max(entity_limit as usize) as u64;
         let upload = |name: &str, bytes: u64| Upload::new(device, name, bytes);
         let bands = options.bake.bands;
         let mut radiosity = Buffer::new(device, "radiosity", BufferKind::Device, radiosity_size.max(16))?;
         radiosity.fill(0, &vec![0.0_f32; radiosity.size_bytes as usize / 4])?;
-        let mut sky = upload("sky", 16 * coefficient_count(bands) as u64)?;
+        let stride = channel_stride(bands);
+        let mut sky = upload("sky", 12 * stride as u64)?;
         let channels = scene.environment.coefficients(bands);
-        let quads: Vec<[f32; 4]> = (0..coefficient_count(bands))
-            .map(|k| [channels[0][k] as f32, channels[1][k] as f32, channels[2][k] as f32, 0.0])
-            .collect();
-        sky.write(&quads)?;
+        let mut floats = vec![0.0_f32; 3 * stride];
+        for (to, from) in floats.chunks_exact_mut(stride).zip(&channels) {
+            to.iter_mut().zip(&from[..coefficient_count(bands)]).for_each(|(to, from)| *to = *from as f32);
+        }
+        sky.write(&floats)?;
         Ok(Frame {
             device: device.clone(),
             scene: scene.clone(),
             options,
             variant,
+            form,
             merge,
             draw,
             entities: upload("entities", count * size_of::<layout::Entity>() as u64)?,
-            rotations: upload("rotations", count * 4 * rotation_stride(bands) as u64)?,
             clusters: upload("clusters", (cluster_table.len() * size_of::<layout::Cluster>()) as u64)?,
             steps: upload("steps", 4 * cluster_table.len() as u64)?,
             sky,
@@ -258,13 +261,12 @@ impl Frame {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         Ok(Inputs {
             entities: Readable::shared(&self.entities, self.variant)?,
-            rotations: Readable::shared(&self.rotations, self.variant)?,
             steps: &self.steps,
             clusters: &self.clusters,
-            fields: Readable::new(&self.store.fields, self.variant, self.store.field_format())?,
+            fields: Readable::new(&self.store.fields, self.variant, self.form.field_format())?,
             transfers: Readable::new(&self.store.transfers, self.variant, floats)?,
             vertices: Readable::new(&self.store.vertices, self.variant, floats)?,
-            sky: &self.sky,
+            sky: Readable::new(&self.sky, self.variant, floats)?,
         })
     }
 
@@ -289,17 +291,17 @@ impl Frame {
     }
 }
 
-/// The variant, less the texel views or uniform blocks that cannot hold the scene.
-fn usable(device: &Device, store: &Store, entity_count: usize, variant: Variant) -> Variant {
+/// The form with its variant less the texel views or uniform blocks that cannot hold the scene.
+fn usable(device: &Device, store: &Store, entity_count: usize, form: Form) -> Form {
     let floats = vk::Format::R32G32B32A32_SFLOAT;
-    let fits = TexelView::fits(device, store.field_format(), store.fields.size_bytes)
+    let fits = TexelView::fits(device, form.field_format(), store.fields.size_bytes)
         && TexelView::fits(device, floats, store.transfers.size_bytes)
         && TexelView::fits(device, floats, store.vertices.size_bytes);
-    let chosen = variant.restricted(fits, entity_count <= uniform_entities(device, store.bands) as usize);
-    if chosen != variant {
-        log::info!("the scene is too large for the variant \"{}\"; using \"{}\"", variant.name, chosen.name);
+    let variant = form.variant.restricted(fits, entity_count <= form.entity_limit as usize);
+    if variant != form.variant {
+        log::info!("the scene is too large for the variant \"{}\"; using \"{}\"", form.variant.name, variant.name);
     }
-    chosen
+    Form { variant, ..form }
 }
 
 /// The form of the merge shader.

@@ -5,29 +5,18 @@ use crate::error::Result;
 use crate::field::quantity::channel_stride;
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
 use crate::render::gather::{self, Body, Bounds, Counts, Pose};
-use crate::render::merge::rotation_stride;
 use crate::scene::Placement;
-use crate::sh::rotation::Rotation;
+use crate::sh::rotation::turns;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
 impl Frame {
-    /// Writes entities, rotations and the clusters' steps of this moment.
+    /// Writes entities and the clusters' steps of this moment.
     pub(super) fn upload(&mut self, placements: &[Placement]) -> Result<()> {
-        let bands = self.options.bake.bands;
-        let stride = rotation_stride(bands);
-        let mut entities = Vec::new();
-        let mut rotations = vec![0.0_f32; stride * placements.len()];
-        for (index, placement) in placements.iter().enumerate() {
-            entities.push(self.entity(index, placement));
-            let blocks = Rotation::new(bands, placement.rotation.as_dquat().normalize());
-            for (to, from) in rotations[index * stride..].iter_mut().zip(blocks.blocks()) {
-                *to = *from as f32;
-            }
-        }
+        let entities: Vec<layout::Entity> =
+            placements.iter().enumerate().map(|(index, placement)| self.entity(index, placement)).collect();
         self.entities.write(&entities)?;
-        self.rotations.write(&rotations)?;
         self.gather(placements)
     }
 
@@ -96,7 +85,7 @@ impl Frame {
         let entity = &self.scene.entities[index];
         let geometry = &self.store.geometries[entity.mesh];
         let rotation = placement.rotation.as_dquat().normalize();
-        let rows = glam::DMat3::from_quat(rotation.inverse()).transpose();
+        let [cos_a, sin_a, cos_b, sin_b, cos_c, sin_c] = turns(rotation).map(|x| x as f32);
         let centre = self.centre(index, placement).as_vec3();
         let radius_m = geometry.radius_m * f64::from(placement.scale);
         let emission = match &geometry.radiance {
@@ -112,15 +101,13 @@ impl Frame {
         });
         layout::Entity {
             centre: centre.extend((1.0 / radius_m) as f32).to_array(),
-            to_object_x: rows.x_axis.as_vec3().extend(0.0).to_array(),
-            to_object_y: rows.y_axis.as_vec3().extend(0.0).to_array(),
-            to_object_z: rows.z_axis.as_vec3().extend(0.0).to_array(),
+            alpha_beta: [cos_a, sin_a, cos_b, sin_b],
+            gamma: [cos_c, sin_c],
             emission: emission.extend(0.0).to_array(),
             albedo: (entity.albedo.as_dvec3() / PI).as_vec3().extend(placement.scale).to_array(),
             radial,
             blocked_base: geometry.blocked.as_ref().map_or(0, store::Slot::quad),
             radiance_base: geometry.radiance.as_ref().map_or(0, store::Slot::quad),
-            ..Default::default()
         }
     }
 

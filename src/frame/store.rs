@@ -13,7 +13,6 @@ use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::render::draw::Drawable;
 use crate::render::gather::Bounds;
 use crate::scene::Scene;
-use ash::vk;
 use glam::{DVec3, Vec3};
 use std::ops::Range;
 
@@ -188,14 +187,6 @@ impl Store {
             storage: options.storage,
             bands: options.bands,
         })
-    }
-
-    /// Format of a texel view of the fields.
-    pub fn field_format(&self) -> vk::Format {
-        match self.storage {
-            Storage::F32 => vk::Format::R32G32B32A32_SFLOAT,
-            Storage::F16 => vk::Format::R16G16B16A16_SFLOAT,
-        }
     }
 
     /// A copy of one field in host memory, for the CPU twin.

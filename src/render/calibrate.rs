@@ -1,14 +1,11 @@
 //! Which variant of the merge is fastest on a device: measured once on a small made-up scene and kept in the cache folder.
 
-use super::merge::{Inputs, Merge, Readable, rotation_stride};
-use super::variant::{Form, Skip, VARIANTS, Variant, uniform_entities};
+use super::merge::Merge;
+use super::variant::{VARIANTS, Variant};
+use super::workload::Workload;
 use crate::error::Result;
-use crate::field::quantity::{Storage, channel_stride};
-use crate::field::{Lattice, Lookup};
-use crate::gpu::{Buffer, BufferKind, Commands, Device};
-use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, NONE, Step};
+use crate::gpu::Device;
 use crate::shaders::Library;
-use ash::vk;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -65,88 +62,18 @@ pub fn fastest(device: &Arc<Device>, library: &Library) -> Result<Variant> {
 /// # Errors
 /// `Failed` when a shader does not compile, `Device` when the device is lost.
 pub fn measure(device: &Arc<Device>, library: &Library) -> Result<Calibration> {
-    let lattice = Lattice::default().starting_at(1.0);
-    let bands = 4;
-    let (slope, offset) = lattice.radial_map();
-    let entity = |x: f32| Entity {
-        centre: [x, 1.5, 0.3, 1.0],
-        to_object_x: [0.36, 0.48, -0.8, 0.0],
-        to_object_y: [-0.8, 0.6, 0.0, 0.0],
-        to_object_z: [0.48, 0.64, 0.6, 0.0],
-        albedo: [0.3, 0.3, 0.3, 1.0],
-        radial: [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32],
-        ..Default::default()
-    };
-    let mut entities: Vec<Entity> = (0..=OCCLUDERS).map(|i| entity(i as f32 - 4.0)).collect();
-    entities[0].centre = [0.0, 0.0, 0.0, 1.0];
-    let edge = VERTICES.isqrt();
-    let vertices: Vec<[f32; 4]> = (0..VERTICES)
-        .flat_map(|v| {
-            let place = |i: u32| 8.0 * i as f32 / edge as f32 - 4.0;
-            [[place(v % edge), 0.0, place(v / edge), 0.0], [0.0, 1.0, 0.0, 0.0]]
-        })
-        .collect();
-    let limit = uniform_entities(device, bands);
-    let padded = |name: &str, bytes: usize| {
-        let count = entities.len().max(limit as usize);
-        Buffer::new(device, name, BufferKind::Upload, (count * bytes) as u64)
-    };
-    let mut entity_buffer = padded("calibration entities", size_of::<Entity>())?;
-    entity_buffer.write(0, &entities);
-    let mut rotations = padded("calibration rotations", 4 * rotation_stride(bands))?;
-    rotations.write(0, &vec![0.1_f32; entities.len() * rotation_stride(bands)]);
-    let list: Vec<u32> = (1..=OCCLUDERS).map(|entity| Step::Occlude { entity, light: None }.pack()).collect();
-    let steps = Buffer::with_data(device, "calibration steps", &list)?;
-    let cluster = |i: u32| Cluster {
-        vertex_first: i * CLUSTER_VERTICES,
-        vertex_count: CLUSTER_VERTICES,
-        transfer_first: NONE,
-        radiosity_first: i * CLUSTER_VERTICES,
-        step_count: OCCLUDERS,
-        ..Default::default()
-    };
-    let list: Vec<Cluster> = (0..VERTICES / CLUSTER_VERTICES).map(cluster).collect();
-    let clusters = Buffer::with_data(device, "calibration clusters", &list)?;
-    let quads = lattice.stored_count() as usize * channel_stride(bands) / 4;
-    // Small enough that the running product neither grows without end nor becomes denormal.
-    let fields = Buffer::with_data(device, "calibration fields", &vec![[0x2000_2000_u32; 2]; quads])?;
-    let transfers = Buffer::with_data(device, "calibration transfers", &[0.0_f32; 4])?;
-    let vertices = Buffer::with_data(device, "calibration vertices", &vertices)?;
-    let sky = Buffer::with_data(device, "calibration sky", &vec![[1.0_f32; 4]; bands * bands])?;
-    let radiosity = Buffer::new(device, "calibration radiosity", BufferKind::Device, 16 * u64::from(VERTICES))?;
-    let floats = vk::Format::R32G32B32A32_SFLOAT;
+    let workload = Workload::new(device, VERTICES, OCCLUDERS)?;
     let mut contenders = Vec::new();
     for &variant in VARIANTS {
-        let form = Form {
-            variant,
-            bands,
-            storage: Storage::F16,
-            lattice,
-            lookup: Lookup::Trilinear,
-            skip: Skip::NONE,
-            entity_limit: limit,
-        };
-        let inputs = Inputs {
-            entities: Readable::shared(&entity_buffer, variant)?,
-            rotations: Readable::shared(&rotations, variant)?,
-            steps: &steps,
-            clusters: &clusters,
-            fields: Readable::new(&fields, variant, vk::Format::R16G16B16A16_SFLOAT)?,
-            transfers: Readable::new(&transfers, variant, floats)?,
-            vertices: Readable::new(&vertices, variant, floats)?,
-            sky: &sky,
-        };
-        contenders.push((variant, Merge::new(device, library, form)?, inputs, f64::INFINITY));
+        let merge = Merge::new(device, library, workload.form(variant))?;
+        contenders.push((variant, merge, workload.inputs(variant)?, f64::INFINITY));
     }
     for run in 0..=RUNS {
         for (_, merge, inputs, least) in &mut contenders {
-            let mut commands = Commands::new(device, "calibration")?;
-            commands
-                .pass("merge", |commands| merge.record(commands, inputs, &radiosity, VERTICES / CLUSTER_VERTICES))?;
-            let timings = commands.submit()?;
+            let milliseconds = workload.run(merge, inputs)?;
             // The first run compiles.
             if run > 0 {
-                *least = least.min(timings[0].milliseconds);
+                *least = least.min(milliseconds);
             }
         }
     }

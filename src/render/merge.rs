@@ -1,6 +1,6 @@
 //! Pass "merge": light on every vertex of every receiver.
 //!
-//! Inputs: entities and their rotations, clusters and their steps (see [`super::gather`]), the field store, transfer vectors,
+//! Inputs: entities, clusters and their steps (see [`super::gather`]), the field store, transfer vectors,
 //! vertices (position and normal, object frame, two quads each), the sky's coefficients. Output: `radiosity`, four floats a
 //! vertex: radiance that leaves the surface, albedo / pi times the integral of incoming light, without emission.
 
@@ -50,8 +50,6 @@ impl<'b> Readable<'b> {
 pub struct Inputs<'b> {
     /// [`crate::layout::Entity`] of every entity.
     pub entities: Readable<'b>,
-    /// Rotation blocks of every entity, [`rotation_stride`] floats apart.
-    pub rotations: Readable<'b>,
     /// Steps of all clusters.
     pub steps: &'b Buffer,
     /// [`crate::layout::Cluster`] of every cluster.
@@ -62,13 +60,8 @@ pub struct Inputs<'b> {
     pub transfers: Readable<'b>,
     /// Positions and normals.
     pub vertices: Readable<'b>,
-    /// Four floats a coefficient: red, green, blue of the sky; zero without one.
-    pub sky: &'b Buffer,
-}
-
-/// Floats of one entity's rotation in the buffer.
-pub fn rotation_stride(bands: usize) -> usize {
-    crate::sh::rotation::block_count(bands).next_multiple_of(4)
+    /// Coefficients of the sky, a channel after the other, [`crate::field::quantity::channel_stride`] floats apart; zero without one.
+    pub sky: Readable<'b>,
 }
 
 /// The pipeline.
@@ -98,14 +91,13 @@ impl Merge {
     ) -> Result<()> {
         let resources = [
             inputs.entities.bind(),
-            inputs.rotations.bind(),
             Bind::Buffer(inputs.steps),
+            Bind::Buffer(inputs.clusters),
             inputs.fields.bind(),
             inputs.transfers.bind(),
             inputs.vertices.bind(),
-            Bind::Buffer(inputs.sky),
+            inputs.sky.bind(),
             Bind::Buffer(radiosity),
-            Bind::Buffer(inputs.clusters),
         ];
         commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])
     }

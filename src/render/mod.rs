@@ -6,5 +6,6 @@ pub mod gather;
 pub mod merge;
 pub mod reference;
 pub mod variant;
+pub mod workload;
 
 pub use variant::Variant;

@@ -1,30 +1,32 @@
 //! Variants of the merge shader that compute the same function, by name, and what else its code depends on.
 
-use super::merge::rotation_stride;
 use crate::error::{Error, Result};
 use crate::field::lattice::{CELL_WARP, Directions, Lattice, Lookup, Spacing};
-use crate::field::quantity::Storage;
+use crate::field::quantity::{Storage, channel_stride};
 use crate::gpu::Device;
 use crate::layout::{CLUSTER_VERTICES, Entity};
 use crate::shaders::Row;
+use ash::vk;
 
 /// How the merge is done, where that changes its speed and not its outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
     /// Name on the command line.
     pub name: &'static str,
-    /// Fields, transfers and vertices are read through texel views rather than storage blocks.
+    /// Everything but steps and clusters is read through texel views rather than storage blocks.
     pub texel: bool,
-    /// Entities and rotations are uniform blocks; otherwise storage blocks or texels like the rest.
+    /// Entities are a uniform block; otherwise a storage block or texels like the rest.
     pub uniform: bool,
+    /// Fields of halves are read eight coefficients a texel, where a channel's coefficients are a multiple of eight.
+    pub packed: bool,
 }
 
-/// Every variant.
+/// Every variant. Uniform blocks with texel fields lost everywhere (see README) and are not among them.
 pub const VARIANTS: &[Variant] = &[
-    Variant { name: "storage", texel: false, uniform: false },
-    Variant { name: "storage-uniform", texel: false, uniform: true },
-    Variant { name: "texel", texel: true, uniform: false },
-    Variant { name: "texel-uniform", texel: true, uniform: true },
+    Variant { name: "storage", texel: false, uniform: false, packed: false },
+    Variant { name: "storage-uniform", texel: false, uniform: true, packed: false },
+    Variant { name: "texel", texel: true, uniform: false, packed: false },
+    Variant { name: "texel-packed", texel: true, uniform: false, packed: true },
 ];
 
 impl Variant {
@@ -42,21 +44,24 @@ impl Variant {
     /// What a device gets before anything was measured on it: texel reads are more than ten times faster than storage reads
     /// on a processor, and no slower than them on the GPUs that are known.
     pub fn sane_default(device: &Device) -> Self {
-        let name = if device.info.is_software() { "texel" } else { "storage-uniform" };
+        let name = if device.info.is_software() { "texel-packed" } else { "storage-uniform" };
         Self::named(name).expect("the default is in the table")
     }
 
     /// The variant that does without what a scene or device rules out.
     pub fn restricted(self, texel: bool, uniform: bool) -> Self {
-        let (texel, uniform) = (self.texel && texel, self.uniform && uniform);
-        VARIANTS.iter().copied().find(|v| v.texel == texel && v.uniform == uniform).expect("every pair has a row")
+        let name = match (self.texel && texel, self.uniform && uniform) {
+            (true, _) => self.name,
+            (false, true) => "storage-uniform",
+            (false, false) => "storage",
+        };
+        Self::named(name).expect("the names are in the table")
     }
 }
 
-/// Entities whose rotations and places fit a uniform block of the device, at most 192 (64 KB at 4 bands, what most devices bind).
-pub fn uniform_entities(device: &Device, bands: usize) -> u32 {
-    let bytes = (4 * rotation_stride(bands)).max(size_of::<Entity>()) as u32;
-    (device.limits.max_uniform_buffer_range / bytes).min(192)
+/// Entities that a uniform block of the device holds, at most 512 (48 KiB; most devices bind 64).
+pub fn uniform_entities(device: &Device) -> u32 {
+    (device.limits.max_uniform_buffer_range / size_of::<Entity>() as u32).min(512)
 }
 
 /// What the merge shader is compiled for: a variant, the shape of the fields, and what is left out.
@@ -116,6 +121,19 @@ impl std::str::FromStr for Skip {
 pub const SKIP_FADE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
 impl Form {
+    /// Format of the texels that fields are read through.
+    pub fn field_format(&self) -> vk::Format {
+        match self.storage {
+            Storage::F32 => vk::Format::R32G32B32A32_SFLOAT,
+            Storage::F16 if self.packed() => vk::Format::R32G32B32A32_UINT,
+            Storage::F16 => vk::Format::R16G16B16A16_SFLOAT,
+        }
+    }
+
+    fn packed(&self) -> bool {
+        self.variant.packed && self.storage == Storage::F16 && channel_stride(self.bands).is_multiple_of(8)
+    }
+
     /// The row of the shader table.
     pub fn row(&self) -> Row {
         let lattice = self.lattice;
@@ -127,6 +145,7 @@ impl Form {
         let row = Row::new("merge.comp", self.bands)
             .define("WORKGROUP", CLUSTER_VERTICES)
             .define("TEXEL", self.variant.texel)
+            .define("PACKED", self.packed())
             .define("UNIFORM", self.variant.uniform)
             .define("ENTITY_LIMIT", self.entity_limit)
             .define("HALF", self.storage == Storage::F16)

@@ -102,30 +102,83 @@ impl Rotation {
     }
 }
 
-/// The rotation as a program: inputs are the coefficients, then the blocks.
+/// A rotation as turns about two axes, `Rz(alpha) Ry(beta) Rz(gamma)`: cosine and sine of alpha, beta and gamma. Any unit
+/// quaternion has such angles; where beta is 0 or pi, alpha and gamma are one of many pairs.
+pub fn turns(rotation: DQuat) -> [f64; 6] {
+    let DQuat { x, y, z, w } = rotation;
+    let (half_sum, half_difference) = (z.atan2(w), (-x).atan2(y));
+    let (alpha, gamma) = (half_sum + half_difference, half_sum - half_difference);
+    let cos_beta = (w * w + z * z) - (x * x + y * y);
+    let sin_beta = 2.0 * x.hypot(y) * w.hypot(z);
+    [alpha.cos(), alpha.sin(), cos_beta, sin_beta, gamma.cos(), gamma.sin()]
+}
+
+/// The rotation as a program: inputs are the coefficients, then [`turns`].
+///
+/// A turn about z mixes only the pair m, -m. A turn about y is one about z between two quarter turns about x, which are
+/// constant and sparse. Against the blocks of [`Rotation`] this is 128 multiply-adds instead of 83, for 6 numbers instead of 83: reads
+/// decide.
 pub fn rotate_program(bands: usize) -> Program {
     let count = coefficient_count(bands);
-    let blocks = (0..block_count(bands)).map(|k| format!("SH_ROTATION({k})"));
-    let mut program = Program::new(elements("c", count).into_iter().chain(blocks).collect());
-    let mut element = count;
-    for l in 1..bands {
-        for row in l * l..(l + 1) * (l + 1) {
-            let terms = (l * l..(l + 1) * (l + 1)).map(|column| {
-                element += 1;
-                Term::new(1.0, &[Value::Input(element - 1), Value::Input(column)])
-            });
-            let value = program.define(terms.collect());
-            program.output(format!("c[{row}]"), value);
-        }
+    let angles = ["alpha_beta.x", "alpha_beta.y", "alpha_beta.z", "alpha_beta.w", "gamma.x", "gamma.y"];
+    let mut program = Program::new(elements("c", count).into_iter().chain(angles.map(String::from)).collect());
+    let mut values: Vec<Value> = (0..count).map(Value::Input).collect();
+    let angle = |i: usize| [Value::Input(count + 2 * i), Value::Input(count + 2 * i + 1)];
+    let quarter = |sign: f64| Rotation::new(bands, DQuat::from_rotation_x(sign * std::f64::consts::FRAC_PI_2));
+    turn_about_z(&mut program, bands, angle(2), &mut values);
+    turn_fixed(&mut program, &quarter(1.0), &mut values);
+    turn_about_z(&mut program, bands, angle(1), &mut values);
+    turn_fixed(&mut program, &quarter(-1.0), &mut values);
+    turn_about_z(&mut program, bands, angle(0), &mut values);
+    for (text, value) in elements("c", count).into_iter().zip(values).skip(1) {
+        program.output(text, value);
     }
     program
 }
 
-/// GLSL 460 text of `void sh_rotate(inout float c[N], uint instance)`, N = bands^2.
-///
-/// The shader that includes it defines the macro `SH_ROTATION(k)`, element k of [`Rotation::blocks`]; the macro may name
-/// the parameter `instance`. Each element is read once.
+/// Appends a turn about z by the angle of the given cosine and sine.
+fn turn_about_z(program: &mut Program, bands: usize, [cosine, sine]: [Value; 2], values: &mut [Value]) {
+    let (mut c, mut s) = (cosine, sine);
+    for m in 1..bands {
+        if m > 1 {
+            let next = program.define(vec![Term::new(1.0, &[c, cosine]), Term::new(-1.0, &[s, sine])]);
+            s = program.define(vec![Term::new(1.0, &[s, cosine]), Term::new(1.0, &[c, sine])]);
+            c = next;
+        }
+        for l in m..bands {
+            let (plus, minus) = (l * (l + 1) + m, l * (l + 1) - m);
+            let (a, b) = (values[plus], values[minus]);
+            values[plus] = program.define(vec![Term::new(1.0, &[c, a]), Term::new(-1.0, &[s, b])]);
+            values[minus] = program.define(vec![Term::new(1.0, &[s, a]), Term::new(1.0, &[c, b])]);
+        }
+    }
+}
+
+/// Appends a rotation that is known beforehand; elements that are 0 in exact arithmetic are left out.
+fn turn_fixed(program: &mut Program, rotation: &Rotation, values: &mut [Value]) {
+    let mut rest = rotation.blocks();
+    for l in 1..rotation.bands() {
+        let (block, after) = rest.split_at((2 * l + 1) * (2 * l + 1));
+        let band = l * l..(l + 1) * (l + 1);
+        let before = values[band.clone()].to_vec();
+        for (value, row) in values[band].iter_mut().zip(block.chunks_exact(2 * l + 1)) {
+            let kept = row.iter().zip(&before).filter(|(element, _)| element.abs() > 1e-9);
+            let exact = |element: f64| if (element.abs() - 1.0).abs() < 1e-9 { element.round() } else { element };
+            let terms: Vec<Term> = kept.map(|(&element, &from)| Term::new(exact(element), &[from])).collect();
+            // A lone element of 1 only changes the place.
+            *value = match &terms[..] {
+                [Term { coefficient: 1.0, factors }] => factors[0],
+                _ => program.define(terms),
+            };
+        }
+        rest = after;
+    }
+}
+
+/// GLSL 460 text of `void sh_rotate(inout float c[N], vec4 alpha_beta, vec2 gamma)`, N = bands^2: the rotation whose
+/// [`turns`] are the parameters' components.
 pub fn glsl_rotate(bands: usize) -> String {
     let count = coefficient_count(bands);
-    format!("void sh_rotate(inout float c[{count}], uint instance) {{\n{}}}\n", rotate_program(bands).glsl_body())
+    let body = rotate_program(bands).glsl_body();
+    format!("void sh_rotate(inout float c[{count}], vec4 alpha_beta, vec2 gamma) {{\n{body}}}\n")
 }

@@ -1,0 +1,155 @@
+//! A made-up merge of known size, for timing: a floor of vertices under turned occluders and a sky, every vertex meeting every
+//! occluder, fields of one shape filled with a constant.
+
+use super::merge::{Inputs, Merge, Readable};
+use super::variant::{Form, Skip, Variant, uniform_entities};
+use crate::error::Result;
+use crate::field::quantity::{Storage, channel_stride};
+use crate::field::{Lattice, Lookup};
+use crate::gpu::{Buffer, BufferKind, Commands, Device};
+use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, NONE, Step};
+use crate::sh::rotation::turns;
+use ash::vk;
+use glam::{DQuat, DVec3};
+use std::sync::Arc;
+
+/// Bands of transfer and fields.
+const BANDS: usize = 4;
+
+/// The buffers of a made-up merge.
+pub struct Workload {
+    vertex_count: u32,
+    occluder_count: u32,
+    lattice: Lattice,
+    entity_limit: u32,
+    entities: Buffer,
+    steps: Buffer,
+    clusters: Buffer,
+    fields: Buffer,
+    transfers: Buffer,
+    vertices: Buffer,
+    sky: Buffer,
+    radiosity: Buffer,
+}
+
+impl Workload {
+    /// `vertex_count` vertices (rounded up to whole clusters) on a square floor of 8 x 8 m under `occluder_count` occluders of
+    /// 1 m radius with fields of default shape, f16 and 4 bands.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn new(device: &Arc<Device>, vertex_count: u32, occluder_count: u32) -> Result<Self> {
+        let vertex_count = vertex_count.next_multiple_of(CLUSTER_VERTICES);
+        let lattice = Lattice::default().starting_at(1.0);
+        let (slope, offset) = lattice.radial_map();
+        let entity_limit = uniform_entities(device);
+        let count = (1 + occluder_count).max(entity_limit) as usize;
+        let mut entities = vec![Entity::default(); count];
+        for (i, entity) in entities.iter_mut().enumerate().take(1 + occluder_count as usize) {
+            // Golden-angle spiral over the floor, so that all faces and shells of the fields are read. Entity 0 is the floor.
+            let (angle, at) = (2.4 * i as f64, i as f64 / f64::from(occluder_count.max(1)));
+            let rotation = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 0.7 + angle);
+            let [a, b, c, d, e, f] = turns(if i == 0 { DQuat::IDENTITY } else { rotation }).map(|x| x as f32);
+            let radius = 3.5 * at.sqrt();
+            let height = if i == 0 { 0.0 } else { 1.5 };
+            *entity = Entity {
+                centre: [(radius * angle.cos()) as f32, height, (radius * angle.sin()) as f32, 1.0],
+                alpha_beta: [a, b, c, d],
+                gamma: [e, f],
+                albedo: [0.3, 0.3, 0.3, 1.0],
+                radial: [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32],
+                ..Default::default()
+            };
+        }
+        // Clusters are tiles of 8 x 8 vertices, as a mesh's are.
+        let tiles = f64::from(vertex_count / CLUSTER_VERTICES).sqrt().ceil() as u32;
+        let edge = CLUSTER_VERTICES.isqrt();
+        let place = |tile: u32, inside: u32| 8.0 * (tile * edge + inside) as f32 / (tiles * edge) as f32 - 4.0;
+        let vertices: Vec<[f32; 4]> = (0..vertex_count)
+            .flat_map(|v| {
+                let (tile, inside) = (v / CLUSTER_VERTICES, v % CLUSTER_VERTICES);
+                let (x, z) = (place(tile % tiles, inside % edge), place(tile / tiles, inside / edge));
+                [[x, 0.0, z, 0.0], [0.0, 1.0, 0.0, 0.0]]
+            })
+            .collect();
+        let list: Vec<u32> = (1..=occluder_count).map(|entity| Step::Occlude { entity, light: None }.pack()).collect();
+        let cluster = |i: u32| Cluster {
+            vertex_first: i * CLUSTER_VERTICES,
+            vertex_count: CLUSTER_VERTICES,
+            transfer_first: NONE,
+            radiosity_first: i * CLUSTER_VERTICES,
+            step_count: occluder_count,
+            ..Default::default()
+        };
+        let clusters: Vec<Cluster> = (0..vertex_count / CLUSTER_VERTICES).map(cluster).collect();
+        let quads = lattice.stored_count() as usize * channel_stride(BANDS) / 4;
+        // Small enough that the running product neither grows without end nor becomes denormal.
+        let fields = vec![[0x2000_2000_u32; 2]; quads];
+        Ok(Workload {
+            vertex_count,
+            occluder_count,
+            lattice,
+            entity_limit,
+            entities: Buffer::with_data(device, "workload entities", &entities)?,
+            steps: Buffer::with_data(device, "workload steps", &list)?,
+            clusters: Buffer::with_data(device, "workload clusters", &clusters)?,
+            fields: Buffer::with_data(device, "workload fields", &fields)?,
+            transfers: Buffer::with_data(device, "workload transfers", &[0.0_f32; 4])?,
+            vertices: Buffer::with_data(device, "workload vertices", &vertices)?,
+            sky: Buffer::with_data(device, "workload sky", &[1.0_f32; 3 * BANDS * BANDS])?,
+            radiosity: Buffer::new(device, "workload radiosity", BufferKind::Device, 16 * u64::from(vertex_count))?,
+        })
+    }
+
+    /// Pairs of vertex and occluder in one merge.
+    pub fn pairs(&self) -> u64 {
+        u64::from(self.vertex_count) * u64::from(self.occluder_count)
+    }
+
+    /// Bytes of the one field that all occluders share.
+    pub fn field_bytes(&self) -> u64 {
+        self.fields.size_bytes
+    }
+
+    /// The form of the shader for a variant.
+    pub fn form(&self, variant: Variant) -> Form {
+        Form {
+            variant,
+            bands: BANDS,
+            storage: Storage::F16,
+            lattice: self.lattice,
+            lookup: Lookup::Trilinear,
+            skip: Skip::NONE,
+            entity_limit: self.entity_limit,
+        }
+    }
+
+    /// What a variant reads.
+    ///
+    /// # Errors
+    /// As [`Readable::new`].
+    pub fn inputs(&self, variant: Variant) -> Result<Inputs<'_>> {
+        let floats = vk::Format::R32G32B32A32_SFLOAT;
+        Ok(Inputs {
+            entities: Readable::shared(&self.entities, variant)?,
+            steps: &self.steps,
+            clusters: &self.clusters,
+            fields: Readable::new(&self.fields, variant, self.form(variant).field_format())?,
+            transfers: Readable::new(&self.transfers, variant, floats)?,
+            vertices: Readable::new(&self.vertices, variant, floats)?,
+            sky: Readable::new(&self.sky, variant, floats)?,
+        })
+    }
+
+    /// Runs the merge once and returns its milliseconds.
+    ///
+    /// # Errors
+    /// `Device` when the device was lost.
+    pub fn run(&self, merge: &Merge, inputs: &Inputs<'_>) -> Result<f64> {
+        let device = self.radiosity.device();
+        let mut commands = Commands::new(device, "workload")?;
+        let clusters = self.vertex_count / CLUSTER_VERTICES;
+        commands.pass("merge", |commands| merge.record(commands, inputs, &self.radiosity, clusters))?;
+        Ok(commands.submit()?[0].milliseconds)
+    }
+}

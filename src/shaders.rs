@@ -96,6 +96,22 @@ impl Library {
         Shader::compile(&source, self.cache_dir.as_deref())
     }
 
+    /// An entry point's file and every file that it includes, directly or not; generated ones are not files.
+    pub fn files(&self, entry: &str) -> Vec<String> {
+        let mut files = vec![entry.to_owned()];
+        let mut at = 0;
+        while at < files.len() {
+            let text = self.text(&files[at]).unwrap_or_default();
+            for name in crate::gpu::shader::included(&text) {
+                if !name.starts_with("generated/") && !files.iter().any(|known| known == name) {
+                    files.push(name.to_owned());
+                }
+            }
+            at += 1;
+        }
+        files
+    }
+
     fn text(&self, name: &str) -> Result<String> {
         if let Some(path) = self.shader_dir.as_ref().map(|folder| folder.join(name))
             && path.exists()

@@ -26,6 +26,18 @@ struct TransferHeader {
     vertex_count: usize,
 }
 
+impl TransferHeader {
+    fn new(mesh: &Mesh, bands: usize, face_px: u32) -> Self {
+        TransferHeader {
+            mesh_hash: mesh.content_hash().iter().map(|byte| format!("{byte:02x}")).collect(),
+            bands,
+            face_px,
+            offset: TRANSFER_OFFSET,
+            vertex_count: mesh.positions.len(),
+        }
+    }
+}
+
 fn key(header: &impl Serialize) -> String {
     let text = serde_json::to_vec(header).expect("headers are plain data");
     blake3::Hasher::new().update(&VERSION.to_le_bytes()).update(&text).finalize().to_hex()[..32].to_owned()
@@ -44,6 +56,16 @@ impl Cache {
 
     fn path(&self, key: &str, ending: &str) -> Option<PathBuf> {
         Some(self.folder.as_ref()?.join(format!("{key}.{ending}")))
+    }
+
+    /// Whether the field that `header` describes is on disk.
+    pub fn has_field(&self, header: &Header) -> bool {
+        self.path(&key(&identity(header)), "sf").is_some_and(|path| path.exists())
+    }
+
+    /// Whether the transfer vectors of a mesh are on disk.
+    pub fn has_transfer(&self, mesh: &Mesh, bands: usize, face_px: u32) -> bool {
+        self.path(&key(&TransferHeader::new(mesh, bands, face_px)), "transfer").is_some_and(|path| path.exists())
     }
 
     /// Puts the field that `header` describes into `store` at `offset_bytes`: from disk, else baked and kept. Returns the
@@ -95,13 +117,7 @@ impl Cache {
         face_px: u32,
         progress: Progress<'_>,
     ) -> Result<(Vec<f32>, Option<Report>)> {
-        let header = TransferHeader {
-            mesh_hash: mesh.content_hash().iter().map(|byte| format!("{byte:02x}")).collect(),
-            bands,
-            face_px,
-            offset: TRANSFER_OFFSET,
-            vertex_count: mesh.positions.len(),
-        };
+        let header = TransferHeader::new(mesh, bands, face_px);
         let path = self.path(&key(&header), "transfer");
         if let Some(path) = path.as_ref().filter(|path| path.exists()) {
             match file::read::<TransferHeader>(path, TRANSFER_MAGIC) {

@@ -6,6 +6,7 @@
 
 pub mod camera;
 mod draw_twin;
+mod live;
 mod pose;
 pub mod store;
 mod twin;
@@ -25,11 +26,14 @@ use crate::render::merge::{Inputs, Merge, Readable};
 use crate::render::variant::{Form, Skip, Variant, uniform_entities};
 use crate::scene::{Placement, Scene};
 use crate::sh::basis::{Y00, coefficient_count};
+use crate::shaders::Library;
 use ash::vk;
 use glam::{DMat4, DVec3, Vec3};
 use half::f16;
 use std::sync::Arc;
 use store::{Progress, Store};
+
+pub use live::{Lit, Part, is_cached};
 
 /// What decides a frame besides the scene.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +64,7 @@ pub struct Frame {
     form: Form,
     merge: Merge,
     draw: Draw,
+    library: Library,
     entities: Upload,
     clusters: Upload,
     steps: Upload,
@@ -72,6 +77,8 @@ pub struct Frame {
     /// What the last gather left off.
     pub counts: Counts,
     background: Vec3,
+    /// Radiosity from elsewhere that is shown beside the merged one or in its place.
+    panels: [Option<Buffer>; 2],
 }
 
 impl Frame {
@@ -103,15 +110,7 @@ impl Frame {
         let bands = options.bake.bands;
         let mut radiosity = Buffer::new(device, "radiosity", BufferKind::Device, radiosity_size.max(16))?;
         radiosity.fill(0, &vec![0.0_f32; radiosity.size_bytes as usize / 4])?;
-        let stride = channel_stride(bands);
-        let mut sky = upload("sky", 12 * stride as u64)?;
-        let channels = scene.environment.coefficients(bands);
-        let mut floats = vec![0.0_f32; 3 * stride];
-        for (to, from) in floats.chunks_exact_mut(stride).zip(&channels) {
-            to.iter_mut().zip(&from[..coefficient_count(bands)]).for_each(|(to, from)| *to = *from as f32);
-        }
-        sky.write(&floats)?;
-        Ok(Frame {
+        let mut frame = Frame {
             device: device.clone(),
             scene: scene.clone(),
             options,
@@ -119,10 +118,12 @@ impl Frame {
             form,
             merge,
             draw,
+            library: library.clone(),
+            panels: Default::default(),
             entities: upload("entities", count * size_of::<layout::Entity>() as u64)?,
             clusters: upload("clusters", (cluster_table.len() * size_of::<layout::Cluster>()) as u64)?,
             steps: upload("steps", 4 * cluster_table.len() as u64)?,
-            sky,
+            sky: upload("sky", 12 * channel_stride(bands) as u64)?,
             radiosity,
             radiosity_offsets,
             readback: Buffer::new(
@@ -133,9 +134,24 @@ impl Frame {
             )?,
             cluster_table,
             counts: Counts::default(),
-            background: Vec3::from_array(channels.map(|c| (c[0] * Y00) as f32)),
+            background: Vec3::ZERO,
             store,
-        })
+        };
+        frame.write_sky()?;
+        Ok(frame)
+    }
+
+    /// Writes the sky's coefficients and takes the background from them.
+    fn write_sky(&mut self) -> Result<()> {
+        let bands = self.options.bake.bands;
+        let channels = self.scene.environment.coefficients(bands);
+        let stride = channel_stride(bands);
+        let mut floats = vec![0.0_f32; 3 * stride];
+        for (to, from) in floats.chunks_exact_mut(stride).zip(&channels) {
+            to.iter_mut().zip(&from[..coefficient_count(bands)]).for_each(|(to, from)| *to = *from as f32);
+        }
+        self.background = Vec3::from_array(channels.map(|c| (c[0] * Y00) as f32));
+        self.sky.write(&floats)
     }
 
     /// Lights every receiver, and draws the picture where `white` is given: radiance above it is brought down to it, hue kept,
@@ -147,7 +163,7 @@ impl Frame {
     pub fn render(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
         self.upload(placements)?;
         let inputs = self.inputs()?;
-        let items = self.items(placements);
+        let items = self.items(placements, self.aspect());
         let mut commands = Commands::new(&self.device, "frame")?;
         let cluster_count = self.cluster_table.len() as u32;
         commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))?;
@@ -163,7 +179,7 @@ impl Frame {
     /// # Errors
     /// As [`Frame::render`].
     pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
-        let items = self.items(placements);
+        let items = self.items(placements, self.aspect());
         let mut commands = Commands::new(&self.device, "redraw")?;
         self.record_draw(&mut commands, &items, self.background, white)?;
         commands.submit()
@@ -174,7 +190,7 @@ impl Frame {
     /// # Errors
     /// As [`Frame::render`].
     pub fn redraw_unlit(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
-        let mut items = self.items(placements);
+        let mut items = self.items(placements, self.aspect());
         items.iter_mut().for_each(|item| item.emission = Vec3::ZERO);
         let mut commands = Commands::new(&self.device, "redraw unlit")?;
         self.record_draw(&mut commands, &items, background.into(), f32::INFINITY)?;
@@ -270,9 +286,12 @@ impl Frame {
         })
     }
 
-    fn items(&self, placements: &[Placement]) -> Vec<Item<'_>> {
-        let [width, height] = self.options.size;
-        let clip_from_world = camera::clip_from_world(&self.scene.data.camera, f64::from(width) / f64::from(height));
+    fn aspect(&self) -> f64 {
+        f64::from(self.options.size[0]) / f64::from(self.options.size[1])
+    }
+
+    fn items(&self, placements: &[Placement], aspect: f64) -> Vec<Item<'_>> {
+        let clip_from_world = camera::clip_from_world(&self.scene.data.camera, aspect);
         let items = placements.iter().enumerate().map(|(index, placement)| {
             let entity = &self.scene.entities[index];
             let world_from_object = DMat4::from_scale_rotation_translation(

@@ -189,6 +189,24 @@ impl Store {
         })
     }
 
+    /// Whether every field that `scene` needs is here; it has the meshes that the store was made for.
+    pub fn covers(&self, scene: &Scene) -> bool {
+        self.geometries.iter().enumerate().all(|(mesh, geometry)| {
+            let [blocked, radiance] = needs(scene, mesh).map(|kind| kind.is_some());
+            (geometry.blocked.is_some() || !blocked) && (geometry.radiance.is_some() || !radiance)
+        })
+    }
+
+    /// Whether everything that `scene` needs is in the cache.
+    pub fn is_cached(cache: &Cache, scene: &Scene, options: &bake::Options) -> bool {
+        scene.meshes.iter().enumerate().all(|(index, mesh)| {
+            let fields = needs(scene, index).into_iter().flatten();
+            let receives = scene.entities.iter().any(|e| e.mesh == index && e.receives);
+            fields.map(|kind| bake::header(mesh, kind, options)).all(|header| cache.has_field(&header))
+                && (!receives || !bakes_transfer(mesh) || cache.has_transfer(mesh, options.bands, options.face_px))
+        })
+    }
+
     /// A copy of one field in host memory, for the CPU twin.
     ///
     /// # Errors

@@ -85,6 +85,11 @@ impl Shader {
     }
 }
 
+/// Names in the `#include` lines of a text.
+pub fn included(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter_map(|line| Some(line.trim_start().strip_prefix("#include")?.trim().trim_matches('"')))
+}
+
 /// Every file that the source includes, directly or not, by name.
 fn gather(source: &Source<'_>) -> Result<BTreeMap<String, String>> {
     fn visit(
@@ -96,9 +101,7 @@ fn gather(source: &Source<'_>) -> Result<BTreeMap<String, String>> {
         if chain.len() > INCLUDE_DEPTH {
             return Err(Error::Failed(format!("includes nest deeper than {INCLUDE_DEPTH}: {}", chain.join(" > "))));
         }
-        for line in text.lines() {
-            let Some(rest) = line.trim_start().strip_prefix("#include") else { continue };
-            let name = rest.trim().trim_matches('"').to_owned();
+        for name in included(text).map(str::to_owned) {
             if found.contains_key(&name) {
                 continue;
             }

@@ -63,6 +63,16 @@ pub struct Item<'d> {
     pub radiosity_offset: u64,
 }
 
+/// Items in a part of the picture, lit one way.
+pub struct Pane<'i, 'd> {
+    /// What is drawn.
+    pub items: &'i [Item<'d>],
+    /// Radiosity of their vertices.
+    pub radiosity: &'d Buffer,
+    /// Left, top, width and height in pixels.
+    pub area: [u32; 4],
+}
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
@@ -124,19 +134,35 @@ impl Draw {
         background: Vec3,
         white: f32,
     ) -> Result<()> {
+        let ImageShape { width, height, .. } = self.picture.shape;
+        self.record_panes(commands, &[Pane { items, radiosity, area: [0, 0, width, height] }], background, white)
+    }
+
+    /// As [`Draw::record`], one pane after the other.
+    ///
+    /// # Errors
+    /// What recording returns.
+    pub fn record_panes<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        panes: &[Pane<'_, 'r>],
+        background: Vec3,
+        white: f32,
+    ) -> Result<()> {
         let target = Target {
             color: self.samples.as_ref().unwrap_or(&self.picture),
             clear: background.extend(1.0).to_array(),
             depth: Some(&self.depth),
             resolve: self.samples.as_ref().map(|_| &self.picture),
         };
-        let shape = self.picture.shape;
+        let every = panes.iter().flat_map(|pane| pane.items.iter().map(move |item| (pane, item)));
         commands.render(&target, |drawing| {
-            for item in items {
+            for (pane, item) in every {
                 let mesh = item.drawable;
-                let vertices = [(&mesh.positions, 0), (&mesh.emission, 0), (radiosity, item.radiosity_offset)];
+                let vertices = [(&mesh.positions, 0), (&mesh.emission, 0), (pane.radiosity, item.radiosity_offset)];
                 drawing.bind(&self.pipeline, &vertices, &mesh.indices);
-                drawing.area(0, 0, shape.width, shape.height);
+                let [left, top, width, height] = pane.area;
+                drawing.area(left, top, width, height);
                 drawing.push(&Push {
                     clip_from_object: item.clip_from_object.to_cols_array(),
                     emission_white: item.emission.extend(white).to_array(),

@@ -1,0 +1,193 @@
+//! A frame that lives on: recorded into somebody else's commands and changed between pictures, for the window.
+
+use super::store::Store;
+use super::{Frame, usable};
+use crate::bake::cache::Cache;
+use crate::error::Result;
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Image};
+use crate::render::calibrate;
+use crate::render::draw::{Draw, Item, Pane};
+use crate::render::merge::Merge;
+use crate::render::variant::{Form, Variant};
+use crate::scene::{Placement, Scene};
+use ash::vk;
+use glam::Vec3;
+
+/// Where the radiosity of a part of the picture comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lit {
+    /// The merge, with what entities emit.
+    Merged,
+    /// What [`Frame::set_panel`] put at that place, with what entities emit.
+    Panel(usize),
+    /// The same as it stands: colours that mean something else.
+    Colors(usize),
+}
+
+/// A part of the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Left, top, width and height in pixels.
+    pub area: [u32; 4],
+    /// What lights it.
+    pub lit: Lit,
+}
+
+impl Frame {
+    /// Writes what the next recording's merge reads, in buffers of that flight's own.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn prepare(&mut self, placements: &[Placement]) -> Result<()> {
+        self.upload(placements)
+    }
+
+    /// Records the merge, after [`Frame::prepare`].
+    ///
+    /// # Errors
+    /// As [`Frame::render`].
+    pub fn record_light<'f>(&'f self, commands: &mut Commands<'f>) -> Result<()> {
+        let inputs = self.inputs()?;
+        let cluster_count = self.cluster_table.len() as u32;
+        commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))?;
+        commands.barrier(Access::ComputeWrite, Access::VertexRead);
+        Ok(())
+    }
+
+    /// Records the picture, part by part, to be read by a fragment shader. `white` as in [`Frame::render`].
+    ///
+    /// # Errors
+    /// As [`Frame::render`].
+    pub fn record_picture<'f>(
+        &'f self,
+        commands: &mut Commands<'f>,
+        placements: &[Placement],
+        parts: &[Part],
+        white: f32,
+    ) -> Result<()> {
+        let lists: Vec<Vec<Item<'f>>> = parts
+            .iter()
+            .map(|part| {
+                let mut items = self.items(placements, f64::from(part.area[2]) / f64::from(part.area[3].max(1)));
+                if matches!(part.lit, Lit::Colors(_)) {
+                    items.iter_mut().for_each(|item| item.emission = Vec3::ZERO);
+                }
+                items
+            })
+            .collect();
+        let radiosity = |lit| match lit {
+            Lit::Merged => &self.radiosity,
+            Lit::Panel(i) | Lit::Colors(i) => self.panels[i].as_ref().unwrap_or(&self.radiosity),
+        };
+        let panes: Vec<Pane<'_, 'f>> = parts
+            .iter()
+            .zip(&lists)
+            .map(|(part, items)| Pane { items, radiosity: radiosity(part.lit), area: part.area })
+            .collect();
+        for image in self.draw.attachments() {
+            let depth = image.shape.format == vk::Format::D32_SFLOAT;
+            commands.image_barrier(image, None, if depth { Access::DepthWrite } else { Access::ColorWrite });
+        }
+        commands.pass("draw", |c| self.draw.record_panes(c, &panes, self.background, white))?;
+        commands.image_barrier(&self.draw.picture, Some(Access::ColorWrite), Access::FragmentSampled);
+        Ok(())
+    }
+
+    /// The picture that was recorded last: linear RGBA, white as it was recorded with.
+    pub fn shown(&self) -> &Image {
+        &self.draw.picture
+    }
+
+    /// Radiosity of every entity's vertices from elsewhere, by entity in the mesh's order, for the panel at that place: 0 or 1.
+    /// Entities that are not named are `rest`.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn set_panel(&mut self, panel: usize, radiosity: &[(usize, Vec<[f32; 3]>)], rest: [f32; 3]) -> Result<()> {
+        let size = self.radiosity.size_bytes;
+        let [r, g, b] = rest;
+        let mut quads = vec![[r, g, b, 0.0]; size as usize / 16];
+        for (entity, values) in radiosity {
+            let order = &self.store.geometries[self.scene.entities[*entity].mesh].order;
+            let first = self.radiosity_offsets[*entity] as usize / 16;
+            for (quad, &v) in quads[first..].iter_mut().zip(order) {
+                let [r, g, b] = values[v as usize];
+                *quad = [r, g, b, 0.0];
+            }
+        }
+        let buffer = match &mut self.panels[panel] {
+            Some(buffer) => buffer,
+            none => none.insert(Buffer::new(&self.device, "panel", BufferKind::Device, size)?),
+        };
+        buffer.fill(0, &quads)
+    }
+
+    /// Makes pictures of another size from now on.
+    ///
+    /// # Errors
+    /// `Input` when it is larger than the device's images.
+    pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
+        if size != self.options.size {
+            self.draw = Draw::new(&self.device, &self.library, size, self.options.multisample)?;
+            let bytes = 8 * u64::from(size[0]) * u64::from(size[1]);
+            self.readback = Buffer::new(&self.device, "readback", BufferKind::Readback, bytes)?;
+            self.options.size = size;
+        }
+        Ok(())
+    }
+
+    /// Whether the fields that `scene` needs are here; it has the meshes and entities that this frame was made for.
+    pub fn covers(&self, scene: &Scene) -> bool {
+        self.store.covers(scene)
+    }
+
+    /// Takes over lights, switches, sky and camera of a scene that has the meshes and receivers that this frame was made for.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    ///
+    /// # Panics
+    /// When entities or receivers are others.
+    pub fn set_scene(&mut self, scene: &Scene) -> Result<()> {
+        let receivers = |scene: &Scene| scene.entities.iter().map(|e| (e.mesh, e.receives)).collect::<Vec<_>>();
+        assert_eq!(receivers(scene), receivers(&self.scene), "another scene needs another frame");
+        let sky = scene.data.environment != self.scene.data.environment;
+        self.scene = scene.clone();
+        if sky { self.write_sky() } else { Ok(()) }
+    }
+
+    /// Merges by another variant from now on; `None` is the device's fastest.
+    ///
+    /// # Errors
+    /// `Failed` when its shader does not compile.
+    pub fn set_variant(&mut self, variant: Option<Variant>) -> Result<()> {
+        let wanted = variant.map_or_else(|| calibrate::fastest(&self.device, &self.library), Ok)?;
+        let form = usable(&self.device, &self.store, self.scene.entities.len(), Form { variant: wanted, ..self.form });
+        if form != self.form {
+            self.merge = Merge::new(&self.device, &self.library, form)?;
+            (self.form, self.variant) = (form, form.variant);
+        }
+        Ok(())
+    }
+
+    /// Builds anew what is made from any of the shader files named. What does not compile stays as it was.
+    ///
+    /// # Errors
+    /// `Failed` with the compiler's lines.
+    pub fn reload(&mut self, changed: &[String]) -> Result<()> {
+        let uses = |files: &[String]| files.iter().any(|file| changed.contains(file));
+        if uses(&self.library.files("draw.vert")) || uses(&self.library.files("draw.frag")) {
+            let options = self.options;
+            self.draw = Draw::new(&self.device, &self.library, options.size, options.multisample)?;
+        }
+        if uses(&self.library.files("merge.comp")) {
+            self.merge = Merge::new(&self.device, &self.library, self.form)?;
+        }
+        Ok(())
+    }
+}
+
+/// Whether a scene's fields and transfers are all in the cache, so that its frame is there at once.
+pub fn is_cached(cache: &Cache, scene: &Scene, options: &crate::bake::Options) -> bool {
+    Store::is_cached(cache, scene, options)
+}

@@ -23,7 +23,9 @@ vec4 field_quad(uint i) {
 }
 #endif
 
-const uint FIELD_QUADS = STRIDE / 4;
+const uint FIELD_QUADS = FIELD_STRIDE / 4; // of an occlusion sample
+const uint CHANNEL_QUADS = STRIDE / 4;     // of a channel of radiance, and of a transfer vector
+const uint FETCHED_QUADS = FIELD_QUADS > CHANNEL_QUADS ? FIELD_QUADS : CHANNEL_QUADS;
 
 #if LOOKUP == 2
 const uint CORNERS = 8;
@@ -158,26 +160,26 @@ FieldPlace field_place(vec3 p, vec4 radial) {
 }
 
 // One channel of the field whose first quad is `base`; samples are `sample_quads` quads apart.
-void field_gather(FieldPlace place, uint base, uint sample_quads, out float b[COEFFICIENTS]) {
-    vec4 sums[FIELD_QUADS];
-    [[unroll]] for (uint q = 0; q < FIELD_QUADS; q++) {
+void field_gather(FieldPlace place, uint base, uint sample_quads, out float b[FETCHED]) {
+    vec4 sums[FETCHED_QUADS];
+    [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q++) {
         sums[q] = vec4(0.0);
     }
     [[unroll]] for (uint k = 0; k < CORNERS; k++) {
         uint at = base + place.corner[k] * sample_quads;
 #if PACKED
-        [[unroll]] for (uint q = 0; q < FIELD_QUADS; q += 2) {
+        [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q += 2) {
             uvec4 halves = texelFetch(field_quads, int((at + q) / 2));
             sums[q] += place.weight[k] * vec4(unpackHalf2x16(halves.x), unpackHalf2x16(halves.y));
             sums[q + 1] += place.weight[k] * vec4(unpackHalf2x16(halves.z), unpackHalf2x16(halves.w));
         }
 #else
-        [[unroll]] for (uint q = 0; q < FIELD_QUADS; q++) {
+        [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q++) {
             sums[q] += place.weight[k] * field_quad(at + q);
         }
 #endif
     }
-    [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
+    [[unroll]] for (uint i = 0; i < FETCHED; i++) {
         b[i] = sums[i / 4][i % 4];
     }
 }

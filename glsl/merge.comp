@@ -7,7 +7,7 @@
 #include "merge_layout.glsl"
 #include "generated/basis.glsl"
 #include "generated/cosine.glsl"
-#include "generated/product.glsl"
+#include "merge_product.glsl"
 
 layout(local_size_x = WORKGROUP) in;
 
@@ -49,7 +49,7 @@ vec4 vertex_quad(uint i) {
     return texelFetch(vertices, int(i));
 }
 #else
-layout(std140, binding = 6) uniform Sky { vec4 sky[3 * FIELD_QUADS]; };
+layout(std140, binding = 6) uniform Sky { vec4 sky[3 * CHANNEL_QUADS]; };
 vec4 sky_quad(uint i) {
     return sky[i];
 }
@@ -90,13 +90,15 @@ void main() {
     position = receiver.albedo.w * to_world(receiver, position);
     normal = to_world(receiver, normal);
 
-    float t_start[COEFFICIENTS];
+    float through[COEFFICIENTS];
     if (cluster.transfer_first == NONE) {
-        sh_cosine(normal, t_start);
+        sh_cosine(normal, through);
     } else {
-        transfer(cluster.transfer_first + v * FIELD_QUADS, receiver, t_start);
+        transfer(cluster.transfer_first + v * CHANNEL_QUADS, receiver, through);
     }
-    float t[COEFFICIENTS] = t_start;
+    float t_start[CHAIN];
+    chain_begin(through, t_start);
+    float t[CHAIN] = t_start;
     vec3 sum = vec3(0.0);
     // Nothing may be read without a step: the scene may have no field at all.
     if (cluster.step_count > 0) {
@@ -122,31 +124,48 @@ void main() {
                 weight *= before(e, cone, l, light);
             }
             vec3 p = to_object(entity, (position - entity.centre.xyz) * entity.centre.w);
-            uint base = of_radiance ? entity.radiance_base + channel * FIELD_QUADS : entity.blocked_base;
-            float b[COEFFICIENTS];
-            field_gather(field_place(p, entity.radial), base, of_radiance ? 3 * FIELD_QUADS : FIELD_QUADS, b);
+            uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_QUADS : entity.blocked_base;
+            float b[FETCHED];
+            field_gather(field_place(p, entity.radial), base, of_radiance ? 3 * CHANNEL_QUADS : FIELD_QUADS, b);
+            // Occlusion and radiance of different bands are read alike; what one of them does not have belongs to the next sample.
+            [[unroll]] for (uint k = FIELD_COEFFICIENTS; k < FETCHED; k++) {
+                b[k] = of_radiance ? b[k] : 0.0;
+            }
             sh_rotate(b, entity.alpha_beta, entity.gamma);
 
-            float met = 0.0;
-            float share = shines ? 0.0 : weight;
+            float s[COEFFICIENTS];
             [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
-                met += b[k] * t[k];
-                b[k] *= share;
+                s[k] = b[k];
+            }
+            float met = chain_meet(t, s);
+            [[unroll]] for (uint k = 0; k < FETCHED; k++) {
+                b[k] = shines ? 0.0 : weight * b[k];
             }
             vec3 color = of_radiance ? vec3(channel == 0, channel == 1, channel == 2) : vec3(1.0);
             sum += (shines ? weight * met : 0.0) * color * entity.emission.rgb;
-            sh_subtract_product(t, b);
+            chain_multiply(t, b);
             bool anew = (packed & STEP_LAST) != 0;
-            [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
+            [[unroll]] for (uint k = 0; k < CHAIN; k++) {
                 t[k] = anew ? t_start[k] : t[k];
             }
             i++;
         } while (i < cluster.step_count);
     }
 
+#if POINT_CHAIN
+    float rest[TERMS];
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        rest[k] = t[k];
+    }
+    sh_from_points(rest, through);
+#else
+    [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
+        through[k] = t[k];
+    }
+#endif
     [[unroll]] for (uint channel = 0; channel < 3; channel++) {
         [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
-            sum[channel] += sky_quad(channel * FIELD_QUADS + k / 4)[k % 4] * t[k];
+            sum[channel] += sky_quad(channel * CHANNEL_QUADS + k / 4)[k % 4] * through[k];
         }
     }
     radiosity[cluster.radiosity_first + v] = vec4(sum * receiver.albedo.rgb, 0.0);

@@ -6,6 +6,8 @@ use crate::field::quantity::channel_stride;
 use crate::gpu::shader::Source;
 use crate::gpu::{Shader, Stage};
 use crate::sh;
+use crate::sh::product_program::{STYLES, glsl_subtract};
+use crate::sh::rotation::glsl_rotate;
 use std::path::PathBuf;
 
 macro_rules! embedded {
@@ -25,6 +27,7 @@ embedded!(
     "merge.comp",
     "merge_cone.glsl",
     "merge_layout.glsl",
+    "merge_product.glsl",
     "project.comp",
 );
 
@@ -35,6 +38,8 @@ pub struct Row {
     pub file: &'static str,
     /// SH bands that generated includes are made for; defines BANDS, COEFFICIENTS and STRIDE.
     pub bands: usize,
+    /// SH bands of occlusion fields; defines FIELD_BANDS, FIELD_COEFFICIENTS and FIELD_STRIDE.
+    pub field_bands: usize,
     /// Further macros.
     pub defines: Vec<(&'static str, String)>,
 }
@@ -42,7 +47,13 @@ pub struct Row {
 impl Row {
     /// A row without further macros.
     pub fn new(file: &'static str, bands: usize) -> Self {
-        Row { file, bands, defines: Vec::new() }
+        Row { file, bands, field_bands: bands, defines: Vec::new() }
+    }
+
+    /// Occlusion fields of other bands than everything else.
+    pub fn field_bands(mut self, field_bands: usize) -> Self {
+        self.field_bands = field_bands;
+        self
     }
 
     /// Adds a macro.
@@ -83,13 +94,16 @@ impl Library {
             ("BANDS", row.bands),
             ("COEFFICIENTS", sh::basis::coefficient_count(row.bands)),
             ("STRIDE", channel_stride(row.bands)),
+            ("FIELD_BANDS", row.field_bands),
+            ("FIELD_COEFFICIENTS", sh::basis::coefficient_count(row.field_bands)),
+            ("FIELD_STRIDE", channel_stride(row.field_bands)),
         ]
         .into_iter()
         .map(|(name, value)| (name.to_owned(), value.to_string()))
         .chain(row.defines.iter().map(|(name, value)| ((*name).to_owned(), value.clone())))
         .collect();
         let include = |name: &str| match name.strip_prefix("generated/") {
-            Some(generated) => generate(generated, row.bands),
+            Some(generated) => generate(generated, row),
             None => self.text(name).ok(),
         };
         let source = Source { name: row.file, stage, text: self.text(row.file)?, defines: &defines, include: &include };
@@ -127,13 +141,24 @@ impl Library {
     }
 }
 
-/// Text of a generated include.
-fn generate(name: &str, bands: usize) -> Option<String> {
+/// Text of a generated include. Includes are looked for before the preprocessor takes any out, so what a row has no use for may
+/// be asked for too.
+fn generate(name: &str, row: &Row) -> Option<String> {
+    let (bands, field_bands) = (row.bands, row.field_bands);
     match name {
         "basis.glsl" => Some(sh::basis::glsl_basis(bands)),
         "cosine.glsl" => Some(sh::lobe::glsl_clamped_cosine(bands)),
-        "product.glsl" => Some(sh::product_program::glsl_product(bands)),
-        "rotate.glsl" => Some(sh::rotation::glsl_rotate(bands)),
+        "points.glsl" if bands > sh::points::BANDS => Some(String::new()),
+        "points.glsl" => Some(sh::points::glsl_points(bands)),
+        "product.glsl" => {
+            let place = row.defines.iter().find(|(name, _)| *name == "PRODUCT").and_then(|(_, n)| n.parse().ok());
+            Some(glsl_subtract(STYLES[place.unwrap_or(0)], bands, field_bands))
+        }
+        // One function for each length of array; GLSL tells them apart by it.
+        "rotate.glsl" => {
+            let more = if field_bands > bands { glsl_rotate(field_bands) } else { String::new() };
+            Some(glsl_rotate(bands) + &more)
+        }
         _ => None,
     }
 }

@@ -16,7 +16,8 @@ const HEADER_LENGTH_AT: usize = 12;
 const PAYLOAD_LENGTH_AT: usize = 16;
 
 fn header(kind: Kind, storage: Storage, lattice: &str) -> Header {
-    let options = bake::Options { storage, lattice: lattice.parse().unwrap(), bands: 2, face_px: 16 };
+    let options =
+        bake::Options { field_bands: None, storage, lattice: lattice.parse().unwrap(), bands: 2, face_px: 16 };
     bake::header(&generate::sphere(0.7, 1), kind, &options)
 }
 

@@ -23,7 +23,7 @@ fn quiet(_: u32, _: u32) {}
 
 /// A small field for tests that are not about accuracy.
 fn small(lattice: &str, storage: Storage, bands: usize) -> bake::Options {
-    bake::Options { bands, storage, lattice: lattice.parse().unwrap(), face_px: 32 }
+    bake::Options { bands, field_bands: None, storage, lattice: lattice.parse().unwrap(), face_px: 32 }
 }
 
 /// A store whose bytes are not those of a new one, so that what a bake leaves out shows.

@@ -10,7 +10,7 @@ use shadow_fields::asset::generate::Generator;
 use shadow_fields::check::merge::{ARITHMETIC, Agreement, LATTICES, MIXED, TIES, against_twin};
 use shadow_fields::field::{Lookup, Storage};
 use shadow_fields::frame::{Frame, Options};
-use shadow_fields::render::variant::{Skip, VARIANTS};
+use shadow_fields::render::variant::{Chain, PRODUCTS, Product, Skip, VARIANTS};
 use shadow_fields::scene::{Placement, Scene};
 use stage::{Stage, scene, small, stage};
 use std::path::Path;
@@ -89,6 +89,38 @@ fn variants_lookups_lattices_and_bands() {
     for bands in [2, 3, 5] {
         let bake = shadow_fields::bake::Options { bands, ..base.bake };
         agrees(&format!("{bands} bands"), &mut stage.frame(&scene, Options { bake, ..base }), &placements);
+    }
+}
+
+/// Every way to multiply, with the guard and without; and fields of more or fewer bands than the transfer.
+#[test]
+fn products_guards_and_field_bands() {
+    let Some(stage) = stage() else { return };
+    let scene = scene(MIXED);
+    let placements = scene.at(0.0);
+    let base = small();
+    let mut first: Option<Vec<Vec<[f32; 3]>>> = None;
+    for &(name, product) in PRODUCTS {
+        // The guard is the same for all products of coefficients.
+        let guards: &[bool] =
+            if matches!(product, Product::Factored | Product::PointChain) { &[true, false] } else { &[true] };
+        for &guard in guards {
+            let mut frame = stage.frame(&scene, Options { chain: Chain { product, guard }, ..base });
+            agrees(&format!("{name}, guard {guard}"), &mut frame, &placements);
+            if guard && product != Product::PointChain {
+                let light = stage.light(&mut frame, &placements);
+                for (a, b) in light.iter().zip(first.get_or_insert_with(|| light.clone())) {
+                    let (worst, brightest) = stage::difference(a, b);
+                    // The same function by other sums of some ten terms.
+                    assert!(worst <= 1e-5 * (1.0 + brightest), "{name}: {worst:e} from the first product");
+                }
+            }
+        }
+    }
+    for (bands, field_bands) in [(4, 5), (4, 7), (3, 4), (4, 3)] {
+        let bake = shadow_fields::bake::Options { bands, field_bands: Some(field_bands), ..base.bake };
+        let mut frame = stage.frame(&scene, Options { bake, ..base });
+        agrees(&format!("{bands} bands of transfer, {field_bands} of visibility"), &mut frame, &placements);
     }
 }
 

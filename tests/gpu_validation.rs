@@ -165,8 +165,13 @@ fn the_barrier_of_a_bake_batch_is_missed() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::sphere(1.0, 1);
     for kind in [Kind::Occlusion, Kind::Radiance] {
-        let options =
-            bake::Options { lattice: "cube:2x2".parse().unwrap(), face_px: 16, bands: 4, storage: Storage::F16 };
+        let options = bake::Options {
+            lattice: "cube:2x2".parse().unwrap(),
+            face_px: 16,
+            bands: 4,
+            field_bands: None,
+            storage: Storage::F16,
+        };
         let bake = || {
             let mut header = bake::header(&mesh, kind, &options);
             let store = Buffer::new(&gpu.device, "store", BufferKind::Device, header.payload_bytes())?;

@@ -8,7 +8,7 @@ use shadow_fields::bake::project::{Job, Project, Projection};
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::gpu::reflect::Reflection;
 use shadow_fields::layout::{Cluster, Entity};
-use shadow_fields::render::variant::{Form, Skip, VARIANTS};
+use shadow_fields::render::variant::{Chain, Form, Skip, VARIANTS};
 use std::mem::offset_of;
 
 /// Compares a struct of the shader with a Rust struct, field by field. The pattern names every field, so one that is missing
@@ -27,6 +27,8 @@ fn merge() -> Vec<(&'static str, Reflection)> {
     let form = |variant| Form {
         variant,
         bands: 4,
+        field_bands: 4,
+        chain: Chain::default(),
         storage: Storage::F16,
         lattice: Lattice::default().starting_at(1.02),
         lookup: Lookup::Trilinear,

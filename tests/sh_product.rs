@@ -4,8 +4,9 @@ use fastrand::Rng;
 use glam::DVec3;
 use shadow_fields::sh::basis::{Y00, coefficient_count, evaluate};
 use shadow_fields::sh::lobe::cap;
+use shadow_fields::sh::points;
 use shadow_fields::sh::product::{Tensor, eigenvalues, largest_eigenvalue};
-use shadow_fields::sh::product_program::{Form, product_program};
+use shadow_fields::sh::product_program::{Form, STYLES, Style, styled_program};
 use shadow_fields::sh::quadrature::sphere_rule;
 
 fn random(rng: &mut Rng, bands: usize) -> Vec<f64> {
@@ -107,21 +108,62 @@ fn product_commutes_is_linear_and_has_a_neutral_element() {
 #[test]
 fn the_program_that_is_printed_equals_the_product() {
     let mut rng = Rng::with_seed(6);
-    for bands in 1..=6 {
-        let tensor = Tensor::new(bands, bands, bands);
-        let [product, subtract] = [Form::Product, Form::Subtract].map(|form| product_program(bands, form));
+    let square = (1..=6).flat_map(|bands| STYLES.map(|style| (style, bands, bands)));
+    let other = [(4, 7), (4, 6), (4, 5), (3, 4), (3, 7), (5, 4), (6, 7), (4, 2)].map(|(a, b)| (Style::Matrix, a, b));
+    let mut tried = 0;
+    for (style, a_bands, b_bands) in square.chain(other).filter(|&(style, a, b)| style.fits(a, b)) {
+        let tensor = Tensor::new(a_bands, b_bands, a_bands);
+        let [product, subtract] =
+            [Form::Product, Form::Subtract].map(|form| styled_program(style, a_bands, b_bands, form));
         for _ in 0..20 {
-            let (a, b) = (random(&mut rng, bands), random(&mut rng, bands));
+            let (a, b) = (random(&mut rng, a_bands), random(&mut rng, b_bands));
             let inputs = [a.clone(), b.clone()].concat();
             let expected = multiply(&tensor, &a, &b);
             let mut out = vec![f64::NAN; a.len()];
             product.evaluate(&inputs, &mut out);
-            assert_close(&out, &expected, &format!("product of {bands} bands"));
+            assert_close(&out, &expected, &format!("{style:?} product of {a_bands} by {b_bands} bands"));
             subtract.evaluate(&inputs, &mut out);
             let expected: Vec<f64> = a.iter().zip(&expected).map(|(a, c)| a - c).collect();
-            assert_close(&out, &expected, &format!("subtracted product of {bands} bands"));
+            assert_close(&out, &expected, &format!("{style:?} subtracted product of {a_bands} by {b_bands} bands"));
         }
+        tried += 1;
     }
+    assert_eq!(tried, 6 * 3 + 4 + 8);
+}
+
+/// A function of up to 4 bands survives the way to the points and back, since the rule is exact for its square.
+#[test]
+fn points_hold_what_they_were_given() {
+    let mut rng = Rng::with_seed(8);
+    let rule = points::points();
+    assert_eq!(rule.len(), points::COUNT);
+    for bands in 1..=4 {
+        let expansion = random(&mut rng, bands);
+        let mut values = vec![f64::NAN; points::COUNT];
+        points::evaluate_program(bands).evaluate(&expansion, &mut values);
+        let expected: Vec<f64> = rule
+            .iter()
+            .map(|(direction, _)| {
+                let mut y = vec![0.0; 16];
+                evaluate(bands, *direction, &mut y);
+                expansion.iter().zip(&y).map(|(c, y)| c * y).sum()
+            })
+            .collect();
+        assert_close(&values, &expected, "values at points");
+        values.iter_mut().zip(&rule).for_each(|(v, (_, weight))| *v *= weight);
+        let mut back = vec![f64::NAN; expansion.len()];
+        points::project_program(bands).evaluate(&values, &mut back);
+        assert_close(&back, &expansion, "projected");
+    }
+}
+
+#[test]
+fn multiply_adds_are_as_many_as_documented() {
+    let cost = |style, b_bands| styled_program(style, 4, b_bands, Form::Subtract).cost().fma_count;
+    let costs = STYLES.map(|style| cost(style, 4));
+    let wide = [5, 6, 7].map(|bands| cost(Style::Matrix, bands));
+    assert_eq!((costs, wide), ([394, 414, 426, 467], [533, 596, 644]));
+    assert_eq!(points::evaluate_program(4).cost().fma_count, 0);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::field::{Lattice, Lookup, Storage};
-use shadow_fields::render::variant::{Form, Skip, VARIANTS};
+use shadow_fields::render::variant::{Chain, Form, Skip, VARIANTS};
 use shadow_fields::shaders::{FILES, Row};
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -34,6 +34,8 @@ fn usual_form() -> Form {
     Form {
         variant: VARIANTS[0],
         bands: 4,
+        field_bands: 4,
+        chain: Chain::default(),
         storage: Storage::F16,
         lattice: Lattice::default().starting_at(1.02),
         lookup: Lookup::Trilinear,
@@ -48,10 +50,10 @@ fn merging() -> Vec<Row> {
     let mut forms = vec![usual];
     forms.extend(["none", "horizon", "cones"].map(|skip| Form { skip: skip.parse().unwrap(), ..usual }));
     // Seven bands take 33 s to optimise, six 5 s, four 0.6 s; see the ignored test.
-    forms.extend((2..=6).map(|bands| Form { bands, ..usual }));
+    forms.extend((2..=6).map(|bands| Form { bands, field_bands: bands, ..usual }));
     for &variant in VARIANTS {
         forms.extend([Storage::F16, Storage::F32].map(|storage| Form { variant, storage, ..usual }));
-        forms.push(Form { variant, storage: Storage::F32, bands: 3, skip: Skip::NONE, ..usual });
+        forms.push(Form { variant, storage: Storage::F32, bands: 3, field_bands: 3, skip: Skip::NONE, ..usual });
     }
     let lattices = [
         "cube:16x8,log,inner=0.25",

@@ -7,7 +7,7 @@ use crate::field::{Lattice, Lookup, Storage};
 use crate::frame;
 use crate::gpu::{self, Device, Validation};
 use crate::render::Variant;
-use crate::render::variant::Skip;
+use crate::render::variant::{Chain, Product, Skip};
 use crate::scene::Scene;
 use crate::shaders::Library;
 use clap::Args;
@@ -61,9 +61,12 @@ pub struct BakeArguments {
     /// Edge of a captured cube face in texels
     #[arg(long, default_value_t = 64, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=1024))]
     pub face_px: u32,
-    /// SH bands, 2 to 7; N bands are N^2 coefficients
+    /// SH bands of light, transfer and what is stored, 2 to 7; N bands are N^2 coefficients
     #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7))]
     pub bands: u32,
+    /// SH bands of stored visibility if other than --bands: more of them cost fetches and bring long chains nearer to the truth
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7))]
+    pub field_bands: Option<u32>,
     /// Number format of stored coefficients
     #[arg(long, default_value = "f16", value_name = "f16|f32")]
     pub storage: Storage,
@@ -74,6 +77,7 @@ impl BakeArguments {
     pub fn options(&self) -> bake::Options {
         bake::Options {
             bands: self.bands as usize,
+            field_bands: self.field_bands.map(|bands| bands as usize),
             storage: self.storage,
             lattice: self.lattice,
             face_px: self.face_px,
@@ -94,6 +98,28 @@ pub struct MergeArguments {
     /// Work to leave out where true visibility makes it zero: all, none, or a list of horizon, cones
     #[arg(long, default_value = "all", value_name = "all|none|LIST")]
     pub skip: Skip,
+    /// How an occluder's visibility is multiplied in: factored, pairs, matrix and points compute the same in different ways;
+    /// point-chain keeps chains at 32 points and projects once, which is quicker and less exact
+    #[arg(long, default_value = "factored", value_name = "NAME")]
+    pub product: Product,
+    /// Whether a chain of occluders is kept from growing: on or off
+    #[arg(long, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
+    pub guard: bool,
+}
+
+impl MergeArguments {
+    /// How occluders are multiplied.
+    pub fn chain(&self) -> Chain {
+        Chain { product: self.product, guard: self.guard }
+    }
+}
+
+fn on_or_off(text: &str) -> std::result::Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(format!("\"{text}\" is neither on nor off")),
+    }
 }
 
 /// Width and height from `WxH`.

@@ -129,6 +129,7 @@ fn options(arguments: &Arguments, scene: &Scene) -> Options {
         lookup: arguments.merge.lookup,
         variant: arguments.merge.variant,
         skip: arguments.merge.skip,
+        chain: arguments.merge.chain(),
         size: arguments.size.unwrap_or([shape.width, shape.height]),
         multisample: true,
     }

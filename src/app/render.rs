@@ -86,6 +86,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         lookup: arguments.merge.lookup,
         variant: arguments.merge.variant,
         skip: arguments.merge.skip,
+        chain: arguments.merge.chain(),
         size: arguments.size.unwrap_or([shape.width, shape.height]),
         multisample: true,
     };

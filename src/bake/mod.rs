@@ -29,8 +29,10 @@ use std::time::{Duration, Instant};
 /// What decides a field besides the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Options {
-    /// SH bands of the stored factor.
+    /// SH bands of transfers and radiance fields.
     pub bands: usize,
+    /// SH bands of occlusion fields; `None`: as many.
+    pub field_bands: Option<usize>,
     /// Number format.
     pub storage: Storage,
     /// Sample points; the first shell may be left to the bake.
@@ -42,7 +44,19 @@ pub struct Options {
 impl Default for Options {
     /// 4 bands, f16, the default lattice, 64 px: a binary cap's error is .0033 at 64 px (DESIGN, section 3).
     fn default() -> Self {
-        Options { bands: 4, storage: Storage::default(), lattice: Lattice::default(), face_px: 64 }
+        Options { bands: 4, field_bands: None, storage: Storage::default(), lattice: Lattice::default(), face_px: 64 }
+    }
+}
+
+impl Options {
+    /// SH bands of occlusion fields.
+    pub fn occlusion_bands(&self) -> usize {
+        self.field_bands.unwrap_or(self.bands)
+    }
+
+    /// SH bands of what has the most.
+    pub fn most_bands(&self) -> usize {
+        self.bands.max(self.occlusion_bands())
     }
 }
 
@@ -119,7 +133,7 @@ pub fn header(mesh: &Mesh, kind: Kind, options: &Options) -> Header {
     let brightest = mesh.colors.iter().flatten().map(|c| c.max_element()).fold(0.0, f32::max);
     Header {
         kind,
-        bands: options.bands,
+        bands: if kind == Kind::Occlusion { options.occlusion_bands() } else { options.bands },
         storage: options.storage,
         lattice: options.lattice.starting_at(first),
         face_px: options.face_px,

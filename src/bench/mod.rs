@@ -54,6 +54,7 @@ pub fn default_options() -> frame::Options {
         bake: crate::bake::Options::default(),
         lookup: crate::field::Lookup::default(),
         skip: crate::render::variant::Skip::ALL,
+        chain: crate::render::variant::Chain::default(),
         variant: None,
         size: [16, 16],
         multisample: false,

@@ -6,8 +6,10 @@ use super::default_options;
 use super::text::{csv, write};
 use crate::asset::embedded;
 use crate::error::{Error, Result};
+use crate::render::chain::Multiplier;
+use crate::render::variant::{self, Product};
 use crate::scene::Scene;
-use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count};
+use crate::sh::basis::MAX_COEFFICIENTS;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::product::Tensor;
 use crate::sh::quadrature::sphere_rule;
@@ -35,7 +37,7 @@ pub struct Chain {
     pub truth: f64,
     /// Products of 4 bands in f64.
     pub plain: f64,
-    /// The same, lengths kept from growing.
+    /// The same, guarded as the merge does it by default.
     pub guarded: f64,
     /// Products of 4 bands in f32.
     pub f32: f64,
@@ -90,28 +92,20 @@ struct Rule {
 type Cap = (DVec3, f64);
 
 fn chain(caps: &[Cap], rule: Rule) -> f64 {
-    let count = coefficient_count(BANDS);
     let tensor = Tensor::new(BANDS, rule.visibility_bands, BANDS);
-    let mut t = [0.0; MAX_COEFFICIENTS];
-    t[..count].copy_from_slice(&clamped_cosine(BANDS, DVec3::Y));
+    let guarded = variant::Chain { product: Product::Factored, guard: rule.guard };
+    let multiplier = Multiplier::new(guarded, BANDS, rule.visibility_bands);
+    let mut t = multiplier.begin(&clamped_cosine(BANDS, DVec3::Y));
     for &(axis, half_angle) in caps {
         let mut blocked = [0.0; MAX_COEFFICIENTS];
         let exact = cap(rule.visibility_bands, axis, half_angle);
         for (to, from) in blocked.iter_mut().zip(exact) {
             *to = if rule.half { f16::from_f64(from).to_f64() } else { from };
         }
-        let length = |t: &[f64]| t.iter().map(|c| c * c).sum::<f64>();
-        let before = length(&t);
         if rule.single {
             subtract_single(&tensor, &mut t, &blocked);
         } else {
-            let mut product = [0.0; MAX_COEFFICIENTS];
-            tensor.multiply(&t, &blocked, &mut product);
-            t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
-        }
-        let after = length(&t);
-        if rule.guard && after > before {
-            t.iter_mut().for_each(|t| *t *= (before / after).sqrt());
+            multiplier.multiply(&mut t, &blocked);
         }
     }
     // Unit irradiance: radiance 1 / pi, whose expansion is sqrt(4 pi) / pi in the constant band.

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::field::{Lookup, Storage};
 use crate::frame::{Frame, Options};
 use crate::render::Variant;
-use crate::render::variant::{Skip, VARIANTS};
+use crate::render::variant::{Chain, PRODUCTS, Skip, VARIANTS};
 use crate::scene::{Placement, Scene};
 use std::path::Path;
 
@@ -77,6 +77,7 @@ pub fn options() -> Options {
         lookup: Lookup::Trilinear,
         variant: Some(Variant::named("texel").expect("a variant")),
         skip: Skip::ALL,
+        chain: Chain::default(),
         size: [64, 48],
         multisample: true,
     }
@@ -176,6 +177,15 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
         };
         compare(what.into(), Options { skip, ..base })?;
     }
+    for &(name, product) in PRODUCTS {
+        let chain = Chain { product, ..base.chain };
+        if chain != base.chain {
+            compare(format!("product {name}"), Options { chain, ..base })?;
+        }
+    }
+    compare("no guard".into(), Options { chain: Chain { guard: false, ..base.chain }, ..base })?;
+    let bake = bake::Options { field_bands: Some(6), ..base.bake };
+    compare("6 bands of visibility".into(), Options { bake, ..base })?;
     for lookup in [Lookup::Nearest, Lookup::Radial] {
         compare(format!("lookup {lookup:?}").to_lowercase(), Options { lookup, ..base })?;
     }

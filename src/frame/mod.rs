@@ -23,7 +23,7 @@ use crate::render::calibrate;
 use crate::render::draw::{Draw, Item};
 use crate::render::gather::{Bounds, Counts};
 use crate::render::merge::{Inputs, Merge, Readable};
-use crate::render::variant::{Form, Skip, Variant, uniform_entities};
+use crate::render::variant::{Chain, Form, Skip, Variant, uniform_entities};
 use crate::scene::{Placement, Scene};
 use crate::sh::basis::{Y00, coefficient_count};
 use crate::shaders::Library;
@@ -46,6 +46,8 @@ pub struct Options {
     pub variant: Option<Variant>,
     /// What the merge leaves out.
     pub skip: Skip,
+    /// How occluders are multiplied.
+    pub chain: Chain,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
     /// Whether pictures are multisampled where the device can.
@@ -85,9 +87,10 @@ impl Frame {
     /// Bakes or finds what the scene needs and builds the passes.
     ///
     /// # Errors
-    /// As [`Store::new`], [`Merge::new`] and [`Draw::new`].
+    /// As [`Store::new`], [`Merge::new`] and [`Draw::new`]; `Usage` as [`crate::render::variant::Product::check`].
     pub fn new(baker: &Baker, cache: &Cache, scene: &Scene, options: Options, progress: Progress<'_>) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
+        options.chain.product.check(options.bake.bands, options.bake.occlusion_bands())?;
         let store = Store::new(baker, cache, scene, &options.bake, progress)?;
         let wanted = options.variant.map_or_else(|| calibrate::fastest(device, library), Ok)?;
         let form = usable(device, &store, scene.entities.len(), form(&options, wanted, uniform_entities(device)));
@@ -328,6 +331,8 @@ fn form(options: &Options, variant: Variant, entity_limit: u32) -> Form {
     Form {
         variant,
         bands: options.bake.bands,
+        field_bands: options.bake.occlusion_bands(),
+        chain: options.chain,
         storage: options.bake.storage,
         lattice: options.bake.lattice,
         lookup: options.lookup,

@@ -82,8 +82,10 @@ pub struct Store {
     pub baked: Vec<Baked>,
     /// Number format of the fields.
     pub storage: Storage,
-    /// SH bands of fields and transfers.
+    /// SH bands of radiance fields and transfers.
     pub bands: usize,
+    /// SH bands of occlusion fields.
+    pub field_bands: usize,
 }
 
 /// Which fields the entities of a mesh need: none for what only receives, no radiance field for a light of one colour.
@@ -126,7 +128,14 @@ impl Store {
                 "the scene's fields take {total} bytes, the device can bind {most}: use a smaller --lattice or f16 storage"
             )));
         }
-        let mut fields = Buffer::new(device, "fields", BufferKind::Device, total.max(ALIGNMENT))?;
+        // Where bands differ, the shader reads as much of any sample as the larger kind has: at the end, past the last.
+        let overrun = 8 * channel_stride(options.most_bands()) as u64;
+        let mut fields = Buffer::new(
+            device,
+            "fields",
+            BufferKind::Device,
+            total.max(ALIGNMENT) + if options.field_bands.is_some() { overrun } else { 0 },
+        )?;
         let mut baked = Vec::new();
         for (mesh, slot) in slots
             .iter_mut()
@@ -186,6 +195,7 @@ impl Store {
             baked,
             storage: options.storage,
             bands: options.bands,
+            field_bands: options.occlusion_bands(),
         })
     }
 

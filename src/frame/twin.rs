@@ -61,6 +61,7 @@ impl Frame {
                 bands: self.options.bake.bands,
                 lookup: self.options.lookup,
                 skip: self.options.skip,
+                chain: self.options.chain,
             };
             out.push((receiver, task.run()));
         }

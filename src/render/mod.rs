@@ -1,6 +1,7 @@
 //! The passes of a frame, one file each.
 
 pub mod calibrate;
+pub mod chain;
 pub mod draw;
 pub mod gather;
 pub mod merge;

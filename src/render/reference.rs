@@ -1,10 +1,10 @@
 //! The CPU twin of "merge", in f64 and vertex by vertex, from the same stored numbers.
 
-use super::variant::{SKIP_FADE_RAD, Skip};
+use super::chain::Multiplier;
+use super::variant::{Chain, SKIP_FADE_RAD, Skip};
 use crate::field::{Lookup, ShadowField};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count};
 use crate::sh::lobe::clamped_cosine;
-use crate::sh::product::Tensor;
 use crate::sh::rotation::Rotation;
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
@@ -47,8 +47,10 @@ pub struct Task<'t> {
     pub normals: &'t [DVec3],
     /// Transfer vectors, `transfer_stride` floats apart; `None` for the cosine of the normal.
     pub transfer: Option<(&'t [f32], usize)>,
-    /// SH bands.
+    /// SH bands of transfer and light; an occlusion field has its own.
     pub bands: usize,
+    /// How factors are multiplied.
+    pub chain: Chain,
     /// Which samples a lookup takes.
     pub lookup: Lookup,
     /// What is left out.
@@ -60,12 +62,19 @@ type Coefficients = [f64; MAX_COEFFICIENTS];
 impl Task<'_> {
     /// Radiosity of every vertex: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self) -> Vec<[f64; 3]> {
-        let tensor = Tensor::new(self.bands, self.bands, self.bands);
-        let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(self.bands, o.rotation)).collect();
-        (0..self.positions.len()).into_par_iter().map(|v| self.vertex(v, &tensor, &rotations)).collect()
+        let field_bands = self.field_bands();
+        let multiplier = Multiplier::new(self.chain, self.bands, field_bands);
+        let bands = self.bands.max(field_bands);
+        let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(bands, o.rotation)).collect();
+        (0..self.positions.len()).into_par_iter().map(|v| self.vertex(v, &multiplier, &rotations)).collect()
     }
 
-    fn vertex(&self, v: usize, tensor: &Tensor, rotations: &[Rotation]) -> [f64; 3] {
+    /// SH bands of the occlusion fields, which all have the same.
+    fn field_bands(&self) -> usize {
+        self.objects.iter().find_map(|o| o.blocked).map_or(self.bands, |field| field.header.bands)
+    }
+
+    fn vertex(&self, v: usize, multiplier: &Multiplier, rotations: &[Rotation]) -> [f64; 3] {
         let count = coefficient_count(self.bands);
         let receiver = &self.objects[self.receiver];
         let position = receiver.centre + receiver.rotation * (self.positions[v] * receiver.scale);
@@ -83,21 +92,17 @@ impl Task<'_> {
             .collect();
         // The chain of the occluders, each as much as `share` says.
         let chain = |share: &dyn Fn(usize) -> f64| {
-            let mut t = transfer;
+            let mut state = multiplier.begin(&transfer[..count]);
             for (j, b) in &factors {
-                let part = b.map(|b| b * share(*j));
-                let mut product = [0.0; MAX_COEFFICIENTS];
-                tensor.multiply(&t[..count], &part[..count], &mut product[..count]);
-                t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
+                multiplier.multiply(&mut state, &b.map(|b| b * share(*j)));
             }
-            t
+            state
         };
-        let against = |s: &[f64], t: &Coefficients| s.iter().zip(t).take(count).map(|(s, t)| s * t).sum::<f64>();
 
         let mut sum = [0.0; 3];
         if let Some(sky) = self.sky {
             let t = chain(&|_| 1.0);
-            sum.iter_mut().zip(sky).for_each(|(sum, sky)| *sum += against(sky, &t));
+            sum.iter_mut().zip(sky).for_each(|(sum, sky)| *sum += multiplier.meet(&t, sky));
         }
         for &light in self.lights.iter().filter(|&&l| l != self.receiver) {
             let before = |j: usize| (cones[j].distance, j) < (cones[light].distance, light);
@@ -105,7 +110,7 @@ impl Task<'_> {
             let reach = cones[light].above_horizon(normal, self.skip);
             for (channel, sum) in sum.iter_mut().enumerate() {
                 let s = self.field(light, position, Some(channel), rotations);
-                *sum += reach * self.objects[light].emission[channel] * against(&s, &t);
+                *sum += reach * self.objects[light].emission[channel] * multiplier.meet(&t, &s);
             }
         }
         std::array::from_fn(|channel| sum[channel] * receiver.albedo_over_pi[channel])
@@ -116,8 +121,10 @@ impl Task<'_> {
         let mut out = [0.0; MAX_COEFFICIENTS];
         match self.transfer {
             Some((floats, stride)) => {
-                let local: Vec<f64> = floats[v * stride..v * stride + count].iter().map(|&f| f.into()).collect();
-                rotation.apply(&local, &mut out[..count]);
+                let mut local = [0.0; MAX_COEFFICIENTS];
+                let stored = &floats[v * stride..v * stride + count];
+                local.iter_mut().zip(stored).for_each(|(to, from)| *to = f64::from(*from));
+                rotation.apply(&local, &mut out);
             }
             None => {
                 let normal = self.objects[self.receiver].rotation * self.normals[v];
@@ -130,15 +137,14 @@ impl Task<'_> {
     /// The field of object `j` at a world position, in the world frame: radiance of a channel, or the blocked part.
     fn field(&self, j: usize, position: DVec3, channel: Option<usize>, rotations: &[Rotation]) -> Coefficients {
         let object = &self.objects[j];
-        let count = coefficient_count(self.bands);
         let local = object.rotation.inverse() * (position - object.centre) / object.radius_m;
         let (field, channel) = match (object.radiance, channel) {
             (Some(field), Some(channel)) => (field, channel),
             _ => (object.blocked.expect("what blocks or shines in one colour has an occlusion field"), 0),
         };
         let (mut found, mut out) = ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
-        field.lookup(local, self.lookup, channel, &mut found[..count]);
-        rotations[j].apply(&found[..count], &mut out[..count]);
+        field.lookup(local, self.lookup, channel, &mut found);
+        rotations[j].apply(&found, &mut out);
         out
     }
 }

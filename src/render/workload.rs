@@ -2,7 +2,7 @@
 //! occluder, fields of one shape filled with a constant.
 
 use super::merge::{Inputs, Merge, Readable};
-use super::variant::{Form, Skip, Variant, uniform_entities};
+use super::variant::{Chain, Form, Skip, Variant, uniform_entities};
 use crate::error::Result;
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::{Lattice, Lookup};
@@ -116,6 +116,8 @@ impl Workload {
         Form {
             variant,
             bands: BANDS,
+            field_bands: BANDS,
+            chain: Chain::default(),
             storage: Storage::F16,
             lattice: self.lattice,
             lookup: Lookup::Trilinear,

@@ -16,6 +16,7 @@
 //! | [`mod@project`] | texels to coefficients |
 //! | [`product`] | the triple-product tensor, products, growth certificates |
 //! | [`product_program`] | the product as straight-line code, and its GLSL |
+//! | [`points`] | products at the 32 points of a rule |
 //! | [`rotation`] | block-diagonal rotation, and its GLSL |
 //! | [`lobe`] | closed forms: caps, spheres, the clamped cosine |
 //! | [`program`] | straight-line programs: run by tests, printed for shaders |
@@ -33,6 +34,7 @@
 pub mod basis;
 pub mod cube;
 pub mod lobe;
+pub mod points;
 pub mod product;
 pub mod product_program;
 pub mod program;

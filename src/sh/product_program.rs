@@ -1,18 +1,47 @@
-//! The SH product as straight-line code.
+//! The SH product as straight-line code, in several [`Style`]s that compute the same numbers.
 //!
-//! Form "pairs": `p_ij = a_i b_j + a_j b_i` once for every unordered pair, then `c_k += G_ijk p_ij`. Two savings on it:
+//! "pairs" forms `p_ij = a_i b_j + a_j b_i` once for every unordered pair, then `c_k += G_ijk p_ij`; products with coefficient
+//! 0 are a scaling by Y00, which is done once on `a_0` and `b_0`. "factored" also forms `p + ratio q` once where several `c_k`
+//! contain two pairs in the same proportion (the linear half of the greedy factoring of reference 3 of [`crate::sh`]).
+//! "matrix" forms the elements `q_ik = sum_j G_ijk b_j` of the symmetric matrix of multiplication by b, and `c_k += q_ik a_i`,
+//! `c_i += q_ik a_k`: the only one here for a second factor of more or fewer bands. "points" is in [`super::points`].
 //!
-//! - products with coefficient 0 are a scaling by Y00, which is done once on `a_0` and `b_0`;
-//! - where several `c_k` contain two pairs in the same proportion, `p + ratio q` is formed once (the linear half of the
-//!   greedy factoring of reference 3 of [`crate::sh`]).
-//!
-//! At 4 bands that is 392 multiplications and 267 additions, 394 slots where multiply-adds fuse; plain pairs take 428 slots.
+//! Multiply-adds at 4 bands: factored 394 (392 multiplications and 267 additions), pairs 414, matrix 426, points 467; matrix of
+//! 4 by 5, 6 and 7 bands: 533, 596, 644.
 
 use std::collections::BTreeMap;
 
 use super::basis::{Y00, coefficient_count};
+use super::points;
 use super::product::Tensor;
 use super::program::{Cost, Program, Term, Value, elements};
+
+/// How a product is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Style {
+    /// Tensor pairs.
+    Pairs,
+    /// Pairs with shared sums factored out.
+    Factored,
+    /// The matrix of multiplication by the second factor, an element at a time.
+    Matrix,
+    /// Both factors at the 32 points of an exact rule, multiplied there and projected: up to 4 bands.
+    Points,
+}
+
+/// Every style; shaders know them by their places here.
+pub const STYLES: [Style; 4] = [Style::Factored, Style::Pairs, Style::Matrix, Style::Points];
+
+impl Style {
+    /// Whether the style can multiply expansions of `a_bands` by those of `b_bands`.
+    pub fn fits(self, a_bands: usize, b_bands: usize) -> bool {
+        match self {
+            Style::Matrix => true,
+            Style::Pairs | Style::Factored => a_bands == b_bands,
+            Style::Points => a_bands == b_bands && a_bands <= points::BANDS,
+        }
+    }
+}
 
 /// A value that rows of the product are summed from.
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +109,7 @@ struct Emitter<'a> {
     program: &'a mut Program,
     linear: &'a Linear,
     values: Vec<Option<Value>>,
-    sums: Vec<Option<Value>>,
+    sums: &'a mut [Option<Value>],
     /// 1 or -1: what the tensor's part is multiplied by.
     sign: f64,
 }
@@ -89,7 +118,7 @@ impl Emitter<'_> {
     fn emit(&mut self, column: usize, terms: Vec<Term>) {
         let value = self.program.define(terms);
         self.values[column] = Some(value);
-        for (row, sum) in self.linear.rows.iter().zip(&mut self.sums) {
+        for (row, sum) in self.linear.rows.iter().zip(self.sums.iter_mut()) {
             if let Some(coefficient) = row.get(&column) {
                 self.program.accumulate(sum, vec![Term::new(self.sign * coefficient, &[value])]);
             }
@@ -113,22 +142,47 @@ pub enum Form {
     Subtract,
 }
 
-/// The product of two expansions of `bands` bands as a program.
+impl Form {
+    fn sign(self) -> f64 {
+        if self == Form::Product { 1.0 } else { -1.0 }
+    }
+}
+
+/// The product of expansions of `bands` bands as a program.
 pub fn product_program(bands: usize, form: Form) -> Program {
+    styled_program(Style::Factored, bands, bands, form)
+}
+
+/// The product of an expansion of `a_bands` by one of `b_bands`, cut to `a_bands`, in a style that [`Style::fits`] them.
+pub fn styled_program(style: Style, a_bands: usize, b_bands: usize, form: Form) -> Program {
+    assert!(style.fits(a_bands, b_bands), "{style:?} cannot multiply {a_bands} bands by {b_bands}");
+    if style == Style::Points {
+        return points::product_program(a_bands, form);
+    }
+    let counts = [a_bands, b_bands].map(coefficient_count);
+    let [left, target] = if form == Form::Product { ["a", "c"] } else { ["t", "t"] };
+    let mut program = Program::new([elements(left, counts[0]), elements("b", counts[1])].concat());
+    let sums = match style {
+        Style::Matrix => matrix_sums(&mut program, a_bands, b_bands, form),
+        _ => pair_sums(&mut program, a_bands, form, style == Style::Factored),
+    };
+    for (text, sum) in elements(target, counts[0]).into_iter().zip(sums) {
+        program.output(text, sum.expect("every coefficient has a term"));
+    }
+    program
+}
+
+fn pair_sums(program: &mut Program, bands: usize, form: Form, factored: bool) -> Vec<Option<Value>> {
     let count = coefficient_count(bands);
-    let left = if form == Form::Product { "a" } else { "t" };
-    let mut program = Program::new([elements(left, count), elements("b", count)].concat());
     let (a, b) = (Value::Input, |j: usize| Value::Input(count + j));
     let mut linear = Linear::new(bands);
-    linear.factor();
-
+    if factored {
+        linear.factor();
+    }
     // The terms of coefficient 0: c_0 = Y00 a_0 b_0, c_k = Y00 (a_0 b_k + a_k b_0).
-    let sign = if form == Form::Product { 1.0 } else { -1.0 };
+    let sign = form.sign();
     let a_0 = program.define(vec![Term::new(Y00, &[a(0)])]);
-    let b_0 = match form {
-        Form::Product => program.define(vec![Term::new(Y00, &[b(0)])]),
-        Form::Subtract => program.define(vec![Term::new(1.0, &[]), Term::new(-Y00, &[b(0)])]),
-    };
+    let b_0 = scaled_first(program, b(0), form);
     let mut sums = vec![None; count];
     let first = match form {
         Form::Product => Term::new(1.0, &[a_0, b(0)]),
@@ -138,9 +192,8 @@ pub fn product_program(bands: usize, form: Form) -> Program {
     for (k, sum) in sums.iter_mut().enumerate().skip(1) {
         program.accumulate(sum, vec![Term::new(1.0, &[a(k), b_0]), Term::new(sign, &[a_0, b(k)])]);
     }
-
     let values = vec![None; linear.columns.len()];
-    let mut emitter = Emitter { program: &mut program, linear: &linear, values, sums, sign };
+    let mut emitter = Emitter { program, linear: &linear, values, sums: &mut sums, sign };
     for (column, definition) in linear.columns.iter().enumerate() {
         if let &Column::Pair(i, j) = definition {
             let mut terms = vec![Term::new(1.0, &[a(i), b(j)])];
@@ -150,15 +203,43 @@ pub fn product_program(bands: usize, form: Form) -> Program {
             emitter.emit(column, terms);
         }
     }
-    let sums = emitter.sums;
-    let target = if form == Form::Product { "c" } else { "t" };
-    for (text, sum) in elements(target, count).into_iter().zip(sums) {
-        program.output(text, sum.expect("every coefficient has a term"));
-    }
-    program
+    sums
 }
 
-/// Arithmetic of one product.
+/// Y00 b_0, or 1 - Y00 b_0 where the product is subtracted: what coefficient 0 of b multiplies all of a by.
+fn scaled_first(program: &mut Program, b_0: Value, form: Form) -> Value {
+    match form {
+        Form::Product => program.define(vec![Term::new(Y00, &[b_0])]),
+        Form::Subtract => program.define(vec![Term::new(1.0, &[]), Term::new(-Y00, &[b_0])]),
+    }
+}
+
+fn matrix_sums(program: &mut Program, a_bands: usize, b_bands: usize, form: Form) -> Vec<Option<Value>> {
+    let count = coefficient_count(a_bands);
+    let (a, b) = (Value::Input, |j: usize| Value::Input(count + j));
+    let mut elements: BTreeMap<(usize, usize), Vec<(usize, f64)>> = BTreeMap::new();
+    for entry in Tensor::new(a_bands, b_bands, a_bands).entries() {
+        if entry.i <= entry.k && entry.j > 0 {
+            elements.entry((entry.i, entry.k)).or_default().push((entry.j, entry.value));
+        }
+    }
+    let b_0 = scaled_first(program, b(0), form);
+    let mut sums = vec![None; count];
+    for (k, sum) in sums.iter_mut().enumerate() {
+        program.accumulate(sum, vec![Term::new(1.0, &[a(k), b_0])]);
+    }
+    for ((i, k), row) in elements {
+        let terms = row.into_iter().map(|(j, value)| Term::new(value, &[b(j)])).collect();
+        let element = program.define(terms);
+        program.accumulate(&mut sums[k], vec![Term::new(form.sign(), &[element, a(i)])]);
+        if i != k {
+            program.accumulate(&mut sums[i], vec![Term::new(form.sign(), &[element, a(k)])]);
+        }
+    }
+    sums
+}
+
+/// Arithmetic of one product of [`product_program`].
 pub fn product_cost(bands: usize, form: Form) -> Cost {
     product_program(bands, form).cost()
 }
@@ -166,15 +247,18 @@ pub fn product_cost(bands: usize, form: Form) -> Cost {
 /// GLSL 460 text of two functions, N = bands^2:
 ///
 /// - `void sh_product(float a[N], float b[N], out float c[N])`: c = product(a, b);
-/// - `void sh_subtract_product(inout float t[N], float b[N])`: t -= product(t, b), multiplication by the visibility 1 - b
-///   of a factor that is stored as its blocked part b.
+/// - [`glsl_subtract`]'s for two factors of as many bands.
 pub fn glsl_product(bands: usize) -> String {
     let count = coefficient_count(bands);
-    let (product, subtract) = (product_program(bands, Form::Product), product_program(bands, Form::Subtract));
-    format!(
-        "void sh_product(float a[{count}], float b[{count}], out float c[{count}]) {{\n{}}}\n\
-         void sh_subtract_product(inout float t[{count}], float b[{count}]) {{\n{}}}\n",
-        product.glsl_body(),
-        subtract.glsl_body()
-    )
+    let body = product_program(bands, Form::Product).glsl_body();
+    format!("void sh_product(float a[{count}], float b[{count}], out float c[{count}]) {{\n{body}}}\n")
+        + &glsl_subtract(Style::Factored, bands, bands)
+}
+
+/// GLSL 460 text of `void sh_subtract_product(inout float t[N], float b[M])`, N = a_bands^2, M = b_bands^2:
+/// t -= product(t, b), multiplication by the visibility 1 - b of a factor that is stored as its blocked part b.
+pub fn glsl_subtract(style: Style, a_bands: usize, b_bands: usize) -> String {
+    let [a_count, b_count] = [a_bands, b_bands].map(coefficient_count);
+    let body = styled_program(style, a_bands, b_bands, Form::Subtract).glsl_body();
+    format!("void sh_subtract_product(inout float t[{a_count}], float b[{b_count}]) {{\n{body}}}\n")
 }

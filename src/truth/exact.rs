@@ -4,11 +4,11 @@
 use super::Vertex;
 use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
 use super::world::{Sight, View, World};
+use crate::render::chain::Multiplier;
 use crate::render::reference::Cone;
-use crate::render::variant::Skip;
+use crate::render::variant::{Chain, Skip};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
-use crate::sh::product::Tensor;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -26,26 +26,28 @@ pub struct Exact {
     pub rays: u32,
     /// Decides the points.
     pub seed: u64,
+    /// How factors are multiplied.
+    pub chain: Chain,
     /// What the chain leaves out, by the merge's rules: where true visibility is zero the band-limited product is not.
     pub skip: Skip,
 }
 
 impl Default for Exact {
-    /// 4 bands throughout, 4096 rays a factor, every skip.
+    /// 4 bands throughout, 4096 rays a factor, the merge's chain, every skip.
     fn default() -> Self {
-        Exact { bands: 4, visibility_bands: 4, rays: 4096, seed: 2, skip: Skip::ALL }
+        Exact { bands: 4, visibility_bands: 4, rays: 4096, seed: 2, chain: Chain::default(), skip: Skip::ALL }
     }
 }
 
 impl Exact {
     /// Radiosity of the given vertices: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self, world: &World<'_>, vertices: &[Vertex]) -> Vec<[f64; 3]> {
-        let tensor = Tensor::new(self.bands, self.visibility_bands, self.bands);
+        let multiplier = Multiplier::new(self.chain, self.bands, self.visibility_bands);
         let sky = world.scene.environment.coefficients(self.bands);
-        vertices.par_iter().map(|&vertex| self.vertex(world, &tensor, &sky, vertex)).collect()
+        vertices.par_iter().map(|&vertex| self.vertex(world, &multiplier, &sky, vertex)).collect()
     }
 
-    fn vertex(&self, world: &World<'_>, tensor: &Tensor, sky: &[Vec<f64>; 3], vertex: Vertex) -> [f64; 3] {
+    fn vertex(&self, world: &World<'_>, multiplier: &Multiplier, sky: &[Vec<f64>; 3], vertex: Vertex) -> [f64; 3] {
         let count = coefficient_count(self.bands);
         let view = world.view(vertex);
         let points = |stream: usize| {
@@ -70,18 +72,16 @@ impl Exact {
             .collect();
         // The chain of the occluders, each as much as `share` says.
         let chain = |share: &dyn Fn(&Sight) -> f64| {
-            let mut t = transfer;
+            let mut state = multiplier.begin(&transfer[..count]);
             for (occluder, blocked) in &factors {
-                let (share, mut product) = (share(occluder), [0.0; MAX_COEFFICIENTS]);
-                tensor.multiply(&t, &blocked.map(|b| b * share), &mut product);
-                t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
+                let share = share(occluder);
+                multiplier.multiply(&mut state, &blocked.map(|b| b * share));
             }
-            t
+            state
         };
-        let against = |s: &[f64], t: &Coefficients| s.iter().zip(t).take(count).map(|(s, t)| s * t).sum::<f64>();
 
         let through = chain(&|_| 1.0);
-        let mut sum = DVec3::from_array(sky.each_ref().map(|channel| against(channel, &through)));
+        let mut sum = DVec3::from_array(sky.each_ref().map(|channel| multiplier.meet(&through, channel)));
         for light in world.lights(&view) {
             let behind = cone(&light);
             let t = chain(&|occluder| {
@@ -90,7 +90,8 @@ impl Exact {
             let reach = behind.above_horizon(view.normal, self.skip);
             let radiance = self.radiance(world, &light, points(1 + light.entity));
             let emission = world.scene.entities[light.entity].emission.as_dvec3();
-            sum += reach * emission * DVec3::from_array(radiance.each_ref().map(|channel| against(channel, &t)));
+            sum +=
+                reach * emission * DVec3::from_array(radiance.each_ref().map(|channel| multiplier.meet(&t, channel)));
         }
         (sum * world.scene.entities[vertex.entity].albedo.as_dvec3() / PI).to_array()
     }

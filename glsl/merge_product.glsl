@@ -1,0 +1,132 @@
+// A chain, and how it is multiplied by the visibility past an occluder; the twin is render::chain. A chain starts as a vertex's
+// transfer T. It is kept as SH coefficients, or at the 32 points of a rule (POINT_CHAIN) as the values there times the weights.
+// PRODUCT, a place in sh::product_program::STYLES, is how a product of coefficients is computed.
+#define FETCHED (COEFFICIENTS > FIELD_COEFFICIENTS ? COEFFICIENTS : FIELD_COEFFICIENTS)
+
+#if POINT_CHAIN
+#include "generated/points.glsl"
+#define TERMS 32
+#else
+#include "generated/product.glsl"
+#define TERMS COEFFICIENTS
+#endif
+// The last element of a guarded chain is the square of the length of all but coefficient 0.
+#define CHAIN (TERMS + GUARD)
+
+// Coefficient 0 of a chain, and the square of the length of the others.
+void chain_parts(float c[CHAIN], out float first, out float rest) {
+#if POINT_CHAIN
+    const float Y00 = 0.28209479;
+    first = 0.0;
+    rest = 0.0;
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        first += Y00 * c[k];
+    }
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        float apart = c[k] - (Y00 * POINT_WEIGHTS[k]) * first;
+        rest += apart * apart / POINT_WEIGHTS[k];
+    }
+#else
+    first = c[0];
+    rest = 0.0;
+    [[unroll]] for (uint k = 1; k < TERMS; k++) {
+        rest += c[k] * c[k];
+    }
+#endif
+}
+
+void chain_begin(float transfer[COEFFICIENTS], out float c[CHAIN]) {
+#if POINT_CHAIN
+    float v[TERMS];
+    sh_points(transfer, v);
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        c[k] = POINT_WEIGHTS[k] * v[k];
+    }
+#else
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        c[k] = transfer[k];
+    }
+#endif
+#if GUARD
+    float first;
+    float rest;
+    chain_parts(c, first, rest);
+    c[TERMS] = rest;
+#endif
+}
+
+// The integral of the chain against a function f of as many bands.
+float chain_meet(float c[CHAIN], float f[COEFFICIENTS]) {
+    float sum = 0.0;
+#if POINT_CHAIN
+    float v[TERMS];
+    sh_points(f, v);
+#define MET v
+#else
+#define MET f
+#endif
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        sum += MET[k] * c[k];
+    }
+    return sum;
+}
+
+// Multiplies by 1 - b.
+//
+// A factor between 0 and 1 makes neither the integral of a function that is nowhere negative larger, nor its length. Cut to a few
+// bands it can do both, a little at a time and without end. The guard takes that back: coefficient 0 neither grows nor changes
+// sign, and the others are shortened until the whole is no longer than before.
+void chain_multiply(inout float c[CHAIN], float b[FETCHED]) {
+#if GUARD
+    float before = c[TERMS];
+#if POINT_CHAIN
+    float first_before = 0.0;
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        first_before += 0.28209479 * c[k];
+    }
+#else
+    float first_before = c[0];
+#endif
+#endif
+#if POINT_CHAIN
+    float v[TERMS];
+    sh_points(b, v);
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        c[k] -= c[k] * v[k];
+    }
+#else
+    float t[TERMS];
+    float blocked[FIELD_COEFFICIENTS];
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        t[k] = c[k];
+    }
+    [[unroll]] for (uint k = 0; k < FIELD_COEFFICIENTS; k++) {
+        blocked[k] = b[k];
+    }
+    sh_subtract_product(t, blocked);
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        c[k] = t[k];
+    }
+#endif
+#if GUARD
+    float first;
+    float rest;
+    chain_parts(c, first, rest);
+    float kept = clamp(first, min(first_before, 0.0), max(first_before, 0.0));
+    // What coefficient 0 gives up, the others may take. A factor of 1 changes nothing, to the last bit.
+    float room = max(before + (first_before - kept) * (first_before + kept), 0.0);
+    float shorten = rest > room ? sqrt(room / rest) : 1.0;
+    c[TERMS] = min(rest, room);
+#if POINT_CHAIN
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        float even = 0.28209479 * POINT_WEIGHTS[k];
+        c[k] = shorten * (c[k] - even * first) + even * kept;
+    }
+#else
+    c[0] = kept;
+    [[unroll]] for (uint k = 1; k < TERMS; k++) {
+        c[k] *= shorten;
+    }
+#endif
+#endif
+}

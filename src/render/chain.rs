@@ -1,0 +1,118 @@
+//! A chain of occluders on one vertex's transfer, in f64: the twin of `glsl/merge_product.glsl`, and the choices that both have.
+
+use super::variant::Chain;
+use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
+use crate::sh::points;
+use crate::sh::product::Tensor;
+
+/// Coefficients, or values at points times the weights; zero past the last.
+pub type State = [f64; MAX_COEFFICIENTS];
+
+/// Multiplies chains of some bands by factors of some bands.
+pub struct Multiplier {
+    tensor: Tensor,
+    guard: bool,
+    /// The basis at each point with the point's weight, where a chain stays at points.
+    points: Option<Vec<(State, f64)>>,
+}
+
+impl Multiplier {
+    /// For transfers of `bands` bands and blocked parts of `field_bands`.
+    pub fn new(chain: Chain, bands: usize, field_bands: usize) -> Self {
+        let basis = |direction| {
+            let mut y = [0.0; MAX_COEFFICIENTS];
+            evaluate(bands, direction, &mut y);
+            y
+        };
+        let points = || points::points().into_iter().map(|(p, weight)| (basis(p), weight)).collect();
+        Multiplier {
+            tensor: Tensor::new(bands, field_bands, bands),
+            guard: chain.guard,
+            points: chain.product.stays_at_points().then(points),
+        }
+    }
+
+    /// The chain without a factor.
+    pub fn begin(&self, transfer: &[f64]) -> State {
+        let mut state = [0.0; MAX_COEFFICIENTS];
+        match &self.points {
+            None => state[..transfer.len()].copy_from_slice(transfer),
+            Some(points) => {
+                for (value, (y, weight)) in state.iter_mut().zip(points) {
+                    *value = weight * dot(y, transfer);
+                }
+            }
+        }
+        state
+    }
+
+    /// The integral of the chain against a function of as many bands as the transfer.
+    pub fn meet(&self, state: &State, function: &[f64]) -> f64 {
+        match &self.points {
+            None => dot(state, &function[..self.count()]),
+            Some(points) => {
+                state.iter().zip(points).map(|(value, (y, _))| value * dot(y, &function[..self.count()])).sum()
+            }
+        }
+    }
+
+    /// Multiplies by 1 - `blocked`.
+    pub fn multiply(&self, state: &mut State, blocked: &[f64]) {
+        let before = self.parts(state);
+        match &self.points {
+            None => {
+                let mut product = [0.0; MAX_COEFFICIENTS];
+                self.tensor.multiply(state, blocked, &mut product);
+                state.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
+            }
+            Some(points) => {
+                for (value, (y, _)) in state.iter_mut().zip(points) {
+                    *value -= *value * dot(y, &blocked[..self.count()]);
+                }
+            }
+        }
+        if self.guard {
+            self.shorten(state, before);
+        }
+    }
+
+    /// Coefficient 0, and the square of the length of the others.
+    fn parts(&self, state: &State) -> [f64; 2] {
+        match &self.points {
+            None => [state[0], dot(&state[1..], &state[1..])],
+            Some(points) => {
+                let first = Y00 * state.iter().sum::<f64>();
+                let apart =
+                    |(value, (_, weight)): (&f64, &(State, f64))| (value - weight * Y00 * first).powi(2) / weight;
+                [first, state.iter().zip(points).map(apart).sum()]
+            }
+        }
+    }
+
+    /// Takes back what no factor between 0 and 1 could have added (see `merge_product.glsl`).
+    fn shorten(&self, state: &mut State, [first_before, rest_before]: [f64; 2]) {
+        let [first, rest] = self.parts(state);
+        let kept = first.clamp(first_before.min(0.0), first_before.max(0.0));
+        let room = (rest_before + (first_before - kept) * (first_before + kept)).max(0.0);
+        let factor = if rest > room { (room / rest).sqrt() } else { 1.0 };
+        match &self.points {
+            None => {
+                state[0] = kept;
+                state[1..].iter_mut().for_each(|t| *t *= factor);
+            }
+            Some(points) => {
+                for (value, (_, weight)) in state.iter_mut().zip(points) {
+                    *value = factor * (*value - weight * Y00 * first) + weight * Y00 * kept;
+                }
+            }
+        }
+    }
+
+    fn count(&self) -> usize {
+        coefficient_count(self.tensor.bands()[0])
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,216 @@
+//! Products at points: an expansion of up to 4 bands is evaluated at the 32 points of the icosahedral rule, multiplied there, and
+//! projected back, which is exact for one product (degree 9). A chain may also stay at the points and be projected once; the
+//! rule is then no longer exact, but a factor costs one evaluation.
+//!
+//! The points come in orbits under the reflections of the axes, eight of (1, 1, 1) and six times four of points in a coordinate
+//! plane. Coefficients that are odd in the same axes have the same magnitude all over an orbit: they are summed at the one
+//! point with no negative coordinate, and butterflies give the others.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use super::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
+use super::product_program::Form;
+use super::program::{Program, Term, Value, elements};
+use super::quadrature::icosahedral_rule;
+
+/// Largest number of bands of a factor whose products the rule projects exactly.
+pub const BANDS: usize = 4;
+
+/// Points of the rule.
+pub const COUNT: usize = 32;
+
+/// The points with their weights, orbit after orbit.
+pub fn points() -> Vec<(DVec3, f64)> {
+    orbits().iter().flat_map(|orbit| (0..orbit.size()).map(|s| (orbit.point(s), orbit.weight))).collect()
+}
+
+/// Points that are reflections of one another.
+struct Orbit {
+    /// The one without negative coordinates.
+    corner: DVec3,
+    /// Axes along which it has reflections.
+    axes: Vec<usize>,
+    weight: f64,
+}
+
+impl Orbit {
+    fn size(&self) -> usize {
+        1 << self.axes.len()
+    }
+
+    /// The point whose coordinate along `axes[n]` is negative where bit n is set.
+    fn point(&self, signs: usize) -> DVec3 {
+        let mut point = self.corner;
+        for (bit, &axis) in self.axes.iter().enumerate() {
+            if signs >> bit & 1 == 1 {
+                point[axis] = -point[axis];
+            }
+        }
+        point
+    }
+
+    /// The axes in which coefficients are odd, as bits of this orbit's axes, with their values at the corner: empty classes and
+    /// those that are odd in an axis without extent are left out.
+    fn classes(&self, bands: usize) -> BTreeMap<usize, Vec<(usize, f64)>> {
+        // A place without symmetry tells the parities of all coefficients.
+        let place = DVec3::new(0.36, 0.48, 0.8);
+        let basis = |at: DVec3| {
+            let mut y = [0.0; MAX_COEFFICIENTS];
+            evaluate(bands, at, &mut y);
+            y
+        };
+        let (here, corner) = (basis(place), basis(self.corner));
+        let mirrored = [0, 1, 2].map(|axis| {
+            let mut at = place;
+            at[axis] = -at[axis];
+            basis(at)
+        });
+        let mut classes: BTreeMap<usize, Vec<(usize, f64)>> = BTreeMap::new();
+        for k in (0..coefficient_count(bands)).filter(|&k| corner[k].abs() > 1e-12) {
+            let bits = self
+                .axes
+                .iter()
+                .enumerate()
+                .map(|(bit, &axis)| (usize::from(mirrored[axis][k] * here[k] < 0.0)) << bit);
+            classes.entry(bits.sum()).or_default().push((k, corner[k]));
+        }
+        classes
+    }
+}
+
+fn orbits() -> Vec<Orbit> {
+    let mut orbits: Vec<Orbit> = Vec::new();
+    for (point, weight) in icosahedral_rule() {
+        let corner = point.abs();
+        if orbits.iter().all(|orbit| orbit.corner.distance(corner) > 1e-9) {
+            let axes = (0..3).filter(|&axis| corner[axis] > 1e-9).collect();
+            orbits.push(Orbit { corner, axes, weight });
+        }
+    }
+    orbits
+}
+
+/// Sums and differences along every axis: classes to points, or back.
+fn butterflies(program: &mut Program, values: &mut [Option<Value>]) {
+    let size = values.len();
+    let mut step = 1;
+    while step < size {
+        for low in (0..size).filter(|low| low & step == 0) {
+            let (x, y) = (values[low], values[low | step]);
+            let term = |sign: f64, v: Value| Term::new(sign, &[v]);
+            (values[low], values[low | step]) = match (x, y) {
+                (Some(x), Some(y)) => {
+                    let sum = program.define(vec![term(1.0, x), term(1.0, y)]);
+                    (Some(sum), Some(program.define(vec![term(1.0, x), term(-1.0, y)])))
+                }
+                (Some(x), None) => (Some(x), Some(x)),
+                (None, Some(y)) => (Some(y), Some(program.define(vec![term(-1.0, y)]))),
+                (None, None) => (None, None),
+            };
+        }
+        step *= 2;
+    }
+}
+
+/// Values at the points of one orbit.
+fn at_orbit(program: &mut Program, orbit: &Orbit, bands: usize, input: impl Fn(usize) -> Value) -> Vec<Value> {
+    let mut values = vec![None; orbit.size()];
+    for (class, members) in orbit.classes(bands) {
+        let terms = members.into_iter().map(|(k, y)| Term::new(y, &[input(k)])).collect();
+        values[class] = Some(program.define(terms));
+    }
+    butterflies(program, &mut values);
+    values.into_iter().map(|v| v.expect("coefficient 0 is even everywhere")).collect()
+}
+
+/// Adds the projection of values at an orbit's points to coefficients; `factor` multiplies the weight.
+fn project(
+    program: &mut Program,
+    orbit: &Orbit,
+    bands: usize,
+    values: Vec<Value>,
+    factor: f64,
+    sums: &mut [Option<Value>],
+) {
+    let mut values: Vec<Option<Value>> = values.into_iter().map(Some).collect();
+    butterflies(program, &mut values);
+    for (class, members) in orbit.classes(bands) {
+        let value = values[class].expect("every point has a value");
+        for (k, y) in members {
+            program.accumulate(&mut sums[k], vec![Term::new(factor * y, &[value])]);
+        }
+    }
+}
+
+/// The product as evaluation, multiplication and projection.
+pub(super) fn product_program(bands: usize, form: Form) -> Program {
+    let count = coefficient_count(bands);
+    let [left, target] = if form == Form::Product { ["a", "c"] } else { ["t", "t"] };
+    let mut program = Program::new([elements(left, count), elements("b", count)].concat());
+    let mut sums = vec![None; count];
+    let sign = match form {
+        Form::Product => 1.0,
+        Form::Subtract => {
+            for (k, sum) in sums.iter_mut().enumerate() {
+                *sum = Some(program.define(vec![Term::new(1.0, &[Value::Input(k)])]));
+            }
+            -1.0
+        }
+    };
+    for orbit in orbits() {
+        let a = at_orbit(&mut program, &orbit, bands, Value::Input);
+        let b = at_orbit(&mut program, &orbit, bands, |k| Value::Input(count + k));
+        let products = a.into_iter().zip(b).map(|(a, b)| program.define(vec![Term::new(1.0, &[a, b])])).collect();
+        project(&mut program, &orbit, bands, products, sign * orbit.weight, &mut sums);
+    }
+    for (text, sum) in elements(target, count).into_iter().zip(sums) {
+        program.output(text, sum.expect("every coefficient has a term"));
+    }
+    program
+}
+
+/// Coefficients to values at the points: inputs c, outputs v in the order of [`points`].
+pub fn evaluate_program(bands: usize) -> Program {
+    let mut program = Program::new(elements("c", coefficient_count(bands)));
+    let mut values = Vec::new();
+    for orbit in orbits() {
+        values.extend(at_orbit(&mut program, &orbit, bands, Value::Input));
+    }
+    for (text, value) in elements("v", COUNT).into_iter().zip(values) {
+        program.output(text, value);
+    }
+    program
+}
+
+/// Values at the points that already hold their weights to coefficients: inputs v, outputs c.
+pub fn project_program(bands: usize) -> Program {
+    let count = coefficient_count(bands);
+    let mut program = Program::new(elements("v", COUNT));
+    let (mut sums, mut first) = (vec![None; count], 0);
+    for orbit in orbits() {
+        let values = (first..first + orbit.size()).map(Value::Input).collect();
+        project(&mut program, &orbit, bands, values, 1.0, &mut sums);
+        first += orbit.size();
+    }
+    for (text, sum) in elements("c", count).into_iter().zip(sums) {
+        program.output(text, sum.expect("every coefficient has a term"));
+    }
+    program
+}
+
+/// GLSL 460 text of `POINT_WEIGHTS`, `void sh_points(float c[N], out float v[32])` and
+/// `void sh_from_points(float v[32], out float c[N])`, the latter for values that already hold their weights.
+pub fn glsl_points(bands: usize) -> String {
+    let count = coefficient_count(bands);
+    let weights: Vec<String> = points().iter().map(|(_, weight)| format!("{:?}", *weight as f32)).collect();
+    format!(
+        "const float POINT_WEIGHTS[{COUNT}] = float[]({});\n\
+         void sh_points(float c[{count}], out float v[{COUNT}]) {{\n{}}}\n\
+         void sh_from_points(float v[{COUNT}], out float c[{count}]) {{\n{}}}\n",
+        weights.join(", "),
+        evaluate_program(bands).glsl_body(),
+        project_program(bands).glsl_body()
+    )
+}

@@ -17,6 +17,11 @@ layout(push_constant) uniform Push {
 void main() {
     vec3 q = position - push.eye.xyz;
     float w = dot(push.forward.xyz, q);
+    // A corner just beside the eye, in r: SwiftShader divides by w before it clips to tell front from back, takes 1 for 1 / 0,
+    // and errs where the quotient is huge.
+    if (abs(w) < 1e-6) {
+        w = w < 0.0 ? -1e-6 : 1e-6;
+    }
 #if RADIANCE
     // Reversed depth w_near / w without a far plane; nothing closer than eye.w (in r) is seen.
     float z = push.eye.w;

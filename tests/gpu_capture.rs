@@ -6,7 +6,7 @@ use common::{Gpu, gpu, pot, report};
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::asset::{Mesh, generate};
 use shadow_fields::bake::capture::{Capture, Model, NO_SLOT};
-use shadow_fields::check::capture::{self as check, DIFFERING_LIMIT, eyes_outside, faces, texel_index};
+use shadow_fields::check::capture::{self as check, differing_limit, eyes_outside, faces, texel_index};
 
 const FACE_PX: u32 = 32;
 /// Coverage of every eye's faces, true where the object is; faces without a slot are `None`.
@@ -52,7 +52,7 @@ fn coverage_is_what_rays_meet() {
         assert_eq!(found.off_edge, 0, "{}: texels differ where there is no edge", mesh.name);
         assert_eq!(found.left_out_wrongly, 0, "{}: a face was left out that shows the object", mesh.name);
         assert!(found.left_out > 0, "{}: no face was left out", mesh.name);
-        assert!(found.error() < DIFFERING_LIMIT, "{}: {found:?}", mesh.name);
+        assert!(found.error() < differing_limit(&gpu.device), "{}: {found:?}", mesh.name);
     }
 }
 
@@ -122,7 +122,7 @@ fn colours_are_what_rays_meet() {
     for mesh in [painted_box(true), generate::torus_two_colour(0.5, 0.15, 48, 20)] {
         let off = check::colors(&gpu.baker(), &mesh, &eyes_outside(), FACE_PX).unwrap();
         report(&format!("{}: {off:.1e} of the texels differ", mesh.name));
-        assert!(off < 2.0 * DIFFERING_LIMIT, "{}: {off} of the texels differ", mesh.name);
+        assert!(off < 2.0 * differing_limit(&gpu.device), "{}: {off} of the texels differ", mesh.name);
     }
 }
 

@@ -11,8 +11,17 @@ use bytemuck::Pod;
 use glam::Vec3;
 use std::sync::Arc;
 
-/// Texels whose centres lie so near an edge that f32 and f64 disagree: a share of all texels.
-pub const DIFFERING_LIMIT: f64 = 1e-3;
+/// Share of texels whose centres may lie so near an edge that device and rays disagree: 1e-3 where corners snap to 1/256 of a
+/// texel, and in proportion to that step on other devices (Vulkan asks for 1/16).
+pub fn differing_limit(device: &Device) -> f64 {
+    1e-3 * snapping(device)
+}
+
+/// How far corners move before rasterisation, in 1/256 of a pixel.
+pub(super) fn snapping(device: &Device) -> f64 {
+    f64::from(8 - device.limits.sub_pixel_precision_bits.min(8) as i32).exp2()
+}
+
 /// Colours interpolated in f32, relative: a few roundings, of which those near a silhouette are the largest.
 const COLOR: f64 = 1e-4;
 
@@ -186,14 +195,14 @@ pub fn eyes_outside() -> Vec<Vec3> {
 /// # Errors
 /// As [`Capture::new`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
-    let measure = "share of texels";
+    let (measure, limit) = ("share of texels", differing_limit(baker.device()));
     for mesh in [generate::sphere(0.5, 3), generate::torus(1.0, 0.3, 32, 16)] {
         let found = coverage(baker, &mesh, &eyes_outside(), 32)?;
-        add(Row::new("capture", format!("coverage, {}", mesh.name), measure, found.error(), DIFFERING_LIMIT));
+        add(Row::new("capture", format!("coverage, {}", mesh.name), measure, found.error(), limit));
     }
     let mesh = generate::torus_two_colour(0.5, 0.15, 32, 16);
     let found = colors(baker, &mesh, &eyes_outside(), 32)?;
     // Silhouettes and the seams where two colours meet count here too.
-    add(Row::new("capture", format!("radiance, {}", mesh.name), measure, found, 2.0 * DIFFERING_LIMIT));
+    add(Row::new("capture", format!("radiance, {}", mesh.name), measure, found, 2.0 * limit));
     Ok(())
 }

@@ -107,6 +107,8 @@ fn scene_file() {
     }
     refused(scene(&format!("{HEAD}[output]\nwidth = 0\n")), "dir/s.toml:4: ", "0 x 640 pixels");
     refused(scene(&format!("{HEAD}[output]\nexposure_ev = inf\n")), "dir/s.toml:4: ", "exposure_ev inf");
+    refused(scene(&format!("{HEAD}[output]\ntime_s = nan\n")), "dir/s.toml:5: ", "not finite");
+    refused(scene(&format!("{HEAD}[output]\ntime_s = \"now\"\n")), "dir/s.toml:5: ", "invalid type");
     refused(Scene::load(Path::new("no/such.toml")), "no/such.toml: ", "o such file");
 }
 
@@ -143,12 +145,25 @@ fn scene_entities() {
         ("motion = [{ jump = { } }]", "unknown variant `jump`"),
         ("motion = [{ keyframes = { keys = [] } }]", "at least one key"),
         ("motion = [{ keyframes = { keys = [{ time_s = 1 }, { time_s = 1 }] } }]", "times that increase"),
+        ("motion = [{ keyframes = { keys = [{ time_s = nan }] } }]", "not finite"),
+        ("motion = [{ keyframes = { keys = [{ time_s = 1, scale = 0 }] } }]", "uniform and positive"),
+        ("motion = [{ keyframes = { keys = [{ time_s = 1, at = 0 }] } }]", "at"),
+        (
+            "motion = [{ keyframes = { interpolation = \"bezier\", keys = [{ time_s = 1 }] } }]",
+            "unknown variant `bezier`",
+        ),
+        ("motion = [{ keyframes = { interpolation = 3, keys = [{ time_s = 1 }] } }]", ""),
     ];
     for (line, part) in table {
         // The entity's table begins in line 7; the line to blame is the ninth.
         let text = format!("{HEAD}{MESH}[[entity]]\nmesh = \"m\"\n{line}\n");
         refused(scene(&text), "dir/s.toml:9: ", part);
     }
+    // In a table of its own the line is the key's, too.
+    let long = format!(
+        "{HEAD}{MESH}[[entity]]\nmesh = \"m\"\n[[entity.motion]]\n[entity.motion.keyframes]\ninterpolation = \"x\"\nkeys = []\n"
+    );
+    refused(scene(&long), "dir/s.toml:", "unknown variant `x`");
     refused(scene(&format!("{HEAD}{MESH}\n[[entity]]\nmesh = \"n\"\n")), "dir/s.toml:8: ", "there is no mesh \"n\"");
     refused(scene(&format!("{HEAD}{MESH}[[entity]]\nname = \"x\"\n")), "dir/s.toml:7: ", "missing field `mesh`");
     let many = format!("{HEAD}{MESH}{}", "[[entity]]\nmesh = \"m\"\n".repeat(4097));
@@ -175,6 +190,17 @@ fn scene_meshes_and_environment() {
         ("[environment]\ngradient = { radiance = [1, 1, nan] }\n", "environment gradient NaN"),
         ("[environment]\nkey = { radiance = [1, 1, 1], toward = [0, 0, 0], sharpness = 1 }\n", "no direction"),
         ("[environment]\nkey = { radiance = [1, 1, 1], toward = [0, 1, 0], sharpness = 1e6 }\n", "limit of 1e5"),
+        ("[environment]\nstrength = -1\n", "environment strength -1"),
+        ("[environment]\nstrength = inf\n", "environment strength inf"),
+        ("[environment]\nturn_deg = nan\n", "environment turn_deg NaN"),
+        ("[environment]\nturn_deg = 1e6\n", "is not within 1e5"),
+        ("[environment]\nsky = { turbidity = 1 }\n", "sky turbidity 1 is not within 2 to 10"),
+        ("[environment]\nsky = { sun_elevation_deg = -1 }\n", "sun_elevation_deg -1 is not within 0 to 90"),
+        ("[environment]\nsky = { sun_azimuth_deg = nan }\n", "sun_azimuth_deg NaN"),
+        ("[environment]\nsky = { radiance = -1 }\n", "sky radiance -1"),
+        ("[environment]\nsky = { sun = inf }\n", "sky sun inf"),
+        ("[environment]\nsky = { ground = [0, 0, 2] }\n", "sky ground 2 is not within 0 to 1"),
+        ("[environment]\nimage = { file = \"sky.exr\", scale = -1 }\n", "image scale -1"),
         ("[environment]\nimage = { file = \"none.exr\" }\n", "no such file"),
         ("[environment]\nimage = { file = \"bad.png\" }\n", "bad.png: environment image"),
         ("[environment]\nimage = { file = \"bad.obj\" }\n", "not an HDR, EXR or PNG"),
@@ -184,6 +210,12 @@ fn scene_meshes_and_environment() {
     }
     refused(scene(&format!("{HEAD}{MESH}{MESH}")), "dir/s.toml:7: ", "two meshes \"m\"");
     refused(scene(&format!("{HEAD}[environment]\nfog = 1\n")), "dir/s.toml:5: ", "unknown field `fog`");
+    refused(scene(&format!("{HEAD}[environment]\nsky = {{ moon = 1 }}\n")), "dir/s.toml:5: ", "unknown field `moon`");
+    refused(
+        scene(&format!("{HEAD}[environment]\nsky = {{ ground = [1, 1] }}\n")),
+        "dir/s.toml:5: ",
+        "invalid length 2",
+    );
 }
 
 #[test]

@@ -154,6 +154,95 @@ fn keyframes_interpolate_hold_and_repeat() {
 }
 
 #[test]
+fn smooth_keyframes_are_a_spline_through_the_keys() {
+    let keys = |rest: &str, points: &[[f64; 2]]| {
+        let keys: Vec<String> = points
+            .iter()
+            .map(|[time, x]| {
+                format!("{{ time_s = {time:?}, position = [{x:?}, {:?}, 0.5], scale = {:?} }}", 2.0 * x, 1.0 + x.abs())
+            })
+            .collect();
+        ball(&format!(
+            "motion = [{{ keyframes = {{ interpolation = \"smooth\", {rest} keys = [{}] }} }}]",
+            keys.join(", ")
+        ))
+    };
+    let x = |scene: &Scene, time: f64| f64::from(scene.at(time)[0].position.x);
+    // Through every key, whatever their spacing, and without a kink: one-sided slopes agree.
+    let points = [[0.0, 0.0], [1.0, 2.0], [1.5, 1.0], [4.0, -1.0], [5.0, 3.0]];
+    let scene = keys("", &points);
+    let slope = |scene: &Scene, time: f64, side: f64| (x(scene, time + side * 1e-3) - x(scene, time)) / (side * 1e-3);
+    for [time, at] in points {
+        assert!((x(&scene, time) - at).abs() < 1e-6);
+        assert!((f64::from(scene.at(time)[0].position.y) - 2.0 * at).abs() < 1e-6);
+    }
+    for (k, [time, _]) in points.iter().enumerate().take(4).skip(1) {
+        let (before, after) = (slope(&scene, *time, -1.0), slope(&scene, *time, 1.0));
+        let expected = (points[k + 1][1] - points[k - 1][1]) / (points[k + 1][0] - points[k - 1][0]);
+        assert!(
+            (before - expected).abs() < 2e-2 && (after - expected).abs() < 2e-2,
+            "{time}: {before} {after} {expected}"
+        );
+    }
+    assert!((0..500).all(|i| scene.at(f64::from(i) * 0.01)[0].scale > 0.05), "a scale stays positive");
+    // Equal steps: the middle of a stretch is (-a + 9 b + 9 c - d) / 16 of the four keys around it.
+    let even = keys("", &[[0.0, 1.0], [1.0, 5.0], [2.0, -2.0], [3.0, 4.0]]);
+    assert!((x(&even, 1.5) - (-1.0 + 45.0 - 18.0 - 4.0) / 16.0).abs() < 1e-6);
+    // On a line at a steady rate it is that line.
+    let line = keys("", &[[0.0, 0.0], [1.0, 1.0], [3.0, 3.0], [3.5, 3.5]]);
+    assert!((0..36).all(|i| (x(&line, f64::from(i) * 0.1) - f64::from(i) * 0.1).abs() < 1e-6));
+    // It holds still outside, and repeats without a kink where it closes.
+    assert_eq!((x(&scene, -3.0), x(&scene, 99.0)), (0.0, 3.0));
+    let ring = keys("repeat = true,", &[[0.0, 0.0], [1.0, 2.0], [2.0, 5.0], [4.0, 0.0]]);
+    for seam in [0.0, 4.0, -8.0] {
+        let (before, after) = (slope(&ring, seam, -1.0), slope(&ring, seam, 1.0));
+        assert!((before - after).abs() < 3e-2 && (after - (2.0 - 5.0) / 3.0).abs() < 2e-2, "{before} {after}");
+    }
+    // It reads back, and "linear" is what is meant without it.
+    let again = Data::parse(&ring.to_toml(), Path::new("again.toml")).unwrap();
+    assert_eq!(again, ring.data);
+    let keys = "keys = [{ time_s = 0 }, { time_s = 1, position = [1, 0, 0] }]";
+    let plain = ball(&format!("motion = [{{ keyframes = {{ {keys} }} }}]"));
+    let named = ball(&format!("motion = [{{ keyframes = {{ interpolation = \"linear\", {keys} }} }}]"));
+    assert_eq!(plain.data, named.data);
+}
+
+#[test]
+fn motion_is_the_same_at_any_rate_of_frames() {
+    let text = embedded::scenes().into_iter().find(|s| s.0 == "twelve_instances").unwrap().1;
+    let scene = Scene::parse(text, Path::new("assets/scenes/twelve_instances.toml"), &embedded::read).unwrap();
+    // The tenth frame of 10 a second, the sixtieth of 60: one second is one second, to the bit.
+    let frames =
+        |count: u32, rate: u32| (0..count).map(|i| scene.at(f64::from(i) / f64::from(rate))).collect::<Vec<_>>();
+    let (slow, fast) = (frames(21, 10), frames(121, 60));
+    for i in 0..21 {
+        assert_eq!(slow[i], fast[6 * i]);
+    }
+}
+
+#[test]
+fn built_in_meshes_are_found_from_any_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.toml");
+    let text = |file: &str| {
+        format!(
+            "[camera]\neye = [0, 1, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"m\"\nfile = \"{file}\"\n[[entity]]\nmesh = \"m\"\n"
+        )
+    };
+    std::fs::write(&path, text("assets/meshes/torus.obj")).unwrap();
+    let torus = Scene::load(&path).unwrap();
+    let built_in = Scene::load(Path::new("assets/scenes/torus_over_plane.toml")).unwrap();
+    assert!(built_in.meshes.iter().any(|m| m.content_hash() == torus.meshes[0].content_hash()));
+    // A file of that name on disk comes first.
+    std::fs::create_dir_all(folder.path().join("assets/meshes")).unwrap();
+    std::fs::write(folder.path().join("assets/meshes/torus.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    assert_eq!(Scene::load(&path).unwrap().meshes[0].triangles.len(), 1);
+    std::fs::write(&path, text("assets/meshes/no.obj")).unwrap();
+    let error = Scene::load(&path).unwrap_err().to_string();
+    assert!(error.contains("no.obj") && error.contains("s.toml:4: "), "{error}");
+}
+
+#[test]
 fn time_alone_decides() {
     let text = embedded::scenes().into_iter().find(|s| s.0 == "torus_over_plane").unwrap().1;
     let scene = Scene::parse(text, Path::new("assets/scenes/torus_over_plane.toml"), &embedded::read).unwrap();

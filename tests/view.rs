@@ -51,6 +51,23 @@ fn the_first_picture_is_the_files() {
 }
 
 #[test]
+fn a_scene_without_distant_light_gets_a_sky_that_is_saved() {
+    let dark = SMALL.replace("[environment]\nuniform = [0.1, 0.1, 0.1]\n", "");
+    let mut editor = from_text(&dark);
+    assert!(editor.scene().data.environment.sky.is_some() && !editor.scene().environment.is_none());
+    let saved = Data::parse(&editor.data(Path::new("")).unwrap().to_toml(), Path::new("d.toml")).unwrap();
+    assert_eq!(saved.environment, editor.scene().data.environment);
+    // Turned off, it stays off when it is saved.
+    assert!(editor.apply(Command::SetSky(0.0)).changed.sky && editor.scene().environment.is_none());
+    let saved = editor.data(Path::new("")).unwrap().to_toml();
+    let read = |path: &Path| Err(shadow_fields::Error::input(path, "this test has no files"));
+    let again = Editor::new(Scene::parse(&saved, Path::new("d.toml"), &read).unwrap(), Path::new("d.toml"));
+    assert!(again.scene().environment.is_none());
+    // A scene that has its light keeps it.
+    assert!(from_text(SMALL).scene().data.environment.sky.is_none());
+}
+
+#[test]
 fn orbiting_keeps_distance_and_target_and_never_flips() {
     let mut editor = from_text(SMALL);
     let before = editor.camera().clone();

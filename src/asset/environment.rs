@@ -1,23 +1,18 @@
 //! Distant light: radiance that depends on direction only, as such and projected to spherical harmonics.
 
 use std::f64::consts::{PI, TAU};
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3, Vec3};
-use image::{ImageFormat, ImageReader, Limits};
 use serde::{Deserialize, Serialize};
 
-use super::picture::linear_from_srgb;
+use super::equirect::Equirect;
+use super::sky::{Dome, Sky};
 use crate::error::{Error, Result};
+use crate::sh::lobe;
 use crate::sh::rotation::Rotation;
-use crate::sh::{basis, lobe};
 
-/// Largest width of an environment image; its height may be half of it: 1.6 GB as f32 RGB.
-pub const WIDTH_LIMIT_PX: u32 = 16_384;
-/// Most memory in bytes that decoding an image may take.
-const DECODE_LIMIT_BYTES: u64 = 2 << 30;
 /// Largest angle that the whole may be turned by: f32 keeps hundredths of a degree there.
 const TURN_LIMIT_DEG: f32 = 1e5;
 /// Intervals of Simpson's rule for the lobe of [`Key`]; its relative error is then below 1e-11.
@@ -42,6 +37,9 @@ pub struct Source {
     /// A soft directional light.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub key: Option<Key>,
+    /// A generated sky; `sky = {}` takes its defaults.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sky: Option<Sky>,
     /// An equirectangular picture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image: Option<Image>,
@@ -50,11 +48,11 @@ pub struct Source {
 impl Default for Source {
     /// Darkness.
     fn default() -> Self {
-        Source { strength: 1.0, turn_deg: 0.0, uniform: None, gradient: None, key: None, image: None }
+        Source { strength: 1.0, turn_deg: 0.0, uniform: None, gradient: None, key: None, sky: None, image: None }
     }
 }
 
-fn one() -> f32 {
+pub(super) fn one() -> f32 {
     1.0
 }
 
@@ -94,12 +92,13 @@ impl Source {
                 return Err(Error::Input("environment key has no direction towards it".into()));
             }
         }
+        self.sky.as_ref().map_or(Ok(()), Sky::check)?;
         self.image.as_ref().map_or(Ok(()), |image| amount("image scale", &[image.scale]))
     }
 
     /// Whether nothing shines, whatever the strength.
     pub fn is_empty(&self) -> bool {
-        self.uniform.is_none() && self.gradient.is_none() && self.key.is_none() && self.image.is_none()
+        *self == Source { strength: self.strength, turn_deg: self.turn_deg, ..Source::default() }
     }
 }
 
@@ -157,15 +156,8 @@ pub struct Image {
 #[derive(Clone, Debug)]
 pub struct Environment {
     source: Source,
-    picture: Option<Arc<Picture>>,
-}
-
-/// Linear radiance of texels, rows from +y.
-#[derive(Debug)]
-struct Picture {
-    width: usize,
-    height: usize,
-    texels: Vec<[f32; 3]>,
+    picture: Option<Arc<Equirect>>,
+    dome: Option<Arc<Dome>>,
 }
 
 impl Environment {
@@ -173,13 +165,14 @@ impl Environment {
     ///
     /// # Errors
     /// [`Error::Input`], one line: a negative or non-finite number, a direction without length, a picture that cannot be
-    /// read, is not HDR, EXR or PNG, is wider than [`WIDTH_LIMIT_PX`], or holds negative or non-finite radiance.
+    /// read, is not HDR, EXR or PNG, is wider than [`super::equirect::WIDTH_LIMIT_PX`], or holds negative or non-finite radiance.
     pub fn new(source: &Source, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Self> {
         source.check()?;
         let picture = source.image.as_ref().map(|image| {
-            Picture::decode(&read(&image.file)?).map(Arc::new).map_err(|e| e.context(image.file.display()))
+            Equirect::decode(&read(&image.file)?).map(Arc::new).map_err(|e| e.context(image.file.display()))
         });
-        Ok(Self { source: source.clone(), picture: picture.transpose()? })
+        let dome = source.sky.as_ref().map(|sky| Arc::new(Dome::new(sky)));
+        Ok(Self { source: source.clone(), picture: picture.transpose()?, dome })
     }
 
     /// The same picture under another description, which must name it too if it names one.
@@ -193,7 +186,11 @@ impl Environment {
             return Err(Error::Input(format!("environment image {} was not read", other.display())));
         }
         let picture = self.picture.clone().filter(|_| source.image.is_some());
-        Ok(Self { source: source.clone(), picture })
+        let dome = match &source.sky {
+            same if *same == self.source.sky => self.dome.clone(),
+            sky => sky.as_ref().map(|sky| Arc::new(Dome::new(sky))),
+        };
+        Ok(Self { source: source.clone(), picture, dome })
     }
 
     /// Its description.
@@ -224,14 +221,17 @@ impl Environment {
             let cosine = k.toward.as_dvec3().normalize().dot(direction);
             sum += k.radiance.as_dvec3() * (f64::from(k.sharpness) * (cosine - 1.0)).exp();
         }
-        if let Some(picture) = &self.picture {
-            sum += picture.at(direction) * f64::from(self.source.image.as_ref().map_or(1.0, |image| image.scale));
+        if let Some(dome) = &self.dome {
+            sum += dome.radiance(direction);
+        }
+        if let (Some(picture), Some(image)) = (&self.picture, &self.source.image) {
+            sum += picture.radiance(direction) * f64::from(image.scale);
         }
         (sum * f64::from(self.source.strength)).to_array()
     }
 
-    /// Projection of each channel to `bands` bands, bands^2 coefficients. All but the picture is projected in closed form or
-    /// by a one-dimensional integral; texels are weighted with their exact solid angle.
+    /// Projection of each channel to `bands` bands, bands^2 coefficients. All but the sky is exact: closed forms, a one-dimensional
+    /// integral, and for pictures the integral over every texel.
     pub fn coefficients(&self, bands: usize) -> [Vec<f64>; 3] {
         let turn = Rotation::new(bands, self.turn());
         self.unturned(bands).map(|channel| {
@@ -268,13 +268,16 @@ impl Environment {
                 &lobe::zonal(bands, &key_zonal(bands, f64::from(k.sharpness)), k.toward.as_dvec3().normalize()),
             );
         }
-        if let Some(picture) = &self.picture {
-            let mut texels = [(); 3].map(|()| vec![0.0; bands * bands]);
-            picture.project(bands, &mut texels);
-            let scale = f64::from(self.source.image.as_ref().map_or(1.0, |image| image.scale));
-            for (channel, texels) in sum.iter_mut().zip(texels) {
-                channel.iter_mut().zip(texels).for_each(|(c, t)| *c += scale * t);
+        let mut mix = |parts: [&[f64]; 3], scale: f64| {
+            for (channel, part) in sum.iter_mut().zip(parts) {
+                channel.iter_mut().zip(part).for_each(|(c, p)| *c += scale * p);
             }
+        };
+        if let Some(dome) = &self.dome {
+            mix(dome.coefficients(bands), 1.0);
+        }
+        if let (Some(picture), Some(image)) = (&self.picture, &self.source.image) {
+            mix(picture.coefficients(bands), f64::from(image.scale));
         }
         sum
     }
@@ -282,7 +285,7 @@ impl Environment {
 
 /// z_l = sqrt((2l + 1) / (4 pi)) * 2 pi * integral over c of exp(sharpness * (c - 1)) P_l(c), by Simpson's rule in 1 - c over the
 /// part where the exponential exceeds 1e-17.
-fn key_zonal(bands: usize, sharpness: f64) -> Vec<f64> {
+pub(super) fn key_zonal(bands: usize, sharpness: f64) -> Vec<f64> {
     let end = if sharpness > 20.0 { 40.0 / sharpness } else { 2.0 };
     let step = end / LOBE_INTERVALS as f64;
     let mut z = vec![0.0; bands];
@@ -306,57 +309,4 @@ fn key_zonal(bands: usize, sharpness: f64) -> Vec<f64> {
         }
     }
     z.iter().enumerate().map(|(l, sum)| ((2.0 * l as f64 + 1.0) / (4.0 * PI)).sqrt() * TAU * sum).collect()
-}
-
-impl Picture {
-    fn decode(bytes: &[u8]) -> Result<Self> {
-        let fail = |what: String| Error::Input(format!("environment image: {what}"));
-        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| fail(e.to_string()))?;
-        let format = reader.format();
-        if !matches!(format, Some(ImageFormat::Hdr | ImageFormat::OpenExr | ImageFormat::Png)) {
-            return Err(fail("not an HDR, EXR or PNG file".into()));
-        }
-        let mut limits = Limits::default();
-        limits.max_image_width = Some(WIDTH_LIMIT_PX);
-        limits.max_image_height = Some(WIDTH_LIMIT_PX / 2);
-        limits.max_alloc = Some(DECODE_LIMIT_BYTES);
-        reader.limits(limits);
-        let decoded = reader.decode().map_err(|e| {
-            let what = e.to_string().replace('\n', " ");
-            fail(format!("{what} (limits: {WIDTH_LIMIT_PX} x {} pixels)", WIDTH_LIMIT_PX / 2))
-        })?;
-        let rgb = decoded.into_rgb32f();
-        let linear = |c: f32| if format == Some(ImageFormat::Png) { linear_from_srgb(c) } else { c };
-        let texels: Vec<[f32; 3]> = rgb.pixels().map(|p| p.0.map(linear)).collect();
-        if texels.is_empty() || texels.iter().flatten().any(|c| !(c.is_finite() && *c >= 0.0)) {
-            return Err(fail("no pixels, or a pixel that is negative or not finite".into()));
-        }
-        Ok(Self { width: rgb.width() as usize, height: rgb.height() as usize, texels })
-    }
-
-    /// The texel in `direction`, as [`Image`] states.
-    fn at(&self, direction: DVec3) -> DVec3 {
-        let column = (0.5 + direction.x.atan2(-direction.z) / TAU) * self.width as f64;
-        let row = direction.y.clamp(-1.0, 1.0).acos() / PI * self.height as f64;
-        // The right edge and the south pole round onto the last texel; a negative index saturates to 0.
-        let (x, y) = ((column as usize).min(self.width - 1), (row as usize).min(self.height - 1));
-        DVec3::from_array(self.texels[y * self.width + x].map(f64::from))
-    }
-
-    fn project(&self, bands: usize, sum: &mut [Vec<f64>; 3]) {
-        let mut values = vec![0.0; bands * bands];
-        for y in 0..self.height {
-            let polar = |edge: f64| PI * (y as f64 + edge) / self.height as f64;
-            let weight = (polar(0.0).cos() - polar(1.0).cos()) * TAU / self.width as f64;
-            let (sine, cosine) = polar(0.5).sin_cos();
-            for x in 0..self.width {
-                let (across, ahead) = (TAU * ((x as f64 + 0.5) / self.width as f64 - 0.5)).sin_cos();
-                basis::evaluate(bands, DVec3::new(sine * across, cosine, -sine * ahead), &mut values);
-                for (channel, texel) in sum.iter_mut().zip(self.texels[y * self.width + x]) {
-                    let amount = weight * f64::from(texel);
-                    channel.iter_mut().zip(&values).for_each(|(c, v)| *c += amount * v);
-                }
-            }
-        }
-    }
 }

@@ -12,12 +12,14 @@ use crate::error::{Error, Result};
 pub mod embedded;
 pub mod enclose;
 pub mod environment;
+pub mod equirect;
 pub mod false_color;
 pub mod generate;
 pub mod lettering;
 pub mod mesh;
 pub mod obj;
 pub mod picture;
+pub mod sky;
 pub mod teapot;
 pub mod topology;
 

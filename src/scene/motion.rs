@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DQuat, DVec3, Quat, Vec3};
+use glam::{DQuat, DVec3, DVec4, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::values;
@@ -102,6 +102,9 @@ pub enum Motion {
         /// Whether it starts over after the last keyframe's time, counted from the first one's.
         #[serde(default)]
         repeat: bool,
+        /// What happens between keys.
+        #[serde(default, skip_serializing_if = "Interpolation::is_linear")]
+        interpolation: Interpolation,
     },
     /// Carries the position around a line; the rotation stays as it is.
     Orbit {
@@ -141,6 +144,26 @@ pub enum Motion {
     },
 }
 
+/// How positions and scales go from key to key. Rotations always turn the short way at a steady rate (spherical linear
+/// interpolation).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Interpolation {
+    /// In straight lines at a steady rate.
+    #[default]
+    Linear,
+    /// On a Catmull-Rom spline through the keys, without a kink: Hermite cubics whose slope at a key is that from the key before to
+    /// the key after, over their times. It starts and ends along its first and last stretch; a repeated path whose last key is
+    /// where the first is has no kink there either. It may swing beyond the keys: a scale is kept above a tenth of its keys'.
+    Smooth,
+}
+
+impl Interpolation {
+    fn is_linear(&self) -> bool {
+        *self == Interpolation::Linear
+    }
+}
+
 fn up() -> Vec3 {
     Vec3::Y
 }
@@ -152,13 +175,13 @@ pub struct Keyframe {
     /// Seconds.
     #[serde(deserialize_with = "values::number")]
     pub time_s: f64,
-    /// Metres; moved in a straight line.
+    /// Metres; between keys as [`Interpolation`] says.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "values::maybe_position")]
     pub position: Option<Vec3>,
     /// Turned the short way at a steady rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Rotation>,
-    /// Grows at a steady rate.
+    /// Between keys as [`Interpolation`] says.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "values::maybe_scale")]
     pub scale: Option<f32>,
 }
@@ -192,6 +215,10 @@ impl Exact {
         }
     }
 
+    fn position_and_scale(self) -> DVec4 {
+        self.position.extend(self.scale)
+    }
+
     /// This placement after `motion`, with `rest` for what keyframes leave out.
     pub(super) fn moved(mut self, motion: &Motion, rest: Exact, time_s: f64) -> Self {
         // The fraction of a turn first: the angle stays small, so late times lose nothing.
@@ -199,7 +226,9 @@ impl Exact {
             DQuat::from_axis_angle(axis.as_dvec3().normalize(), TAU * (time_s / period_s).fract())
         };
         match motion {
-            Motion::Keyframes { keys, repeat } => return interpolate(keys, *repeat, rest, time_s),
+            Motion::Keyframes { keys, repeat, interpolation } => {
+                return interpolate(keys, *repeat, *interpolation, rest, time_s);
+            }
             Motion::Orbit { centre, axis, period_s } => {
                 let centre = centre.as_dvec3();
                 self.position = centre + turn(*axis, *period_s) * (self.position - centre);
@@ -214,7 +243,7 @@ impl Exact {
     }
 }
 
-fn interpolate(keys: &[Keyframe], repeat: bool, rest: Exact, time_s: f64) -> Exact {
+fn interpolate(keys: &[Keyframe], repeat: bool, interpolation: Interpolation, rest: Exact, time_s: f64) -> Exact {
     let (first, last) = (keys[0].time_s, keys[keys.len() - 1].time_s);
     let time = if repeat && last > first { first + (time_s - first).rem_euclid(last - first) } else { time_s };
     let place = |key: &Keyframe| Exact {
@@ -227,10 +256,39 @@ fn interpolate(keys: &[Keyframe], repeat: bool, rest: Exact, time_s: f64) -> Exa
         return place(&keys[next.saturating_sub(1)]);
     }
     let (from, to) = (place(&keys[next - 1]), place(&keys[next]));
-    let part = (time - keys[next - 1].time_s) / (keys[next].time_s - keys[next - 1].time_s);
-    Exact {
-        position: from.position.lerp(to.position, part),
-        rotation: from.rotation.slerp(to.rotation, part),
-        scale: from.scale + (to.scale - from.scale) * part,
-    }
+    let span_s = keys[next].time_s - keys[next - 1].time_s;
+    let part = (time - keys[next - 1].time_s) / span_s;
+    let rotation = from.rotation.slerp(to.rotation, part);
+    let [a, b] = [from, to].map(Exact::position_and_scale);
+    let between = match interpolation {
+        Interpolation::Linear => a.lerp(b, part),
+        Interpolation::Smooth => {
+            let closed =
+                repeat && place(&keys[0]).position_and_scale() == place(&keys[keys.len() - 1]).position_and_scale();
+            // Over this stretch: the slope at a key by its neighbours.
+            let slope = |key: usize| {
+                let end = keys.len() - 1;
+                // The first and the last key of a closed path are one, whose neighbours lie on both sides of the seam.
+                let at = |key: usize| place(&keys[key]).position_and_scale();
+                let (before, after, took_s) = match key {
+                    _ if closed && (key == 0 || key == end) => {
+                        (at(end - 1), at(1), (last - keys[end - 1].time_s) + (keys[1].time_s - first))
+                    }
+                    0 => (at(0), at(1), keys[1].time_s - first),
+                    _ if key == end => (at(end - 1), at(end), last - keys[end - 1].time_s),
+                    _ => (at(key - 1), at(key + 1), keys[key + 1].time_s - keys[key - 1].time_s),
+                };
+                (after - before) * (span_s / took_s)
+            };
+            let spline = hermite([a, b], [slope(next - 1), slope(next)], part);
+            spline.with_w(spline.w.max(0.1 * a.w.min(b.w)))
+        }
+    };
+    Exact { position: between.truncate(), rotation, scale: between.w }
+}
+
+/// The cubic through `values` at 0 and 1 with `slopes` there.
+fn hermite([a, b]: [DVec4; 2], [from, to]: [DVec4; 2], t: f64) -> DVec4 {
+    let rest = 1.0 - t;
+    (a * (1.0 + 2.0 * t) + from * t) * rest * rest + (b * (1.0 + 2.0 * rest) - to * rest) * t * t
 }

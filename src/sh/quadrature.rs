@@ -10,7 +10,7 @@ use glam::DVec3;
 /// Nodes and weights on [-1, 1] that integrate polynomials up to degree `2 * node_count - 1`; weights sum to 2.
 ///
 /// Newton iteration on the Legendre polynomial from the usual cosine estimate of its roots.
-fn gauss_legendre(node_count: usize) -> Vec<(f64, f64)> {
+pub fn gauss_legendre(node_count: usize) -> Vec<(f64, f64)> {
     let n = node_count as f64;
     (0..node_count)
         .map(|i| {

@@ -5,6 +5,8 @@ use super::history::History;
 use super::orbit::Orbit;
 use super::pick::{Drag, Picker};
 use crate::asset::embedded;
+use crate::asset::environment::Source;
+use crate::asset::sky::Sky;
 use crate::error::Result;
 use crate::field::quantity;
 use crate::frame::store;
@@ -33,8 +35,15 @@ pub struct Editor {
 }
 
 impl Editor {
-    /// The state in which a scene is first shown: as its file says, running, nothing selected. `path` is the scene's file.
-    pub fn new(scene: Scene, path: &Path) -> Self {
+    /// The state in which a scene is first shown: as its file says, running, nothing selected. `path` is the scene's file. A scene
+    /// whose file says nothing of distant light gets a generated sky, which is saved with it.
+    pub fn new(mut scene: Scene, path: &Path) -> Self {
+        if scene.data.environment.is_empty() {
+            let source = Source { sky: Some(Sky::default()), ..scene.data.environment.clone() };
+            if let Err(error) = scene.set_environment(&source) {
+                log::warn!("no generated sky: {error}");
+            }
+        }
         Editor {
             orbit: Orbit::new(&scene.data.camera),
             size: [scene.data.output.width, scene.data.output.height],

@@ -106,8 +106,8 @@ void main() {
         // Tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the loop.
         do {
             uint packed = steps[cluster.step_first + i];
-            uint e = packed & 0xfff;
-            uint l = (packed >> 12) & 0xfff;
+            uint e = packed & SKY_CHAIN;
+            uint l = (packed >> STEP_BITS) & SKY_CHAIN;
             bool shines = (packed & STEP_LIGHT) != 0;
             uint channel = (packed >> STEP_CHANNEL) & 3;
             bool of_radiance = shines && channel != 3;

@@ -43,8 +43,9 @@ struct Cluster {
     uint spare;
 };
 
-// A step: what one lookup is for. Bits 0-11: entity. Bits 12-23: the light whose chain this is, SKY_CHAIN for the sky's.
-const uint SKY_CHAIN = 0xfff;
-const uint STEP_LIGHT = 1u << 24;    // meets the light rather than multiplying an occluder
-const uint STEP_CHANNEL = 25;        // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour
-const uint STEP_LAST = 1u << 27;     // ends the chain: the next step begins anew from the transfer
+// A step: what one lookup is for. Bits 0-13: entity. Bits 14-27: the light whose chain this is, SKY_CHAIN for the sky's.
+const uint STEP_BITS = 14;
+const uint SKY_CHAIN = (1u << STEP_BITS) - 1u;
+const uint STEP_LIGHT = 1u << 28;    // meets the light rather than multiplying an occluder
+const uint STEP_CHANNEL = 29;        // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour
+const uint STEP_LAST = 1u << 31;     // ends the chain: the next step begins anew from the transfer

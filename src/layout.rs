@@ -53,8 +53,10 @@ pub const NONE: u32 = u32::MAX;
 /// limits.
 pub const CLUSTER_VERTICES: u32 = 64;
 
-/// Entities that a step can name; the last number stands for the sky.
-pub const STEP_ENTITIES: u32 = 4095;
+/// Bits of an entity's number in a step.
+pub const STEP_BITS: u32 = 14;
+/// Entities that a step can name: numbers below this, which stands for the sky.
+pub const STEP_ENTITIES: u32 = (1 << STEP_BITS) - 1;
 
 /// What one lookup of the merge is for, packed into 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,12 +80,18 @@ pub enum Step {
 }
 
 impl Step {
+    /// The two entities that packed bits name; the second is [`STEP_ENTITIES`] in the sky's chain.
+    pub fn entities(packed: u32) -> [u32; 2] {
+        [packed & STEP_ENTITIES, packed >> STEP_BITS & STEP_ENTITIES]
+    }
+
     /// The 32 bits that `merge_layout.glsl` takes apart.
     pub fn pack(self) -> u32 {
         match self {
-            Step::Occlude { entity, light } => entity | light.unwrap_or(STEP_ENTITIES) << 12,
+            Step::Occlude { entity, light } => entity | light.unwrap_or(STEP_ENTITIES) << STEP_BITS,
             Step::Shine { entity, channel, last } => {
-                entity | entity << 12 | 1 << 24 | channel.unwrap_or(3) << 25 | u32::from(last) << 27
+                let flags = 1 | channel.unwrap_or(3) << 1 | u32::from(last) << 3;
+                entity | entity << STEP_BITS | flags << (2 * STEP_BITS)
             }
         }
     }

@@ -7,7 +7,7 @@ use crate::field::{Lattice, Lookup, Storage};
 use crate::frame;
 use crate::gpu::{self, Device, Validation};
 use crate::render::Variant;
-use crate::render::variant::{Chain, Product, Skip};
+use crate::render::variant::{Chain, EPS, Product, Skip};
 use crate::scene::Scene;
 use crate::shaders::Library;
 use clap::Args;
@@ -95,9 +95,13 @@ pub struct MergeArguments {
     /// Samples that a lookup takes
     #[arg(long, default_value = "trilinear", value_name = "nearest|radial|trilinear")]
     pub lookup: Lookup,
-    /// Work to leave out where true visibility makes it zero: all, none, or a list of horizon, cones
+    /// Work to leave out that changes nothing visible: all, none, or a list of horizon, cones (zero by true visibility),
+    /// behind, facing, empty, unmoved (no change at all)
     #[arg(long, default_value = "all", value_name = "all|none|LIST")]
     pub skip: Skip,
+    /// Leave out light and shadow that is bounded below this share of white, a vertex and entity; 0 leaves none out
+    #[arg(long, default_value_t = EPS, value_name = "SHARE", value_parser = eps)]
+    pub eps: f32,
     /// How an occluder's visibility is multiplied in: factored, pairs, matrix and points compute the same in different ways;
     /// point-chain keeps chains at 32 points and projects once, which is quicker and less exact
     #[arg(long, default_value = "factored", value_name = "NAME")]
@@ -120,6 +124,11 @@ fn on_or_off(text: &str) -> std::result::Result<bool, String> {
         "off" => Ok(false),
         _ => Err(format!("\"{text}\" is neither on nor off")),
     }
+}
+
+fn eps(text: &str) -> std::result::Result<f32, String> {
+    let number = text.parse().ok().filter(|eps| (0.0..=1.0).contains(eps));
+    number.ok_or_else(|| format!("\"{text}\" is no number from 0 to 1"))
 }
 
 /// Width and height from `WxH`.

@@ -130,6 +130,7 @@ fn options(arguments: &Arguments, scene: &Scene) -> Options {
         variant: arguments.merge.variant,
         skip: arguments.merge.skip,
         chain: arguments.merge.chain(),
+        eps: arguments.merge.eps,
         size: arguments.size.unwrap_or([shape.width, shape.height]),
         multisample: true,
     }

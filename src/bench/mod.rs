@@ -53,8 +53,10 @@ pub fn default_options() -> frame::Options {
     frame::Options {
         bake: crate::bake::Options::default(),
         lookup: crate::field::Lookup::default(),
-        skip: crate::render::variant::Skip::ALL,
         chain: crate::render::variant::Chain::default(),
+        // Frames are timed at rest: each must merge everything.
+        skip: crate::render::variant::Skip::without("unmoved"),
+        eps: crate::render::variant::EPS,
         variant: None,
         size: [16, 16],
         multisample: false,

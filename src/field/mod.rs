@@ -1,5 +1,6 @@
 //! A baked field: where it is sampled ([`lattice`]), what is stored, and its file ([`mod@file`]).
 
+pub mod extent;
 pub mod file;
 pub mod growth;
 pub mod lattice;

@@ -12,6 +12,7 @@ use crate::render::variant::{Form, Variant};
 use crate::scene::{Placement, Scene};
 use ash::vk;
 use glam::Vec3;
+use std::sync::atomic::Ordering;
 
 /// Where the radiosity of a part of the picture comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,18 +40,26 @@ impl Frame {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn prepare(&mut self, placements: &[Placement]) -> Result<()> {
+        if !*self.recorded.get_mut() {
+            self.lists.forget();
+        }
+        *self.recorded.get_mut() = false;
         self.upload(placements)
     }
 
-    /// Records the merge, after [`Frame::prepare`].
+    /// Records the merge of what has changed, after [`Frame::prepare`]; nothing where nothing has. When the recording does not
+    /// run, call [`Frame::forget`].
     ///
     /// # Errors
     /// As [`Frame::render`].
     pub fn record_light<'f>(&'f self, commands: &mut Commands<'f>) -> Result<()> {
-        let inputs = self.inputs()?;
-        let cluster_count = self.cluster_table.len() as u32;
-        commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))?;
-        commands.barrier(Access::ComputeWrite, Access::VertexRead);
+        if self.merged.merged_clusters > 0 {
+            let inputs = self.inputs()?;
+            let cluster_count = self.merged.merged_clusters as u32;
+            commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))?;
+            commands.barrier(Access::ComputeWrite, Access::VertexRead);
+        }
+        self.recorded.store(true, Ordering::Relaxed);
         Ok(())
     }
 
@@ -165,6 +174,7 @@ impl Frame {
         let form = usable(&self.device, &self.store, self.scene.entities.len(), Form { variant: wanted, ..self.form });
         if form != self.form {
             self.merge = Merge::new(&self.device, &self.library, form)?;
+            self.lists.forget();
             (self.form, self.variant) = (form, form.variant);
         }
         Ok(())
@@ -182,6 +192,7 @@ impl Frame {
         }
         if uses(&self.library.files("merge.comp")) {
             self.merge = Merge::new(&self.device, &self.library, self.form)?;
+            self.lists.forget();
         }
         Ok(())
     }

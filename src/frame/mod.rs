@@ -6,7 +6,9 @@
 
 pub mod camera;
 mod draw_twin;
+pub mod lists;
 mod live;
+pub mod memory;
 mod pose;
 pub mod store;
 mod twin;
@@ -21,7 +23,7 @@ use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, TexelView, Timing
 use crate::layout;
 use crate::render::calibrate;
 use crate::render::draw::{Draw, Item};
-use crate::render::gather::{Bounds, Counts};
+use crate::render::gather::Counts;
 use crate::render::merge::{Inputs, Merge, Readable};
 use crate::render::variant::{Chain, Form, Skip, Variant, uniform_entities};
 use crate::scene::{Placement, Scene};
@@ -30,7 +32,10 @@ use crate::shaders::Library;
 use ash::vk;
 use glam::{DMat4, DVec3, Vec3};
 use half::f16;
+use lists::{Lists, Merged};
+use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use store::{Progress, Store};
 
 pub use live::{Lit, Part, is_cached};
@@ -48,6 +53,9 @@ pub struct Options {
     pub skip: Skip,
     /// How occluders are multiplied.
     pub chain: Chain,
+    /// Light that the merge leaves out: contributions to a vertex that are bounded below this share of the radiance that the
+    /// scene's exposure shows as white; 0 leaves none out.
+    pub eps: f32,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
     /// Whether pictures are multisampled where the device can.
@@ -74,10 +82,13 @@ pub struct Frame {
     radiosity: Buffer,
     radiosity_offsets: Vec<u64>,
     readback: Buffer,
-    /// Clusters of all receivers without their steps, and their bounds.
-    cluster_table: Vec<(layout::Cluster, Bounds)>,
-    /// What the last gather left off.
-    pub counts: Counts,
+    lists: Lists,
+    /// What the last frame did about its clusters.
+    pub merged: Merged,
+    /// Whether the merge that was prepared last was recorded.
+    recorded: AtomicBool,
+    /// Largest radiance of the sky as projected, of any colour.
+    sky_radiance: f64,
     background: Vec3,
     /// Radiosity from elsewhere that is shown beside the merged one or in its place.
     panels: [Option<Buffer>; 2],
@@ -97,12 +108,12 @@ impl Frame {
         let (variant, entity_limit) = (form.variant, form.entity_limit);
 
         let mut radiosity_offsets = Vec::new();
-        let (mut radiosity_size, mut cluster_table) = (0, Vec::new());
+        let (mut radiosity_size, mut lists) = (0, Lists::default());
         for (index, entity) in scene.entities.iter().enumerate() {
             let geometry = &store.geometries[entity.mesh];
             radiosity_offsets.push(radiosity_size);
             if entity.receives {
-                cluster_table.extend(pose::clusters(index, geometry, radiosity_size / 16, options.bake.bands));
+                lists.add(index, pose::clusters(index, geometry, radiosity_size / 16, options.bake.bands));
             }
             radiosity_size += 16 * geometry.vertices.len() as u64;
         }
@@ -124,8 +135,8 @@ impl Frame {
             library: library.clone(),
             panels: Default::default(),
             entities: upload("entities", count * size_of::<layout::Entity>() as u64)?,
-            clusters: upload("clusters", (cluster_table.len() * size_of::<layout::Cluster>()) as u64)?,
-            steps: upload("steps", 4 * cluster_table.len() as u64)?,
+            clusters: upload("clusters", (lists.clusters.len() * size_of::<layout::Cluster>()) as u64)?,
+            steps: upload("steps", 4 * lists.clusters.len() as u64)?,
             sky: upload("sky", 12 * channel_stride(bands) as u64)?,
             radiosity,
             radiosity_offsets,
@@ -135,8 +146,10 @@ impl Frame {
                 BufferKind::Readback,
                 8 * u64::from(options.size[0]) * u64::from(options.size[1]),
             )?,
-            cluster_table,
-            counts: Counts::default(),
+            lists,
+            merged: Merged::default(),
+            recorded: AtomicBool::new(true),
+            sky_radiance: 0.0,
             background: Vec3::ZERO,
             store,
         };
@@ -153,25 +166,40 @@ impl Frame {
         for (to, from) in floats.chunks_exact_mut(stride).zip(&channels) {
             to.iter_mut().zip(&from[..coefficient_count(bands)]).for_each(|(to, from)| *to = *from as f32);
         }
+        self.sky_radiance = pose::brightest(&channels, bands);
         self.background = Vec3::from_array(channels.map(|c| (c[0] * Y00) as f32));
+        self.lists.forget();
         self.sky.write(&floats)
     }
 
-    /// Lights every receiver, and draws the picture where `white` is given: radiance above it is brought down to it, hue kept,
-    /// before samples are averaged, so that edges of lights are smooth; infinity leaves radiance as it is. Returns each
-    /// pass's duration.
+    /// Lights every receiver as far as anything has changed since the last call, and draws the picture where `white` is given:
+    /// radiance above it is brought down to it, hue kept, before samples are averaged, so that edges of lights are smooth;
+    /// infinity leaves radiance as it is. Returns each pass's duration.
     ///
     /// # Errors
     /// `Device` when the device was lost, `Failed` when a barrier is missing.
     pub fn render(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
+        let outcome = self.light_and_draw(placements, white);
+        if outcome.is_err() {
+            // Perhaps nothing ran: no cluster can be taken for merged.
+            self.lists.forget();
+        }
+        outcome
+    }
+
+    fn light_and_draw(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
         self.upload(placements)?;
+        let cluster_count = self.merged.merged_clusters as u32;
         let inputs = self.inputs()?;
         let items = self.items(placements, self.aspect());
         let mut commands = Commands::new(&self.device, "frame")?;
-        let cluster_count = self.cluster_table.len() as u32;
-        commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))?;
+        if cluster_count > 0 {
+            commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))?;
+        }
         if let Some(white) = white {
-            commands.barrier(Access::ComputeWrite, Access::VertexRead);
+            if cluster_count > 0 {
+                commands.barrier(Access::ComputeWrite, Access::VertexRead);
+            }
             self.record_draw(&mut commands, &items, self.background, white)?;
         }
         commands.submit()
@@ -227,6 +255,7 @@ impl Frame {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn set_radiosity(&mut self, entity: usize, radiosity: &[[f32; 3]]) -> Result<()> {
+        self.lists.forget();
         let order = &self.store.geometries[self.scene.entities[entity].mesh].order;
         assert_eq!(radiosity.len(), order.len(), "radiosity of entity {entity}");
         let quad = |&v: &u32| {
@@ -273,7 +302,23 @@ impl Frame {
 
     /// Vertices that are lit.
     pub fn receiver_vertex_count(&self) -> usize {
-        self.cluster_table.iter().map(|(cluster, _)| cluster.vertex_count as usize).sum()
+        self.lists.clusters.iter().map(|cluster| cluster.vertex_count as usize).sum()
+    }
+
+    /// What the lists of all clusters leave off at this moment, and why, and a bound of the light in it: by looking at every
+    /// cluster and entity, which no frame does.
+    pub fn counts(&self, placements: &[Placement]) -> Counts {
+        self.lists.counts(&self.state(placements))
+    }
+
+    /// Entities that stand on the list of any cluster of a receiver at this moment.
+    pub fn listed(&self, placements: &[Placement], receiver: usize) -> BTreeSet<usize> {
+        self.lists.entities_on(&self.state(placements), receiver)
+    }
+
+    /// Merges every cluster in the next frame, moved or not.
+    pub fn forget(&mut self) {
+        self.lists.forget();
     }
 
     fn inputs(&self) -> Result<Inputs<'_>> {

@@ -1,83 +1,88 @@
 //! What an entity is to the merge at a moment: its place, rotation and light, and the steps of every cluster.
 
-use super::{Frame, store};
+use super::Frame;
+use super::lists::{Merged, State};
+use super::store::{self, Slot};
 use crate::error::Result;
+use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::render::gather::{self, Body, Bounds, Counts, Pose};
+use crate::render::gather::{Body, Bounds, Moment, Pose};
 use crate::scene::Placement;
+use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
+use crate::sh::cube::{self, FACE_COUNT, texel_st};
 use crate::sh::rotation::turns;
 use glam::DVec3;
-use rayon::prelude::*;
 use std::f64::consts::PI;
 
 impl Frame {
-    /// Writes entities and the clusters' steps of this moment.
+    /// Writes what has changed for the merge at this moment: clusters to light, their steps, and all entities.
     pub(super) fn upload(&mut self, placements: &[Placement]) -> Result<()> {
-        let entities: Vec<layout::Entity> =
-            placements.iter().enumerate().map(|(index, placement)| self.entity(index, placement)).collect();
-        self.entities.write(&entities)?;
-        self.gather(placements)
-    }
-
-    /// Lists the steps of every cluster at this moment.
-    fn gather(&mut self, placements: &[Placement]) -> Result<()> {
-        let bodies: Vec<Body> = placements.iter().enumerate().map(|(index, p)| self.body(index, p)).collect();
-        let centres: Vec<DVec3> = bodies.iter().map(|b| b.centre).collect();
-        let poses: Vec<Pose> = placements
-            .iter()
-            .enumerate()
-            .map(|(entity, placement)| Pose {
-                entity,
-                centre: bodies[entity].centre,
-                rotation: placement.rotation.as_dquat().normalize(),
-                scale: placement.scale.into(),
-                occluders: if self.scene.entities[entity].receives {
-                    self.occluders(&centres, entity)
-                } else {
-                    Vec::new()
-                },
-            })
-            .collect();
-        let (sky, skip) = (!self.scene.environment.is_none(), self.options.skip);
-        // Some hundred clusters make a job that is worth handing to another core.
-        let parts: Vec<(Vec<u32>, Vec<u32>, Counts)> = self
-            .cluster_table
-            .par_chunks(256)
-            .map(|clusters| {
-                let (mut steps, mut lengths, mut counts) = (Vec::new(), Vec::new(), Counts::default());
-                for (cluster, bounds) in clusters {
-                    let first = steps.len();
-                    let pose = &poses[cluster.receiver as usize];
-                    counts += gather::steps(bounds, pose, &bodies, sky, skip, &mut steps);
-                    lengths.push((steps.len() - first) as u32);
-                }
-                (steps, lengths, counts)
-            })
-            .collect();
-        self.counts = Counts::default();
-        let (mut steps, mut clusters) = (Vec::new(), Vec::with_capacity(self.cluster_table.len()));
-        for (part, lengths, counts) in parts {
-            self.counts += counts;
-            for step_count in lengths {
-                let cluster = self.cluster_table[clusters.len()].0;
-                let step_first = clusters.last().map_or(0, |c: &layout::Cluster| c.step_first + c.step_count);
-                clusters.push(layout::Cluster { step_first, step_count, ..cluster });
-            }
-            steps.extend(part);
+        let state = self.state(placements);
+        let dirty = self.lists.update(&state);
+        self.lists.keep(state);
+        self.merged = Merged { clusters: self.lists.clusters.len(), merged_clusters: dirty.len(), merged_steps: 0 };
+        if dirty.is_empty() {
+            return Ok(());
         }
+        let (mut steps, mut clusters) = (Vec::new(), Vec::with_capacity(dirty.len()));
+        for cluster in dirty {
+            let list = self.lists.steps(cluster);
+            let (step_first, step_count) = (steps.len() as u32, list.len() as u32);
+            clusters.push(layout::Cluster { step_first, step_count, ..self.lists.clusters[cluster] });
+            steps.extend_from_slice(list);
+        }
+        self.merged.merged_steps = steps.len();
+        self.entities.write(self.lists.entities())?;
         self.steps.write(&steps)?;
         self.clusters.write(&clusters)
+    }
+
+    /// All that lists and merge depend on at this moment.
+    pub(super) fn state(&self, placements: &[Placement]) -> State {
+        let bodies: Vec<Body> = placements.iter().enumerate().map(|(index, p)| self.body(index, p)).collect();
+        let pose = |(entity, placement): (usize, &Placement)| Pose {
+            entity,
+            centre: bodies[entity].centre,
+            rotation: placement.rotation.as_dquat().normalize(),
+            scale: placement.scale.into(),
+            reflectance: self.scene.entities[entity].albedo.max_element().into(),
+        };
+        let poses = placements.iter().enumerate().map(pose).collect();
+        let white = f64::from(-self.scene.data.output.exposure_ev).exp2();
+        let sky = (!self.scene.environment.is_none()).then_some(self.sky_radiance);
+        let eps = f64::from(self.options.eps) * white;
+        State {
+            entities: placements.iter().enumerate().map(|(index, p)| self.entity(index, p)).collect(),
+            moment: Moment::new(bodies, sky, self.options.skip, eps),
+            poses,
+            placements: placements.to_vec(),
+        }
     }
 
     fn body(&self, index: usize, placement: &Placement) -> Body {
         let entity = &self.scene.entities[index];
         let geometry = &self.store.geometries[entity.mesh];
+        // A field that nobody needs was not baked, and one of zeros changes nothing.
+        let holds = |slot: &Option<Slot>| {
+            slot.as_ref().is_some_and(|slot| !self.options.skip.empty || slot.extent != Extent::Nothing)
+        };
+        let coloured = geometry.radiance.is_some() && entity.emits;
+        let source = if coloured { &geometry.radiance } else { &geometry.blocked };
+        let rotation = placement.rotation.as_dquat().normalize();
+        let facing = source.as_ref().and_then(|slot| match slot.extent {
+            Extent::Cone { axis, half_angle_rad } => Some((rotation * axis, half_angle_rad)),
+            Extent::Nothing | Extent::All => None,
+        });
+        let brightest = geometry.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale);
         Body {
             centre: self.centre(index, placement),
             radius_m: geometry.radius_m * f64::from(placement.scale),
-            emits: entity.emits,
-            coloured: geometry.radiance.is_some() && entity.emits,
+            occludes: entity.occludes && holds(&geometry.blocked),
+            emits: entity.emits && holds(source),
+            coloured,
+            radiance: f64::from(entity.emission.max_element()) * f64::from(brightest),
+            facing,
         }
     }
 
@@ -118,12 +123,18 @@ impl Frame {
         placement.position.as_dvec3() + rotation * (centre_m * f64::from(placement.scale))
     }
 
+    /// Whether an entity occludes and something sees it.
+    fn occludes(&self, index: usize) -> bool {
+        let entity = &self.scene.entities[index];
+        entity.occludes && self.store.geometries[entity.mesh].blocked.is_some()
+    }
+
     /// Occluders of a receiver, near to far from its bounding sphere's centre, ties by index; itself left out. One order for
     /// the whole receiver: products truncated in another order differ (by up to .006 over twelve occluders), which would show
     /// as seams between clusters.
     pub(super) fn occluders(&self, centres: &[DVec3], receiver: usize) -> Vec<usize> {
         let mut order: Vec<(f64, usize)> = (0..centres.len())
-            .filter(|&j| self.scene.entities[j].occludes && j != receiver)
+            .filter(|&j| self.occludes(j) && j != receiver)
             .map(|j| (centres[j].distance(centres[receiver]), j))
             .collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -155,4 +166,17 @@ pub(super) fn clusters(
         (cluster, *bounds)
     };
     geometry.clusters.iter().enumerate().map(cluster).collect()
+}
+
+/// Largest value of a projected sky, of any colour, on a grid of directions that is fine against its bands; at least 0.
+pub(super) fn brightest(channels: &[Vec<f64>; 3], bands: usize) -> f64 {
+    let mut basis = [0.0; MAX_COEFFICIENTS];
+    let mut most = 0.0_f64;
+    for (face, y, x) in (0..FACE_COUNT).flat_map(|face| (0..256).map(move |i| (face, i / 16, i % 16))) {
+        evaluate(bands, cube::direction(face, texel_st(x, 16), texel_st(y, 16)), &mut basis);
+        for channel in channels {
+            most = most.max(channel.iter().zip(&basis).map(|(c, y)| c * y).sum());
+        }
+    }
+    most
 }

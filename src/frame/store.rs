@@ -6,13 +6,14 @@ use crate::bake::cache::Cache;
 use crate::bake::capture::{morton, unit_positions};
 use crate::bake::{self, Baker, Report};
 use crate::error::{Error, Result};
+use crate::field::extent::{Extent, extent};
 use crate::field::quantity::{Kind, Storage, channel_stride};
 use crate::field::{Header, ShadowField};
 use crate::gpu::{Buffer, BufferKind};
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::render::draw::Drawable;
 use crate::render::gather::Bounds;
-use crate::scene::Scene;
+use crate::scene::{Entity, Scene};
 use glam::{DVec3, Vec3};
 use std::ops::Range;
 
@@ -28,6 +29,8 @@ pub struct Slot {
     pub header: Header,
     /// Its bytes in the store.
     pub bytes: Range<u64>,
+    /// Directions in which it is not zero.
+    pub extent: Extent,
 }
 
 impl Slot {
@@ -88,11 +91,15 @@ pub struct Store {
     pub field_bands: usize,
 }
 
-/// Which fields the entities of a mesh need: none for what only receives, no radiance field for a light of one colour.
+/// Which fields the entities of a mesh need: none for what only receives or what nothing else can see, none for shadows where
+/// there is no light, no radiance field for a light of one colour.
 pub fn needs(scene: &Scene, mesh: usize) -> [Option<Kind>; 2] {
-    let entities = || scene.entities.iter().filter(|e| e.mesh == mesh);
+    let receivers = scene.entities.iter().filter(|e| e.receives).count();
+    let seen = |e: &&Entity| receivers > usize::from(e.receives);
+    let entities = || scene.entities.iter().filter(|e| e.mesh == mesh).filter(seen);
     let coloured = scene.meshes[mesh].colors.is_some();
-    let blocked = entities().any(|e| e.occludes || (e.emits && !coloured));
+    let light = !scene.environment.is_none() || scene.entities.iter().any(|e| e.emits);
+    let blocked = entities().any(|e| (e.occludes && light) || (e.emits && !coloured));
     let radiance = coloured && entities().any(|e| e.emits);
     [blocked.then_some(Kind::Occlusion), radiance.then_some(Kind::Radiance)]
 }
@@ -118,7 +125,7 @@ impl Store {
                     let header = bake::header(mesh, kind, options);
                     let bytes = total..total + header.payload_bytes();
                     total = bytes.end.next_multiple_of(ALIGNMENT);
-                    Slot { header, bytes }
+                    Slot { header, bytes, extent: Extent::All }
                 })
             }));
         }
@@ -148,6 +155,7 @@ impl Store {
             if let Some(report) = cache.field(baker, mesh, &mut slot.header, target, &done)? {
                 baked.push(Baked { what, report });
             }
+            slot.extent = extent(&download(&fields, slot)?);
         }
 
         let (mut transfers, mut vertices, mut geometries) = (Vec::new(), Vec::<[f32; 4]>::new(), Vec::new());
@@ -222,7 +230,7 @@ impl Store {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn field(&self, slot: &Slot) -> Result<ShadowField> {
-        Ok(ShadowField { header: slot.header.clone(), payload: self.fields.download_range(slot.bytes.clone())? })
+        download(&self.fields, slot)
     }
 
     /// A copy of a mesh's transfer vectors in the mesh's order of vertices: floats and their stride.
@@ -243,6 +251,10 @@ impl Store {
         }
         Ok(Some((floats, stride)))
     }
+}
+
+fn download(fields: &Buffer, slot: &Slot) -> Result<ShadowField> {
+    Ok(ShadowField { header: slot.header.clone(), payload: fields.download_range(slot.bytes.clone())? })
 }
 
 /// Whether a mesh can shadow itself; if not, its transfer is the cosine of the normal.

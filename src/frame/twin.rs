@@ -1,11 +1,16 @@
 //! The CPU twin of a frame's merge.
 
+use super::lists::State;
+use super::store::Geometry;
 use super::{Frame, store};
 use crate::error::Result;
 use crate::field;
+use crate::layout::{CLUSTER_VERTICES, STEP_ENTITIES, Step};
+use crate::render::gather::{self, Chains};
 use crate::render::reference::{Object, Task};
 use crate::scene::{Placement, Scene};
 use glam::DVec3;
+use std::collections::HashSet;
 use std::f64::consts::PI;
 
 impl Frame {
@@ -41,6 +46,7 @@ impl Frame {
         let lights = indices(&self.scene, |e| e.emits);
         let sky = self.scene.environment.coefficients(self.options.bake.bands);
         let centres: Vec<DVec3> = objects.iter().map(|o| o.centre).collect();
+        let state = self.state(placements);
         let mut out = Vec::new();
         for receiver in indices(&self.scene, |e| e.receives) {
             let mesh_index = self.scene.entities[receiver].mesh;
@@ -49,6 +55,12 @@ impl Frame {
             let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3() - geometry.centre_m).collect();
             let normals: Vec<DVec3> = mesh.normals.iter().map(|n| n.as_dvec3()).collect();
             let transfer = self.store.transfer(geometry)?;
+            // Without a threshold the twin looks at everything, which is what the lists are held against.
+            let listed = (self.options.eps > 0.0).then(|| listed(&state, receiver, geometry));
+            let leaves = |v: usize, j: usize, light: Option<usize>| {
+                let Some((cluster_of, listed)) = &listed else { return false };
+                !listed[cluster_of[v]].contains(&(j as u32, light.map_or(STEP_ENTITIES, |l| l as u32)))
+            };
             let task = Task {
                 objects: &objects,
                 receiver,
@@ -62,11 +74,30 @@ impl Frame {
                 lookup: self.options.lookup,
                 skip: self.options.skip,
                 chain: self.options.chain,
+                leaves: &leaves,
             };
             out.push((receiver, task.run()));
         }
         Ok(out)
     }
+}
+
+/// The cluster of every vertex of a mesh, and what stands on each cluster's list: entity and light, or the sky's number.
+type Listed = (Vec<usize>, Vec<HashSet<(u32, u32)>>);
+
+fn listed(state: &State, receiver: usize, geometry: &Geometry) -> Listed {
+    let (moment, pose) = (&state.moment, &state.poses[receiver]);
+    let mut cluster_of = vec![0; geometry.order.len()];
+    for (place, &v) in geometry.order.iter().enumerate() {
+        cluster_of[v as usize] = place / CLUSTER_VERTICES as usize;
+    }
+    let chains = Chains::all(moment, pose);
+    let of_cluster = |bounds| {
+        let mut steps = Vec::new();
+        gather::steps(moment, pose, bounds, &chains, &mut steps);
+        steps.into_iter().map(|step| Step::entities(step).into()).collect()
+    };
+    (cluster_of, geometry.clusters.iter().map(of_cluster).collect())
 }
 
 /// Entities that satisfy a condition.

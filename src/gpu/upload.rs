@@ -41,6 +41,11 @@ impl Upload {
         buffer.write(0, data);
         Ok(())
     }
+
+    /// Bytes of all flights together.
+    pub fn all_bytes(&self) -> u64 {
+        self.buffers.iter().map(|buffer| buffer.size_bytes).sum()
+    }
 }
 
 impl Deref for Upload {

@@ -51,6 +51,13 @@ impl Drawable {
     }
 }
 
+impl Drawable {
+    /// Device memory, bytes.
+    pub fn size_bytes(&self) -> u64 {
+        self.positions.size_bytes + self.emission.size_bytes + self.indices.size_bytes
+    }
+}
+
 /// One entity to draw.
 pub struct Item<'d> {
     /// Its mesh.
@@ -120,6 +127,16 @@ impl Draw {
     /// Images whose content is thrown away before each frame: colour ones first, the depth image last.
     pub fn attachments(&self) -> impl Iterator<Item = &Image> {
         self.samples.iter().chain([&self.picture, &self.depth])
+    }
+
+    /// Device memory of the images, bytes: 8 a sample of colour, 4 of depth.
+    pub fn size_bytes(&self) -> u64 {
+        let texels = |image: &Image| {
+            let shape = image.shape;
+            let texel_bytes = if shape.format == DEPTH { 4 } else { 8 };
+            texel_bytes * u64::from(shape.width) * u64::from(shape.height) * u64::from(shape.samples)
+        };
+        self.attachments().map(texels).sum()
     }
 
     /// Draws all items over a background of one colour. Radiance above `white` is brought down to it, hue kept.

@@ -5,7 +5,9 @@ pub mod chain;
 pub mod draw;
 pub mod gather;
 pub mod merge;
+pub mod moment;
 pub mod reference;
+pub mod tree;
 pub mod variant;
 pub mod workload;
 

@@ -55,6 +55,9 @@ pub struct Task<'t> {
     pub lookup: Lookup,
     /// What is left out.
     pub skip: Skip,
+    /// Whether a vertex leaves out an entity in the chain of a light (`None`: of the sky), or the light itself where both are the
+    /// same, for another reason.
+    pub leaves: &'t (dyn Fn(usize, usize, Option<usize>) -> bool + Sync),
 }
 
 type Coefficients = [f64; MAX_COEFFICIENTS];
@@ -101,11 +104,12 @@ impl Task<'_> {
 
         let mut sum = [0.0; 3];
         if let Some(sky) = self.sky {
-            let t = chain(&|_| 1.0);
+            let t = chain(&|j| if (self.leaves)(v, j, None) { 0.0 } else { 1.0 });
             sum.iter_mut().zip(sky).for_each(|(sum, sky)| *sum += multiplier.meet(&t, sky));
         }
-        for &light in self.lights.iter().filter(|&&l| l != self.receiver) {
-            let before = |j: usize| (cones[j].distance, j) < (cones[light].distance, light);
+        for &light in self.lights.iter().filter(|&&l| l != self.receiver && !(self.leaves)(v, l, Some(l))) {
+            let before =
+                |j: usize| !(self.leaves)(v, j, Some(light)) && (cones[j].distance, j) < (cones[light].distance, light);
             let t = chain(&|j| if before(j) { cones[j].overlap(&cones[light], self.skip) } else { 0.0 });
             let reach = cones[light].above_horizon(normal, self.skip);
             for (channel, sum) in sum.iter_mut().enumerate() {

@@ -89,39 +89,78 @@ pub struct Form {
     pub entity_limit: u32,
 }
 
-/// Work that the merge leaves out because true visibility makes it zero. The band-limited product is not zero there, so each
-/// skip fades out over [`SKIP_FADE_RAD`] beyond its threshold.
+/// Work that a frame leaves out. `horizon` and `cones` follow from true visibility, which makes it zero; the band-limited
+/// product is not zero there, so each fades out over [`SKIP_FADE_RAD`] beyond its threshold. The others change no number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 pub struct Skip {
     /// Lights and occluders whose bounding spheres lie below the horizon of the receiving surface.
     pub horizon: bool,
     /// Occluders whose bounding spheres do not reach into a light's, as seen from the vertex.
     pub cones: bool,
+    /// Occluders that are farther than the light from a whole cluster of vertices.
+    pub behind: bool,
+    /// Lights whose radiance field is zero on the side of a cluster.
+    pub facing: bool,
+    /// Entities whose field holds nothing but zeros.
+    pub empty: bool,
+    /// Clusters of vertices for which nothing has changed since they were last merged.
+    pub unmoved: bool,
 }
 
 impl Skip {
     /// Every skip.
-    pub const ALL: Skip = Skip { horizon: true, cones: true };
+    pub const ALL: Skip = Skip { horizon: true, cones: true, behind: true, facing: true, empty: true, unmoved: true };
     /// No skip.
-    pub const NONE: Skip = Skip { horizon: false, cones: false };
+    pub const NONE: Skip =
+        Skip { horizon: false, cones: false, behind: false, facing: false, empty: false, unmoved: false };
+    /// Names on the command line.
+    pub const NAMES: [&str; 6] = ["horizon", "cones", "behind", "facing", "empty", "unmoved"];
+
+    /// The switch of that name.
+    pub fn switch(&mut self, name: &str) -> Option<&mut bool> {
+        Some(match name {
+            "horizon" => &mut self.horizon,
+            "cones" => &mut self.cones,
+            "behind" => &mut self.behind,
+            "facing" => &mut self.facing,
+            "empty" => &mut self.empty,
+            "unmoved" => &mut self.unmoved,
+            _ => return None,
+        })
+    }
+
+    /// All but one.
+    ///
+    /// # Panics
+    /// When there is no skip of that name.
+    pub fn without(name: &str) -> Self {
+        let mut skip = Skip::ALL;
+        *skip.switch(name).unwrap_or_else(|| panic!("there is no skip {name}")) = false;
+        skip
+    }
 }
 
 impl std::str::FromStr for Skip {
     type Err = String;
-    /// `all`, `none`, or a list of `horizon` and `cones` with commas.
+    /// `all`, `none`, or a list of [`Skip::NAMES`] with commas.
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         match text {
             "all" => return Ok(Skip::ALL),
             "none" => return Ok(Skip::NONE),
             _ => {}
         }
-        text.split(',').try_fold(Skip::NONE, |skip, word| match word {
-            "horizon" => Ok(Skip { horizon: true, ..skip }),
-            "cones" => Ok(Skip { cones: true, ..skip }),
-            _ => Err(format!("unknown skip \"{word}\" (all, none, or a list of horizon, cones)")),
-        })
+        let mut skip = Skip::NONE;
+        for word in text.split(',') {
+            *skip.switch(word).ok_or_else(|| {
+                format!("unknown skip \"{word}\" (all, none, or a list of {})", Skip::NAMES.join(", "))
+            })? = true;
+        }
+        Ok(skip)
     }
 }
+
+/// Default threshold of contributions: a quarter of a step of an 8-bit picture.
+pub const EPS: f32 = 1e-3;
 
 /// Angle over which a skip fades out: 10 degrees.
 pub const SKIP_FADE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;

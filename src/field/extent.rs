@@ -1,0 +1,57 @@
+//! In which directions around its object a field holds anything at all.
+
+use super::lattice::Directions;
+use super::{ShadowField, quantity::Kind};
+use crate::sh::basis::coefficient_count;
+use glam::DVec3;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Where a field is not zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Extent {
+    /// Nowhere: its object blocks or sends nothing.
+    Nothing,
+    /// At most within a cone of directions from the centre, object's frame.
+    Cone {
+        /// Unit.
+        axis: DVec3,
+        /// Less than pi.
+        half_angle_rad: f64,
+    },
+    /// Perhaps everywhere.
+    All,
+}
+
+/// The extent of a field, from its stored numbers; a lookup outside it gives exactly zero.
+pub fn extent(field: &ShadowField) -> Extent {
+    let header = &field.header;
+    let (lattice, count) = (header.lattice, coefficient_count(header.bands));
+    let channels = if header.kind == Kind::Radiance { 3 } else { 1 };
+    let stored = lattice.stored_direction_count();
+    let holds = |sample: u32| (0..channels).any(|c| (0..count).any(|k| field.stored(sample, c, k) != 0.0));
+    let lit: Vec<DVec3> = lattice
+        .sources()
+        .iter()
+        .enumerate()
+        // The corner of a border is the mean of three cells that are looked at by themselves.
+        .filter(|(_, cells)| cells.len() == 1)
+        .filter(|(at, _)| (0..lattice.shells).any(|shell| holds(shell * stored + *at as u32)))
+        .map(|(_, cells)| lattice.direction(cells[0]))
+        .collect();
+    if lit.is_empty() {
+        return Extent::Nothing;
+    }
+    let axis = lit.iter().sum::<DVec3>().normalize_or_zero();
+    if axis == DVec3::ZERO {
+        return Extent::All;
+    }
+    // A sample reaches one step along either axis of its plane; twice the step is more than the diagonal.
+    let step_rad = match lattice.directions {
+        Directions::Cube { cells } => FRAC_PI_2 / f64::from(cells),
+        Directions::LatLon { latitudes, longitudes } => {
+            (PI / f64::from(latitudes)).max(2.0 * PI / f64::from(longitudes))
+        }
+    };
+    let half_angle_rad = lit.iter().map(|d| d.angle_between(axis)).fold(0.0, f64::max) + 2.0 * step_rad;
+    if half_angle_rad < PI { Extent::Cone { axis, half_angle_rad } } else { Extent::All }
+}

@@ -1,0 +1,49 @@
+//! What a scene takes of the device's memory and of the host's.
+
+use super::Frame;
+use serde::Serialize;
+
+/// Bytes by use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Memory {
+    /// Fields.
+    pub fields: u64,
+    /// Transfer vectors.
+    pub transfers: u64,
+    /// Positions and normals that the merge reads.
+    pub vertices: u64,
+    /// Light on vertices.
+    pub radiosity: u64,
+    /// What is drawn: positions, emission and indices of meshes.
+    pub drawables: u64,
+    /// Entities, clusters, steps and sky.
+    pub lists: u64,
+    /// Images and the buffer that a picture is read back through.
+    pub pictures: u64,
+    /// Lists as the host keeps them.
+    pub host_lists: u64,
+}
+
+impl Memory {
+    /// On the device, or visible to it.
+    pub fn device(&self) -> u64 {
+        self.fields + self.transfers + self.vertices + self.radiosity + self.drawables + self.lists + self.pictures
+    }
+}
+
+impl Frame {
+    /// Memory that the scene takes now, meshes as read from their files apart.
+    pub fn memory(&self) -> Memory {
+        let uploads = [&self.entities, &self.clusters, &self.steps, &self.sky];
+        Memory {
+            fields: self.store.fields.size_bytes,
+            transfers: self.store.transfers.size_bytes,
+            vertices: self.store.vertices.size_bytes,
+            radiosity: self.radiosity.size_bytes,
+            drawables: self.store.geometries.iter().map(|geometry| geometry.drawable.size_bytes()).sum(),
+            lists: uploads.iter().map(|upload| upload.all_bytes()).sum(),
+            pictures: self.readback.size_bytes + self.draw.size_bytes(),
+            host_lists: self.lists.size_bytes(),
+        }
+    }
+}

@@ -1,0 +1,324 @@
+//! What is not done: lists made through a tree are those of a look at everything; an unmoved scene merges nothing, and one in
+//! which something moves comes to the bits of a full merge; what is dropped as small stays within its bound.
+
+mod common;
+#[path = "common/stage.rs"]
+mod stage;
+
+use common::report;
+use glam::{DQuat, DVec3, Quat, Vec3};
+use shadow_fields::frame::Options;
+use shadow_fields::render::gather::{self, Body, Bounds, Chains, Moment, Pose};
+use shadow_fields::render::variant::Skip;
+use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::truth::raycast::RayCast;
+use shadow_fields::truth::{Shapes, Vertex, World};
+use stage::{at, scene, small, stage};
+use std::fmt::Write;
+
+fn random_direction(rng: &mut fastrand::Rng) -> DVec3 {
+    loop {
+        let p = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5);
+        if (1e-3..0.25).contains(&p.length_squared()) {
+            return p.normalize();
+        }
+    }
+}
+
+/// Groups of clusters in random scenes, near and far, with and without a sky, lights and each skip.
+#[test]
+fn the_tree_leaves_every_list_as_it_is() {
+    let mut rng = fastrand::Rng::with_seed(21);
+    let (mut listed, mut offered, mut all) = (0, 0, 0);
+    for round in 0..60 {
+        let spread_m = if round % 2 == 0 { 60.0 } else { 8.0 };
+        let bodies: Vec<Body> = (0..200)
+            .map(|i| Body {
+                centre: DVec3::new(rng.f64() - 0.5, 0.1 * rng.f64(), rng.f64() - 0.5) * spread_m,
+                radius_m: 0.1 + 0.4 * rng.f64(),
+                occludes: i % 5 != 0,
+                emits: i % 25 == 0,
+                coloured: i % 50 == 0,
+                radiance: 3.0 * rng.f64(),
+                facing: (i % 50 == 25).then(|| (random_direction(&mut rng), 1.8)),
+            })
+            .collect();
+        let pose = Pose {
+            entity: rng.usize(0..200),
+            centre: DVec3::new(rng.f64(), rng.f64(), rng.f64()) * 3.0,
+            rotation: DQuat::from_axis_angle(random_direction(&mut rng), 6.0 * rng.f64()),
+            scale: 0.5 + rng.f64(),
+            reflectance: 0.3 + 0.7 * rng.f64(),
+        };
+        let skips = [Skip::ALL, Skip::NONE, Skip::without("cones"), Skip::without("behind"), Skip::without("horizon")];
+        let eps = if round % 6 == 5 { 0.0 } else { 10_f64.powf(-1.5 - 2.5 * rng.f64()) };
+        let moment = Moment::new(bodies, (round % 4 != 3).then_some(1.2), skips[round % skips.len()], eps);
+        let facing = random_direction(&mut rng);
+        let clusters: Vec<Bounds> = (0..32)
+            .map(|_| Bounds {
+                centre: 2.0 * random_direction(&mut rng) * rng.f64(),
+                radius_m: 0.3 * rng.f64(),
+                axis: (facing + 0.5 * random_direction(&mut rng)).normalize(),
+                spread_rad: 0.4 * rng.f64(),
+            })
+            .collect();
+        let group = Chains::of_group(&moment, &pose, &Bounds::union(&clusters));
+        let everything = Chains::all(&moment, &pose);
+        offered += group.occluder_count();
+        all += everything.occluder_count();
+        for bounds in &clusters {
+            let (mut found, mut expected) = (Vec::new(), Vec::new());
+            gather::steps(&moment, &pose, bounds, &group, &mut found);
+            gather::steps(&moment, &pose, bounds, &everything, &mut expected);
+            assert_eq!(found, expected, "round {round}");
+            listed += expected.len();
+            let counts = gather::counts(&moment, &pose, bounds);
+            let left =
+                counts.below_horizon + counts.behind_light + counts.apart + counts.facing_away + counts.below_eps;
+            assert_eq!(left + expected.len() as u64, counts.considered, "every lookup is listed or has a reason");
+            for step in expected {
+                let [entity, _] = shadow_fields::layout::Step::entities(step);
+                assert!(gather::may_matter(&moment, &pose, bounds, &moment.bodies[entity as usize]), "round {round}");
+            }
+        }
+    }
+    report(&format!("{listed} steps; the tree offers {offered} of {all} occluders to groups"));
+    assert!(listed > 10_000 && 2 * offered < all, "the tree is of use: {offered} of {all}");
+}
+
+/// Balls and rings on a floor, some of them lights, on a grid with `step_m` between them.
+fn town(edge: usize, step_m: f32, lights: usize) -> Scene {
+    let size_m = edge as f32 * step_m;
+    let mut text = format!(
+        "environment = {{ uniform = [0.4, 0.5, 0.6] }}\n\
+         [[mesh]]\nname = \"floor\"\nplane = {{ size_m = {size_m}, cells = 63 }}\n\
+         [[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.3, subdivisions = 1 }}\n\
+         [[mesh]]\nname = \"ring\"\ntorus = {{ major_m = 0.3, minor_m = 0.1, segments = 12, sides = 6 }}\n\
+         [[entity]]\nmesh = \"floor\"\n"
+    );
+    for i in 0..edge * edge {
+        let (x, z) = ((i % edge) as f32 + 0.37, (i / edge) as f32 + 0.61);
+        let (x, z) = (x * step_m - size_m / 2.0, z * step_m - size_m / 2.0);
+        let light = i % (edge * edge / lights.max(1)) == 3 && lights > 0;
+        let _ = writeln!(
+            text,
+            "[[entity]]\nmesh = \"{}\"\nposition = [{x}, {}, {z}]\n{}",
+            if i % 3 == 0 { "ring" } else { "ball" },
+            if light { 1.3 } else { 0.41 },
+            if light { "emission = [4, 5, 6]\nscale = 0.3" } else { "" }
+        );
+    }
+    scene(&text)
+}
+
+fn jostled(place: &Placement, rng: &mut fastrand::Rng, reach_m: f32) -> Placement {
+    let mut step = || (rng.f32() - 0.5) * 2.0 * reach_m;
+    let position = place.position + Vec3::new(step(), 0.1 * step(), step());
+    let rotation = (Quat::from_rotation_y(step()) * place.rotation).normalize();
+    Placement { position, rotation, scale: place.scale }
+}
+
+#[test]
+fn what_moves_is_merged_again_to_the_same_bits() {
+    let Some(stage) = stage() else { return };
+    let scene = town(8, 4.0, 4);
+    for eps in [1e-3, 0.0] {
+        let options = Options { eps, ..small() };
+        let mut kept = stage.frame(&scene, options);
+        let mut anew = stage.frame(&scene, Options { skip: Skip::without("unmoved"), ..options });
+        let mut placements = scene.at(0.0);
+        let mut rng = fastrand::Rng::with_seed(3);
+        let (mut merged, mut all) = (0, 0);
+        for round in 0..12 {
+            // Mostly one of 64 moves, a little or across the town; at times it is a light, the floor, three at once, or none.
+            let movers: Vec<usize> = match round {
+                0 | 5 => vec![],
+                3 => vec![4],
+                7 => vec![0],
+                9 => vec![1, 33, 60],
+                _ => vec![1 + rng.usize(0..64)],
+            };
+            for &j in &movers {
+                placements[j] = jostled(&placements[j], &mut rng, if round % 2 == 0 { 0.2 } else { 8.0 });
+            }
+            let found = stage.light(&mut kept, &placements);
+            let expected = stage.light(&mut anew, &placements);
+            assert_eq!(anew.merged.merged_clusters, anew.merged.clusters);
+            let same = |a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]| {
+                let bits = |v: &[Vec<[f32; 3]>]| v.iter().flatten().flatten().map(|c| c.to_bits()).collect::<Vec<_>>();
+                bits(a) == bits(b)
+            };
+            assert!(same(&found, &expected), "round {round}, eps {eps}");
+            let now = kept.merged;
+            report(&format!("eps {eps}, {movers:?} moved: {} of {} clusters", now.merged_clusters, now.clusters));
+            if round > 0 && movers.is_empty() {
+                assert_eq!(now.merged_clusters, 0, "nothing has moved");
+            }
+            if movers.len() == 1 && movers != [0] {
+                merged += now.merged_clusters;
+                all += now.clusters;
+                assert!(now.merged_clusters > 0, "what moved is itself lit anew");
+            }
+        }
+        if eps > 0.0 {
+            assert!(3 * merged < all, "{merged} of {all} clusters when one of 64 moves");
+        }
+    }
+}
+
+/// A merge that did not run leaves nothing behind that a later one would take for done.
+#[test]
+fn a_refused_frame_is_done_again() {
+    let Some(stage) = stage() else { return };
+    let scene = town(3, 2.0, 1);
+    let mut frame = stage.frame(&scene, small());
+    let placements = scene.at(0.0);
+    stage.gpu.device.omit_barrier(Some(0));
+    assert!(frame.render(&placements, Some(1.0)).is_err());
+    stage.gpu.device.omit_barrier(None);
+    stage.gpu.device.take_validation_messages();
+    let passes = frame.render(&placements, Some(1.0)).unwrap();
+    assert!(passes.iter().any(|t| t.pass == "merge"), "{passes:?}");
+    let passes = frame.render(&placements, Some(1.0)).unwrap();
+    assert!(passes.iter().all(|t| t.pass != "merge"), "nothing has moved: {passes:?}");
+    frame.set_radiosity(0, &vec![[0.0; 3]; frame.radiosity(0).unwrap().len()]).unwrap();
+    let passes = frame.render(&placements, Some(1.0)).unwrap();
+    assert!(passes.iter().any(|t| t.pass == "merge"), "the light was replaced: {passes:?}");
+}
+
+/// Switches that say they change no number.
+#[test]
+fn exact_skips_change_nothing() {
+    let Some(stage) = stage() else { return };
+    let scene = town(6, 1.1, 5);
+    let placements = scene.at(0.0);
+    let mut all = stage.frame(&scene, small());
+    let expected = stage.light(&mut all, &placements);
+    let steps = all.merged.merged_steps;
+    for name in ["behind", "facing", "empty", "unmoved"] {
+        let mut frame = stage.frame(&scene, Options { skip: Skip::without(name), ..small() });
+        assert_eq!(stage.light(&mut frame, &placements), expected, "without {name}");
+        let counts = all.counts(&placements);
+        report(&format!("without {name}: {} steps, with it {steps}; {counts:?}", frame.merged.merged_steps));
+        assert!(name != "behind" || frame.merged.merged_steps > steps);
+    }
+}
+
+/// A box of which only the top shines: below it its field is zero and it is left off, with the same light.
+#[test]
+fn a_light_that_faces_away_is_left_off() {
+    let Some(stage) = stage() else { return };
+    let mut scene = scene(
+        "[[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 31 }\n\
+         [[mesh]]\nname = \"lamp\"\ncuboid = { size_m = [1, 0.2, 1], cells = 2 }\n\
+         [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"floor\"\nposition = [0, 4, 0]\nrotation = { axis = [1, 0, 0], angle_deg = 180 }\n\
+         [[entity]]\nmesh = \"lamp\"\nposition = [0, 2, 0]\nemission = [3, 2, 1]\n",
+    );
+    let lamp = &scene.meshes[1];
+    let colors = lamp.normals.iter().map(|n| if n.y > 0.5 { Vec3::ONE } else { Vec3::ZERO }).collect();
+    let (positions, normals, triangles) = (lamp.positions.clone(), lamp.normals.clone(), lamp.triangles.clone());
+    let lamp = shadow_fields::asset::Mesh::new("lamp", positions, normals, Some(colors), triangles).unwrap();
+    scene.meshes[1] = lamp.into();
+    let placements = scene.at(0.0);
+    // Fine directions: a cell more to either side counts as lit.
+    let bake = shadow_fields::bake::Options { lattice: "cube:6x12".parse().unwrap(), ..small().bake };
+    let options = Options { bake, ..small() };
+    let mut with = stage.frame(&scene, options);
+    let mut without = stage.frame(&scene, Options { skip: Skip::without("facing"), ..options });
+    let (a, b) = (stage.light(&mut with, &placements), stage.light(&mut without, &placements));
+    assert_eq!(a, b);
+    assert!(a[0].iter().flatten().all(|c| *c == 0.0), "no light goes down");
+    assert!(a[1].iter().any(|c| c[0] > 0.05), "the ceiling is lit");
+    let counts = with.counts(&placements);
+    report(&format!("{counts:?}"));
+    assert!(counts.facing_away > 0 && with.merged.merged_steps < without.merged.merged_steps);
+    // Black altogether, it is no light.
+    let black = vec![Vec3::ZERO; scene.meshes[1].positions.len()];
+    let lamp = &scene.meshes[1];
+    let (positions, normals, triangles) = (lamp.positions.clone(), lamp.normals.clone(), lamp.triangles.clone());
+    scene.meshes[1] =
+        shadow_fields::asset::Mesh::new("lamp", positions, normals, Some(black), triangles).unwrap().into();
+    let mut with = stage.frame(&scene, options);
+    let light = stage.light(&mut with, &placements);
+    assert!(light.iter().flatten().flatten().all(|c| *c == 0.0) && with.merged.merged_steps == 0);
+}
+
+/// One cluster in a wide town: what rays say that the dropped occluders and lights took and brought is within the bound, and
+/// so is what the merge itself changes.
+#[test]
+fn what_is_dropped_stays_within_its_bound() {
+    let Some(stage) = stage() else { return };
+    let mut town = town(14, 1.5, 7);
+    let mut patch = town.data.clone();
+    // A small patch of floor: one cluster, so that one list holds for all its vertices.
+    patch.meshes.retain(|mesh| mesh.name != "floor");
+    let plane = scene("[[mesh]]\nname = \"floor\"\nplane = { size_m = 0.4, cells = 6 }\n").data.meshes.remove(0);
+    patch.meshes.insert(0, plane);
+    for entity in &mut patch.entities[1..] {
+        entity.receives = Some(false);
+    }
+    let text = patch.to_toml();
+    town = Scene::parse(&text, std::path::Path::new("patch.toml"), &shadow_fields::asset::embedded::read).unwrap();
+    let placements = town.at(0.0);
+    let mut full = stage.frame(&town, small());
+    let exact = stage.light(&mut full, &placements);
+    let shapes = Shapes::new(&town);
+    let world = World::new(&town, &shapes, &placements);
+    let vertices: Vec<Vertex> = (0..exact[0].len()).map(|index| Vertex { entity: 0, index }).collect();
+    let cast = RayCast { rays: 1 << 13, ..Default::default() };
+    let truth = cast.run(&world, &vertices);
+    for eps in [1e-3, 5e-3, 2e-2] {
+        let mut frame = stage.frame(&town, Options { eps, ..small() });
+        let light = stage.light(&mut frame, &placements);
+        let counts = frame.counts(&placements);
+        let (worst, brightest) = stage::difference(&light[0], &exact[0]);
+        // The same town without what the list leaves out, by rays.
+        let listed = frame.listed(&placements, 0);
+        let mut bare = town.clone();
+        for (j, entity) in bare.entities.iter_mut().enumerate().skip(1) {
+            entity.occludes &= listed.contains(&j);
+            entity.emits &= listed.contains(&j);
+        }
+        let without = cast.run(&World::new(&bare, &shapes, &placements), &vertices);
+        let pairs = truth.iter().zip(&without);
+        let by_rays = pairs
+            .flat_map(|(a, b)| (0..3).map(move |c| (a.radiosity[c] - b.radiosity[c]).abs()))
+            .fold(0.0_f64, f64::max);
+        report(&format!(
+            "eps {eps}: {} of {} dropped, bound {:.4}, by rays {by_rays:.4}, merge {worst:.4} of {brightest:.3}",
+            counts.below_eps, counts.considered, counts.dropped_bound
+        ));
+        assert!(
+            counts.below_eps > 0 && f64::from(worst) <= counts.dropped_bound,
+            "{worst} of {}",
+            counts.dropped_bound
+        );
+        // Rays have noise: a hundredth of what they measure.
+        assert!(by_rays <= counts.dropped_bound + 0.01 * f64::from(brightest));
+    }
+}
+
+/// As an occluder passes eps nothing changes by more than it.
+#[test]
+fn nothing_pops_by_more_than_eps() {
+    let Some(stage) = stage() else { return };
+    let scene = scene(
+        "environment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"floor\"\nplane = { size_m = 1, cells = 7 }\n\
+         [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.5, subdivisions = 2 }\n[[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"ball\"\n",
+    );
+    let eps = 4e-3;
+    let mut frame = stage.frame(&scene, Options { eps, ..small() });
+    let (mut before, mut largest, mut dropped): (Option<Vec<[f32; 3]>>, f32, bool) = (None, 0.0, false);
+    for i in 0..120 {
+        let placements = [at(0.0, 0.0, 0.0), at(4.0 + 0.02 * i as f32, 1.0, 0.3)];
+        let light = stage.light(&mut frame, &placements).swap_remove(0);
+        let steps = frame.counts(&placements);
+        dropped |= steps.below_eps > 0;
+        if let Some(before) = before.replace(light.clone()) {
+            largest = largest.max(stage::difference(&light, &before).0);
+        }
+    }
+    report(&format!("largest step {largest:.5}"));
+    assert!(dropped && largest <= eps, "{largest}");
+    assert!(largest > eps / 5.0, "the step is seen at all: {largest}");
+}

@@ -74,7 +74,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("bands", format!("{} ({} coefficients a channel)", header.bands, header.bands * header.bands)),
         ("lattice", lattice.to_string()),
         ("shells", format!("{} r", shells.join(" "))),
-        ("samples", format!("{} ({} filled from neighbours)", lattice.sample_count(), header.filled_samples)),
+        ("samples", format!("{} ({} inside, seen from the surface)", lattice.sample_count(), header.filled_samples)),
         ("stored", format!("{} samples, {storage}, {} bytes", lattice.stored_count(), field.payload.len())),
         ("face", format!("{0} x {0} texels", header.face_px)),
     ];

@@ -1,5 +1,5 @@
-//! Pass "assemble": captured samples to the field as stored: cube borders copied from neighbouring faces, samples inside the
-//! solid filled from valid ones around them, halves where wanted.
+//! Pass "assemble": captured samples to the field as stored: fitted to being interpolated, cube borders copied from neighbouring
+//! faces, samples that see nothing filled from valid ones around them, halves where wanted.
 //!
 //! Input: `captured`, floats of one sample after another. Output: the field's payload at a byte offset of the store.
 
@@ -9,47 +9,109 @@ use crate::field::quantity::Storage;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device};
 use crate::shaders::{Library, Row};
 use bytemuck::{Pod, Zeroable};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// For every stored sample the captured ones whose mean it is, as offsets into a list.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A captured sample and its share in a stored one.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Source {
+    /// Captured sample.
+    pub sample: u32,
+    /// Share; those of a stored sample sum to 1.
+    pub weight: f32,
+}
+
+/// For every stored sample the captured ones whose weighted sum it is, as offsets into a list.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sources {
     /// Where each stored sample's list begins; one more than there are samples.
     pub offsets: Vec<u32>,
     /// Captured samples.
-    pub list: Vec<u32>,
+    pub list: Vec<Source>,
 }
 
+/// What a straight line through samples is too high by between them, on average, in units of their second difference: where
+/// f'' is constant, the chord over a step h errs by f'' t (h - t) / 2, whose mean is f'' h^2 / 12. Lowering every sample by that
+/// makes the interpolant the best one in the mean square: its error falls from .0913 to .0373 h^2 f''.
+const SAG: f64 = 1.0 / 12.0;
+
 impl Sources {
-    /// Plans the assembly of a lattice of which `inside` marks the captured samples that may not be used.
+    /// Plans the assembly of a lattice of which `unseen` marks the captured samples that may not be used.
     ///
     /// An unusable sample is replaced by the mean of the usable ones that are fewest steps away, a step leading to the next
-    /// shell or the next direction.
+    /// shell or the next direction. `inside` marks samples that stand for others (see [`super::inside::pushed_out`]): no second
+    /// difference is taken across them. Every other sample is lowered by [`SAG`] of its second differences, along shells and
+    /// along both directions.
     ///
     /// # Errors
     /// `Input` when no sample is usable.
-    pub fn new(lattice: &Lattice, inside: &[bool]) -> Result<Self> {
+    pub fn new(lattice: &Lattice, inside: &[bool], unseen: &[bool]) -> Result<Self> {
         if inside.iter().all(|&i| i) {
             return Err(Error::Input("every sample point lies inside the solid: nothing can see the object".into()));
         }
-        let replacements: Vec<Vec<u32>> = (0..inside.len() as u32)
-            .map(|sample| if inside[sample as usize] { nearest_usable(lattice, inside, sample) } else { vec![sample] })
+        let fitted: Vec<BTreeMap<u32, f64>> = (0..unseen.len() as u32)
+            .map(|sample| {
+                if unseen[sample as usize] {
+                    let around = nearest_usable(lattice, unseen, sample);
+                    let share = 1.0 / around.len() as f64;
+                    return around.into_iter().map(|other| (other, share)).collect();
+                }
+                fit(lattice, inside, sample)
+            })
             .collect();
         let directions = lattice.direction_count();
         let planes = lattice.sources();
         let (mut offsets, mut list) = (vec![0], Vec::new());
         for shell in 0..lattice.shells {
             for cells in &planes {
+                let mut sum = BTreeMap::<u32, f64>::new();
                 for cell in cells {
-                    // A corner's three cells weigh the same only when each brings one sample: take their means in turn.
-                    list.extend(&replacements[(shell * directions + cell) as usize]);
+                    for (&sample, weight) in &fitted[(shell * directions + cell) as usize] {
+                        *sum.entry(sample).or_default() += weight / cells.len() as f64;
+                    }
                 }
+                list.extend(sum.into_iter().map(|(sample, weight)| Source { sample, weight: weight as f32 }));
                 offsets.push(list.len() as u32);
             }
         }
         Ok(Sources { offsets, list })
     }
+}
+
+/// A sample less [`SAG`] of its second differences.
+fn fit(lattice: &Lattice, inside: &[bool], sample: u32) -> BTreeMap<u32, f64> {
+    let mut out = BTreeMap::from([(sample, 1.0)]);
+    for pair in opposite(lattice, sample) {
+        if [pair[0], pair[1], sample].iter().all(|&s| !inside[s as usize]) {
+            *out.entry(sample).or_default() += 2.0 * SAG;
+            for other in pair {
+                *out.entry(other).or_default() -= SAG;
+            }
+        }
+    }
+    out
+}
+
+/// Fewest shells, and cells along a face's edge, whose second differences tell of curvature: fewer are too far apart.
+const FEWEST: u32 = 4;
+
+/// Pairs of samples between which a sample lies: the shells below and above, and the directions on both sides in both
+/// directions of a cube's grid. Grids of latitudes and longitudes have none: they stand for how others sample.
+fn opposite(lattice: &Lattice, sample: u32) -> Vec<[u32; 2]> {
+    let Directions::Cube { cells } = lattice.directions else { return Vec::new() };
+    let directions = lattice.direction_count();
+    let (shell, direction) = (sample / directions, sample % directions);
+    let mut out = Vec::new();
+    if lattice.shells >= FEWEST && shell > 0 && shell + 1 < lattice.shells {
+        out.push([sample - directions, sample + directions]);
+    }
+    if cells >= FEWEST {
+        let around = lattice.cell_neighbours(direction).into_iter().map(|d| shell * directions + d).collect::<Vec<_>>();
+        out.extend(around.chunks_exact(2).map(|pair| [pair[0], pair[1]]));
+    }
+    out
 }
 
 /// The usable samples at the least number of steps, by breadth-first search.
@@ -149,8 +211,9 @@ pub fn reference(captured: &[f32], sources: &Sources, sample_stride: usize, fact
     lists
         .flat_map(|list| {
             (0..sample_stride).map(move |k| {
-                let sum: f64 = list.iter().map(|&s| f64::from(captured[s as usize * sample_stride + k])).sum();
-                sum * f64::from(factor) / list.len() as f64
+                let part =
+                    |s: &Source| f64::from(s.weight) * f64::from(captured[s.sample as usize * sample_stride + k]);
+                list.iter().map(part).sum::<f64>() * f64::from(factor)
             })
         })
         .collect()

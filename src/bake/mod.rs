@@ -67,9 +67,9 @@ pub const TRANSFER_OFFSET: f32 = 2e-3;
 /// Where the time of a bake went.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
-    /// Samples captured.
+    /// Samples captured at their own place.
     pub samples: u32,
-    /// Samples inside the solid, filled from neighbours.
+    /// Samples inside the solid, captured off the nearest surface or, where that sees nothing, filled from neighbours.
     pub filled: u32,
     /// Device time in capture passes.
     pub capture_ms: f64,
@@ -104,26 +104,10 @@ pub fn first_shell(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
     }
     let nearest = triangles
         .iter()
-        .map(|t| distance_to_triangle(t.map(|i| positions[i as usize].as_dvec3())))
+        .map(|t| inside::nearest_on_triangle(t.map(|i| positions[i as usize].as_dvec3())).length())
         .fold(f64::INFINITY, f64::min);
     // A tessellated sphere's facets lie a few percent inside it.
     if nearest > 0.93 { OUTSIDE_INNER } else { nearest.max(ROOMY_INNER) }
-}
-
-/// Distance of the origin from a triangle (Ericson, *Real-Time Collision Detection*, section 5.1.5, by regions).
-fn distance_to_triangle([a, b, c]: [DVec3; 3]) -> f64 {
-    let (ab, ac) = (b - a, c - a);
-    let normal = ab.cross(ac);
-    let along = |from: DVec3, edge: DVec3| {
-        let t = (-from.dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (from + t * edge).length()
-    };
-    let sides = [(a, ab), (b, c - b), (c, a - c)];
-    let inside = sides.iter().all(|(from, edge)| normal.dot(edge.cross(-*from)) >= 0.0);
-    if inside && normal != DVec3::ZERO {
-        return a.dot(normal.normalize()).abs();
-    }
-    sides.iter().map(|&(from, edge)| along(from, edge)).fold(f64::INFINITY, f64::min)
 }
 
 /// Header of the field that a bake of `mesh` would make.
@@ -208,7 +192,9 @@ impl Baker {
         let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
         let inside = inside::inside(&unit_positions(mesh), &mesh.triangles, &positions);
         header.filled_samples = inside.iter().filter(|i| **i).count() as u32;
-        let sources = Sources::new(&lattice, &inside)?;
+        let pushed = inside::pushed_out(&unit_positions(mesh), &mesh.triangles, &positions, &inside);
+        let unseen: Vec<bool> = inside.iter().zip(&pushed).map(|(inside, eye)| *inside && eye.is_none()).collect();
+        let sources = Sources::new(&lattice, &inside, &unseen)?;
 
         let radiance = header.kind == Kind::Radiance;
         let capture = Capture::new(&self.device, &self.library, header.face_px, radiance)?;
@@ -217,14 +203,15 @@ impl Baker {
         let model = Model::new(&self.device, mesh, radiance)?;
         let captured = Buffer::new(&self.device, "captured samples", BufferKind::Device, captured_bytes(header))?;
         let mut targets = Vec::new();
-        for (index, position) in positions.iter().enumerate().filter(|(index, _)| !inside[*index]) {
-            let scale = lattice.scale(position.length()) as f32;
-            targets.push((position.as_vec3(), Job { normal: [0.0; 4], slots: [0; 6], target: index as u32, scale }));
+        for (index, position) in positions.iter().enumerate().filter(|(index, _)| !unseen[*index]) {
+            let eye = pushed[index].unwrap_or(*position);
+            let scale = lattice.scale(eye.length().max(lattice.inner)) as f32;
+            targets.push((eye.as_vec3(), Job { normal: [0.0; 4], slots: [0; 6], target: index as u32, scale }));
         }
         let sweep = Sweep { capture: &capture, project: &project, model: &model, cull: true };
         let mut report = sweep.run(&self.device, &targets, &captured, progress)?;
-        report.samples = targets.len() as u32;
         report.filled = header.filled_samples;
+        report.samples = lattice.sample_count() - report.filled;
 
         let assemble = Assemble::new(&self.device, &self.library, header.storage)?;
         let offsets = Buffer::with_data(&self.device, "assemble offsets", &sources.offsets)?;

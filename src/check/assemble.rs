@@ -32,7 +32,7 @@ pub fn compare(
     const FACTOR: f32 = 0.7;
     let mut rng = Rng::with_seed(seed);
     let inside: Vec<bool> = (0..lattice.sample_count()).map(|i| i > 0 && rng.u32(..10) < 3).collect();
-    let sources = Sources::new(lattice, &inside)?;
+    let sources = Sources::new(lattice, &inside, &inside)?;
     let stride = channels * channel_stride(bands);
     // What lies inside is never to be used: NaN would show.
     let number = |inside: bool, rng: &mut Rng| if inside { f32::NAN } else { 8.0 * rng.f32() - 4.0 };

@@ -28,7 +28,7 @@ pub struct Header {
     pub lattice: Lattice,
     /// Edge of the captured cube faces in texels.
     pub face_px: u32,
-    /// Samples that lay inside the solid and were filled from their neighbours.
+    /// Samples that lay inside the solid: they hold what is seen just off the surface nearest to them.
     pub filled_samples: u32,
     /// Occlusion fields: what one product may lengthen a transfer vector by at most (see [`growth`]), from the stored numbers;
     /// 0 before the bake, and in radiance fields, which are not multiplied.

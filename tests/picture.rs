@@ -78,7 +78,8 @@ fn apng_has_its_frames() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("p.png");
     let frames: Vec<Vec<u8>> = (0..7u8).map(|f| vec![f * 30; 4 * 2 * 3]).collect();
-    write_apng(&path, 4, 2, &frames, 25).unwrap();
+    let all = || frames.iter().cloned().map(Ok);
+    write_apng(&path, 4, 2, all(), 25).unwrap();
     let mut reader = png::Decoder::new(BufReader::new(std::fs::File::open(&path).unwrap())).read_info().unwrap();
     let control = reader.info().animation_control.unwrap();
     assert_eq!((control.num_frames, control.num_plays), (7, 0));
@@ -89,8 +90,13 @@ fn apng_has_its_frames() {
         let shown = reader.info().frame_control.unwrap();
         assert_eq!((shown.delay_num, shown.delay_den), (1, 25));
     }
-    assert_eq!(write_apng(&path, 4, 2, &[], 25).unwrap_err().exit_code(), 2);
-    assert_eq!(write_apng(&path, 4, 2, &frames, 0).unwrap_err().exit_code(), 2);
+    assert_eq!(write_apng(&path, 4, 2, std::iter::empty(), 25).unwrap_err().exit_code(), 2);
+    assert_eq!(write_apng(&path, 4, 2, all(), 0).unwrap_err().exit_code(), 2);
+    // A frame that fails is what fails, and the older file stays.
+    let before = std::fs::read(&path).unwrap();
+    let broken = [Ok(frames[0].clone()), Err(shadow_fields::Error::Device("gone".into()))];
+    assert_eq!(write_apng(&path, 4, 2, broken.into_iter(), 25).unwrap_err().exit_code(), 5);
+    assert_eq!(std::fs::read(&path).unwrap(), before);
 }
 
 #[test]

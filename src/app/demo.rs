@@ -195,7 +195,7 @@ fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene
         pictures.push(picture::encode_srgb(&frame.picture(), exposure_ev));
     }
     let path = arguments.output.join(format!("{name}_animation.png"));
-    picture::write_apng(&path, options.size[0], options.size[1], &pictures, fps)?;
+    picture::write_apng(&path, options.size[0], options.size[1], pictures.into_iter().map(Ok), fps)?;
     Ok(path)
 }
 

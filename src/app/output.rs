@@ -49,7 +49,7 @@ pub fn start_log(global: &Global) {
     let _ = env_logger::Builder::from_env(environment).format_timestamp(None).try_init();
 }
 
-/// A progress bar for one bake after another; nothing where stderr is no terminal or bars are not wanted.
+/// A progress bar for one piece of work after another; nothing where stderr is no terminal or bars are not wanted.
 pub struct Progress {
     hidden: bool,
     current: RefCell<Option<(String, ProgressBar)>>,
@@ -63,13 +63,24 @@ impl Progress {
 
     /// Shows that `done` of `all` samples of `what` are baked.
     pub fn show(&self, what: &str, done: u32, all: u32) {
+        self.bar(what, "baking {msg:24} [{bar:32}] {pos}/{len} samples, {eta} left", done, all);
+    }
+
+    /// Shows that `done` of `all` pictures are rendered; a single one needs no bar.
+    pub fn pictures(&self, done: u32, all: u32) {
+        if all > 1 {
+            self.bar("pictures", "rendering [{bar:32}] {pos}/{len} {msg}, {eta} left", done, all);
+        }
+    }
+
+    fn bar(&self, what: &str, template: &str, done: u32, all: u32) {
         if self.hidden {
             return;
         }
         let mut current = self.current.borrow_mut();
         if current.as_ref().is_none_or(|(name, _)| name != what) {
             let bar = ProgressBar::with_draw_target(Some(all.into()), ProgressDrawTarget::stderr());
-            let style = ProgressStyle::with_template("baking {msg:24} [{bar:32}] {pos}/{len} samples, {eta} left");
+            let style = ProgressStyle::with_template(template);
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
             bar.set_message(what.to_owned());
             *current = Some((what.to_owned(), bar));

@@ -20,16 +20,16 @@ use std::time::Instant;
 pub struct Arguments {
     /// Scene file (see assets/scenes for examples)
     scene: PathBuf,
-    /// Picture to write; with --frames an animated PNG, or numbered pictures when the name has a run of #
+    /// Picture to write; with --frames an animated PNG, or pictures numbered from 0 when the name has a run of #: out/f_####.png
     #[arg(short, long, value_name = "P.png")]
     output: PathBuf,
-    /// Also write linear f32 radiance
+    /// Also write linear f32 radiance: of every picture when the name has a run of #, else of the last
     #[arg(long, value_name = "P.exr")]
     exr: Option<PathBuf>,
     /// Pictures of an animation
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
-    /// Pictures a second of scene time
+    /// Pictures a second of scene time; what is shown depends on the time alone, not on this
     #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
     fps: u16,
     /// Scene time of the first picture, seconds; default: the scene's, which is 0 unless it says otherwise
@@ -71,11 +71,12 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if arguments.time.is_some_and(|time| !time.is_finite()) {
         return Err(Error::Usage("--time wants a finite number of seconds".into()));
     }
-    let numbered = Numbered::new(&arguments.output)?;
+    let numbered = Numbered::new(&arguments.output, "png")?;
     let others = [&arguments.exr, &arguments.vertices, &arguments.stats, &arguments.error];
     for path in others.into_iter().flatten().chain([&arguments.output]) {
         output::check_folder(path)?;
     }
+    let numbered_exr = arguments.exr.as_deref().map(|path| Numbered::new(path, "exr")).transpose()?.flatten();
     let scene = Scene::load(&arguments.scene)?;
     let context = Context::new(global)?;
     let started = Instant::now();
@@ -98,10 +99,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let prepared = started.elapsed();
 
     let [width, height] = options.size;
-    let mut encoded = Vec::new();
     let mut timings = Vec::new();
     let mut worst_error = 0.0_f64;
-    for index in 0..arguments.frames {
+    let mut draw = |index: u32| {
         let time_s = first_s + f64::from(index) / f64::from(arguments.fps);
         let placements = scene.at(time_s);
         let start = Instant::now();
@@ -113,28 +113,24 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         };
         timings.push((time_s, start.elapsed(), passes));
         let rgb = frame.picture();
-        match &numbered {
-            Some(numbered) => {
-                picture::write_png(&numbered.path(index), width, height, &rgb, shape.exposure_ev)?;
-            }
-            None if arguments.frames == 1 => {
-                picture::write_png(&arguments.output, width, height, &rgb, shape.exposure_ev)?;
-            }
-            None => encoded.push(picture::encode_srgb(&rgb, shape.exposure_ev)),
+        let last = arguments.exr.as_ref().filter(|_| index + 1 == arguments.frames).cloned();
+        if let Some(path) = numbered_exr.as_ref().map(|numbered| numbered.path(index)).or(last) {
+            frame.redraw(&placements, f32::INFINITY)?;
+            picture::write_exr(&path, width, height, &frame.picture())?;
         }
-    }
-    if !encoded.is_empty() {
-        picture::write_apng(&arguments.output, width, height, &encoded, arguments.fps)?;
+        context.progress.pictures(index + 1, arguments.frames);
+        Ok(rgb)
+    };
+    if numbered.is_none() && arguments.frames > 1 {
+        let frames = (0..arguments.frames).map(|index| Ok(picture::encode_srgb(&draw(index)?, shape.exposure_ev)));
+        picture::write_apng(&arguments.output, width, height, frames, arguments.fps)?;
+    } else {
+        for index in 0..arguments.frames {
+            let path = numbered.as_ref().map_or_else(|| arguments.output.clone(), |numbered| numbered.path(index));
+            picture::write_png(&path, width, height, &draw(index)?, shape.exposure_ev)?;
+        }
     }
     let last = scene.at(timings.last().map_or(first_s, |(time_s, ..)| *time_s));
-    if let Some(path) = &arguments.exr {
-        if arguments.reference {
-            frame.redraw(&last, f32::INFINITY)?;
-        } else {
-            frame.render(&last, Some(f32::INFINITY))?;
-        }
-        picture::write_exr(path, width, height, &frame.picture())?;
-    }
     if let Some(path) = &arguments.vertices {
         text::write(path, &vertex_table(&frame, &last)?)?;
     }
@@ -232,10 +228,13 @@ struct Numbered {
 }
 
 impl Numbered {
-    fn new(path: &Path) -> Result<Option<Self>> {
+    /// A name that ends as the pictures do; `None` where it has no run of `#`.
+    fn new(path: &Path, ending: &str) -> Result<Option<Self>> {
         let text = path.to_str().ok_or_else(|| Error::Usage(format!("{}: the name is not UTF-8", path.display())))?;
-        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
-            return Err(Error::Usage(format!("{text}: pictures are written as .png (and --exr)")));
+        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case(ending)) {
+            return Err(Error::Usage(format!(
+                "{text}: the name is to end in .{ending} (-o writes PNG, --exr OpenEXR)"
+            )));
         }
         Ok(text.find('#').map(|at| {
             let digits = text[at..].bytes().take_while(|b| *b == b'#').count();

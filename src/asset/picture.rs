@@ -44,25 +44,34 @@ pub fn write_png(path: &Path, width: u32, height: u32, linear_rgb: &[f32], expos
     })
 }
 
-/// Writes 8-bit sRGB frames (see [`encode_srgb`]) as an animated PNG that repeats for ever, `fps` frames a second.
+/// Writes 8-bit sRGB frames (see [`encode_srgb`]) as an animated PNG that repeats for ever, `fps` frames a second. Frames are asked
+/// for one by one, and only their compressed form is kept until the file is written.
 ///
 /// # Errors
-/// [`Error::Failed`] where the path cannot be written; [`Error::Usage`] without frames or with zero `fps`.
-pub fn write_apng(path: &Path, width: u32, height: u32, frames: &[Vec<u8>], fps: u16) -> Result<()> {
-    if frames.is_empty() || fps == 0 {
+/// [`Error::Failed`] where the path cannot be written; [`Error::Usage`] without frames or with zero `fps`; that of a frame.
+pub fn write_apng(
+    path: &Path,
+    width: u32,
+    height: u32,
+    frames: impl ExactSizeIterator<Item = Result<Vec<u8>>>,
+    fps: u16,
+) -> Result<()> {
+    if frames.len() == 0 || fps == 0 {
         return Err(Error::Usage(format!("{}: an animation needs frames and a rate above 0", path.display())));
     }
-    frames.iter().for_each(|f| check_size(width, height, f.len()));
-    write_whole(path, |file| {
-        let mut encoder = rgb8_encoder(file, width, height);
-        encoder.set_animated(frames.len() as u32, 0)?;
-        encoder.set_frame_delay(1, fps)?;
-        let mut writer = encoder.write_header()?;
-        for frame in frames {
-            writer.write_image_data(frame)?;
-        }
-        Ok(writer.finish()?)
-    })
+    let fail = |e: png::EncodingError| Error::Failed(format!("{}: cannot write: {e}", path.display()));
+    let mut bytes = Vec::new();
+    let mut encoder = rgb8_encoder(&mut bytes, width, height);
+    encoder.set_animated(frames.len() as u32, 0).map_err(fail)?;
+    encoder.set_frame_delay(1, fps).map_err(fail)?;
+    let mut writer = encoder.write_header().map_err(fail)?;
+    for frame in frames {
+        let frame = frame?;
+        check_size(width, height, frame.len());
+        writer.write_image_data(&frame).map_err(fail)?;
+    }
+    writer.finish().map_err(fail)?;
+    write_whole(path, |file| Ok(file.write_all(&bytes)?))
 }
 
 /// Writes linear RGB as OpenEXR with 32-bit floats, bit for bit.

@@ -261,3 +261,37 @@ fn camera_up() {
     assert_eq!(camera("[0, 1, 1]").up(), Vec3::Y);
     assert_eq!(camera("[0, 4, 0]").up(), Vec3::NEG_Z);
 }
+
+/// Loads the scene that documentation shows, from a folder that has the picture it names.
+fn documented(text: &str) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    shadow_fields::asset::picture::write_exr(&folder.path().join("studio.hdr"), 2, 1, &[1.0; 6]).unwrap();
+    std::fs::write(folder.path().join("shown.toml"), text).unwrap();
+    Scene::load(&folder.path().join("shown.toml")).unwrap()
+}
+
+#[test]
+fn the_scenes_of_the_documentation_load() {
+    let lines = |text: &str, prefix: &str| -> String {
+        text.lines().filter_map(|line| Some(line.strip_prefix(prefix)?.to_owned() + "\n")).collect()
+    };
+    let file = |name: &str| std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+    let readme = file("README.md");
+    let section = readme.split("## Scene files").nth(1).unwrap().split("\n## ").next().unwrap();
+    let scene = documented(&lines(section, "    "));
+    assert!(scene.entities[0].emits && scene.data.entities[0].motion.len() == 4);
+    assert!(scene.data.environment.sky.is_some());
+    // The reference shows every part of the environment and every motion.
+    let reference = file("src/scene/data.rs");
+    let scene =
+        documented(&lines(reference.split("//! ```toml\n").nth(1).unwrap().split("//! ```\n").next().unwrap(), "//! "));
+    let source = &scene.data.environment;
+    let parts = [
+        source.uniform.is_some(),
+        source.gradient.is_some(),
+        source.key.is_some(),
+        source.sky.is_some(),
+        source.image.is_some(),
+    ];
+    assert_eq!((parts, scene.data.entities[0].motion.len()), ([true; 5], 4));
+}

@@ -1,21 +1,37 @@
 //! The tables of a scene file.
 //!
 //! ```toml
-//! [camera]
+//! [camera]                                   # fov_deg is vertical
 //! eye = [0, 2, 5]
 //! target = [0, 0.5, 0]
-//!
-//! [environment]
-//! gradient = { radiance = [0.3, 0.4, 0.5] }
-//!
+//! [output]                                   # all may be left out; time_s is that of the first picture
+//! width = 960
+//! exposure_ev = -0.5
+//! time_s = 0
+//! [environment]                              # what is given adds up, times strength, turned about +y
+//! strength = 1
+//! turn_deg = 30
+//! uniform = [0.02, 0.02, 0.03]
+//! gradient = { radiance = [0.1, 0.12, 0.16] }                              # brighter towards the zenith
+//! key = { radiance = [3, 3, 2], toward = [1, 2, 1], sharpness = 8 }        # a soft directional light
+//! sky = { sun_elevation_deg = 40, turbidity = 3, radiance = 0.35 }         # generated daylight; sky = {} will do
+//! image = { file = "studio.hdr", scale = 0.5 }                             # equirectangular HDR, EXR or PNG
 //! [[mesh]]
 //! name = "ball"
-//! sphere = { radius_m = 0.5, subdivisions = 3 }     # or file = "ball.obj", relative to the scene file
-//!
+//! sphere = { radius_m = 0.5, subdivisions = 4 }                            # or plane, cuboid, torus, teapot
 //! [[entity]]
 //! mesh = "ball"
-//! position = [0, 0.5, 0]
-//! motion = [{ orbit = { centre = [1, 0, 0], period_s = 4 } }]
+//! position = [0, 0.6, 0]
+//! rotation = { axis = [0, 1, 0], angle_deg = 30 }
+//! scale = 1
+//! albedo = [0.7, 0.4, 0.2]
+//! emission = [40, 36, 30]                    # makes it a light; emits, occludes, receives = true | false say otherwise
+//! motion = [                                 # one after the other, functions of time alone
+//!     { keyframes = { repeat = true, interpolation = "smooth", keys = [    # Catmull-Rom; or "linear"; rotations by slerp
+//!         { time_s = 0, position = [0, 0.6, 0] }, { time_s = 2, position = [1, 0.9, 0] }, { time_s = 4, position = [0, 0.6, 0] } ] } },
+//!     { orbit = { centre = [0, 0, 0], period_s = 8 } }, { spin = { axis = [0, 1, 0], period_s = 4 } },
+//!     { bob = { amplitude_m = 0.1, period_s = 3 } },
+//! ]
 //! ```
 
 use std::path::{Path, PathBuf};

@@ -10,5 +10,10 @@ void main() {
     if (brightest > white) {
         shown *= white / brightest;
     }
+#if DISPLAY
+    // IEC 61966-2-1, white at 1.
+    shown /= white;
+    shown = mix(1.055 * pow(shown, vec3(1.0 / 2.4)) - 0.055, 12.92 * shown, lessThanEqual(shown, vec3(0.0031308)));
+#endif
     color = vec4(shown, 1.0);
 }

@@ -5,7 +5,9 @@ mod common;
 mod stage;
 
 use common::report;
+use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::frame::Options;
+use shadow_fields::render::draw::Finish;
 use shadow_fields::scene::{Placement, Scene};
 use stage::{at, scene, small, stage};
 
@@ -161,4 +163,28 @@ fn lit_surfaces_have_their_radiosity() {
     for (found, expected) in picture.chunks_exact(3).flatten().zip([0.75_f32, 0.5, 0.75].iter().cycle()) {
         assert!((found - expected).abs() < 1e-3, "{found} for {expected}");
     }
+}
+
+/// A picture for a screen is the linear one over white, in 8 bits of sRGB.
+#[test]
+fn screens_are_shown_the_same() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("environment = { uniform = [0.2, 0.5, 0.05] }", &[[4.0, 1.0, 0.3], [0.1, 0.2, 0.001]]);
+    let placements = [at(-0.5, 0.0, 0.0), at(0.6, 0.2, 0.0)];
+    let mut frame = stage.frame(&scene, options(false));
+    let white = 2.0;
+    frame.render(&placements, Some(white)).unwrap();
+    let linear = frame.picture();
+    frame.set_finish(Finish::Display, false).unwrap();
+    frame.render(&placements, Some(white)).unwrap();
+    for (shown, linear) in frame.picture().iter().zip(&linear) {
+        let levels = 255.0 * (srgb_from_linear(*shown) - srgb_from_linear(linear / white));
+        // Half a level of rounding, and as much for the device's own powers.
+        assert!(levels.abs() < 1.0, "{shown} against {linear}");
+    }
+    let brightest = linear.iter().fold(0.0_f32, |m, c| m.max(*c));
+    assert!((brightest - white).abs() < 1e-3 * white, "the ball is brighter than white: {brightest}");
+    // A frame that is only shown stays on the device; here nothing receives, so nothing is merged either.
+    let passes: Vec<_> = frame.show(&placements, white).unwrap().into_iter().map(|t| t.pass).collect();
+    assert_eq!(passes, ["draw"]);
 }

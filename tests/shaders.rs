@@ -23,7 +23,8 @@ fn baking() -> Vec<Row> {
 }
 
 fn drawing() -> Vec<Row> {
-    ["draw.vert", "draw.frag"].map(|file| Row::new(file, 4)).to_vec()
+    let fragment = [false, true].map(|display| Row::new("draw.frag", 4).define("DISPLAY", display));
+    fragment.into_iter().chain([Row::new("draw.vert", 4)]).collect()
 }
 
 fn lattice(text: &str) -> Lattice {

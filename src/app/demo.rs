@@ -8,6 +8,7 @@ use crate::bake;
 use crate::error::{Error, Result};
 use crate::field::Lookup;
 use crate::frame::{Frame, Options};
+use crate::render::draw::Finish;
 use crate::scene::Scene;
 use clap::Args;
 use serde_json::json;
@@ -73,7 +74,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(json!({ "origin": origin, "scenes": rows, "pictures": files }).to_string());
         return Ok(());
     }
-    let header = ["scene", "vertices", "entities", "bake s", "merge ms", "draw ms", "frame ms", "frames/s"];
+    let header =
+        ["scene", "vertices", "entities", "bake s", "merge ms", "draw ms", "frame ms", "frames/s", "at 1 sample"];
     output::table(&header, &rows.iter().map(Row::cells).collect::<Vec<_>>());
     let first = rows.first().map_or(0.0, |row| row.first_picture_s);
     output::say(format!("first picture after {first:.2} s, all after {:.1} s", started.elapsed().as_secs_f64()));
@@ -93,6 +95,8 @@ struct Row {
     merge_ms: f64,
     draw_ms: f64,
     frame_ms: f64,
+    draw_1_sample_ms: f64,
+    frame_1_sample_ms: f64,
     first_picture_s: f64,
     variant: &'static str,
 }
@@ -109,6 +113,7 @@ impl Row {
             format!("{:.2}", self.draw_ms),
             format!("{:.2}", self.frame_ms),
             format!("{:.1}", 1e3 / self.frame_ms),
+            format!("{:.1}", 1e3 / self.frame_1_sample_ms),
         ]
     }
 }
@@ -136,7 +141,8 @@ fn options(arguments: &Arguments, scene: &Scene) -> Options {
     }
 }
 
-/// The scene's picture, and its frame time while it moves.
+/// The scene's picture, and its frame time while it moves: frames as a window shows them, not read back, with and without
+/// multisampling.
 fn still(
     context: &Context,
     arguments: &Arguments,
@@ -152,30 +158,44 @@ fn still(
     let first_picture_s = started.elapsed().as_secs_f64();
     written.push(path);
 
-    let (mut merge, mut drawn, mut whole) = (Vec::new(), Vec::new(), Vec::new());
-    for index in 0..arguments.timed_frames + 2 {
-        let placements = scene.at(f64::from(index) / 30.0);
-        let start = Instant::now();
-        let passes = frame.render(&placements, Some(white(scene.data.output.exposure_ev)))?;
-        let wall = start.elapsed().as_secs_f64() * 1e3;
-        if index >= 2 {
-            let of = |name: &str| passes.iter().find(|t| t.pass == name).map_or(0.0, |t| t.milliseconds);
-            merge.push(of("merge"));
-            drawn.push(of("draw"));
-            whole.push(wall);
+    let mut timed = [true, false].map(|multisample| (multisample, Times::default()));
+    for (multisample, times) in &mut timed {
+        frame.set_finish(Finish::Display, *multisample)?;
+        for index in 0..arguments.timed_frames + 2 {
+            let placements = scene.at(f64::from(index) / 30.0);
+            let start = Instant::now();
+            let passes = frame.show(&placements, white(scene.data.output.exposure_ev))?;
+            let wall = start.elapsed().as_secs_f64() * 1e3;
+            if index >= 2 {
+                let of = |name: &str| passes.iter().find(|t| t.pass == name).map_or(0.0, |t| t.milliseconds);
+                times.merge.push(of("merge"));
+                times.draw.push(of("draw"));
+                times.whole.push(wall);
+            }
         }
     }
+    let [(_, times), (_, single)] = &timed;
     Ok(Row {
         scene: name,
         vertices: frame.receiver_vertex_count(),
         entities: scene.entities.len(),
         bake_s: frame.store.baked.iter().map(|b| b.report.total.as_secs_f64()).sum(),
-        merge_ms: output::median(&merge),
-        draw_ms: output::median(&drawn),
-        frame_ms: output::median(&whole),
+        merge_ms: output::median(&times.merge),
+        draw_ms: output::median(&times.draw),
+        frame_ms: output::median(&times.whole),
+        draw_1_sample_ms: output::median(&single.draw),
+        frame_1_sample_ms: output::median(&single.whole),
         first_picture_s,
         variant: frame.variant.name,
     })
+}
+
+/// Milliseconds of the timed frames.
+#[derive(Default)]
+struct Times {
+    merge: Vec<f64>,
+    draw: Vec<f64>,
+    whole: Vec<f64>,
 }
 
 fn draw(frame: &mut Frame, scene: &Scene, options: Options, path: &Path) -> Result<()> {

@@ -4,9 +4,9 @@ use super::store::Store;
 use super::{Frame, usable};
 use crate::bake::cache::Cache;
 use crate::error::Result;
-use crate::gpu::{Access, Buffer, BufferKind, Commands, Image};
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Image, Timing};
 use crate::render::calibrate;
-use crate::render::draw::{Draw, Item, Pane};
+use crate::render::draw::{Draw, Finish, Item, Pane};
 use crate::render::merge::Merge;
 use crate::render::variant::{Form, Variant};
 use crate::scene::{Placement, Scene};
@@ -137,12 +137,45 @@ impl Frame {
     /// `Input` when it is larger than the device's images.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
         if size != self.options.size {
-            self.draw = Draw::new(&self.device, &self.library, size, self.options.multisample)?;
+            self.draw = Draw::new(&self.device, &self.library, size, self.options.multisample, self.draw.finish())?;
             let bytes = 8 * u64::from(size[0]) * u64::from(size[1]);
             self.readback = Buffer::new(&self.device, "readback", BufferKind::Readback, bytes)?;
             self.options.size = size;
         }
         Ok(())
+    }
+
+    /// Makes pictures for files or for a screen from now on, multisampled or not. A frame begins with linear ones.
+    ///
+    /// # Errors
+    /// `Failed` when a shader does not compile.
+    pub fn set_finish(&mut self, finish: Finish, multisample: bool) -> Result<()> {
+        if (finish, multisample) != (self.draw.finish(), self.options.multisample) {
+            self.draw = Draw::new(&self.device, &self.library, self.options.size, multisample, finish)?;
+            self.options.multisample = multisample;
+        }
+        Ok(())
+    }
+
+    /// As [`Frame::render`] with a picture that stays on the device, as a window would show it.
+    ///
+    /// # Errors
+    /// As [`Frame::render`].
+    pub fn show(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
+        let outcome = self.light_and_show(placements, white);
+        if outcome.is_err() {
+            self.forget();
+        }
+        outcome
+    }
+
+    fn light_and_show(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
+        self.prepare(placements)?;
+        let area = [0, 0, self.options.size[0], self.options.size[1]];
+        let mut commands = Commands::new(&self.device, "frame")?;
+        self.record_light(&mut commands)?;
+        self.record_picture(&mut commands, placements, &[Part { area, lit: Lit::Merged }], white)?;
+        commands.submit()
     }
 
     /// Whether the fields that `scene` needs are here; it has the meshes and entities that this frame was made for.
@@ -188,7 +221,7 @@ impl Frame {
         let uses = |files: &[String]| files.iter().any(|file| changed.contains(file));
         if uses(&self.library.files("draw.vert")) || uses(&self.library.files("draw.frag")) {
             let options = self.options;
-            self.draw = Draw::new(&self.device, &self.library, options.size, options.multisample)?;
+            self.draw = Draw::new(&self.device, &self.library, options.size, options.multisample, self.draw.finish())?;
         }
         if uses(&self.library.files("merge.comp")) {
             self.merge = Merge::new(&self.device, &self.library, self.form)?;

@@ -13,6 +13,7 @@ mod pose;
 pub mod store;
 mod twin;
 
+use crate::asset::picture::linear_from_srgb;
 use crate::bake;
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
@@ -22,7 +23,7 @@ use crate::field::quantity::channel_stride;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, TexelView, Timing, Upload};
 use crate::layout;
 use crate::render::calibrate;
-use crate::render::draw::{Draw, Item};
+use crate::render::draw::{Draw, Finish, Item};
 use crate::render::gather::Counts;
 use crate::render::merge::{Inputs, Merge, Readable};
 use crate::render::variant::{Chain, Form, Skip, Variant, uniform_entities};
@@ -118,7 +119,7 @@ impl Frame {
             radiosity_size += 16 * geometry.vertices.len() as u64;
         }
         let merge = Merge::new(device, library, form)?;
-        let draw = Draw::new(device, library, options.size, options.multisample)?;
+        let draw = Draw::new(device, library, options.size, options.multisample, Finish::Linear)?;
         let count = scene.entities.len().max(entity_limit as usize) as u64;
         let upload = |name: &str, bytes: u64| Upload::new(device, name, bytes);
         let bands = options.bake.bands;
@@ -266,9 +267,14 @@ impl Frame {
         self.radiosity.fill(self.radiosity_offsets[entity], &quads)
     }
 
-    /// The last picture: linear RGB, three floats a pixel, rows from the top.
+    /// The last picture: linear RGB, three floats a pixel, rows from the top. Made for a screen, it is decoded: white is 1.
     pub fn picture(&self) -> Vec<f32> {
         let pixels = (self.options.size[0] * self.options.size[1]) as usize;
+        if self.draw.finish() == Finish::Display {
+            let bytes: Vec<u8> = self.readback.read(0, 4 * pixels);
+            let linear = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
+            return bytes.chunks_exact(4).flat_map(|p| [linear(p[0]), linear(p[1]), linear(p[2])]).collect();
+        }
         let halves: Vec<f16> = self.readback.read(0, 4 * pixels);
         halves.chunks_exact(4).flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
     }

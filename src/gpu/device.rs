@@ -203,6 +203,9 @@ impl Device {
         let candidates: Vec<_> = devices.iter().map(|(_, candidate)| candidate.clone()).collect();
         let info = choose(&candidates, options.device.as_deref())?.clone();
         let physical = devices[info.index].0;
+        if info.is_software() {
+            super::heap::keep_freed_memory();
+        }
 
         // SAFETY: queries on a handle that the live instance returned.
         let (families, memory, properties) = unsafe {

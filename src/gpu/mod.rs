@@ -9,6 +9,7 @@ pub mod descriptors;
 pub mod device;
 pub mod drawing;
 pub mod flight;
+mod heap;
 pub mod image;
 pub mod memory;
 #[cfg(feature = "view")]

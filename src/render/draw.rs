@@ -1,9 +1,11 @@
 //! Pass "draw": lit vertices to a picture.
 //!
 //! Inputs: a mesh an entity (positions from its sphere's centre in metres, emission pattern, indices) and the entity's part
-//! of the radiosity buffer. Output: linear RGBA of `width` x `height`, multisampled with depth and resolved.
+//! of the radiosity buffer. Output: RGBA of `width` x `height`, multisampled with depth and resolved, linear or as a screen
+//! shows it.
 
 use crate::asset::mesh::Mesh;
+use crate::asset::picture::srgb_from_linear;
 use crate::error::Result;
 use crate::gpu::ImageShape;
 use crate::gpu::Target;
@@ -16,7 +18,20 @@ use std::sync::Arc;
 
 /// Linear half floats: 11 bits are more than a PNG shows, at half the bandwidth of f32.
 const COLOR: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
+/// What a screen shows, encoded by the shader: half the bytes of half floats. A format that encodes by itself (_SRGB) takes
+/// llvmpipe half as long again with four samples.
+const SHOWN: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
+
+/// What a picture is made for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Finish {
+    /// Linear radiance in half floats, for files and further work.
+    #[default]
+    Linear,
+    /// 8 bits, sRGB, with white at its brightest, for a screen. Samples are averaged after encoding.
+    Display,
+}
 
 /// A mesh as it is drawn.
 pub struct Drawable {
@@ -101,14 +116,21 @@ impl Draw {
     ///
     /// # Errors
     /// `Input` when the picture is larger than the device's images.
-    pub fn new(device: &Arc<Device>, library: &Library, [width, height]: [u32; 2], multisample: bool) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        [width, height]: [u32; 2],
+        multisample: bool,
+        finish: Finish,
+    ) -> Result<Self> {
         let limits = &device.limits;
         let offered = limits.framebuffer_color_sample_counts & limits.framebuffer_depth_sample_counts;
         let samples = if multisample && offered.contains(vk::SampleCountFlags::TYPE_4) { 4 } else { 1 };
-        let shape = ImageShape { format: COLOR, width, height, samples: 1 };
-        let state = GraphicsState { color: COLOR, depth: Some(DEPTH), samples, cull: vk::CullModeFlags::NONE };
+        let color = if finish == Finish::Display { SHOWN } else { COLOR };
+        let shape = ImageShape { format: color, width, height, samples: 1 };
+        let state = GraphicsState { color, depth: Some(DEPTH), samples, cull: vk::CullModeFlags::NONE };
         let vertex = library.shader(&Row::new("draw.vert", 4))?;
-        let fragment = library.shader(&Row::new("draw.frag", 4))?;
+        let fragment = library.shader(&Row::new("draw.frag", 4).define("DISPLAY", finish == Finish::Display))?;
         Ok(Draw {
             pipeline: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
             samples: (samples > 1)
@@ -117,6 +139,11 @@ impl Draw {
             depth: Image::new(device, "draw depth", ImageShape { format: DEPTH, samples, ..shape })?,
             picture: Image::new(device, "picture", shape)?,
         })
+    }
+
+    /// What its pictures are made for.
+    pub fn finish(&self) -> Finish {
+        if self.picture.shape.format == SHOWN { Finish::Display } else { Finish::Linear }
     }
 
     /// Samples a pixel.
@@ -166,6 +193,10 @@ impl Draw {
         background: Vec3,
         white: f32,
     ) -> Result<()> {
+        let background = match self.finish() {
+            Finish::Linear => background,
+            Finish::Display => Vec3::from_array((background / white).to_array().map(srgb_from_linear)),
+        };
         let target = Target {
             color: self.samples.as_ref().unwrap_or(&self.picture),
             clear: background.extend(1.0).to_array(),

@@ -35,7 +35,7 @@ pub enum Button {
     Middle,
 }
 
-/// What a window hears. Places are in pixels of the picture, x to the right, y down.
+/// What a window hears. Places are in pixels of the window, x to the right, y down; the picture that is edited is at its left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// A key went down, or was said again because it is held.
@@ -159,6 +159,8 @@ struct Drag {
     held: Held,
     start: [f32; 2],
     last: [f32; 2],
+    /// Left edge of the part of the window that it began in.
+    left: f32,
     /// Whether it went farther than a click does.
     moved: bool,
 }
@@ -167,14 +169,13 @@ struct Drag {
 #[derive(Debug)]
 pub struct Input {
     drag: Option<Drag>,
-    pointer: [f32; 2],
     scale: f32,
 }
 
 impl Input {
     /// Nothing held. `scale` is the screen's pixels per pixel of a 96 dpi screen.
     pub fn new(scale: f32) -> Self {
-        Input { drag: None, pointer: [0.0; 2], scale: if scale.is_finite() { scale.max(0.1) } else { 1.0 } }
+        Input { drag: None, scale: if scale.is_finite() { scale.max(0.1) } else { 1.0 } }
     }
 
     /// Whether the pointer holds something: events are the scene's then, even over the overlay.
@@ -187,14 +188,17 @@ impl Input {
         match event {
             Event::Key { key, control, repeat } => of_key(key, control, repeat).into_iter().collect(),
             Event::Press(button, at) => {
-                self.pointer = at;
                 let out = self.let_go();
+                // The reference beside the picture shows the same scene from the same eye: a place in it is that place.
+                let width = editor.size()[0] as f32;
+                let left = if at[0] >= width { width } else { 0.0 };
+                let at = [at[0] - left, at[1]];
                 let held = match button {
                     Button::Left if editor.grabs(at) => Held::Grab,
                     Button::Left => Held::Turn,
                     Button::Right | Button::Middle => Held::Pan,
                 };
-                self.drag = Some(Drag { button, held, start: at, last: at, moved: false });
+                self.drag = Some(Drag { button, held, start: at, last: at, left, moved: false });
                 out
             }
             Event::Move(to) => self.moved(to),
@@ -211,8 +215,8 @@ impl Input {
     }
 
     fn moved(&mut self, to: [f32; 2]) -> Vec<Command> {
-        self.pointer = to;
         let Some(drag) = &mut self.drag else { return Vec::new() };
+        let to = [to[0] - drag.left, to[1]];
         let mut out = Vec::new();
         if !drag.moved {
             let [x, y] = [to[0] - drag.start[0], to[1] - drag.start[1]];

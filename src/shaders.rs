@@ -28,6 +28,7 @@ embedded!(
     "merge_cone.glsl",
     "merge_layout.glsl",
     "merge_product.glsl",
+    "product.comp",
     "project.comp",
 );
 

@@ -7,7 +7,8 @@ use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::field::{Lattice, Lookup, Storage};
-use shadow_fields::render::variant::{Chain, Form, Skip, VARIANTS};
+use shadow_fields::render::product::{Products, Shape};
+use shadow_fields::render::variant::{Chain, Form, PRODUCTS, Skip, VARIANTS};
 use shadow_fields::shaders::{FILES, Row};
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -68,6 +69,8 @@ fn merging() -> Vec<Row> {
         forms.push(Form { lookup, ..usual });
         forms.extend(lattices.map(|text| Form { lattice: lattice(text), lookup, ..usual }));
     }
+    forms.extend(PRODUCTS.iter().map(|&(_, product)| Form { chain: Chain { product, guard: false }, ..usual }));
+    forms.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| Form { bands, field_bands, ..usual }));
     forms.push(Form {
         variant: VARIANTS[VARIANTS.len() - 1],
         lattice: lattice("latlon:8x4x4,log,raw,inner=0.2"),
@@ -75,6 +78,18 @@ fn merging() -> Vec<Row> {
         ..usual
     });
     forms.iter().map(Form::row).collect()
+}
+
+/// Every product, with its loop alone, guarded or not, and by fields of more or fewer bands.
+fn multiplying() -> Vec<Row> {
+    let square = PRODUCTS.iter().flat_map(|&(_, product)| [true, false].map(|guard| (Chain { product, guard }, 4, 4)));
+    let other = [(4, 6), (3, 5), (5, 3)].map(|(bands, field_bands)| (Chain::default(), bands, field_bands));
+    square
+        .chain(other)
+        .flat_map(|(chain, bands, field_bands)| {
+            [true, false].map(|multiply| Products::row(Shape { chain, bands, field_bands }, multiply))
+        })
+        .collect()
 }
 
 /// What spirv-val says of the words: `Err` with its complaint.
@@ -117,6 +132,11 @@ fn baking_shaders_are_valid() {
 }
 
 #[test]
+fn multiplying_shaders_are_valid() {
+    check(multiplying());
+}
+
+#[test]
 fn drawing_shaders_are_valid() {
     check(drawing());
 }
@@ -134,7 +154,8 @@ fn merge_of_seven_bands_is_valid() {
 
 #[test]
 fn every_entry_point_is_among_the_rows() {
-    let compiled: BTreeSet<&str> = [baking(), drawing(), merging()].concat().iter().map(|row| row.file).collect();
+    let compiled: BTreeSet<&str> =
+        [baking(), drawing(), merging(), multiplying()].concat().iter().map(|row| row.file).collect();
     let there: BTreeSet<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| !name.ends_with(".glsl")).collect();
     assert_eq!(compiled, there);
 }

@@ -5,6 +5,7 @@ pub mod budget;
 pub mod cases;
 pub mod figures;
 pub mod plot;
+pub mod product;
 pub mod rival;
 pub mod stability;
 pub mod sweep;

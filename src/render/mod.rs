@@ -6,6 +6,7 @@ pub mod draw;
 pub mod gather;
 pub mod merge;
 pub mod moment;
+pub mod product;
 pub mod reference;
 pub mod tree;
 pub mod variant;

@@ -1,5 +1,6 @@
 //! `shadow-fields bench`: the measurements behind the documentation's figures.
 
+mod product;
 mod stability;
 mod time_error;
 
@@ -18,6 +19,8 @@ pub struct Arguments {
 enum What {
     /// What a picture's error is made of, what run time buys, and ray casting beside the merge
     TimeError(time_error::Arguments),
+    /// What one product costs in every form, alone on the device
+    Product(product::Arguments),
     /// What long chains, odd places and odd numbers do to the merge; exit code 1 where one goes wrong
     Stability(stability::Arguments),
 }
@@ -26,6 +29,7 @@ enum What {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     match &arguments.what {
         What::TimeError(arguments) => time_error::run(global, arguments),
+        What::Product(arguments) => product::run(global, arguments),
         What::Stability(arguments) => stability::run(global, arguments),
     }
 }

@@ -1,0 +1,166 @@
+//! `bench product`: what a product costs alone, and what it keeps of the truth.
+
+use super::Bench;
+use super::figures::{Spread, spread};
+use super::text::{csv, write};
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, BufferKind, Commands};
+use crate::render::product::{Products, Push, Shape, reference};
+use crate::render::variant::{Chain, PRODUCTS, Product};
+use crate::sh::basis::coefficient_count;
+use crate::sh::lobe::{cap, clamped_cosine};
+use crate::sh::points;
+use crate::sh::product_program::{Form, styled_program};
+use glam::DVec3;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// SH bands of all chains.
+const BANDS: usize = 4;
+/// Products a chain while it is timed.
+const STEPS: u32 = 64;
+
+/// One form.
+#[derive(Clone, Debug, Serialize)]
+pub struct Timed {
+    /// Name on the command line.
+    pub product: &'static str,
+    /// Whether chains are guarded.
+    pub guard: bool,
+    /// SH bands of the factor.
+    pub field_bands: usize,
+    /// Multiply-adds a product, guard left out.
+    pub multiply_adds: usize,
+    /// Nanoseconds a product on the whole device, the loop around it taken off.
+    pub ns_per_product: Spread,
+    /// Multiplications and additions a nanosecond, guard left out.
+    pub gflops: f64,
+    /// Largest difference to the twin in f64 after one product, in units of the largest coefficient.
+    pub error: f64,
+    /// Irradiance behind 64 caps of 30 degrees at one place, f64 (truth: .77).
+    pub identical_64: f64,
+}
+
+/// Measures every form on the device.
+///
+/// # Errors
+/// As [`Products::new`]; `Device` when the device was lost.
+pub fn measure(bench: &Bench<'_>) -> Result<Vec<Timed>> {
+    let (device, library) = (bench.baker.device(), bench.baker.library());
+    let mut shapes = Vec::new();
+    for guard in [false, true] {
+        for &(name, product) in PRODUCTS {
+            shapes.push((name, Shape { chain: Chain { product, guard }, bands: BANDS, field_bands: BANDS }));
+        }
+    }
+    for field_bands in [5, 6, 7] {
+        let chain = Chain { product: Product::Matrix, guard: false };
+        shapes.push(("matrix", Shape { chain, bands: BANDS, field_bands }));
+    }
+    let count: u32 = if bench.quick { 16_384 } else { 65_536 };
+    let mut rng = fastrand::Rng::with_seed(bench.seed);
+    let transfers: Vec<f64> = (0..count).flat_map(|_| clamped_cosine(BANDS, direction(&mut rng))).collect();
+    let narrow = |of: &[f64]| of.iter().map(|c| *c as f32).collect::<Vec<f32>>();
+    let transfer_buffer = Buffer::with_data(device, "transfers", &narrow(&transfers))?;
+    let products = Buffer::new(device, "products", BufferKind::Device, 4 * transfers.len() as u64)?;
+    let factors: Vec<Vec<f64>> = (BANDS..=7)
+        .map(|bands| {
+            let cap = |rng: &mut fastrand::Rng| cap(bands, direction(rng), (5.0 + 30.0 * rng.f64()).to_radians());
+            (0..count).flat_map(|_| cap(&mut rng)).collect()
+        })
+        .collect();
+    let factor_buffers =
+        factors.iter().map(|f| Buffer::with_data(device, "factors", &narrow(f))).collect::<Result<Vec<_>>>()?;
+    let run = |pass: &Products, field_bands: usize, steps: u32| -> Result<f64> {
+        let mut commands = Commands::new(device, "product")?;
+        let push = Push { count, steps, fade: 0.97 };
+        let buffers = [&transfer_buffer, &factor_buffers[field_bands - BANDS], &products];
+        commands.pass("product", |c| pass.record(c, buffers, push))?;
+        Ok(commands.submit()?[0].milliseconds)
+    };
+    let mut passes = Vec::new();
+    for (name, shape) in &shapes {
+        let pass = Products::new(device, library, *shape, true)?;
+        let empty = Products::new(device, library, *shape, false)?;
+        run(&empty, shape.field_bands, 1)?;
+        run(&pass, shape.field_bands, 1)?;
+        let found: Vec<f32> = products.download(transfers.len())?;
+        let error = error_of(*shape, &transfers, &factors[shape.field_bands - BANDS], &found);
+        passes.push((*name, *shape, pass, empty, error, Vec::new()));
+        (bench.progress)(&format!("{name}, {} bands, guard {} compiled", shape.field_bands, shape.chain.guard));
+    }
+    for round in 0..if bench.quick { 6 } else { 16 } {
+        for (_, shape, pass, empty, _, times) in &mut passes {
+            let took = run(pass, shape.field_bands, STEPS)? - run(empty, shape.field_bands, STEPS)?;
+            if round > 0 {
+                times.push(took * 1e6 / (f64::from(count) * f64::from(STEPS)));
+            }
+        }
+    }
+    let rows = passes.into_iter().map(|(product, shape, _, _, error, times)| {
+        let cost = match shape.chain.product.stays_at_points() {
+            true => {
+                let mut cost = points::evaluate_program(BANDS).cost();
+                cost.fma_count += points::COUNT;
+                cost.multiply_count += points::COUNT;
+                cost.add_count += points::COUNT;
+                cost
+            }
+            false => {
+                let style = shape.chain.product.style(BANDS, shape.field_bands);
+                styled_program(style, BANDS, shape.field_bands, Form::Subtract).cost()
+            }
+        };
+        let ns_per_product = spread(&times);
+        let caps = cap(shape.field_bands, DVec3::new(0.5, 0.75_f64.sqrt(), 0.0), 30_f64.to_radians());
+        let push = Push { count: 1, steps: 64, fade: 1.0 };
+        let start = clamped_cosine(BANDS, DVec3::Y);
+        Timed {
+            product,
+            guard: shape.chain.guard,
+            field_bands: shape.field_bands,
+            multiply_adds: cost.fma_count,
+            gflops: (cost.multiply_count + cost.add_count) as f64 / ns_per_product.median,
+            ns_per_product,
+            error,
+            identical_64: reference(shape, &start, &caps, push)[0] / start[0],
+        }
+    });
+    Ok(rows.collect())
+}
+
+fn direction(rng: &mut fastrand::Rng) -> DVec3 {
+    loop {
+        let place = DVec3::new(rng.f64(), rng.f64(), rng.f64()) * 2.0 - 1.0;
+        if (0.01..=1.0).contains(&place.length()) {
+            return place.normalize();
+        }
+    }
+}
+
+/// Largest difference to the twin among the first chains.
+fn error_of(shape: Shape, transfers: &[f64], factors: &[f64], found: &[f32]) -> f64 {
+    let sizes = [shape.bands, shape.field_bands].map(coefficient_count);
+    let chains = transfers.chunks(sizes[0]).zip(factors.chunks(sizes[1])).zip(found.chunks(sizes[0])).take(64);
+    let apart = chains.flat_map(|((transfer, factor), found)| {
+        let expected = reference(shape, transfer, factor, Push { count: 1, steps: 1, fade: 1.0 });
+        found.iter().zip(expected).map(|(f, e)| (f64::from(*f) - e).abs()).collect::<Vec<_>>()
+    });
+    apart.fold(0.0, |worst, d| if d.is_nan() { f64::INFINITY } else { worst.max(d) })
+}
+
+/// Measures, and writes `product.csv` and `product.json` into `folder`.
+///
+/// # Errors
+/// As [`measure`]; `Failed` when the folder cannot be written.
+pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Timed>> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+    let timed = measure(bench)?;
+    let origin = json!({ "origin": bench.origin, "quick": bench.quick, "seed": bench.seed });
+    let rows: Vec<Value> = timed.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect();
+    write(&folder.join("product.csv"), &csv(&origin, &rows))?;
+    write(&folder.join("product.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": timed })))?;
+    Ok(timed)
+}

@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::field::{Lookup, Storage};
 use crate::frame::{self, Frame};
 use crate::gpu::Timing;
+use crate::render::variant::PRODUCTS;
 use crate::scene::Placement;
 use serde::Serialize;
 use std::time::Instant;
@@ -85,6 +86,10 @@ pub fn variations(quick: bool) -> Vec<Variation> {
             add(axis, text, &|o| o.bake.lattice = lattice);
         }
     }
+    for &(name, product) in PRODUCTS.iter().filter(|(_, product)| *product != base.chain.product) {
+        add("product", name, &|o| o.chain.product = product);
+    }
+    add("guard", "off", &|o| o.chain.guard = false);
     let faces: &[u32] = if quick { &[16] } else { &[8, 16, 32, 128] };
     for &face_px in faces {
         add("face", &format!("{face_px} px"), &|o| o.bake.face_px = face_px);
@@ -93,6 +98,13 @@ pub fn variations(quick: bool) -> Vec<Variation> {
         for bands in [3, 5, 6] {
             add("bands", &format!("{bands} bands"), &|o| o.bake.bands = bands);
         }
+        for bands in [5, 6, 7] {
+            add("stored bands", &format!("{bands} of visibility"), &|o| o.bake.field_bands = Some(bands));
+        }
+        add("stored bands", "7 of visibility, no guard", &|o| {
+            (o.bake.field_bands, o.chain.guard) = (Some(7), false);
+        });
+        add("stored bands", "3 of transfer, 4 of visibility", &|o| (o.bake.bands, o.bake.field_bands) = (3, Some(4)));
         let student = "latlon:8x4x4,linear,raw,inner=0.2".parse().expect("a lattice");
         add("together", "8x4x4, nearest, f32, 32 px", &|o| {
             (o.bake.lattice, o.bake.storage, o.bake.face_px, o.lookup) = (student, Storage::F32, 32, Lookup::Nearest);

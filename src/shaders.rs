@@ -30,6 +30,8 @@ embedded!(
     "merge_product.glsl",
     "product.comp",
     "project.comp",
+    "show.frag",
+    "show.vert",
 );
 
 /// One compilation of one entry point. Everything that changes the code is in here; the cache key is the whole row.

@@ -157,6 +157,14 @@ impl Context {
     /// # Errors
     /// `Unsupported` when there is none.
     pub fn new(global: &Global) -> Result<Self> {
+        Self::with_device(global, Device::new)
+    }
+
+    /// As [`Context::new`] with a device that `open` opens.
+    ///
+    /// # Errors
+    /// What `open` returns.
+    pub fn with_device(global: &Global, open: impl FnOnce(&gpu::Options) -> Result<Arc<Device>>) -> Result<Self> {
         let cache_dir = match (global.no_cache, &global.cache_dir) {
             (true, _) => None,
             (false, Some(folder)) => Some(folder.clone()),
@@ -174,7 +182,7 @@ impl Context {
         {
             return Err(Error::input(folder, "is no folder of shaders"));
         }
-        let device = Device::new(&gpu::Options {
+        let device = open(&gpu::Options {
             device: global.device.clone(),
             validation: global.validation,
             cache_dir: cache_dir.clone(),

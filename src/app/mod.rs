@@ -11,6 +11,8 @@ mod output;
 mod profile;
 mod render;
 mod sheet;
+#[cfg(feature = "view")]
+mod view;
 
 use crate::error::Result;
 use clap::{Parser, Subcommand};
@@ -45,6 +47,9 @@ enum Command {
     Check(check::Arguments),
     /// Time every pass and every variant of the merge shader on this device
     Profile(profile::Arguments),
+    /// Open a window: move lights and occluders by hand and see the shadows follow
+    #[cfg(feature = "view")]
+    View(view::Arguments),
     /// List the Vulkan devices of this machine
     Devices(devices::Arguments),
 }
@@ -71,6 +76,8 @@ fn run(cli: &Cli) -> Result<()> {
         Command::Bench(arguments) => bench::run(&cli.global, arguments),
         Command::Check(arguments) => check::run(&cli.global, arguments),
         Command::Profile(arguments) => profile::run(&cli.global, arguments),
+        #[cfg(feature = "view")]
+        Command::View(arguments) => view::run(&cli.global, arguments),
         Command::Devices(arguments) => devices::run(&cli.global, arguments),
     }
 }

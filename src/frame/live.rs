@@ -9,7 +9,7 @@ use crate::render::calibrate;
 use crate::render::draw::{Draw, Finish, Item, Pane};
 use crate::render::merge::Merge;
 use crate::render::variant::{Form, Variant};
-use crate::scene::{Placement, Scene};
+use crate::scene::{Camera, Placement, Scene};
 use ash::vk;
 use glam::Vec3;
 use std::sync::atomic::Ordering;
@@ -196,6 +196,26 @@ impl Frame {
         let sky = scene.data.environment != self.scene.data.environment;
         self.scene = scene.clone();
         if sky { self.write_sky() } else { Ok(()) }
+    }
+
+    /// Sees the scene from elsewhere from now on.
+    pub fn set_camera(&mut self, camera: &Camera) {
+        self.scene.data.camera = camera.clone();
+    }
+
+    /// The picture at full quality, whatever is shown: multisampled where the device can, linear RGB, three floats a pixel, rows
+    /// from the top; `white` as in [`Frame::render`]. Waits.
+    ///
+    /// # Errors
+    /// As [`Frame::render`].
+    pub fn still(&mut self, placements: &[Placement], white: f32) -> Result<Vec<f32>> {
+        self.device.settle();
+        let fine = Draw::new(&self.device, &self.library, self.options.size, true)?;
+        let usual = std::mem::replace(&mut self.draw, fine);
+        let outcome = self.render(placements, Some(white));
+        self.draw = usual;
+        outcome?;
+        Ok(self.picture())
     }
 
     /// Merges by another variant from now on; `None` is the device's fastest.

@@ -11,9 +11,19 @@ pub mod editor;
 pub mod history;
 pub mod input;
 pub mod orbit;
+pub mod outline;
+#[cfg(feature = "view")]
+pub mod panel;
 pub mod pick;
+pub mod reference;
+pub mod reload;
 mod save;
+pub mod task;
+#[cfg(feature = "view")]
+pub mod viewer;
 
 pub use command::{Changed, Command, Effect, Request, Step};
 pub use editor::Editor;
 pub use input::{Event, Input};
+#[cfg(feature = "view")]
+pub use viewer::{Canvas, Setup, Viewer};

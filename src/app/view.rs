@@ -1,0 +1,358 @@
+//! `shadow-fields view`
+
+use super::Global;
+use super::context::{BakeArguments, Context, MergeArguments, size};
+use crate::bake::cache::Cache;
+use crate::error::{Error, Result};
+use crate::frame;
+use crate::gpu::{self, Device, PresentMode, Window};
+use crate::scene::Scene;
+use crate::view::command::Command;
+use crate::view::input::{Button, Event, Key};
+use crate::view::{Canvas, Editor, Setup, Viewer};
+use clap::Args;
+use raw_window_handle::HasDisplayHandle;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
+use winit::keyboard::{Key as Logical, ModifiersState, NamedKey};
+use winit::window::WindowId;
+
+/// Pixels of a touchpad's wheel that count as a notch.
+const NOTCH_PX: f64 = 40.0;
+/// How often a window that shows nothing is asked again.
+const HIDDEN_PERIOD: Duration = Duration::from_millis(200);
+/// Smallest window in which the overlay can be read.
+const LEAST_SIZE: PhysicalSize<u32> = PhysicalSize::new(160, 120);
+
+/// Arguments of `view`.
+#[derive(Args)]
+#[command(after_long_help = format!("Controls:\n{}", crate::view::input::help()))]
+pub struct Arguments {
+    /// Scene file, or the name of a built-in one
+    #[arg(default_value = "assets/scenes/teapot_lights.toml")]
+    scene: PathBuf,
+    /// Size of the window in pixels; default: the scene's
+    #[arg(long, value_parser = size, value_name = "WxH")]
+    size: Option<[u32; 2]>,
+    /// When finished frames are shown
+    #[arg(long, default_value = "fifo", value_name = "fifo|fifo-relaxed|mailbox|immediate")]
+    present_mode: PresentMode,
+    /// Four samples a pixel; default: on a GPU, not on a software device
+    #[arg(long, value_name = "on|off", value_parser = on_off)]
+    multisample: Option<bool>,
+    /// Start with the motion paused
+    #[arg(long)]
+    paused: bool,
+    /// Start without the overlay (H shows it)
+    #[arg(long)]
+    no_overlay: bool,
+    #[command(flatten)]
+    merge: MergeArguments,
+    #[command(flatten)]
+    bake: BakeArguments,
+}
+
+fn on_off(word: &str) -> std::result::Result<bool, String> {
+    match word {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(format!("\"{word}\" is neither on nor off")),
+    }
+}
+
+/// Opens the window and stays until it is closed.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let scene = Scene::load(&arguments.scene)?;
+    let events = event_loop()?;
+    let display = events.owned_display_handle();
+    let display = display.display_handle().map_err(no_display)?.as_raw();
+    let mut device_options = gpu::Options::default();
+    let context = Context::with_device(global, |options| {
+        device_options = options.clone();
+        Device::for_display(options, display)
+    })?;
+    let outcome = {
+        let mut app = App {
+            global,
+            arguments,
+            context: &context,
+            device_options,
+            scene: Some(scene),
+            shown: None,
+            outcome: Ok(()),
+        };
+        let ran = events.run_app(&mut app).map_err(|error| Error::Failed(format!("the window system: {error}")));
+        let App { shown, outcome, .. } = app;
+        let ended = shown.map_or(Ok(()), Shown::close);
+        outcome.and(ran).and(ended)
+    };
+    let finished = context.finish();
+    outcome.and(finished)
+}
+
+fn no_display(error: impl std::fmt::Display) -> Error {
+    let reason = error.to_string().replace('\n', " ");
+    Error::Unsupported(format!(
+        "no display to open a window on ({reason}); `shadow-fields render SCENE.toml -o P.png` needs none"
+    ))
+}
+
+/// winit panics where a library that it loads at run time is missing; here that is an error that names the packages.
+fn event_loop() -> Result<EventLoop<()>> {
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| ()));
+    let made = std::panic::catch_unwind(EventLoop::new);
+    std::panic::set_hook(hook);
+    let libraries = "a library of the window system is missing; Debian's packages are libx11-6 libx11-xcb1 libxcursor1 libxi6 \
+                     libxkbcommon-x11-0";
+    match made {
+        Ok(Ok(events)) => Ok(events),
+        Ok(Err(error)) if error.to_string().contains(".so") => Err(no_display(format!("{libraries}: {error}"))),
+        Ok(Err(error)) => Err(no_display(error)),
+        Err(_) => Err(no_display(libraries)),
+    }
+}
+
+/// The open window and all that draws into it; fields go in this order.
+struct Shown {
+    viewer: Viewer,
+    egui: egui_winit::State,
+    target: Window,
+    window: Arc<winit::window::Window>,
+    modifiers: ModifiersState,
+    pointer: [f32; 2],
+    updated: Instant,
+    /// Nothing could be drawn the last time.
+    hidden: bool,
+    /// When it was tried.
+    tried: Instant,
+    /// Holds bakes where nothing is to be kept.
+    _folder: Option<tempfile::TempDir>,
+}
+
+impl Shown {
+    fn close(mut self) -> Result<()> {
+        self.viewer.settle()
+    }
+}
+
+struct App<'a> {
+    global: &'a Global,
+    arguments: &'a Arguments,
+    context: &'a Context,
+    device_options: gpu::Options,
+    scene: Option<Scene>,
+    shown: Option<Shown>,
+    outcome: Result<()>,
+}
+
+impl App<'_> {
+    fn open(&mut self, events: &ActiveEventLoop, scene: Scene) -> Result<Shown> {
+        let device = &self.context.device;
+        let [width, height] = self.arguments.size.unwrap_or([scene.data.output.width, scene.data.output.height]);
+        let attributes = winit::window::Window::default_attributes()
+            .with_title(format!("{} - shadow-fields", self.arguments.scene.display()))
+            .with_inner_size(PhysicalSize::new(width, height))
+            .with_min_inner_size(LEAST_SIZE);
+        let window = Arc::new(events.create_window(attributes).map_err(no_display)?);
+        let own: [u32; 2] = window.inner_size().into();
+        let target = Window::new(device, &window, own, self.arguments.present_mode)?;
+        let folder = if self.global.no_cache {
+            let made = tempfile::tempdir();
+            Some(made.map_err(|error| Error::Failed(format!("no folder for background bakes: {error}")))?)
+        } else {
+            None
+        };
+        let cache = folder.as_ref().map_or_else(|| self.context.cache.clone(), |f| Cache::new(Some(f.path())));
+        let merge = &self.arguments.merge;
+        let setup = Setup {
+            device: device.clone(),
+            options: self.device_options.clone(),
+            library: self.context.baker.library().clone(),
+            cache,
+            frame: frame::Options {
+                bake: self.arguments.bake.options(),
+                lookup: merge.lookup,
+                variant: merge.variant,
+                skip: merge.skip,
+                size: own,
+                multisample: self.arguments.multisample.unwrap_or(!device.info.is_software()),
+            },
+            format: target.format(),
+            encodes_srgb: target.encodes_srgb(),
+            seed: self.global.seed,
+        };
+        let mut editor = Editor::new(scene, &self.arguments.scene);
+        if self.arguments.paused {
+            editor.apply(Command::ToggleRunning);
+        }
+        if self.arguments.no_overlay {
+            editor.apply(Command::ToggleOverlay);
+        }
+        let scale = window.scale_factor() as f32;
+        let mut viewer = Viewer::new(setup, editor, scale)?;
+        viewer.apply(Command::Resize(own))?;
+        let egui = egui_winit::State::new(
+            viewer.egui().clone(),
+            egui::ViewportId::ROOT,
+            &*window,
+            Some(scale),
+            None,
+            Some(device.limits.max_image_dimension2_d as usize),
+        );
+        window.request_redraw();
+        Ok(Shown {
+            viewer,
+            egui,
+            target,
+            window,
+            modifiers: ModifiersState::empty(),
+            pointer: [0.0; 2],
+            updated: Instant::now(),
+            hidden: false,
+            tried: Instant::now(),
+            _folder: folder,
+        })
+    }
+
+    /// Ends the loop where something failed or the user is done.
+    fn check(&mut self, events: &ActiveEventLoop, outcome: Result<()>) {
+        if let Err(error) = outcome {
+            self.outcome = Err(error);
+            events.exit();
+        } else if self.shown.as_ref().is_some_and(|shown| shown.viewer.wants_to_quit()) {
+            events.exit();
+        }
+    }
+}
+
+impl ApplicationHandler for App<'_> {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        let Some(scene) = self.scene.take() else { return };
+        let opened = self.open(events, scene).map(|shown| self.shown = Some(shown));
+        self.check(events, opened);
+    }
+
+    fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(shown) = &mut self.shown else { return };
+        let outcome = shown.window_event(&event);
+        self.check(events, outcome);
+    }
+
+    fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        let Some(shown) = &mut self.shown else { return };
+        let now = Instant::now();
+        let passed = now.duration_since(std::mem::replace(&mut shown.updated, now));
+        let outcome = shown.viewer.update(passed.as_secs_f64());
+        let flow = if shown.hidden {
+            if shown.tried.elapsed() >= HIDDEN_PERIOD {
+                shown.window.request_redraw();
+            }
+            ControlFlow::WaitUntil(now + HIDDEN_PERIOD)
+        } else if shown.viewer.wants_frame() {
+            shown.window.request_redraw();
+            ControlFlow::Wait
+        } else {
+            shown.viewer.idle().map_or(ControlFlow::Wait, |idle| ControlFlow::WaitUntil(now + idle))
+        };
+        events.set_control_flow(flow);
+        self.check(events, outcome);
+    }
+}
+
+impl Shown {
+    fn window_event(&mut self, event: &WindowEvent) -> Result<()> {
+        if let WindowEvent::RedrawRequested = event {
+            return self.redraw();
+        }
+        let response = self.egui.on_window_event(&self.window, event);
+        if response.repaint {
+            self.window.request_redraw();
+        }
+        match event {
+            WindowEvent::CloseRequested => self.viewer.apply(Command::Quit),
+            WindowEvent::Resized(size) => {
+                log::info!("resized to {}x{}", size.width, size.height);
+                self.hidden = false;
+                self.target.resize((*size).into());
+                self.viewer.apply(Command::Resize((*size).into()))
+            }
+            WindowEvent::Occluded(occluded) => {
+                log::info!("occluded: {occluded}");
+                self.hidden &= occluded;
+                Ok(())
+            }
+            WindowEvent::ModifiersChanged(modifiers) => {
+                self.modifiers = modifiers.state();
+                Ok(())
+            }
+            WindowEvent::Focused(false) => self.viewer.event(Event::Lost),
+            WindowEvent::CursorMoved { position, .. } => {
+                self.pointer = [position.x as f32, position.y as f32];
+                if response.consumed && !self.viewer.is_dragging() {
+                    return Ok(());
+                }
+                self.viewer.event(Event::Move(self.pointer))
+            }
+            // What the scene holds is let go wherever the pointer is.
+            WindowEvent::MouseInput { state: ElementState::Released, button, .. } => {
+                button_of(*button).map_or(Ok(()), |button| self.viewer.event(Event::Release(button)))
+            }
+            _ if response.consumed => Ok(()),
+            WindowEvent::MouseInput { state: ElementState::Pressed, button, .. } => {
+                button_of(*button).map_or(Ok(()), |button| self.viewer.event(Event::Press(button, self.pointer)))
+            }
+            WindowEvent::MouseWheel { delta, .. } => {
+                let notches = match delta {
+                    MouseScrollDelta::LineDelta(_, lines) => *lines,
+                    MouseScrollDelta::PixelDelta(pixels) => (pixels.y / NOTCH_PX) as f32,
+                };
+                self.viewer.event(Event::Wheel(notches))
+            }
+            WindowEvent::KeyboardInput { event, is_synthetic: false, .. } if event.state == ElementState::Pressed => {
+                let control = self.modifiers.control_key();
+                key_of(event).map_or(Ok(()), |key| self.viewer.event(Event::Key { key, control, repeat: event.repeat }))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn redraw(&mut self) -> Result<()> {
+        let input = self.egui.take_egui_input(&self.window);
+        let output = self.viewer.ui(input)?;
+        self.egui.handle_platform_output(&self.window, output);
+        self.window.pre_present_notify();
+        let drawn = self.viewer.draw(Canvas::Window(&mut self.target))?;
+        (self.hidden, self.tried) = (!drawn, Instant::now());
+        Ok(())
+    }
+}
+
+fn button_of(button: MouseButton) -> Option<Button> {
+    match button {
+        MouseButton::Left => Some(Button::Left),
+        MouseButton::Right => Some(Button::Right),
+        MouseButton::Middle => Some(Button::Middle),
+        _ => None,
+    }
+}
+
+fn key_of(event: &KeyEvent) -> Option<Key> {
+    match &event.logical_key {
+        Logical::Named(NamedKey::Space) => Some(Key::Space),
+        Logical::Named(NamedKey::Escape) => Some(Key::Escape),
+        Logical::Named(NamedKey::Home) => Some(Key::Home),
+        Logical::Named(NamedKey::F1) => Some(Key::Function(1)),
+        Logical::Named(NamedKey::F12) => Some(Key::Function(12)),
+        Logical::Character(text) => {
+            let letter = text.chars().next().filter(char::is_ascii_alphabetic)?;
+            Some(Key::Letter(letter.to_ascii_lowercase()))
+        }
+        _ => None,
+    }
+}

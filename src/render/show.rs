@@ -1,0 +1,53 @@
+//! Pass "show": a linear picture onto what a display shows.
+//!
+//! Input: the picture, as large as the target. Output: an 8-bit image, sRGB by its format or by the shader.
+
+use crate::asset::picture::srgb_from_linear;
+use crate::error::Result;
+use crate::gpu::{Bind, Device, Drawing, GraphicsPipeline, GraphicsState, Image};
+use crate::shaders::{Library, Row};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    gain: f32,
+    encode: u32,
+}
+
+/// The pipeline.
+pub struct Show {
+    pipeline: GraphicsPipeline,
+    encode: bool,
+}
+
+impl Show {
+    /// For targets of `format`; `encodes_srgb` as the format is.
+    ///
+    /// # Errors
+    /// `Failed` when a shader does not compile.
+    pub fn new(device: &Arc<Device>, library: &Library, format: vk::Format, encodes_srgb: bool) -> Result<Self> {
+        let state = GraphicsState { color: format, depth: None, samples: 1, cull: vk::CullModeFlags::NONE };
+        let vertex = library.shader(&Row::new("show.vert", 4))?;
+        let fragment = library.shader(&Row::new("show.frag", 4))?;
+        let pipeline = GraphicsPipeline::new(device, "show", &vertex, &fragment, state)?;
+        Ok(Show { pipeline, encode: !encodes_srgb })
+    }
+
+    /// Covers the target with the picture; `white` is the radiance that becomes white.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn record<'r>(&'r self, drawing: &mut Drawing<'_, 'r>, picture: &'r Image, white: f32) -> Result<()> {
+        drawing.area(0, 0, picture.shape.width, picture.shape.height);
+        let push = Push { gain: 1.0 / white, encode: u32::from(self.encode) };
+        drawing.screen(&self.pipeline, &[Bind::Image(picture)], &push)
+    }
+
+    /// The twin: a channel of radiance as 8 bits.
+    pub fn reference(radiance: f32, white: f32) -> u8 {
+        (255.0 * srgb_from_linear(radiance / white)).round() as u8
+    }
+}

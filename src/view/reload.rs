@@ -1,0 +1,87 @@
+//! Which shader files changed on disk: looked at now and then, by time and length.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+
+/// How often the folder is looked at.
+pub const PERIOD: Duration = Duration::from_millis(250);
+
+type Stamps = BTreeMap<String, (Option<SystemTime>, u64)>;
+
+/// Watches a folder of shader files.
+pub struct Watch {
+    folder: PathBuf,
+    stamps: Stamps,
+    looked: Instant,
+    /// Changed since they were last compiled without an error.
+    changed: BTreeSet<String>,
+}
+
+impl Watch {
+    /// What is there now counts as compiled.
+    pub fn new(folder: &Path) -> Self {
+        Watch { folder: folder.to_owned(), stamps: stamps(folder), looked: Instant::now(), changed: BTreeSet::new() }
+    }
+
+    /// Files to compile anew, if any has changed since the last look; all that have not been [`Watch::compiled`] since.
+    pub fn poll(&mut self) -> Option<Vec<String>> {
+        if self.looked.elapsed() < PERIOD {
+            return None;
+        }
+        self.look()
+    }
+
+    /// As [`Watch::poll`], at once.
+    pub fn look(&mut self) -> Option<Vec<String>> {
+        self.looked = Instant::now();
+        let now = stamps(&self.folder);
+        let names: BTreeSet<&String> = now.keys().chain(self.stamps.keys()).collect();
+        let fresh: Vec<String> =
+            names.into_iter().filter(|name| now.get(*name) != self.stamps.get(*name)).cloned().collect();
+        self.stamps = now;
+        if fresh.is_empty() {
+            return None;
+        }
+        self.changed.extend(fresh);
+        Some(self.changed.iter().cloned().collect())
+    }
+
+    /// All of them have compiled.
+    pub fn compiled(&mut self) {
+        self.changed.clear();
+    }
+}
+
+fn stamps(folder: &Path) -> Stamps {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Stamps::new() };
+    let stamp = |entry: std::fs::DirEntry| {
+        let metadata = entry.metadata().ok().filter(std::fs::Metadata::is_file)?;
+        Some((entry.file_name().into_string().ok()?, (metadata.modified().ok(), metadata.len())))
+    };
+    entries.flatten().filter_map(stamp).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_told_until_they_compile() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        write("a.glsl", "one");
+        let mut watch = Watch::new(folder.path());
+        assert_eq!(watch.look(), None);
+        assert_eq!(watch.poll(), None, "too early to look again");
+        write("a.glsl", "three");
+        write("b.glsl", "new");
+        assert_eq!(watch.look().unwrap(), ["a.glsl", "b.glsl"]);
+        assert_eq!(watch.look(), None, "told once");
+        write("b.glsl", "newer");
+        assert_eq!(watch.look().unwrap(), ["a.glsl", "b.glsl"], "the first has not compiled yet");
+        watch.compiled();
+        std::fs::remove_file(folder.path().join("a.glsl")).unwrap();
+        assert_eq!(watch.look().unwrap(), ["a.glsl"], "the built-in one is back");
+    }
+}

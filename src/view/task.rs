@@ -1,0 +1,152 @@
+//! Work in the background: bakes and rays, each on a thread of its own that can be told to stop.
+
+use crate::error::{Error, Result};
+use std::any::Any;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+/// How far a task is.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// What is being done.
+    pub what: String,
+    /// Parts done.
+    pub done: u32,
+    /// Parts in all.
+    pub all: u32,
+}
+
+/// The thread's end of a task: where it says how far it is and hands over what it has.
+pub struct Worker<T> {
+    stop: Arc<AtomicBool>,
+    progress: Arc<Mutex<Progress>>,
+    results: Sender<T>,
+}
+
+/// Thrown through a task's stack when it is to stop: nobody waits for its result.
+struct Stopped;
+
+impl<T> Worker<T> {
+    /// Says how far the task is. Where the task is to stop, this unwinds its thread, which frees what it holds.
+    pub fn report(&self, what: &str, done: u32, all: u32) {
+        if self.stop.load(Ordering::Relaxed) {
+            // Not a panic: nothing is printed, and `Task` expects it.
+            resume_unwind(Box::new(Stopped));
+        }
+        let progress = Progress { what: what.to_owned(), done, all };
+        *self.progress.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = progress;
+    }
+
+    /// Hands over a result.
+    pub fn send(&self, result: T) {
+        let _ = self.results.send(result); // a task that is dropped needs none
+    }
+}
+
+/// A task under way. Dropping it stops it and waits for its thread.
+pub struct Task<T> {
+    thread: Option<JoinHandle<Result<()>>>,
+    stop: Arc<AtomicBool>,
+    progress: Arc<Mutex<Progress>>,
+    results: Receiver<T>,
+}
+
+impl<T: Send + 'static> Task<T> {
+    /// Starts a thread.
+    pub fn new(work: impl FnOnce(&Worker<T>) -> Result<()> + Send + 'static) -> Self {
+        let (stop, progress) = (Arc::<AtomicBool>::default(), Arc::<Mutex<Progress>>::default());
+        let (sender, results) = channel();
+        let worker = Worker { stop: stop.clone(), progress: progress.clone(), results: sender };
+        let thread = std::thread::spawn(move || work(&worker));
+        Task { thread: Some(thread), stop, progress, results }
+    }
+
+    /// What the task has handed over since, oldest first.
+    pub fn results(&self) -> Vec<T> {
+        self.results.try_iter().collect()
+    }
+
+    /// How far it is.
+    pub fn progress(&self) -> Progress {
+        self.progress.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).clone()
+    }
+
+    /// How it ended, once it has.
+    pub fn ended(&mut self) -> Option<Result<()>> {
+        self.thread.take_if(|thread| thread.is_finished()).map(|thread| outcome(thread.join()))
+    }
+
+    /// Whether it goes on.
+    pub fn is_running(&self) -> bool {
+        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
+    }
+}
+
+fn outcome(joined: std::result::Result<Result<()>, Box<dyn Any + Send>>) -> Result<()> {
+    match joined {
+        Ok(result) => result,
+        Err(thrown) if thrown.is::<Stopped>() => Err(Error::Failed("stopped".into())),
+        Err(thrown) => resume_unwind(thrown),
+    }
+}
+
+impl<T> Drop for Task<T> {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dropped_task_stops_at_its_next_report() {
+        let freed = Arc::new(AtomicBool::new(false));
+        struct Held(Arc<AtomicBool>);
+        impl Drop for Held {
+            fn drop(&mut self) {
+                self.0.store(true, Ordering::Relaxed);
+            }
+        }
+        let held = Held(freed.clone());
+        let task = Task::new(move |worker: &Worker<u32>| {
+            let _held = held;
+            for i in 0.. {
+                worker.report("counting", i, u32::MAX);
+                worker.send(i);
+                std::thread::yield_now();
+            }
+            Ok(())
+        });
+        while task.results().is_empty() {
+            std::thread::yield_now();
+        }
+        assert_eq!(task.progress().what, "counting");
+        drop(task);
+        assert!(freed.load(Ordering::Relaxed), "the thread's stack was unwound");
+    }
+
+    #[test]
+    fn a_task_that_ends_says_how_once() {
+        let mut task = Task::new(|worker: &Worker<&str>| {
+            worker.send("half");
+            Err(Error::Device("gone".into()))
+        });
+        let ended = loop {
+            if let Some(ended) = task.ended() {
+                break ended;
+            }
+            std::thread::yield_now();
+        };
+        assert_eq!(ended.unwrap_err().exit_code(), 5);
+        assert_eq!(task.results(), ["half"]);
+        assert!(task.ended().is_none() && !task.is_running());
+    }
+}

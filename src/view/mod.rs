@@ -6,8 +6,12 @@
 
 mod change;
 pub mod command;
+#[cfg(feature = "view")]
+mod compare;
 pub mod edit;
 pub mod editor;
+#[cfg(feature = "view")]
+mod follow;
 pub mod history;
 pub mod input;
 pub mod orbit;
@@ -15,6 +19,8 @@ pub mod outline;
 #[cfg(feature = "view")]
 pub mod panel;
 pub mod pick;
+#[cfg(feature = "view")]
+mod picture;
 pub mod reference;
 pub mod reload;
 mod save;
@@ -26,4 +32,6 @@ pub use command::{Changed, Command, Effect, Request, Step};
 pub use editor::Editor;
 pub use input::{Event, Input};
 #[cfg(feature = "view")]
-pub use viewer::{Canvas, Setup, Viewer};
+pub use picture::Canvas;
+#[cfg(feature = "view")]
+pub use viewer::{Setup, Viewer};

@@ -15,6 +15,8 @@ use std::collections::VecDeque;
 const MARGIN: f32 = 8.0;
 /// Width of the panel of figures, points.
 const FIGURES_WIDTH: f32 = 268.0;
+/// Width of the help, points.
+const HELP_WIDTH: f32 = 350.0;
 /// Colours of the passes in the graph, in their order.
 const PASS_COLORS: [Color32; 4] = [
     Color32::from_rgb(240, 170, 70),
@@ -102,12 +104,13 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
             .resizable(false)
             .default_width(width)
             .max_width(width)
-            .max_height(height - 40.0)
+            .default_height(height)
+            .max_height(height - 44.0)
             .vscroll(true)
     };
     // Two panels side by side need room; in a narrow window the help starts folded away.
-    let narrow = screen.width() < 2.0 * FIGURES_WIDTH + 120.0;
-    panel("Controls", Align2::LEFT_TOP, FIGURES_WIDTH).default_open(!narrow).show(context, help);
+    let narrow = screen.width() < FIGURES_WIDTH + HELP_WIDTH + 100.0;
+    panel("Controls", Align2::LEFT_TOP, HELP_WIDTH).default_open(!narrow).show(context, help);
     panel("Figures", Align2::RIGHT_TOP, FIGURES_WIDTH).default_open(!narrow).show(context, |ui| {
         figures(ui, editor, status, &mut commands);
     });
@@ -212,7 +215,8 @@ fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {
         ui.spacing_mut().slider_width = 110.0;
         let slider = egui::Slider::new(&mut now, range).suffix(unit).text(name).max_decimals(2);
         let response = ui.add(slider);
-        if response.changed() && now != value {
+        // The slider itself rounds what it shows.
+        if response.changed() && (now - value).abs() > 0.006 {
             commands.push(command(now));
         }
         if response.drag_stopped() || response.lost_focus() {
@@ -241,22 +245,26 @@ fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
     let order = ["merge", "draw", "show"];
     names.sort_by_key(|name| order.iter().position(|o| o == name).unwrap_or(order.len()));
     let total = |frame: &Vec<Timing>| frame.iter().map(|t| t.milliseconds).sum::<f64>();
-    let most = timings.iter().map(total).fold(0.0, f64::max);
-    let top = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0].into_iter().find(|t| *t >= most).unwrap_or(most);
+    // All but the slowest few: the first frame compiles shaders.
+    let mut totals: Vec<f64> = timings.iter().map(total).collect();
+    totals.sort_by(f64::total_cmp);
+    let most = totals.get((totals.len() * 19 / 20).saturating_sub(1)).copied().unwrap_or(0.0);
+    let top = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0].into_iter().find(|t| *t >= most).unwrap_or(1000.0);
     let step = area.width() / HISTORY as f32;
     for (column, frame) in timings.iter().rev().enumerate() {
         let right = area.right() - column as f32 * step;
         let mut bottom = area.bottom();
         for (index, name) in names.iter().enumerate() {
             let milliseconds: f64 = frame.iter().filter(|t| t.pass == *name).map(|t| t.milliseconds).sum();
-            let height = (milliseconds / top) as f32 * area.height();
+            let height = ((milliseconds / top) as f32 * area.height()).min(bottom - area.top());
             let bar = Rect::from_min_max(pos2(right - step, bottom - height), pos2(right, bottom));
             painter.rect_filled(bar, 0.0, PASS_COLORS[index % PASS_COLORS.len()]);
             bottom -= height;
         }
     }
     for (limit, text) in [(1000.0 / 60.0, "60/s"), (1000.0 / 30.0, "30/s")] {
-        if limit < top {
+        // Apart enough to be read.
+        if limit < top && limit > top / 5.0 {
             let y = area.bottom() - (limit / top) as f32 * area.height();
             painter.hline(area.x_range(), y, Stroke::new(1.0, Color32::from_white_alpha(70)));
             painter.text(

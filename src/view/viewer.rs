@@ -7,27 +7,18 @@ use super::command::{Changed, Command, Effect, Request};
 use super::input::{Event, Input};
 use super::outline::Edges;
 use super::panel::{self, Status};
-use super::reference::{self, Reference};
+use super::reference::Reference;
 use super::reload::Watch;
-use super::task::{Progress, Task, Worker};
-use crate::asset::false_color::{NEUTRAL, Scheme};
-use crate::asset::picture;
+use super::task::{Progress, Task};
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::error::{Error, Result};
-use crate::frame::camera::clip_from_world;
-use crate::frame::store::Store;
-use crate::frame::{self, Frame, Lit, Part, is_cached};
-use crate::gpu::validation::Messages;
-use crate::gpu::{self, Access, Commands, Device, FLIGHTS, Flight, Image, Overlay, Paint, Target, Timing, Window};
+use crate::frame::{self, Frame};
+use crate::gpu::{self, Device, Flight, Overlay, Paint, Timing};
 use crate::render::show::Show;
-use crate::render::variant::Variant;
 use crate::shaders::Library;
-use crate::truth::error_map::{self, ErrorMap};
 use ash::vk;
-use glam::DVec2;
 use std::collections::{HashMap, VecDeque};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -36,8 +27,8 @@ pub const HISTORY: usize = 120;
 /// How long a message stands.
 const MESSAGE_S: f64 = 6.0;
 /// Panels of the frame: radiosity of the reference, colours of the error.
-const REFERENCE: usize = 0;
-const ERROR: usize = 1;
+pub(super) const REFERENCE: usize = 0;
+pub(super) const ERROR: usize = 1;
 
 /// What a viewer is made of.
 pub struct Setup {
@@ -59,49 +50,41 @@ pub struct Setup {
     pub seed: u64,
 }
 
-/// What a frame is drawn into.
-pub enum Canvas<'c> {
-    /// A window; the frame is shown.
-    Window(&'c mut Window),
-    /// An image of the setup's format, left to be copied from.
-    Image(&'c Image),
-}
-
 /// The editor with all that shows it.
 pub struct Viewer {
-    setup: Setup,
-    editor: Editor,
-    input: Input,
-    baker: Baker,
-    frame: Option<Frame>,
-    show: Show,
-    overlay: Overlay,
-    egui: egui::Context,
-    paint: Paint,
-    flights: VecDeque<Flight>,
+    pub(super) setup: Setup,
+    pub(super) editor: Editor,
+    pub(super) input: Input,
+    pub(super) baker: Baker,
+    pub(super) frame: Option<Frame>,
+    pub(super) show: Show,
+    pub(super) overlay: Overlay,
+    pub(super) egui: egui::Context,
+    pub(super) paint: Paint,
+    pub(super) flights: VecDeque<Flight>,
     /// What is not yet seen in a frame.
-    pending: Changed,
-    bake: Option<Task<()>>,
-    rays: Option<Task<Reference>>,
+    pub(super) pending: Changed,
+    pub(super) bake: Option<Task<()>>,
+    pub(super) rays: Option<Task<Reference>>,
     /// Version of the light that the rays are cast for.
-    rays_version: u64,
-    reference: Option<Reference>,
-    error_shown: Option<(u64, u32, panel::ErrorScale)>,
+    pub(super) rays_version: u64,
+    pub(super) reference: Option<Reference>,
+    pub(super) error_shown: Option<(u64, u32, panel::ErrorScale)>,
     /// Counts every change of the light on vertices.
-    version: u64,
-    watch: Option<Watch>,
-    shader_error: Option<String>,
-    messages: VecDeque<(Instant, String)>,
-    timings: VecDeque<Vec<Timing>>,
-    edges: HashMap<usize, Edges>,
-    quit: bool,
+    pub(super) version: u64,
+    pub(super) watch: Option<Watch>,
+    pub(super) shader_error: Option<String>,
+    pub(super) messages: VecDeque<(Instant, String)>,
+    pub(super) timings: VecDeque<Vec<Timing>>,
+    pub(super) edges: HashMap<usize, Edges>,
+    pub(super) quit: bool,
     /// Width and height of the window's picture, pixels.
-    size: [u32; 2],
+    pub(super) size: [u32; 2],
     /// When egui wants to be drawn again by itself.
-    repaint_at: Option<Instant>,
+    pub(super) repaint_at: Option<Instant>,
     /// Progress that was shown last.
-    told: [Option<Progress>; 2],
-    frame_count: u64,
+    pub(super) told: [Option<Progress>; 2],
+    pub(super) frame_count: u64,
 }
 
 impl Viewer {
@@ -321,281 +304,16 @@ impl Viewer {
         Ok(output.platform_output)
     }
 
-    /// Draws a frame. False where there was nothing to draw into, as in a minimised window.
-    ///
-    /// # Errors
-    /// `Device` when the device or the surface was lost.
-    pub fn draw(&mut self, mut canvas: Canvas<'_>) -> Result<bool> {
-        while self.flights.len() >= FLIGHTS {
-            self.land()?;
-        }
-        let shot = match &mut canvas {
-            Canvas::Window(window) => match window.acquire()? {
-                Some(shot) => Some(shot),
-                None => return Ok(false),
-            },
-            Canvas::Image(_) => None,
-        };
-        let target = match (&canvas, &shot) {
-            (Canvas::Image(image), _) => *image,
-            (_, Some(shot)) => &*shot.image,
-            (Canvas::Window(_), None) => unreachable!("a window gave a shot"),
-        };
-        let size = [target.shape.width, target.shape.height];
-        let resized = self.frame.as_ref().is_some_and(|frame| frame.size() != size);
-        let parts = self.parts(size);
-        let placements = self.editor.placements();
-        let white = (-self.editor.exposure_ev()).exp2();
-        let pending = std::mem::take(&mut self.pending);
-        let light = pending.light() || pending.variant;
-        if let Some(frame) = &mut self.frame {
-            frame.resize(size)?;
-            if light {
-                frame.prepare(&placements)?;
-            }
-        }
-        let mut commands = Commands::new(&self.setup.device, "frame")?;
-        commands.after_flights();
-        if let Some(frame) = &self.frame {
-            if light {
-                frame.record_light(&mut commands)?;
-            }
-            if pending.any() || resized {
-                frame.record_picture(&mut commands, &placements, &parts, white)?;
-            }
-        }
-        commands.image_barrier(target, None, Access::ColorWrite);
-        let (frame, show, overlay, paint) = (&self.frame, &self.show, &mut self.overlay, &self.paint);
-        let color = Target { color: target, clear: [0.02, 0.02, 0.025, 1.0], depth: None, resolve: None };
-        commands.pass("show", |c| {
-            c.render(&color, |drawing| {
-                if let Some(frame) = frame {
-                    show.record(drawing, frame.shown(), white)?;
-                }
-                drawing.overlay(overlay, target, paint)
-            })
-        })?;
-        let after = if shot.is_some() { Access::Present } else { Access::TransferRead };
-        commands.image_barrier(target, Some(Access::ColorWrite), after);
-        let flight = match (canvas, &shot) {
-            (Canvas::Window(window), Some(shot)) => window.present(commands, shot)?,
-            _ => commands.launch()?,
-        };
-        self.flights.push_back(flight);
-        assert!(self.setup.device.flight_count() <= FLIGHTS, "more than {FLIGHTS} frames are queued");
-        self.frame_count += 1;
-        Ok(true)
-    }
-
-    /// Waits for all frames.
-    ///
-    /// # Errors
-    /// `Device` when the device was lost.
-    pub fn settle(&mut self) -> Result<()> {
-        while !self.flights.is_empty() {
-            self.land()?;
-        }
-        Ok(())
-    }
-
-    /// Ends the oldest flight and keeps its times.
-    fn land(&mut self) -> Result<()> {
-        if let Some(flight) = self.flights.pop_front() {
-            self.timings.push_back(flight.wait()?);
-            if self.timings.len() > HISTORY {
-                self.timings.pop_front();
-            }
-        }
-        Ok(())
-    }
-
-    /// Parts of the picture: merged or error, and the reference on the right of it.
-    fn parts(&self, [width, height]: [u32; 2]) -> Vec<Part> {
-        let error = self.editor.shows_error() && self.error_shown.is_some();
-        let own = if error { Lit::Colors(ERROR) } else { Lit::Merged };
-        if !self.editor.shows_reference() {
-            return vec![Part { area: [0, 0, width, height], lit: own }];
-        }
-        let [half, _] = self.pane_of([width, height]);
-        let mut parts = vec![Part { area: [0, 0, half, height], lit: own }];
-        if self.reference.is_some() && width > half {
-            parts.push(Part { area: [half, 0, width - half, height], lit: Lit::Panel(REFERENCE) });
-        }
-        parts
-    }
-
     /// The part of the window that shows the merged picture: its left half beside a reference.
-    fn pane(&self) -> [u32; 2] {
+    pub(super) fn pane(&self) -> [u32; 2] {
         self.pane_of(self.size)
     }
 
-    fn pane_of(&self, [width, height]: [u32; 2]) -> [u32; 2] {
+    pub(super) fn pane_of(&self, [width, height]: [u32; 2]) -> [u32; 2] {
         [if self.editor.shows_reference() { (width / 2).max(1) } else { width }, height]
     }
 
-    /// Brings the frame up to what the editor says.
-    fn follow(&mut self, changed: Changed) -> Result<()> {
-        if !changed.any() {
-            return Ok(());
-        }
-        self.pending |= changed;
-        if changed.light() {
-            self.version += 1;
-        }
-        if changed.scene {
-            self.settle()?;
-            (self.frame, self.reference, self.error_shown, self.rays) = (None, None, None, None);
-            self.edges.clear();
-            self.timings.clear();
-            return self.prepare();
-        }
-        let Some(frame) = &mut self.frame else { return Ok(()) };
-        if changed.variant {
-            let chosen = self.editor.variant().map(Variant::named).transpose()?.or(self.setup.frame.variant);
-            let outcome = frame.set_variant(chosen);
-            self.tolerate(outcome)?;
-            return Ok(());
-        }
-        if changed.camera {
-            frame.set_camera(self.editor.camera());
-        }
-        if changed.emission || changed.sky || changed.roles || changed.placements {
-            if frame.covers(self.editor.scene()) {
-                self.bake = None;
-                frame.set_scene(self.editor.scene())?;
-            } else if self.bake.is_none() || changed.roles {
-                return self.prepare();
-            }
-        }
-        Ok(())
-    }
-
-    /// Builds the frame if all of it is in the cache, else has it baked first.
-    fn prepare(&mut self) -> Result<()> {
-        self.bake = None;
-        let (cache, bake) = (self.setup.cache.clone(), self.setup.frame.bake);
-        let scene = self.editor.scene().clone();
-        if is_cached(&cache, &scene, &bake) {
-            return self.build();
-        }
-        let (options, library) = (self.setup.options.clone(), self.setup.library.clone());
-        self.bake = Some(Task::new(move |worker: &Worker<()>| {
-            worker.report("opening the device for it", 0, 1);
-            let device = Device::new(&options)?;
-            let baker = Baker::new(&device, &library);
-            let store = Store::new(&baker, &cache, &scene, &bake, &|what, done, all| worker.report(what, done, all))?;
-            drop((store, baker));
-            Messages::into_result(device.take_validation_messages())
-        }));
-        Ok(())
-    }
-
-    fn build(&mut self) -> Result<()> {
-        self.settle()?;
-        let variant = self.editor.variant().map(Variant::named).transpose()?.or(self.setup.frame.variant);
-        let options = frame::Options { size: self.size, variant, ..self.setup.frame };
-        let built = Frame::new(&self.baker, &self.setup.cache, self.editor.scene(), options, &|_, _, _| ());
-        if let Some(frame) = self.tolerate(built)? {
-            self.frame = Some(frame);
-            self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
-            self.version += 1;
-        }
-        Ok(())
-    }
-
-    fn reload(&mut self, files: &[String]) {
-        let library = &self.setup.library;
-        let uses = |entry: &str| library.files(entry).iter().any(|file| files.contains(file));
-        let show = if uses("show.vert") || uses("show.frag") {
-            Show::new(&self.setup.device, library, self.setup.format, self.setup.encodes_srgb)
-                .map(|show| self.show = show)
-        } else {
-            Ok(())
-        };
-        let frame = self.frame.as_mut().map_or(Ok(()), |frame| frame.reload(files));
-        self.baker = Baker::new(&self.setup.device, library);
-        let errors: Vec<String> = [show, frame].into_iter().filter_map(|r| r.err().map(|e| e.to_string())).collect();
-        if errors.is_empty() {
-            log::info!("shaders rebuilt: {}", files.join(", "));
-            self.say(Some(format!("shaders rebuilt: {}", files.join(", "))));
-            self.shader_error = None;
-            if let Some(watch) = &mut self.watch {
-                watch.compiled();
-            }
-        } else {
-            log::warn!("{}", errors.join("\n"));
-            self.shader_error = Some(errors.join("\n"));
-        }
-        self.pending |= Changed { placements: true, display: true, ..Changed::default() };
-    }
-
-    /// Starts rays where they are wanted, takes in what they found, and compares.
-    fn look_at_rays(&mut self) -> Result<()> {
-        let wanted = self.editor.shows_reference() || self.editor.shows_error();
-        if !wanted || self.frame.is_none() {
-            self.rays = None;
-            return Ok(());
-        }
-        if let Some(found) = self.rays.as_ref().and_then(|rays| rays.results().pop()) {
-            let frame = self.frame.as_mut().expect("checked above");
-            frame.set_panel(REFERENCE, &found.radiosity, [0.0; 3])?;
-            self.reference = Some(found);
-            self.pending |= Changed { display: true, ..Changed::default() };
-        }
-        if let Some(Err(error)) = self.rays.as_mut().and_then(Task::ended) {
-            self.tolerate(Err::<(), _>(error)).map(|_| ())?;
-        }
-        let current = self.reference.as_ref().is_some_and(|r| r.version == self.version);
-        // Rays for a state that is gone end after their first round, so that something is seen while things move.
-        let known = self.reference.as_ref().map(|r| r.version);
-        let stale = self.rays_version != self.version && known == Some(self.rays_version);
-        if (self.rays.is_none() && !current) || stale || (!current && !self.rays.as_ref().is_some_and(Task::is_running))
-        {
-            let (scene, placements) = (self.editor.scene().clone(), self.editor.placements());
-            self.rays = Some(reference::cast(scene, placements, self.version, self.setup.seed));
-            self.rays_version = self.version;
-        }
-        if self.editor.shows_error() && current && !self.pending.light() {
-            self.compare()?;
-        }
-        Ok(())
-    }
-
-    /// Colours of the error of what was merged last, where they are not known yet.
-    fn compare(&mut self) -> Result<()> {
-        let (Some(frame), Some(reference)) = (&mut self.frame, &self.reference) else { return Ok(()) };
-        if self
-            .error_shown
-            .as_ref()
-            .is_some_and(|(version, rays, _)| (*version, *rays) == (self.version, reference.rays))
-        {
-            return Ok(());
-        }
-        let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference.radiosity, Scheme::Signed);
-        let scale = map.scale();
-        frame.set_panel(ERROR, &map.colors(&scale), NEUTRAL)?;
-        let shown = panel::ErrorScale { rms: map.rms(), limit: scale.limit };
-        self.error_shown = Some((self.version, reference.rays, shown));
-        self.pending |= Changed { display: true, ..Changed::default() };
-        Ok(())
-    }
-
-    /// Writes the picture beside the saved scene, at full quality and without the overlay.
-    fn screenshot(&mut self) -> Result<String> {
-        let Some(frame) = &mut self.frame else { return Err(Error::Failed("nothing is shown yet".into())) };
-        let [width, height] = frame.size();
-        let (placements, ev) = (self.editor.placements(), self.editor.exposure_ev());
-        let png = free_name(&self.editor.save_path());
-        let exr = png.with_extension("exr");
-        for flight in self.flights.drain(..) {
-            flight.wait()?;
-        }
-        picture::write_png(&png, width, height, &frame.still(&placements, (-ev).exp2())?, ev)?;
-        picture::write_exr(&exr, width, height, &frame.still(&placements, f32::INFINITY)?)?;
-        Ok(format!("wrote {} and {}", png.display(), exr.display()))
-    }
-
-    fn say(&mut self, message: Option<String>) {
+    pub(super) fn say(&mut self, message: Option<String>) {
         if let Some(message) = message {
             log::info!("message: {message}");
             self.messages.push_back((Instant::now(), message));
@@ -604,7 +322,7 @@ impl Viewer {
     }
 
     /// Passes on what no user can mend; the rest becomes a message.
-    fn tolerate<T>(&mut self, outcome: Result<T>) -> Result<Option<T>> {
+    pub(super) fn tolerate<T>(&mut self, outcome: Result<T>) -> Result<Option<T>> {
         match outcome {
             Ok(value) => Ok(Some(value)),
             Err(error @ (Error::Device(_) | Error::Unsupported(_))) => Err(error),
@@ -615,7 +333,7 @@ impl Viewer {
         }
     }
 
-    fn status(&self) -> Status<'_> {
+    pub(super) fn status(&self) -> Status<'_> {
         let info = &self.setup.device.info;
         Status {
             device: &info.name,
@@ -633,28 +351,4 @@ impl Viewer {
             messages: self.messages.iter().map(|(_, text)| text.as_str()).collect(),
         }
     }
-
-    /// The outline of the selected entity in points.
-    fn outline(&mut self) -> Vec<[egui::Pos2; 2]> {
-        let Some(selected) = self.editor.selection() else { return Vec::new() };
-        let scene = self.editor.scene();
-        let mesh = scene.entities[selected].mesh;
-        let edges = self.edges.entry(mesh).or_insert_with(|| Edges::new(&scene.meshes[mesh]));
-        let [width, height] = self.editor.size().map(f64::from);
-        let camera = self.editor.camera();
-        let size = DVec2::new(width, height) / f64::from(self.paint.pixels_per_point);
-        let placement = self.editor.placements()[selected];
-        let lines = edges.outline(&placement, clip_from_world(camera, width / height), camera.eye.as_dvec3(), size);
-        let point = |p: DVec2| egui::pos2(p.x as f32, p.y as f32);
-        let inside = |l: &[DVec2; 2]| l.iter().all(|p| p.x <= size.x);
-        lines.into_iter().filter(inside).map(|line| line.map(point)).collect()
-    }
-}
-
-/// `NAME-001.png` beside a path, or the next number that is free.
-fn free_name(beside: &std::path::Path) -> PathBuf {
-    let stem = beside.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let stem = stem.trim_end_matches("-edited");
-    let name = |number: u32| beside.with_file_name(format!("{stem}-{number:03}.png"));
-    (1..).map(name).find(|path| !path.exists() && !path.with_extension("exr").exists()).expect("numbers do not end")
 }

@@ -1,0 +1,63 @@
+//! The viewer's reference and error: rays in the background, and what they say about the merge.
+
+use super::command::Changed;
+use super::panel;
+use super::reference;
+use super::task::Task;
+use super::viewer::{ERROR, REFERENCE, Viewer};
+use crate::asset::false_color::{NEUTRAL, Scheme};
+use crate::error::Result;
+use crate::truth::error_map::{self, ErrorMap};
+
+impl Viewer {
+    /// Starts rays where they are wanted, takes in what they found, and compares.
+    pub(super) fn look_at_rays(&mut self) -> Result<()> {
+        let wanted = self.editor.shows_reference() || self.editor.shows_error();
+        if !wanted || self.frame.is_none() {
+            self.rays = None;
+            return Ok(());
+        }
+        if let Some(found) = self.rays.as_ref().and_then(|rays| rays.results().pop()) {
+            let frame = self.frame.as_mut().expect("checked above");
+            frame.set_panel(REFERENCE, &found.radiosity, [0.0; 3])?;
+            self.reference = Some(found);
+            self.pending |= Changed { display: true, ..Changed::default() };
+        }
+        if let Some(Err(error)) = self.rays.as_mut().and_then(Task::ended) {
+            self.tolerate(Err::<(), _>(error)).map(|_| ())?;
+        }
+        let current = self.reference.as_ref().is_some_and(|r| r.version == self.version);
+        // Rays for a state that is gone end after their first round, so that something is seen while things move.
+        let known = self.reference.as_ref().map(|r| r.version);
+        let stale = self.rays_version != self.version && known == Some(self.rays_version);
+        if (self.rays.is_none() && !current) || stale || (!current && !self.rays.as_ref().is_some_and(Task::is_running))
+        {
+            let (scene, placements) = (self.editor.scene().clone(), self.editor.placements());
+            self.rays = Some(reference::cast(scene, placements, self.version, self.setup.seed));
+            self.rays_version = self.version;
+        }
+        if self.editor.shows_error() && current && !self.pending.light() {
+            self.compare()?;
+        }
+        Ok(())
+    }
+
+    /// Colours of the error of what was merged last, where they are not known yet.
+    pub(super) fn compare(&mut self) -> Result<()> {
+        let (Some(frame), Some(reference)) = (&mut self.frame, &self.reference) else { return Ok(()) };
+        if self
+            .error_shown
+            .as_ref()
+            .is_some_and(|(version, rays, _)| (*version, *rays) == (self.version, reference.rays))
+        {
+            return Ok(());
+        }
+        let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference.radiosity, Scheme::Signed);
+        let scale = map.scale();
+        frame.set_panel(ERROR, &map.colors(&scale), NEUTRAL)?;
+        let shown = panel::ErrorScale { rms: map.rms(), limit: scale.limit };
+        self.error_shown = Some((self.version, reference.rays, shown));
+        self.pending |= Changed { display: true, ..Changed::default() };
+        Ok(())
+    }
+}

@@ -1,0 +1,111 @@
+//! The viewer after a change: what is taken over at once, what is baked in the background first, what is rebuilt.
+
+use super::command::Changed;
+use super::task::{Task, Worker};
+use super::viewer::Viewer;
+use crate::bake::Baker;
+use crate::error::Result;
+use crate::frame::store::Store;
+use crate::frame::{self, Frame, is_cached};
+use crate::gpu::Device;
+use crate::gpu::validation::Messages;
+use crate::render::show::Show;
+use crate::render::variant::Variant;
+
+impl Viewer {
+    /// Brings the frame up to what the editor says.
+    pub(super) fn follow(&mut self, changed: Changed) -> Result<()> {
+        if !changed.any() {
+            return Ok(());
+        }
+        self.pending |= changed;
+        if changed.light() {
+            self.version += 1;
+        }
+        if changed.scene {
+            self.settle()?;
+            (self.frame, self.reference, self.error_shown, self.rays) = (None, None, None, None);
+            self.edges.clear();
+            self.timings.clear();
+            return self.prepare();
+        }
+        let Some(frame) = &mut self.frame else { return Ok(()) };
+        if changed.variant {
+            let chosen = self.editor.variant().map(Variant::named).transpose()?.or(self.setup.frame.variant);
+            let outcome = frame.set_variant(chosen);
+            self.tolerate(outcome)?;
+            return Ok(());
+        }
+        if changed.camera {
+            frame.set_camera(self.editor.camera());
+        }
+        if changed.emission || changed.sky || changed.roles || changed.placements {
+            if frame.covers(self.editor.scene()) {
+                self.bake = None;
+                frame.set_scene(self.editor.scene())?;
+            } else if self.bake.is_none() || changed.roles {
+                return self.prepare();
+            }
+        }
+        Ok(())
+    }
+
+    /// Builds the frame if all of it is in the cache, else has it baked first.
+    pub(super) fn prepare(&mut self) -> Result<()> {
+        self.bake = None;
+        let (cache, bake) = (self.setup.cache.clone(), self.setup.frame.bake);
+        let scene = self.editor.scene().clone();
+        if is_cached(&cache, &scene, &bake) {
+            return self.build();
+        }
+        let (options, library) = (self.setup.options.clone(), self.setup.library.clone());
+        self.bake = Some(Task::new(move |worker: &Worker<()>| {
+            worker.report("opening the device for it", 0, 1);
+            let device = Device::new(&options)?;
+            let baker = Baker::new(&device, &library);
+            let store = Store::new(&baker, &cache, &scene, &bake, &|what, done, all| worker.report(what, done, all))?;
+            drop((store, baker));
+            Messages::into_result(device.take_validation_messages())
+        }));
+        Ok(())
+    }
+
+    pub(super) fn build(&mut self) -> Result<()> {
+        self.settle()?;
+        let variant = self.editor.variant().map(Variant::named).transpose()?.or(self.setup.frame.variant);
+        let options = frame::Options { size: self.size, variant, ..self.setup.frame };
+        let built = Frame::new(&self.baker, &self.setup.cache, self.editor.scene(), options, &|_, _, _| ());
+        if let Some(frame) = self.tolerate(built)? {
+            self.frame = Some(frame);
+            self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
+            self.version += 1;
+        }
+        Ok(())
+    }
+
+    pub(super) fn reload(&mut self, files: &[String]) {
+        let library = &self.setup.library;
+        let uses = |entry: &str| library.files(entry).iter().any(|file| files.contains(file));
+        let show = if uses("show.vert") || uses("show.frag") {
+            Show::new(&self.setup.device, library, self.setup.format, self.setup.encodes_srgb)
+                .map(|show| self.show = show)
+        } else {
+            Ok(())
+        };
+        let frame = self.frame.as_mut().map_or(Ok(()), |frame| frame.reload(files));
+        self.baker = Baker::new(&self.setup.device, library);
+        let errors: Vec<String> = [show, frame].into_iter().filter_map(|r| r.err().map(|e| e.to_string())).collect();
+        if errors.is_empty() {
+            log::info!("shaders rebuilt: {}", files.join(", "));
+            self.say(Some(format!("shaders rebuilt: {}", files.join(", "))));
+            self.shader_error = None;
+            if let Some(watch) = &mut self.watch {
+                watch.compiled();
+            }
+        } else {
+            log::warn!("{}", errors.join("\n"));
+            self.shader_error = Some(errors.join("\n"));
+        }
+        self.pending |= Changed { placements: true, display: true, ..Changed::default() };
+    }
+}

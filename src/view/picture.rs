@@ -1,0 +1,163 @@
+//! The viewer's frames: into a window, into an image, into files.
+
+use super::outline::Edges;
+use super::viewer::{ERROR, HISTORY, REFERENCE, Viewer};
+use crate::asset::picture;
+use crate::error::{Error, Result};
+use crate::frame::camera::clip_from_world;
+use crate::frame::{Lit, Part};
+use crate::gpu::{Access, Commands, FLIGHTS, Image, Target, Window};
+use glam::DVec2;
+use std::path::{Path, PathBuf};
+
+/// What a frame is drawn into.
+pub enum Canvas<'c> {
+    /// A window; the frame is shown.
+    Window(&'c mut Window),
+    /// An image of the setup's format, left to be copied from.
+    Image(&'c Image),
+}
+
+impl Viewer {
+    /// Draws a frame. False where there was nothing to draw into, as in a minimised window.
+    ///
+    /// # Errors
+    /// `Device` when the device or the surface was lost.
+    pub fn draw(&mut self, mut canvas: Canvas<'_>) -> Result<bool> {
+        while self.flights.len() >= FLIGHTS {
+            self.land()?;
+        }
+        let shot = match &mut canvas {
+            Canvas::Window(window) => match window.acquire()? {
+                Some(shot) => Some(shot),
+                None => return Ok(false),
+            },
+            Canvas::Image(_) => None,
+        };
+        let target = match (&canvas, &shot) {
+            (Canvas::Image(image), _) => *image,
+            (_, Some(shot)) => &*shot.image,
+            (Canvas::Window(_), None) => unreachable!("a window gave a shot"),
+        };
+        let size = [target.shape.width, target.shape.height];
+        let resized = self.frame.as_ref().is_some_and(|frame| frame.size() != size);
+        let parts = self.parts(size);
+        let placements = self.editor.placements();
+        let white = (-self.editor.exposure_ev()).exp2();
+        let pending = std::mem::take(&mut self.pending);
+        let light = pending.light() || pending.variant;
+        if let Some(frame) = &mut self.frame {
+            frame.resize(size)?;
+            if light {
+                frame.prepare(&placements)?;
+            }
+        }
+        let mut commands = Commands::new(&self.setup.device, "frame")?;
+        commands.after_flights();
+        if let Some(frame) = &self.frame {
+            if light {
+                frame.record_light(&mut commands)?;
+            }
+            if pending.any() || resized {
+                frame.record_picture(&mut commands, &placements, &parts, white)?;
+            }
+        }
+        commands.image_barrier(target, None, Access::ColorWrite);
+        let (frame, show, overlay, paint) = (&self.frame, &self.show, &mut self.overlay, &self.paint);
+        let color = Target { color: target, clear: [0.02, 0.02, 0.025, 1.0], depth: None, resolve: None };
+        commands.pass("show", |c| {
+            c.render(&color, |drawing| {
+                if let Some(frame) = frame {
+                    show.record(drawing, frame.shown(), white)?;
+                }
+                drawing.overlay(overlay, target, paint)
+            })
+        })?;
+        let after = if shot.is_some() { Access::Present } else { Access::TransferRead };
+        commands.image_barrier(target, Some(Access::ColorWrite), after);
+        let flight = match (canvas, &shot) {
+            (Canvas::Window(window), Some(shot)) => window.present(commands, shot)?,
+            _ => commands.launch()?,
+        };
+        self.flights.push_back(flight);
+        assert!(self.setup.device.flight_count() <= FLIGHTS, "more than {FLIGHTS} frames are queued");
+        self.frame_count += 1;
+        Ok(true)
+    }
+
+    /// Waits for all frames.
+    ///
+    /// # Errors
+    /// `Device` when the device was lost.
+    pub fn settle(&mut self) -> Result<()> {
+        while !self.flights.is_empty() {
+            self.land()?;
+        }
+        Ok(())
+    }
+
+    /// Ends the oldest flight and keeps its times.
+    pub(super) fn land(&mut self) -> Result<()> {
+        if let Some(flight) = self.flights.pop_front() {
+            self.timings.push_back(flight.wait()?);
+            if self.timings.len() > HISTORY {
+                self.timings.pop_front();
+            }
+        }
+        Ok(())
+    }
+
+    /// Parts of the picture: merged or error, and the reference on the right of it.
+    pub(super) fn parts(&self, [width, height]: [u32; 2]) -> Vec<Part> {
+        let error = self.editor.shows_error() && self.error_shown.is_some();
+        let own = if error { Lit::Colors(ERROR) } else { Lit::Merged };
+        if !self.editor.shows_reference() {
+            return vec![Part { area: [0, 0, width, height], lit: own }];
+        }
+        let [half, _] = self.pane_of([width, height]);
+        let mut parts = vec![Part { area: [0, 0, half, height], lit: own }];
+        if self.reference.is_some() && width > half {
+            parts.push(Part { area: [half, 0, width - half, height], lit: Lit::Panel(REFERENCE) });
+        }
+        parts
+    }
+
+    /// Writes the picture beside the saved scene, at full quality and without the overlay.
+    pub(super) fn screenshot(&mut self) -> Result<String> {
+        let Some(frame) = &mut self.frame else { return Err(Error::Failed("nothing is shown yet".into())) };
+        let [width, height] = frame.size();
+        let (placements, ev) = (self.editor.placements(), self.editor.exposure_ev());
+        let png = free_name(&self.editor.save_path());
+        let exr = png.with_extension("exr");
+        for flight in self.flights.drain(..) {
+            flight.wait()?;
+        }
+        picture::write_png(&png, width, height, &frame.still(&placements, (-ev).exp2())?, ev)?;
+        picture::write_exr(&exr, width, height, &frame.still(&placements, f32::INFINITY)?)?;
+        Ok(format!("wrote {} and {}", png.display(), exr.display()))
+    }
+
+    /// The outline of the selected entity in points.
+    pub(super) fn outline(&mut self) -> Vec<[egui::Pos2; 2]> {
+        let Some(selected) = self.editor.selection() else { return Vec::new() };
+        let scene = self.editor.scene();
+        let mesh = scene.entities[selected].mesh;
+        let edges = self.edges.entry(mesh).or_insert_with(|| Edges::new(&scene.meshes[mesh]));
+        let [width, height] = self.editor.size().map(f64::from);
+        let camera = self.editor.camera();
+        let size = DVec2::new(width, height) / f64::from(self.paint.pixels_per_point);
+        let placement = self.editor.placements()[selected];
+        let lines = edges.outline(&placement, clip_from_world(camera, width / height), camera.eye.as_dvec3(), size);
+        let point = |p: DVec2| egui::pos2(p.x as f32, p.y as f32);
+        let inside = |l: &[DVec2; 2]| l.iter().all(|p| p.x <= size.x);
+        lines.into_iter().filter(inside).map(|line| line.map(point)).collect()
+    }
+}
+
+/// `NAME-001.png` beside a path, or the next number that is free.
+fn free_name(beside: &Path) -> PathBuf {
+    let stem = beside.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stem = stem.trim_end_matches("-edited");
+    let name = |number: u32| beside.with_file_name(format!("{stem}-{number:03}.png"));
+    (1..).map(name).find(|path| !path.exists() && !path.with_extension("exr").exists()).expect("numbers do not end")
+}

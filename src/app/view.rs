@@ -179,6 +179,7 @@ impl App<'_> {
                 bake: self.arguments.bake.options(),
                 lookup: merge.lookup,
                 variant: merge.variant,
+                chain: merge.chain(),
                 skip: merge.skip,
                 size: own,
                 multisample: self.arguments.multisample.unwrap_or(!device.info.is_software()),

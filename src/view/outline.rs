@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn flat_faces_show_no_triangles() {
-        let lines = outline("cuboid = { size_m = [1, 1, 1] }");
-        assert_eq!(lines.len(), 4, "the square seen from the front: {lines:?}");
+        let lines = outline("cuboid = { size_m = [1, 1, 1], cells = 2 }");
+        assert_eq!(lines.len(), 8, "two edges a side of the square seen from the front: {lines:?}");
     }
 }

@@ -180,6 +180,7 @@ impl App<'_> {
                 lookup: merge.lookup,
                 variant: merge.variant,
                 chain: merge.chain(),
+                eps: merge.eps,
                 skip: merge.skip,
                 size: own,
                 multisample: self.arguments.multisample.unwrap_or(!device.info.is_software()),

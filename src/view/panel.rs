@@ -49,6 +49,8 @@ pub struct Status<'s> {
     pub timings: &'s VecDeque<Vec<Timing>>,
     /// Lookups of the last merge.
     pub counts: Option<Counts>,
+    /// Clusters that the last frame merged, and all.
+    pub merged: (usize, usize),
     /// Vertices that are lit.
     pub vertices: usize,
     /// Merge variant in use.
@@ -70,7 +72,7 @@ pub struct Status<'s> {
 /// Dark, and clear enough to see the scene through.
 pub fn visuals() -> egui::Visuals {
     let mut visuals = egui::Visuals::dark();
-    visuals.window_fill = Color32::from_black_alpha(215);
+    visuals.window_fill = Color32::from_black_alpha(232);
     visuals.override_text_color = Some(Color32::from_gray(230));
     visuals.window_shadow = egui::Shadow::NONE;
     visuals
@@ -99,23 +101,23 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
     let height = (screen.height() - 2.0 * MARGIN).max(60.0);
     let panel = |title: &str, align: Align2, width: f32| {
         let offset = if align == Align2::LEFT_TOP { vec2(MARGIN, MARGIN) } else { vec2(-MARGIN, MARGIN) };
-        egui::Window::new(title.to_owned())
-            .anchor(align, offset)
-            .resizable(false)
-            .default_width(width)
-            .max_width(width)
-            .default_height(height)
-            .max_height(height - 44.0)
-            .vscroll(true)
+        egui::Window::new(title.to_owned()).anchor(align, offset).resizable(false).default_width(width).max_width(width)
     };
     // Two panels side by side need room; in a narrow window the help starts folded away.
     let narrow = screen.width() < FIGURES_WIDTH + HELP_WIDTH + 100.0;
-    panel("Controls", Align2::LEFT_TOP, HELP_WIDTH).default_open(!narrow).show(context, help);
+    panel("Controls", Align2::LEFT_TOP, HELP_WIDTH).default_open(!narrow).show(context, |ui| {
+        scrolled(ui, height, help);
+    });
     panel("Figures", Align2::RIGHT_TOP, FIGURES_WIDTH).default_open(!narrow).show(context, |ui| {
-        figures(ui, editor, status, &mut commands);
+        scrolled(ui, height, |ui| figures(ui, editor, status, &mut commands));
     });
     notes(context, editor, status);
     commands
+}
+
+/// As high as its content, but within the window.
+fn scrolled(ui: &mut Ui, height: f32, add: impl FnOnce(&mut Ui)) {
+    egui::ScrollArea::vertical().max_height(height - 44.0).show(ui, add);
 }
 
 fn help(ui: &mut Ui) {
@@ -163,7 +165,7 @@ fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec
     graph(ui, status.timings);
     ui.separator();
     if let Some(counts) = status.counts {
-        let skipped = counts.behind_light + counts.below_horizon + counts.apart;
+        let skipped = counts.behind_light + counts.below_horizon + counts.apart + counts.facing_away + counts.below_eps;
         ui.label(format!(
             "{} entities, {} lit vertices",
             editor.scene().entities.len(),
@@ -174,14 +176,18 @@ fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec
         let of = |count: u64| 100.0 * count as f64 / counts.considered.max(1) as f64;
         ui.label(
             RichText::new(format!(
-                "behind light {:.0} %, below horizon {:.0} %, apart {:.0} %",
+                "behind light {:.0} %, below horizon {:.0} %, apart {:.0} %, turned away {:.0} %, below eps {:.0} %",
                 of(counts.behind_light),
                 of(counts.below_horizon),
-                of(counts.apart)
+                of(counts.apart),
+                of(counts.facing_away),
+                of(counts.below_eps)
             ))
             .small(),
         );
     }
+    let (merged, all) = status.merged;
+    ui.label(format!("clusters merged again {} of {}", grouped(merged as u64), grouped(all as u64)));
     variants(ui, editor, status, commands);
     ui.separator();
     sliders(ui, editor, commands);

@@ -15,6 +15,7 @@ use crate::bake::cache::Cache;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame};
 use crate::gpu::{self, Device, Flight, Overlay, Paint, Timing};
+use crate::render::gather::Counts;
 use crate::render::show::Show;
 use crate::shaders::Library;
 use ash::vk;
@@ -84,6 +85,10 @@ pub struct Viewer {
     pub(super) repaint_at: Option<Instant>,
     /// Progress that was shown last.
     pub(super) told: [Option<Progress>; 2],
+    /// Lookups that lists leave off, of the version counted.
+    pub(super) counts: Option<(u64, Counts)>,
+    /// When they may be counted again: it takes a look at every cluster and entity.
+    pub(super) count_at: Instant,
     pub(super) frame_count: u64,
 }
 
@@ -121,6 +126,8 @@ impl Viewer {
             size: editor.size(),
             repaint_at: Some(Instant::now()),
             told: [None, None],
+            counts: None,
+            count_at: Instant::now(),
             frame_count: 0,
             editor,
             setup,
@@ -271,11 +278,24 @@ impl Viewer {
                 Err(error) => self.tolerate(Err::<(), _>(error)).map(|_| ())?,
             }
         }
+        self.count();
         let files = self.watch.as_mut().and_then(Watch::poll);
         if let Some(files) = files {
             self.reload(&files);
         }
         self.look_at_rays()
+    }
+
+    /// Counts what the lists leave off where that is not known, at most a twentieth of the time.
+    fn count(&mut self) {
+        let Some(frame) = &self.frame else { return };
+        let known = self.counts.as_ref().is_some_and(|(version, _)| *version == self.version);
+        if !known && self.editor.shows_overlay() && Instant::now() >= self.count_at {
+            let start = Instant::now();
+            self.counts = Some((self.version, frame.counts(&self.editor.placements())));
+            self.count_at = Instant::now() + (20 * start.elapsed()).max(Duration::from_millis(500));
+            self.pending.display = true;
+        }
     }
 
     /// Runs the overlay on egui's input; what its widgets ask for is done.
@@ -286,10 +306,11 @@ impl Viewer {
         let lines = self.outline();
         let status = self.status();
         let context = self.egui.clone();
-        context.begin_pass(input);
-        panel::outline(&context, &lines);
-        let commands = panel::show(&context, &self.editor, &status);
-        let output = context.end_pass();
+        let mut commands = Vec::new();
+        let output = context.run_ui(input, |ui| {
+            panel::outline(ui.ctx(), &lines);
+            commands.extend(panel::show(ui.ctx(), &self.editor, &status));
+        });
         drop(status);
         let delay = output.viewport_output.values().map(|v| v.repaint_delay).min();
         self.repaint_at = delay.and_then(|delay| Instant::now().checked_add(delay));
@@ -340,7 +361,8 @@ impl Viewer {
             driver: &info.driver,
             size: self.size,
             timings: &self.timings,
-            counts: self.frame.as_ref().map(|frame| frame.counts),
+            counts: self.counts.as_ref().map(|(_, counts)| *counts),
+            merged: self.frame.as_ref().map_or((0, 0), |f| (f.merged.merged_clusters, f.merged.clusters)),
             vertices: self.frame.as_ref().map_or(0, Frame::receiver_vertex_count),
             variant: self.frame.as_ref().map_or("", |frame| frame.variant.name),
             bake: self.bake.as_ref().map(Task::progress),

@@ -7,10 +7,13 @@ pub mod figures;
 pub mod plot;
 pub mod product;
 pub mod rival;
+pub mod scaling;
+pub mod skips;
 pub mod stability;
 pub mod sweep;
 pub mod text;
 pub mod time_error;
+pub mod town;
 
 use crate::bake::Baker;
 use crate::bake::cache::Cache;

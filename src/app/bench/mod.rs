@@ -1,6 +1,9 @@
 //! `shadow-fields bench`: the measurements behind the documentation's figures.
 
+mod common;
 mod product;
+mod scaling;
+mod skip;
 mod stability;
 mod time_error;
 
@@ -23,6 +26,10 @@ enum What {
     Product(product::Arguments),
     /// What long chains, odd places and odd numbers do to the merge; exit code 1 where one goes wrong
     Stability(stability::Arguments),
+    /// What each skip saves and what it does to the error
+    Skip(skip::Arguments),
+    /// Time and memory as vertices, entities and lights become many
+    Scaling(scaling::Arguments),
 }
 
 /// Runs a measurement.
@@ -31,5 +38,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         What::TimeError(arguments) => time_error::run(global, arguments),
         What::Product(arguments) => product::run(global, arguments),
         What::Stability(arguments) => stability::run(global, arguments),
+        What::Skip(arguments) => skip::run(global, arguments),
+        What::Scaling(arguments) => scaling::run(global, arguments),
     }
 }

@@ -1,0 +1,28 @@
+//! What the measurements of `bench` have in common.
+
+use crate::app::context::Context;
+use crate::app::{Global, output};
+use crate::bench::Bench;
+use crate::error::Result;
+use std::time::Instant;
+
+/// Opens the device, measures with progress on stderr, and hands both back.
+pub fn start<T>(global: &Global, quick: bool, measure: impl FnOnce(&Bench<'_>) -> Result<T>) -> Result<(Context, T)> {
+    let context = Context::new(global)?;
+    let started = Instant::now();
+    let show = |what: &str| {
+        if !global.no_progress {
+            output::note(global, format!("{:6.1} s  {what}", started.elapsed().as_secs_f64()));
+        }
+    };
+    let bench = Bench {
+        baker: &context.baker,
+        cache: &context.cache,
+        progress: &show,
+        quick,
+        seed: global.seed,
+        origin: context.origin(global),
+    };
+    let outcome = measure(&bench)?;
+    Ok((context, outcome))
+}

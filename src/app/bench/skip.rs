@@ -1,0 +1,40 @@
+//! `shadow-fields bench skip`
+
+use super::common::start;
+use crate::app::{Global, output};
+use crate::bench::{skips, text::three};
+use crate::error::Result;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `bench skip`.
+#[derive(Args)]
+pub struct Arguments {
+    /// A minute on two cores instead of five: two scenes, fewer rays and rounds
+    #[arg(long)]
+    quick: bool,
+    /// Folder for skip.csv and skip.json
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Measures and prints a row a scene and skip.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let (context, rows) = start(global, arguments.quick, |bench| skips::run(bench, &arguments.out))?;
+    if global.json {
+        output::say(serde_json::to_value(&rows).expect("results are plain data").to_string());
+        return context.finish();
+    }
+    output::say("Frame without drawing and relative RMS error against ray casting, the skip off and on in turns");
+    let cells = rows.iter().map(|row| {
+        let mut cells = vec![row.case.clone(), row.skip.clone()];
+        cells.extend([row.off.frame_ms.median, row.on.frame_ms.median, row.times_faster].map(three));
+        cells.extend([row.off.steps, row.on.steps].map(|steps| steps.to_string()));
+        cells.extend([row.off.error.rms, row.on.error.rms, row.change.max].map(three));
+        cells
+    });
+    let header =
+        ["scene", "skip", "off ms", "on ms", "times", "off steps", "on steps", "off error", "on error", "most change"];
+    output::table(&header, &cells.collect::<Vec<_>>());
+    context.finish()
+}

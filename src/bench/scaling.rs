@@ -1,0 +1,224 @@
+//! `bench scaling`: what a frame costs as vertices, entities and lights become many.
+
+use super::budget::device_radiosity;
+use super::figures::{Radiosity, Spread, difference, rms, spread};
+use super::plot::{Curve, Dot, Plot};
+use super::sweep::merge_ms;
+use super::text::{csv, write};
+use super::town::{Town, moved};
+use super::{Bench, default_options};
+use crate::error::{Error, Result};
+use crate::frame::memory::Memory;
+use crate::frame::{self, Frame};
+use crate::render::gather::Counts;
+use crate::render::variant::Skip;
+use crate::scene::Placement;
+use crate::truth::{RayCast, Shapes, World, sample_vertices};
+use serde::Serialize;
+use serde_json::json;
+use std::path::Path;
+use std::time::Instant;
+
+/// One size of one axis.
+#[derive(Clone, Debug, Serialize)]
+pub struct Point {
+    /// What is varied: vertices, entities (floor alone lit), entities all lit, or lights.
+    pub axis: &'static str,
+    /// Lit vertices.
+    pub vertices: usize,
+    /// Entities, the floor included.
+    pub entities: usize,
+    /// Of them, lights.
+    pub lights: usize,
+    /// Wall time of a frame without drawing in which everything but the floor moves, milliseconds.
+    pub all_move_ms: Spread,
+    /// Device time of the merge in it, milliseconds.
+    pub merge_ms: Spread,
+    /// The same in nanoseconds a vertex.
+    pub merge_ns_a_vertex: f64,
+    /// Wall time of a frame in which one entity moves, milliseconds.
+    pub one_moves_ms: Spread,
+    /// Wall time of a frame at rest, milliseconds.
+    pub rest_ms: Spread,
+    /// Lookups a vertex.
+    pub steps_a_vertex: f64,
+    /// What the lists leave off.
+    pub counts: Counts,
+    /// Relative root mean square error of some vertices against ray casting.
+    pub error: f64,
+    /// Device memory and lists, bytes.
+    pub memory_bytes: Memory,
+    /// Device memory, bytes.
+    pub device_bytes: u64,
+    /// Memory of the whole process that is resident, bytes, where the system tells; on a software device this holds the
+    /// device's too.
+    pub resident_bytes: Option<u64>,
+}
+
+/// Measures, and writes `scaling.csv`, `scaling.json` and a plot an axis into `folder`.
+///
+/// # Errors
+/// `Failed` when the folder cannot be written; else as [`Frame::new`].
+pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Point>> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+    let mut points = Vec::new();
+    for (axis, towns) in axes(bench.quick) {
+        for town in towns {
+            points.push(point(bench, axis, town)?);
+        }
+    }
+    let origin = json!({ "origin": bench.origin, "quick": bench.quick });
+    let rows: Vec<_> = points.iter().map(|p| serde_json::to_value(p).expect("points are plain data")).collect();
+    write(&folder.join("scaling.csv"), &csv(&origin, &rows))?;
+    write(&folder.join("scaling.json"), &format!("{:#}\n", json!({ "origin": origin, "points": points })))?;
+    for (axis, _) in axes(bench.quick) {
+        let of_axis: Vec<&Point> = points.iter().filter(|p| p.axis == axis).collect();
+        write(&folder.join(format!("scaling-{}.svg", axis.replace(' ', "-"))), &plot(axis, &of_axis).svg())?;
+    }
+    Ok(points)
+}
+
+/// Every axis with its towns, small to large. As entities grow in number the town grows, at equal density of entities and of
+/// vertices: what is near a vertex stays the same.
+fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
+    let cells: &[usize] = if quick { &[31, 63, 127, 255] } else { &[31, 63, 127, 255, 511, 1023] };
+    let things: &[usize] = if quick { &[64, 1024, 4095] } else { &[1, 4, 16, 64, 256, 1024, 4095] };
+    let lights: &[usize] = if quick { &[1, 16] } else { &[1, 4, 16, 64] };
+    let base = Town { things: 64, lights: 0, cells: 64, receive: false };
+    let with = |of: &[usize], town: &dyn Fn(usize) -> Town| of.iter().map(|&n| town(n)).collect::<Vec<_>>();
+    let edge = |things: usize| (things as f64).sqrt().ceil() as usize;
+    let mut axes = vec![
+        ("vertices", with(cells, &|cells| Town { cells, things: 16, ..base })),
+        ("entities", with(things, &|things| Town { things, cells: 4 * edge(things), ..base })),
+        ("lights", with(lights, &|lights| Town { lights, ..base })),
+    ];
+    if !quick {
+        let lit = |things| Town { things, cells: 4 * edge(things), receive: true, ..base };
+        axes.insert(2, ("entities all lit", with(things, &lit)));
+    }
+    axes
+}
+
+/// Relative root mean square error of a few vertices against rays.
+fn error(bench: &Bench<'_>, frame: &mut Frame, placements: &[Placement]) -> Result<f64> {
+    let scene = frame.scene().clone();
+    let shapes = Shapes::new(&scene);
+    let vertices = sample_vertices(&scene, if bench.quick { 64 } else { 256 }, bench.seed);
+    let cast = RayCast { rays: if bench.quick { 256 } else { 1024 }, seed: bench.seed, ..Default::default() };
+    let lit = cast.run(&World::new(&scene, &shapes, placements), &vertices);
+    let truth: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
+    frame.render(placements, None)?;
+    Ok(difference(&device_radiosity(frame, &vertices)?, &truth, rms(&truth).max(f64::MIN_POSITIVE)).rms)
+}
+
+fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<Point> {
+    let scene = town.scene()?;
+    let placements = scene.at(0.0);
+    let mut frame = bench.frame(&scene, frame::Options { skip: Skip::ALL, ..default_options() })?;
+    let everything = |time_s: f64| -> Vec<Placement> {
+        let floor = placements.iter().take(1).copied();
+        floor.chain(placements.iter().skip(1).map(|p| moved(p, time_s))).collect()
+    };
+    let most = if bench.quick { 3 } else { 7 };
+    let timed = |frame: &mut Frame, at: &dyn Fn(usize) -> Vec<Placement>| -> Result<(Vec<f64>, Vec<f64>)> {
+        let (mut walls, mut merges, begun) = (Vec::new(), Vec::new(), Instant::now());
+        for round in 0..=most {
+            let now = at(round);
+            let started = Instant::now();
+            let merge = merge_ms(&frame.render(&now, None)?);
+            if round > 0 {
+                walls.push(started.elapsed().as_secs_f64() * 1e3);
+                merges.push(merge);
+            }
+            // Long frames need fewer repetitions.
+            if walls.len() >= 3 && begun.elapsed().as_secs_f64() > 5.0 {
+                break;
+            }
+        }
+        Ok((walls, merges))
+    };
+    let (walls, merges) = timed(&mut frame, &|round| everything(round as f64))?;
+    let vertices = frame.receiver_vertex_count();
+    let steps_a_vertex = frame.merged.merged_steps as f64 / frame.merged.clusters.max(1) as f64;
+    let last = scene.entities.len() - 1;
+    let (one, _) = timed(&mut frame, &|round| {
+        let mut now = placements.clone();
+        now[last / 2] = moved(&placements[last / 2], round as f64);
+        now
+    })?;
+    let (rest, _) = timed(&mut frame, &|_| placements.clone())?;
+    let merge_ms = spread(&merges);
+    (bench.progress)(&format!("{axis}: {vertices} vertices, {} entities measured", scene.entities.len()));
+    Ok(Point {
+        axis,
+        vertices,
+        entities: scene.entities.len(),
+        lights: town.lights,
+        all_move_ms: spread(&walls),
+        merge_ms,
+        merge_ns_a_vertex: merge_ms.median * 1e6 / vertices as f64,
+        one_moves_ms: spread(&one),
+        rest_ms: spread(&rest),
+        steps_a_vertex,
+        counts: frame.counts(&placements),
+        error: error(bench, &mut frame, &placements)?,
+        memory_bytes: frame.memory(),
+        device_bytes: frame.memory().device(),
+        resident_bytes: resident_bytes(),
+    })
+}
+
+/// Resident memory of this process, where the system has a file that tells.
+fn resident_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    Some(line.trim().trim_end_matches(" kB").trim().parse::<u64>().ok()? * 1024)
+}
+
+fn plot(axis: &str, points: &[&Point]) -> Plot {
+    let size = |p: &Point| match axis {
+        "vertices" => p.vertices,
+        "lights" => p.lights,
+        _ => p.entities,
+    } as f64;
+    let dots = |group: &str, value: &dyn Fn(&Point) -> f64| -> Vec<Dot> {
+        let label = |p: &Point| format!("{group} at {}: {} ms", size(p), super::text::three(value(p)));
+        points.iter().map(|p| Dot { label: label(p), group: group.into(), x: size(p), y: value(p) }).collect()
+    };
+    let curve = |label: &str, value: &dyn Fn(&Point) -> f64| Curve {
+        label: format!("{label}, slope {:.2}", slope(points.iter().map(|p| (size(p), value(p))))),
+        points: points.iter().map(|p| (size(p), value(p))).collect(),
+    };
+    let (all, one) = (|p: &Point| p.all_move_ms.median, |p: &Point| p.one_moves_ms.median);
+    let mut marks = dots("all move", &all);
+    marks.extend(dots("one moves", &one));
+    Plot {
+        title: format!("A frame without drawing as {axis} grow"),
+        x_label: if axis.starts_with("entities") { "entities".into() } else { axis.into() },
+        y_label: "milliseconds (median)".into(),
+        dots: marks,
+        front: Vec::new(),
+        curves: vec![curve("all move", &all), curve("one moves", &one)],
+    }
+}
+
+/// Least-squares slope in logarithms: 1 where cost is in proportion to size.
+fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let logs: Vec<(f64, f64)> = points.map(|(x, y)| (x.ln(), y.ln())).collect();
+    let count = logs.len() as f64;
+    let (mean_x, mean_y) =
+        (logs.iter().map(|p| p.0).sum::<f64>() / count, logs.iter().map(|p| p.1).sum::<f64>() / count);
+    let (along, across) =
+        logs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + (x - mean_x).powi(2), b + (x - mean_x) * (y - mean_y)));
+    across / along
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn slope_of_a_power() {
+        let points = [1.0, 2.0, 10.0].map(|x: f64| (x, 3.0 * x.powf(1.5)));
+        assert!((super::slope(points.into_iter()) - 1.5).abs() < 1e-12);
+    }
+}

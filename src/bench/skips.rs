@@ -1,0 +1,185 @@
+//! `bench skip`: what each skip saves and what it does to the error against ray casting, with it off and on in turns.
+
+use super::budget::device_radiosity;
+use super::cases::{self, Case};
+use super::figures::{Difference, Radiosity, Spread, difference, rms, spread};
+use super::sweep::merge_ms;
+use super::town::{Town, moved};
+use super::{Bench, default_options};
+use crate::error::{Error, Result};
+use crate::frame;
+use crate::render::gather::Counts;
+use crate::render::variant::{EPS, Skip};
+use crate::scene::Placement;
+use crate::truth::raycast::{Distant, relative_error};
+use crate::truth::{RayCast, Shapes, Vertex, World, sample_vertices};
+use serde::Serialize;
+use serde_json::json;
+use std::path::Path;
+use std::time::Instant;
+
+/// A frame without drawing, with the skip off or on.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Side {
+    /// Wall time of lists, merge and all else, milliseconds.
+    pub frame_ms: Spread,
+    /// Device time of the merge, milliseconds.
+    pub merge_ms: Spread,
+    /// Lookups in the lists that were merged, one for 64 vertices.
+    pub steps: usize,
+    /// Against ray casting.
+    pub error: Difference,
+}
+
+/// One skip in one case.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Scene.
+    pub case: String,
+    /// Name of the skip.
+    pub skip: String,
+    /// Lit vertices.
+    pub vertices: usize,
+    /// Without it, all others on.
+    pub off: Side,
+    /// With all skips.
+    pub on: Side,
+    /// Frame time off over on.
+    pub times_faster: f64,
+    /// Largest change of a vertex, relative to the root mean square of T0.
+    pub change: Difference,
+    /// What the lists leave off, all skips on.
+    pub counts: Counts,
+}
+
+/// Measures, and writes `skip.csv` and `skip.json` into `folder`.
+///
+/// # Errors
+/// `Failed` when the folder cannot be written; else as [`frame::Frame::new`].
+pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Row>> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+    let mut rows = Vec::new();
+    for case in chosen(bench.quick)? {
+        rows.extend(of_case(bench, &case)?);
+    }
+    let origin = json!({
+        "origin": bench.origin, "quick": bench.quick, "seed": bench.seed,
+        "errors": "relative to the root mean square of T0 over the judged vertices",
+    });
+    let values: Vec<_> = rows.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect();
+    super::text::write(&folder.join("skip.csv"), &super::text::csv(&origin, &values))?;
+    super::text::write(&folder.join("skip.json"), &format!("{:#}\n", json!({ "origin": origin, "rows": rows })))?;
+    Ok(rows)
+}
+
+fn chosen(quick: bool) -> Result<Vec<Case>> {
+    let town = |things, lights, cells| -> Result<Case> {
+        let scene = Town { things, lights, cells, receive: true }.scene()?;
+        Ok(Case { name: format!("town of {things}, {lights} lights"), scene, time_s: 0.0, distant: Distant::Exact })
+    };
+    if quick {
+        return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?]);
+    }
+    let mut cases = cases::scenes()?;
+    cases.push(town(64, 4, 160)?);
+    cases.push(town(256, 8, 160)?);
+    Ok(cases)
+}
+
+fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<Row>> {
+    (bench.progress)(&format!("{}: casting rays", case.name));
+    let placements = case.scene.at(case.time_s);
+    let shapes = Shapes::new(&case.scene);
+    let world = World::new(&case.scene, &shapes, &placements);
+    let vertices = sample_vertices(&case.scene, if bench.quick { 500 } else { 1500 }, bench.seed);
+    let rays = if bench.quick { 512 } else { 4096 };
+    let cast = RayCast { rays, seed: bench.seed, distant: case.distant, ..Default::default() };
+    let lit = cast.run(&world, &vertices);
+    let truth: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
+    let judge = Judge { unit: rms(&truth).max(f64::MIN_POSITIVE), vertices, truth };
+    (bench.progress)(&format!("{}: relative standard error of T0 {:.1e}", case.name, relative_error(&lit)));
+
+    let at_rest = default_options();
+    let skip_without = |name: &str| {
+        let mut skip = Skip::without(name);
+        skip.unmoved = false;
+        frame::Options { skip, ..at_rest }
+    };
+    let mut rows = Vec::new();
+    for name in Skip::NAMES.into_iter().filter(|name| *name != "unmoved") {
+        rows.push(judge.row(bench, case, &placements, name, [skip_without(name), at_rest], false)?);
+    }
+    let eps = format!("eps {EPS}");
+    let without_eps = frame::Options { eps: 0.0, ..at_rest };
+    rows.push(judge.row(bench, case, &placements, &eps, [without_eps, at_rest], false)?);
+    let none = frame::Options { eps: 0.0, skip: Skip::NONE, ..at_rest };
+    rows.push(judge.row(bench, case, &placements, "all but unmoved", [none, at_rest], false)?);
+    let kept = frame::Options { skip: Skip::ALL, ..at_rest };
+    rows.push(judge.row(bench, case, &placements, "unmoved, one moves", [at_rest, kept], true)?);
+    Ok(rows)
+}
+
+/// What results are held against.
+struct Judge {
+    unit: f64,
+    vertices: Vec<Vertex>,
+    truth: Vec<Radiosity>,
+}
+
+impl Judge {
+    /// One row: both sides in turns, at rest or with one entity that moves.
+    fn row(
+        &self,
+        bench: &Bench<'_>,
+        case: &Case,
+        placements: &[Placement],
+        skip: &str,
+        [off, on]: [frame::Options; 2],
+        moves: bool,
+    ) -> Result<Row> {
+        let mut frames = [bench.frame(&case.scene, off)?, bench.frame(&case.scene, on)?];
+        let mover = case.scene.entities.iter().position(|e| e.occludes).unwrap_or(0);
+        let (mut walls, mut merges) = ([Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
+        let rounds = if bench.quick { 5 } else { 11 };
+        for round in 0..rounds + 2 {
+            let mut now = placements.to_vec();
+            if moves {
+                now[mover] = moved(&placements[mover], 0.2 * f64::from(round));
+            }
+            for (side, frame) in frames.iter_mut().enumerate() {
+                let started = Instant::now();
+                let merge = merge_ms(&frame.render(&now, None)?);
+                // The first frames compile.
+                if round >= 2 {
+                    walls[side].push(started.elapsed().as_secs_f64() * 1e3);
+                    merges[side].push(merge);
+                }
+            }
+        }
+        let steps = [frames[0].merged.merged_steps, frames[1].merged.merged_steps];
+        let mut found = Vec::new();
+        for frame in &mut frames {
+            frame.render(placements, None)?;
+            found.push(device_radiosity(frame, &self.vertices)?);
+        }
+        let side = |i: usize| Side {
+            frame_ms: spread(&walls[i]),
+            merge_ms: spread(&merges[i]),
+            steps: steps[i],
+            error: difference(&found[i], &self.truth, self.unit),
+        };
+        let (off, on) = (side(0), side(1));
+        (bench.progress)(&format!("{}: {skip} measured", case.name));
+        Ok(Row {
+            case: case.name.clone(),
+            skip: skip.to_owned(),
+            vertices: frames[0].receiver_vertex_count(),
+            times_faster: off.frame_ms.median / on.frame_ms.median,
+            change: difference(&found[0], &found[1], self.unit),
+            counts: frames[1].counts(placements),
+            off,
+            on,
+        })
+    }
+}

@@ -210,7 +210,7 @@ impl Frame {
     /// As [`Frame::render`].
     pub fn still(&mut self, placements: &[Placement], white: f32) -> Result<Vec<f32>> {
         self.device.settle();
-        let fine = Draw::new(&self.device, &self.library, self.options.size, true)?;
+        let fine = Draw::new(&self.device, &self.library, self.options.size, true, Finish::Linear)?;
         let usual = std::mem::replace(&mut self.draw, fine);
         let outcome = self.render(placements, Some(white));
         self.draw = usual;

@@ -14,6 +14,7 @@ pub mod sweep;
 pub mod text;
 pub mod time_error;
 pub mod town;
+pub mod trials;
 
 use crate::bake::Baker;
 use crate::bake::cache::Cache;

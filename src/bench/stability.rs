@@ -1,19 +1,17 @@
 //! `bench stability`: what long chains, odd places and odd numbers do to the merge.
 
 use super::Bench;
-use super::budget::device_radiosity;
 use super::default_options;
 use super::text::{csv, write};
-use crate::asset::embedded;
+use super::trials::{self, Trial, Turn};
 use crate::error::{Error, Result};
+use crate::field::Storage;
 use crate::render::chain::Multiplier;
 use crate::render::variant::{self, Product};
-use crate::scene::Scene;
 use crate::sh::basis::MAX_COEFFICIENTS;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::product::Tensor;
 use crate::sh::quadrature::sphere_rule;
-use crate::truth::receiver_vertices;
 use glam::DVec3;
 use half::f16;
 use serde::Serialize;
@@ -51,25 +49,6 @@ pub struct Chain {
     pub bands_7: f64,
 }
 
-/// A scene that tries the merge.
-#[derive(Clone, Debug, Serialize)]
-pub struct Trial {
-    /// What is odd about it.
-    pub name: &'static str,
-    /// Vertices that are lit.
-    pub vertices: usize,
-    /// Whether every number on the device is finite.
-    pub finite: bool,
-    /// Whether a second run gave the same bytes.
-    pub repeatable: bool,
-    /// Largest magnitude of a radiosity.
-    pub largest: f64,
-    /// Largest difference of the device to its f64 twin, relative to the twin's largest magnitude.
-    pub twin_error: f64,
-    /// Whether all is as it should be: finite, repeatable, and within 1e-3 of the twin.
-    pub passed: bool,
-}
-
 /// What was measured.
 #[derive(Serialize)]
 pub struct Outcome {
@@ -77,6 +56,8 @@ pub struct Outcome {
     pub chains: Vec<Chain>,
     /// Scenes.
     pub trials: Vec<Trial>,
+    /// Rotations composed of small steps.
+    pub turns: Vec<Turn>,
 }
 
 /// How a chain multiplies.
@@ -163,72 +144,7 @@ pub fn chains(seed: u64, longest: usize) -> Vec<Chain> {
     out
 }
 
-/// Scenes of a floor and two balls, and what is odd about each.
-const TRIALS: &[(&str, &str)] = &[
-    ("apart", "position = [0, 1, 0]; position = [1.2, 0.9, 0.3]"),
-    ("touching each other", "position = [0, 1, 0]; position = [1, 1, 0]"),
-    ("touching the floor", "position = [0, 0.5, 0]; position = [1.2, 0.5, 0]"),
-    ("nested", "position = [0, 1, 0]; position = [0.05, 1, 0]\nscale = 0.5"),
-    ("coinciding", "position = [0, 1, 0]; position = [0, 1, 0]"),
-    (
-        "floor through a centre, receivers on axes, edges and corners of the cube",
-        "position = [0, 0, 0]; position = [0, 2, 0]",
-    ),
-    ("floor just inside the sphere", "position = [0, 0.499, 0]; position = [1.2, 0.5, 0]"),
-    ("10^6 radii away", "position = [0, 500000, 0]; position = [1, 1, 0]"),
-    ("positions of 10^6 m", "position = [1000000, 1, 1000000]; position = [1000000.5, 1, 1000000]"),
-    ("scale 10^-6", "position = [0, 1, 0]\nscale = 0.000001; position = [1, 1, 0]"),
-    ("scale 10^6", "position = [0, 600000, 0]\nscale = 1000000; position = [1, 1, 0]"),
-    ("an object as large as the scene", "position = [0, 1, 0]\nscale = 8; position = [1, 1, 0]"),
-    ("light in an occluder", "position = [0, 1, 0]; position = [0, 1, 0]\nscale = 0.2\nemission = [5, 5, 5]"),
-    ("occluder in a light", "position = [0, 1, 0]\nscale = 0.2; position = [0, 1, 0]\nemission = [5, 5, 5]"),
-    ("equal distances", "position = [-1, 1, 0]; position = [1, 1, 0]\nemission = [5, 5, 5]\noccludes = true"),
-    ("radiance 0", "position = [0, 1, 0]; position = [1, 1, 0]\nemission = [0, 0, 0]\nemits = true"),
-    ("radiance 10^-6", "position = [0, 1, 0]; position = [1, 1, 0]\nemission = [1e-6, 1e-6, 1e-6]"),
-    ("radiance 10^6", "position = [0, 1, 0]; position = [1, 1, 0]\nemission = [1e6, 1e6, 1e6]"),
-];
-
-fn trial_scene(places: &str) -> Result<Scene> {
-    let entity = |place: &str| format!("[[entity]]\nmesh = \"ball\"\n{}\n", place.trim());
-    let entities: String = places.split(';').map(entity).collect();
-    let text = format!(
-        "[camera]\neye = [0, 3, 6]\ntarget = [0, 0, 0]\n[environment]\ngradient = {{ radiance = [1, 1, 1] }}\n\
-         [[mesh]]\nname = \"floor\"\nplane = {{ size_m = 4, cells = 40 }}\n\
-         [[mesh]]\nname = \"ball\"\nfile = \"../meshes/sphere.obj\"\n[[entity]]\nmesh = \"floor\"\n{entities}"
-    );
-    Scene::parse(&text, Path::new("assets/scenes/trial.toml"), &embedded::read)
-}
-
-/// Lights a trial twice on the device and once in f64.
-fn trial(bench: &Bench<'_>, name: &'static str, places: &str) -> Result<Trial> {
-    let scene = trial_scene(places)?;
-    let placements = scene.at(0.0);
-    let vertices = receiver_vertices(&scene);
-    let mut frame = bench.frame(&scene, default_options())?;
-    frame.render(&placements, None)?;
-    let first = device_radiosity(&frame, &vertices)?;
-    frame.render(&placements, None)?;
-    let second = device_radiosity(&frame, &vertices)?;
-    let twin: Vec<f64> = frame.reference(&placements)?.into_iter().flat_map(|(_, all)| all).flatten().collect();
-    let device: Vec<f64> = first.iter().flatten().copied().collect();
-    let largest = |values: &[f64]| values.iter().fold(0.0, |worst: f64, v| worst.max(v.abs()));
-    let apart: Vec<f64> = device.iter().zip(&twin).map(|(a, b)| a - b).collect();
-    let twin_error = largest(&apart) / largest(&twin).max(f64::MIN_POSITIVE);
-    let finite = device.iter().all(|v| v.is_finite());
-    let bytes = |of: &[[f64; 3]]| of.iter().flatten().map(|v| v.to_bits()).collect::<Vec<_>>();
-    let repeatable = bytes(&first) == bytes(&second);
-    Ok(Trial {
-        name,
-        vertices: vertices.len(),
-        finite,
-        repeatable,
-        largest: largest(&device),
-        twin_error,
-        passed: finite && repeatable && twin_error < 1e-3,
-    })
-}
-
-/// Measures, and writes `chains.csv`, `trials.csv` and `stability.json` into `folder`.
+/// Measures, and writes `chains.csv`, `trials.csv`, `turns.csv` and `stability.json` into `folder`.
 ///
 /// # Errors
 /// `Failed` when the folder cannot be written; else as [`crate::frame::Frame::new`].
@@ -238,15 +154,23 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Outcome> {
     (bench.progress)("chains of caps");
     let chains = chains(bench.seed, if bench.quick { 64 } else { 1000 });
     let mut trials = Vec::new();
-    for (name, places) in TRIALS {
-        trials.push(trial(bench, name, places)?);
-        (bench.progress)(name);
+    for case in trials::cases(if bench.quick { 64 } else { 1000 })? {
+        let frame = |options| bench.frame(&case.scene, options);
+        for storage in [Storage::F16, Storage::F32] {
+            let options = default_options();
+            let bake = crate::bake::Options { storage, ..options.bake };
+            trials.push(trials::run(&case, frame(crate::frame::Options { bake, ..options })?, storage)?);
+        }
+        (bench.progress)(&case.name);
     }
+    (bench.progress)("a million small turns");
+    let turns = trials::turns(1_000_000);
     let rows = |value: Value| value.as_array().cloned().unwrap_or_default();
     let origin = json!({ "origin": bench.origin, "quick": bench.quick, "seed": bench.seed });
-    let outcome = Outcome { chains, trials };
+    let outcome = Outcome { chains, trials, turns };
     write(&folder.join("chains.csv"), &csv(&origin, &rows(json!(outcome.chains))))?;
     write(&folder.join("trials.csv"), &csv(&origin, &rows(json!(outcome.trials))))?;
+    write(&folder.join("turns.csv"), &csv(&origin, &rows(json!(outcome.turns))))?;
     write(&folder.join("stability.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
     Ok(outcome)
 }
@@ -269,13 +193,5 @@ mod tests {
         }
         let worst = chains(1, 64).into_iter().filter(|c| c.count == 64).map(|c| c.plain).fold(0.0, f64::max);
         assert!(worst > 1.2, "the plain chain is known to brighten: {worst}");
-    }
-
-    #[test]
-    fn every_trial_is_a_scene() {
-        for (name, places) in TRIALS {
-            let scene = trial_scene(places).unwrap_or_else(|error| panic!("{name}: {error}"));
-            assert_eq!(scene.entities.len(), 3, "{name}");
-        }
     }
 }

@@ -13,7 +13,7 @@ pub struct Arguments {
     /// Chains of up to 64 factors instead of 1000
     #[arg(long)]
     quick: bool,
-    /// Folder for chains.csv, trials.csv and stability.json
+    /// Folder for chains.csv, trials.csv, turns.csv and stability.json
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
@@ -51,20 +51,36 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             .iter()
             .map(|t| {
                 vec![
-                    t.name.to_owned(),
+                    format!("{}, {}", t.name, format!("{:?}", t.storage).to_lowercase()),
                     yes(t.finite),
                     yes(t.repeatable),
-                    three(t.largest),
+                    format!("{:.2e}", t.largest),
+                    format!("{:.2e}", t.bound),
                     format!("{:.1e}", t.twin_error),
                     yes(t.passed),
                 ]
             })
             .collect();
-        output::table(&["scene", "finite", "repeatable", "largest", "against f64", "passed"], &rows);
+        output::table(&["scene", "finite", "repeatable", "largest", "bound", "against f64", "passed"], &rows);
+        output::say("\nRotations composed of small steps in f32");
+        let rows: Vec<Vec<String>> = outcome
+            .turns
+            .iter()
+            .map(|t| {
+                let numbers = [format!("{:.7}", t.length), format!("{:.1e}", t.not_orthogonal), three(t.drift_deg)];
+                [t.name.to_owned(), t.steps.to_string()].into_iter().chain(numbers).chain([yes(t.passed)]).collect()
+            })
+            .collect();
+        output::table(&["steps", "count", "length", "SH lengths off", "drift, degrees", "passed"], &rows);
     }
     context.finish()?;
-    match outcome.trials.iter().filter(|t| !t.passed).count() {
+    let failed =
+        outcome.trials.iter().filter(|t| !t.passed).count() + outcome.turns.iter().filter(|t| !t.passed).count();
+    match failed {
         0 => Ok(()),
-        failed => Err(Error::Failed(format!("{failed} of {} scenes failed", outcome.trials.len()))),
+        failed => {
+            let all = outcome.trials.len() + outcome.turns.len();
+            Err(Error::Failed(format!("{failed} of {all} trials failed")))
+        }
     }
 }

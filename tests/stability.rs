@@ -1,0 +1,27 @@
+//! Odd places, sizes, numbers and meshes: everything finite, bounded, the same on a second run, and near its f64 twin.
+
+mod common;
+#[path = "common/stage.rs"]
+mod stage;
+
+use common::report;
+use shadow_fields::bake;
+use shadow_fields::bench::trials::{cases, run};
+use shadow_fields::field::Storage;
+use shadow_fields::frame::Options;
+use shadow_fields::render::variant::Skip;
+use stage::{small, stage};
+
+#[test]
+fn odd_scenes_stay_bounded() {
+    let Some(stage) = stage() else { return };
+    for case in cases(64).unwrap() {
+        for storage in [Storage::F16, Storage::F32] {
+            let bake = bake::Options { storage, ..small().bake };
+            let options = Options { bake, skip: Skip::without("unmoved"), ..small() };
+            let trial = run(&case, stage.frame(&case.scene, options), storage).unwrap();
+            report(&format!("{trial:?}"));
+            assert!(trial.passed, "{trial:?}");
+        }
+    }
+}

@@ -101,7 +101,7 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
     let height = (screen.height() - 2.0 * MARGIN).max(60.0);
     let panel = |title: &str, align: Align2, width: f32| {
         let offset = if align == Align2::LEFT_TOP { vec2(MARGIN, MARGIN) } else { vec2(-MARGIN, MARGIN) };
-        egui::Window::new(title.to_owned()).anchor(align, offset).resizable(false).default_width(width).max_width(width)
+        egui::Window::new(title.to_owned()).anchor(align, offset).auto_sized().default_width(width).max_width(width)
     };
     // Two panels side by side need room; in a narrow window the help starts folded away.
     let narrow = screen.width() < FIGURES_WIDTH + HELP_WIDTH + 100.0;

@@ -220,7 +220,7 @@ impl Viewer {
             Command::Orbit(_) | Command::Pan(_) | Command::DragTo(_) | Command::Resize(_) => {
                 log::debug!("command {command:?}");
             }
-            _ => log::info!("command {command:?}"),
+            _ => log::info!("frame {}: command {command:?}", self.frame_count),
         }
         // The editor sees the part of the window that shows what it edits.
         let command = match command {

@@ -565,8 +565,19 @@ fn the_next_scene_comes_round() {
         ]
     );
     let mut own = from_text(SMALL);
+    own.apply(step(Step::Left));
+    let data = own.scene().data.clone();
     own.apply(Command::NextScene);
     assert_eq!(own.path(), Path::new("assets/scenes/glowing_torus.toml"));
+    // Changes are not lost to it: undo leads back to them, and then takes them back.
+    own.apply(Command::Resize([90, 60]));
+    let effect = own.apply(Command::Undo);
+    assert!(effect.changed.scene && effect.message.unwrap().contains("t.toml"));
+    assert_eq!((own.path(), &own.scene().data, own.size()), (Path::new("t.toml"), &data, [90, 60]));
+    assert!(own.apply(Command::Undo).changed.placements && own.apply(Command::Undo).message.is_some());
+    // An unchanged scene leaves nothing to go back to.
+    own.apply(Command::NextScene);
+    assert!(!own.apply(Command::Undo).changed.any());
 }
 
 #[test]

@@ -183,6 +183,12 @@ impl Editor {
             back
         };
         let found = if forth { self.history.redo(swap) } else { self.history.undo(swap) };
+        if !found
+            && !forth
+            && let Some(effect) = self.return_to_former()
+        {
+            return effect;
+        }
         let message = (!found).then(|| format!("nothing to {}", if forth { "redo" } else { "undo" }));
         Effect { changed, message, request: None }
     }

@@ -63,7 +63,7 @@ pub enum Command {
     DragEnd,
     /// An occluder becomes a light, a light an occluder.
     ToggleLight,
-    /// Takes the last change of the scene back.
+    /// Takes the last change of the scene back; where there is none, the loading of this scene over a changed one.
     Undo,
     /// Does again what was taken back.
     Redo,

@@ -32,6 +32,8 @@ pub struct Editor {
     pub(super) former_emission: Vec<Option<Vec3>>,
     pub(super) picker: Picker,
     pub(super) drag: Option<Drag>,
+    /// The scene before this one, if it was changed.
+    former: Option<Box<Editor>>,
 }
 
 impl Editor {
@@ -58,6 +60,7 @@ impl Editor {
             former_emission: vec![None; scene.entities.len()],
             picker: Picker::new(scene.meshes.len()),
             drag: None,
+            former: None,
             path: path.to_owned(),
             scene,
         }
@@ -278,20 +281,35 @@ impl Editor {
     fn next_scene(&mut self) -> Effect {
         match self.load_next() {
             Ok((scene, path)) => {
-                let next = Editor::new(scene, &path);
-                *self = Editor {
-                    size: self.size,
-                    running: self.running,
-                    reference: self.reference,
-                    error: self.error,
-                    overlay: self.overlay,
-                    variant: self.variant,
-                    ..next
-                };
+                let former = self.replace(Editor::new(scene, &path));
+                // Z is near Ctrl-Z: changes are not lost to it.
+                self.former = (former.undo_count() > 0).then(|| Box::new(Editor { former: None, ..former }));
                 Changed { scene: true, ..Changed::default() }.into()
             }
             Err(error) => Effect { message: Some(error.to_string()), ..Effect::default() },
         }
+    }
+
+    /// Takes the loading of another scene back, if the one before had been changed.
+    pub(super) fn return_to_former(&mut self) -> Option<Effect> {
+        let former = self.former.take()?;
+        self.replace(*former);
+        let message = Some(format!("back to {}", self.path.display()));
+        Some(Effect { changed: Changed { scene: true, ..Changed::default() }, message, request: None })
+    }
+
+    /// Puts another scene in place; what belongs to the window stays. Returns what was there.
+    fn replace(&mut self, next: Editor) -> Editor {
+        let next = Editor {
+            size: self.size,
+            running: self.running,
+            reference: self.reference,
+            error: self.error,
+            overlay: self.overlay,
+            variant: self.variant,
+            ..next
+        };
+        std::mem::replace(self, next)
     }
 
     /// The built-in scene after this one; the first where this is none of them.

@@ -17,7 +17,7 @@ use stage::{Stage, scene, small, stage};
 fn inputs(shape: Shape, count: usize) -> [Vec<f64>; 2] {
     let mut rng = fastrand::Rng::with_seed(11);
     let mut direction = || {
-        let (z, turn) = (2.0 * rng.f64() - 1.0, 6.283 * rng.f64());
+        let (z, turn) = (2.0 * rng.f64() - 1.0, std::f64::consts::TAU * rng.f64());
         let across = (1.0 - z * z).sqrt();
         (glam::DVec3::new(across * turn.cos(), across * turn.sin(), z), (10.0 + 30.0 * rng.f64()).to_radians())
     };
@@ -113,7 +113,7 @@ fn balls(count: usize, distinct: bool) -> shadow_fields::scene::Scene {
     );
     let mut rng = fastrand::Rng::with_seed(12);
     for _ in 0..count {
-        let (turn, up) = (6.283 * rng.f64(), 0.3 + 0.7 * rng.f64());
+        let (turn, up) = (std::f64::consts::TAU * rng.f64(), 0.3 + 0.7 * rng.f64());
         let across = 2.0 * (1.0 - up * up).sqrt();
         let at = if distinct { [across * turn.cos(), 2.0 * up, across * turn.sin()] } else { [0.4, 0.9, 0.1] };
         text += &format!("[[entity]]\nmesh = \"ball\"\nreceives = false\nposition = {at:?}\n");

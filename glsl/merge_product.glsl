@@ -24,7 +24,7 @@ void chain_parts(float c[CHAIN], out float first, out float rest) {
     }
     [[unroll]] for (uint k = 0; k < TERMS; k++) {
         float apart = c[k] - (Y00 * POINT_WEIGHTS[k]) * first;
-        rest += (1.0 / POINT_WEIGHTS[k]) * (apart * apart);
+        rest += POINT_INVERSES[k] * (apart * apart);
     }
 #else
     first = c[0];

@@ -129,6 +129,8 @@ pub fn interleaved(frames: &mut [Frame], placements: &[Placement], rounds: usize
     let mut times = vec![Vec::with_capacity(rounds); frames.len()];
     for round in 0..WARM_UP + rounds {
         for (frame, times) in frames.iter_mut().zip(&mut times) {
+            // Nothing moves: a frame would not be merged again.
+            frame.forget();
             let took = merge_ms(&frame.render(placements, None)?);
             if round >= WARM_UP {
                 times.push(took);

@@ -200,16 +200,19 @@ pub fn project_program(bands: usize) -> Program {
     program
 }
 
-/// GLSL 460 text of `POINT_WEIGHTS`, `void sh_points(float c[N], out float v[32])` and
+/// GLSL 460 text of `POINT_WEIGHTS` and their reciprocals `POINT_INVERSES`, `void sh_points(float c[N], out float v[32])` and
 /// `void sh_from_points(float v[32], out float c[N])`, the latter for values that already hold their weights.
 pub fn glsl_points(bands: usize) -> String {
     let count = coefficient_count(bands);
-    let weights: Vec<String> = points().iter().map(|(_, weight)| format!("{:?}", *weight as f32)).collect();
+    let list = |of: &dyn Fn(f64) -> f64| {
+        points().iter().map(|(_, weight)| format!("{:?}", of(*weight) as f32)).collect::<Vec<_>>().join(", ")
+    };
+    let (weights, inverses) = (list(&|weight| weight), list(&|weight| 1.0 / weight));
     format!(
-        "const float POINT_WEIGHTS[{COUNT}] = float[]({});\n\
+        "const float POINT_WEIGHTS[{COUNT}] = float[]({weights});\n\
+         const float POINT_INVERSES[{COUNT}] = float[]({inverses});\n\
          void sh_points(float c[{count}], out float v[{COUNT}]) {{\n{}}}\n\
          void sh_from_points(float v[{COUNT}], out float c[{count}]) {{\n{}}}\n",
-        weights.join(", "),
         evaluate_program(bands).glsl_body(),
         project_program(bands).glsl_body()
     )

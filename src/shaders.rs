@@ -21,6 +21,7 @@ embedded!(
     "assemble.comp",
     "capture.frag",
     "capture.vert",
+    "ceiling.comp",
     "draw.frag",
     "draw.vert",
     "field.glsl",

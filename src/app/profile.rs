@@ -1,57 +1,173 @@
 //! `shadow-fields profile`
-use super::context::Context;
+
+use super::context::{Context, size};
 use super::{Global, output};
-use crate::error::Result;
-use crate::render::merge::Merge;
-use crate::render::variant::{VARIANTS, Variant};
+use crate::bench::ceilings::{self, Ceilings};
+use crate::bench::profile::{self, Contender, Row, Start, Tenths};
+use crate::bench::{Bench, text};
+use crate::error::{Error, Result};
+use crate::gpu::{self, Device, Validation};
 use crate::render::workload::Workload;
+use crate::scene::Scene;
 use clap::Args;
+use serde_json::{Value, json};
+use std::path::PathBuf;
 
 /// Arguments of `profile`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Vertices
-    #[arg(long, default_value_t = 65536)]
+    /// Scene whose passes are timed; without one a made-up merge of known size
+    scene: Option<PathBuf>,
+    /// Size of the scene's pictures
+    #[arg(long, default_value = "1280x720", value_parser = size, value_name = "WxH")]
+    size: [u32; 2],
+    /// Vertices of the made-up merge
+    #[arg(long, default_value_t = 65_536, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=4_194_304))]
     grid: u32,
-    /// Occluders
-    #[arg(long, default_value_t = 4)]
-    occluders: u32,
-    /// One variant
-    #[arg(long, value_parser = Variant::named)]
-    variant: Option<Variant>,
-    /// Runs
-    #[arg(long, default_value_t = 20)]
+    /// Turned occluders that each of its vertices meets; several numbers with commas
+    #[arg(long, default_value = "4,16", value_delimiter = ',', value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
+    occluders: Vec<u32>,
+    /// Time one variant only; an unknown name lists them
+    #[arg(long, value_name = "NAME", conflicts_with = "compare")]
+    variant: Option<String>,
+    /// Time two variants of the made-up merge in turns, and their ratio
+    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with = "scene")]
+    compare: Option<Vec<String>>,
+    /// Timed runs of each, after one to warm up
+    #[arg(long, default_value_t = 15, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
+    /// Write the variants' SPIR-V into this folder, as words and as text
+    #[arg(long, value_name = "DIR")]
+    spirv: Option<PathBuf>,
+    /// Write profile.csv, starts.csv and profile.json into this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
 }
 
-/// Profiles.
+/// Measures and prints.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let context = Context::new(global)?;
-    let workload = Workload::new(&context.device, arguments.grid, arguments.occluders)?;
-    let mut all = Vec::new();
-    for &v in VARIANTS.iter().filter(|v| arguments.variant.is_none_or(|w| w == **v)) {
-        let merge = Merge::new(&context.device, context.baker.library(), workload.form(v))?;
-        all.push((v, merge, workload.inputs(v)?, vec![]));
+    for folder in [&arguments.spirv, &arguments.out].into_iter().flatten() {
+        std::fs::create_dir_all(folder)
+            .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
     }
-    for run in 0..=arguments.runs {
-        for (_, merge, inputs, times) in &mut all {
-            let ms = workload.run(merge, inputs)?;
-            if run > 0 {
-                times.push(ms)
+    let chosen: Vec<Contender> = match (&arguments.variant, &arguments.compare) {
+        (Some(name), _) => vec![profile::named(&context.device, name)?],
+        (_, Some(names)) => names.iter().map(|name| profile::named(&context.device, name)).collect::<Result<_>>()?,
+        _ => profile::contenders(&context.device),
+    };
+    let show = |what: &str| output::note(global, what);
+    let bench = Bench {
+        baker: &context.baker,
+        cache: &context.cache,
+        progress: &show,
+        quick: false,
+        seed: global.seed,
+        origin: context.origin(global),
+    };
+    let library = context.baker.library();
+    let small = Workload::new(&context.device, 64, 1)?;
+    if let Some(folder) = &arguments.spirv {
+        profile::write_spirv(folder, library, &small, &chosen)?;
+    }
+    let at_best = ceilings::measure(&context.device, library, small.field_bytes())?;
+    let (mut rows, mut ratios) = (Vec::new(), Vec::new());
+    if let Some(path) = &arguments.scene {
+        let scene = Scene::load(path)?;
+        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        rows = profile::scene(&bench, &name, &scene, arguments.size, &chosen, arguments.runs, &at_best)?;
+    } else {
+        for &occluders in &arguments.occluders {
+            let workload = Workload::new(&context.device, arguments.grid, occluders)?;
+            let timed = profile::made_up(&bench, &workload, &chosen, arguments.runs, &at_best)?;
+            if let (true, [(a, first), (b, second)]) = (arguments.compare.is_some(), &timed[..]) {
+                let each: Vec<f64> = first.iter().zip(second).map(|(a, b)| a / b).collect();
+                ratios.push((format!("{}: {} over {}", a.case, a.variant, b.variant), Tenths::new(&each)));
             }
+            rows.extend(timed.into_iter().map(|(row, _)| row));
         }
     }
-    for (v, _, _, times) in &mut all {
-        times.sort_by(f64::total_cmp);
-        let m = output::median(times);
-        output::say(format!(
-            "{:24} {:8.2} ms  p10 {:8.2} p90 {:8.2}  {:6.1} ns/pair",
-            v.name,
-            m,
-            times[times.len() / 10],
-            times[times.len() * 9 / 10],
-            m * 1e6 / workload.pairs() as f64
-        ));
+    let fresh = Device::new(&gpu::Options {
+        device: Some(context.device.info.uuid.clone()),
+        validation: Validation::Off,
+        cache_dir: None,
+    })?;
+    let starts = profile::starts(&fresh, library, &chosen)?;
+    let document = json!({
+        "origin": bench.origin,
+        "ceilings": at_best,
+        "passes": rows,
+        "ratios": ratios.iter().map(|(what, ratio)| json!({ "what": what, "ratio": ratio })).collect::<Vec<_>>(),
+        "starts": starts,
+    });
+    if let Some(folder) = &arguments.out {
+        let lines = |key: &str| document[key].as_array().cloned().unwrap_or_default();
+        text::write(&folder.join("profile.csv"), &text::csv(&bench.origin, &lines("passes")))?;
+        text::write(&folder.join("starts.csv"), &text::csv(&bench.origin, &lines("starts")))?;
+        text::write(&folder.join("profile.json"), &format!("{document:#}\n"))?;
     }
+    print(global, &document, &at_best, &rows, &ratios, &starts);
     context.finish()
+}
+
+fn print(
+    global: &Global,
+    document: &Value,
+    at_best: &Ceilings,
+    rows: &[Row],
+    ratios: &[(String, Tenths)],
+    starts: &[Start],
+) {
+    if global.json {
+        output::say(document.to_string());
+        return;
+    }
+    output::say(format!(
+        "at best: {:.0} GFLOP/s; {:.2} G texels/s of four halves, {:.2} of 16 bytes; {:.2} G storage reads/s of 8 bytes; triad \
+         {:.1} GB/s",
+        at_best.gflops, at_best.texel_halves_giga, at_best.texel_packed_giga, at_best.storage_giga, at_best.triad_gb_s
+    ));
+    let number = |value: Option<f64>, digits: usize| value.map_or_else(String::new, |v| format!("{v:.digits$}"));
+    let percent = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{:.0} %", 100.0 * v));
+    let cells = |row: &Row| {
+        let count = |f: fn(&profile::Work) -> u32| row.work.as_ref().map_or_else(String::new, |w| f(w).to_string());
+        let mut cells = vec![format!("{} {} {}", row.case, row.pass, row.variant)];
+        cells.extend([row.ms.median, row.ms.p10, row.ms.p90].map(|ms| format!("{ms:.2}")));
+        cells.extend([number(row.ns_a_pair, 1), count(|w| w.flops), count(|w| w.fetches), count(|w| w.bytes)]);
+        cells.extend([
+            number(row.gflops, 0),
+            number(row.gb_s, 1),
+            percent(row.arithmetic_share),
+            percent(row.read_share),
+        ]);
+        let both = row.arithmetic_share.zip(row.read_share).map(|(a, r)| a + r);
+        cells.push(percent(both));
+        cells
+    };
+    let header = [
+        "pass",
+        "ms",
+        "p10",
+        "p90",
+        "ns/pair",
+        "flops",
+        "texels",
+        "bytes",
+        "GFLOP/s",
+        "GB/s",
+        "arithmetic",
+        "reads",
+        "both",
+    ];
+    output::table(&header, &rows.iter().map(cells).collect::<Vec<_>>());
+    for (what, ratio) in ratios {
+        output::say(format!("{what}: {:.3} ({:.3} - {:.3})", ratio.median, ratio.p10, ratio.p90));
+    }
+    output::say("\nbefore the first merge, ms");
+    let cells = |start: &Start| {
+        let times = [start.spirv_cold_ms, start.spirv_warm_ms, start.first_cold_ms, start.first_warm_ms];
+        [start.variant.clone()].into_iter().chain(times.map(|ms| format!("{ms:.1}"))).collect()
+    };
+    let header = ["variant", "SPIR-V", "from cache", "pipeline and first run", "again"];
+    output::table(&header, &starts.iter().map(cells).collect::<Vec<_>>());
 }

@@ -3,9 +3,11 @@
 
 pub mod budget;
 pub mod cases;
+pub mod ceilings;
 pub mod figures;
 pub mod plot;
 pub mod product;
+pub mod profile;
 pub mod rival;
 pub mod scaling;
 pub mod skips;

@@ -212,10 +212,14 @@ impl Frame {
         self.device.settle();
         let fine = Draw::new(&self.device, &self.library, self.options.size, true, Finish::Linear)?;
         let usual = std::mem::replace(&mut self.draw, fine);
-        let outcome = self.render(placements, Some(white));
+        let outcome = self.render(placements, Some(white)).map(|_| self.picture());
         self.draw = usual;
-        outcome?;
-        Ok(self.picture())
+        outcome
+    }
+
+    /// What its merge was compiled for.
+    pub fn form(&self) -> Form {
+        self.form
     }
 
     /// Merges by another variant from now on; `None` is the device's fastest.

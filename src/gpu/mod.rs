@@ -4,6 +4,7 @@
 //! has one owner whose `Drop` destroys it; every owner keeps the [`Device`] alive.
 
 pub mod access;
+pub mod census;
 pub mod commands;
 pub mod descriptors;
 pub mod device;

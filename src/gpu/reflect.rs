@@ -88,7 +88,7 @@ impl Reflection {
 }
 
 /// Indexes over a module that make the questions below one-liners.
-struct Reader<'m> {
+pub(super) struct Reader<'m> {
     module: &'m Module,
     definitions: HashMap<u32, &'m Instruction>,
     names: HashMap<u32, &'m str>,
@@ -110,7 +110,7 @@ fn literal(operand: Option<&Operand>) -> u32 {
 }
 
 impl<'m> Reader<'m> {
-    fn new(module: &'m Module) -> Self {
+    pub(super) fn new(module: &'m Module) -> Self {
         let mut names = HashMap::new();
         let mut member_names = HashMap::new();
         for instruction in &module.debug_names {
@@ -259,8 +259,27 @@ impl<'m> Reader<'m> {
         Ok(Binding { index, name, kind, writes, block_bytes })
     }
 
+    /// Components of a scalar or vector type.
+    pub(super) fn components(&self, of: u32) -> u32 {
+        match self.definitions[&of].class.opcode {
+            Op::TypeVector => literal(self.definitions[&of].operands.get(1)),
+            _ => 1,
+        }
+    }
+
+    /// Name of a variable, or of its block where it has none.
+    pub(super) fn variable_name(&self, variable: u32) -> String {
+        let own = self.name(variable);
+        if !own.is_empty() {
+            return own.to_owned();
+        }
+        let pointer = self.definitions.get(&variable).and_then(|i| i.result_type);
+        let target = pointer.and_then(|p| self.definitions.get(&p)).map(|p| id(&p.operands[1]));
+        target.map_or_else(String::new, |target| self.name(target).to_owned())
+    }
+
     /// Bytes of a type; a runtime array counts as 0.
-    fn size_bytes(&self, of: u32) -> u32 {
+    pub(super) fn size_bytes(&self, of: u32) -> u32 {
         let definition = self.definitions[&of];
         let operands = &definition.operands;
         match definition.class.opcode {

@@ -101,6 +101,16 @@ impl Workload {
         })
     }
 
+    /// Vertices that are lit.
+    pub fn vertex_count(&self) -> u32 {
+        self.vertex_count
+    }
+
+    /// Occluders that each of them meets.
+    pub fn occluder_count(&self) -> u32 {
+        self.occluder_count
+    }
+
     /// Pairs of vertex and occluder in one merge.
     pub fn pairs(&self) -> u64 {
         u64::from(self.vertex_count) * u64::from(self.occluder_count)

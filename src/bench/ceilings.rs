@@ -1,0 +1,90 @@
+//! What a device does at best, measured with shaders that do one thing each: what the merge is held against.
+
+use crate::error::Result;
+use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
+use crate::shaders::{Library, Row};
+use ash::vk;
+use serde::Serialize;
+use std::sync::Arc;
+
+/// Rates of a device.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Ceilings {
+    /// Multiplications and additions, in 10^9 a second; a fused one counts as two.
+    pub gflops: f64,
+    /// Texels of four halves from a buffer of the field's size, in 10^9 a second.
+    pub texel_halves_giga: f64,
+    /// Texels of 16 bytes likewise.
+    pub texel_packed_giga: f64,
+    /// Reads of 8 bytes from a storage block of the field's size, in 10^9 a second.
+    pub storage_giga: f64,
+    /// Bytes that `a = b + s c` reads and writes in buffers larger than caches, in 10^9 a second.
+    pub triad_gb_s: f64,
+}
+
+/// Timed runs of each shader after one to warm up.
+const RUNS: usize = 5;
+/// Multiply-adds of vectors, or reads, in a round.
+const READS: u32 = 16;
+/// Floats of each of the triad's three buffers: 16 MiB.
+const TRIAD_FLOATS: u32 = 4 << 20;
+
+/// Measures a device with reads from a buffer of `field_bytes`.
+///
+/// # Errors
+/// `Failed` when a shader does not compile, `Device` when memory ran out.
+pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Result<Ceilings> {
+    let source = Buffer::with_data(device, "ceiling source", &vec![0x2000_2000_u32; field_bytes as usize / 4])?;
+    let out = Buffer::new(device, "ceiling results", BufferKind::Device, 4 * u64::from(TRIAD_FLOATS))?;
+    // Invocations of a run of each kind; what is slow on a processor does less.
+    let rate = |kind: u32, invocations: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
+        let count = (field_bytes / texel_bytes).max(8) as u32;
+        let mask = count.next_power_of_two() / if count.is_power_of_two() { 1 } else { 2 } - 1;
+        let row = Row::new("ceiling.comp", 4)
+            .define("KIND", kind)
+            .define("READS", READS)
+            .define("ROUNDS", rounds)
+            .define("MASK", mask);
+        let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?, &[])?;
+        let view = match kind {
+            1 => Some(TexelView::new(&source, vk::Format::R16G16B16A16_SFLOAT)?),
+            2 => Some(TexelView::new(&source, vk::Format::R32G32B32A32_UINT)?),
+            _ => None,
+        };
+        let first = view.as_ref().map_or(Bind::Buffer(&source), |view| Bind::Texel(*view));
+        let seconds = best(device, &pipeline, &[first, Bind::Buffer(&out)], invocations)?;
+        Ok(f64::from(invocations) * f64::from(rounds) * f64::from(READS) / seconds * 1e-9)
+    };
+    Ok(Ceilings {
+        // A round multiplies and adds vectors of four.
+        gflops: 8.0 * rate(0, 65_536, 256, 8)?,
+        texel_halves_giga: rate(1, 16_384, 64, 8)?,
+        texel_packed_giga: rate(2, 16_384, 64, 16)?,
+        storage_giga: rate(3, 16_384, 16, 8)?,
+        triad_gb_s: triad(device, library, &out)?,
+    })
+}
+
+fn triad(device: &Arc<Device>, library: &Library, out: &Buffer) -> Result<f64> {
+    let bytes = 4 * u64::from(TRIAD_FLOATS);
+    let ones = vec![1.0_f32; TRIAD_FLOATS as usize];
+    let (b, c) = (Buffer::with_data(device, "ceiling b", &ones)?, Buffer::with_data(device, "ceiling c", &ones)?);
+    let row = Row::new("ceiling.comp", 4).define("KIND", 4_u32);
+    let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?, &[])?;
+    let resources = [Bind::Buffer(&b), Bind::Buffer(out), Bind::Buffer(&c)];
+    Ok(3.0 * bytes as f64 / best(device, &pipeline, &resources, TRIAD_FLOATS / 4)? * 1e-9)
+}
+
+/// Seconds of the fastest run: noise only adds.
+fn best(device: &Arc<Device>, pipeline: &ComputePipeline, resources: &[Bind<'_>], invocations: u32) -> Result<f64> {
+    let mut least = f64::INFINITY;
+    for run in 0..=RUNS {
+        let mut commands = Commands::new(device, "ceiling")?;
+        commands.pass("ceiling", |c| c.dispatch(pipeline, resources, &(), [invocations, 1, 1]))?;
+        let milliseconds = commands.submit()?[0].milliseconds;
+        if run > 0 {
+            least = least.min(milliseconds);
+        }
+    }
+    Ok(least * 1e-3)
+}

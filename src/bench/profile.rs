@@ -1,0 +1,316 @@
+//! Where time goes: the merge in each of its variants and the draw, against what the device can do at best.
+
+use super::Bench;
+use super::ceilings::Ceilings;
+use crate::error::{Error, Result};
+use crate::gpu::Device;
+use crate::gpu::census::{Census, disassemble};
+use crate::render::draw::Finish;
+use crate::render::merge::Merge;
+use crate::render::variant::{Chain, Form, PRODUCTS, Product, VARIANTS, Variant};
+use crate::render::workload::Workload;
+use crate::scene::Scene;
+use crate::shaders::Library;
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A way to merge: a variant of the shader, and how it multiplies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contender {
+    /// The variant's name; of other products "variant/product", without the guard "variant/unguarded".
+    pub name: String,
+    /// How it reads.
+    pub variant: Variant,
+    /// How it multiplies.
+    pub chain: Chain,
+}
+
+/// Everything that is timed: each variant as it is used, then other products in the device's usual variant.
+pub fn contenders(device: &Device) -> Vec<Contender> {
+    let usual = Variant::sane_default(device);
+    let with = |what: &str, chain| Contender { name: format!("{}/{what}", usual.name), variant: usual, chain };
+    let plain = |&variant: &Variant| Contender { name: variant.name.into(), variant, chain: Chain::default() };
+    let products = PRODUCTS.iter().filter(|(_, product)| *product != Product::default());
+    let products = products.map(|(name, product)| with(name, Chain { product: *product, ..Chain::default() }));
+    let unguarded = with("unguarded", Chain { guard: false, ..Chain::default() });
+    VARIANTS.iter().map(plain).chain([unguarded]).chain(products).collect()
+}
+
+/// The contender of that name.
+///
+/// # Errors
+/// `Usage` that lists the names.
+pub fn named(device: &Device, name: &str) -> Result<Contender> {
+    let all = contenders(device);
+    all.iter().find(|c| c.name == name).cloned().ok_or_else(|| {
+        let names: Vec<_> = all.iter().map(|c| c.name.as_str()).collect();
+        Error::Usage(format!("unknown variant \"{name}\" ({})", names.join(", ")))
+    })
+}
+
+/// Median, and what a tenth of the values lies under and over.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Tenths {
+    /// A tenth lies below.
+    pub p10: f64,
+    /// The middle value.
+    pub median: f64,
+    /// A tenth lies above.
+    pub p90: f64,
+}
+
+impl Tenths {
+    /// Of some values; 0 of none.
+    pub fn new(values: &[f64]) -> Self {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            let place = (share * (sorted.len().max(1) - 1) as f64).round() as usize;
+            sorted.get(place).copied().unwrap_or(0.0)
+        };
+        Tenths { p10: at(0.1), median: at(0.5), p90: at(0.9) }
+    }
+}
+
+/// What a merge does for a pair of vertex and occluder, counted in the SPIR-V of the loop's body.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Work {
+    /// Float multiplications and additions.
+    pub flops: u32,
+    /// Texels fetched.
+    pub fetches: u32,
+    /// Bytes fetched and loaded.
+    pub bytes: u32,
+}
+
+/// One variant of one pass.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Scene, or vertices and occluders of the made-up merge.
+    pub case: String,
+    /// "merge" or "draw".
+    pub pass: &'static str,
+    /// Variant.
+    pub variant: String,
+    /// Device time.
+    pub ms: Tenths,
+    /// Nanoseconds a pair of vertex and occluder; a merge's alone, like all below.
+    pub ns_a_pair: Option<f64>,
+    /// Per pair.
+    pub work: Option<Work>,
+    /// Multiplications and additions reached, in 10^9 a second.
+    pub gflops: Option<f64>,
+    /// Bytes fetched and loaded, caches included, in 10^9 a second.
+    pub gb_s: Option<f64>,
+    /// Time that the arithmetic alone would take at the device's ceiling, as a share of the time taken.
+    pub arithmetic_share: Option<f64>,
+    /// Time that the reads alone would take likewise.
+    pub read_share: Option<f64>,
+}
+
+fn work(form: &Form, census: &Census) -> Work {
+    let texel = |name: &str| if name == "field_quads" { texel_bytes(form) } else { 16 };
+    let fetched: u32 = census.fetches.iter().map(|(name, count)| count * texel(name)).sum();
+    let loaded: u32 = census.block_bytes.values().sum();
+    Work { flops: census.flops, fetches: census.fetch_count(), bytes: fetched + loaded }
+}
+
+fn texel_bytes(form: &Form) -> u32 {
+    if form.field_format() == ash::vk::Format::R16G16B16A16_SFLOAT { 8 } else { 16 }
+}
+
+fn row(case: &str, name: &str, pairs: u64, times: &[f64], form: &Form, census: &Census, at_best: &Ceilings) -> Row {
+    let ms = Tenths::new(times);
+    let work = work(form, census);
+    // Per nanosecond is 10^9 a second.
+    let ns = ms.median * 1e6 / pairs.max(1) as f64;
+    let field = census.fetches.get("field_quads").copied().unwrap_or(0);
+    let field_rate = if texel_bytes(form) == 8 { at_best.texel_halves_giga } else { at_best.texel_packed_giga };
+    let other = f64::from(work.fetches - field) / at_best.texel_packed_giga;
+    let loaded: u32 = census.block_bytes.values().sum();
+    let reads = f64::from(field) / field_rate + other + f64::from(loaded) / 8.0 / at_best.storage_giga;
+    Row {
+        case: case.to_owned(),
+        pass: "merge",
+        variant: name.to_owned(),
+        ms,
+        ns_a_pair: Some(ns),
+        work: Some(work),
+        gflops: Some(f64::from(work.flops) / ns),
+        gb_s: Some(f64::from(work.bytes) / ns),
+        arithmetic_share: Some(f64::from(work.flops) / at_best.gflops / ns),
+        read_share: Some(reads / ns),
+    }
+}
+
+/// Times made-up merges, interleaved, after one run each to warm up. Returns a row and all times of each.
+///
+/// # Errors
+/// `Failed` when a shader does not compile.
+pub fn made_up(
+    bench: &Bench<'_>,
+    workload: &Workload,
+    chosen: &[Contender],
+    runs: u32,
+    at_best: &Ceilings,
+) -> Result<Vec<(Row, Vec<f64>)>> {
+    let (device, library) = (bench.baker.device(), bench.baker.library());
+    let mut ready = Vec::new();
+    for contender in chosen {
+        let form = Form { chain: contender.chain, ..workload.form(contender.variant) };
+        let census = Census::new(&library.shader(&form.row())?)?;
+        let merge = Merge::new(device, library, form)?;
+        ready.push((contender, form, census, merge, workload.inputs(contender.variant)?, Vec::new()));
+    }
+    for run in 0..=runs {
+        for (.., merge, inputs, times) in &mut ready {
+            let milliseconds = workload.run(merge, inputs)?;
+            if run > 0 {
+                times.push(milliseconds);
+            }
+        }
+    }
+    let case = format!("{} x {}", workload.vertex_count(), workload.occluder_count());
+    let rows = ready.into_iter().map(|(contender, form, census, _, _, times)| {
+        (row(&case, &contender.name, workload.pairs(), &times, &form, &census, at_best), times)
+    });
+    Ok(rows.collect())
+}
+
+/// Times a scene's merge in each variant, everything merged in every frame while it moves, and its draw for files and for a
+/// screen, with and without multisampling.
+///
+/// # Errors
+/// As [`crate::frame::Frame::new`].
+pub fn scene(
+    bench: &Bench<'_>,
+    name: &str,
+    scene: &Scene,
+    size: [u32; 2],
+    chosen: &[Contender],
+    runs: u32,
+    at_best: &Ceilings,
+) -> Result<Vec<Row>> {
+    let library = bench.baker.library();
+    let mut rows = Vec::new();
+    let mut frames = Vec::new();
+    for contender in chosen {
+        let options = crate::frame::Options {
+            chain: contender.chain,
+            variant: Some(contender.variant),
+            size,
+            ..super::default_options()
+        };
+        frames.push((contender, bench.frame(scene, options)?, Vec::new(), 0));
+    }
+    for run in 0..=runs {
+        for (_, frame, times, pairs) in &mut frames {
+            let passes = frame.render(&scene.at(f64::from(run) / 30.0), None)?;
+            if run > 0 {
+                times.extend(passes.iter().filter(|t| t.pass == "merge").map(|t| t.milliseconds));
+                *pairs = 64 * frame.merged.merged_steps as u64;
+            }
+        }
+    }
+    for (contender, frame, times, pairs) in &frames {
+        let form = frame.form();
+        let census = Census::new(&library.shader(&form.row())?)?;
+        rows.push(row(name, &contender.name, *pairs, times, &form, &census, at_best));
+    }
+    let Some((_, frame, ..)) = frames.first_mut() else { return Ok(rows) };
+    for (finish, word) in [(Finish::Display, "screen"), (Finish::Linear, "file")] {
+        for (multisample, samples) in [(true, "multisampled"), (false, "1 sample")] {
+            frame.set_finish(finish, multisample)?;
+            let mut times = Vec::new();
+            for run in 0..=runs {
+                let passes = frame.show(&scene.at(f64::from(run) / 30.0), 1.0)?;
+                if run > 0 {
+                    times.extend(passes.iter().filter(|t| t.pass == "draw").map(|t| t.milliseconds));
+                }
+            }
+            rows.push(Row {
+                case: name.to_owned(),
+                pass: "draw",
+                variant: format!("{word}, {samples}"),
+                ms: Tenths::new(&times),
+                ns_a_pair: None,
+                work: None,
+                gflops: None,
+                gb_s: None,
+                arithmetic_share: None,
+                read_share: None,
+            });
+        }
+    }
+    Ok(rows)
+}
+
+/// What a variant costs before its first run is over, in milliseconds.
+#[derive(Clone, Debug, Serialize)]
+pub struct Start {
+    /// Variant.
+    pub variant: String,
+    /// GLSL to SPIR-V, and the same from the cache on disk.
+    pub spirv_cold_ms: f64,
+    /// From the cache.
+    pub spirv_warm_ms: f64,
+    /// Pipeline and first dispatch on a device that has not seen the shader in this process. A driver may still know it from
+    /// its own cache on disk.
+    pub first_cold_ms: f64,
+    /// The same again, from the pipeline cache.
+    pub first_warm_ms: f64,
+}
+
+/// Measures starts on `fresh`, a device without cache folder; `library` keeps SPIR-V.
+///
+/// # Errors
+/// `Failed` when a shader does not compile.
+pub fn starts(fresh: &Arc<Device>, library: &Library, chosen: &[Contender]) -> Result<Vec<Start>> {
+    let workload = Workload::new(fresh, 4096, 1)?;
+    let bare = Library { cache_dir: None, ..library.clone() };
+    let since = |start: Instant| start.elapsed().as_secs_f64() * 1e3;
+    let mut out = Vec::new();
+    for contender in chosen {
+        let form = Form { chain: contender.chain, ..workload.form(contender.variant) };
+        let compile = |library: &Library| -> Result<f64> {
+            let start = Instant::now();
+            library.shader(&form.row())?;
+            Ok(since(start))
+        };
+        let inputs = workload.inputs(contender.variant)?;
+        let first = || -> Result<f64> {
+            let start = Instant::now();
+            let merge = Merge::new(fresh, library, form)?;
+            workload.run(&merge, &inputs)?;
+            Ok(since(start))
+        };
+        let (spirv_cold_ms, _) = (compile(&bare)?, compile(library)?);
+        out.push(Start {
+            variant: contender.name.clone(),
+            spirv_cold_ms,
+            spirv_warm_ms: compile(library)?,
+            first_cold_ms: first()?,
+            first_warm_ms: first()?,
+        });
+    }
+    Ok(out)
+}
+
+/// Writes each contender's SPIR-V, as words for a vendor's tool and as text: `VARIANT.spv`, `VARIANT.spvasm`.
+///
+/// # Errors
+/// `Failed` when a file cannot be written.
+pub fn write_spirv(folder: &Path, library: &Library, workload: &Workload, chosen: &[Contender]) -> Result<()> {
+    for contender in chosen {
+        let form = Form { chain: contender.chain, ..workload.form(contender.variant) };
+        let shader = library.shader(&form.row())?;
+        let path = |ending: &str| folder.join(format!("{}.{ending}", contender.name.replace('/', "-")));
+        let words: Vec<u8> = shader.spirv.iter().flat_map(|word| word.to_le_bytes()).collect();
+        crate::files::replace(&path("spv"), &words)
+            .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path("spv").display())))?;
+        super::text::write(&path("spvasm"), &disassemble(&shader)?)?;
+    }
+    Ok(())
+}

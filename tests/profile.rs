@@ -1,0 +1,108 @@
+//! What `profile` counts and prints. Nothing here is timed.
+
+#[path = "common/cli.rs"]
+mod cli;
+mod common;
+
+use cli::{command, finish, good, has_device, names};
+use common::library;
+use shadow_fields::gpu::census::Census;
+use shadow_fields::shaders::Row;
+use std::path::Path;
+
+fn ceiling(kind: u32) -> Census {
+    let row = Row::new("ceiling.comp", 4).define("KIND", kind).define("READS", 16_u32).define("ROUNDS", 64_u32);
+    Census::new(&library().shader(&row.define("MASK", 1023_u32)).unwrap()).unwrap()
+}
+
+#[test]
+fn a_round_of_a_loop_is_counted() {
+    let arithmetic = ceiling(0);
+    assert_eq!(arithmetic.flops, 16 * 4 * 2, "sixteen vectors of four, multiplied and added");
+    assert!(arithmetic.fetches.is_empty() && arithmetic.block_bytes.is_empty());
+    for kind in [1, 2] {
+        let census = ceiling(kind);
+        assert_eq!(census.fetches.get("source"), Some(&16));
+        assert_eq!((census.fetch_count(), census.flops), (16, 16 * 4), "each is added");
+    }
+    let census = ceiling(3);
+    assert_eq!(census.fetch_count(), 0);
+    assert_eq!(census.block_bytes.values().sum::<u32>(), 16 * 8);
+    // Without a loop the whole shader counts: two vectors of four read, one scaled, one added.
+    let census = ceiling(4);
+    assert_eq!(census.block_bytes.values().sum::<u32>(), 32);
+    assert_eq!(census.flops, 8);
+}
+
+fn json(folder: &Path, arguments: &[&str]) -> serde_json::Value {
+    let ran = good(folder, &[&["profile", "--runs", "2", "--json", "--validation", "sync"], arguments].concat());
+    serde_json::from_str(&ran.stdout).unwrap()
+}
+
+fn positive(row: &serde_json::Value, keys: &[&str]) {
+    for key in keys {
+        let value = row.pointer(key).and_then(serde_json::Value::as_f64);
+        assert!(value.is_some_and(|v| v > 0.0 && v.is_finite()), "{key} of {row}");
+    }
+}
+
+#[test]
+fn two_variants_side_by_side() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let more =
+        ["--grid", "64", "--occluders", "2", "--compare", "texel", "storage", "--out", "out", "--spirv", "spirv"];
+    let document = json(folder.path(), &more);
+    positive(
+        &document["ceilings"],
+        &["/gflops", "/texel_halves_giga", "/texel_packed_giga", "/storage_giga", "/triad_gb_s"],
+    );
+    let rows = document["passes"].as_array().unwrap();
+    assert_eq!(rows.len(), 2);
+    for (row, name) in rows.iter().zip(["texel", "storage"]) {
+        assert_eq!(row["variant"], name);
+        positive(row, &["/ms/median", "/ns_a_pair", "/gflops", "/gb_s", "/arithmetic_share", "/read_share"]);
+        // Eight corners of four quads; 659 operations of the product and 256 of the weights alone.
+        assert!(row["work"]["bytes"].as_u64().unwrap() >= 8 * 4 * 8, "{row}");
+        assert!(row["work"]["flops"].as_u64().unwrap() > 900, "{row}");
+        assert_eq!(row["work"]["fetches"].as_u64().unwrap() > 0, name == "texel");
+    }
+    positive(&document["ratios"][0], &["/ratio/p10", "/ratio/median", "/ratio/p90"]);
+    for start in document["starts"].as_array().unwrap() {
+        positive(start, &["/spirv_cold_ms", "/spirv_warm_ms", "/first_cold_ms", "/first_warm_ms"]);
+    }
+    assert_eq!(names(&folder.path().join("out")), ["profile.csv", "profile.json", "starts.csv"]);
+    let spirv = names(&folder.path().join("spirv"));
+    assert_eq!(spirv, ["storage.spv", "storage.spvasm", "texel.spv", "texel.spvasm"]);
+    let words = std::fs::read(folder.path().join("spirv/texel.spv")).unwrap();
+    assert_eq!(words[..4], 0x0723_0203_u32.to_le_bytes(), "SPIR-V's magic number");
+}
+
+#[test]
+fn a_scene_is_timed_pass_by_pass() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let text = "camera = { eye = [0, 2, 3], target = [0, 0, 0] }\nenvironment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"floor\"\nplane = { size_m = 2, cells = 9 }\n\
+        [[entity]]\nmesh = \"floor\"\n";
+    std::fs::write(folder.path().join("floor.toml"), text).unwrap();
+    let document = json(folder.path(), &["floor.toml", "--size", "64x48", "--variant", "texel-packed"]);
+    let rows = document["passes"].as_array().unwrap();
+    let passes: Vec<_> = rows.iter().map(|row| row["pass"].as_str().unwrap()).collect();
+    assert_eq!(passes, ["merge", "draw", "draw", "draw", "draw"]);
+    rows.iter().for_each(|row| positive(row, &["/ms/median"]));
+}
+
+#[test]
+fn an_unknown_variant_lists_the_known() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let ran = finish(&mut command(folder.path(), &["profile", "--variant", "fast"]));
+    assert_eq!(ran.code, 2);
+    assert!(ran.stderr.contains("texel-packed/points"), "{}", ran.stderr);
+}

@@ -6,7 +6,7 @@ use super::{Global, output};
 use crate::asset::Mesh;
 use crate::bake::capture::snapshot;
 use crate::error::{Error, Result};
-use crate::field::{Kind, Lookup, ShadowField};
+use crate::field::{Kind, Lookup, ShadowField, growth};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
 use clap::Args;
@@ -82,7 +82,12 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(format!("{name:16} {value}"));
     }
     if header.kind == Kind::Occlusion {
-        output::say(format!("{:16} at most {:.4} times a product", "growth", header.growth));
+        output::say(format!(
+            "{:16} at most {:.4} times a product, transfers of {} bands",
+            "growth",
+            header.growth,
+            growth::TRANSFER_BANDS
+        ));
     }
     if header.kind == Kind::Radiance {
         output::say(format!("{:16} {}", "radiance scale", header.radiance_scale));

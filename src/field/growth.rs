@@ -15,11 +15,15 @@ use crate::sh::basis::coefficient_count;
 use crate::sh::product::{Tensor, eigenvalues};
 use rayon::prelude::*;
 
+/// SH bands of the transfers that the certificate is for, whatever the field's. It holds for fewer too: their matrix is a part of
+/// this one, and its eigenvalues lie between this one's (Cauchy). For more it does not.
+pub const TRANSFER_BANDS: usize = 4;
+
 /// Largest factor, at least 1 (where nothing blocks, a product changes nothing), from the stored, quantised numbers.
 pub fn growth(field: &ShadowField) -> f64 {
     let header = &field.header;
     let (lattice, bands) = (header.lattice, header.bands);
-    let tensor = Tensor::new(bands, bands, bands);
+    let tensor = Tensor::new(TRANSFER_BANDS, bands, TRANSFER_BANDS);
     let directions = lattice.stored_direction_count();
     (0..lattice.stored_count())
         .into_par_iter()
@@ -50,15 +54,19 @@ mod tests {
 
     /// The exact field of a ball, stored as f32.
     fn ball(lattice: Lattice) -> ShadowField {
+        ball_of(4, lattice)
+    }
+
+    fn ball_of(bands: usize, lattice: Lattice) -> ShadowField {
         let sources = lattice.sources();
         let directions = lattice.direction_count();
         let mut payload = Vec::new();
         for shell in 0..lattice.shells {
             for source in &sources {
-                let mut mean = [0.0; 16];
+                let mut mean = vec![0.0; crate::field::quantity::channel_stride(bands)];
                 for &direction in source {
                     let position = lattice.position(shell * directions + direction);
-                    let blocked = lobe::sphere(4, -position, 1.0);
+                    let blocked = lobe::sphere(bands, -position, 1.0);
                     let share = lattice.scale(position.length()) / source.len() as f64;
                     mean.iter_mut().zip(&blocked).for_each(|(m, b)| *m += share * b);
                 }
@@ -67,7 +75,7 @@ mod tests {
         }
         let header = Header {
             kind: Kind::Occlusion,
-            bands: 4,
+            bands,
             storage: Storage::F32,
             lattice,
             face_px: 64,
@@ -100,6 +108,15 @@ mod tests {
             worst = values.iter().map(|lambda| (1.0 - lambda).abs()).fold(worst, f64::max);
         }
         assert!(worst <= bound + 1e-12 && worst > 1.02, "{worst} of {bound}");
+    }
+
+    /// Seven bands of a factor between 0 and 1 give four bands of transfer eigenvalues in [0, 1]; what is left is that u of the
+    /// neighbouring shells is not the sample's own.
+    #[test]
+    fn more_stored_bands_grow_less() {
+        let lattice = "cube:24x2,inner=1.3".parse().expect("a lattice");
+        let [four, five, seven] = [4, 5, 7].map(|bands| growth(&ball_of(bands, lattice)));
+        assert!(four > five && five > seven && four > 1.03 && seven < 1.02, "{four} {five} {seven}");
     }
 
     #[test]

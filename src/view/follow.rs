@@ -76,6 +76,7 @@ impl Viewer {
         let options = frame::Options { size: self.size, variant, ..self.setup.frame };
         let built = Frame::new(&self.baker, &self.setup.cache, self.editor.scene(), options, &|_, _, _| ());
         if let Some(frame) = self.tolerate(built)? {
+            log::info!("ready: the first picture of {}", self.editor.path().display());
             self.frame = Some(frame);
             self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
             self.version += 1;

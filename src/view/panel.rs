@@ -72,7 +72,7 @@ pub struct Status<'s> {
 /// Dark, and clear enough to see the scene through.
 pub fn visuals() -> egui::Visuals {
     let mut visuals = egui::Visuals::dark();
-    visuals.window_fill = Color32::from_black_alpha(232);
+    visuals.window_fill = Color32::from_black_alpha(246);
     visuals.override_text_color = Some(Color32::from_gray(230));
     visuals.window_shadow = egui::Shadow::NONE;
     visuals

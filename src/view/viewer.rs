@@ -171,6 +171,16 @@ impl Viewer {
         self.reference.as_ref().map(|r| (r.rays, r.version == self.version))
     }
 
+    /// Names of the passes of the last frame that has ended.
+    pub fn last_passes(&self) -> Vec<&str> {
+        self.timings.back().map_or(Vec::new(), |passes| passes.iter().map(|t| t.pass.as_str()).collect())
+    }
+
+    /// Whether the error's colours of the state shown are known.
+    pub fn shows_error_colors(&self) -> bool {
+        self.editor.shows_error() && self.error_shown.as_ref().is_some_and(|(version, ..)| *version == self.version)
+    }
+
     /// The compiler's lines about the last change of a shader file.
     pub fn shader_error(&self) -> Option<&str> {
         self.shader_error.as_deref()

@@ -1,0 +1,330 @@
+//! The window's inside without a window: events and time in, pictures out, overlay included.
+#![cfg(feature = "view")]
+
+mod common;
+#[path = "common/stage.rs"]
+mod stage;
+
+use common::{Gpu, gpu};
+use shadow_fields::asset::picture::srgb_from_linear;
+use shadow_fields::bake::Baker;
+use shadow_fields::bake::cache::Cache;
+use shadow_fields::frame::{Frame, Options};
+use shadow_fields::gpu::{self, Access, Buffer, BufferKind, Commands, FLIGHTS, Image, ImageShape, Validation};
+use shadow_fields::scene::Scene;
+use shadow_fields::view::command::Command;
+use shadow_fields::view::input::{Button, Event, Key};
+use shadow_fields::view::{Canvas, Editor, Setup, Viewer};
+use stage::{scene, small};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+const SIZE: [u32; 2] = [320, 240];
+const FORMAT: ash::vk::Format = ash::vk::Format::R8G8B8A8_SRGB;
+const SCENE: &str = r#"
+[output]
+width = 320
+height = 240
+[environment]
+gradient = { radiance = [0.3, 0.35, 0.4] }
+[[mesh]]
+name = "floor"
+plane = { size_m = 6, cells = 24 }
+[[mesh]]
+name = "ball"
+sphere = { radius_m = 0.5, subdivisions = 2 }
+[[mesh]]
+name = "box"
+cuboid = { size_m = [0.6, 0.6, 0.6], cells = 4 }
+[[entity]]
+name = "floor"
+mesh = "floor"
+position = [0, -1, 0]
+[[entity]]
+name = "ball"
+mesh = "ball"
+[[entity]]
+name = "lamp"
+mesh = "box"
+position = [1.2, 0.8, 0]
+emission = [9, 6, 3]
+"#;
+
+/// A viewer that draws into an image.
+struct Stand {
+    viewer: Viewer,
+    image: Image,
+    readback: Buffer,
+    options: Options,
+    cache: PathBuf,
+    gpu: Gpu,
+}
+
+impl Stand {
+    fn new(name: &str, shader_dir: Option<&Path>) -> Option<Self> {
+        let gpu = gpu()?;
+        let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("view-{name}"));
+        let _ = std::fs::remove_dir_all(&cache);
+        let mut library = gpu.library.clone();
+        library.shader_dir = shader_dir.map(Path::to_owned);
+        let options = Options { size: SIZE, ..small() };
+        let setup = Setup {
+            device: gpu.device.clone(),
+            options: gpu::Options { device: None, validation: Validation::Core, cache_dir: Some(common::cache_dir()) },
+            library,
+            cache: Cache::new(Some(&cache)),
+            frame: options,
+            format: FORMAT,
+            encodes_srgb: true,
+            seed: 1,
+        };
+        // The state and pictures are saved beside the scene's file.
+        std::fs::create_dir_all(&cache).unwrap();
+        let path = cache.join("scene.toml");
+        std::fs::write(&path, scene(SCENE).to_toml()).unwrap();
+        let mut editor = Editor::new(scene(SCENE), &path);
+        editor.apply(Command::ToggleOverlay);
+        let viewer = Viewer::new(setup, editor, 1.0).unwrap();
+        let [width, height] = SIZE;
+        let image =
+            Image::new(&gpu.device, "window", ImageShape { format: FORMAT, width, height, samples: 1 }).unwrap();
+        let bytes = 4 * u64::from(width) * u64::from(height);
+        let readback = Buffer::new(&gpu.device, "window on the host", BufferKind::Readback, bytes).unwrap();
+        Some(Stand { viewer, image, readback, options, cache, gpu })
+    }
+
+    /// One turn of the window's loop.
+    fn turn(&mut self) {
+        self.viewer.update(0.0).unwrap();
+        let [width, height] = SIZE.map(|s| s as f32);
+        let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
+        let _ = self.viewer.ui(egui::RawInput { screen_rect: Some(screen), ..Default::default() }).unwrap();
+        assert!(self.viewer.draw(Canvas::Image(&self.image)).unwrap());
+        assert!(self.gpu.device.flight_count() <= FLIGHTS);
+    }
+
+    /// Turns until `done`, at most a minute.
+    fn until(&mut self, what: &str, done: impl Fn(&Viewer) -> bool) {
+        let start = Instant::now();
+        while !done(&self.viewer) {
+            assert!(start.elapsed() < Duration::from_secs(60), "{what}: {:?}", self.viewer.message());
+            self.turn();
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn ready(&mut self) {
+        self.until("a first frame", |viewer| viewer.frame().is_some() && !viewer.is_baking());
+    }
+
+    /// What is shown, RGBA.
+    fn shown(&mut self) -> Vec<[u8; 4]> {
+        self.turn();
+        self.viewer.settle().unwrap();
+        let mut commands = Commands::new(&self.gpu.device, "look").unwrap();
+        commands.copy_image(&self.image, &self.readback);
+        commands.barrier(Access::TransferWrite, Access::HostRead);
+        commands.submit().unwrap();
+        self.readback.read(0, (SIZE[0] * SIZE[1]) as usize)
+    }
+
+    /// The state rendered by a frame of its own, encoded.
+    fn rendered(&self, scene: &Scene) -> Vec<[u8; 4]> {
+        let editor = self.viewer.editor();
+        let baker = Baker::new(&self.gpu.device, &self.gpu.library);
+        let cache = Cache::new(Some(&self.cache));
+        let mut frame = Frame::new(&baker, &cache, scene, self.options, &|_, _, _| ()).unwrap();
+        let white = (-editor.exposure_ev()).exp2();
+        frame.render(&scene.at(editor.time_s()), Some(white)).unwrap();
+        let encode = |c: f32| (255.0 * srgb_from_linear(c / white)).round() as u8;
+        frame.picture().chunks_exact(3).map(|p| [encode(p[0]), encode(p[1]), encode(p[2]), 255]).collect()
+    }
+
+    fn key(&mut self, key: Key) {
+        self.viewer.event(Event::Key { key, control: false, repeat: false }).unwrap();
+    }
+
+    fn letter(&mut self, letter: char) {
+        self.key(Key::Letter(letter));
+    }
+
+    fn drag(&mut self, button: Button, from: [f32; 2], to: [f32; 2]) {
+        for event in [Event::Press(button, from), Event::Move(to), Event::Release(button)] {
+            self.viewer.event(event).unwrap();
+            self.turn();
+        }
+    }
+}
+
+/// Pixels that differ by more than the rounding of two encoders.
+fn apart(a: &[[u8; 4]], b: &[[u8; 4]]) -> usize {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).filter(|(a, b)| (0..3).any(|c| a[c].abs_diff(b[c]) > 1)).count()
+}
+
+#[test]
+fn what_is_shown_is_what_render_makes_of_the_state() {
+    let Some(mut stand) = Stand::new("state", None) else { return };
+    assert!(stand.viewer.is_baking(), "nothing is cached, so it is baked in the background");
+    assert!(stand.viewer.frame().is_none());
+    stand.turn();
+    stand.ready();
+    let first = stand.shown();
+    let scene = stand.viewer.editor().scene().clone();
+    assert_eq!(apart(&first, &stand.rendered(&scene)), 0);
+
+    // Everything that moves the camera or an entity, one after the other; the picture follows each.
+    let mut before = first;
+    let mut follows = |stand: &mut Stand, what: &str| {
+        let now = stand.shown();
+        assert!(apart(&before, &now) > 20, "{what} is not seen");
+        before = now;
+    };
+    stand.drag(Button::Left, [20.0, 20.0], [60.0, 40.0]);
+    follows(&mut stand, "a turn");
+    stand.drag(Button::Right, [20.0, 20.0], [10.0, 40.0]);
+    follows(&mut stand, "a pan");
+    stand.viewer.event(Event::Wheel(2.0)).unwrap();
+    follows(&mut stand, "the wheel");
+    stand.key(Key::Home);
+    follows(&mut stand, "Home");
+    stand.letter('q');
+    stand.letter('q');
+    assert_eq!(stand.viewer.editor().selection(), Some(1), "the ball");
+    follows(&mut stand, "the outline");
+    for letter in "liomr".chars() {
+        stand.letter(letter);
+        if letter != 'r' {
+            follows(&mut stand, &format!("key {letter}"));
+        }
+    }
+    stand.letter('c');
+    stand.viewer.apply(Command::SetExposure(0.5)).unwrap();
+    follows(&mut stand, "exposure");
+    stand.viewer.apply(Command::SetSky(0.5)).unwrap();
+    follows(&mut stand, "the sky's strength");
+    stand.viewer.apply(Command::SetVariant(Some("storage"))).unwrap();
+    stand.key(Key::Escape);
+
+    // A light that was none: its field is baked in the background while the old picture stays.
+    stand.letter('q');
+    stand.letter('q');
+    stand.letter('e');
+    stand.turn();
+    stand.ready();
+    assert!(stand.viewer.editor().scene().entities[1].emits);
+    follows(&mut stand, "a new light");
+    stand.key(Key::Escape);
+    let shown = stand.shown();
+    let scene = stand.viewer.editor().scene().clone();
+    assert_eq!(apart(&shown, &stand.rendered(&scene)), 0, "the same state through `render`");
+
+    // Back as it was, step by step.
+    while stand.viewer.editor().undo_count() > 0 {
+        stand.viewer.event(Event::Key { key: Key::Letter('z'), control: true, repeat: false }).unwrap();
+        stand.turn();
+    }
+    stand.ready();
+    let shown = stand.shown();
+    let scene = stand.viewer.editor().scene().clone();
+    assert_eq!(apart(&shown, &stand.rendered(&scene)), 0, "after undoing everything");
+
+    // The saved file and the picture files.
+    stand.viewer.event(Event::Key { key: Key::Letter('s'), control: true, repeat: false }).unwrap();
+    stand.key(Key::Function(12));
+    let names = |ending: &str| {
+        let files = std::fs::read_dir(&stand.cache).unwrap().map(|f| f.unwrap().path());
+        files.filter(|f| f.extension().is_some_and(|e| e == ending)).collect::<Vec<_>>()
+    };
+    let [png, exr, toml] =
+        ["png", "exr", "toml"].map(|ending| names(ending).into_iter().find(|f| !f.ends_with("scene.toml")).unwrap());
+    assert!(exr.metadata().unwrap().len() > 1000);
+    let saved = Scene::load(&toml).unwrap();
+    let picture = image::open(png).unwrap().into_rgb8();
+    let picture: Vec<[u8; 4]> = picture.pixels().map(|p| [p[0], p[1], p[2], 255]).collect();
+    assert_eq!(apart(&picture, &stand.rendered(&saved)), 0, "the saved scene gives the saved picture");
+    assert_eq!(apart(&picture, &shown), 0, "both are what was shown");
+}
+
+#[test]
+fn a_scene_that_stands_still_costs_only_its_showing() {
+    let Some(mut stand) = Stand::new("still", None) else { return };
+    stand.ready();
+    stand.shown();
+    let passes = |stand: &mut Stand| {
+        stand.turn();
+        stand.viewer.settle().unwrap();
+        stand.viewer.last_passes().join(" ")
+    };
+    assert_eq!(passes(&mut stand), "show");
+    stand.drag(Button::Left, [20.0, 20.0], [40.0, 20.0]);
+    stand.viewer.event(Event::Wheel(1.0)).unwrap();
+    assert_eq!(passes(&mut stand), "draw show", "a camera that moves merges nothing");
+    stand.viewer.apply(Command::SelectNext).unwrap();
+    stand.viewer.apply(Command::SelectNext).unwrap();
+    stand.letter('j');
+    assert_eq!(passes(&mut stand), "merge draw show");
+    assert!(!stand.viewer.wants_frame() || stand.viewer.idle().is_some());
+}
+
+#[test]
+fn the_overlay_and_the_reference_are_drawn() {
+    let Some(mut stand) = Stand::new("overlay", None) else { return };
+    stand.ready();
+    let plain = stand.shown();
+    stand.letter('h');
+    stand.turn();
+    let with = stand.shown();
+    let covered = apart(&plain, &with);
+    assert!(covered > 2000, "the overlay covers {covered} pixels");
+    stand.key(Key::Function(1));
+    assert_eq!(apart(&plain, &stand.shown()), 0, "and goes again");
+
+    stand.letter('g');
+    stand.until("rays", |viewer| viewer.reference().is_some_and(|(_, fresh)| fresh));
+    let split = stand.shown();
+    let column = |x: u32| (0..SIZE[1]).map(|y| split[(y * SIZE[0] + x) as usize]).collect::<Vec<_>>();
+    // The same place in both halves, lit by the merge and by rays: alike, but not the same.
+    let (left, right) = (column(80), column(240));
+    let distance: u32 =
+        left.iter().zip(&right).map(|(a, b)| (0..3).map(|c| u32::from(a[c].abs_diff(b[c]))).sum::<u32>()).sum();
+    assert!(distance > 0 && distance < 40 * SIZE[1], "the halves are {distance} apart");
+    stand.letter('g');
+    stand.letter('x');
+    stand.until("an error", |viewer| viewer.shows_error_colors());
+    let error = stand.shown();
+    assert!(apart(&plain, &error) > 5000, "false colours replace the picture");
+    stand.letter('x');
+    assert_eq!(apart(&plain, &stand.shown()), 0, "and it is back");
+}
+
+#[test]
+fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(mut stand) = Stand::new("reload", Some(folder.path())) else { return };
+    stand.ready();
+    let plain = stand.shown();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("draw.frag", "#version 460\nlayout(location = 0) out vec4 color;\nvoid main() { color = nonsense; }\n");
+    stand.until("the compiler's lines", |viewer| viewer.shader_error().is_some());
+    let error = stand.viewer.shader_error().unwrap().to_owned();
+    assert!(error.contains("draw.frag:3") && error.contains("nonsense"), "{error}");
+    assert_eq!(apart(&plain, &stand.shown()), 0, "the pipeline before stays");
+    write(
+        "draw.frag",
+        "#version 460\nlayout(location = 0) out vec4 color;\nvoid main() { color = vec4(1, 0, 0, 1); }\n",
+    );
+    stand.until("a good shader", |viewer| viewer.shader_error().is_none());
+    let red = stand.shown().iter().filter(|p| p[0] > 250 && p[1] == 0 && p[2] == 0).count();
+    assert!(red > 10_000, "{red} red pixels");
+    // A file that others include: the entry point itself is as it was.
+    std::fs::remove_file(folder.path().join("draw.frag")).unwrap();
+    stand.until("the built-in shader", |viewer| viewer.message().is_some_and(|m| m.ends_with("draw.frag")));
+    let cone = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl/merge_layout.glsl")).unwrap();
+    write("merge_layout.glsl", &format!("{cone}\nnonsense\n"));
+    stand.until("the including shader's error", |viewer| viewer.shader_error().is_some());
+    assert!(stand.viewer.shader_error().unwrap().contains("merge_layout.glsl"));
+    write("merge_layout.glsl", &cone);
+    stand.until("a good include", |viewer| viewer.shader_error().is_none());
+    assert_eq!(apart(&plain, &stand.shown()), 0);
+}

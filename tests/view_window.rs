@@ -1,0 +1,332 @@
+//! A real window on a virtual display: every control, resizing, minimising, a screenshot against `render`, a clean end.
+#![cfg(all(feature = "view", target_os = "linux"))]
+
+#[path = "common/cli.rs"]
+mod cli;
+mod common;
+
+use cli::{SMALL, cache, command, finish, good, has_device};
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+const SIZE: [usize; 2] = [480, 320];
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A program that is ended with the test.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A virtual display that writes its pixels to a file.
+struct Display {
+    name: String,
+    pixels: PathBuf,
+    _server: Running,
+}
+
+impl Display {
+    /// `None` where Xvfb or xdotool is missing.
+    fn open(folder: &Path) -> Option<Self> {
+        if Command::new("xdotool").arg("version").output().is_err() {
+            common::skip("no xdotool");
+            return None;
+        }
+        // The server picks a free number and tells it.
+        let server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "640x480x24", "-fbdir"])
+            .arg(folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let Ok(mut server) = server else {
+            common::skip("no Xvfb");
+            return None;
+        };
+        let mut number = String::new();
+        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
+        let name = format!(":{}", number.trim());
+        Some(Display { name, pixels: folder.join("Xvfb_screen0"), _server: Running(server) })
+    }
+
+    fn xdotool(&self, arguments: &[&str]) -> String {
+        let output = Command::new("xdotool").env("DISPLAY", &self.name).args(arguments).output().unwrap();
+        assert!(output.status.success(), "xdotool {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// RGB of the top left corner of the screen: X11's window dump format, 32 bits a pixel.
+    fn look(&self, [width, height]: [usize; 2]) -> Vec<[u8; 3]> {
+        let bytes = std::fs::read(&self.pixels).unwrap();
+        let word = |i: usize| u32::from_be_bytes(bytes[4 * i..][..4].try_into().unwrap()) as usize;
+        let (header, little, bits, line, colors) = (word(0), word(7) == 0, word(11), word(12), word(19));
+        assert!(little && bits == 32, "the display's pixels are of another kind");
+        let first = header + 12 * colors;
+        let pixel = |i: usize| {
+            let at = first + i / width * line + i % width * 4;
+            [bytes[at + 2], bytes[at + 1], bytes[at]]
+        };
+        (0..width * height).map(pixel).collect()
+    }
+}
+
+/// The program with its window, and the lines that it logs.
+struct View<'d> {
+    display: &'d Display,
+    child: Running,
+    lines: Receiver<String>,
+    heard: Vec<String>,
+    window: String,
+}
+
+impl<'d> View<'d> {
+    fn open(display: &'d Display, folder: &Path, arguments: &[&str]) -> Self {
+        let mut program = command(folder, &["view"]);
+        program.args(arguments).env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").arg("-v");
+        let mut child = program.stderr(Stdio::piped()).spawn().unwrap();
+        let stderr = child.stderr.take().unwrap();
+        let (sender, lines) = channel();
+        std::thread::spawn(move || {
+            BufReader::new(stderr).lines().map_while(Result::ok).for_each(|line| drop(sender.send(line)));
+        });
+        let mut view = View { display, child: Running(child), lines, heard: Vec::new(), window: String::new() };
+        view.hears("the first picture");
+        view.window = display.xdotool(&["search", "--name", "shadow-fields"]).trim().to_owned();
+        display.xdotool(&["windowfocus", "--sync", &view.window]);
+        view
+    }
+
+    /// Waits until a line with that text is logged.
+    fn hears(&mut self, text: &str) {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            match self.lines.recv_timeout(left) {
+                Ok(line) => {
+                    let found = line.contains(text);
+                    self.heard.push(line);
+                    if found {
+                        return;
+                    }
+                }
+                Err(_) => panic!("\"{text}\" was not heard; before: {:#?}", self.heard),
+            }
+        }
+    }
+
+    fn key(&mut self, key: &str, text: &str) {
+        self.display.xdotool(&["key", key]);
+        self.hears(text);
+    }
+
+    fn drag(&mut self, button: &str, from: [i32; 2], to: [i32; 2]) {
+        let places = [from, [(from[0] + to[0]) / 2, (from[1] + to[1]) / 2], to].map(|p| p.map(|c| c.to_string()));
+        let mut arguments = vec!["mousemove", &places[0][0], &places[0][1], "mousedown", button];
+        for place in &places[1..] {
+            arguments.extend(["sleep", "0.05", "mousemove", &place[0], &place[1]]);
+        }
+        arguments.extend(["sleep", "0.05", "mouseup", button]);
+        self.display.xdotool(&arguments);
+    }
+
+    /// Looks until two looks in a row show the same.
+    fn picture(&self, size: [usize; 2]) -> Vec<[u8; 3]> {
+        let end = Instant::now() + PATIENCE;
+        let mut before = Vec::new();
+        loop {
+            let now = self.display.look(size);
+            if now == before {
+                return now;
+            }
+            assert!(Instant::now() < end, "the picture does not settle");
+            before = now;
+            std::thread::sleep(Duration::from_millis(400));
+        }
+    }
+
+    /// Waits for the end; everything that was logged.
+    fn end(mut self) -> (i32, Vec<String>) {
+        let start = Instant::now();
+        let code = loop {
+            if let Some(status) = self.child.0.try_wait().unwrap() {
+                break status.code().expect("it ended by itself");
+            }
+            assert!(start.elapsed() < PATIENCE, "the window does not close: {:#?}", self.heard);
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        self.heard.extend(self.lines.try_iter());
+        (code, std::mem::take(&mut self.heard))
+    }
+}
+
+const SCENE: &str = r#"
+[camera]
+eye = [0, 1.5, 5]
+target = [0, 0, 0]
+[environment]
+gradient = { radiance = [0.3, 0.35, 0.4] }
+[[mesh]]
+name = "floor"
+plane = { size_m = 6, cells = 24 }
+[[mesh]]
+name = "ball"
+sphere = { radius_m = 0.6, subdivisions = 2 }
+[[entity]]
+name = "floor"
+mesh = "floor"
+position = [0, -0.6, 0]
+[[entity]]
+name = "ball"
+mesh = "ball"
+[[entity]]
+name = "lamp"
+mesh = "ball"
+position = [1.4, 1.1, 0]
+scale = 0.3
+emission = [30, 24, 12]
+motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } }]
+"#;
+
+/// Small bakes, the window's size, samples as `render` takes them.
+fn arguments() -> Vec<&'static str> {
+    let small = &SMALL[..4];
+    ["scene.toml", "--size", "480x320", "--paused", "--no-overlay", "--multisample", "on", "--validation", "sync"]
+        .into_iter()
+        .chain(small.iter().copied())
+        .collect()
+}
+
+#[test]
+fn a_window_does_what_its_controls_say() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let Some(display) = Display::open(folder.path()) else { return };
+    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    let mut view = View::open(&display, folder.path(), &arguments());
+    let first = view.picture(SIZE);
+    assert!(first.iter().any(|p| *p != first[0]), "the window is of one colour");
+
+    // Keys of every row of the help.
+    for (key, text) in [
+        ("q", "SelectNext"),
+        ("q", "SelectNext"),
+        ("a", "SelectPrevious"),
+        ("q", "SelectNext"),
+        ("j", "step: Left"),
+        ("l", "step: Right"),
+        ("i", "step: Up"),
+        ("k", "step: Down"),
+        ("o", "step: Back"),
+        ("p", "step: Forth"),
+        ("n", "step: Larger"),
+        ("m", "step: Smaller"),
+        ("r", "step: TurnLeft"),
+        ("t", "step: TurnRight"),
+        ("ctrl+z", "Undo"),
+        ("ctrl+y", "Redo"),
+        ("c", "TurnSky"),
+        ("v", "TurnSky"),
+        ("g", "ToggleReference"),
+        ("g", "ToggleReference"),
+        ("x", "ToggleError"),
+        ("x", "ToggleError"),
+        ("h", "ToggleOverlay"),
+        ("F1", "ToggleOverlay"),
+        ("Escape", "SelectNone"),
+        ("space", "ToggleRunning"),
+        ("space", "ToggleRunning"),
+        ("Home", "Home"),
+    ] {
+        view.key(key, text);
+    }
+
+    // The pointer: turn, pan, wheel, pick, and drag what was picked.
+    view.drag("1", [30, 30], [90, 60]);
+    view.drag("3", [30, 30], [40, 20]);
+    display.xdotool(&["click", "4"]);
+    view.hears("command Zoom(1.0)");
+    view.key("Home", "command Home");
+    let places = view.picture(SIZE);
+    display.xdotool(&["mousemove", "240", "170", "sleep", "0.1", "click", "1"]);
+    view.hears("command Pick");
+    let picked = view.picture(SIZE);
+    assert!(places != picked, "what is picked is outlined");
+    view.drag("1", [240, 170], [300, 190]);
+    view.hears("command DragStart");
+    view.hears("command DragEnd");
+    view.key("e", "command ToggleLight");
+    view.key("e", "command ToggleLight");
+
+    // Resized ten times, at last back to the first size, and minimised in between.
+    for round in 0..10 {
+        let (width, height) = (480 - 16 * (9 - round), 320 + 8 * (9 - round));
+        display.xdotool(&["windowsize", &view.window.clone(), &width.to_string(), &height.to_string()]);
+        view.hears(&format!("resized to {width}x{height}"));
+        if round == 4 {
+            display.xdotool(&["windowunmap", "--sync", &view.window.clone()]);
+            std::thread::sleep(Duration::from_millis(300));
+            display.xdotool(&["windowmap", "--sync", &view.window.clone()]);
+            display.xdotool(&["windowfocus", "--sync", &view.window.clone()]);
+        }
+    }
+
+    // Saved, looked at, and rendered from the file.
+    view.key("Escape", "command SelectNone");
+    view.key("ctrl+s", "wrote");
+    view.key("F12", "wrote");
+    let shown = view.picture(SIZE);
+    display.xdotool(&["key", "ctrl+q"]);
+    let (code, heard) = view.end();
+    assert_eq!(code, 0, "{heard:#?}");
+    assert!(!heard.iter().any(|line| line.contains("validation:")), "{heard:#?}");
+    let swapchains = heard.iter().filter(|line| line.contains("swapchain of")).count();
+    assert!(swapchains >= 8, "{swapchains} swapchains for ten sizes");
+    good(folder.path(), &[&["render", "scene-edited.toml", "-o", "again.png"], &SMALL[..4]].concat());
+    let again = image::open(folder.path().join("again.png")).unwrap().into_rgb8();
+    assert_eq!([again.width() as usize, again.height() as usize], SIZE, "the saved scene has the window's size");
+    let again: Vec<[u8; 3]> = again.pixels().map(|p| p.0).collect();
+    let apart = shown.iter().zip(&again).filter(|(a, b)| (0..3).any(|c| a[c].abs_diff(b[c]) > 1)).count();
+    assert_eq!(apart, 0, "pixels of the window that `render` makes otherwise");
+    let kept = image::open(folder.path().join("scene-001.png")).unwrap().into_rgb8();
+    assert!(kept.pixels().zip(&again).all(|(a, b)| a.0 == *b), "F12 writes what `render` does");
+    assert!(folder.path().join("scene-001.exr").exists());
+}
+
+#[test]
+fn the_next_scene_is_baked_and_shown_and_closing_ends_a_bake() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let Some(display) = Display::open(folder.path()) else { return };
+    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    let mut view = View::open(&display, folder.path(), &arguments());
+    view.key("z", "command NextScene");
+    // In the middle of what may be its bake.
+    display.xdotool(&["key", "ctrl+q"]);
+    let (code, heard) = view.end();
+    assert_eq!(code, 0, "{heard:#?}");
+}
+
+#[test]
+fn without_a_display_one_line_names_render() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut view = command(folder.path(), &["view", "assets/scenes/sphere_over_plane.toml"]);
+    let ran = finish(view.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET"));
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+    assert!(ran.stderr.contains("no display") && ran.stderr.contains("shadow-fields render"), "{}", ran.stderr);
+    assert!(cache().exists());
+}

@@ -109,10 +109,13 @@ pub struct Budget {
     /// Scene and light.
     pub case: String,
     /// Vertices judged.
+    #[serde(rename = "vertex_count")]
     pub vertices: usize,
     /// T0's own relative standard error.
+    #[serde(rename = "t0_error_relative")]
     pub t0_error: f64,
     /// T1's own relative standard error.
+    #[serde(rename = "t1_error_relative")]
     pub t1_error: f64,
     /// T0 to T1.
     pub bands: Difference,
@@ -125,6 +128,7 @@ pub struct Budget {
     /// T0 to T3.
     pub total: Difference,
     /// T0's root mean square over that of the unoccluded value: what turns errors relative to T0 into errors relative to it.
+    #[serde(rename = "t0_per_unoccluded_ratio")]
     pub t0_per_unoccluded: f64,
 }
 

@@ -10,10 +10,13 @@ pub type Radiosity = [f64; 3];
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Difference {
     /// Root mean square over vertices.
+    #[serde(rename = "rms_relative")]
     pub rms: f64,
     /// What 99 of 100 vertices stay below.
+    #[serde(rename = "p99_relative")]
     pub p99: f64,
     /// The worst vertex.
+    #[serde(rename = "max_relative")]
     pub max: f64,
 }
 

@@ -32,8 +32,10 @@ pub struct Comparison {
     /// Scene and light.
     pub case: String,
     /// Lit vertices.
+    #[serde(rename = "vertex_count")]
     pub vertices: usize,
     /// Threads of the rival.
+    #[serde(rename = "thread_count")]
     pub threads: usize,
     /// Wall time of a frame without drawing, milliseconds.
     pub frame_wall_ms: Spread,
@@ -49,6 +51,7 @@ pub struct Comparison {
     /// Rays at which it has it.
     pub rays_at_equal_rms: Option<f64>,
     /// How many times faster a frame of the merge is at equal root mean square error.
+    #[serde(rename = "speed_up_at_equal_rms_ratio")]
     pub speed_up_at_equal_rms: Option<f64>,
 }
 

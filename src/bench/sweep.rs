@@ -44,6 +44,7 @@ pub struct Point {
     /// Device time of the merge pass, milliseconds.
     pub merge_ms: Spread,
     /// Merge time over that of the default in the same round: median over rounds.
+    #[serde(rename = "time_per_default_ratio")]
     pub time_per_default: f64,
     /// T0 to T3.
     pub total: Difference,
@@ -72,7 +73,9 @@ pub fn variations(quick: bool) -> Vec<Variation> {
         ("lattice", "cube:8x8"),
         ("lattice", "cube:12x6"),
         ("lattice", "cube:16x12"),
+        ("lattice", "cube:24x10"),
         ("lattice", "cube:32x8"),
+        ("lattice", "cube:32x12"),
         ("spacing", "cube:16x8,chord,raw"),
         ("spacing", "cube:16x8,chord,scaled"),
         ("spacing", "cube:16x8,log,scaled"),
@@ -106,11 +109,19 @@ pub fn variations(quick: bool) -> Vec<Variation> {
         });
         add("stored bands", "3 of transfer, 4 of visibility", &|o| (o.bake.bands, o.bake.field_bands) = (3, Some(4)));
         let student = "latlon:8x4x4,linear,raw,inner=0.2".parse().expect("a lattice");
-        add("together", "8x4x4, nearest, f32, 32 px", &|o| {
+        add("together", "student: 8x4x4, nearest, f32, 32 px", &|o| {
             (o.bake.lattice, o.bake.storage, o.bake.face_px, o.lookup) = (student, Storage::F32, 32, Lookup::Nearest);
         });
         let small = "cube:8x4".parse().expect("a lattice");
-        add("together", "cube:8x4, 16 px", &|o| (o.bake.lattice, o.bake.face_px) = (small, 16));
+        add("together", "small: cube:8x4, 16 px", &|o| (o.bake.lattice, o.bake.face_px) = (small, 16));
+        let paper = "cube:16x4,linear,raw,inner=0.2".parse().expect("a lattice");
+        add("together", "paper: 16 linear shells x 96, radial, f32", &|o| {
+            (o.bake.lattice, o.bake.storage, o.lookup) = (paper, Storage::F32, Lookup::Radial);
+        });
+        let fine = "cube:24x10".parse().expect("a lattice");
+        add("together", "fine: cube:24x10, f32, 128 px", &|o| {
+            (o.bake.lattice, o.bake.storage, o.bake.face_px) = (fine, Storage::F32, 128);
+        });
     }
     all
 }

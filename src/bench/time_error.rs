@@ -1,13 +1,17 @@
 //! `bench time-error`: error budgets, run time against error, and ray casting beside it.
 
-use super::Bench;
 use super::budget::{Budget, Effort, Truth, budget};
 use super::cases::{self, Case};
 use super::plot::{Curve, Dot, Plot};
 use super::rival::{Comparison, compare};
 use super::sweep::{Point, pareto, sweep, variations};
 use super::text::{csv, three, write};
+use super::{Bench, default_options};
+use crate::asset::false_color::Scheme;
 use crate::error::{Error, Result};
+use crate::frame::Options;
+use crate::truth::error_map::Shown;
+use crate::truth::{self, ErrorMap, RayCast, error_map};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -18,27 +22,31 @@ use std::path::Path;
 pub struct Outcome {
     /// A row a scene and light.
     pub budgets: Vec<Budget>,
+    /// A picture a scene and light.
+    pub pictures: Vec<Shown>,
     /// A row a case and variation.
     pub points: Vec<Point>,
     /// A row a case.
     pub comparisons: Vec<Comparison>,
 }
 
-/// Measures, and writes `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, a plot a swept case and
-/// `time-error.txt` into `folder`.
+/// Measures, and writes `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, an error picture a case, a plot a swept case
+/// and `time-error.txt` into `folder`.
 ///
 /// # Errors
 /// `Failed` when the folder cannot be written; else as [`crate::frame::Frame::new`].
 pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Outcome> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
-    let mut outcome = Outcome { budgets: Vec::new(), points: Vec::new(), comparisons: Vec::new() };
+    let mut outcome =
+        Outcome { budgets: Vec::new(), pictures: Vec::new(), points: Vec::new(), comparisons: Vec::new() };
     let effort = Effort::new(bench.quick);
     let all = variations(bench.quick);
     for case in chosen(bench.quick)? {
         (bench.progress)(&format!("{}: casting rays", case.name));
         let truth = Truth::new(&case, effort, bench.seed);
         outcome.budgets.push(budget(bench, &case, &truth)?);
+        outcome.pictures.push(error_picture(bench, &case, folder)?);
         outcome.comparisons.push(compare(bench, &case, &truth)?);
         if is_swept(&case, bench.quick) {
             outcome.points.extend(sweep(bench, &case, &truth, &all)?);
@@ -48,10 +56,35 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// The quick run leaves out what takes ten seconds and more to bake on two cores: the teapot and the torus of two colours.
+/// Rays of an error picture in a quick and a thorough run, a few seconds on two cores: shared by its vertices and lights, so that
+/// what has few vertices, and errs little, is judged by more of them.
+const PICTURE_RAYS: [usize; 2] = [8_000_000, 32_000_000];
+/// Size of the error pictures, less their scale bars.
+const PICTURE_SIZE: [u32; 2] = [720, 480];
+
+/// Writes the error of every lit vertex in false colour, as `error-` and the case's name.
+fn error_picture(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<Shown> {
+    let placements = case.scene.at(case.time_s);
+    let options = Options { size: PICTURE_SIZE, multisample: true, ..default_options() };
+    let mut frame = bench.frame(&case.scene, options)?;
+    frame.render(&placements, None)?;
+    let share = PICTURE_RAYS[usize::from(!bench.quick)] / frame.receiver_vertex_count().max(1);
+    let lights = 1 + case.scene.entities.iter().filter(|e| e.emits).count();
+    let rays = ((share / lights).clamp(64, 4096) as u32).next_power_of_two();
+    let cast = RayCast { rays, runs: 2, seed: bench.seed, distant: case.distant, shadows: true };
+    let (reference, noise) = truth::picture(&case.scene, &placements, &cast);
+    let map = ErrorMap::new(&error_map::radiosity(&frame)?, &reference, Scheme::Signed);
+    let words: Vec<&str> = case.name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty()).collect();
+    map.write(&folder.join(format!("error-{}.png", words.join("-"))), &mut frame, &placements, None, noise)
+}
+
+/// The quick run leaves out what takes ten seconds and more to bake on two cores, and takes the teapot under one light, as an
+/// occluder alone.
 fn chosen(quick: bool) -> Result<Vec<Case>> {
     if quick {
-        return ["sphere_over_plane", "torus_over_plane"].into_iter().map(cases::scene).collect();
+        let teapot = cases::teapot_lights()?.into_iter().nth(1);
+        let scenes = ["sphere_over_plane", "torus_over_plane"].into_iter().map(cases::scene);
+        return scenes.chain(teapot.map(Ok)).collect();
     }
     Ok(cases::teapot_lights()?.into_iter().chain(cases::scenes()?).collect())
 }
@@ -87,9 +120,9 @@ fn write_all(bench: &Bench<'_>, folder: &Path, outcome: &Outcome) -> Result<()> 
 fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     let row = |what: String, wall_ms: f64, error| {
         json!({
-            "case": comparison.case, "what": what, "vertices": comparison.vertices, "threads": comparison.threads,
+            "case": comparison.case, "what": what, "vertex_count": comparison.vertices, "thread_count": comparison.threads,
             "wall_ms": wall_ms, "error": error,
-            "speed_up_at_equal_rms": comparison.speed_up_at_equal_rms, "rays_at_equal_rms": comparison.rays_at_equal_rms,
+            "speed_up_at_equal_rms_ratio": comparison.speed_up_at_equal_rms, "rays_at_equal_rms": comparison.rays_at_equal_rms,
         })
     };
     let merge = row("merge".into(), comparison.frame_wall_ms.median, comparison.merge_error);

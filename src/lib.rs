@@ -26,6 +26,17 @@
 //! where, and its file), [`shaders`] (every entry point), [`asset`] (meshes, distant light, pictures), [`bake`], [`render`] (the
 //! passes of a frame), [`scene`], [`frame`] (their sequence), [`truth`] (ray casting and the exact chain), [`check`] (every pass
 //! against its twin), [`mod@bench`], [`view`] (the state behind the window), [`app`].
+//!
+//! # Beyond one device
+//!
+//! On paper, not built. *Merges over many devices*: a cluster reads its list, the entities on it and their fields, and writes its
+//! own vertices only, so clusters can be dealt out by receiver and place with no exchange but the entities' 4 200 bytes a frame
+//! for every 30 of them; each device needs the fields and vertices of its own clusters, and sends 16 bytes a vertex to the one
+//! that draws. What a device merges again is what moved near its clusters. *Farms of bakes*: a field depends on mesh, lattice,
+//! bands, face size and format, whose hash names its cache file, and every file is replaced whole: workers that share a cache
+//! folder need no other meeting place. Within one field, targets are independent and the kept part of a bake is a prefix of
+//! them; a range for each worker and a sum of the parts would do. *Larger scenes*: fields beyond what a device binds want several
+//! buffers, or those of a neighbourhood at a time, which the lists already name.
 
 pub mod app;
 pub mod asset;

@@ -24,6 +24,9 @@ pub struct Arguments {
     /// instead of an occlusion field
     #[arg(long, value_name = "R,G,B", value_parser = color)]
     radiance: Option<Vec3>,
+    /// Capture far samples of a large mesh from all of its triangles too
+    #[arg(long)]
+    no_simplify: bool,
     #[command(flatten)]
     bake: BakeArguments,
 }
@@ -48,7 +51,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         let colors = mesh.colors.as_ref().unwrap_or(&white).iter().map(|c| *c * radiance).collect();
         mesh = Mesh::new(mesh.name, mesh.positions, mesh.normals, Some(colors), mesh.triangles)?;
     }
-    let context = Context::new(global)?;
+    let mut context = Context::new(global)?;
+    context.baker.simplify = !arguments.no_simplify;
     let mut header = bake::header(&mesh, kind, &arguments.bake.options());
     header.validate().map_err(|error| error.context(arguments.mesh.display()))?;
     context.baker.fits(&header).map_err(|error| error.context(arguments.mesh.display()))?;

@@ -4,7 +4,7 @@ use super::context::Context;
 use super::sheet::{self, Cell};
 use super::{Global, output};
 use crate::asset::Mesh;
-use crate::bake::capture::snapshot;
+use crate::bake::snapshot::snapshot;
 use crate::error::{Error, Result};
 use crate::field::{Kind, Lookup, ShadowField, growth};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};

@@ -1,5 +1,6 @@
 //! Baked fields and transfers on disk, found again by the content of the mesh and everything else that decides them.
 
+use super::partial::Partial;
 use super::{Baker, Progress, Report, TRANSFER_OFFSET};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
@@ -38,9 +39,14 @@ impl TransferHeader {
     }
 }
 
+/// Counted up when a bake comes to other numbers from the same header.
+const BAKE: u32 = 1;
+
 fn key(header: &impl Serialize) -> String {
     let text = serde_json::to_vec(header).expect("headers are plain data");
-    blake3::Hasher::new().update(&VERSION.to_le_bytes()).update(&text).finalize().to_hex()[..32].to_owned()
+    blake3::Hasher::new().update(&VERSION.to_le_bytes()).update(&BAKE.to_le_bytes()).update(&text).finalize().to_hex()
+        [..32]
+        .to_owned()
 }
 
 /// What decides a field: the header without the name for people and without what only the bake finds out.
@@ -94,7 +100,8 @@ impl Cache {
                 Err(error) => log::warn!("{error}; baking anew"),
             }
         }
-        let report = baker.field(mesh, header, (store, offset_bytes), progress)?;
+        let partial = Partial::new(path.as_ref().map(|path| path.with_extension("part")));
+        let report = baker.field_from(&partial, mesh, header, (store, offset_bytes), progress)?;
         if let Some(path) = path {
             let payload = store.download_range(offset_bytes..offset_bytes + header.payload_bytes())?;
             let field = ShadowField { header: header.clone(), payload };
@@ -131,7 +138,8 @@ impl Cache {
                 Err(error) => log::warn!("{error}; baking anew"),
             }
         }
-        let (transfer, report) = baker.transfer(mesh, bands, face_px, progress)?;
+        let partial = Partial::new(path.as_ref().map(|path| path.with_extension("transfer-part")));
+        let (transfer, report) = baker.transfer_from(&partial, mesh, bands, face_px, progress)?;
         if let Some(path) = path
             && let Err(error) = file::write(&path, TRANSFER_MAGIC, &header, bytemuck::cast_slice(&transfer))
         {

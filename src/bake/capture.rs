@@ -5,11 +5,12 @@
 //! with depth. A face that the object's bounding sphere does not reach is not drawn and gets no place in the atlas; of the
 //! rest only the chunks of neighbouring triangles are drawn whose bounding spheres reach into the face.
 
+use super::simplify::Level;
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::gpu::ImageShape;
 use crate::gpu::Target;
-use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, GraphicsPipeline, GraphicsState, Image};
+use crate::gpu::{Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
 use crate::sh::cube::{FACE_COUNT, face_basis, texel_st};
 use crate::shaders::{Library, Row};
 use ash::vk;
@@ -66,6 +67,27 @@ impl Model {
             indices: Buffer::with_data(device, "capture indices", &triangles)?,
             chunks,
             closed: mesh.is_closed(),
+        })
+    }
+}
+
+impl Model {
+    /// Uploads a mesh that stands for another, in r, of one colour where `color` is given.
+    ///
+    /// # Errors
+    /// As [`Model::new`].
+    pub fn stand_in(device: &Arc<Device>, level: &Level, color: Option<Vec3>) -> Result<Self> {
+        let (triangles, chunks) = chunk(&level.positions, &level.triangles);
+        let flat: Vec<[f32; 3]> = level.positions.iter().map(Vec3::to_array).collect();
+        let colors = color
+            .map(|color| Buffer::with_data(device, "capture colors", &vec![color.to_array(); flat.len()]))
+            .transpose()?;
+        Ok(Model {
+            positions: Buffer::with_data(device, "capture positions", &flat)?,
+            colors,
+            indices: Buffer::with_data(device, "capture indices", &triangles)?,
+            chunks,
+            closed: level.closed,
         })
     }
 }
@@ -335,61 +357,4 @@ fn rays(
             }
         }
     }
-}
-
-/// Captures six faces from every eye (in r) and brings them to the host: RGB triples, faces +X -X +Y -Y +Z -Z in rows of
-/// `face_px`. Occlusion captures are white where nothing is hit.
-///
-/// # Errors
-/// As [`Capture::new`].
-pub fn snapshot(
-    device: &Arc<Device>,
-    library: &Library,
-    mesh: &Mesh,
-    eyes: &[DVec3],
-    face_px: u32,
-    radiance: bool,
-) -> Result<Vec<Vec<f32>>> {
-    let capture = Capture::new(device, library, face_px, radiance)?;
-    let model = Model::new(device, mesh, radiance)?;
-    let eyes: Vec<Vec3> = eyes.iter().map(|eye| eye.as_vec3()).collect();
-    let texel_bytes = if radiance { 16 } else { 1 };
-    let edge = (capture.columns * face_px) as usize;
-    let bytes = (edge * edge * texel_bytes) as u64;
-    let download = Buffer::new(device, "captured faces", BufferKind::Readback, bytes)?;
-    let mut out = Vec::new();
-    while out.len() < eyes.len() {
-        let rest = &eyes[out.len()..];
-        let plan = capture.plan(&model, rest);
-        let mut commands = Commands::new(device, "snapshot")?;
-        commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
-        if let Some(depth) = &capture.depth {
-            commands.image_barrier(depth, None, Access::DepthWrite);
-        }
-        commands.pass("capture", |c| capture.record(c, &model, rest, &plan, true))?;
-        commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
-        commands.copy_image(&capture.atlas, &download);
-        commands.barrier(Access::TransferWrite, Access::HostRead);
-        commands.submit()?;
-        let atlas: Vec<u8> = download.read(0, bytes as usize);
-        let texel = |slot: u32, x: usize, y: usize| -> [f32; 3] {
-            if slot == NO_SLOT {
-                return [if radiance { 0.0 } else { 1.0 }; 3];
-            }
-            let (column, row) = ((slot % capture.columns) as usize, (slot / capture.columns) as usize);
-            let at = ((row * face_px as usize + y) * edge + column * face_px as usize + x) * texel_bytes;
-            if radiance {
-                let float = |k: usize| f32::from_le_bytes(atlas[at + 4 * k..at + 4 * k + 4].try_into().expect("four"));
-                [float(0), float(1), float(2)]
-            } else {
-                [f32::from(atlas[at]) / 255.0; 3]
-            }
-        };
-        for slots in &plan {
-            let px = face_px as usize;
-            let faces = slots.iter().flat_map(|&slot| (0..px * px).flat_map(move |i| texel(slot, i % px, i / px)));
-            out.push(faces.collect());
-        }
-    }
-    Ok(out)
 }

@@ -9,22 +9,28 @@ pub mod assemble;
 pub mod cache;
 pub mod capture;
 pub mod inside;
+pub mod partial;
 pub mod project;
+pub mod simplify;
+pub mod snapshot;
+mod sweep;
 
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
 use crate::field::quantity::{Kind, Storage, channel_stride};
 use crate::field::{Header, Lattice, ShadowField, growth};
-use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
+use crate::gpu::{Buffer, BufferKind, Commands, Device};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
-use capture::{Capture, Model, Slots, unit_positions};
+use capture::{Capture, Model, unit_positions};
 use glam::{DVec3, Vec3};
+use partial::Partial;
 use project::{Job, Project, Projection};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use sweep::Sweep;
 
 /// What decides a field besides the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,6 +77,8 @@ pub struct Report {
     pub samples: u32,
     /// Samples inside the solid, captured off the nearest surface or, where that sees nothing, filled from neighbours.
     pub filled: u32,
+    /// Meshes that samples were captured from: simplified ones for those far off, the full one last.
+    pub levels: Vec<LevelReport>,
     /// Device time in capture passes.
     pub capture_ms: f64,
     /// Device time in project passes.
@@ -79,6 +87,15 @@ pub struct Report {
     pub assemble_ms: f64,
     /// Wall time of the whole bake.
     pub total: Duration,
+}
+
+/// Samples that were captured from one mesh.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct LevelReport {
+    /// Its triangles.
+    pub triangles: usize,
+    /// How many.
+    pub samples: u32,
 }
 
 impl Report {
@@ -140,20 +157,14 @@ fn captured_bytes(header: &Header) -> u64 {
 pub struct Baker {
     device: Arc<Device>,
     library: Library,
-}
-
-/// One run of capture and project over many eyes.
-struct Sweep<'s> {
-    capture: &'s Capture,
-    project: &'s Project,
-    model: &'s Model,
-    cull: bool,
+    /// Whether eyes far from a large mesh see a simplified one; so by default.
+    pub simplify: bool,
 }
 
 impl Baker {
     /// A baker that compiles its shaders from `library`.
     pub fn new(device: &Arc<Device>, library: &Library) -> Self {
-        Baker { device: device.clone(), library: library.clone() }
+        Baker { device: device.clone(), library: library.clone(), simplify: true }
     }
 
     /// Checks that the device can bind the field that `header` describes, and what it is baked from.
@@ -182,6 +193,21 @@ impl Baker {
         &self,
         mesh: &Mesh,
         header: &mut Header,
+        target: (&Buffer, u64),
+        progress: Progress<'_>,
+    ) -> Result<Report> {
+        self.field_from(&Partial::new(None), mesh, header, target, progress)
+    }
+
+    /// As [`Baker::field`], going on from what a cancelled bake of the same field has kept.
+    ///
+    /// # Errors
+    /// As [`Baker::field`].
+    pub fn field_from(
+        &self,
+        partial: &Partial,
+        mesh: &Mesh,
+        header: &mut Header,
         (store, offset_bytes): (&Buffer, u64),
         progress: Progress<'_>,
     ) -> Result<Report> {
@@ -201,15 +227,19 @@ impl Baker {
         let projection = if radiance { Projection::Radiance } else { Projection::Blocked };
         let project = self.project(header.bands, projection, &capture)?;
         let model = Model::new(&self.device, mesh, radiance)?;
-        let captured = Buffer::new(&self.device, "captured samples", BufferKind::Device, captured_bytes(header))?;
+        let mut captured = Buffer::new(&self.device, "captured samples", BufferKind::Device, captured_bytes(header))?;
         let mut targets = Vec::new();
         for (index, position) in positions.iter().enumerate().filter(|(index, _)| !unseen[*index]) {
             let eye = pushed[index].unwrap_or(*position);
             let scale = lattice.scale(eye.length().max(lattice.inner)) as f32;
             targets.push((eye.as_vec3(), Job { normal: [0.0; 4], slots: [0; 6], target: index as u32, scale }));
         }
-        let sweep = Sweep { capture: &capture, project: &project, model: &model, cull: true };
-        let mut report = sweep.run(&self.device, &targets, &captured, progress)?;
+        let sweep = Sweep { capture: &capture, project: &project, model: &model, partial };
+        let mut report = if self.simplify {
+            sweep.at_levels(mesh, radiance, &targets, &mut captured, progress)?
+        } else {
+            sweep.alone(&targets, &mut captured, progress)?
+        };
         report.filled = header.filled_samples;
         report.samples = lattice.sample_count() - report.filled;
 
@@ -245,12 +275,27 @@ impl Baker {
         face_px: u32,
         progress: Progress<'_>,
     ) -> Result<(Vec<f32>, Report)> {
+        self.transfer_from(&Partial::new(None), mesh, bands, face_px, progress)
+    }
+
+    /// As [`Baker::transfer`], going on from what a cancelled bake of the same transfer has kept.
+    ///
+    /// # Errors
+    /// As [`Baker::field`].
+    pub fn transfer_from(
+        &self,
+        partial: &Partial,
+        mesh: &Mesh,
+        bands: usize,
+        face_px: u32,
+        progress: Progress<'_>,
+    ) -> Result<(Vec<f32>, Report)> {
         let started = Instant::now();
         let capture = Capture::new(&self.device, &self.library, face_px, false)?;
         let project = self.project(bands, Projection::Transfer, &capture)?;
         let model = Model::new(&self.device, mesh, false)?;
         let floats = mesh.positions.len() * channel_stride(bands);
-        let captured = Buffer::new(&self.device, "transfer", BufferKind::Device, 4 * floats as u64)?;
+        let mut captured = Buffer::new(&self.device, "transfer", BufferKind::Device, 4 * floats as u64)?;
         let positions = unit_positions(mesh);
         let targets: Vec<(Vec3, Job)> = positions
             .iter()
@@ -262,8 +307,9 @@ impl Baker {
                 (position + TRANSFER_OFFSET * normal, job)
             })
             .collect();
-        let sweep = Sweep { capture: &capture, project: &project, model: &model, cull: true };
-        let mut report = sweep.run(&self.device, &targets, &captured, progress)?;
+        // A vertex sees its own surface from nearby: no simplified mesh will do.
+        let sweep = Sweep { capture: &capture, project: &project, model: &model, partial };
+        let mut report = sweep.alone(&targets, &mut captured, progress)?;
         report.samples = targets.len() as u32;
         let transfer = captured.download(floats)?;
         report.total = started.elapsed();
@@ -282,59 +328,5 @@ impl Baker {
     /// The device that the baker works on.
     pub fn device(&self) -> &Arc<Device> {
         &self.device
-    }
-}
-
-impl Sweep<'_> {
-    /// Captures every eye and projects it into `samples`, an atlas at a time.
-    fn run(
-        &self,
-        device: &Arc<Device>,
-        targets: &[(Vec3, Job)],
-        samples: &Buffer,
-        progress: Progress<'_>,
-    ) -> Result<Report> {
-        let eyes: Vec<Vec3> = targets.iter().map(|(eye, _)| *eye).collect();
-        let texels = self.project.texel_view()?;
-        let mut jobs = Project::job_buffer(device, self.capture.capacity())?;
-        let mut report = Report::default();
-        let mut done = 0;
-        while done < eyes.len() {
-            // An eye takes at least one job, and a job at most one capacity.
-            let rest = done..eyes.len().min(done + self.capture.capacity() as usize);
-            let plan: Vec<Slots> = self.capture.plan(self.model, &eyes[rest]);
-            let batch = done..done + plan.len();
-            let filled: Vec<Job> = targets[batch.clone()]
-                .iter()
-                .zip(&plan)
-                .map(|((_, job), slots)| Job { slots: *slots, ..*job })
-                .collect();
-            jobs.write(0, &filled);
-            report.add(&self.batch(device, &eyes[batch.clone()], &plan, &jobs, &texels, samples)?);
-            done = batch.end;
-            progress(done as u32, eyes.len() as u32);
-        }
-        Ok(report)
-    }
-
-    fn batch(
-        &self,
-        device: &Arc<Device>,
-        eyes: &[Vec3],
-        plan: &[Slots],
-        jobs: &Buffer,
-        texels: &crate::gpu::TexelView<'_>,
-        samples: &Buffer,
-    ) -> Result<Vec<crate::gpu::Timing>> {
-        let atlas = &self.capture.atlas;
-        let mut commands = Commands::new(device, "bake batch")?;
-        commands.image_barrier(atlas, None, Access::ColorWrite);
-        if let Some(depth) = self.capture.depth() {
-            commands.image_barrier(depth, None, Access::DepthWrite);
-        }
-        commands.pass("capture", |c| self.capture.record(c, self.model, eyes, plan, self.cull))?;
-        commands.image_barrier(atlas, Some(Access::ColorWrite), Access::ComputeSampled);
-        commands.pass("project", |c| self.project.record(c, atlas, jobs, texels, samples, plan.len() as u32))?;
-        commands.submit()
     }
 }

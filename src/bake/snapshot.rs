@@ -1,0 +1,66 @@
+//! Captured faces as pictures, for `inspect` and its contact sheets.
+
+use super::capture::{Capture, Model, NO_SLOT};
+use crate::asset::mesh::Mesh;
+use crate::error::Result;
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
+use crate::shaders::Library;
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+/// Captures six faces from every eye (in r) and brings them to the host: RGB triples, faces +X -X +Y -Y +Z -Z in rows of
+/// `face_px`. Occlusion captures are white where nothing is hit.
+///
+/// # Errors
+/// As [`Capture::new`].
+pub fn snapshot(
+    device: &Arc<Device>,
+    library: &Library,
+    mesh: &Mesh,
+    eyes: &[DVec3],
+    face_px: u32,
+    radiance: bool,
+) -> Result<Vec<Vec<f32>>> {
+    let capture = Capture::new(device, library, face_px, radiance)?;
+    let model = Model::new(device, mesh, radiance)?;
+    let eyes: Vec<Vec3> = eyes.iter().map(|eye| eye.as_vec3()).collect();
+    let texel_bytes = if radiance { 16 } else { 1 };
+    let edge = (capture.columns * face_px) as usize;
+    let bytes = (edge * edge * texel_bytes) as u64;
+    let download = Buffer::new(device, "captured faces", BufferKind::Readback, bytes)?;
+    let mut out = Vec::new();
+    while out.len() < eyes.len() {
+        let rest = &eyes[out.len()..];
+        let plan = capture.plan(&model, rest);
+        let mut commands = Commands::new(device, "snapshot")?;
+        commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
+        if let Some(depth) = capture.depth() {
+            commands.image_barrier(depth, None, Access::DepthWrite);
+        }
+        commands.pass("capture", |c| capture.record(c, &model, rest, &plan, true))?;
+        commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
+        commands.copy_image(&capture.atlas, &download);
+        commands.barrier(Access::TransferWrite, Access::HostRead);
+        commands.submit()?;
+        let atlas: Vec<u8> = download.read(0, bytes as usize);
+        let texel = |slot: u32, x: usize, y: usize| -> [f32; 3] {
+            if slot == NO_SLOT {
+                return [if radiance { 0.0 } else { 1.0 }; 3];
+            }
+            let (column, row) = ((slot % capture.columns) as usize, (slot / capture.columns) as usize);
+            let at = ((row * face_px as usize + y) * edge + column * face_px as usize + x) * texel_bytes;
+            if radiance {
+                let float = |k: usize| f32::from_le_bytes(atlas[at + 4 * k..at + 4 * k + 4].try_into().expect("four"));
+                [float(0), float(1), float(2)]
+            } else {
+                [f32::from(atlas[at]) / 255.0; 3]
+            }
+        };
+        for slots in &plan {
+            let px = face_px as usize;
+            let faces = slots.iter().flat_map(|&slot| (0..px * px).flat_map(move |i| texel(slot, i % px, i / px)));
+            out.push(faces.collect());
+        }
+    }
+    Ok(out)
+}

@@ -92,7 +92,7 @@ fn a_scene_is_timed_pass_by_pass() {
     let document = json(folder.path(), &["floor.toml", "--size", "64x48", "--variant", "texel-packed"]);
     let rows = document["passes"].as_array().unwrap();
     let passes: Vec<_> = rows.iter().map(|row| row["pass"].as_str().unwrap()).collect();
-    assert_eq!(passes, ["merge", "draw", "draw", "draw", "draw"]);
+    assert_eq!(passes, ["merge", "draw", "frame", "draw", "frame", "draw", "frame", "draw", "frame"]);
     rows.iter().for_each(|row| positive(row, &["/ms/median"]));
 }
 

@@ -90,7 +90,7 @@ pub struct Work {
 pub struct Row {
     /// Scene, or vertices and occluders of the made-up merge.
     pub case: String,
-    /// "merge" or "draw".
+    /// "merge", "draw", or "frame": from placements to the picture on the device, by the host's clock.
     pub pass: &'static str,
     /// Variant.
     pub variant: String,
@@ -179,8 +179,8 @@ pub fn made_up(
     Ok(rows.collect())
 }
 
-/// Times a scene's merge in each variant, everything merged in every frame while it moves, and its draw for files and for a
-/// screen, with and without multisampling.
+/// Times a scene's merge in each variant, everything merged in every frame while it moves, and its draw and whole frames for
+/// files and for a screen, with and without multisampling.
 ///
 /// # Errors
 /// As [`crate::frame::Frame::new`].
@@ -223,25 +223,29 @@ pub fn scene(
     for (finish, word) in [(Finish::Display, "screen"), (Finish::Linear, "file")] {
         for (multisample, samples) in [(true, "multisampled"), (false, "1 sample")] {
             frame.set_finish(finish, multisample)?;
-            let mut times = Vec::new();
+            let (mut draws, mut walls) = (Vec::new(), Vec::new());
             for run in 0..=runs {
+                let start = Instant::now();
                 let passes = frame.show(&scene.at(f64::from(run) / 30.0), 1.0)?;
                 if run > 0 {
-                    times.extend(passes.iter().filter(|t| t.pass == "draw").map(|t| t.milliseconds));
+                    walls.push(start.elapsed().as_secs_f64() * 1e3);
+                    draws.extend(passes.iter().filter(|t| t.pass == "draw").map(|t| t.milliseconds));
                 }
             }
-            rows.push(Row {
-                case: name.to_owned(),
-                pass: "draw",
-                variant: format!("{word}, {samples}"),
-                ms: Tenths::new(&times),
-                ns_a_pair: None,
-                work: None,
-                gflops: None,
-                gb_s: None,
-                arithmetic_share: None,
-                read_share: None,
-            });
+            for (pass, times) in [("draw", draws), ("frame", walls)] {
+                rows.push(Row {
+                    case: name.to_owned(),
+                    pass,
+                    variant: format!("{word}, {samples}"),
+                    ms: Tenths::new(&times),
+                    ns_a_pair: None,
+                    work: None,
+                    gflops: None,
+                    gb_s: None,
+                    arithmetic_share: None,
+                    read_share: None,
+                });
+            }
         }
     }
     Ok(rows)

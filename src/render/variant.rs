@@ -23,7 +23,10 @@ pub struct Variant {
     pub packed: bool,
 }
 
-/// Every variant. Uniform blocks with texel fields lost everywhere (see README) and are not among them.
+/// Every variant. What lost where it was measured is not among them, on llvmpipe 22.3 in milliseconds for 65 536 vertices and 4
+/// occluders: uniform blocks with texel fields 11.8 against 8.2 without, since llvmpipe gathers them lane by lane; rotations
+/// as matrix elements 8.5 against 6.4 as angles; entities fetched by the lanes of a subgroup and handed round 14.4 against
+/// 8.3, since each broadcast there walks through the lanes.
 pub const VARIANTS: &[Variant] = &[
     Variant { name: "storage", texel: false, uniform: false, packed: false },
     Variant { name: "storage-uniform", texel: false, uniform: true, packed: false },

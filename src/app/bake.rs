@@ -24,9 +24,10 @@ pub struct Arguments {
     /// instead of an occlusion field
     #[arg(long, value_name = "R,G,B", value_parser = color)]
     radiance: Option<Vec3>,
-    /// Capture far samples of a large mesh from all of its triangles too
+    /// Capture far samples of a large mesh from simplified ones, at most an eighth of a texel off: for lattices whose samples
+    /// mostly stand far from it
     #[arg(long)]
-    no_simplify: bool,
+    simplify: bool,
     #[command(flatten)]
     bake: BakeArguments,
 }
@@ -52,7 +53,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         mesh = Mesh::new(mesh.name, mesh.positions, mesh.normals, Some(colors), mesh.triangles)?;
     }
     let mut context = Context::new(global)?;
-    context.baker.simplify = !arguments.no_simplify;
+    context.baker.simplify = arguments.simplify;
     let mut header = bake::header(&mesh, kind, &arguments.bake.options());
     header.validate().map_err(|error| error.context(arguments.mesh.display()))?;
     context.baker.fits(&header).map_err(|error| error.context(arguments.mesh.display()))?;

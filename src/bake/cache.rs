@@ -39,14 +39,9 @@ impl TransferHeader {
     }
 }
 
-/// Counted up when a bake comes to other numbers from the same header.
-const BAKE: u32 = 1;
-
 fn key(header: &impl Serialize) -> String {
     let text = serde_json::to_vec(header).expect("headers are plain data");
-    blake3::Hasher::new().update(&VERSION.to_le_bytes()).update(&BAKE.to_le_bytes()).update(&text).finalize().to_hex()
-        [..32]
-        .to_owned()
+    blake3::Hasher::new().update(&VERSION.to_le_bytes()).update(&text).finalize().to_hex()[..32].to_owned()
 }
 
 /// What decides a field: the header without the name for people and without what only the bake finds out.

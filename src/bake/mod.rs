@@ -157,14 +157,15 @@ fn captured_bytes(header: &Header) -> u64 {
 pub struct Baker {
     device: Arc<Device>,
     library: Library,
-    /// Whether eyes far from a large mesh see a simplified one; so by default.
+    /// Whether eyes far from a large mesh see a simplified one. Not by default: of the default lattice's samples too few stand far
+    /// off, and making the levels costs more than they save (102 400 triangles: 39.3 s with, 34.7 s without).
     pub simplify: bool,
 }
 
 impl Baker {
     /// A baker that compiles its shaders from `library`.
     pub fn new(device: &Arc<Device>, library: &Library) -> Self {
-        Baker { device: device.clone(), library: library.clone(), simplify: true }
+        Baker { device: device.clone(), library: library.clone(), simplify: false }
     }
 
     /// Checks that the device can bind the field that `header` describes, and what it is baked from.

@@ -176,7 +176,7 @@ fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec
         let of = |count: u64| 100.0 * count as f64 / counts.considered.max(1) as f64;
         ui.label(
             RichText::new(format!(
-                "behind light {:.0} %, below horizon {:.0} %, apart {:.0} %, turned away {:.0} %, below eps {:.0} %",
+                "behind light {:.0} %, horizon {:.0} %, apart {:.0} %, away {:.0} %, eps {:.0} %",
                 of(counts.behind_light),
                 of(counts.below_horizon),
                 of(counts.apart),
@@ -273,13 +273,9 @@ fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
         if limit < top && limit > top / 5.0 {
             let y = area.bottom() - (limit / top) as f32 * area.height();
             painter.hline(area.x_range(), y, Stroke::new(1.0, Color32::from_white_alpha(70)));
-            painter.text(
-                pos2(area.left() + 3.0, y),
-                Align2::LEFT_BOTTOM,
-                text,
-                FontId::proportional(9.0),
-                Color32::GRAY,
-            );
+            let label = Rect::from_min_size(pos2(area.left(), y - 12.0), vec2(26.0, 12.0));
+            painter.rect_filled(label, 2.0, Color32::from_black_alpha(230));
+            painter.text(label.center(), Align2::CENTER_CENTER, text, FontId::proportional(9.0), Color32::WHITE);
         }
     }
     painter.text(

@@ -96,7 +96,12 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
 }
 
 fn no_display(error: impl std::fmt::Display) -> Error {
-    let reason = error.to_string().replace('\n', " ");
+    let text = error.to_string().replace('\n', " ");
+    // winit puts the place in its source in front.
+    let reason = match text.strip_prefix("os error at ") {
+        Some(rest) => rest.rsplit(": ").next().unwrap_or(rest),
+        None => &text,
+    };
     Error::Unsupported(format!(
         "no display to open a window on ({reason}); `shadow-fields render SCENE.toml -o P.png` needs none"
     ))

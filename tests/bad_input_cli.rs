@@ -165,7 +165,10 @@ fn more_than_the_device_can_hold() {
     if !has_device() {
         return;
     }
-    let scene = format!("{CAMERA}{BALL}[[entity]]\nmesh = \"ball\"\n");
+    // What nobody sees, or what stands in no light, is not baked.
+    let light = "[environment]\nuniform = [1, 1, 1]\n";
+    let two = "[[entity]]\nmesh = \"ball\"\n[[entity]]\nmesh = \"ball\"\nposition = [3, 0, 0]\n";
+    let scene = format!("{CAMERA}{light}{BALL}{two}");
     let case =
         case(&[("s.toml", &scene), ("m.obj", &format!("{TRIANGLE}v 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"))]);
     // Seven bands, four bytes, 4 million samples: 832 MB of an occlusion field, three times that of a radiance field.

@@ -54,7 +54,7 @@ fn a_wrong_shader_is_found() {
     let wrong = [
         ("capture.vert", "vec3 q = position - push.eye.xyz;", "vec3 q = position - push.eye.xyz + 0.02;", "capture"),
         ("project.comp", "total *= jobs[job].scale;", "total *= 1.0001 * jobs[job].scale;", "project"),
-        ("assemble.comp", "vec4 mean = sum", "vec4 mean = 1.01 * sum", "assemble"),
+        ("assemble.comp", "sum *= push.factor;", "sum *= 1.01 * push.factor;", "assemble"),
         ("merge.comp", "float weight = above_horizon", "float weight = 0.999 * above_horizon", "merge"),
         ("draw.frag", "color = vec4(shown,", "color = vec4(1.01 * shown,", "draw"),
     ];

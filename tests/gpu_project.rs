@@ -172,9 +172,10 @@ fn samples_are_lowered_by_the_sag_between_them() {
             assert!((found - wanted).abs() < 1e-5, "power {power}, stored sample {at}: {found}, not {wanted}");
         }
     }
-    // Across directions: x^2 over the sphere has a mean of 1/3, and its second differences sum to almost nothing.
+    // Across directions, cells of 18 degrees: x^2 is a squared cosine, whose second derivative is -2 along both at its peak,
+    // which rises by 2 x 2 (pi / 10)^2 / 12 = .033, and 2 across its trough, which sinks by half that.
     let squares = stored(&|s| lattice.direction(s % lattice.direction_count()).x.powi(2));
-    assert!(squares.iter().all(|x| (-0.03..1.0).contains(x)), "{squares:?}");
+    assert!(squares.iter().all(|x| (-0.018..1.035).contains(x)), "{squares:?}");
     // Nothing is taken across a sample that stands for another place.
     let mut inside = none.clone();
     inside[100] = true;

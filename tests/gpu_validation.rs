@@ -90,7 +90,8 @@ fn chain(gpu: &Gpu) -> Result<Vec<f32>> {
     let pass = Assemble::new(&gpu.device, &gpu.library, Storage::F32)?;
     let input = Buffer::with_data(&gpu.device, "input", &(0..64).map(|i| i as f32).collect::<Vec<_>>())?;
     let offsets = Buffer::with_data(&gpu.device, "offsets", &(0..=16).collect::<Vec<u32>>())?;
-    let list = Buffer::with_data(&gpu.device, "list", &(0..16).rev().collect::<Vec<u32>>())?;
+    let sources = (0..16).rev().map(|sample| [sample, 1.0_f32.to_bits()]);
+    let list = Buffer::with_data(&gpu.device, "list", &sources.collect::<Vec<[u32; 2]>>())?;
     let [middle, output] =
         ["middle", "output"].map(|name| Buffer::with_data(&gpu.device, name, &[0.0_f32; 64]).unwrap());
     let host = Buffer::new(&gpu.device, "host copy", BufferKind::Readback, 256)?;

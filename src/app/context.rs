@@ -106,8 +106,8 @@ pub struct MergeArguments {
     /// point-chain keeps chains at 32 points and projects once, which is quicker and less exact
     #[arg(long, default_value = "factored", value_name = "NAME")]
     pub product: Product,
-    /// Whether a chain of occluders is kept from growing: on or off
-    #[arg(long, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
+    /// Whether a chain of occluders is kept from growing
+    #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
     pub guard: bool,
 }
 
@@ -118,7 +118,8 @@ impl MergeArguments {
     }
 }
 
-fn on_or_off(text: &str) -> std::result::Result<bool, String> {
+/// A switch that takes a word.
+pub fn on_or_off(text: &str) -> std::result::Result<bool, String> {
     match text {
         "on" => Ok(true),
         "off" => Ok(false),

@@ -1,7 +1,7 @@
 //! `shadow-fields view`
 
 use super::Global;
-use super::context::{BakeArguments, Context, MergeArguments, size};
+use super::context::{BakeArguments, Context, MergeArguments, on_or_off, size};
 use crate::bake::cache::Cache;
 use crate::error::{Error, Result};
 use crate::frame;
@@ -43,7 +43,7 @@ pub struct Arguments {
     #[arg(long, default_value = "fifo", value_name = "fifo|fifo-relaxed|mailbox|immediate")]
     present_mode: PresentMode,
     /// Four samples a pixel; default: on a GPU, not on a software device
-    #[arg(long, value_name = "on|off", value_parser = on_off)]
+    #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     multisample: Option<bool>,
     /// Start with the motion paused
     #[arg(long)]
@@ -55,14 +55,6 @@ pub struct Arguments {
     merge: MergeArguments,
     #[command(flatten)]
     bake: BakeArguments,
-}
-
-fn on_off(word: &str) -> std::result::Result<bool, String> {
-    match word {
-        "on" => Ok(true),
-        "off" => Ok(false),
-        _ => Err(format!("\"{word}\" is neither on nor off")),
-    }
 }
 
 /// Opens the window and stays until it is closed.

@@ -25,7 +25,13 @@ fn baking() -> Vec<Row> {
 
 fn drawing() -> Vec<Row> {
     let fragment = [false, true].map(|display| Row::new("draw.frag", 4).define("DISPLAY", display));
-    fragment.into_iter().chain([Row::new("draw.vert", 4)]).collect()
+    fragment.into_iter().chain(["draw.vert", "show.vert", "show.frag"].map(|file| Row::new(file, 4))).collect()
+}
+
+fn measuring() -> Vec<Row> {
+    let kind = |kind: u32| Row::new("ceiling.comp", 4).define("KIND", kind);
+    let rate = |n| kind(n).define("READS", 16_u32).define("ROUNDS", 16_u32).define("MASK", 1023_u32);
+    (0..4).map(rate).chain([kind(4)]).collect()
 }
 
 fn lattice(text: &str) -> Lattice {
@@ -142,6 +148,11 @@ fn drawing_shaders_are_valid() {
 }
 
 #[test]
+fn measuring_shaders_are_valid() {
+    check(measuring());
+}
+
+#[test]
 fn merge_shaders_are_valid() {
     check(merging());
 }
@@ -155,7 +166,7 @@ fn merge_of_seven_bands_is_valid() {
 #[test]
 fn every_entry_point_is_among_the_rows() {
     let compiled: BTreeSet<&str> =
-        [baking(), drawing(), merging(), multiplying()].concat().iter().map(|row| row.file).collect();
+        [baking(), drawing(), measuring(), merging(), multiplying()].concat().iter().map(|row| row.file).collect();
     let there: BTreeSet<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| !name.ends_with(".glsl")).collect();
     assert_eq!(compiled, there);
 }

@@ -42,7 +42,7 @@ impl Sources {
     ///
     /// An unusable sample is replaced by the mean of the usable ones that are fewest steps away, a step leading to the next
     /// shell or the next direction. `inside` marks samples that stand for others (see [`super::inside::pushed_out`]): no second
-    /// difference is taken across them. Every other sample is lowered by [`SAG`] of its second differences, along shells and
+    /// difference is taken across them. Every other sample is lowered by `SAG` of its second differences, along shells and
     /// along both directions.
     ///
     /// # Errors
@@ -80,7 +80,7 @@ impl Sources {
     }
 }
 
-/// A sample less [`SAG`] of its second differences.
+/// A sample less `SAG` of its second differences.
 fn fit(lattice: &Lattice, inside: &[bool], sample: u32) -> BTreeMap<u32, f64> {
     let mut out = BTreeMap::from([(sample, 1.0)]);
     for pair in opposite(lattice, sample) {

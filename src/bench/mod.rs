@@ -1,5 +1,7 @@
 //! Measurements behind the figures in the documentation: what a picture's error is made of, what run time buys, and what
 //! keeps the numbers bounded.
+#![doc = ""]
+#![doc = include_str!("MEASURED.md")]
 
 pub mod budget;
 pub mod cases;

@@ -3,7 +3,7 @@
 //! Inputs: bounding spheres of the entities, their switches, bounds of the clusters. Output: a list of [`Step`]s a cluster.
 //! A step is left off when it changes no vertex of the cluster (an occluder farther than the light from all of them, or one
 //! that the skips in `merge_cone.glsl` weigh with zero everywhere), and, with a threshold `eps`, when the light that it could
-//! take or bring is bounded below it ([`Scope::weight`]). Neighbouring clusters are gathered together: a tree of the
+//! take or bring is bounded below it (`Scope::weight`). Neighbouring clusters are gathered together: a tree of the
 //! occluders finds what may matter to any of them, so that the work grows with that and not with what exists. The lists do
 //! not depend on the tree: what it leaves out, each cluster would leave off by itself.
 
@@ -33,7 +33,7 @@ struct View {
     /// Largest half-angle from any vertex, with the turn of the direction between vertices; `None` when a vertex may be inside.
     spread_rad: Option<f64>,
     below: bool,
-    /// See [`Scope::weight`].
+    /// See `Scope::weight`.
     weight: f64,
 }
 

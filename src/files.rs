@@ -25,7 +25,12 @@ pub fn replace_with<E: From<std::io::Error>>(
     // Like any created file, not private to its owner as temporary files are.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = BufWriter::new(builder.prefix(".unfinished-").tempfile_in(folder)?);
+    // The error names the other name, which is nobody's business.
+    let made = builder.prefix(".unfinished-").tempfile_in(folder).map_err(|e| {
+        let text = e.to_string();
+        std::io::Error::new(e.kind(), text.split(" at path ").next().unwrap_or(&text).to_owned())
+    });
+    let mut file = BufWriter::new(made?);
     write(&mut file)?;
     file.flush()?;
     file.into_inner().map_err(|e| e.into_error())?.persist(&target).map_err(|e| e.error)?;

@@ -144,7 +144,10 @@ fn scene_entities() {
         ("motion = [{ spin = { period_s = 1, speed = 2 } }]", "speed"),
         ("motion = [{ jump = { } }]", "unknown variant `jump`"),
         ("motion = [{ keyframes = { keys = [] } }]", "at least one key"),
-        ("motion = [{ keyframes = { keys = [{ time_s = 1 }, { time_s = 1 }] } }]", "times that increase"),
+        (
+            "motion = [{ keyframes = { keys = [{ time_s = 1 }, { time_s = 1 }] } }]",
+            "times that increase: key 2 of 2 is at 1 s",
+        ),
         ("motion = [{ keyframes = { keys = [{ time_s = nan }] } }]", "not finite"),
         ("motion = [{ keyframes = { keys = [{ time_s = 1, scale = 0 }] } }]", "uniform and positive"),
         ("motion = [{ keyframes = { keys = [{ time_s = 1, at = 0 }] } }]", "at"),
@@ -192,6 +195,16 @@ fn scene_meshes_and_environment() {
         ("[environment]\nkey = { radiance = [1, 1, 1], toward = [0, 1, 0], sharpness = 1e6 }\n", "limit of 1e5"),
         ("[environment]\nstrength = -1\n", "environment strength -1"),
         ("[environment]\nstrength = inf\n", "environment strength inf"),
+        ("[environment]\nstrength = 1e38\n", "environment strength 1e38 is not within 0 to 1e15"),
+        ("[environment]\nuniform = [1, 1e16, 1]\n", "environment uniform 1e16 is not within 0 to 1e15"),
+        ("[environment]\nuniform = [1, 1e15, 1]\nstrength = 2\n", "uniform times strength 2 is over the limit of 1e15"),
+        ("[environment]\ngradient = { radiance = [1, 1, 1e15], rise = 1e3 }\n", "environment gradient times strength"),
+        (
+            "[environment]\nkey = { radiance = [1e9, 1, 1], toward = [0, 1, 0], sharpness = 1 }\nstrength = 1e9\n",
+            "key times",
+        ),
+        ("[environment]\nsky = { radiance = 1e12, sun = 1e6 }\n", "environment sky times strength 1 is over"),
+        ("[environment]\nsky = { radiance = 1e16 }\n", "sky radiance 1e16 is not within 0 to 1e15"),
         ("[environment]\nturn_deg = nan\n", "environment turn_deg NaN"),
         ("[environment]\nturn_deg = 1e6\n", "is not within 1e5"),
         ("[environment]\nsky = { turbidity = 1 }\n", "sky turbidity 1 is not within 2 to 10"),
@@ -216,6 +229,10 @@ fn scene_meshes_and_environment() {
         "dir/s.toml:5: ",
         "invalid length 2",
     );
+    for word in ["sky", "gradient"] {
+        let text = format!("{HEAD}[environment]\n{word} = 3\n");
+        refused(scene(&text), "dir/s.toml:5: ", "invalid type: integer `3`, expected a table { ... }");
+    }
 }
 
 #[test]

@@ -282,3 +282,65 @@ fn usage() {
     refused(&case, &[&render[..], &["--time", "nan"]].concat(), 2, &["--time"]);
     refused(&case, &[&render[..], &["--shader-dir", "none"]].concat(), 4, &["none: ", "folder"]);
 }
+
+/// Numbers out of range, endings and options without the one that they belong to: told before anything is done.
+#[test]
+fn usage_of_values_and_pairs() {
+    let case = case(&[("s.toml", &format!("{CAMERA}{BALL}")), ("m.obj", &format!("{TRIANGLE}f 1 2 3\n"))]);
+    std::fs::create_dir(case.folder.join("dir.sf")).unwrap();
+    let render = ["render", "s.toml", "-o", "p.png"];
+    let bake = ["bake", "m.obj", "-o", "f.sf"];
+    for (start, more, part) in [
+        (&render[..], &["--eps", "-1"][..], "\"-1\" is no number from 0 to 1"),
+        (&render, &["--error", "e.png", "--error-limit", "-1"], "no number above 0"),
+        (&render, &["--rays", "64"], "--reference"),
+        (&render, &["--error-scheme", "absolute"], "--error"),
+        (&render, &["--error-limit", "1"], "--error"),
+        (&bake, &["--radiance", "-1,2,3"], "\"-1,2,3\" is no radiance"),
+        (&bake, &["--radiance", "1e38,1,1"], "from 0 to 1e15"),
+        (&["inspect", "f.sf"], &["--at", "1e300,0,0"], "within 1e15 m"),
+    ] {
+        let ran = finish(&mut command(&case.folder, &[start, more].concat()));
+        assert!(ran.code == 2 && ran.stderr.contains(part), "{more:?}: {} {}", ran.code, ran.stderr);
+    }
+    refused(&case, &["bake", "m.obj", "-o", "f.png"], 2, &["f.png: ", ".sf"]);
+    refused(&case, &["bake", "m.obj", "-o", "dir.sf"], 1, &["dir.sf: ", "a folder"]);
+    refused(&case, &["inspect", "f.sf", "--faces", "f.jpg"], 2, &["f.jpg: ", ".png"]);
+    refused(&case, &["inspect", "dir.sf"], 4, &["dir.sf: ", "Is a directory"]);
+}
+
+/// A name that a built-in scene has not is a missing file; a full disk under the results is told.
+#[test]
+fn names_and_results() {
+    let case = case(&[
+        ("m.obj", &format!("{TRIANGLE}f 1 2 3\n")),
+        ("n.obj", &format!("{TRIANGLE}v 0 0 2\nf 1 2 3\nf 1 2 4\n")),
+        ("dark.toml", &format!("{CAMERA}[environment]\nuniform = [1e38, 1, 1]\nstrength = 1e38\n")),
+    ]);
+    refused(&case, &["render", "dark.toml", "-o", "p.png"], 4, &["dark.toml:4: ", "1e38", "1e15"]);
+    refused(&case, &["render", "no_such_scene", "-o", "p.png"], 4, &["no_such_scene: "]);
+    if !has_device() {
+        return;
+    }
+    let small = ["--lattice", "cube:1x1", "--face-px", "4"];
+    let picture = ["render", "sphere_over_plane", "-o", "p.png", "--size", "8x8", "--time", "-3"];
+    good(&case.folder, &[&picture[..], &small].concat());
+    good(&case.folder, &[&["bake", "m.obj", "-o", "f.sf"][..], &small].concat());
+    let other = ["inspect", "f.sf", "--faces", "o.png", "--mesh", "n.obj"];
+    refused(&case, &other, 4, &["n.obj: ", "not the mesh m "]);
+    good(&case.folder, &[&["bake", "m.obj", "-o", "r.sf", "--radiance", "1,2,3"][..], &small].concat());
+    refused(&case, &["inspect", "r.sf", "--faces", "o.png", "--mesh", "n.obj"], 4, &["n.obj: "]);
+    #[cfg(target_os = "linux")]
+    {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let mut devices = command(&case.folder, &["devices"]);
+        let ran =
+            devices.stdout(full).stderr(std::process::Stdio::piped()).spawn().unwrap().wait_with_output().unwrap();
+        let text = String::from_utf8(ran.stderr).unwrap();
+        assert_eq!(ran.status.code(), Some(1), "{text}");
+        assert!(text.lines().count() == 1 && text.starts_with("shadow-fields: stdout: "), "{text}");
+        let proc = [&["render", "sphere_over_plane", "-o", "/proc/x.png", "--size", "8x8"][..], &small].concat();
+        let ran = finish(&mut command(&case.folder, &proc));
+        assert!(ran.code == 1 && !ran.stderr.contains("unfinished"), "{}", ran.stderr);
+    }
+}

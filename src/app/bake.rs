@@ -3,6 +3,7 @@
 use super::context::{BakeArguments, Context};
 use super::{Global, output};
 use crate::asset::Mesh;
+use crate::asset::environment::RADIANCE_LIMIT;
 use crate::bake;
 use crate::error::{Error, Result};
 use crate::field::{Kind, ShadowField};
@@ -22,7 +23,7 @@ pub struct Arguments {
     output: PathBuf,
     /// Bake a radiance field of a surface that shines with this colour (times the mesh's own colours, if it has them)
     /// instead of an occlusion field
-    #[arg(long, value_name = "R,G,B", value_parser = color)]
+    #[arg(long, value_name = "R,G,B", value_parser = color, allow_hyphen_values = true)]
     radiance: Option<Vec3>,
     /// Capture far samples of a large mesh from simplified ones, at most an eighth of a texel off: for lattices whose samples
     /// mostly stand far from it
@@ -35,21 +36,27 @@ pub struct Arguments {
 fn color(text: &str) -> std::result::Result<Vec3, String> {
     let numbers: Vec<f32> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
     match numbers[..] {
-        [r, g, b] if text.split(',').count() == 3 && numbers.iter().all(|c| c.is_finite() && *c >= 0.0) => {
+        [r, g, b] if text.split(',').count() == 3 && numbers.iter().all(|c| (0.0..=RADIANCE_LIMIT).contains(c)) => {
             Ok(Vec3::new(r, g, b))
         }
-        _ => Err(format!("\"{text}\" is no radiance like 1,0.5,0.2: three finite numbers of at least 0")),
+        _ => Err(format!("\"{text}\" is no radiance like 1,0.5,0.2: three numbers from 0 to {RADIANCE_LIMIT:e}")),
     }
 }
 
 /// Bakes one field. The result does not depend on the cache, which is not used.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     output::check_folder(&arguments.output)?;
+    output::check_ending(&arguments.output, "sf", "a field file")?;
     let mut mesh = Mesh::load(&arguments.mesh)?;
     let kind = if arguments.radiance.is_some() { Kind::Radiance } else { Kind::Occlusion };
     if let Some(radiance) = arguments.radiance {
         let white = vec![Vec3::ONE; mesh.positions.len()];
         let colors = mesh.colors.as_ref().unwrap_or(&white).iter().map(|c| *c * radiance).collect();
+        let brightest = mesh.colors.iter().flatten().map(|c| (*c * radiance).max_element()).fold(0.0, f32::max);
+        if brightest > RADIANCE_LIMIT {
+            let what = format!("its colours times --radiance are over the limit of {RADIANCE_LIMIT:e}");
+            return Err(Error::input(&arguments.mesh, what));
+        }
         mesh = Mesh::new(mesh.name, mesh.positions, mesh.normals, Some(colors), mesh.triangles)?;
     }
     let mut context = Context::new(global)?;

@@ -4,15 +4,15 @@ use super::context::Context;
 use super::sheet::{self, Cell};
 use super::{Global, output};
 use crate::asset::Mesh;
-use crate::bake::snapshot::snapshot;
+use crate::bake::{self, snapshot::snapshot};
 use crate::error::{Error, Result};
-use crate::field::{Kind, Lookup, ShadowField, growth};
+use crate::field::{Header, Kind, Lookup, ShadowField, growth};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
 use clap::Args;
 use glam::DVec3;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `inspect`.
 #[derive(Args)]
@@ -33,17 +33,25 @@ pub struct Arguments {
     lookup: Lookup,
 }
 
+/// Farthest coordinate of a lookup in metres.
+const PLACE_LIMIT_M: f64 = 1e15;
+
 fn place(text: &str) -> std::result::Result<DVec3, String> {
     let numbers: Vec<f64> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
     match numbers[..] {
-        [x, y, z] if text.split(',').count() == 3 && numbers.iter().all(|n| n.is_finite()) => Ok(DVec3::new(x, y, z)),
-        _ => Err(format!("\"{text}\" is no place like 1,0.5,-2")),
+        [x, y, z] if text.split(',').count() == 3 && numbers.iter().all(|n| n.abs() <= PLACE_LIMIT_M) => {
+            Ok(DVec3::new(x, y, z))
+        }
+        _ => Err(format!("\"{text}\" is no place like 1,0.5,-2, within {PLACE_LIMIT_M:e} m")),
     }
 }
 
 /// Shows a field.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    arguments.faces.as_deref().map_or(Ok(()), output::check_folder)?;
+    if let Some(path) = &arguments.faces {
+        output::check_folder(path)?;
+        output::check_ending(path, "png", "a picture")?;
+    }
     let field = ShadowField::read(&arguments.field)?;
     let header = &field.header;
     let mut result = json!({
@@ -57,7 +65,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         result["at"] = lookup(&field, position_m, arguments.lookup);
     }
     if let Some(path) = &arguments.faces {
-        let mesh = arguments.mesh.as_ref().map(|path| Mesh::load(path)).transpose()?;
+        let mesh = arguments.mesh.as_deref().map(|path| baked_mesh(header, path)).transpose()?;
         write_sheet(global, &field, mesh.as_ref(), path)?;
     }
     if global.json {
@@ -98,6 +106,30 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
+/// The mesh that a field was baked from.
+fn baked_mesh(header: &Header, path: &Path) -> Result<Mesh> {
+    let mesh = Mesh::load(path)?;
+    let (centre, radius_m) = mesh.bounding_sphere();
+    // A radiance field's hash holds the colours that it was baked with, which --radiance may have changed.
+    let same = match header.kind {
+        Kind::Occlusion => bake::hash_text(&mesh) == header.mesh_hash,
+        Kind::Radiance => centre.to_array() == header.centre_m && radius_m == header.radius_m,
+    };
+    if same {
+        return Ok(mesh);
+    }
+    let of = |centre: [f32; 3], radius_m: f32| format!("centre {centre:?} m, radius {radius_m} m");
+    Err(Error::input(
+        path,
+        format!(
+            "is not the mesh {} that the field was baked from ({}; this one has {})",
+            header.mesh,
+            of(header.centre_m, header.radius_m),
+            of(centre.to_array(), radius_m)
+        ),
+    ))
+}
+
 /// Coefficients at a place in the mesh's frame, metres.
 fn lookup(field: &ShadowField, position_m: DVec3, lookup: Lookup) -> serde_json::Value {
     let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
@@ -125,7 +157,7 @@ const LATITUDES_DEG: [f64; 3] = [45.0, 0.0, -45.0];
 /// Shells of the sheet, as fractions of their number.
 const SHELLS: [f64; 4] = [0.0, 0.3, 0.6, 1.0];
 
-fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: &std::path::Path) -> Result<()> {
+fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: &Path) -> Result<()> {
     let lattice = field.header.lattice;
     let mut rows = Vec::new();
     let mut eyes = Vec::new();

@@ -58,7 +58,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     output::start_log(&cli.global);
-    match run(&cli) {
+    match run(&cli).and_then(|()| output::written()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             output::complain(&error);

@@ -6,10 +6,29 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::cell::RefCell;
 use std::io::Write;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
-/// Writes one line of results to stdout. A reader that went away is no error.
+/// What kept results from being written first.
+static UNWRITTEN: Mutex<Option<std::io::Error>> = Mutex::new(None);
+
+/// Writes one line of results to stdout. A reader that went away is no error; any other is kept for [`written`].
 pub fn say(line: impl AsRef<str>) {
-    let _ = writeln!(std::io::stdout().lock(), "{}", line.as_ref());
+    let mut stdout = std::io::stdout().lock();
+    let Err(error) = writeln!(stdout, "{}", line.as_ref()).and_then(|()| stdout.flush()) else { return };
+    if error.kind() != std::io::ErrorKind::BrokenPipe {
+        UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    }
+}
+
+/// Fails where results could not be written, as to a full disk.
+///
+/// # Errors
+/// `Failed` with the first reason.
+pub fn written() -> Result<()> {
+    match UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        Some(error) => Err(Error::Failed(format!("stdout: cannot be written: {error}"))),
+        None => Ok(()),
+    }
 }
 
 /// Writes one line of an error to stderr.
@@ -24,17 +43,33 @@ pub fn note(global: &Global, line: impl AsRef<str>) {
     }
 }
 
-/// Fails where a file could not be written because its folder is missing: told before work is done, not after.
+/// Fails where a file could not be written because its folder is missing or it is a folder itself: told before work is done,
+/// not after.
 ///
 /// # Errors
 /// `Failed` with the file's name.
 pub fn check_folder(path: &Path) -> Result<()> {
+    if path.is_dir() {
+        return Err(Error::Failed(format!("{}: cannot write: it is a folder", path.display())));
+    }
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
             Err(Error::Failed(format!("{}: cannot write: there is no folder {}", path.display(), folder.display())))
         }
         _ => Ok(()),
     }
+}
+
+/// Fails where a file's name does not end as its kind does; a device or pipe may have any name.
+///
+/// # Errors
+/// `Usage` with the name and the ending.
+pub fn check_ending(path: &Path, ending: &str, what: &str) -> Result<()> {
+    let device = std::fs::metadata(path).is_ok_and(|m| !m.is_file());
+    if device || path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!("{}: the name of {what} is to end in .{ending}", path.display())))
 }
 
 /// Starts the log on stderr: warnings by default, more with `-v`, as RUST_LOG says where it is set.

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 /// Arguments of `profile`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Scene whose passes are timed; without one a made-up merge of known size
+    /// Scene file, or the name of a built-in scene, whose passes are timed; without one a made-up merge of known size
     scene: Option<PathBuf>,
     /// Size of the scene's pictures
     #[arg(long, default_value = "1280x720", value_parser = size, value_name = "WxH")]

@@ -18,7 +18,7 @@ use std::time::Instant;
 /// Arguments of `render`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Scene file (see assets/scenes for examples)
+    /// Scene file (see assets/scenes for examples), or the name of a built-in one
     scene: PathBuf,
     /// Picture to write; with --frames an animated PNG, or pictures numbered from 0 when the name has a run of #: out/f_####.png
     #[arg(short, long, value_name = "P.png")]
@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
     fps: u16,
     /// Scene time of the first picture, seconds; default: the scene's, which is 0 unless it says otherwise
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time: Option<f64>,
     /// Size of the picture; default: the scene's
     #[arg(long, value_parser = size, value_name = "WxH")]
@@ -45,20 +45,20 @@ pub struct Arguments {
     #[arg(long, value_name = "S.json")]
     stats: Option<PathBuf>,
     /// Light by ray casting instead of shadow fields: slow, and what the fields are judged by
-    #[arg(long)]
+    #[arg(long, group = "judge")]
     reference: bool,
     /// Also write the error of the last picture's vertices against ray casting in false colour, with a scale bar
-    #[arg(long, value_name = "E.png", conflicts_with = "reference")]
+    #[arg(long, value_name = "E.png", group = "judge", conflicts_with = "reference")]
     error: Option<PathBuf>,
     /// With --error: blue too dark and red too bright, or dark right and light wrong
-    #[arg(long, default_value = "signed", value_name = "signed|absolute")]
+    #[arg(long, default_value = "signed", value_name = "signed|absolute", requires = "error")]
     error_scheme: Scheme,
     /// With --error: the error with the last colour, relative to the root mean square of the radiosity; default: the 99th
     /// percentile, rounded up
-    #[arg(long, value_name = "X", value_parser = positive)]
+    #[arg(long, value_name = "X", value_parser = positive, requires = "error", allow_negative_numbers = true)]
     error_limit: Option<f64>,
     /// With --reference or --error: rays a vertex for the sky and for each light
-    #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
+    #[arg(long, default_value_t = 1024, value_name = "N", requires = "judge", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
     rays: u32,
     #[command(flatten)]
     merge: MergeArguments,

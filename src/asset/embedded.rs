@@ -1,6 +1,6 @@
 //! Scenes and meshes compiled into the binary, so that it runs without this repository's folder.
 
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Error, Result};
 
@@ -60,6 +60,12 @@ fn entry(path: &Path) -> Option<&'static (&'static str, &'static [u8])> {
 /// [`Error::Input`] for a path that is not embedded.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     find(path).map(<[u8]>::to_vec).ok_or_else(|| Error::input(path, "no such embedded file"))
+}
+
+/// Where the built-in scene of this bare name stands: `assets/scenes/NAME.toml`. `None` for any other word.
+pub fn scene_path(name: &Path) -> Option<PathBuf> {
+    let path = Path::new(ROOT).join("scenes").join(name).with_extension("toml");
+    (name.components().count() == 1 && name.extension().is_none() && find(&path).is_some()).then_some(path)
 }
 
 /// Name (without folder and extension) and text of every embedded scene.

@@ -8,11 +8,14 @@ use glam::{DQuat, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::equirect::Equirect;
+use super::short;
 use super::sky::{Dome, Sky};
 use crate::error::{Error, Result};
 use crate::sh::lobe;
 use crate::sh::rotation::Rotation;
 
+/// Largest radiance, and largest of its factors: the square still fits f32.
+pub const RADIANCE_LIMIT: f32 = 1e15;
 /// Largest angle that the whole may be turned by: f32 keeps hundredths of a degree there.
 const TURN_LIMIT_DEG: f32 = 1e5;
 /// Intervals of Simpson's rule for the lobe of [`Key`]; its relative error is then below 1e-11.
@@ -66,8 +69,12 @@ fn is_zero(value: &f32) -> bool {
 
 impl Source {
     fn check(&self) -> Result<()> {
-        let amount = |what: &str, values: &[f32]| match values.iter().find(|v| !(v.is_finite() && **v >= 0.0)) {
-            Some(bad) => Err(Error::Input(format!("environment {what} {bad} is negative or not finite"))),
+        let amount = |what: &str, values: &[f32]| match values.iter().find(|v| !(0.0..=RADIANCE_LIMIT).contains(*v)) {
+            Some(bad) => Err(Error::Input(format!(
+                "environment {what} {} is not within 0 to {}",
+                short(*bad),
+                short(RADIANCE_LIMIT)
+            ))),
             None => Ok(()),
         };
         amount("strength", &[self.strength])?;
@@ -77,13 +84,19 @@ impl Source {
                 self.turn_deg
             )));
         }
-        self.uniform.map_or(Ok(()), |rgb| amount("uniform", &rgb.to_array()))?;
+        if let Some(rgb) = self.uniform {
+            amount("uniform", &rgb.to_array())?;
+            self.within("uniform", f64::from(rgb.max_element()))?;
+        }
         if let Some(gradient) = &self.gradient {
             amount("gradient", &gradient.radiance.to_array())?;
             amount("gradient", &[gradient.base, gradient.rise])?;
+            let shares = f64::from(gradient.base) + f64::from(gradient.rise);
+            self.within("gradient", f64::from(gradient.radiance.max_element()) * shares)?;
         }
         if let Some(key) = &self.key {
             amount("key", &key.radiance.to_array())?;
+            self.within("key", f64::from(key.radiance.max_element()))?;
             amount("key sharpness", &[key.sharpness])?;
             if key.sharpness > 1e5 {
                 return Err(Error::Input("environment key sharpness is over the limit of 1e5".into()));
@@ -92,8 +105,31 @@ impl Source {
                 return Err(Error::Input("environment key has no direction towards it".into()));
             }
         }
-        self.sky.as_ref().map_or(Ok(()), Sky::check)?;
+        if let Some(sky) = &self.sky {
+            sky.check()?;
+            self.within("sky", f64::from(sky.radiance) * f64::from(sky.sun.max(1.0)))?;
+        }
         self.image.as_ref().map_or(Ok(()), |image| amount("image scale", &[image.scale]))
+    }
+
+    /// Refuses radiance that `strength` takes over the limit.
+    fn within(&self, what: &str, radiance: f64) -> Result<()> {
+        let whole = radiance * f64::from(self.strength);
+        if whole <= f64::from(RADIANCE_LIMIT) * (1.0 + 1e-6) {
+            return Ok(());
+        }
+        Err(Error::Input(format!(
+            "environment {what} times strength {} is over the limit of {} for radiance",
+            short(self.strength),
+            short(RADIANCE_LIMIT)
+        )))
+    }
+
+    /// [`Source::within`] for the mean of a picture.
+    fn check_picture(&self, picture: &Equirect) -> Result<()> {
+        let scale = self.image.as_ref().map_or(0.0, |image| f64::from(image.scale));
+        let mean = picture.coefficients(1).iter().map(|c| c[0]).fold(0.0, f64::max) / (4.0 * PI).sqrt();
+        self.within("image", mean * scale)
     }
 
     /// Whether nothing shines, whatever the strength.
@@ -164,15 +200,18 @@ impl Environment {
     /// Checks `source` and decodes its picture, whose bytes `read` supplies.
     ///
     /// # Errors
-    /// [`Error::Input`], one line: a negative or non-finite number, a direction without length, a picture that cannot be
-    /// read, is not HDR, EXR or PNG, is wider than [`super::equirect::WIDTH_LIMIT_PX`], or holds negative or non-finite radiance.
+    /// [`Error::Input`], one line: a negative number, radiance over [`RADIANCE_LIMIT`], a direction without length, a picture
+    /// that cannot be read, is not HDR, EXR or PNG, is wider than [`super::equirect::WIDTH_LIMIT_PX`], or holds negative or
+    /// non-finite radiance.
     pub fn new(source: &Source, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Self> {
         source.check()?;
         let picture = source.image.as_ref().map(|image| {
             Equirect::decode(&read(&image.file)?).map(Arc::new).map_err(|e| e.context(image.file.display()))
         });
+        let picture = picture.transpose()?;
+        picture.as_ref().map_or(Ok(()), |picture| source.check_picture(picture))?;
         let dome = source.sky.as_ref().map(|sky| Arc::new(Dome::new(sky)));
-        Ok(Self { source: source.clone(), picture: picture.transpose()?, dome })
+        Ok(Self { source: source.clone(), picture, dome })
     }
 
     /// The same picture under another description, which must name it too if it names one.
@@ -186,6 +225,7 @@ impl Environment {
             return Err(Error::Input(format!("environment image {} was not read", other.display())));
         }
         let picture = self.picture.clone().filter(|_| source.image.is_some());
+        picture.as_ref().map_or(Ok(()), |picture| source.check_picture(picture))?;
         let dome = match &source.sky {
             same if *same == self.source.sky => self.dome.clone(),
             sky => sky.as_ref().map(|sky| Arc::new(Dome::new(sky))),

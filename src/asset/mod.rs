@@ -25,6 +25,16 @@ pub mod topology;
 
 pub use mesh::Mesh;
 
+/// A number as people write it: very large and very small ones with an exponent (`1e15`).
+pub fn short<T: Copy + Into<f64> + std::fmt::Display + std::fmt::LowerExp>(number: T) -> String {
+    let size = number.into().abs();
+    if size.is_finite() && size != 0.0 && !(1e-4..1e7).contains(&size) {
+        format!("{number:e}")
+    } else {
+        number.to_string()
+    }
+}
+
 /// Reads a file of at most `limit_bytes`, whatever length it claims.
 ///
 /// # Errors

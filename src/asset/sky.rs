@@ -9,7 +9,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::{DMat3, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::environment::{key_zonal, one};
+use super::environment::{RADIANCE_LIMIT, key_zonal, one};
+use super::short;
 use crate::error::{Error, Result};
 use crate::sh::basis::{self, MAX_BANDS, MAX_COEFFICIENTS};
 use crate::sh::lobe;
@@ -61,12 +62,17 @@ impl Sky {
     pub(super) fn check(&self) -> Result<()> {
         let range = |what: &str, value: f32, low: f32, high: f32| match (low..=high).contains(&value) {
             true => Ok(()),
-            false => Err(Error::Input(format!("environment sky {what} {value} is not within {low} to {high}"))),
+            false => Err(Error::Input(format!(
+                "environment sky {what} {} is not within {} to {}",
+                short(value),
+                short(low),
+                short(high)
+            ))),
         };
         range("sun_elevation_deg", self.sun_elevation_deg, 0.0, 90.0)?;
         range("sun_azimuth_deg", self.sun_azimuth_deg, -360.0, 360.0)?;
         range("turbidity", self.turbidity, 2.0, 10.0)?;
-        range("radiance", self.radiance, 0.0, 1e15)?;
+        range("radiance", self.radiance, 0.0, RADIANCE_LIMIT)?;
         range("sun", self.sun, 0.0, 1e6)?;
         self.ground.to_array().into_iter().try_for_each(|c| range("ground", c, 0.0, 1.0))
     }

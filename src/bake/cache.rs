@@ -30,7 +30,7 @@ struct TransferHeader {
 impl TransferHeader {
     fn new(mesh: &Mesh, bands: usize, face_px: u32) -> Self {
         TransferHeader {
-            mesh_hash: mesh.content_hash().iter().map(|byte| format!("{byte:02x}")).collect(),
+            mesh_hash: super::hash_text(mesh),
             bands,
             face_px,
             offset: TRANSFER_OFFSET,

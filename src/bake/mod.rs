@@ -127,6 +127,11 @@ pub fn first_shell(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
     if nearest > 0.93 { OUTSIDE_INNER } else { nearest.max(ROOMY_INNER) }
 }
 
+/// The hash of a mesh's contents as headers hold it.
+pub fn hash_text(mesh: &Mesh) -> String {
+    mesh.content_hash().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// Header of the field that a bake of `mesh` would make.
 pub fn header(mesh: &Mesh, kind: Kind, options: &Options) -> Header {
     let (centre, radius_m) = mesh.bounding_sphere();
@@ -144,7 +149,7 @@ pub fn header(mesh: &Mesh, kind: Kind, options: &Options) -> Header {
         radius_m,
         radiance_scale: if kind == Kind::Radiance && mesh.colors.is_some() { brightest } else { 1.0 },
         mesh: mesh.name.clone(),
-        mesh_hash: mesh.content_hash().iter().map(|byte| format!("{byte:02x}")).collect(),
+        mesh_hash: hash_text(mesh),
     }
 }
 

@@ -60,7 +60,11 @@ pub fn write<H: Serialize>(path: &Path, magic: [u8; 8], header: &H, payload: &[u
 pub fn read<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
     let bad = |what: String| Error::input(path, what);
     let mut file = File::open(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
-    let size = file.metadata().map_err(|error| bad(format!("cannot be read: {error}")))?.len();
+    let about = file.metadata().map_err(|error| bad(format!("cannot be read: {error}")))?;
+    if about.is_dir() {
+        return Err(bad("cannot be read: Is a directory".into()));
+    }
+    let size = about.len();
     let mut prologue = [0; PROLOGUE];
     file.read_exact(&mut prologue).map_err(|_| bad(format!("{size} bytes are too short for a field file")))?;
     if prologue[..8] != magic {

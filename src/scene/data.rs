@@ -275,7 +275,7 @@ impl Data {
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let data: Data = toml::from_str(text).map_err(|e| {
             let line = e.span().map_or(1, |span| line_of(text, span.start));
-            Error::input_at(path, line, e.message().trim().replace('\n', ", "))
+            Error::input_at(path, line, plain(&e.message().trim().replace('\n', ", ")))
         })?;
         for (what, count, limit) in
             [("meshes", data.meshes.len(), MESH_LIMIT), ("entities", data.entities.len(), ENTITY_LIMIT)]
@@ -292,6 +292,13 @@ impl Data {
         // All fields are plain values, tables and lists of them, which TOML can hold.
         toml::to_string(self).unwrap_or_else(|e| panic!("scene data does not fit TOML: {e}"))
     }
+}
+
+/// A message without the names of this program's types: where it expected one of them, a table is wanted.
+fn plain(message: &str) -> String {
+    let Some((before, rest)) = message.split_once("expected struct ") else { return message.to_owned() };
+    let after = rest.find(|c: char| !c.is_alphanumeric() && c != '_').map_or("", |end| &rest[end..]);
+    format!("{before}expected a table {{ ... }}{after}")
 }
 
 /// Line, counted from 1, of a byte of `text`.

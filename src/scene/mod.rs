@@ -60,11 +60,13 @@ pub struct Entity {
 
 impl Scene {
     /// Reads a scene and the files it names, relative to it. A path that does not exist but is embedded in the binary
-    /// (`assets/scenes/NAME.toml`) is taken from there.
+    /// (`assets/scenes/NAME.toml`, or NAME alone) is taken from there.
     ///
     /// # Errors
     /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line.
     pub fn load(path: &Path) -> Result<Self> {
+        let named = embedded::scene_path(path).filter(|_| !path.exists());
+        let path = named.as_deref().unwrap_or(path);
         if !path.exists() && embedded::find(path).is_some() {
             let bytes = embedded::read(path)?;
             return Self::parse(utf8(path, &bytes)?, path, &embedded::read);

@@ -188,8 +188,17 @@ pub struct Keyframe {
 
 fn keyframes<'de, D: serde::Deserializer<'de>>(source: D) -> Result<Vec<Keyframe>, D::Error> {
     let keys = Vec::<Keyframe>::deserialize(source)?;
-    if keys.is_empty() || keys.windows(2).any(|k| k[1].time_s <= k[0].time_s) {
-        return Err(serde::de::Error::custom("keyframes need at least one key, and times that increase"));
+    if keys.is_empty() {
+        return Err(serde::de::Error::custom("keyframes need at least one key"));
+    }
+    if let Some(before) = keys.windows(2).position(|k| k[1].time_s <= k[0].time_s) {
+        return Err(serde::de::Error::custom(format!(
+            "keyframes need times that increase: key {} of {} is at {} s, the one before at {} s",
+            before + 2,
+            keys.len(),
+            keys[before + 1].time_s,
+            keys[before].time_s
+        )));
     }
     Ok(keys)
 }

@@ -1,5 +1,7 @@
 //! Numbers of a scene file, checked while they are read, so that a message names the line of the number.
 
+use crate::asset::environment::RADIANCE_LIMIT;
+use crate::asset::short;
 use glam::Vec3;
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 
@@ -7,8 +9,6 @@ use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 pub const POSITION_LIMIT_M: f32 = 1e7;
 /// Scales lie between the inverse of this and this.
 pub const SCALE_LIMIT: f32 = 1e7;
-/// Largest radiance: its square still fits f32.
-pub const RADIANCE_LIMIT: f32 = 1e15;
 /// Largest angle in degrees and time in seconds; f64 keeps fractions of 1e-7 there.
 pub const NUMBER_LIMIT: f64 = 1e9;
 
@@ -18,7 +18,7 @@ fn three<'de, D: Deserializer<'de>>(source: D, what: &str, in_range: impl Fn(f32
     let three: [f32; 3] =
         list.try_into().map_err(|l: Vec<f32>| D::Error::custom(format!("{what} has 3 numbers, not {}", l.len())))?;
     match three.iter().find(|v| !in_range(**v)) {
-        Some(bad) => Err(D::Error::custom(format!("{bad} is out of range for {what}"))),
+        Some(bad) => Err(D::Error::custom(format!("{} is out of range for {what}", short(*bad)))),
         None => Ok(Vec3::from_array(three)),
     }
 }
@@ -58,14 +58,18 @@ pub fn number<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     if value.abs() <= NUMBER_LIMIT {
         Ok(value)
     } else {
-        Err(D::Error::custom(format!("{value} is not finite or beyond 1e9")))
+        Err(D::Error::custom(format!("{} is not finite or beyond 1e9", short(value))))
     }
 }
 
 /// Seconds of one turn; negative turns the other way.
 pub fn period<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     let value = number(source)?;
-    if value.abs() >= 1e-6 { Ok(value) } else { Err(D::Error::custom(format!("a period of {value} s is too short"))) }
+    if value.abs() >= 1e-6 {
+        Ok(value)
+    } else {
+        Err(D::Error::custom(format!("a period of {} s is too short", short(value))))
+    }
 }
 
 const SCALE: &str = "one scale, uniform and positive (1e-7 to 1e7)";
@@ -83,7 +87,7 @@ pub fn scale<'de, D: Deserializer<'de>>(source: D) -> Result<f32, D::Error> {
             if (1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(&single) {
                 Ok(single)
             } else {
-                Err(E::custom(format!("scale {value}: expected {SCALE}")))
+                Err(E::custom(format!("scale {}: expected {SCALE}", short(value))))
             }
         }
         fn visit_i64<E: Error>(self, value: i64) -> Result<f32, E> {

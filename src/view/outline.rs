@@ -2,7 +2,7 @@
 
 use crate::asset::Mesh;
 use crate::scene::Placement;
-use glam::{DMat4, DVec2, DVec3, Vec3};
+use glam::{DMat4, DVec2, DVec3, DVec4, Vec3};
 use std::collections::HashMap;
 
 /// Edges of a mesh with the faces beside them.
@@ -46,7 +46,8 @@ impl Edges {
         edges
     }
 
-    /// Line segments of the outline in a picture of `size` pixels (any unit), in its coordinates: x right, y down.
+    /// Line segments of the outline in a picture of `size` pixels (any unit), in its coordinates: x right, y down. They end at
+    /// the picture's edges.
     pub fn outline(&self, placement: &Placement, clip_from_world: DMat4, eye: DVec3, size: DVec2) -> Vec<[DVec2; 2]> {
         let rotation = placement.rotation.as_dquat().normalize();
         let world = DMat4::from_scale_rotation_translation(
@@ -57,19 +58,34 @@ impl Edges {
         let clip = clip_from_world * world;
         let eye = world.inverse().transform_point3(eye);
         let seen: Vec<bool> = self.planes.iter().map(|(point, normal)| normal.dot(eye - *point) > 0.0).collect();
-        let place = |p: &Vec3| {
-            let c = clip * p.as_dvec3().extend(1.0);
-            (c.w > 1e-6).then(|| (DVec2::new(c.x, c.y) / c.w + 1.0) / 2.0 * size)
-        };
+        let place = |c: DVec4| (DVec2::new(c.x, c.y) / c.w + 1.0) / 2.0 * size;
         let of = |(faces, ends): (&[u32; 2], &[Vec3; 2])| {
             let [a, b] = faces.map(|f| seen[f as usize]);
             if a == b && faces[0] != faces[1] {
                 return None;
             }
-            Some([place(&ends[0])?, place(&ends[1])?])
+            clipped(ends.map(|p| clip * p.as_dvec3().extend(1.0))).map(|ends| ends.map(place))
         };
         self.faces.iter().zip(&self.ends).filter_map(of).collect()
     }
+}
+
+/// The part of a segment in clip coordinates that is before the eye and between the picture's edges.
+fn clipped([from, to]: [DVec4; 2]) -> Option<[DVec4; 2]> {
+    let sides = |c: DVec4| [c.w - 1e-6, c.w - c.x, c.w + c.x, c.w - c.y, c.w + c.y];
+    let (mut first, mut last) = (0.0, 1.0);
+    for (a, b) in sides(from).into_iter().zip(sides(to)) {
+        if a < 0.0 && b < 0.0 {
+            return None;
+        }
+        let crossing = a / (a - b);
+        if a < 0.0 {
+            first = f64::max(first, crossing);
+        } else if b < 0.0 {
+            last = f64::min(last, crossing);
+        }
+    }
+    (first < last).then(|| [first, last].map(|t| from.lerp(to, t)))
 }
 
 #[cfg(test)]
@@ -81,10 +97,14 @@ mod tests {
     use glam::Quat;
 
     fn outline(toml: &str) -> Vec<[DVec2; 2]> {
+        outline_at(toml, Vec3::ZERO)
+    }
+
+    fn outline_at(toml: &str, position: Vec3) -> Vec<[DVec2; 2]> {
         let table: HashMap<String, Generator> = toml::from_str(&format!("mesh.{toml}")).unwrap();
         let mesh = table["mesh"].build().unwrap();
         let camera = Camera { eye: Vec3::new(0.0, 0.0, 10.0), target: Vec3::ZERO, fov_deg: 40.0 };
-        let placement = Placement { position: Vec3::ZERO, rotation: Quat::IDENTITY, scale: 1.0 };
+        let placement = Placement { position, rotation: Quat::IDENTITY, scale: 1.0 };
         let clip = clip_from_world(&camera, 1.0);
         Edges::new(&mesh).outline(&placement, clip, camera.eye.as_dvec3(), DVec2::splat(200.0))
     }
@@ -105,5 +125,20 @@ mod tests {
     fn flat_faces_show_no_triangles() {
         let lines = outline("cuboid = { size_m = [1, 1, 1], cells = 2 }");
         assert_eq!(lines.len(), 8, "two edges a side of the square seen from the front: {lines:?}");
+    }
+
+    #[test]
+    fn an_outline_ends_at_the_edges_of_the_picture() {
+        // Wider than the picture, and its near edge is behind the camera.
+        let lines = outline_at("plane = { size_m = 60, cells = 1 }", Vec3::new(0.0, -1.0, 0.0));
+        assert_eq!(lines.len(), 1, "the far edge alone is in view: {lines:?}");
+        let [a, b] = lines[0];
+        assert!((a.x - b.x).abs() > 199.9 && (a.y - b.y).abs() < 1e-6 && (100.0..200.0).contains(&a.y), "{lines:?}");
+        // Half of a square beyond the right edge: its two long sides reach that edge.
+        let edge = 10.0 * 20.0_f64.to_radians().tan() as f32;
+        let lines = outline_at("cuboid = { size_m = [1, 1, 0.001], cells = 1 }", Vec3::new(edge, 0.0, 0.0));
+        let reach = |l: &&[DVec2; 2]| l.iter().any(|p| (p.x - 200.0).abs() < 1e-6);
+        assert_eq!(lines.iter().filter(reach).count(), 2, "{lines:?}");
+        assert!(lines.iter().flatten().all(|p| (0.0..=200.0 + 1e-6).contains(&p.x)));
     }
 }

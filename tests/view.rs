@@ -619,7 +619,7 @@ fn a_saved_scene_reads_back_as_the_state() {
         }
         assert_eq!(scene.environment.coefficients(4), editor.scene().environment.coefficients(4));
         // And it can be edited on, and saved over.
-        let again = Editor::new(scene, &path);
+        let mut again = Editor::new(scene, &path);
         assert_eq!((again.placements(), again.save_path()), (editor.placements(), path.clone()));
         again.save(&path).unwrap();
         assert_eq!(Scene::load(&path).unwrap().data, again.scene().data);
@@ -644,9 +644,10 @@ fn saved_files_are_found_from_other_folders() {
                 [[mesh]]\nname = \"m\"\nfile = \"meshes/t.obj\"\n[[mesh]]\nname = \"b\"\nfile = \"assets/meshes/torus.obj\"\n[[entity]]\nmesh = \"m\"\n";
     std::fs::write(here.join("s.toml"), text).unwrap();
     let open = |path: &Path| Editor::new(Scene::load(path).unwrap(), path);
-    let editor = open(&here.join("s.toml"));
+    let mut editor = open(&here.join("s.toml"));
     assert_eq!(editor.save_path(), here.join("s-edited.toml"));
     editor.save(&editor.save_path()).unwrap();
+    assert_eq!(editor.save_path(), here.join("s-edited.toml"), "its own file is written over");
     let beside = Scene::load(&here.join("s-edited.toml")).unwrap();
     assert_eq!(beside.data, editor.scene().data, "beside it, names stay as they are");
     editor.save(&there.join("s.toml")).unwrap();
@@ -659,6 +660,35 @@ fn saved_files_are_found_from_other_folders() {
     let moved = Scene::load(&folder.path().join("s.toml")).unwrap();
     assert_eq!(moved.data.meshes[0].file.as_deref(), Some(Path::new("here/meshes/t.obj")), "relative where it can be");
     assert_eq!(moved.data.meshes[1].file.as_deref(), Some(Path::new("assets/meshes/torus.obj")));
+}
+
+#[test]
+fn what_an_earlier_session_saved_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("s.toml"), SMALL).unwrap();
+    let open = |name: &str| Editor::new(Scene::load(&at(name)).unwrap(), &at(name));
+    let mut saved = Vec::new();
+    for name in ["s-edited.toml", "s-edited-2.toml", "s-edited-3.toml"] {
+        let mut editor = open("s.toml");
+        editor.advance(0.1 * (1 + saved.len()) as f64);
+        for _ in 0..2 {
+            assert_eq!(editor.save_path(), at(name));
+            editor.save(&editor.save_path()).unwrap();
+        }
+        saved.push((name, std::fs::read(at(name)).unwrap()));
+    }
+    for (name, bytes) in &saved {
+        assert_eq!(&std::fs::read(at(name)).unwrap(), bytes, "{name}");
+        assert_eq!(open(name).save_path(), at(name), "opened, it is written over");
+    }
+    // The same scene loaded again in one session is still that session.
+    let mut editor = open("s.toml");
+    editor.save(&editor.save_path()).unwrap();
+    editor.apply(Command::Step { step: Step::Right, repeat: false });
+    editor.apply(Command::NextScene);
+    editor.apply(Command::Undo);
+    assert_eq!((editor.path(), editor.save_path()), (&*at("s.toml"), at("s-edited-4.toml")));
 }
 
 #[test]

@@ -12,6 +12,7 @@ use crate::field::quantity;
 use crate::frame::store;
 use crate::scene::{Camera, Placement, Scene};
 use glam::{DVec3, Vec3};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Everything that `view` shows, and how it changes.
@@ -32,6 +33,8 @@ pub struct Editor {
     pub(super) former_emission: Vec<Option<Vec3>>,
     pub(super) picker: Picker,
     pub(super) drag: Option<Drag>,
+    /// Files that were written since the start, of any scene.
+    pub(super) saved: HashSet<PathBuf>,
     /// The scene before this one, if it was changed.
     former: Option<Box<Editor>>,
 }
@@ -60,6 +63,7 @@ impl Editor {
             former_emission: vec![None; scene.entities.len()],
             picker: Picker::new(scene.meshes.len()),
             drag: None,
+            saved: HashSet::new(),
             former: None,
             path: path.to_owned(),
             scene,
@@ -307,6 +311,7 @@ impl Editor {
             error: self.error,
             overlay: self.overlay,
             variant: self.variant,
+            saved: self.saved.clone(),
             ..next
         };
         std::mem::replace(self, next)

@@ -1,6 +1,7 @@
 //! The viewer's frames: into a window, into an image, into files.
 
 use super::outline::Edges;
+use super::save::unedited;
 use super::viewer::{ERROR, HISTORY, REFERENCE, Viewer};
 use crate::asset::picture;
 use crate::error::{Error, Result};
@@ -23,7 +24,20 @@ impl Viewer {
     ///
     /// # Errors
     /// `Device` when the device or the surface was lost.
-    pub fn draw(&mut self, mut canvas: Canvas<'_>) -> Result<bool> {
+    pub fn draw(&mut self, canvas: Canvas<'_>) -> Result<bool> {
+        let pending = self.pending;
+        let drawn = self.draw_pending(canvas);
+        if drawn.is_err() {
+            // What was recorded may not have run: the next frame merges all of it again.
+            if let Some(frame) = &mut self.frame {
+                frame.forget();
+            }
+            self.pending |= pending;
+        }
+        drawn
+    }
+
+    fn draw_pending(&mut self, mut canvas: Canvas<'_>) -> Result<bool> {
         while self.flights.len() >= FLIGHTS {
             self.land()?;
         }
@@ -149,15 +163,14 @@ impl Viewer {
         let placement = self.editor.placements()[selected];
         let lines = edges.outline(&placement, clip_from_world(camera, width / height), camera.eye.as_dvec3(), size);
         let point = |p: DVec2| egui::pos2(p.x as f32, p.y as f32);
-        let inside = |l: &[DVec2; 2]| l.iter().all(|p| p.x <= size.x);
-        lines.into_iter().filter(inside).map(|line| line.map(point)).collect()
+        lines.into_iter().map(|line| line.map(point)).collect()
     }
 }
 
 /// `NAME-001.png` beside a path, or the next number that is free.
 fn free_name(beside: &Path) -> PathBuf {
     let stem = beside.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let stem = stem.trim_end_matches("-edited");
+    let stem = unedited(&stem);
     let name = |number: u32| beside.with_file_name(format!("{stem}-{number:03}.png"));
     (1..).map(name).find(|path| !path.exists() && !path.with_extension("exr").exists()).expect("numbers do not end")
 }

@@ -12,12 +12,22 @@ const SUFFIX: &str = "-edited";
 
 impl Editor {
     /// Where [`Editor::save`] writes unless told otherwise: `NAME-edited.toml` beside the scene's file, or in the current folder
-    /// for a built-in scene. An edited scene is written over.
+    /// for a built-in scene; with the next free number where there is such a file that this editor did not write. An edited
+    /// scene that was opened is written over.
     pub fn save_path(&self) -> PathBuf {
-        let folder = if self.path().exists() { self.path().parent() } else { None };
+        let own = self.path().exists();
+        let folder = if own { self.path().parent() } else { None }.unwrap_or(Path::new(""));
         let stem = self.path().file_stem().unwrap_or_default().to_string_lossy();
-        let name = if stem.ends_with(SUFFIX) { format!("{stem}.toml") } else { format!("{stem}{SUFFIX}.toml") };
-        folder.unwrap_or(Path::new("")).join(name)
+        let name = unedited(&stem);
+        if own && name != stem {
+            return folder.join(format!("{stem}.toml"));
+        }
+        let numbered = |number: u32| match number {
+            1 => folder.join(format!("{name}{SUFFIX}.toml")),
+            _ => folder.join(format!("{name}{SUFFIX}-{number}.toml")),
+        };
+        let usable = |path: &PathBuf| self.saved.contains(path) || !path.exists();
+        (1..).map(numbered).find(usable).expect("numbers do not end")
     }
 
     /// The state as scene data for a file in `folder`: placed, lit, seen, sized and timed as now, so that its first picture is
@@ -44,15 +54,24 @@ impl Editor {
     ///
     /// # Errors
     /// `Failed` where it cannot be written; an older file is left as it was then.
-    pub fn save(&self, path: &Path) -> Result<()> {
+    pub fn save(&mut self, path: &Path) -> Result<()> {
         let data = self.data(path.parent().unwrap_or(Path::new("")))?;
         let text = format!(
             "# Written by shadow-fields view; `shadow-fields render` gives the same picture.\n\n{}",
             data.to_toml()
         );
         files::replace_with(path, |file| file.write_all(text.as_bytes()))
-            .map_err(|error: std::io::Error| Error::Failed(format!("{}: cannot write: {error}", path.display())))
+            .map_err(|error: std::io::Error| Error::Failed(format!("{}: cannot write: {error}", path.display())))?;
+        self.saved.insert(path.to_owned());
+        Ok(())
     }
+}
+
+/// A name without what [`Editor::save_path`] adds to it.
+pub(super) fn unedited(stem: &str) -> &str {
+    let number = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+    let marked = if number.len() < stem.len() { number.strip_suffix('-') } else { Some(stem) };
+    marked.and_then(|marked| marked.strip_suffix(SUFFIX)).unwrap_or(stem)
 }
 
 /// How a file that a scene in `from` calls `file` is called by a scene in `to`.

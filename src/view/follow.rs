@@ -25,6 +25,7 @@ impl Viewer {
         if changed.scene {
             self.settle()?;
             (self.frame, self.reference, self.error_shown, self.rays) = (None, None, None, None);
+            self.counts = None;
             self.edges.clear();
             self.timings.clear();
             return self.prepare();

@@ -5,16 +5,21 @@ use super::command::Command;
 use super::input::CONTROLS;
 use super::task::Progress;
 use super::viewer::HISTORY;
+use crate::asset::false_color::{Scale, Scheme};
+use crate::asset::picture::srgb_from_linear;
 use crate::gpu::Timing;
 use crate::render::gather::Counts;
 use crate::render::variant::VARIANTS;
-use egui::{Align2, Color32, Context, FontId, Pos2, Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
+use egui::collapsing_header::CollapsingState;
+use egui::{Align2, Color32, Context, FontId, Id, Pos2, Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
 use std::collections::VecDeque;
 
 /// Space around panels, points.
 const MARGIN: f32 = 8.0;
 /// Width of the panel of figures, points.
 const FIGURES_WIDTH: f32 = 268.0;
+/// Room for its title bar where it is folded, points.
+const FOLDED_WIDTH: f32 = 104.0;
 /// Width of the help, points.
 const HELP_WIDTH: f32 = 350.0;
 /// Colours of the passes in the graph, in their order.
@@ -49,12 +54,12 @@ pub struct Status<'s> {
     pub timings: &'s VecDeque<Vec<Timing>>,
     /// Lookups of the last merge.
     pub counts: Option<Counts>,
-    /// Clusters that the last frame merged, and all.
-    pub merged: (usize, usize),
+    /// Clusters that the last frame merged, and all; `None` before the first frame of a scene.
+    pub merged: Option<(usize, usize)>,
     /// Vertices that are lit.
     pub vertices: usize,
-    /// Merge variant in use.
-    pub variant: &'s str,
+    /// Merge variant in use; `None` before the first frame of a scene.
+    pub variant: Option<&'s str>,
     /// The bake in the background.
     pub bake: Option<Progress>,
     /// The rays that are being cast.
@@ -99,20 +104,43 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
         return commands;
     }
     let height = (screen.height() - 2.0 * MARGIN).max(60.0);
-    let panel = |title: &str, align: Align2, width: f32| {
-        let offset = if align == Align2::LEFT_TOP { vec2(MARGIN, MARGIN) } else { vec2(-MARGIN, MARGIN) };
-        egui::Window::new(title.to_owned()).anchor(align, offset).auto_sized().default_width(width).max_width(width)
+    let panel = |title: &str, x: f32, width: f32, open: bool| {
+        let place = pos2(x, screen.top() + MARGIN);
+        let window = egui::Window::new(title.to_owned()).id(Id::new(title)).fixed_pos(place);
+        window.auto_sized().default_width(width).max_width(width).default_open(open)
     };
-    // Two panels side by side need room; in a narrow window the help starts folded away.
-    let narrow = screen.width() < FIGURES_WIDTH + HELP_WIDTH + 100.0;
-    panel("Controls", Align2::LEFT_TOP, HELP_WIDTH).default_open(!narrow).show(context, |ui| {
+    halves(context, editor);
+    // Two panels side by side need room; in a narrow window the help starts folded away, in a narrower one the figures too.
+    let wide = screen.width() >= FIGURES_WIDTH + HELP_WIDTH + 100.0;
+    panel("Controls", screen.left() + MARGIN, HELP_WIDTH, wide).show(context, |ui| {
         scrolled(ui, height, help);
     });
-    panel("Figures", Align2::RIGHT_TOP, FIGURES_WIDTH).default_open(!narrow).show(context, |ui| {
+    let open = screen.width() >= 2.0 * FIGURES_WIDTH;
+    // egui takes a folded window for one without width, so that it cannot be put to the right.
+    let folding = CollapsingState::load_with_default_open(context, Id::new("Figures").with("collapsing"), open);
+    let width = if folding.openness(context) > 0.0 { FIGURES_WIDTH } else { FOLDED_WIDTH };
+    let x = (screen.right() - MARGIN - width).max(screen.left() + MARGIN);
+    panel("Figures", x, FIGURES_WIDTH, open).show(context, |ui| {
         scrolled(ui, height, |ui| figures(ui, editor, status, &mut commands));
     });
     notes(context, editor, status);
     commands
+}
+
+/// Says which half is which, on both sides of where they meet.
+fn halves(context: &Context, editor: &Editor) {
+    if !editor.shows_reference() {
+        return;
+    }
+    let painter = context.layer_painter(egui::LayerId::background());
+    let screen = context.content_rect();
+    let own = if editor.shows_error() { "error of the merge" } else { "merged" };
+    for (text, align, side) in [(own, Align2::RIGHT_TOP, -1.0), ("ray cast", Align2::LEFT_TOP, 1.0)] {
+        let text = painter.layout_no_wrap(text.to_owned(), FontId::proportional(14.0), Color32::WHITE);
+        let place = align.anchor_size(pos2(screen.center().x + side * 10.0, screen.top() + MARGIN + 4.0), text.size());
+        painter.rect_filled(place.expand2(vec2(6.0, 3.0)), 3.0, Color32::from_black_alpha(180));
+        painter.galley(place.min, text, Color32::WHITE);
+    }
 }
 
 /// As high as its content, but within the window.
@@ -142,7 +170,7 @@ fn baking(context: &Context, bake: &Progress) {
 }
 
 fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec<Command>) {
-    ui.set_width(FIGURES_WIDTH - 20.0);
+    ui.set_width(FIGURES_WIDTH - ui.spacing().window_margin.sum().x - 2.0);
     ui.label(RichText::new(status.device).strong());
     ui.label(RichText::new(status.driver).small());
     let [width, height] = status.size;
@@ -173,6 +201,7 @@ fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec
         ));
         let share = 100.0 * skipped as f64 / (counts.considered.max(1)) as f64;
         ui.label(format!("lookups considered {}, skipped {share:.0} %", grouped(counts.considered)));
+        ui.label(RichText::new("one lookup: a cluster x a product chain x an entity").small());
         let of = |count: u64| 100.0 * count as f64 / counts.considered.max(1) as f64;
         ui.label(
             RichText::new(format!(
@@ -186,8 +215,9 @@ fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec
             .small(),
         );
     }
-    let (merged, all) = status.merged;
-    ui.label(format!("clusters merged again {} of {}", grouped(merged as u64), grouped(all as u64)));
+    if let Some((merged, all)) = status.merged {
+        ui.label(format!("clusters merged again {} of {}", grouped(merged as u64), grouped(all as u64)));
+    }
     variants(ui, editor, status, commands);
     ui.separator();
     sliders(ui, editor, commands);
@@ -197,7 +227,11 @@ fn variants(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Ve
     ui.horizontal(|ui| {
         ui.label("merge");
         let chosen = editor.variant();
-        let text = if chosen.is_some() { status.variant.to_owned() } else { format!("fastest: {}", status.variant) };
+        let text = match (chosen, status.variant) {
+            (_, None) => chosen.unwrap_or("the device's fastest").to_owned(),
+            (Some(_), Some(used)) => used.to_owned(),
+            (None, Some(used)) => format!("fastest: {used}"),
+        };
         egui::ComboBox::from_id_salt("variant").width(180.0).selected_text(text).show_ui(ui, |ui| {
             let choices = std::iter::once(None).chain(VARIANTS.iter().map(|v| Some(v.name)));
             for choice in choices {
@@ -309,9 +343,10 @@ fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
     let mut lines: Vec<(String, Color32)> = Vec::new();
     if editor.shows_reference() || editor.shows_error() {
         lines.push(match status.reference {
-            Some((rays, error, true)) => {
-                (format!("reference: {rays} rays a vertex, {:.1} % standard error", 100.0 * error), Color32::WHITE)
-            }
+            Some((rays, error, true)) => (
+                format!("reference: {rays} rays a vertex, {} % standard error", two_digits(100.0 * error)),
+                Color32::WHITE,
+            ),
             Some((rays, ..)) => {
                 (format!("reference: {rays} rays a vertex, of an earlier moment (Space pauses)"), WARNING)
             }
@@ -328,9 +363,8 @@ fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
         lines.push(match status.error {
             Some((scale, fresh)) => (
                 format!(
-                    "error: blue too dark, red too bright, ends at ±{:.3} of the RMS radiosity; RMS {:.4}{}",
-                    scale.limit,
-                    scale.rms,
+                    "error of the merge, in RMS radiosities: RMS {}{}",
+                    two_digits(scale.rms),
                     if fresh { "" } else { ", of an earlier moment (Space pauses)" }
                 ),
                 if fresh { Color32::WHITE } else { WARNING },
@@ -351,11 +385,45 @@ fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
             for (text, color) in lines {
                 ui.colored_label(color, text);
             }
+            if let Some((scale, _)) = status.error.filter(|_| editor.shows_error()) {
+                bar(ui, scale.limit);
+            }
             if let Some(error) = status.shader_error {
                 ui.colored_label(WARNING, "a shader does not compile; the one before stays in use");
                 ui.label(RichText::new(error.trim()).monospace().color(ERROR));
             }
         });
+}
+
+/// Which colour is which error, from -`limit` to `limit`.
+fn bar(ui: &mut Ui, limit: f64) {
+    let scale = Scale { scheme: Scheme::Signed, limit };
+    let width = ui.available_width().min(420.0);
+    let (response, painter) = ui.allocate_painter(vec2(width, 28.0), Sense::hover());
+    let area = response.rect;
+    let steps = 64;
+    for step in 0..steps {
+        let x = |step: u32| area.left() + area.width() * step as f32 / steps as f32;
+        let [r, g, b] = scale
+            .color(((f64::from(step) + 0.5) / f64::from(steps) * 2.0 - 1.0) * limit)
+            .map(|c| (255.0 * srgb_from_linear(c)).round() as u8);
+        let strip = Rect::from_x_y_ranges(x(step)..=x(step + 1), area.top()..=area.top() + 14.0);
+        painter.rect_filled(strip, 0.0, Color32::from_rgb(r, g, b));
+    }
+    let limit = two_digits(limit);
+    for (x, align, text) in [
+        (area.left(), Align2::LEFT_BOTTOM, format!("-{limit} too dark")),
+        (area.center().x, Align2::CENTER_BOTTOM, "0".to_owned()),
+        (area.right(), Align2::RIGHT_BOTTOM, format!("too bright +{limit}")),
+    ] {
+        painter.text(pos2(x, area.bottom()), align, text, FontId::proportional(11.0), Color32::WHITE);
+    }
+}
+
+/// A number that is not negative with two significant digits, at most nine after the point.
+fn two_digits(number: f64) -> String {
+    let power = if number > 0.0 { number.log10().floor() as i32 } else { 0 };
+    format!("{number:.*}", (1 - power).clamp(0, 9) as usize)
 }
 
 /// 12345 as 12 345.
@@ -378,6 +446,75 @@ mod tests {
     #[test]
     fn numbers_read_in_threes() {
         assert_eq!(["0", "999", "1 000", "12 345 678"], [0, 999, 1000, 12_345_678].map(grouped)[..]);
+    }
+
+    #[test]
+    fn small_numbers_keep_two_digits() {
+        let numbers = [0.0, 0.0314, 0.31, 2.0, 31.4, 314.0].map(two_digits);
+        assert_eq!(numbers, ["0.0", "0.031", "0.31", "2.0", "31", "314"]);
+    }
+
+    #[test]
+    fn both_panels_can_be_reached_folded_and_open() {
+        let text = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"m\"\nplane = { size_m = 1, cells = 1 }\n\
+                    [[entity]]\nmesh = \"m\"\n";
+        let path = std::path::Path::new("t.toml");
+        let scene = crate::scene::Scene::parse(text, path, &crate::asset::embedded::read).unwrap();
+        let editor = Editor::new(scene, path);
+        let timings = VecDeque::new();
+        let status = Status {
+            device: "a device",
+            driver: "a driver",
+            size: [640, 480],
+            timings: &timings,
+            counts: None,
+            merged: None,
+            vertices: 0,
+            variant: None,
+            bake: None,
+            rays: None,
+            reference: None,
+            error: None,
+            shader_error: None,
+            messages: Vec::new(),
+        };
+        for (size, open) in [([320.0, 240.0], false), ([640.0, 480.0], true), ([1280.0, 720.0], true)] {
+            let context = Context::default();
+            let screen = Rect::from_min_size(Pos2::ZERO, size.into());
+            let mut time = 0.0;
+            let mut turn = |events: Vec<egui::Event>| {
+                time += 0.5;
+                let input =
+                    egui::RawInput { screen_rect: Some(screen), time: Some(time), events, ..Default::default() };
+                context.run_ui(input, |ui| drop(show(ui.ctx(), &editor, &status))).textures_delta.clear();
+            };
+            let folded = |context: &Context| {
+                let id = Id::new("Figures").with("collapsing");
+                !CollapsingState::load(context, id).unwrap().is_open()
+            };
+            (0..4).for_each(|_| turn(Vec::new()));
+            assert_eq!(folded(&context), !open, "{size:?}");
+            for _ in 0..3 {
+                let place = |title: &str| context.memory(|m| m.area_rect(Id::new(title)).unwrap());
+                let figures = place("Figures");
+                let title_width = if folded(&context) { FOLDED_WIDTH } else { figures.width() };
+                let right = figures.left() + title_width;
+                assert!(right <= screen.right() && right > screen.right() - 2.0 * MARGIN, "{size:?}: {figures}");
+                // The triangle before the title folds and unfolds.
+                let (pos, before) = (figures.left_top() + vec2(16.0, 16.0), folded(&context));
+                let press = |pressed| egui::Event::PointerButton {
+                    pos,
+                    button: egui::PointerButton::Primary,
+                    pressed,
+                    modifiers: egui::Modifiers::NONE,
+                };
+                turn(vec![egui::Event::PointerMoved(pos)]);
+                turn(vec![press(true)]);
+                turn(vec![press(false)]);
+                (0..4).for_each(|_| turn(Vec::new()));
+                assert_ne!(folded(&context), before, "{size:?}: a click at {pos} does nothing");
+            }
+        }
     }
 
     #[test]

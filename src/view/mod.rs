@@ -12,8 +12,12 @@ pub mod edit;
 pub mod editor;
 #[cfg(feature = "view")]
 mod follow;
+#[cfg(feature = "view")]
+mod graph;
 pub mod history;
 pub mod input;
+#[cfg(feature = "view")]
+mod notes;
 pub mod orbit;
 pub mod outline;
 #[cfg(feature = "view")]

@@ -2,35 +2,27 @@
 
 use super::Editor;
 use super::command::Command;
+use super::graph;
 use super::input::CONTROLS;
+use super::notes;
 use super::task::Progress;
-use super::viewer::HISTORY;
-use crate::asset::false_color::{Scale, Scheme};
-use crate::asset::picture::srgb_from_linear;
 use crate::gpu::Timing;
 use crate::render::gather::Counts;
 use crate::render::variant::VARIANTS;
 use egui::collapsing_header::CollapsingState;
-use egui::{Align2, Color32, Context, FontId, Id, Pos2, Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
+use egui::{Align2, Color32, Context, Id, Pos2, RichText, Stroke, Ui, pos2, vec2};
 use std::collections::VecDeque;
 
 /// Space around panels, points.
-const MARGIN: f32 = 8.0;
+pub(super) const MARGIN: f32 = 8.0;
 /// Width of the panel of figures, points.
 const FIGURES_WIDTH: f32 = 268.0;
 /// Room for its title bar where it is folded, points.
 const FOLDED_WIDTH: f32 = 104.0;
 /// Width of the help, points.
 const HELP_WIDTH: f32 = 350.0;
-/// Colours of the passes in the graph, in their order.
-const PASS_COLORS: [Color32; 4] = [
-    Color32::from_rgb(240, 170, 70),
-    Color32::from_rgb(90, 160, 240),
-    Color32::from_rgb(120, 200, 130),
-    Color32::from_rgb(200, 120, 200),
-];
-const WARNING: Color32 = Color32::from_rgb(255, 190, 90);
-const ERROR: Color32 = Color32::from_rgb(255, 120, 110);
+pub(super) const WARNING: Color32 = Color32::from_rgb(255, 190, 90);
+pub(super) const ERROR: Color32 = Color32::from_rgb(255, 120, 110);
 const OUTLINE: Color32 = Color32::from_rgb(255, 200, 60);
 
 /// Colours of the error as they are shown.
@@ -109,7 +101,7 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
         let window = egui::Window::new(title.to_owned()).id(Id::new(title)).fixed_pos(place);
         window.auto_sized().default_width(width).max_width(width).default_open(open)
     };
-    halves(context, editor);
+    notes::halves(context, editor);
     // Two panels side by side need room; in a narrow window the help starts folded away, in a narrower one the figures too.
     let wide = screen.width() >= FIGURES_WIDTH + HELP_WIDTH + 100.0;
     panel("Controls", screen.left() + MARGIN, HELP_WIDTH, wide).show(context, |ui| {
@@ -123,24 +115,8 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
     panel("Figures", x, FIGURES_WIDTH, open).show(context, |ui| {
         scrolled(ui, height, |ui| figures(ui, editor, status, &mut commands));
     });
-    notes(context, editor, status);
+    notes::notes(context, editor, status);
     commands
-}
-
-/// Says which half is which, on both sides of where they meet.
-fn halves(context: &Context, editor: &Editor) {
-    if !editor.shows_reference() {
-        return;
-    }
-    let painter = context.layer_painter(egui::LayerId::background());
-    let screen = context.content_rect();
-    let own = if editor.shows_error() { "error of the merge" } else { "merged" };
-    for (text, align, side) in [(own, Align2::RIGHT_TOP, -1.0), ("ray cast", Align2::LEFT_TOP, 1.0)] {
-        let text = painter.layout_no_wrap(text.to_owned(), FontId::proportional(14.0), Color32::WHITE);
-        let place = align.anchor_size(pos2(screen.center().x + side * 10.0, screen.top() + MARGIN + 4.0), text.size());
-        painter.rect_filled(place.expand2(vec2(6.0, 3.0)), 3.0, Color32::from_black_alpha(180));
-        painter.galley(place.min, text, Color32::WHITE);
-    }
 }
 
 /// As high as its content, but within the window.
@@ -190,7 +166,7 @@ fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec
     });
     ui.label(format!("selected: {selected}"));
     ui.separator();
-    graph(ui, status.timings);
+    graph::graph(ui, status.timings);
     ui.separator();
     if let Some(counts) = status.counts {
         let skipped = counts.behind_light + counts.below_horizon + counts.apart + counts.facing_away + counts.below_eps;
@@ -271,163 +247,8 @@ fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {
     slide(ui, "sky turned", editor.sky_turn_deg(), -180.0..=180.0, "°", Command::SetSkyTurn);
 }
 
-/// Stacked times of the passes, newest at the right.
-fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
-    let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), 64.0), Sense::hover());
-    let area = response.rect;
-    painter.rect_filled(area, 2.0, Color32::from_black_alpha(120));
-    let mut names: Vec<&str> = Vec::new();
-    for timing in timings.iter().flatten() {
-        if !names.contains(&timing.pass.as_str()) {
-            names.push(&timing.pass);
-        }
-    }
-    let order = ["merge", "draw", "show"];
-    names.sort_by_key(|name| order.iter().position(|o| o == name).unwrap_or(order.len()));
-    let total = |frame: &Vec<Timing>| frame.iter().map(|t| t.milliseconds).sum::<f64>();
-    // All but the slowest few: the first frame compiles shaders.
-    let mut totals: Vec<f64> = timings.iter().map(total).collect();
-    totals.sort_by(f64::total_cmp);
-    let most = totals.get((totals.len() * 19 / 20).saturating_sub(1)).copied().unwrap_or(0.0);
-    let top = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0].into_iter().find(|t| *t >= most).unwrap_or(1000.0);
-    let step = area.width() / HISTORY as f32;
-    for (column, frame) in timings.iter().rev().enumerate() {
-        let right = area.right() - column as f32 * step;
-        let mut bottom = area.bottom();
-        for (index, name) in names.iter().enumerate() {
-            let milliseconds: f64 = frame.iter().filter(|t| t.pass == *name).map(|t| t.milliseconds).sum();
-            let height = ((milliseconds / top) as f32 * area.height()).min(bottom - area.top());
-            let bar = Rect::from_min_max(pos2(right - step, bottom - height), pos2(right, bottom));
-            painter.rect_filled(bar, 0.0, PASS_COLORS[index % PASS_COLORS.len()]);
-            bottom -= height;
-        }
-    }
-    for (limit, text) in [(1000.0 / 60.0, "60/s"), (1000.0 / 30.0, "30/s")] {
-        // Apart enough to be read.
-        if limit < top && limit > top / 5.0 {
-            let y = area.bottom() - (limit / top) as f32 * area.height();
-            painter.hline(area.x_range(), y, Stroke::new(1.0, Color32::from_white_alpha(70)));
-            let label = Rect::from_min_size(pos2(area.left(), y - 12.0), vec2(26.0, 12.0));
-            painter.rect_filled(label, 2.0, Color32::from_black_alpha(230));
-            painter.text(label.center(), Align2::CENTER_CENTER, text, FontId::proportional(9.0), Color32::WHITE);
-        }
-    }
-    painter.text(
-        area.right_top() + vec2(-3.0, 1.0),
-        Align2::RIGHT_TOP,
-        format!("{top} ms"),
-        FontId::proportional(9.0),
-        Color32::GRAY,
-    );
-    ui.horizontal_wrapped(|ui| {
-        for (index, name) in names.iter().enumerate() {
-            let of = |frame: &Vec<Timing>| {
-                frame
-                    .iter()
-                    .any(|t| t.pass == *name)
-                    .then(|| frame.iter().filter(|t| t.pass == *name).map(|t| t.milliseconds).sum())
-            };
-            let text = format!("{name} {:.1} ms", median(timings.iter().filter_map(of).collect()));
-            ui.label(RichText::new(text).color(PASS_COLORS[index % PASS_COLORS.len()]));
-        }
-    });
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// What is to be told at the bottom: reference and error, shader errors, messages.
-fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
-    let mut lines: Vec<(String, Color32)> = Vec::new();
-    if editor.shows_reference() || editor.shows_error() {
-        lines.push(match status.reference {
-            Some((rays, error, true)) => (
-                format!("reference: {rays} rays a vertex, {} % standard error", two_digits(100.0 * error)),
-                Color32::WHITE,
-            ),
-            Some((rays, ..)) => {
-                (format!("reference: {rays} rays a vertex, of an earlier moment (Space pauses)"), WARNING)
-            }
-            None => ("reference: casting the first rays".to_owned(), WARNING),
-        });
-        if let Some(rays) = &status.rays {
-            lines.push((
-                format!("casting {}: {} of {}", rays.what, grouped(rays.done.into()), grouped(rays.all.into())),
-                Color32::GRAY,
-            ));
-        }
-    }
-    if editor.shows_error() {
-        lines.push(match status.error {
-            Some((scale, fresh)) => (
-                format!(
-                    "error of the merge, in RMS radiosities: RMS {}{}",
-                    two_digits(scale.rms),
-                    if fresh { "" } else { ", of an earlier moment (Space pauses)" }
-                ),
-                if fresh { Color32::WHITE } else { WARNING },
-            ),
-            None => ("error: waits for the reference of a scene that stands still (Space pauses)".to_owned(), WARNING),
-        });
-    }
-    lines.extend(status.messages.iter().map(|text| ((*text).to_owned(), Color32::WHITE)));
-    if lines.is_empty() && status.shader_error.is_none() {
-        return;
-    }
-    egui::Window::new("notes")
-        .title_bar(false)
-        .resizable(false)
-        .anchor(Align2::CENTER_BOTTOM, vec2(0.0, -MARGIN))
-        .max_width((context.content_rect().width() - 4.0 * MARGIN).max(100.0))
-        .show(context, |ui| {
-            for (text, color) in lines {
-                ui.colored_label(color, text);
-            }
-            if let Some((scale, _)) = status.error.filter(|_| editor.shows_error()) {
-                bar(ui, scale.limit);
-            }
-            if let Some(error) = status.shader_error {
-                ui.colored_label(WARNING, "a shader does not compile; the one before stays in use");
-                ui.label(RichText::new(error.trim()).monospace().color(ERROR));
-            }
-        });
-}
-
-/// Which colour is which error, from -`limit` to `limit`.
-fn bar(ui: &mut Ui, limit: f64) {
-    let scale = Scale { scheme: Scheme::Signed, limit };
-    let width = ui.available_width().min(420.0);
-    let (response, painter) = ui.allocate_painter(vec2(width, 28.0), Sense::hover());
-    let area = response.rect;
-    let steps = 64;
-    for step in 0..steps {
-        let x = |step: u32| area.left() + area.width() * step as f32 / steps as f32;
-        let [r, g, b] = scale
-            .color(((f64::from(step) + 0.5) / f64::from(steps) * 2.0 - 1.0) * limit)
-            .map(|c| (255.0 * srgb_from_linear(c)).round() as u8);
-        let strip = Rect::from_x_y_ranges(x(step)..=x(step + 1), area.top()..=area.top() + 14.0);
-        painter.rect_filled(strip, 0.0, Color32::from_rgb(r, g, b));
-    }
-    let limit = two_digits(limit);
-    for (x, align, text) in [
-        (area.left(), Align2::LEFT_BOTTOM, format!("-{limit} too dark")),
-        (area.center().x, Align2::CENTER_BOTTOM, "0".to_owned()),
-        (area.right(), Align2::RIGHT_BOTTOM, format!("too bright +{limit}")),
-    ] {
-        painter.text(pos2(x, area.bottom()), align, text, FontId::proportional(11.0), Color32::WHITE);
-    }
-}
-
-/// A number that is not negative with two significant digits, at most nine after the point.
-fn two_digits(number: f64) -> String {
-    let power = if number > 0.0 { number.log10().floor() as i32 } else { 0 };
-    format!("{number:.*}", (1 - power).clamp(0, 9) as usize)
-}
-
 /// 12345 as 12 345.
-fn grouped(number: u64) -> String {
+pub(super) fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut out = String::new();
     for (index, digit) in digits.chars().enumerate() {
@@ -442,16 +263,11 @@ fn grouped(number: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use egui::Rect;
 
     #[test]
     fn numbers_read_in_threes() {
         assert_eq!(["0", "999", "1 000", "12 345 678"], [0, 999, 1000, 12_345_678].map(grouped)[..]);
-    }
-
-    #[test]
-    fn small_numbers_keep_two_digits() {
-        let numbers = [0.0, 0.0314, 0.31, 2.0, 31.4, 314.0].map(two_digits);
-        assert_eq!(numbers, ["0.0", "0.031", "0.31", "2.0", "31", "314"]);
     }
 
     #[test]
@@ -515,11 +331,5 @@ mod tests {
                 assert_ne!(folded(&context), before, "{size:?}: a click at {pos} does nothing");
             }
         }
-    }
-
-    #[test]
-    fn the_median_of_nothing_is_nothing() {
-        assert_eq!(median(vec![]), 0.0);
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
     }
 }

@@ -1,0 +1,122 @@
+//! What is written over the picture besides the panels: names of its halves, messages, the scale of the error.
+
+use super::Editor;
+use super::panel::{ERROR, MARGIN, Status, WARNING, grouped};
+use crate::asset::false_color::{Scale, Scheme};
+use crate::asset::picture::srgb_from_linear;
+use egui::{Align2, Color32, Context, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
+
+/// Says which half is which, on both sides of where they meet.
+pub(super) fn halves(context: &Context, editor: &Editor) {
+    if !editor.shows_reference() {
+        return;
+    }
+    let painter = context.layer_painter(egui::LayerId::background());
+    let screen = context.content_rect();
+    let own = if editor.shows_error() { "error of the merge" } else { "merged" };
+    for (text, align, side) in [(own, Align2::RIGHT_TOP, -1.0), ("ray cast", Align2::LEFT_TOP, 1.0)] {
+        let text = painter.layout_no_wrap(text.to_owned(), FontId::proportional(14.0), Color32::WHITE);
+        let place = align.anchor_size(pos2(screen.center().x + side * 10.0, screen.top() + MARGIN + 4.0), text.size());
+        painter.rect_filled(place.expand2(vec2(6.0, 3.0)), 3.0, Color32::from_black_alpha(180));
+        painter.galley(place.min, text, Color32::WHITE);
+    }
+}
+
+/// What is to be told at the bottom: reference and error, shader errors, messages.
+pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
+    let mut lines: Vec<(String, Color32)> = Vec::new();
+    if editor.shows_reference() || editor.shows_error() {
+        lines.push(match status.reference {
+            Some((rays, error, true)) => (
+                format!("reference: {rays} rays a vertex, {} % standard error", two_digits(100.0 * error)),
+                Color32::WHITE,
+            ),
+            Some((rays, ..)) => {
+                (format!("reference: {rays} rays a vertex, of an earlier moment (Space pauses)"), WARNING)
+            }
+            None => ("reference: casting the first rays".to_owned(), WARNING),
+        });
+        if let Some(rays) = &status.rays {
+            lines.push((
+                format!("casting {}: {} of {}", rays.what, grouped(rays.done.into()), grouped(rays.all.into())),
+                Color32::GRAY,
+            ));
+        }
+    }
+    if editor.shows_error() {
+        lines.push(match status.error {
+            Some((scale, fresh)) => (
+                format!(
+                    "error of the merge, in RMS radiosities: RMS {}{}",
+                    two_digits(scale.rms),
+                    if fresh { "" } else { ", of an earlier moment (Space pauses)" }
+                ),
+                if fresh { Color32::WHITE } else { WARNING },
+            ),
+            None => ("error: waits for the reference of a scene that stands still (Space pauses)".to_owned(), WARNING),
+        });
+    }
+    lines.extend(status.messages.iter().map(|text| ((*text).to_owned(), Color32::WHITE)));
+    if lines.is_empty() && status.shader_error.is_none() {
+        return;
+    }
+    egui::Window::new("notes")
+        .title_bar(false)
+        .resizable(false)
+        .anchor(Align2::CENTER_BOTTOM, vec2(0.0, -MARGIN))
+        .max_width((context.content_rect().width() - 4.0 * MARGIN).max(100.0))
+        .show(context, |ui| {
+            for (text, color) in lines {
+                ui.colored_label(color, text);
+            }
+            if let Some((scale, _)) = status.error.filter(|_| editor.shows_error()) {
+                bar(ui, scale.limit);
+            }
+            if let Some(error) = status.shader_error {
+                ui.colored_label(WARNING, "a shader does not compile; the one before stays in use");
+                ui.label(RichText::new(error.trim()).monospace().color(ERROR));
+            }
+        });
+}
+
+/// Which colour is which error, from -`limit` to `limit`.
+fn bar(ui: &mut Ui, limit: f64) {
+    let scale = Scale { scheme: Scheme::Signed, limit };
+    let width = ui.available_width().min(420.0);
+    let (response, painter) = ui.allocate_painter(vec2(width, 28.0), Sense::hover());
+    let area = response.rect;
+    let steps = 64;
+    for step in 0..steps {
+        let x = |step: u32| area.left() + area.width() * step as f32 / steps as f32;
+        let [r, g, b] = scale
+            .color(((f64::from(step) + 0.5) / f64::from(steps) * 2.0 - 1.0) * limit)
+            .map(|c| (255.0 * srgb_from_linear(c)).round() as u8);
+        let strip = Rect::from_x_y_ranges(x(step)..=x(step + 1), area.top()..=area.top() + 14.0);
+        painter.rect_filled(strip, 0.0, Color32::from_rgb(r, g, b));
+    }
+    let limit = two_digits(limit);
+    for (x, align, text) in [
+        (area.left(), Align2::LEFT_BOTTOM, format!("-{limit} too dark")),
+        (area.center().x, Align2::CENTER_BOTTOM, "0".to_owned()),
+        (area.right(), Align2::RIGHT_BOTTOM, format!("too bright +{limit}")),
+    ] {
+        painter.text(pos2(x, area.bottom()), align, text, FontId::proportional(11.0), Color32::WHITE);
+    }
+}
+
+/// A number that is not negative with two significant digits, at most nine after the point.
+fn two_digits(number: f64) -> String {
+    let power = if number > 0.0 { number.log10().floor() as i32 } else { 0 };
+    format!("{number:.*}", (1 - power).clamp(0, 9) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_numbers_keep_two_digits() {
+        let numbers = [0.0, 0.0314, 0.31, 2.0, 31.4, 314.0].map(two_digits);
+        assert_eq!(numbers, ["0.0", "0.031", "0.31", "2.0", "31", "314"]);
+    }
+}

@@ -1,8 +1,8 @@
 //! `shadow-fields bench product`
 
-use crate::app::context::Context;
+use super::common::start;
 use crate::app::{Global, output};
-use crate::bench::{Bench, product, text::three};
+use crate::bench::{product, text::three};
 use crate::error::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -20,16 +20,7 @@ pub struct Arguments {
 
 /// Measures and prints the table.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let context = Context::new(global)?;
-    let bench = Bench {
-        baker: &context.baker,
-        cache: &context.cache,
-        progress: &|what| log::info!("{what}"),
-        quick: arguments.quick,
-        seed: global.seed,
-        origin: context.origin(global),
-    };
-    let timed = product::run(&bench, &arguments.out)?;
+    let (context, timed) = start(global, arguments.quick, |bench| product::run(bench, &arguments.out))?;
     if global.json {
         output::say(serde_json::to_value(&timed).expect("results are plain data").to_string());
         return context.finish();

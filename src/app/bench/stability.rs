@@ -1,8 +1,8 @@
 //! `shadow-fields bench stability`
 
-use crate::app::context::Context;
+use super::common::start;
 use crate::app::{Global, output};
-use crate::bench::{Bench, stability, text::three};
+use crate::bench::{stability, text::three};
 use crate::error::{Error, Result};
 use clap::Args;
 use std::path::PathBuf;
@@ -20,16 +20,7 @@ pub struct Arguments {
 
 /// Measures, prints both tables, and fails where a trial did.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let context = Context::new(global)?;
-    let bench = Bench {
-        baker: &context.baker,
-        cache: &context.cache,
-        progress: &|_| {},
-        quick: arguments.quick,
-        seed: global.seed,
-        origin: context.origin(global),
-    };
-    let outcome = stability::run(&bench, &arguments.out)?;
+    let (context, outcome) = start(global, arguments.quick, |bench| stability::run(bench, &arguments.out))?;
     if global.json {
         output::say(serde_json::to_value(&outcome).expect("results are plain data").to_string());
     } else {

@@ -1,12 +1,11 @@
 //! `shadow-fields bench time-error`
 
-use crate::app::context::Context;
+use super::common::start;
 use crate::app::{Global, output};
-use crate::bench::{Bench, text::three, time_error};
+use crate::bench::{text::three, time_error};
 use crate::error::Result;
 use clap::Args;
 use std::path::PathBuf;
-use std::time::Instant;
 
 /// Arguments of `bench time-error`.
 #[derive(Args)]
@@ -21,22 +20,7 @@ pub struct Arguments {
 
 /// Measures and prints the budget and the comparison.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let context = Context::new(global)?;
-    let started = Instant::now();
-    let show = |what: &str| {
-        if !global.no_progress {
-            output::note(global, format!("{:6.1} s  {what}", started.elapsed().as_secs_f64()));
-        }
-    };
-    let bench = Bench {
-        baker: &context.baker,
-        cache: &context.cache,
-        progress: &show,
-        quick: arguments.quick,
-        seed: global.seed,
-        origin: context.origin(global),
-    };
-    let outcome = time_error::run(&bench, &arguments.out)?;
+    let (context, outcome) = start(global, arguments.quick, |bench| time_error::run(bench, &arguments.out))?;
     if global.json {
         output::say(serde_json::to_value(&outcome).expect("results are plain data").to_string());
         return context.finish();

@@ -10,6 +10,8 @@ use std::path::Path;
 pub struct Case {
     /// For tables.
     pub name: String,
+    /// What lights it, in words.
+    pub light: String,
     /// The scene.
     pub scene: Scene,
     /// Scene time in seconds.
@@ -40,7 +42,27 @@ pub fn scenes() -> Result<Vec<Case>> {
 /// `Input` when there is none.
 pub fn scene(name: &str) -> Result<Case> {
     let path = Path::new(embedded::ROOT).join("scenes").join(format!("{name}.toml"));
-    Ok(Case { name: name.to_owned(), scene: Scene::load(&path)?, time_s: 0.0, distant: Distant::Exact })
+    let scene = Scene::load(&path)?;
+    Ok(Case { name: name.to_owned(), light: light(&scene), scene, time_s: 0.0, distant: Distant::Exact })
+}
+
+/// What lights a scene: its distant light and the number of those in it.
+pub fn light(scene: &Scene) -> String {
+    let source = scene.environment.source();
+    let named = [
+        (source.uniform.is_some(), "uniform sky"),
+        (source.gradient.is_some(), "sky gradient"),
+        (source.key.is_some(), "soft key light"),
+        (source.sky.is_some(), "daylight"),
+        (source.image.is_some(), "sky picture"),
+    ];
+    let mut words: Vec<String> = named.iter().filter(|(is, _)| *is).map(|(_, word)| (*word).to_owned()).collect();
+    match scene.entities.iter().filter(|e| e.emits).count() {
+        0 => {}
+        1 => words.push("1 local light".into()),
+        count => words.push(format!("{count} local lights")),
+    }
+    words.join(" + ")
 }
 
 /// Teapot of bounding radius 1 over a floor of 40 x 40 vertices and 6 x 6 m that alone is lit, under one light at a time:
@@ -106,7 +128,7 @@ pub fn teapot_lights() -> Result<Vec<Case>> {
     let case = |(name, light, distant): (&str, String, Distant)| {
         let path = Path::new("assets/scenes/teapot_over_plane.toml");
         let scene = Scene::parse(&format!("{head}{light}"), path, &embedded::read)?;
-        Ok(Case { name: name.to_owned(), scene, time_s: 0.0, distant })
+        Ok(Case { name: name.to_owned(), light: self::light(&scene), scene, time_s: 0.0, distant })
     };
     lights.into_iter().map(case).collect()
 }

@@ -20,6 +20,15 @@ pub struct Ceilings {
     pub storage_giga: f64,
     /// Bytes that `a = b + s c` reads and writes in buffers larger than caches, in 10^9 a second.
     pub triad_gb_s: f64,
+    /// What a dispatch of one workgroup takes that does next to nothing, milliseconds: the grain of all times.
+    pub dispatch_ms: f64,
+}
+
+impl Ceilings {
+    /// Whether a time says more of what was done than of starting it: at least five times an idle dispatch.
+    pub fn resolve(&self, milliseconds: f64) -> bool {
+        milliseconds >= 5.0 * self.dispatch_ms
+    }
 }
 
 /// Timed runs of each shader after one to warm up.
@@ -62,6 +71,7 @@ pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Res
         texel_packed_giga: rate(2, 16_384, 64, 16)?,
         storage_giga: rate(3, 16_384, 16, 8)?,
         triad_gb_s: triad(device, library, &out)?,
+        dispatch_ms: idle(device, library, &source, &out)?,
     })
 }
 
@@ -73,6 +83,17 @@ fn triad(device: &Arc<Device>, library: &Library, out: &Buffer) -> Result<f64> {
     let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?, &[])?;
     let resources = [Bind::Buffer(&b), Bind::Buffer(out), Bind::Buffer(&c)];
     Ok(3.0 * bytes as f64 / best(device, &pipeline, &resources, TRIAD_FLOATS / 4)? * 1e-9)
+}
+
+/// Milliseconds of a dispatch of one workgroup that multiplies once.
+fn idle(device: &Arc<Device>, library: &Library, source: &Buffer, out: &Buffer) -> Result<f64> {
+    let row = Row::new("ceiling.comp", 4)
+        .define("KIND", 0_u32)
+        .define("READS", 1_u32)
+        .define("ROUNDS", 1_u32)
+        .define("MASK", 7_u32);
+    let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?, &[])?;
+    Ok(1e3 * best(device, &pipeline, &[Bind::Buffer(source), Bind::Buffer(out)], 1)?)
 }
 
 /// Seconds of the fastest run: noise only adds.

@@ -74,6 +74,17 @@ pub fn crossing(curve: &[(f64, f64)], y: f64) -> Option<f64> {
     (slope < 0.0).then(|| (pair[0].0 + (target - pair[0].1) / slope).exp().max(curve[0].0))
 }
 
+/// What a rising curve of (x, y) has at `x`, straight in logarithms between its points and on beyond its ends; of one point, that.
+///
+/// # Panics
+/// When there is no point.
+pub fn along(curve: &[(f64, f64)], x: f64) -> f64 {
+    let last = curve.len().saturating_sub(1);
+    let after = curve.iter().position(|p| p.0 >= x).unwrap_or(last).clamp(1, last.max(1));
+    let (Some(a), Some(b)) = (curve.get(after - 1), curve.get(after)) else { return curve[0].1 };
+    a.1 * ((b.1 / a.1).ln() * (x / a.0).ln() / (b.0 / a.0).ln()).exp()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,6 +108,11 @@ mod tests {
             assert!((crossing(&curve, y).unwrap() * y - 1.0).abs() < 1e-12);
         }
         assert_eq!(crossing(&curve, 2.0), Some(1.0), "already better at its first point");
+        // y = x^2, at its points, between and beyond.
+        for x in [1.0, 3.0, 4.0, 64.0] {
+            assert!((along(&[(1.0, 1.0), (4.0, 16.0), (16.0, 256.0)], x) / (x * x) - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(along(&[(2.0, 7.0)], 5.0), 7.0);
         assert_eq!(crossing(&[(1.0, 1.0), (2.0, 1.0)], 0.5), None);
     }
 }

@@ -10,6 +10,7 @@ pub mod figures;
 pub mod plot;
 pub mod product;
 pub mod profile;
+pub mod refusals;
 pub mod rival;
 pub mod scaling;
 pub mod skips;
@@ -19,6 +20,7 @@ pub mod text;
 pub mod time_error;
 pub mod town;
 pub mod trials;
+pub mod verdict;
 
 use crate::bake::Baker;
 use crate::bake::cache::Cache;

@@ -96,7 +96,8 @@ pub struct Row {
     pub variant: String,
     /// Device time.
     pub ms: Tenths,
-    /// Nanoseconds a pair of vertex and occluder; a merge's alone, like all below.
+    /// Nanoseconds a pair of vertex and occluder; a merge's alone, like all below. None of these where the time is mostly that of
+    /// starting a dispatch (see [`Ceilings::resolve`]).
     pub ns_a_pair: Option<f64>,
     /// Per pair.
     pub work: Option<Work>,
@@ -131,17 +132,19 @@ fn row(case: &str, name: &str, pairs: u64, times: &[f64], form: &Form, census: &
     let other = f64::from(work.fetches - field) / at_best.texel_packed_giga;
     let loaded: u32 = census.block_bytes.values().sum();
     let reads = f64::from(field) / field_rate + other + f64::from(loaded) / 8.0 / at_best.storage_giga;
+    // A scene of a few vertices tells nothing of rates.
+    let rate = |value: f64| (at_best.resolve(ms.median) && pairs > 0).then_some(value);
     Row {
         case: case.to_owned(),
         pass: "merge",
         variant: name.to_owned(),
         ms,
-        ns_a_pair: Some(ns),
+        ns_a_pair: rate(ns),
         work: Some(work),
-        gflops: Some(f64::from(work.flops) / ns),
-        gb_s: Some(f64::from(work.bytes) / ns),
-        arithmetic_share: Some(f64::from(work.flops) / at_best.gflops / ns),
-        read_share: Some(reads / ns),
+        gflops: rate(f64::from(work.flops) / ns),
+        gb_s: rate(f64::from(work.bytes) / ns),
+        arithmetic_share: rate(f64::from(work.flops) / at_best.gflops / ns),
+        read_share: rate(reads / ns),
     }
 }
 

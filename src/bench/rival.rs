@@ -8,7 +8,7 @@ use super::Bench;
 use super::budget::{Truth, device_radiosity};
 use super::cases::Case;
 use super::default_options;
-use super::figures::{Difference, Radiosity, Spread, crossing, spread};
+use super::figures::{Difference, Radiosity, Spread, along, crossing, spread};
 use super::sweep::merge_ms;
 use crate::error::Result;
 use crate::truth::{RayCast, Shapes, World};
@@ -19,6 +19,7 @@ use std::time::Instant;
 #[derive(Clone, Debug, Serialize)]
 pub struct RivalPoint {
     /// Rays a vertex for the sky and for each light.
+    #[serde(rename = "ray_count")]
     pub rays: u32,
     /// Wall time for all lit vertices, in proportion from the judged ones, milliseconds.
     pub wall_ms: Spread,
@@ -31,6 +32,8 @@ pub struct RivalPoint {
 pub struct Comparison {
     /// Scene and light.
     pub case: String,
+    /// What lights it, in words.
+    pub light: String,
     /// Lit vertices.
     #[serde(rename = "vertex_count")]
     pub vertices: usize,
@@ -49,10 +52,18 @@ pub struct Comparison {
     /// or at one ray where that is already better.
     pub rival_ms_at_equal_rms: Option<f64>,
     /// Rays at which it has it.
+    #[serde(rename = "rays_at_equal_rms_count")]
     pub rays_at_equal_rms: Option<f64>,
     /// How many times faster a frame of the merge is at equal root mean square error.
     #[serde(rename = "speed_up_at_equal_rms_ratio")]
     pub speed_up_at_equal_rms: Option<f64>,
+}
+
+impl Comparison {
+    /// The case with its light, once.
+    pub fn title(&self) -> String {
+        if self.case.contains(", (") { self.case.clone() } else { format!("{} ({})", self.case, self.light) }
+    }
 }
 
 /// Runs both in turns.
@@ -95,15 +106,15 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparis
         .enumerate()
         .map(|(i, &rays)| RivalPoint { rays, wall_ms: spread(&rival_walls[i]), error: truth.error(&found[i]) })
         .collect();
-    let curve = |x: &dyn Fn(&RivalPoint) -> f64| {
-        crossing(&rival.iter().map(|p| (x(p), p.error.rms)).collect::<Vec<_>>(), merge_error.rms)
-    };
+    let rays_at_equal_rms =
+        crossing(&rival.iter().map(|p| (f64::from(p.rays), p.error.rms)).collect::<Vec<_>>(), merge_error.rms);
     let frame_wall_ms = spread(&walls);
-    let rival_ms = curve(&|p| p.wall_ms.median);
-    let rays_at_equal_rms = curve(&|p| f64::from(p.rays));
+    let times: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.wall_ms.median)).collect();
+    let rival_ms = rays_at_equal_rms.map(|rays| along(&times, rays));
     (bench.progress)(&format!("{}: merge against ray casting measured", case.name));
     Ok(Comparison {
         case: case.name.clone(),
+        light: case.light.clone(),
         vertices,
         threads: rayon::current_num_threads(),
         merge_ms: spread(&merges),

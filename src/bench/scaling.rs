@@ -2,7 +2,7 @@
 
 use super::budget::device_radiosity;
 use super::figures::{Radiosity, Spread, difference, rms, spread};
-use super::plot::{Curve, Dot, Plot};
+use super::plot::{Curve, Panel, Plot};
 use super::sweep::merge_ms;
 use super::text::{csv, write};
 use super::town::{Town, moved};
@@ -182,25 +182,21 @@ fn plot(axis: &str, points: &[&Point]) -> Plot {
         "lights" => p.lights,
         _ => p.entities,
     } as f64;
-    let dots = |group: &str, value: &dyn Fn(&Point) -> f64| -> Vec<Dot> {
-        let label = |p: &Point| format!("{group} at {}: {} ms", size(p), super::text::three(value(p)));
-        points.iter().map(|p| Dot { label: label(p), group: group.into(), x: size(p), y: value(p) }).collect()
-    };
     let curve = |label: &str, value: &dyn Fn(&Point) -> f64| Curve {
         label: format!("{label}, slope {:.2}", slope(points.iter().map(|p| (size(p), value(p))))),
         points: points.iter().map(|p| (size(p), value(p))).collect(),
+        notes: points.iter().map(|p| super::text::three(value(p))).collect(),
     };
-    let (all, one) = (|p: &Point| p.all_move_ms.median, |p: &Point| p.one_moves_ms.median);
-    let mut marks = dots("all move", &all);
-    marks.extend(dots("one moves", &one));
-    Plot {
-        title: format!("A frame without drawing as {axis} grow"),
+    let panel = Panel {
         x_label: if axis.starts_with("entities") { "entities".into() } else { axis.into() },
         y_label: "milliseconds (median)".into(),
-        dots: marks,
-        front: Vec::new(),
-        curves: vec![curve("all move", &all), curve("one moves", &one)],
-    }
+        curves: vec![
+            curve("all move", &|p: &Point| p.all_move_ms.median),
+            curve("one moves", &|p: &Point| p.one_moves_ms.median),
+        ],
+        ..Panel::default()
+    };
+    Plot { title: format!("A frame without drawing as {axis} grow"), panels: vec![panel] }
 }
 
 /// Least-squares slope in logarithms: 1 where cost is in proportion to size.

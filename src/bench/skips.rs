@@ -3,6 +3,7 @@
 use super::budget::device_radiosity;
 use super::cases::{self, Case};
 use super::figures::{Difference, Radiosity, Spread, difference, rms, spread};
+use super::plot::{Column, Group, Rows, Scale};
 use super::sweep::merge_ms;
 use super::town::{Town, moved};
 use super::{Bench, default_options};
@@ -26,6 +27,7 @@ pub struct Side {
     /// Device time of the merge, milliseconds.
     pub merge_ms: Spread,
     /// Lookups in the lists that were merged, one for 64 vertices.
+    #[serde(rename = "step_count")]
     pub steps: usize,
     /// Against ray casting.
     pub error: Difference,
@@ -39,20 +41,38 @@ pub struct Row {
     /// Name of the skip.
     pub skip: String,
     /// Lit vertices.
+    #[serde(rename = "vertex_count")]
     pub vertices: usize,
     /// Without it, all others on.
     pub off: Side,
     /// With all skips.
     pub on: Side,
     /// Frame time off over on.
+    #[serde(rename = "speed_up_ratio")]
     pub times_faster: f64,
     /// Largest change of a vertex, relative to the root mean square of T0.
     pub change: Difference,
     /// What the lists leave off, all skips on.
     pub counts: Counts,
+    /// Of that, what this skip left off: (cluster, chain, entity) triples, a cluster being 64 vertices. None where it does not work
+    /// on lists.
+    pub left_off_count: Option<u64>,
 }
 
-/// Measures, and writes `skip.csv` and `skip.json` into `folder`.
+/// The count that goes with a skip.
+fn left_off(skip: &str, counts: &Counts) -> Option<u64> {
+    let name = match skip {
+        "horizon" => "below_horizon",
+        "cones" => "apart",
+        "behind" => "behind_light",
+        "facing" => "facing_away",
+        eps if eps.starts_with("eps") => "below_eps",
+        other => other,
+    };
+    serde_json::to_value(counts).ok()?.get(name)?.as_u64()
+}
+
+/// Measures, and writes `skip.csv`, `skip.json` and `skip.svg` into `folder`.
 ///
 /// # Errors
 /// `Failed` when the folder cannot be written; else as [`frame::Frame::new`].
@@ -70,13 +90,52 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Row>> {
     let values: Vec<_> = rows.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect();
     super::text::write(&folder.join("skip.csv"), &super::text::csv(&origin, &values))?;
     super::text::write(&folder.join("skip.json"), &format!("{:#}\n", json!({ "origin": origin, "rows": rows })))?;
+    super::text::write(&folder.join("skip.svg"), &plot(&rows).svg())?;
     Ok(rows)
+}
+
+/// Time and error of every skip, off and on.
+fn plot(rows: &[Row]) -> Rows {
+    let mut cases: Vec<&str> = rows.iter().map(|row| row.case.as_str()).collect();
+    cases.dedup();
+    let group = |case: &&str| Group {
+        heading: (*case).to_owned(),
+        rows: rows.iter().filter(|row| row.case == *case).map(|row| row.skip.clone()).collect(),
+    };
+    let column = |x_label: &str, value: &dyn Fn(&Row) -> [Option<f64>; 2]| Column {
+        x_label: x_label.into(),
+        scale: Scale::Log,
+        limit: None,
+        values: rows.iter().map(|row| value(row).to_vec()).collect(),
+    };
+    let lead = column("times faster with it", &|row| [None, Some(row.times_faster)]);
+    Rows {
+        title: "Every skip off and on, all others on".into(),
+        series: vec!["off".into(), "on".into()],
+        groups: cases.iter().map(group).collect(),
+        columns: vec![
+            column("frame without drawing, milliseconds (median)", &|row| {
+                [row.off, row.on].map(|side| Some(side.frame_ms.median))
+            }),
+            Column { limit: Some((1.0, "equal".into())), ..lead },
+            column("RMS error against ray casting, relative", &|row| {
+                [row.off, row.on].map(|side| Some(side.error.rms))
+            }),
+        ],
+    }
 }
 
 fn chosen(quick: bool) -> Result<Vec<Case>> {
     let town = |things, lights, cells| -> Result<Case> {
         let scene = Town { things, lights, cells, receive: true }.scene()?;
-        Ok(Case { name: format!("town of {things}, {lights} lights"), scene, time_s: 0.0, distant: Distant::Exact })
+        let light = cases::light(&scene);
+        Ok(Case {
+            name: format!("town of {things}, {lights} lights"),
+            light,
+            scene,
+            time_s: 0.0,
+            distant: Distant::Exact,
+        })
     };
     if quick {
         return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?]);
@@ -170,6 +229,7 @@ impl Judge {
             error: difference(&found[i], &self.truth, self.unit),
         };
         let (off, on) = (side(0), side(1));
+        let counts = frames[1].counts(placements);
         (bench.progress)(&format!("{}: {skip} measured", case.name));
         Ok(Row {
             case: case.name.clone(),
@@ -177,7 +237,8 @@ impl Judge {
             vertices: frames[0].receiver_vertex_count(),
             times_faster: off.frame_ms.median / on.frame_ms.median,
             change: difference(&found[0], &found[1], self.unit),
-            counts: frames[1].counts(placements),
+            left_off_count: left_off(skip, &counts),
+            counts,
             off,
             on,
         })

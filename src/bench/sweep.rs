@@ -35,6 +35,8 @@ pub struct Point {
     pub axis: &'static str,
     /// Its setting.
     pub name: String,
+    /// Whether long chains are bounded: by the guard.
+    pub guarded: bool,
     /// Bytes of all fields of the scene.
     pub field_bytes: u64,
     /// Device time of the bakes, milliseconds; none where all was in the cache.
@@ -177,6 +179,7 @@ pub fn sweep(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variat
             case: case.name.clone(),
             axis: variation.axis,
             name: variation.name.clone(),
+            guarded: variation.options.chain.guard,
             field_bytes: frame.store.fields.size_bytes,
             bake_ms: (!baked.is_empty()).then(|| bake_ms.sum()),
             first_merge_ms: first[index],

@@ -16,7 +16,18 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
 /// Serialisable rows as CSV: nested numbers get names joined by `_`, lists of objects are left out, and the first line, after
 /// `#`, is `origin` as JSON.
 pub fn csv(origin: &Value, rows: &[Value]) -> String {
-    let flat: Vec<Vec<(String, String)>> = rows.iter().map(|row| flatten("", row)).collect();
+    let mut flat: Vec<Vec<(String, String)>> = rows.iter().map(|row| flatten("", row)).collect();
+    // Words before numbers, judged by the first row: what a row is about stands at its left.
+    let words = |row: &Value| {
+        flatten("", row).iter().map(|(_, value)| !value.is_empty() && value.parse::<f64>().is_err()).collect::<Vec<_>>()
+    };
+    if let Some(words) = rows.first().map(words) {
+        for row in &mut flat {
+            let (first, second): (Vec<_>, Vec<_>) =
+                std::mem::take(row).into_iter().enumerate().partition(|(i, _)| words.get(*i) == Some(&true));
+            *row = first.into_iter().chain(second).map(|(_, cell)| cell).collect();
+        }
+    }
     let mut text = format!("# {origin}\n");
     if let Some(first) = flat.first() {
         let line = |cells: Vec<String>| cells.iter().map(|c| quote(c)).collect::<Vec<_>>().join(",") + "\n";
@@ -50,7 +61,9 @@ pub fn three(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return x.to_string();
     }
-    let digits = (2 - x.abs().log10().floor() as i32).clamp(0, 8) as usize;
+    // Of the rounded number: 0.9996 is 1.00.
+    let rounded: f64 = format!("{x:.2e}").parse().unwrap_or(x);
+    let digits = (2 - rounded.abs().log10().floor() as i32).clamp(0, 8) as usize;
     let text = format!("{x:.digits$}");
     text.strip_prefix("0.").map_or(text.clone(), |rest| format!(".{rest}"))
 }
@@ -77,7 +90,7 @@ mod tests {
 
     #[test]
     fn three_digits() {
-        let shown: Vec<String> = [0.012_345, 123.4, 0.0, 9876.5, 1.0, -0.5].map(three).to_vec();
+        let shown: Vec<String> = [0.012_345, 123.4, 0.0, 9876.5, 0.9996, -0.5].map(three).to_vec();
         assert_eq!(shown, [".0123", "123", "0", "9876", "1.00", "-0.500"]);
     }
 }

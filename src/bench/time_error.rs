@@ -2,11 +2,11 @@
 
 use super::budget::{Budget, Effort, Truth, budget};
 use super::cases::{self, Case};
-use super::plot::{Curve, Dot, Plot};
+use super::plot::{Column, Curve, Dot, Gap, Group, Panel, Plot, Rows, Scale};
 use super::rival::{Comparison, compare};
-use super::sweep::{Point, pareto, sweep, variations};
+use super::sweep::{Point, Variation, pareto, sweep, variations};
 use super::text::{csv, three, write};
-use super::{Bench, default_options};
+use super::{Bench, default_options, verdict};
 use crate::asset::false_color::Scheme;
 use crate::error::{Error, Result};
 use crate::frame::Options;
@@ -14,8 +14,18 @@ use crate::truth::error_map::Shown;
 use crate::truth::{self, ErrorMap, RayCast, error_map};
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::fmt::Write;
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::Instant;
+
+/// What is measured: all where nothing is named.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Selection {
+    /// Parts of the names of cases; all that are named are swept.
+    pub cases: Vec<String>,
+    /// Axes of the sweep.
+    pub axes: Vec<String>,
+}
 
 /// What was measured.
 #[derive(Serialize)]
@@ -28,31 +38,58 @@ pub struct Outcome {
     pub points: Vec<Point>,
     /// A row a case.
     pub comparisons: Vec<Comparison>,
+    /// Wall time of the parts of the run in seconds, all cases together.
+    pub seconds: BTreeMap<&'static str, f64>,
 }
 
-/// Measures, and writes `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, an error picture a case, a plot a swept case
-/// and `time-error.txt` into `folder`.
+impl Outcome {
+    /// How long the run took and what with.
+    pub fn took(&self) -> String {
+        let parts: Vec<String> = self.seconds.iter().map(|(part, s)| format!("{part} {s:.0}")).collect();
+        format!("{:.0} s in all: {}", self.seconds.values().sum::<f64>(), parts.join(", "))
+    }
+}
+
+/// Measures, and writes `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, an error picture a case, a plot a swept case,
+/// one of the rivals, and `time-error.txt` into `folder`.
 ///
 /// # Errors
-/// `Failed` when the folder cannot be written; else as [`crate::frame::Frame::new`].
-pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Outcome> {
+/// `Usage` when a case or axis does not exist, `Failed` when the folder cannot be written; else as
+/// [`crate::frame::Frame::new`].
+pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection) -> Result<Outcome> {
+    let cases = chosen(bench.quick, &selection.cases)?;
+    let all = variations_of(bench.quick, &selection.axes)?;
     std::fs::create_dir_all(folder)
         .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
-    let mut outcome =
-        Outcome { budgets: Vec::new(), pictures: Vec::new(), points: Vec::new(), comparisons: Vec::new() };
+    let mut outcome = Outcome {
+        budgets: Vec::new(),
+        pictures: Vec::new(),
+        points: Vec::new(),
+        comparisons: Vec::new(),
+        seconds: BTreeMap::new(),
+    };
     let effort = Effort::new(bench.quick);
-    let all = variations(bench.quick);
-    for case in chosen(bench.quick)? {
-        (bench.progress)(&format!("{}: casting rays", case.name));
-        let truth = Truth::new(&case, effort, bench.seed);
-        outcome.budgets.push(budget(bench, &case, &truth)?);
-        outcome.pictures.push(error_picture(bench, &case, folder)?);
-        outcome.comparisons.push(compare(bench, &case, &truth)?);
-        if is_swept(&case, bench.quick) {
-            outcome.points.extend(sweep(bench, &case, &truth, &all)?);
+    for (index, case) in cases.iter().enumerate() {
+        (bench.progress)(&format!("case {} of {}, {}: casting rays", index + 1, cases.len(), case.name));
+        let mut started = Instant::now();
+        let mut took = |outcome: &mut Outcome, part| {
+            *outcome.seconds.entry(part).or_default() += started.elapsed().as_secs_f64();
+            started = Instant::now();
+        };
+        let truth = Truth::new(case, effort, bench.seed);
+        took(&mut outcome, "casting the truth's rays");
+        outcome.budgets.push(budget(bench, case, &truth)?);
+        took(&mut outcome, "baking and budgets");
+        outcome.pictures.push(error_picture(bench, case, folder)?);
+        took(&mut outcome, "error pictures");
+        outcome.comparisons.push(compare(bench, case, &truth)?);
+        took(&mut outcome, "the rival");
+        if is_swept(case) || !selection.cases.is_empty() {
+            outcome.points.extend(sweep(bench, case, &truth, &all)?);
+            took(&mut outcome, "sweeps with their bakes");
         }
     }
-    write_all(bench, folder, &outcome)?;
+    write_all(bench, folder, selection, &outcome)?;
     Ok(outcome)
 }
 
@@ -78,28 +115,50 @@ fn error_picture(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<Shown>
     map.write(&folder.join(format!("error-{}.png", words.join("-"))), &mut frame, &placements, None, noise)
 }
 
-/// The quick run leaves out what takes ten seconds and more to bake on two cores, and takes the teapot under one light, as an
-/// occluder alone.
-fn chosen(quick: bool) -> Result<Vec<Case>> {
-    if quick {
-        let teapot = cases::teapot_lights()?.into_iter().nth(1);
-        let scenes = ["sphere_over_plane", "torus_over_plane"].into_iter().map(cases::scene);
-        return scenes.chain(teapot.map(Ok)).collect();
+/// The cases that are named, or all. The quick run leaves out what takes ten seconds and more to bake on two cores, and takes the
+/// teapot under one light, as an occluder alone.
+fn chosen(quick: bool, named: &[String]) -> Result<Vec<Case>> {
+    let mut all: Vec<Case> = cases::teapot_lights()?.into_iter().chain(cases::scenes()?).collect();
+    if named.is_empty() {
+        let cheap = |name: &str| ["sphere_over_plane", "torus_over_plane"].contains(&name) || name.contains("(b)");
+        all.retain(|case| !quick || cheap(&case.name));
+        return Ok(all);
     }
-    Ok(cases::teapot_lights()?.into_iter().chain(cases::scenes()?).collect())
+    for name in named {
+        if !all.iter().any(|case| case.name.contains(name)) {
+            let names: Vec<&str> = all.iter().map(|case| case.name.as_str()).collect();
+            return Err(Error::Usage(format!("no case has \"{name}\" in its name ({})", names.join("; "))));
+        }
+    }
+    all.retain(|case| named.iter().any(|name| case.name.contains(name)));
+    Ok(all)
+}
+
+/// The default and the settings of the axes that are named, or of all.
+fn variations_of(quick: bool, axes: &[String]) -> Result<Vec<Variation>> {
+    let mut all = variations(quick && axes.is_empty());
+    for axis in axes {
+        if !all.iter().any(|v| v.axis == axis) {
+            let mut names: Vec<&str> = all.iter().skip(1).map(|v| v.axis).collect();
+            names.dedup();
+            return Err(Error::Usage(format!("unknown axis \"{axis}\" ({})", names.join(", "))));
+        }
+    }
+    all.retain(|v| axes.is_empty() || v.axis == "default" || axes.iter().any(|axis| v.axis == axis));
+    Ok(all)
 }
 
 /// Variations are baked anew, so few cases are swept: one object under a sky, and one with a local light.
-fn is_swept(case: &Case, quick: bool) -> bool {
-    case.name == "torus_over_plane" || (!quick && case.name.contains("(b)"))
+fn is_swept(case: &Case) -> bool {
+    case.name == "torus_over_plane" || case.name.contains("(b)")
 }
 
-fn write_all(bench: &Bench<'_>, folder: &Path, outcome: &Outcome) -> Result<()> {
+fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &Outcome) -> Result<()> {
     fn rows(of: &[impl Serialize]) -> Vec<Value> {
         of.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect()
     }
     let origin = json!({
-        "origin": bench.origin, "quick": bench.quick, "seed": bench.seed,
+        "origin": bench.origin, "quick": bench.quick, "seed": bench.seed, "selection": selection,
         "errors": "relative to the root mean square of T0 over the judged vertices",
     });
     write(&folder.join("budget.csv"), &csv(&origin, &rows(&outcome.budgets)))?;
@@ -107,22 +166,27 @@ fn write_all(bench: &Bench<'_>, folder: &Path, outcome: &Outcome) -> Result<()> 
     let rivals: Vec<Value> = outcome.comparisons.iter().flat_map(rival_rows).collect();
     write(&folder.join("rival.csv"), &csv(&origin, &rivals))?;
     write(&folder.join("time-error.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
-    let mut swept: Vec<&str> = outcome.points.iter().map(|p| p.case.as_str()).collect();
-    swept.dedup();
-    for (index, case) in swept.iter().enumerate() {
+    for (index, case) in verdict::swept(&outcome.points).iter().enumerate() {
         let svg = plot(case, outcome).svg();
         write(&folder.join(format!("time-error-{}.svg", index + 1)), &svg)?;
     }
-    write(&folder.join("time-error.txt"), &page(outcome))
+    write(&folder.join("rival.svg"), &rival_plot(&outcome.comparisons).svg())?;
+    let page = [
+        verdict::defaults(&outcome.points),
+        verdict::rivals(&outcome.comparisons),
+        verdict::budgets(&outcome.budgets),
+        format!("This run took {}.\n", outcome.took()),
+    ];
+    write(&folder.join("time-error.txt"), &page.join("\n"))
 }
 
 /// A row for the merge and one for each number of rays.
 fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     let row = |what: String, wall_ms: f64, error| {
         json!({
-            "case": comparison.case, "what": what, "vertex_count": comparison.vertices, "thread_count": comparison.threads,
+            "case": comparison.case, "light": comparison.light, "what": what, "vertex_count": comparison.vertices, "thread_count": comparison.threads,
             "wall_ms": wall_ms, "error": error,
-            "speed_up_at_equal_rms_ratio": comparison.speed_up_at_equal_rms, "rays_at_equal_rms": comparison.rays_at_equal_rms,
+            "speed_up_at_equal_rms_ratio": comparison.speed_up_at_equal_rms, "rays_at_equal_rms_count": comparison.rays_at_equal_rms,
         })
     };
     let merge = row("merge".into(), comparison.frame_wall_ms.median, comparison.merge_error);
@@ -130,122 +194,70 @@ fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     std::iter::once(merge).chain(cast).collect()
 }
 
+/// The settings of a case with their front, and that front beside ray casting.
 fn plot(case: &str, outcome: &Outcome) -> Plot {
     let points: Vec<&Point> = outcome.points.iter().filter(|p| p.case == case).collect();
     let places: Vec<(f64, f64)> = points.iter().map(|p| (p.merge_ms.median, p.total.rms)).collect();
-    let rival = outcome.comparisons.iter().filter(|c| c.case == case);
-    Plot {
-        title: format!("{case}: time against error"),
-        x_label: "merge, milliseconds (median)".into(),
-        y_label: "relative RMS error against ray casting".into(),
-        dots: points
-            .iter()
-            .zip(&places)
-            .map(|(p, &(x, y))| Dot { label: format!("{}: {}", p.axis, p.name), group: p.axis.into(), x, y })
-            .collect(),
+    let dot = |p: &&Point| Dot {
+        label: if p.axis == "default" { format!("default: {}", p.name) } else { format!("{}: {}", p.axis, p.name) },
+        group: p.axis.into(),
+        x: p.merge_ms.median,
+        y: p.total.rms,
+        x_range: Some((p.merge_ms.lower, p.merge_ms.upper)),
+    };
+    let own = Panel {
+        title: "Every setting of the merge".into(),
+        x_label: "merge on the device, milliseconds (median, quartiles)".into(),
+        y_label: "RMS error of radiosity against ray casting, relative".into(),
+        dots: points.iter().map(dot).collect(),
         front: pareto(&places),
-        curves: rival
-            .map(|c| Curve {
-                label: format!("ray casting, {} threads", c.threads),
-                points: c.rival.iter().map(|p| (p.wall_ms.median, p.error.rms)).collect(),
-            })
-            .collect(),
+        ..Panel::default()
+    };
+    let rival = outcome.comparisons.iter().find(|c| c.case == case);
+    let beside = Panel {
+        title: "Beside ray casting on all threads".into(),
+        x_label: "milliseconds (median); numbers: rays a vertex and light".into(),
+        dots: own.dots.iter().cloned().map(|dot| Dot { x_range: None, ..dot }).collect(),
+        numbered: false,
+        curves: rival.map(rival_curve).into_iter().collect(),
+        gap: rival.and_then(|c| {
+            let lead = c.speed_up_at_equal_rms?;
+            let (from, to, y) = (c.frame_wall_ms.median, c.rival_ms_at_equal_rms?, c.merge_error.rms);
+            let label = if lead >= 1.0 { "faster" } else { "slower" };
+            let label = format!("a frame: {} times {label}", three(lead.max(1.0 / lead)));
+            Some(Gap { from, to, y, label })
+        }),
+        ..own.clone()
+    };
+    Plot { title: format!("{case}: time against error"), panels: vec![own, beside] }
+}
+
+fn rival_curve(c: &Comparison) -> Curve {
+    Curve {
+        label: format!("ray casting, {} threads", c.threads),
+        points: c.rival.iter().map(|p| (p.wall_ms.median, p.error.rms)).collect(),
+        notes: c.rival.iter().map(|p| p.rays.to_string()).collect(),
     }
 }
 
-/// One page: where the default stands and why, from the numbers.
-fn page(outcome: &Outcome) -> String {
-    let mut text = String::from(
-        "Time against error\n\nErrors are root mean squares over vertices relative to that of the ray-cast radiosity (T0).\n\n\
-         What a picture's error is made of\n",
-    );
-    for b in &outcome.budgets {
-        let _ = writeln!(
-            text,
-            "  {}: bands {}, sampling {}, arithmetic and storage {}, total {} (worst vertex {}); T0 itself {}",
-            b.case,
-            three(b.bands.rms),
-            three(b.sampling.rms),
-            three(b.arithmetic_and_storage.rms),
-            three(b.total.rms),
-            three(b.total.max),
-            three(b.t0_error),
-        );
-    }
-    text += "\nWhat run time buys\n";
-    let mut swept: Vec<&str> = outcome.points.iter().map(|p| p.case.as_str()).collect();
-    swept.dedup();
-    for case in swept {
-        let points: Vec<&Point> = outcome.points.iter().filter(|p| p.case == case).collect();
-        let places: Vec<(f64, f64)> = points.iter().map(|p| (p.merge_ms.median, p.total.rms)).collect();
-        let front = pareto(&places);
-        let Some(default) = points.first() else { continue };
-        let _ = writeln!(
-            text,
-            "  {case}: the default ({}) takes {} ms and is off by {}; it is {} the front of what nothing beats in both:",
-            default.name,
-            three(default.merge_ms.median),
-            three(default.total.rms),
-            if front.contains(&0) { "on" } else { "off" },
-        );
-        for (i, point) in points.iter().enumerate().skip(1) {
-            let _ = writeln!(
-                text,
-                "   {} {} {}: {} times the time, error {}, below the bands {}, {} kB",
-                if front.contains(&i) { "*" } else { " " },
-                point.axis,
-                point.name,
-                three(point.time_per_default),
-                three(point.total.rms),
-                three(point.below_bands.rms),
-                point.field_bytes / 1024,
-            );
-        }
-        text += &verdict(default, &points);
-    }
-    text += "\nMerge against ray casting at equal error\n";
-    for c in &outcome.comparisons {
-        let _ = match (c.speed_up_at_equal_rms, c.rays_at_equal_rms) {
-            (Some(times), Some(rays)) => writeln!(
-                text,
-                "  {}: {} times {} ({} ms a frame; the rays that reach its error {}: {} a vertex and light, {} ms)",
-                c.case,
-                three(if times >= 1.0 { times } else { 1.0 / times }),
-                if times >= 1.0 { "faster" } else { "SLOWER" },
-                three(c.frame_wall_ms.median),
-                three(c.merge_error.rms),
-                three(rays),
-                three(c.rival_ms_at_equal_rms.unwrap_or(f64::NAN)),
-            ),
-            _ => writeln!(text, "  {}: the rival's error does not fall; no comparison", c.case),
+/// Every case's lead at equal error.
+fn rival_plot(comparisons: &[Comparison]) -> Rows {
+    let column =
+        |x_label: &str, values: &dyn Fn(&Comparison) -> [Option<f64>; 2], limit: Option<(f64, String)>| Column {
+            x_label: x_label.into(),
+            scale: Scale::Log,
+            limit,
+            values: comparisons.iter().map(|c| values(c).to_vec()).collect(),
         };
+    let times: &dyn Fn(&Comparison) -> [Option<f64>; 2] = &|c| [Some(c.frame_wall_ms.median), c.rival_ms_at_equal_rms];
+    let lead: &dyn Fn(&Comparison) -> [Option<f64>; 2] = &|c| [c.speed_up_at_equal_rms, None];
+    Rows {
+        title: "Merge and ray casting at equal error".into(),
+        series: vec!["merge (a frame without drawing)".into(), "ray casting on as many threads".into()],
+        groups: vec![Group { heading: String::new(), rows: comparisons.iter().map(Comparison::title).collect() }],
+        columns: vec![
+            column("wall time, milliseconds (median)", times, None),
+            column("how many times faster the merge is", lead, Some((1.0, "equal".into()))),
+        ],
     }
-    text
-}
-
-/// The reason for the default, as far as the numbers carry it.
-fn verdict(default: &Point, points: &[&Point]) -> String {
-    let better: Vec<&&Point> = points[1..]
-        .iter()
-        .filter(|p| {
-            p.time_per_default < 1.02 && p.total.rms < 0.98 * default.total.rms && p.field_bytes <= default.field_bytes
-        })
-        .collect();
-    let faster = points[1..]
-        .iter()
-        .filter(|p| p.time_per_default < 0.98 && p.total.rms < 1.1 * default.total.rms)
-        .map(|p| format!("{} {}", p.axis, p.name));
-    let faster: Vec<String> = faster.collect();
-    let mut text = match better.is_empty() {
-        true => "    Nothing is as fast, as small and more than 2 % nearer to the truth than the default.\n".to_owned(),
-        false => {
-            let names: Vec<String> = better.iter().map(|p| format!("{} {}", p.axis, p.name)).collect();
-            format!("    As fast, as small and nearer to the truth than the default here: {}.\n", names.join("; "))
-        }
-    };
-    text += &match faster.is_empty() {
-        true => "    Nothing is more than 2 % faster within a tenth of its error.\n".to_owned(),
-        false => format!("    Faster within a tenth of its error: {}.\n", faster.join("; ")),
-    };
-    text
 }

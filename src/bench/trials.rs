@@ -32,16 +32,20 @@ pub struct Trial {
     /// Number format of the fields.
     pub storage: Storage,
     /// Vertices that are lit.
+    #[serde(rename = "vertex_count")]
     pub vertices: usize,
     /// Whether every number on the device is finite.
     pub finite: bool,
     /// Whether a second run gave the same bytes.
     pub repeatable: bool,
     /// Largest magnitude of a radiosity.
+    #[serde(rename = "largest_radiosity")]
     pub largest: f64,
     /// What it cannot exceed (see [`bound`]).
+    #[serde(rename = "bound_radiosity")]
     pub bound: f64,
     /// Largest difference of the device to its f64 twin, relative to the twin's largest magnitude; 0 where all is dark.
+    #[serde(rename = "twin_error_relative")]
     pub twin_error: f64,
     /// Whether all is as it should be: finite, repeatable, within the bound, and within [`NEAR_TWIN`] of the twin.
     pub passed: bool,
@@ -67,14 +71,21 @@ const TRIALS: &[(&str, &str)] = &[
     ("an object as large as the scene", "position = [0, 1, 0]\nscale = 8; position = [1, 1, 0]"),
     ("light in an occluder", "position = [0, 1, 0]; position = [0, 1, 0]\nscale = 0.2\nemission = [5, 5, 5]"),
     ("occluder in a light", "position = [0, 1, 0]\nscale = 0.2; position = [0, 1, 0]\nemission = [5, 5, 5]"),
-    ("equal distances", "position = [-1, 1, 0]; position = [1, 1, 0]\nemission = [5, 5, 5]\noccludes = true"),
+    (
+        "equal distances, occluder first",
+        "position = [-1, 1, 0]; position = [1, 1, 0]\nemission = [5, 5, 5]\noccludes = true",
+    ),
+    (
+        "equal distances, light first",
+        "position = [1, 1, 0]\nemission = [5, 5, 5]\noccludes = true; position = [-1, 1, 0]",
+    ),
     ("radiance 0", "position = [0, 1, 0]; position = [1, 1, 0]\nemission = [0, 0, 0]\nemits = true"),
     ("radiance 10^-6", "position = [0, 1, 0]; position = [1, 1, 0]\nemission = [1e-6, 1e-6, 1e-6]"),
     ("radiance 10^6", "position = [0, 1, 0]; position = [1, 1, 0]\nemission = [1e6, 1e6, 1e6]"),
 ];
 
 /// A floor of `cells` x `cells`, a ball and a two-coloured ring to place, and a sky.
-fn scene(cells: u32, sky: &str, entities: &str) -> Result<Scene> {
+pub(super) fn scene(cells: u32, sky: &str, entities: &str) -> Result<Scene> {
     let text = format!(
         "[camera]\neye = [0, 3, 6]\ntarget = [0, 0, 0]\n{sky}\n\
          [[mesh]]\nname = \"floor\"\nplane = {{ size_m = 4, cells = {cells} }}\n\
@@ -84,10 +95,12 @@ fn scene(cells: u32, sky: &str, entities: &str) -> Result<Scene> {
     Scene::parse(&text, Path::new("assets/scenes/trial.toml"), &embedded::read)
 }
 
-const GRADIENT: &str = "[environment]\ngradient = { radiance = [1, 1, 1] }";
+/// A sky.
+pub(super) const GRADIENT: &str = "[environment]\ngradient = { radiance = [1, 1, 1] }";
 const FLOOR: &str = "[[entity]]\nmesh = \"floor\"\n";
 
-fn entity(mesh: &str, more: &str) -> String {
+/// An entity of a mesh of [`scene`], and more of its keys.
+pub(super) fn entity(mesh: &str, more: &str) -> String {
     format!("[[entity]]\nmesh = \"{mesh}\"\n{more}\n")
 }
 
@@ -238,10 +251,13 @@ pub struct Turn {
     /// What is done after each step.
     pub name: &'static str,
     /// Steps.
+    #[serde(rename = "step_count")]
     pub steps: usize,
     /// Length of the quaternion in the end.
+    #[serde(rename = "length_ratio")]
     pub length: f64,
     /// How far the frame's rotation matrix of it is from keeping lengths: largest error of the SH blocks' rows.
+    #[serde(rename = "not_orthogonal_relative")]
     pub not_orthogonal: f64,
     /// Angle to the same turn in f64, degrees.
     pub drift_deg: f64,

@@ -2,7 +2,8 @@
 
 use super::common::start;
 use crate::app::{Global, output};
-use crate::bench::{text::three, time_error};
+use crate::bench::text::three;
+use crate::bench::time_error::{self, Selection};
 use crate::error::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -13,14 +14,23 @@ pub struct Arguments {
     /// A minute on two cores instead of a quarter of an hour: fewer scenes, settings and rays
     #[arg(long)]
     quick: bool,
-    /// Folder for budget.csv, sweep.csv, rival.csv, time-error.json, time-error.txt and plots
+    /// Measure and sweep only cases that have TEXT in their names; may be given again; a text that none has lists them
+    #[arg(long, value_name = "TEXT")]
+    case: Vec<String>,
+    /// Sweep only this axis, with all its settings; may be given again; an unknown name lists them
+    #[arg(long, value_name = "NAME")]
+    axis: Vec<String>,
+    /// Folder for budget.csv, sweep.csv, rival.csv, time-error.json, time-error.txt (which setting is the default and why), plots
+    /// and error pictures
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
 
 /// Measures and prints the budget and the comparison.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let (context, outcome) = start(global, arguments.quick, |bench| time_error::run(bench, &arguments.out))?;
+    let selection = Selection { cases: arguments.case.clone(), axes: arguments.axis.clone() };
+    let (context, outcome) =
+        start(global, arguments.quick, |bench| time_error::run(bench, &arguments.out, &selection))?;
     if global.json {
         output::say(serde_json::to_value(&outcome).expect("results are plain data").to_string());
         return context.finish();
@@ -43,13 +53,15 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         .iter()
         .map(|c| {
             let or_none = |x: Option<f64>| x.map_or("-".into(), three);
-            let mut row = vec![c.case.clone()];
+            let mut row = vec![c.case.clone(), c.light.clone()];
             row.extend([c.frame_wall_ms.median, c.merge_error.rms].map(three));
             row.extend([c.rays_at_equal_rms, c.rival_ms_at_equal_rms, c.speed_up_at_equal_rms].map(or_none));
             row
         })
         .collect();
-    output::table(&["scene", "frame ms", "error", "rays", "rays ms", "times faster"], &rows);
-    output::say(format!("\n{}: {} settings measured", arguments.out.display(), outcome.points.len()));
+    output::table(&["scene", "light", "frame ms", "error", "rays", "rays ms", "times faster"], &rows);
+    let folder = arguments.out.display();
+    output::say(format!("\n{folder}: {} settings measured, {}", outcome.points.len(), outcome.took()));
+    output::say(format!("{folder}/time-error.txt says which setting is the default and why"));
     context.finish()
 }

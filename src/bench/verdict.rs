@@ -1,0 +1,229 @@
+//! Which setting is the default and why, and where the merge leads and loses, in words made from a run's own figures.
+
+use super::budget::Budget;
+use super::rival::Comparison;
+use super::sweep::Point;
+use super::text::three;
+use std::fmt::Write;
+
+/// Changes of time, error or bytes by less than this factor count as none: medians of quiet runs differ by as much.
+const NOISE: f64 = 1.02;
+/// How many times the default's bytes a setting may need and still take its place.
+const MORE_BYTES: f64 = 1.25;
+
+/// A setting in units of the default, case by case.
+struct Ratios {
+    guarded: bool,
+    time: Vec<f64>,
+    error: Vec<f64>,
+    bytes: Vec<f64>,
+}
+
+impl Ratios {
+    fn new(points: &[&Point], defaults: &[&Point]) -> Self {
+        let of = |value: &dyn Fn(&Point) -> f64| {
+            points.iter().zip(defaults).map(|(p, d)| value(p) / value(d).max(f64::MIN_POSITIVE)).collect()
+        };
+        Ratios {
+            guarded: points.iter().all(|p| p.guarded),
+            time: points.iter().map(|p| p.time_per_default).collect(),
+            error: of(&|p| p.total.rms),
+            bytes: of(&|p| p.field_bytes as f64),
+        }
+    }
+
+    /// Time multiplied by error, in the case where that is largest.
+    fn worst_product(&self) -> f64 {
+        self.time.iter().zip(&self.error).map(|(t, e)| t * e).fold(0.0, f64::max)
+    }
+
+    fn takes_the_place(&self) -> bool {
+        self.guarded && self.worst_product() < 1.0 / NOISE && self.bytes.iter().all(|b| *b <= MORE_BYTES)
+    }
+
+    /// What it is, compared with the default.
+    fn word(&self) -> &'static str {
+        let any = |of: &[f64], test: &dyn Fn(f64) -> bool| of.iter().any(|v| test(*v));
+        let (more, less) = (|v: f64| v > NOISE, |v: f64| v < 1.0 / NOISE);
+        let farther = any(&self.error, &more);
+        let nearer = any(&self.error, &less);
+        let dearer = any(&self.time, &more);
+        let cheaper = any(&self.time, &less);
+        let (larger, smaller) = (any(&self.bytes, &more), any(&self.bytes, &less));
+        match (nearer, farther) {
+            _ if !self.guarded => "without a bound for long chains",
+            _ if self.takes_the_place() => "BETTER by the rule",
+            (true, true) => "nearer in one case, farther in another",
+            (true, false) if dearer => "nearer, but slower",
+            (true, false) if larger => "nearer, but larger",
+            (true, false) => "nearer",
+            (false, true) if cheaper => "faster, but farther",
+            (false, true) if smaller => "smaller, but farther",
+            (false, true) => "farther, and no faster",
+            (false, false) if dearer => "slower, and no nearer",
+            (false, false) if larger => "larger, and no nearer",
+            (false, false) if cheaper => "faster, as near",
+            (false, false) if smaller => "smaller, as near",
+            (false, false) => "no difference",
+        }
+    }
+}
+
+fn plural(count: usize, one: &str) -> String {
+    if count == 1 { format!("1 {one}") } else { format!("{count} {one}s") }
+}
+
+/// Names of swept cases in their order.
+pub fn swept(points: &[Point]) -> Vec<&str> {
+    let mut cases: Vec<&str> = points.iter().map(|p| p.case.as_str()).collect();
+    cases.dedup();
+    cases
+}
+
+/// Where the default stands among all settings, and a line for each.
+pub fn defaults(points: &[Point]) -> String {
+    let cases = swept(points);
+    let of_case = |case: &str| points.iter().filter(|p| p.case == case).collect::<Vec<_>>();
+    let by_case: Vec<Vec<&Point>> = cases.iter().map(|case| of_case(case)).collect();
+    let defaults: Vec<&Point> = by_case.iter().filter_map(|points| points.first().copied()).collect();
+    let Some(default) = defaults.first() else { return "Nothing was swept.\n".into() };
+    let count = by_case[0].len();
+    let mut text = format!(
+        "Which setting is the default, and why\n\n\
+         The default is {}, trilinear lookup, f16, 64 px a face, 4 bands of transfer and of visibility, guarded factored products.\n",
+        default.name
+    );
+    for default in &defaults {
+        let _ = writeln!(
+            text,
+            "  {}: merged in {} ms (quarters {} to {}; the first time {} ms), off by {} (99 of 100 vertices below {}, the \
+             worst {}), {} kB of fields.",
+            default.case,
+            three(default.merge_ms.median),
+            three(default.merge_ms.lower),
+            three(default.merge_ms.upper),
+            three(default.first_merge_ms),
+            three(default.total.rms),
+            three(default.total.p99),
+            three(default.total.max),
+            default.field_bytes / 1024,
+        );
+    }
+    let _ = writeln!(
+        text,
+        "\nThe rule: another setting takes its place if time multiplied by error falls by more than {:.0} % (what two quiet runs \
+         may differ\nby) in every swept case, with fields of at most {MORE_BYTES} times its bytes. A saving that costs more error \
+         than it brings time, or a\ngain that costs more time than it brings error, is left to the user as an option. What\nleaves chains without a bound does not take its \
+         place (bench stability).",
+        (NOISE - 1.0) * 100.0
+    );
+    let (mut lines, mut better, mut axis) = (String::new(), Vec::new(), "");
+    for setting in 1..count {
+        let points: Vec<&Point> = by_case.iter().filter_map(|of| of.get(setting).copied()).collect();
+        let Some(point) = points.first() else { continue };
+        let ratios = Ratios::new(&points, &defaults);
+        if ratios.takes_the_place() {
+            better.push(format!("{} {}", point.axis, point.name));
+        }
+        if axis != point.axis {
+            axis = point.axis;
+            let _ = writeln!(lines, "  {axis}");
+        }
+        let each = |values: &[f64]| values.iter().map(|v| format!("{:>7}", three(*v))).collect::<String>();
+        let _ = writeln!(
+            lines,
+            "    {:<44}{}   {}   {}   {}",
+            point.name,
+            each(&ratios.time),
+            each(&ratios.error),
+            each(&ratios.bytes[..1]),
+            ratios.word()
+        );
+    }
+    text += &match better.is_empty() {
+        true => format!("By this rule none of the {} takes its place.\n", plural(count - 1, "other setting")),
+        false => format!("By this rule these would take its place: {}.\n", better.join("; ")),
+    };
+    let width = 7 * cases.len();
+    let _ = writeln!(
+        text,
+        "\nIn units of the default, case by case ({}):\n    {:<44}{:>width$}   {:>width$}   {:>7}",
+        cases.join("; "),
+        "",
+        "time",
+        "error",
+        "bytes",
+    );
+    text + &lines
+}
+
+/// A line a case with its lead, then where it is thin or none.
+pub fn rivals(comparisons: &[Comparison]) -> String {
+    let mut text = String::from(
+        "How many times faster the merge is than ray casting on all threads at equal error\n\
+         (a frame without drawing, everything merged, against the rays a vertex and light that err as little; sky and lights \
+         sampled\ndirectly, hierarchies built beforehand)\n",
+    );
+    let (mut losses, mut thin) = (Vec::new(), Vec::new());
+    for c in comparisons {
+        let (Some(times), Some(rays)) = (c.speed_up_at_equal_rms, c.rays_at_equal_rms) else {
+            let _ = writeln!(text, "  {}: the rays' error does not fall; no comparison", c.title());
+            continue;
+        };
+        let _ = writeln!(
+            text,
+            "  {}: {} times {} ({} ms at an error of {}; {} {} ms)",
+            c.title(),
+            three(if times >= 1.0 { times } else { 1.0 / times }),
+            if times >= 1.0 { "faster" } else { "SLOWER" },
+            three(c.frame_wall_ms.median),
+            three(c.merge_error.rms),
+            if rays <= 1.0 { "one ray errs less and takes".into() } else { format!("{} rays take", three(rays)) },
+            three(c.rival_ms_at_equal_rms.unwrap_or(f64::NAN)),
+        );
+        if times < 1.0 {
+            losses.push(c.title());
+        } else if times < 10.0 {
+            thin.push(c.title());
+        }
+    }
+    if !losses.is_empty() {
+        let _ = writeln!(text, "It LOSES in {}.", losses.join("; "));
+    }
+    if !thin.is_empty() {
+        let _ = writeln!(text, "It leads by less than ten times in {}.", thin.join("; "));
+    }
+    if !losses.is_empty() || !thin.is_empty() {
+        text += "There few rays reach what so few bands can: under small lights the shadow's edge, which bands blur, decides the \
+                 error.\n";
+    }
+    text
+}
+
+/// The table of rungs: root mean square, 99th percentile and maximum of each.
+pub fn budgets(budgets: &[Budget]) -> String {
+    let wide = budgets.iter().map(|b| b.case.len()).max().unwrap_or(0);
+    let mut text = format!(
+        "What a picture's error is made of\n(relative to the root mean square of the ray-cast radiosity T0; of each cause: root \
+         mean square over vertices, what 99 of 100\nvertices stay below, the worst vertex)\n  {:<wide$}  {:^22}  {:^22}  {:^22}  \
+         {:^22}  {:>7}\n",
+        "", "four bands", "sampling", "arithmetic, storage", "total", "T0's own"
+    );
+    for b in budgets {
+        let _ = write!(text, "  {:<wide$}", b.case);
+        for rung in [b.bands, b.sampling, b.arithmetic_and_storage, b.total] {
+            text += "  ";
+            for value in [rung.rms, rung.p99, rung.max] {
+                let _ = write!(text, "{:>7} ", short(value));
+            }
+            text.pop();
+        }
+        let _ = writeln!(text, "  {:>8}", short(b.t0_error));
+    }
+    text
+}
+
+/// Three digits, or a power of ten below 1e-4.
+fn short(value: f64) -> String {
+    if value != 0.0 && value < 1e-4 { format!("{value:.0e}") } else { three(value) }
+}

@@ -13,26 +13,35 @@
 // The last element of a guarded chain is the square of the length of all but coefficient 0.
 #define CHAIN (TERMS + GUARD)
 
-// Coefficient 0 of a chain, and the square of the length of the others.
-void chain_parts(float c[CHAIN], out float first, out float rest) {
+const float CHAIN_Y00 = 0.28209479;
+
+// Coefficient 0 of a chain.
+float chain_first(float c[CHAIN]) {
 #if POINT_CHAIN
-    const float Y00 = 0.28209479;
-    first = 0.0;
-    rest = 0.0;
+    float first = 0.0;
     [[unroll]] for (uint k = 0; k < TERMS; k++) {
-        first += Y00 * c[k];
+        first += CHAIN_Y00 * c[k];
     }
+    return first;
+#else
+    return c[0];
+#endif
+}
+
+// The square of the length of all the others.
+float chain_rest(float c[CHAIN], float first) {
+    float rest = 0.0;
+#if POINT_CHAIN
     [[unroll]] for (uint k = 0; k < TERMS; k++) {
-        float apart = c[k] - (Y00 * POINT_WEIGHTS[k]) * first;
+        float apart = c[k] - (CHAIN_Y00 * POINT_WEIGHTS[k]) * first;
         rest += POINT_INVERSES[k] * (apart * apart);
     }
 #else
-    first = c[0];
-    rest = 0.0;
     [[unroll]] for (uint k = 1; k < TERMS; k++) {
         rest += c[k] * c[k];
     }
 #endif
+    return rest;
 }
 
 void chain_begin(float transfer[COEFFICIENTS], out float c[CHAIN]) {
@@ -48,10 +57,7 @@ void chain_begin(float transfer[COEFFICIENTS], out float c[CHAIN]) {
     }
 #endif
 #if GUARD
-    float first;
-    float rest;
-    chain_parts(c, first, rest);
-    c[TERMS] = rest;
+    c[TERMS] = chain_rest(c, chain_first(c));
 #endif
 }
 
@@ -78,15 +84,8 @@ float chain_meet(float c[CHAIN], float f[COEFFICIENTS]) {
 // sign, and the others are shortened until the whole is no longer than before.
 void chain_multiply(inout float c[CHAIN], float b[FETCHED]) {
 #if GUARD
-    float before = c[TERMS];
-#if POINT_CHAIN
-    float first_before = 0.0;
-    [[unroll]] for (uint k = 0; k < TERMS; k++) {
-        first_before += 0.28209479 * c[k];
-    }
-#else
-    float first_before = c[0];
-#endif
+    float first_before = chain_first(c);
+    float rest_before = c[TERMS];
 #endif
 #if POINT_CHAIN
     float v[TERMS];
@@ -109,17 +108,16 @@ void chain_multiply(inout float c[CHAIN], float b[FETCHED]) {
     }
 #endif
 #if GUARD
-    float first;
-    float rest;
-    chain_parts(c, first, rest);
+    float first = chain_first(c);
+    float rest = chain_rest(c, first);
     float kept = clamp(first, min(first_before, 0.0), max(first_before, 0.0));
     // What coefficient 0 gives up, the others may take. A factor of 1 changes nothing, to the last bit.
-    float room = max(before + (first_before - kept) * (first_before + kept), 0.0);
+    float room = max(rest_before + (first_before - kept) * (first_before + kept), 0.0);
     float shorten = rest > room ? sqrt(room / rest) : 1.0;
     c[TERMS] = min(rest, room);
 #if POINT_CHAIN
     [[unroll]] for (uint k = 0; k < TERMS; k++) {
-        float even = 0.28209479 * POINT_WEIGHTS[k];
+        float even = CHAIN_Y00 * POINT_WEIGHTS[k];
         c[k] = shorten * (c[k] - even * first) + even * kept;
     }
 #else

@@ -12,6 +12,8 @@ layout(std430, binding = 3) writeonly buffer Stored { uvec2 stored[]; };
 layout(std430, binding = 3) writeonly buffer Stored { vec4 stored[]; };
 #endif
 
+const float LEAST_HALF = 6.103515625e-5; // 2^-14
+
 layout(push_constant) uniform Push {
     uint quad_count;
     uint sample_quads;
@@ -32,6 +34,8 @@ void main() {
     }
     sum *= push.factor;
 #if HALF
+    // Halves too small for a leading 1 are left out: they are slow or lost where a shader makes floats of their bits.
+    sum = mix(sum, vec4(0.0), lessThan(abs(sum), vec4(LEAST_HALF)));
     stored[i] = uvec2(packHalf2x16(sum.xy), packHalf2x16(sum.zw));
 #else
     stored[i] = sum;

@@ -2,9 +2,26 @@
 // ShadowField::lookup. A quad is four coefficients: vec4, or four halves.
 // DIRECTIONS 0 cube, 1 latitude-longitude; SPACING 0 chord, 1 log, 2 linear; LOOKUP 0 nearest, 1 radial, 2 trilinear.
 
-#if PACKED
+#if IMAGE
+// Fields as one image of three dimensions: shells along z, the directions of all faces along y, a coefficient quad beside the other
+// along x. Channels of fields stand above and beside each other; a base is the number of a channel. The sampler interpolates.
+layout(binding = FIELD_BINDING) uniform sampler3D field_image;
+#elif PACKED
 // Two quads of halves a texel: as many bytes a read as a texel can have.
 layout(binding = FIELD_BINDING) uniform utextureBuffer field_quads;
+#if SHIFTED
+// The bits of a half, moved to where a float has them, are that float times 2^-112, which the weights undo. A processor without
+// an instruction for whole vectors of halves is quicker so.
+const float FIELD_UNIT = 5192296858534827628530496329220096.0;
+const uint HALF_BITS = 0x8fffe000u;
+vec2 field_pair(uint halves) {
+    return vec2(uintBitsToFloat(uint(int(halves << 16) >> 3) & HALF_BITS), uintBitsToFloat(uint(int(halves) >> 3) & HALF_BITS));
+}
+#else
+vec2 field_pair(uint halves) {
+    return unpackHalf2x16(halves);
+}
+#endif
 #elif TEXEL
 layout(binding = FIELD_BINDING) uniform textureBuffer field_quads;
 vec4 field_quad(uint i) {
@@ -23,11 +40,22 @@ vec4 field_quad(uint i) {
 }
 #endif
 
+#if !SHIFTED
+const float FIELD_UNIT = 1.0;
+#endif
+
 const uint FIELD_QUADS = FIELD_STRIDE / 4; // of an occlusion sample
 const uint CHANNEL_QUADS = STRIDE / 4;     // of a channel of radiance, and of a transfer vector
+#if IMAGE
+const uint CHANNEL_STEP = 1;
+#else
+const uint CHANNEL_STEP = CHANNEL_QUADS;
+#endif
 const uint FETCHED_QUADS = FIELD_QUADS > CHANNEL_QUADS ? FIELD_QUADS : CHANNEL_QUADS;
 
-#if LOOKUP == 2
+#if IMAGE
+const uint CORNERS = 1;
+#elif LOOKUP == 2
 const uint CORNERS = 8;
 #elif LOOKUP == 1
 const uint CORNERS = 2;
@@ -36,8 +64,12 @@ const uint CORNERS = 1;
 #endif
 
 struct FieldPlace {
+#if IMAGE
+    vec3 texel;            // within a channel, of its first quad; texel centres at halves
+#else
     uint corner[CORNERS];  // stored sample
-    float weight[CORNERS]; // includes the factor that undoes the stored scale
+#endif
+    float weight[CORNERS]; // includes the factors that undo the stored scale and FIELD_UNIT
 };
 
 float field_warp(float s) {
@@ -100,10 +132,19 @@ FieldPlace field_place(vec3 p, vec4 radial) {
     float t = clamp(radial.x * coordinate + radial.y, 0.0, SHELLS - 1.0);
     float beyond = radial.w / max(d, radial.w);
 #if SCALED
-    float unscale = h * beyond * beyond;
+    float unscale = FIELD_UNIT * h * beyond * beyond;
 #else
-    float unscale = beyond * beyond;
+    float unscale = FIELD_UNIT * beyond * beyond;
 #endif
+#if IMAGE
+    uint face_base;
+    vec2 face_cell;
+    field_plane(p, face_base, face_cell);
+    FieldPlace place;
+    place.texel = vec3(face_cell.x, face_cell.y + float(face_base / (CELLS + 2)), t) + 0.5;
+    place.weight[0] = unscale;
+    return place;
+#else
 #if LOOKUP == 0
     t = floor(t + 0.5);
 #endif
@@ -157,28 +198,45 @@ FieldPlace field_place(vec3 p, vec4 radial) {
 #endif
 #endif
     return place;
+#endif
 }
 
 // One channel of the field whose first quad is `base`; samples are `sample_quads` quads apart.
 void field_gather(FieldPlace place, uint base, uint sample_quads, out float b[FETCHED]) {
+    // All corners are read before any is used: a processor keeps nothing in registers while it reads a texel, a GPU waits once.
     vec4 sums[FETCHED_QUADS];
+#if IMAGE
+    vec3 size = vec3(textureSize(field_image, 0));
+    uint along = uint(size.z) / SHELLS;
+    vec3 texel = place.texel + vec3(0, float(base / along * (6 * (CELLS + 2))), float(base % along * SHELLS));
     [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q++) {
+        sums[q] = place.weight[0] * textureLod(field_image, (texel + vec3(float(q * (CELLS + 2)), 0, 0)) / size, 0.0);
+    }
+#elif PACKED
+    [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q += 2) {
+        uvec4 halves[CORNERS];
+        [[unroll]] for (uint k = 0; k < CORNERS; k++) {
+            halves[k] = texelFetch(field_quads, int((base + place.corner[k] * sample_quads + q) / 2));
+        }
         sums[q] = vec4(0.0);
-    }
-    [[unroll]] for (uint k = 0; k < CORNERS; k++) {
-        uint at = base + place.corner[k] * sample_quads;
-#if PACKED
-        [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q += 2) {
-            uvec4 halves = texelFetch(field_quads, int((at + q) / 2));
-            sums[q] += place.weight[k] * vec4(unpackHalf2x16(halves.x), unpackHalf2x16(halves.y));
-            sums[q + 1] += place.weight[k] * vec4(unpackHalf2x16(halves.z), unpackHalf2x16(halves.w));
+        sums[q + 1] = vec4(0.0);
+        [[unroll]] for (uint k = 0; k < CORNERS; k++) {
+            sums[q] += place.weight[k] * vec4(field_pair(halves[k].x), field_pair(halves[k].y));
+            sums[q + 1] += place.weight[k] * vec4(field_pair(halves[k].z), field_pair(halves[k].w));
         }
+    }
 #else
-        [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q++) {
-            sums[q] += place.weight[k] * field_quad(at + q);
+    [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q++) {
+        vec4 quads[CORNERS];
+        [[unroll]] for (uint k = 0; k < CORNERS; k++) {
+            quads[k] = field_quad(base + place.corner[k] * sample_quads + q);
         }
-#endif
+        sums[q] = vec4(0.0);
+        [[unroll]] for (uint k = 0; k < CORNERS; k++) {
+            sums[q] += place.weight[k] * quads[k];
+        }
     }
+#endif
     [[unroll]] for (uint i = 0; i < FETCHED; i++) {
         b[i] = sums[i / 4][i % 4];
     }

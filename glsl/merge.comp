@@ -124,9 +124,13 @@ void main() {
                 weight *= before(e, cone, l, light);
             }
             vec3 p = to_object(entity, (position - entity.centre.xyz) * entity.centre.w);
-            uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_QUADS : entity.blocked_base;
+            uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_STEP : entity.blocked_base;
             float b[FETCHED];
-            field_gather(field_place(p, entity.radial), base, of_radiance ? 3 * CHANNEL_QUADS : FIELD_QUADS, b);
+            FieldPlace place = field_place(p, entity.radial);
+            [[unroll]] for (uint k = 0; k < CORNERS; k++) {
+                place.weight[k] *= weight;
+            }
+            field_gather(place, base, of_radiance ? 3 * CHANNEL_QUADS : FIELD_QUADS, b);
             // Occlusion and radiance of different bands are read alike; what one of them does not have belongs to the next sample.
             [[unroll]] for (uint k = FIELD_COEFFICIENTS; k < FETCHED; k++) {
                 b[k] = of_radiance ? b[k] : 0.0;
@@ -139,10 +143,10 @@ void main() {
             }
             float met = chain_meet(t, s);
             [[unroll]] for (uint k = 0; k < FETCHED; k++) {
-                b[k] = shines ? 0.0 : weight * b[k];
+                b[k] = shines ? 0.0 : b[k];
             }
             vec3 color = of_radiance ? vec3(channel == 0, channel == 1, channel == 2) : vec3(1.0);
-            sum += (shines ? weight * met : 0.0) * color * entity.emission.rgb;
+            sum += (shines ? met : 0.0) * color * entity.emission.rgb;
             chain_multiply(t, b);
             bool anew = (packed & STEP_LAST) != 0;
             [[unroll]] for (uint k = 0; k < CHAIN; k++) {

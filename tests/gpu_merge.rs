@@ -7,10 +7,10 @@ mod stage;
 use common::report;
 use shadow_fields::asset::embedded;
 use shadow_fields::asset::generate::Generator;
-use shadow_fields::check::merge::{ARITHMETIC, Agreement, LATTICES, MIXED, TIES, against_twin};
+use shadow_fields::check::merge::{ARITHMETIC, Agreement, FILTER, LATTICES, MIXED, TIES, against_twin};
 use shadow_fields::field::{Lookup, Storage};
 use shadow_fields::frame::{Frame, Options};
-use shadow_fields::render::variant::{Chain, PRODUCTS, Product, Skip, VARIANTS};
+use shadow_fields::render::variant::{Chain, PRODUCTS, Product, Skip, VARIANTS, Variant};
 use shadow_fields::scene::{Placement, Scene};
 use stage::{Stage, scene, small, stage};
 use std::path::Path;
@@ -60,7 +60,7 @@ fn variants_lookups_lattices_and_bands() {
     let placements = scene.at(0.0);
     let base = small();
     let mut first: Option<Vec<Vec<[f32; 3]>>> = None;
-    for &variant in VARIANTS {
+    for &variant in VARIANTS.iter().filter(|variant| !variant.image) {
         let mut frame = stage.frame(&scene, Options { variant: Some(variant), ..base });
         assert_eq!(frame.variant, variant, "the scene is small enough for each");
         agrees(variant.name, &mut frame, &placements);
@@ -89,6 +89,39 @@ fn variants_lookups_lattices_and_bands() {
     for bands in [2, 3, 5] {
         let bake = shadow_fields::bake::Options { bands, ..base.bake };
         agrees(&format!("{bands} bands"), &mut stage.frame(&scene, Options { bake, ..base }), &placements);
+    }
+}
+
+/// Fields as an image, whose sampler may be less exact; where they are no such image, the nearest variant takes its place.
+#[test]
+fn a_sampler_interpolates() {
+    let Some(stage) = stage() else { return };
+    let scene = scene(MIXED);
+    let placements = scene.at(0.0);
+    let base = small();
+    let halves = shadow_fields::bake::Options { storage: Storage::F16, ..base.bake };
+    for (name, instead) in [("image", "texel-packed"), ("image-uniform", "storage-uniform")] {
+        let variant = Some(Variant::named(name).unwrap());
+        let mut frame = stage.frame(&scene, Options { variant, bake: halves, ..base });
+        assert_eq!(frame.variant.name, name);
+        agrees_within(FILTER, name, &mut frame, &placements);
+        let exact = Variant::named("texel-packed").unwrap();
+        frame.set_variant(Some(exact)).unwrap();
+        agrees(&format!("{name} no more"), &mut frame, &placements);
+        frame.set_variant(variant).unwrap();
+        agrees_within(FILTER, &format!("{name} again"), &mut frame, &placements);
+        for options in [
+            Options { variant, ..base },
+            Options { variant, lookup: Lookup::Radial, bake: halves, ..base },
+            Options { variant, bake: shadow_fields::bake::Options { field_bands: Some(5), ..halves }, ..base },
+            Options {
+                variant,
+                bake: shadow_fields::bake::Options { lattice: LATTICES[0].0.parse().unwrap(), ..halves },
+                ..base
+            },
+        ] {
+            assert_eq!(stage.frame(&scene, options).variant.name, instead, "{options:?}");
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::render::product::{Products, Shape};
-use shadow_fields::render::variant::{Chain, Form, PRODUCTS, Skip, VARIANTS};
+use shadow_fields::render::variant::{Chain, Form, PRODUCTS, Skip, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, Row};
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -31,7 +31,7 @@ fn drawing() -> Vec<Row> {
 fn measuring() -> Vec<Row> {
     let kind = |kind: u32| Row::new("ceiling.comp", 4).define("KIND", kind);
     let rate = |n| kind(n).define("READS", 16_u32).define("ROUNDS", 16_u32).define("MASK", 1023_u32);
-    (0..4).map(rate).chain([kind(4)]).collect()
+    (0..4).map(rate).chain([kind(4), rate(5)]).collect()
 }
 
 fn lattice(text: &str) -> Lattice {
@@ -78,7 +78,7 @@ fn merging() -> Vec<Row> {
     forms.extend(PRODUCTS.iter().map(|&(_, product)| Form { chain: Chain { product, guard: false }, ..usual }));
     forms.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| Form { bands, field_bands, ..usual }));
     forms.push(Form {
-        variant: VARIANTS[VARIANTS.len() - 1],
+        variant: Variant::named("texel-shifted").unwrap(),
         lattice: lattice("latlon:8x4x4,log,raw,inner=0.2"),
         lookup: Lookup::Nearest,
         ..usual

@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 use crate::field::{Lattice, Lookup, Storage};
 use crate::frame;
 use crate::gpu::{self, Device, Validation};
-use crate::render::Variant;
 use crate::render::variant::{Chain, EPS, Product, Skip};
+use crate::render::{Variant, calibrate};
 use crate::scene::Scene;
 use crate::shaders::Library;
 use clap::Args;
@@ -89,7 +89,8 @@ impl BakeArguments {
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "Merging")]
 pub struct MergeArguments {
-    /// Shader variant: storage, storage-uniform, texel or texel-packed; default: the device's fastest
+    /// Shader variant: storage, storage-uniform, texel, texel-packed or texel-shifted, or image or image-uniform, whose sampler
+    /// interpolates less exactly; default: of the former what was measured to be the device's fastest, after a first run
     #[arg(long, value_name = "NAME", value_parser = Variant::named)]
     pub variant: Option<Variant>,
     /// Samples that a lookup takes
@@ -206,6 +207,25 @@ impl Context {
         frame::Frame::new(&self.baker, &self.cache, scene, options, &|what, done, all| {
             self.progress.show(what, done, all);
         })
+    }
+
+    /// Finds the fastest variant of the merge on a device where that is not known, for the next time.
+    ///
+    /// # Errors
+    /// `Device` when the device is lost.
+    pub fn learn(&self, global: &Global) -> Result<()> {
+        let measured = calibrate::learn(&self.device, self.baker.library());
+        match measured {
+            Ok(Some(calibration)) => output::note(
+                global,
+                format!("measured once for {}: \"{}\" merges fastest", self.device.info.name, calibration.fastest),
+            ),
+            // The command has done its work with another.
+            Err(Error::Failed(error)) => log::warn!("calibration: {error}"),
+            Err(error) => return Err(error),
+            Ok(None) => {}
+        }
+        Ok(())
     }
 
     /// Ends the work on the device: keeps its pipeline cache, and fails when the validation layer had something to say.

@@ -68,6 +68,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     written.extend(pair(&context, arguments)?);
     let origin = context.origin(global);
+    if arguments.merge.variant.is_none() {
+        context.learn(global)?;
+    }
     context.finish()?;
     if global.json {
         let files: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();

@@ -196,6 +196,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ));
     }
     drop(frame);
+    if arguments.merge.variant.is_none() {
+        context.learn(global)?;
+    }
     context.finish()
 }
 

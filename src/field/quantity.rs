@@ -28,7 +28,7 @@ impl Kind {
 pub enum Storage {
     /// 32-bit floats.
     F32,
-    /// 16-bit floats: half the bytes; error under 1e-3 of the blocked part.
+    /// 16-bit floats: half the bytes; error under 1e-3 of the blocked part. What is below 2^-14 is stored as 0.
     #[default]
     F16,
 }

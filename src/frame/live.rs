@@ -1,7 +1,8 @@
 //! A frame that lives on: recorded into somebody else's commands and changed between pictures, for the window.
 
+use super::Frame;
+use super::form::usable;
 use super::store::Store;
-use super::{Frame, usable};
 use crate::bake::cache::Cache;
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Image, Timing};
@@ -227,12 +228,13 @@ impl Frame {
     /// # Errors
     /// `Failed` when its shader does not compile.
     pub fn set_variant(&mut self, variant: Option<Variant>) -> Result<()> {
-        let wanted = variant.map_or_else(|| calibrate::fastest(&self.device, &self.library), Ok)?;
-        let form = usable(&self.device, &self.store, self.scene.entities.len(), Form { variant: wanted, ..self.form });
+        let wanted = variant.unwrap_or_else(|| calibrate::best_known(&self.device));
+        let (form, image) =
+            usable(&self.device, &self.store, self.scene.entities.len(), Form { variant: wanted, ..self.form })?;
         if form != self.form {
             self.merge = Merge::new(&self.device, &self.library, form)?;
             self.lists.forget();
-            (self.form, self.variant) = (form, form.variant);
+            (self.form, self.variant, self.image) = (form, form.variant, image);
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! What a scene takes of the device's memory and of the host's.
 
 use super::Frame;
+use crate::gpu::Volume;
 use serde::Serialize;
 
 /// Bytes by use.
@@ -36,7 +37,7 @@ impl Frame {
     pub fn memory(&self) -> Memory {
         let uploads = [&self.entities, &self.clusters, &self.steps, &self.sky];
         Memory {
-            fields: self.store.fields.size_bytes,
+            fields: self.store.fields.size_bytes + self.image.as_ref().map_or(0, Volume::size_bytes),
             transfers: self.store.transfers.size_bytes,
             vertices: self.store.vertices.size_bytes,
             radiosity: self.radiosity.size_bytes,

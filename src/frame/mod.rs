@@ -6,6 +6,7 @@
 
 pub mod camera;
 mod draw_twin;
+mod form;
 pub mod lists;
 mod live;
 pub mod memory;
@@ -20,7 +21,7 @@ use crate::bake::cache::Cache;
 use crate::error::Result;
 use crate::field::Lookup;
 use crate::field::quantity::channel_stride;
-use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, TexelView, Timing, Upload};
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing, Upload, Volume};
 use crate::layout;
 use crate::render::calibrate;
 use crate::render::draw::{Draw, Finish, Item};
@@ -31,6 +32,7 @@ use crate::scene::{Placement, Scene};
 use crate::sh::basis::{Y00, coefficient_count};
 use crate::shaders::Library;
 use ash::vk;
+use form::{form, usable};
 use glam::{DMat4, DVec3, Vec3};
 use half::f16;
 use lists::{Lists, Merged};
@@ -73,6 +75,8 @@ pub struct Frame {
     /// Variant in use.
     pub variant: Variant,
     form: Form,
+    /// Fields as the variant's sampler reads them.
+    image: Option<Volume>,
     merge: Merge,
     draw: Draw,
     library: Library,
@@ -104,8 +108,9 @@ impl Frame {
         let (device, library) = (baker.device(), baker.library());
         options.chain.product.check(options.bake.bands, options.bake.occlusion_bands())?;
         let store = Store::new(baker, cache, scene, &options.bake, progress)?;
-        let wanted = options.variant.map_or_else(|| calibrate::fastest(device, library), Ok)?;
-        let form = usable(device, &store, scene.entities.len(), form(&options, wanted, uniform_entities(device)));
+        let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
+        let (form, image) =
+            usable(device, &store, scene.entities.len(), form(&options, wanted, uniform_entities(device)))?;
         let (variant, entity_limit) = (form.variant, form.entity_limit);
 
         let mut radiosity_offsets = Vec::new();
@@ -131,6 +136,7 @@ impl Frame {
             options,
             variant,
             form,
+            image,
             merge,
             draw,
             library: library.clone(),
@@ -333,7 +339,7 @@ impl Frame {
             entities: Readable::shared(&self.entities, self.variant)?,
             steps: &self.steps,
             clusters: &self.clusters,
-            fields: Readable::new(&self.store.fields, self.variant, self.form.field_format())?,
+            fields: Readable::fields(&self.store.fields, self.image.as_ref(), &self.form)?,
             transfers: Readable::new(&self.store.transfers, self.variant, floats)?,
             vertices: Readable::new(&self.store.vertices, self.variant, floats)?,
             sky: Readable::new(&self.sky, self.variant, floats)?,
@@ -361,33 +367,5 @@ impl Frame {
             }
         });
         items.collect()
-    }
-}
-
-/// The form with its variant less the texel views or uniform blocks that cannot hold the scene.
-fn usable(device: &Device, store: &Store, entity_count: usize, form: Form) -> Form {
-    let floats = vk::Format::R32G32B32A32_SFLOAT;
-    let fits = TexelView::fits(device, form.field_format(), store.fields.size_bytes)
-        && TexelView::fits(device, floats, store.transfers.size_bytes)
-        && TexelView::fits(device, floats, store.vertices.size_bytes);
-    let variant = form.variant.restricted(fits, entity_count <= form.entity_limit as usize);
-    if variant != form.variant {
-        log::info!("the scene is too large for the variant \"{}\"; using \"{}\"", form.variant.name, variant.name);
-    }
-    Form { variant, ..form }
-}
-
-/// The form of the merge shader.
-fn form(options: &Options, variant: Variant, entity_limit: u32) -> Form {
-    Form {
-        variant,
-        bands: options.bake.bands,
-        field_bands: options.bake.occlusion_bands(),
-        chain: options.chain,
-        storage: options.bake.storage,
-        lattice: options.bake.lattice,
-        lookup: options.lookup,
-        skip: options.skip,
-        entity_limit,
     }
 }

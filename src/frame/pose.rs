@@ -97,6 +97,7 @@ impl Frame {
             Some(slot) if entity.emits => entity.emission * slot.header.radiance_scale,
             _ => entity.emission,
         };
+        let base = |slot: &Slot| if self.image.is_some() { slot.channel } else { slot.quad() };
         let slot = geometry.blocked.as_ref().or(geometry.radiance.as_ref());
         // Both fields of a mesh have the same shells.
         let radial = slot.map_or([0.0; 4], |slot| {
@@ -111,8 +112,8 @@ impl Frame {
             emission: emission.extend(0.0).to_array(),
             albedo: (entity.albedo.as_dvec3() / PI).as_vec3().extend(placement.scale).to_array(),
             radial,
-            blocked_base: geometry.blocked.as_ref().map_or(0, store::Slot::quad),
-            radiance_base: geometry.radiance.as_ref().map_or(0, store::Slot::quad),
+            blocked_base: geometry.blocked.as_ref().map_or(0, base),
+            radiance_base: geometry.radiance.as_ref().map_or(0, base),
         }
     }
 

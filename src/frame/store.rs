@@ -9,10 +9,11 @@ use crate::error::{Error, Result};
 use crate::field::extent::{Extent, extent};
 use crate::field::quantity::{Kind, Storage, channel_stride};
 use crate::field::{Header, ShadowField};
-use crate::gpu::{Buffer, BufferKind};
+use crate::gpu::{Buffer, BufferKind, Volume};
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::render::draw::Drawable;
 use crate::render::gather::Bounds;
+use crate::render::shelf::Shelf;
 use crate::scene::{Entity, Scene};
 use glam::{DVec3, Vec3};
 use std::ops::Range;
@@ -29,6 +30,8 @@ pub struct Slot {
     pub header: Header,
     /// Its bytes in the store.
     pub bytes: Range<u64>,
+    /// Number of its first channel among those of all fields, as they stand in an image.
+    pub channel: u32,
     /// Directions in which it is not zero.
     pub extent: Extent,
 }
@@ -117,7 +120,7 @@ impl Store {
         progress: Progress<'_>,
     ) -> Result<Self> {
         let device = baker.device();
-        let mut total = 0;
+        let (mut total, mut channels) = (0, 0);
         let mut slots: Vec<[Option<Slot>; 2]> = Vec::new();
         for (index, mesh) in scene.meshes.iter().enumerate() {
             slots.push(needs(scene, index).map(|kind| {
@@ -125,7 +128,9 @@ impl Store {
                     let header = bake::header(mesh, kind, options);
                     let bytes = total..total + header.payload_bytes();
                     total = bytes.end.next_multiple_of(ALIGNMENT);
-                    Slot { header, bytes, extent: Extent::All }
+                    let channel = channels;
+                    channels += kind.channels() as u32;
+                    Slot { header, bytes, channel, extent: Extent::All }
                 })
             }));
         }
@@ -231,6 +236,32 @@ impl Store {
     /// `Device` when memory ran out.
     pub fn field(&self, slot: &Slot) -> Result<ShadowField> {
         download(&self.fields, slot)
+    }
+
+    /// All fields as one image; `None` where the device or their shape rules that out.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn image(&self) -> Result<Option<Volume>> {
+        let device = self.fields.device();
+        let slots = self.geometries.iter().flat_map(|g| [&g.blocked, &g.radiance]).flatten();
+        let fields = slots.map(|slot| self.field(slot)).collect::<Result<Vec<_>>>()?;
+        let Some(lattice) = fields.first().map(|field| field.header.lattice) else { return Ok(None) };
+        let count = fields.iter().map(|field| field.header.kind.channels() as u32).sum();
+        let Some(shelf) = Shelf::new(device, lattice, self.bands, count) else { return Ok(None) };
+        type Quads<'f> = Box<dyn Fn(usize, usize) -> [u16; 4] + 'f>;
+        let channels = fields.iter().flat_map(|field| {
+            (0..field.header.kind.channels()).map(move |channel| {
+                let stride = field.header.channel_stride();
+                Box::new(move |sample: usize, quad: usize| {
+                    let first = sample * field.header.sample_stride() + channel * stride + 4 * quad;
+                    [0, 1, 2, 3]
+                        .map(|k| 2 * (first + k))
+                        .map(|at| u16::from_le_bytes([field.payload[at], field.payload[at + 1]]))
+                }) as Quads<'_>
+            })
+        });
+        Ok(Some(shelf.fill(device, channels)?))
     }
 
     /// A copy of a mesh's transfer vectors in the mesh's order of vertices: floats and their stride.

@@ -79,6 +79,7 @@ impl Access {
             Access::ColorWrite => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
             Access::DepthWrite => vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
             Access::TransferRead => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            Access::TransferWrite => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
             Access::Present => vk::ImageLayout::PRESENT_SRC_KHR,
             _ => vk::ImageLayout::GENERAL,
         }

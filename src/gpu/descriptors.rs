@@ -7,6 +7,7 @@ use super::image::Image;
 use super::memory::{Buffer, TexelView};
 use super::pipeline::{Layout, descriptor_type};
 use super::reflect::BindingKind;
+use super::volume::Volume;
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -23,6 +24,8 @@ pub enum Bind<'r> {
     Texel(TexelView<'r>),
     /// An image that is read with `texelFetch`.
     Image(&'r Image),
+    /// An image of three dimensions with its sampler.
+    Volume(&'r Volume),
     /// Nothing: the variant in use does not have this binding.
     None,
 }
@@ -133,6 +136,12 @@ impl<'r> Commands<'r> {
                     }];
                     write = write.image_info(&images);
                 }
+                (BindingKind::Volume, Bind::Volume(volume)) => {
+                    let access = Access::ComputeSampled;
+                    self.tracker.use_image(volume.id, &volume.name, access, &pass);
+                    images = [volume.descriptor(access.layout())];
+                    write = write.image_info(&images);
+                }
                 _ => complain("another kind of resource, or none, was given"),
             }
             // SAFETY: the set is fresh and not yet in use; every resource is borrowed until the commands have run.
@@ -162,6 +171,7 @@ impl<'r> Commands<'r> {
                 vk::DescriptorType::UNIFORM_BUFFER,
                 vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
                 vk::DescriptorType::SAMPLED_IMAGE,
+                vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
             ]
             .map(|ty| vk::DescriptorPoolSize { ty, descriptor_count: 12 * SETS_PER_POOL });
             let create = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);

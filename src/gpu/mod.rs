@@ -23,6 +23,7 @@ pub mod select;
 pub mod shader;
 pub mod upload;
 pub mod validation;
+pub mod volume;
 #[cfg(feature = "view")]
 pub mod window;
 
@@ -38,6 +39,7 @@ pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState};
 pub use shader::{Shader, Stage};
 pub use upload::Upload;
 pub use validation::Validation;
+pub use volume::Volume;
 
 #[cfg(feature = "view")]
 pub use overlay::{Overlay, Paint};

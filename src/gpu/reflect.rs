@@ -17,6 +17,8 @@ pub enum BindingKind {
     Texel,
     /// `texture2D` without a sampler.
     Image,
+    /// `sampler3D`.
+    Volume,
 }
 
 /// One binding of descriptor set 0.
@@ -253,6 +255,12 @@ impl<'m> Reader<'m> {
                 Operand::Dim(Dim::Dim2D) => (BindingKind::Image, false),
                 ref other => return Err(Error::Failed(format!("{name}: images of {other:?} are not in use"))),
             },
+            (StorageClass::UniformConstant, Op::TypeSampledImage) => {
+                match self.definitions[&id(&definition.operands[0])].operands[1] {
+                    Operand::Dim(Dim::Dim3D) => (BindingKind::Volume, false),
+                    ref other => return Err(Error::Failed(format!("{name}: samplers of {other:?} are not in use"))),
+                }
+            }
             (class, opcode) => return Err(Error::Failed(format!("{name}: no binding for {class:?} of {opcode:?}"))),
         };
         let block_bytes = if definition.class.opcode == Op::TypeStruct { self.size_bytes(target) } else { 0 };

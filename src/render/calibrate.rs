@@ -1,9 +1,10 @@
-//! Which variant of the merge is fastest on a device: measured once on a small made-up scene and kept in the cache folder.
+//! Which variant of the merge is fastest on a device: measured once on a small made-up scene, when a command has done its work,
+//! and kept in the cache folder. Until then a device gets a default.
 
 use super::merge::Merge;
 use super::variant::{VARIANTS, Variant};
 use super::workload::Workload;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Device;
 use crate::shaders::Library;
 use serde::{Deserialize, Serialize};
@@ -19,8 +20,8 @@ pub struct Calibration {
     pub program: String,
     /// Name of the fastest variant.
     pub fastest: String,
-    /// Milliseconds of the made-up scene, by variant.
-    pub milliseconds: Vec<(String, f64)>,
+    /// Milliseconds of the made-up scene, by variant; `None` of one that the driver refused.
+    pub milliseconds: Vec<(String, Option<f64>)>,
 }
 
 /// Vertices of the made-up scene: some hundred workgroups, so that every core has work.
@@ -34,42 +35,66 @@ fn path(device: &Device) -> Option<PathBuf> {
     Some(device.cache_dir.as_ref()?.join(format!("calibration-{}.json", device.info.uuid)))
 }
 
-/// The device's fastest variant: from the cache folder, else measured and kept there. Without a cache folder nothing is
-/// measured and the device gets [`Variant::sane_default`].
+/// Variants that compute the same function.
+fn candidates() -> impl Iterator<Item = Variant> {
+    VARIANTS.iter().copied().filter(|variant| !variant.image)
+}
+
+/// What was measured on the device before, with this driver and program, of the variants that there are now.
+fn known(device: &Device) -> Option<Variant> {
+    let calibration: Calibration = serde_json::from_slice(&std::fs::read(path(device)?).ok()?).ok()?;
+    let names = calibration.milliseconds.iter().map(|(name, _)| name.as_str());
+    let same = calibration.driver == device.info.driver
+        && calibration.program == env!("CARGO_PKG_VERSION")
+        && names.eq(candidates().map(|variant| variant.name));
+    same.then(|| Variant::named(&calibration.fastest).ok())?
+}
+
+/// The device's fastest variant as far as it is known, at once: as measured, or [`Variant::sane_default`] on a device that was
+/// never measured.
+pub fn best_known(device: &Device) -> Variant {
+    known(device).unwrap_or_else(|| Variant::sane_default(device))
+}
+
+/// Measures a device that was never measured and keeps the outcome in its cache folder; nothing where it is known or where there
+/// is no such folder. It takes some seconds, most of them the driver's compiler.
 ///
 /// # Errors
 /// As [`measure`].
-pub fn fastest(device: &Arc<Device>, library: &Library) -> Result<Variant> {
-    let Some(path) = path(device) else { return Ok(Variant::sane_default(device)) };
-    let known = std::fs::read(&path).ok().and_then(|bytes| serde_json::from_slice::<Calibration>(&bytes).ok());
-    let known = known.filter(|c| c.driver == device.info.driver && c.program == env!("CARGO_PKG_VERSION"));
-    if let Some(variant) = known.and_then(|c| Variant::named(&c.fastest).ok()) {
-        return Ok(variant);
-    }
+pub fn learn(device: &Arc<Device>, library: &Library) -> Result<Option<Calibration>> {
+    let Some(path) = path(device).filter(|_| known(device).is_none()) else { return Ok(None) };
     let calibration = measure(device, library)?;
     for (name, milliseconds) in &calibration.milliseconds {
-        log::info!("calibration: {name} {milliseconds:.3} ms");
+        log::info!("calibration: {name} {:.3} ms", milliseconds.unwrap_or(f64::NAN));
     }
     let bytes = serde_json::to_vec_pretty(&calibration).expect("a calibration is plain data");
     if let Err(error) = crate::files::replace(&path, &bytes) {
         log::warn!("{}: the calibration was not kept: {error}", path.display());
     }
-    Variant::named(&calibration.fastest)
+    Ok(Some(calibration))
 }
 
-/// Times every variant on a made-up scene: a sky and some turned occluders with fields of default shape.
+/// Times every variant on a made-up scene: a sky and some turned occluders with fields of default shape. What a driver refuses
+/// to compile takes no part.
 ///
 /// # Errors
-/// `Failed` when a shader does not compile, `Device` when the device is lost.
+/// `Failed` when it refuses all, `Device` when the device is lost.
 pub fn measure(device: &Arc<Device>, library: &Library) -> Result<Calibration> {
     let workload = Workload::new(device, VERTICES, OCCLUDERS)?;
     let mut contenders = Vec::new();
-    for &variant in VARIANTS {
-        let merge = Merge::new(device, library, workload.form(variant))?;
-        contenders.push((variant, merge, workload.inputs(variant)?, f64::INFINITY));
+    for variant in candidates() {
+        let merge = match Merge::new(device, library, workload.form(variant)) {
+            Err(error @ Error::Failed(_)) => {
+                log::warn!("calibration: {} takes no part: {error}", variant.name);
+                None
+            }
+            other => Some(other?),
+        };
+        contenders.push((variant.name, merge, workload.inputs(variant)?, f64::INFINITY));
     }
     for run in 0..=RUNS {
         for (_, merge, inputs, least) in &mut contenders {
+            let Some(merge) = merge else { continue };
             let milliseconds = workload.run(merge, inputs)?;
             // The first run compiles.
             if run > 0 {
@@ -77,11 +102,14 @@ pub fn measure(device: &Arc<Device>, library: &Library) -> Result<Calibration> {
             }
         }
     }
-    let best = contenders.iter().min_by(|a, b| a.3.total_cmp(&b.3)).expect("there are variants");
+    let best = contenders.iter().filter(|c| c.1.is_some()).min_by(|a, b| a.3.total_cmp(&b.3));
+    let (fastest, ..) = best.ok_or_else(|| Error::Failed("the driver compiles no variant of the merge".into()))?;
+    let milliseconds =
+        |(name, merge, _, least): &(&str, Option<Merge>, _, f64)| ((*name).to_owned(), merge.as_ref().map(|_| *least));
     Ok(Calibration {
         driver: device.info.driver.clone(),
         program: env!("CARGO_PKG_VERSION").into(),
-        fastest: best.0.name.into(),
-        milliseconds: contenders.iter().map(|(variant, .., least)| (variant.name.into(), *least)).collect(),
+        fastest: (*fastest).into(),
+        milliseconds: contenders.iter().map(milliseconds).collect(),
     })
 }

@@ -6,17 +6,14 @@
 
 use super::variant::{Form, Variant};
 use crate::error::Result;
-use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
+use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView, Volume};
 use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::Library;
 use ash::vk;
 use std::sync::Arc;
 
-/// A resource that a variant reads as a storage block or through a texel view.
-pub struct Readable<'b> {
-    buffer: &'b Buffer,
-    view: Option<TexelView<'b>>,
-}
+/// A resource that a variant reads as a block, through a texel view, or through a sampler.
+pub struct Readable<'b>(Bind<'b>);
 
 impl<'b> Readable<'b> {
     /// Prepares `buffer` for `variant`.
@@ -24,8 +21,7 @@ impl<'b> Readable<'b> {
     /// # Errors
     /// `Input` when a texel view of the device cannot hold it.
     pub fn new(buffer: &'b Buffer, variant: Variant, format: vk::Format) -> Result<Self> {
-        let view = variant.texel.then(|| TexelView::new(buffer, format)).transpose()?;
-        Ok(Readable { buffer, view })
+        Self::either(buffer, variant.texel.then_some(format))
     }
 
     /// As [`Readable::new`] for what is the same in a whole workgroup, which some variants read as uniform blocks.
@@ -34,15 +30,29 @@ impl<'b> Readable<'b> {
     /// As [`Readable::new`].
     pub fn shared(buffer: &'b Buffer, variant: Variant) -> Result<Self> {
         let texel = variant.texel && !variant.uniform;
-        let view = texel.then(|| TexelView::new(buffer, vk::Format::R32G32B32A32_SFLOAT)).transpose()?;
-        Ok(Readable { buffer, view })
+        Self::either(buffer, texel.then_some(vk::Format::R32G32B32A32_SFLOAT))
+    }
+
+    /// Fields: the image where there is one, else as [`Readable::new`].
+    ///
+    /// # Errors
+    /// As [`Readable::new`].
+    pub fn fields(buffer: &'b Buffer, image: Option<&'b Volume>, form: &Form) -> Result<Self> {
+        image.map_or_else(
+            || Self::new(buffer, form.variant, form.field_format()),
+            |image| Ok(Readable(Bind::Volume(image))),
+        )
+    }
+
+    fn either(buffer: &'b Buffer, texels: Option<vk::Format>) -> Result<Self> {
+        Ok(Readable(match texels {
+            Some(format) => Bind::Texel(TexelView::new(buffer, format)?),
+            None => Bind::Buffer(buffer),
+        }))
     }
 
     fn bind(&self) -> Bind<'b> {
-        match self.view {
-            Some(view) => Bind::Texel(view),
-            None => Bind::Buffer(self.buffer),
-        }
+        self.0.clone()
     }
 }
 

@@ -8,6 +8,7 @@ pub mod merge;
 pub mod moment;
 pub mod product;
 pub mod reference;
+pub mod shelf;
 pub mod show;
 pub mod tree;
 pub mod variant;

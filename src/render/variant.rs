@@ -21,6 +21,11 @@ pub struct Variant {
     pub uniform: bool,
     /// Fields of halves are read eight coefficients a texel, where a channel's coefficients are a multiple of eight.
     pub packed: bool,
+    /// Those halves become floats by shifts of their bits rather than by the instruction for it.
+    pub shifted: bool,
+    /// Fields are an image whose samples a sampler interpolates, with weights of as few bits as the device likes (8 on
+    /// most): not quite the same function, and so only by name.
+    pub image: bool,
 }
 
 /// Every variant. What lost where it was measured is not among them, on llvmpipe 22.3 in milliseconds for 65 536 vertices and 4
@@ -28,11 +33,16 @@ pub struct Variant {
 /// as matrix elements 8.5 against 6.4 as angles; entities fetched by the lanes of a subgroup and handed round 14.4 against
 /// 8.3, since each broadcast there walks through the lanes.
 pub const VARIANTS: &[Variant] = &[
-    Variant { name: "storage", texel: false, uniform: false, packed: false },
-    Variant { name: "storage-uniform", texel: false, uniform: true, packed: false },
-    Variant { name: "texel", texel: true, uniform: false, packed: false },
-    Variant { name: "texel-packed", texel: true, uniform: false, packed: true },
+    Variant { name: "storage", ..STORAGE },
+    Variant { name: "storage-uniform", uniform: true, ..STORAGE },
+    Variant { name: "texel", texel: true, ..STORAGE },
+    Variant { name: "texel-packed", texel: true, packed: true, ..STORAGE },
+    Variant { name: "texel-shifted", texel: true, packed: true, shifted: true, ..STORAGE },
+    Variant { name: "image", texel: true, image: true, ..STORAGE },
+    Variant { name: "image-uniform", uniform: true, image: true, ..STORAGE },
 ];
+const STORAGE: Variant =
+    Variant { name: "", texel: false, uniform: false, packed: false, shifted: false, image: false };
 
 impl Variant {
     /// The variant of that name.
@@ -49,13 +59,16 @@ impl Variant {
     /// What a device gets before anything was measured on it: texel reads are more than ten times faster than storage reads
     /// on a processor, and no slower than them on the GPUs that are known.
     pub fn sane_default(device: &Device) -> Self {
-        let name = if device.info.is_software() { "texel-packed" } else { "storage-uniform" };
+        let name = if device.info.is_software() { "texel-shifted" } else { "storage-uniform" };
         Self::named(name).expect("the default is in the table")
     }
 
     /// The variant that does without what a scene or device rules out.
-    pub fn restricted(self, texel: bool, uniform: bool) -> Self {
+    pub fn restricted(self, texel: bool, uniform: bool, image: bool) -> Self {
+        let fits = (texel || !self.texel) && (uniform || !self.uniform);
         let name = match (self.texel && texel, self.uniform && uniform) {
+            _ if self.image && image && fits => self.name,
+            (true, _) if self.image => "texel-packed",
             (true, _) => self.name,
             (false, true) => "storage-uniform",
             (false, false) => "storage",
@@ -263,6 +276,14 @@ impl Form {
         }
     }
 
+    /// Whether fields of this form can be read as an image.
+    pub fn fits_image(&self) -> bool {
+        self.storage == Storage::F16
+            && self.bands == self.field_bands
+            && self.lookup == Lookup::Trilinear
+            && matches!(self.lattice.directions, Directions::Cube { .. })
+    }
+
     fn packed(&self) -> bool {
         self.variant.packed
             && self.storage == Storage::F16
@@ -285,7 +306,9 @@ impl Form {
             .define("GUARD", self.chain.guard)
             .define("WORKGROUP", CLUSTER_VERTICES)
             .define("TEXEL", self.variant.texel)
+            .define("IMAGE", self.variant.image && self.fits_image())
             .define("PACKED", self.packed())
+            .define("SHIFTED", self.packed() && self.variant.shifted)
             .define("UNIFORM", self.variant.uniform)
             .define("ENTITY_LIMIT", self.entity_limit)
             .define("HALF", self.storage == Storage::F16)

@@ -2,11 +2,12 @@
 //! occluder, fields of one shape filled with a constant.
 
 use super::merge::{Inputs, Merge, Readable};
+use super::shelf::Shelf;
 use super::variant::{Chain, Form, Skip, Variant, uniform_entities};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::{Lattice, Lookup};
-use crate::gpu::{Buffer, BufferKind, Commands, Device};
+use crate::gpu::{Buffer, BufferKind, Commands, Device, Volume};
 use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, NONE, Step};
 use crate::sh::rotation::turns;
 use ash::vk;
@@ -26,6 +27,7 @@ pub struct Workload {
     steps: Buffer,
     clusters: Buffer,
     fields: Buffer,
+    image: Volume,
     transfers: Buffer,
     vertices: Buffer,
     sky: Buffer,
@@ -84,7 +86,10 @@ impl Workload {
         let clusters: Vec<Cluster> = (0..vertex_count / CLUSTER_VERTICES).map(cluster).collect();
         let quads = lattice.stored_count() as usize * channel_stride(BANDS) / 4;
         // Small enough that the running product neither grows without end nor becomes denormal.
-        let fields = vec![[0x2000_2000_u32; 2]; quads];
+        const HALF: u16 = 0x2000;
+        let fields = vec![[HALF; 4]; quads];
+        let shelf = Shelf::new(device, lattice, BANDS, 1)
+            .ok_or_else(|| Error::Unsupported("the device's images are too small for one field".into()))?;
         Ok(Workload {
             vertex_count,
             occluder_count,
@@ -94,6 +99,8 @@ impl Workload {
             steps: Buffer::with_data(device, "workload steps", &list)?,
             clusters: Buffer::with_data(device, "workload clusters", &clusters)?,
             fields: Buffer::with_data(device, "workload fields", &fields)?,
+            image: shelf
+                .fill(device, std::iter::once(Box::new(|_, _| [HALF; 4]) as Box<dyn Fn(usize, usize) -> [u16; 4]>))?,
             transfers: Buffer::with_data(device, "workload transfers", &[0.0_f32; 4])?,
             vertices: Buffer::with_data(device, "workload vertices", &vertices)?,
             sky: Buffer::with_data(device, "workload sky", &[1.0_f32; 3 * BANDS * BANDS])?,
@@ -146,7 +153,7 @@ impl Workload {
             entities: Readable::shared(&self.entities, variant)?,
             steps: &self.steps,
             clusters: &self.clusters,
-            fields: Readable::new(&self.fields, variant, self.form(variant).field_format())?,
+            fields: Readable::fields(&self.fields, variant.image.then_some(&self.image), &self.form(variant))?,
             transfers: Readable::new(&self.transfers, variant, floats)?,
             vertices: Readable::new(&self.vertices, variant, floats)?,
             sky: Readable::new(&self.sky, variant, floats)?,

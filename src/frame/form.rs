@@ -1,0 +1,42 @@
+//! What the merge shader is compiled for, and what of that a scene and device allow.
+
+use super::Options;
+use super::store::Store;
+use crate::error::Result;
+use crate::gpu::{Device, TexelView, Volume};
+use crate::render::variant::{Form, Variant};
+use ash::vk;
+
+/// The form with its variant less the texel views or uniform blocks that cannot hold the scene.
+pub(super) fn usable(
+    device: &Device,
+    store: &Store,
+    entity_count: usize,
+    form: Form,
+) -> Result<(Form, Option<Volume>)> {
+    let floats = vk::Format::R32G32B32A32_SFLOAT;
+    let fits = TexelView::fits(device, form.field_format(), store.fields.size_bytes)
+        && TexelView::fits(device, floats, store.transfers.size_bytes)
+        && TexelView::fits(device, floats, store.vertices.size_bytes);
+    let image = (form.variant.image && form.fits_image()).then(|| store.image()).transpose()?.flatten();
+    let variant = form.variant.restricted(fits, entity_count <= form.entity_limit as usize, image.is_some());
+    if variant != form.variant {
+        log::info!("the scene is too large for the variant \"{}\"; using \"{}\"", form.variant.name, variant.name);
+    }
+    Ok((Form { variant, ..form }, image.filter(|_| variant.image)))
+}
+
+/// The form of the merge shader.
+pub(super) fn form(options: &Options, variant: Variant, entity_limit: u32) -> Form {
+    Form {
+        variant,
+        bands: options.bake.bands,
+        field_bands: options.bake.occlusion_bands(),
+        chain: options.chain,
+        storage: options.bake.storage,
+        lattice: options.bake.lattice,
+        lookup: options.lookup,
+        skip: options.skip,
+        entity_limit,
+    }
+}

@@ -7,6 +7,7 @@ use crate::bench::profile::{self, Contender, Row, Start, Tenths};
 use crate::bench::{Bench, text};
 use crate::error::{Error, Result};
 use crate::gpu::{self, Device, Validation};
+use crate::render::calibrate;
 use crate::render::workload::Workload;
 use crate::scene::Scene;
 use clap::Args;
@@ -30,8 +31,8 @@ pub struct Arguments {
     /// Time one variant only; an unknown name lists them
     #[arg(long, value_name = "NAME", conflicts_with = "compare")]
     variant: Option<String>,
-    /// Time two variants of the made-up merge in turns, and their ratio
-    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with = "scene")]
+    /// Time two variants in turns, and their ratio
+    #[arg(long, num_args = 2, value_names = ["A", "B"])]
     compare: Option<Vec<String>>,
     /// Timed runs of each, after one to warm up
     #[arg(long, default_value_t = 15, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
@@ -71,22 +72,29 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         profile::write_spirv(folder, library, &small, &chosen)?;
     }
     let at_best = ceilings::measure(&context.device, library, small.field_bytes())?;
-    let (mut rows, mut ratios) = (Vec::new(), Vec::new());
+    let mut cases = Vec::new();
     if let Some(path) = &arguments.scene {
         let scene = Scene::load(path)?;
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        rows = profile::scene(&bench, &name, &scene, arguments.size, &chosen, arguments.runs, &at_best)?;
+        cases.push(profile::scene(&bench, &name, &scene, arguments.size, &chosen, arguments.runs, &at_best)?);
     } else {
         for &occluders in &arguments.occluders {
             let workload = Workload::new(&context.device, arguments.grid, occluders)?;
-            let timed = profile::made_up(&bench, &workload, &chosen, arguments.runs, &at_best)?;
-            if let (true, [(a, first), (b, second)]) = (arguments.compare.is_some(), &timed[..]) {
-                let each: Vec<f64> = first.iter().zip(second).map(|(a, b)| a / b).collect();
-                ratios.push((format!("{}: {} over {}", a.case, a.variant, b.variant), Tenths::new(&each)));
-            }
-            rows.extend(timed.into_iter().map(|(row, _)| row));
+            cases.push(profile::made_up(&bench, &workload, &chosen, arguments.runs, &at_best)?);
         }
     }
+    let mut ratios = Vec::new();
+    for case in cases.iter().filter(|_| arguments.compare.is_some()) {
+        if let [(a, first), (b, second), ..] = &case[..] {
+            let each: Vec<f64> = first.iter().zip(second).map(|(a, b)| a / b).collect();
+            ratios.push((format!("{}: {} over {}", a.case, a.variant, b.variant), Tenths::new(&each)));
+        }
+    }
+    let rows: Vec<Row> = cases.into_iter().flatten().map(|(row, _)| row).collect();
+    if arguments.variant.is_none() && arguments.compare.is_none() {
+        context.learn(global)?;
+    }
+    let usual = calibrate::best_known(&context.device).name;
     let fresh = Device::new(&gpu::Options {
         device: Some(context.device.info.uuid.clone()),
         validation: Validation::Off,
@@ -99,6 +107,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "passes": rows,
         "ratios": ratios.iter().map(|(what, ratio)| json!({ "what": what, "ratio": ratio })).collect::<Vec<_>>(),
         "starts": starts,
+        "usual_variant": usual,
     });
     if let Some(folder) = &arguments.out {
         let lines = |key: &str| document[key].as_array().cloned().unwrap_or_default();
@@ -107,6 +116,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         text::write(&folder.join("profile.json"), &format!("{document:#}\n"))?;
     }
     print(global, &document, &at_best, &rows, &ratios, &starts);
+    if !global.json {
+        output::say(format!("\nwithout --variant this device merges with \"{usual}\""));
+    }
     context.finish()
 }
 
@@ -123,9 +135,14 @@ fn print(
         return;
     }
     output::say(format!(
-        "at best: {:.0} GFLOP/s; {:.2} G texels/s of four halves, {:.2} of 16 bytes; {:.2} G storage reads/s of 8 bytes; triad \
-         {:.1} GB/s",
-        at_best.gflops, at_best.texel_halves_giga, at_best.texel_packed_giga, at_best.storage_giga, at_best.triad_gb_s
+        "at best: {:.0} GFLOP/s; {:.2} G texels/s of four halves, {:.2} of 16 bytes; {:.2} G filtered samples/s; {:.2} G storage \
+         reads/s of 8 bytes; triad {:.1} GB/s",
+        at_best.gflops,
+        at_best.texel_halves_giga,
+        at_best.texel_packed_giga,
+        at_best.filtered_giga,
+        at_best.storage_giga,
+        at_best.triad_gb_s
     ));
     let number = |value: Option<f64>, digits: usize| value.map_or_else(String::new, |v| format!("{v:.digits$}"));
     let percent = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{:.0} %", 100.0 * v));

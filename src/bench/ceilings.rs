@@ -1,7 +1,7 @@
 //! What a device does at best, measured with shaders that do one thing each: what the merge is held against.
 
 use crate::error::Result;
-use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
+use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView, Volume};
 use crate::shaders::{Library, Row};
 use ash::vk;
 use serde::Serialize;
@@ -16,6 +16,8 @@ pub struct Ceilings {
     pub texel_halves_giga: f64,
     /// Texels of 16 bytes likewise.
     pub texel_packed_giga: f64,
+    /// Samples interpolated between eight texels of four halves of an image of the field's size, in 10^9 a second.
+    pub filtered_giga: f64,
     /// Reads of 8 bytes from a storage block of the field's size, in 10^9 a second.
     pub storage_giga: f64,
     /// Bytes that `a = b + s c` reads and writes in buffers larger than caches, in 10^9 a second.
@@ -45,6 +47,9 @@ const TRIAD_FLOATS: u32 = 4 << 20;
 pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Result<Ceilings> {
     let source = Buffer::with_data(device, "ceiling source", &vec![0x2000_2000_u32; field_bytes as usize / 4])?;
     let out = Buffer::new(device, "ceiling results", BufferKind::Device, 4 * u64::from(TRIAD_FLOATS))?;
+    // As wide and high as a field of default shape.
+    let size = [40, 60, (field_bytes / (8 * 40 * 60)).max(1) as u32];
+    let image = Volume::with_data(device, "ceiling image", size, &vec![[0x2000; 4]; (size[2] * 40 * 60) as usize])?;
     // Invocations of a run of each kind; what is slow on a processor does less.
     let rate = |kind: u32, invocations: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
         let count = (field_bytes / texel_bytes).max(8) as u32;
@@ -60,7 +65,11 @@ pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Res
             2 => Some(TexelView::new(&source, vk::Format::R32G32B32A32_UINT)?),
             _ => None,
         };
-        let first = view.as_ref().map_or(Bind::Buffer(&source), |view| Bind::Texel(*view));
+        let first = match view {
+            _ if kind == 5 => Bind::Volume(&image),
+            Some(view) => Bind::Texel(view),
+            None => Bind::Buffer(&source),
+        };
         let seconds = best(device, &pipeline, &[first, Bind::Buffer(&out)], invocations)?;
         Ok(f64::from(invocations) * f64::from(rounds) * f64::from(READS) / seconds * 1e-9)
     };
@@ -69,6 +78,7 @@ pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Res
         gflops: 8.0 * rate(0, 65_536, 256, 8)?,
         texel_halves_giga: rate(1, 16_384, 64, 8)?,
         texel_packed_giga: rate(2, 16_384, 64, 16)?,
+        filtered_giga: rate(5, 16_384, 16, 8)?,
         storage_giga: rate(3, 16_384, 16, 8)?,
         triad_gb_s: triad(device, library, &out)?,
         dispatch_ms: idle(device, library, &source, &out)?,

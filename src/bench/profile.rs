@@ -12,6 +12,7 @@ use crate::render::workload::Workload;
 use crate::scene::Scene;
 use crate::shaders::Library;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -79,7 +80,7 @@ impl Tenths {
 pub struct Work {
     /// Float multiplications and additions.
     pub flops: u32,
-    /// Texels fetched.
+    /// Texels fetched, and samples taken by a sampler.
     pub fetches: u32,
     /// Bytes fetched and loaded.
     pub bytes: u32,
@@ -90,8 +91,8 @@ pub struct Work {
 pub struct Row {
     /// Scene, or vertices and occluders of the made-up merge.
     pub case: String,
-    /// "merge", "draw", or "frame": from placements to the picture on the device, by the host's clock.
-    pub pass: &'static str,
+    /// A pass of a frame, or "frame": from placements to the picture on the device, by the host's clock.
+    pub pass: String,
     /// Variant.
     pub variant: String,
     /// Device time.
@@ -112,7 +113,12 @@ pub struct Row {
 }
 
 fn work(form: &Form, census: &Census) -> Work {
-    let texel = |name: &str| if name == "field_quads" { texel_bytes(form) } else { 16 };
+    // A sampler reads eight texels of four halves.
+    let texel = |name: &str| match name {
+        "field_quads" => texel_bytes(form),
+        "field_image" => 64,
+        _ => 16,
+    };
     let fetched: u32 = census.fetches.iter().map(|(name, count)| count * texel(name)).sum();
     let loaded: u32 = census.block_bytes.values().sum();
     Work { flops: census.flops, fetches: census.fetch_count(), bytes: fetched + loaded }
@@ -128,15 +134,17 @@ fn row(case: &str, name: &str, pairs: u64, times: &[f64], form: &Form, census: &
     // Per nanosecond is 10^9 a second.
     let ns = ms.median * 1e6 / pairs.max(1) as f64;
     let field = census.fetches.get("field_quads").copied().unwrap_or(0);
+    let filtered = census.fetches.get("field_image").copied().unwrap_or(0);
     let field_rate = if texel_bytes(form) == 8 { at_best.texel_halves_giga } else { at_best.texel_packed_giga };
-    let other = f64::from(work.fetches - field) / at_best.texel_packed_giga;
+    let other = f64::from(work.fetches - field - filtered) / at_best.texel_packed_giga
+        + f64::from(filtered) / at_best.filtered_giga;
     let loaded: u32 = census.block_bytes.values().sum();
     let reads = f64::from(field) / field_rate + other + f64::from(loaded) / 8.0 / at_best.storage_giga;
     // A scene of a few vertices tells nothing of rates.
     let rate = |value: f64| (at_best.resolve(ms.median) && pairs > 0).then_some(value);
     Row {
         case: case.to_owned(),
-        pass: "merge",
+        pass: "merge".into(),
         variant: name.to_owned(),
         ms,
         ns_a_pair: rate(ns),
@@ -182,8 +190,8 @@ pub fn made_up(
     Ok(rows.collect())
 }
 
-/// Times a scene's merge in each variant, everything merged in every frame while it moves, and its draw and whole frames for
-/// files and for a screen, with and without multisampling.
+/// Times a scene's merge in each variant, in turns, everything merged in every frame while it moves; its other passes, the draw and
+/// whole frames for files and for a screen, with and without multisampling. Returns a row and all times of each.
 ///
 /// # Errors
 /// As [`crate::frame::Frame::new`].
@@ -195,7 +203,7 @@ pub fn scene(
     chosen: &[Contender],
     runs: u32,
     at_best: &Ceilings,
-) -> Result<Vec<Row>> {
+) -> Result<Vec<(Row, Vec<f64>)>> {
     let library = bench.baker.library();
     let mut rows = Vec::new();
     let mut frames = Vec::new();
@@ -208,20 +216,40 @@ pub fn scene(
         };
         frames.push((contender, bench.frame(scene, options)?, Vec::new(), 0));
     }
+    let mut others: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for run in 0..=runs {
         for (_, frame, times, pairs) in &mut frames {
-            let passes = frame.render(&scene.at(f64::from(run) / 30.0), None)?;
-            if run > 0 {
-                times.extend(passes.iter().filter(|t| t.pass == "merge").map(|t| t.milliseconds));
-                *pairs = 64 * frame.merged.merged_steps as u64;
+            for pass in frame.render(&scene.at(f64::from(run) / 30.0), None)? {
+                match pass.pass.as_str() {
+                    _ if run == 0 => {}
+                    "merge" => times.push(pass.milliseconds),
+                    other => others.entry(other.to_owned()).or_default().push(pass.milliseconds),
+                }
             }
+            *pairs = 64 * frame.merged.merged_steps as u64;
         }
     }
     for (contender, frame, times, pairs) in &frames {
         let form = frame.form();
         let census = Census::new(&library.shader(&form.row())?)?;
-        rows.push(row(name, &contender.name, *pairs, times, &form, &census, at_best));
+        rows.push((row(name, &contender.name, *pairs, times, &form, &census, at_best), times.clone()));
     }
+    let mut add = |pass: &str, variant: &str, times: Vec<f64>| {
+        let row = Row {
+            case: name.to_owned(),
+            pass: pass.to_owned(),
+            variant: variant.to_owned(),
+            ms: Tenths::new(&times),
+            ns_a_pair: None,
+            work: None,
+            gflops: None,
+            gb_s: None,
+            arithmetic_share: None,
+            read_share: None,
+        };
+        rows.push((row, times));
+    };
+    others.into_iter().for_each(|(pass, times)| add(&pass, "", times));
     let Some((_, frame, ..)) = frames.first_mut() else { return Ok(rows) };
     for (finish, word) in [(Finish::Display, "screen"), (Finish::Linear, "file")] {
         for (multisample, samples) in [(true, "multisampled"), (false, "1 sample")] {
@@ -235,20 +263,9 @@ pub fn scene(
                     draws.extend(passes.iter().filter(|t| t.pass == "draw").map(|t| t.milliseconds));
                 }
             }
-            for (pass, times) in [("draw", draws), ("frame", walls)] {
-                rows.push(Row {
-                    case: name.to_owned(),
-                    pass,
-                    variant: format!("{word}, {samples}"),
-                    ms: Tenths::new(&times),
-                    ns_a_pair: None,
-                    work: None,
-                    gflops: None,
-                    gb_s: None,
-                    arithmetic_share: None,
-                    read_share: None,
-                });
-            }
+            let variant = format!("{word}, {samples}");
+            add("draw", &variant, draws);
+            add("frame", &variant, walls);
         }
     }
     Ok(rows)

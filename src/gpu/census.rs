@@ -19,7 +19,7 @@ pub struct Census {
     pub flops: u32,
     /// Further float operations: divisions, roots, minima, conversions.
     pub other_float: u32,
-    /// Texels fetched, by the binding's name.
+    /// Texels fetched, and samples taken by a sampler, by the binding's name.
     pub fetches: BTreeMap<String, u32>,
     /// Bytes loaded from storage and uniform blocks, by the block's name.
     pub block_bytes: BTreeMap<String, u32>,
@@ -127,7 +127,7 @@ impl<'m> Counter<'m> {
             Op::FDiv | Op::FNegate | Op::ExtInst | Op::ConvertFToU | Op::ConvertFToS | Op::ConvertUToF => {
                 census.other_float += components();
             }
-            Op::ImageFetch => {
+            Op::ImageFetch | Op::ImageSampleExplicitLod => {
                 let name = ids(instruction).next().map_or_else(String::new, |image| self.name(image));
                 *census.fetches.entry(name).or_default() += 1;
             }

@@ -330,6 +330,16 @@ fn names_and_results() {
     refused(&case, &other, 4, &["n.obj: ", "not the mesh m "]);
     good(&case.folder, &[&["bake", "m.obj", "-o", "r.sf", "--radiance", "1,2,3"][..], &small].concat());
     refused(&case, &["inspect", "r.sf", "--faces", "o.png", "--mesh", "n.obj"], 4, &["n.obj: "]);
+    // The same triangles, but not the colour that was baked.
+    let same = ["inspect", "r.sf", "--faces", "o.png", "--mesh", "m.obj"];
+    refused(&case, &same, 4, &["m.obj: ", "--radiance"]);
+    good(&case.folder, &[&same[..], &["--radiance", "1,2,3"]].concat());
+    refused(
+        &case,
+        &["inspect", "f.sf", "--faces", "o.png", "--mesh", "m.obj", "--radiance", "1,2,3"],
+        2,
+        &["occlusion"],
+    );
     #[cfg(target_os = "linux")]
     {
         let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();

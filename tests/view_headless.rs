@@ -2,10 +2,13 @@
 #![cfg(feature = "view")]
 
 mod common;
+#[path = "common/room.rs"]
+mod room;
 #[path = "common/stage.rs"]
 mod stage;
 
 use common::{Gpu, gpu};
+use room::apart;
 use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
@@ -15,41 +18,12 @@ use shadow_fields::scene::Scene;
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
 use shadow_fields::view::{Canvas, Editor, Setup, Viewer};
-use stage::{scene, small};
+use stage::small;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 const SIZE: [u32; 2] = [320, 240];
 const FORMAT: ash::vk::Format = ash::vk::Format::R8G8B8A8_SRGB;
-const SCENE: &str = r#"
-[output]
-width = 320
-height = 240
-[environment]
-gradient = { radiance = [0.3, 0.35, 0.4] }
-[[mesh]]
-name = "floor"
-plane = { size_m = 6, cells = 24 }
-[[mesh]]
-name = "ball"
-sphere = { radius_m = 0.5, subdivisions = 2 }
-[[mesh]]
-name = "box"
-cuboid = { size_m = [0.6, 0.6, 0.6], cells = 4 }
-[[entity]]
-name = "floor"
-mesh = "floor"
-position = [0, -1, 0]
-[[entity]]
-name = "ball"
-mesh = "ball"
-[[entity]]
-name = "lamp"
-mesh = "box"
-position = [1.2, 0.8, 0]
-emission = [9, 6, 3]
-"#;
-
 /// A viewer that draws into an image.
 struct Stand {
     viewer: Viewer,
@@ -79,10 +53,8 @@ impl Stand {
             seed: 1,
         };
         // The state and pictures are saved beside the scene's file.
-        std::fs::create_dir_all(&cache).unwrap();
-        let path = cache.join("scene.toml");
-        std::fs::write(&path, scene(SCENE).to_toml()).unwrap();
-        let mut editor = Editor::new(scene(SCENE), &path);
+        let path = room::write(&cache, SIZE, "");
+        let mut editor = Editor::new(room::scene(SIZE), &path);
         editor.apply(Command::ToggleOverlay);
         let viewer = Viewer::new(setup, editor, 1.0).unwrap();
         let [width, height] = SIZE;
@@ -154,12 +126,6 @@ impl Stand {
             self.turn();
         }
     }
-}
-
-/// Pixels that differ by more than the rounding of two encoders.
-fn apart(a: &[[u8; 4]], b: &[[u8; 4]]) -> usize {
-    assert_eq!(a.len(), b.len());
-    a.iter().zip(b).filter(|(a, b)| (0..3).any(|c| a[c].abs_diff(b[c]) > 1)).count()
 }
 
 #[test]

@@ -4,6 +4,8 @@
 #[path = "common/cli.rs"]
 mod cli;
 mod common;
+#[path = "common/room.rs"]
+mod room;
 
 use cli::{SMALL, cache, command, finish, good, has_device};
 use std::io::{BufRead, BufReader};
@@ -166,33 +168,12 @@ impl<'d> View<'d> {
     }
 }
 
-const SCENE: &str = r#"
-[camera]
-eye = [0, 1.5, 5]
-target = [0, 0, 0]
-[environment]
-gradient = { radiance = [0.3, 0.35, 0.4] }
-[[mesh]]
-name = "floor"
-plane = { size_m = 6, cells = 24 }
-[[mesh]]
-name = "ball"
-sphere = { radius_m = 0.6, subdivisions = 2 }
-[[entity]]
-name = "floor"
-mesh = "floor"
-position = [0, -0.6, 0]
-[[entity]]
-name = "ball"
-mesh = "ball"
-[[entity]]
-name = "lamp"
-mesh = "ball"
-position = [1.4, 1.1, 0]
-scale = 0.3
-emission = [30, 24, 12]
-motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } }]
-"#;
+/// Opens a window on the room, at 480x320.
+fn open<'d>(display: &'d Display, folder: &Path) -> View<'d> {
+    let size = SIZE.map(|side| side as u32);
+    room::write(folder, size, "motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } }]");
+    View::open(display, folder, &arguments())
+}
 
 /// Small bakes, the window's size, samples as `render` takes them.
 fn arguments() -> Vec<&'static str> {
@@ -210,8 +191,7 @@ fn a_window_does_what_its_controls_say() {
     }
     let folder = tempfile::tempdir().unwrap();
     let Some(display) = Display::open(folder.path()) else { return };
-    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
-    let mut view = View::open(&display, folder.path(), &arguments());
+    let mut view = open(&display, folder.path());
     let first = view.picture(SIZE);
     assert!(first.iter().any(|p| *p != first[0]), "the window is of one colour");
 
@@ -294,8 +274,7 @@ fn a_window_does_what_its_controls_say() {
     let again = image::open(folder.path().join("again.png")).unwrap().into_rgb8();
     assert_eq!([again.width() as usize, again.height() as usize], SIZE, "the saved scene has the window's size");
     let again: Vec<[u8; 3]> = again.pixels().map(|p| p.0).collect();
-    let apart = shown.iter().zip(&again).filter(|(a, b)| (0..3).any(|c| a[c].abs_diff(b[c]) > 1)).count();
-    assert_eq!(apart, 0, "pixels of the window that `render` makes otherwise");
+    assert_eq!(room::apart(&shown, &again), 0, "pixels of the window that `render` makes otherwise");
     let kept = image::open(folder.path().join("scene-001.png")).unwrap().into_rgb8();
     assert!(kept.pixels().zip(&again).all(|(a, b)| a.0 == *b), "F12 writes what `render` does");
     assert!(folder.path().join("scene-001.exr").exists());
@@ -308,8 +287,7 @@ fn the_next_scene_is_baked_and_shown_and_closing_ends_a_bake() {
     }
     let folder = tempfile::tempdir().unwrap();
     let Some(display) = Display::open(folder.path()) else { return };
-    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
-    let mut view = View::open(&display, folder.path(), &arguments());
+    let mut view = open(&display, folder.path());
     view.key("z", "command NextScene");
     // In the middle of what may be its bake.
     display.xdotool(&["key", "ctrl+q"]);

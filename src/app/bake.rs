@@ -11,7 +11,7 @@ use crate::gpu::{Buffer, BufferKind};
 use clap::Args;
 use glam::Vec3;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `bake`.
 #[derive(Args)]
@@ -33,7 +33,8 @@ pub struct Arguments {
     bake: BakeArguments,
 }
 
-fn color(text: &str) -> std::result::Result<Vec3, String> {
+/// Three numbers with commas.
+pub(super) fn color(text: &str) -> std::result::Result<Vec3, String> {
     let numbers: Vec<f32> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
     match numbers[..] {
         [r, g, b] if text.split(',').count() == 3 && numbers.iter().all(|c| (0.0..=RADIANCE_LIMIT).contains(c)) => {
@@ -43,6 +44,20 @@ fn color(text: &str) -> std::result::Result<Vec3, String> {
     }
 }
 
+/// A mesh whose surface shines: its own colours, or white, times `radiance`.
+///
+/// # Errors
+/// `Input` that names the file when a colour becomes too bright.
+pub(super) fn shining(mesh: Mesh, radiance: Vec3, path: &Path) -> Result<Mesh> {
+    let white = vec![Vec3::ONE; mesh.positions.len()];
+    let colors: Vec<Vec3> = mesh.colors.as_ref().unwrap_or(&white).iter().map(|c| *c * radiance).collect();
+    if colors.iter().any(|c| c.max_element() > RADIANCE_LIMIT) {
+        let what = format!("its colours times --radiance are over the limit of {RADIANCE_LIMIT:e}");
+        return Err(Error::input(path, what));
+    }
+    Mesh::new(mesh.name, mesh.positions, mesh.normals, Some(colors), mesh.triangles)
+}
+
 /// Bakes one field. The result does not depend on the cache, which is not used.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     output::check_folder(&arguments.output)?;
@@ -50,14 +65,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let mut mesh = Mesh::load(&arguments.mesh)?;
     let kind = if arguments.radiance.is_some() { Kind::Radiance } else { Kind::Occlusion };
     if let Some(radiance) = arguments.radiance {
-        let white = vec![Vec3::ONE; mesh.positions.len()];
-        let colors = mesh.colors.as_ref().unwrap_or(&white).iter().map(|c| *c * radiance).collect();
-        let brightest = mesh.colors.iter().flatten().map(|c| (*c * radiance).max_element()).fold(0.0, f32::max);
-        if brightest > RADIANCE_LIMIT {
-            let what = format!("its colours times --radiance are over the limit of {RADIANCE_LIMIT:e}");
-            return Err(Error::input(&arguments.mesh, what));
-        }
-        mesh = Mesh::new(mesh.name, mesh.positions, mesh.normals, Some(colors), mesh.triangles)?;
+        mesh = shining(mesh, radiance, &arguments.mesh)?;
     }
     let mut context = Context::new(global)?;
     context.baker.simplify = arguments.simplify;

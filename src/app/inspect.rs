@@ -1,16 +1,18 @@
 //! `shadow-fields inspect`
 
+use super::bake::{color, shining};
 use super::context::Context;
 use super::sheet::{self, Cell};
 use super::{Global, output};
 use crate::asset::Mesh;
 use crate::bake::{self, snapshot::snapshot};
+use crate::bench::text;
 use crate::error::{Error, Result};
 use crate::field::{Header, Kind, Lookup, ShadowField, growth};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
 use clap::Args;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +30,9 @@ pub struct Arguments {
     /// With --faces: capture this mesh anew beside what the field's coefficients say
     #[arg(long, value_name = "MESH.obj", requires = "faces")]
     mesh: Option<PathBuf>,
+    /// With --mesh: the colour that a radiance field was baked with
+    #[arg(long, value_name = "R,G,B", requires = "mesh", value_parser = color, allow_hyphen_values = true)]
+    radiance: Option<Vec3>,
     /// With --at: samples that the lookup takes
     #[arg(long, default_value = "trilinear", value_name = "nearest|radial|trilinear")]
     lookup: Lookup,
@@ -65,7 +70,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         result["at"] = lookup(&field, position_m, arguments.lookup);
     }
     if let Some(path) = &arguments.faces {
-        let mesh = arguments.mesh.as_deref().map(|path| baked_mesh(header, path)).transpose()?;
+        let mesh = arguments.mesh.as_deref().map(|path| baked_mesh(header, path, arguments.radiance)).transpose()?;
         write_sheet(global, &field, mesh.as_ref(), path)?;
     }
     if global.json {
@@ -106,28 +111,28 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// The mesh that a field was baked from.
-fn baked_mesh(header: &Header, path: &Path) -> Result<Mesh> {
-    let mesh = Mesh::load(path)?;
-    let (centre, radius_m) = mesh.bounding_sphere();
-    // A radiance field's hash holds the colours that it was baked with, which --radiance may have changed.
-    let same = match header.kind {
-        Kind::Occlusion => bake::hash_text(&mesh) == header.mesh_hash,
-        Kind::Radiance => centre.to_array() == header.centre_m && radius_m == header.radius_m,
-    };
-    if same {
+/// The mesh that a field was baked from, with the colours that it was baked with.
+fn baked_mesh(header: &Header, path: &Path, radiance: Option<Vec3>) -> Result<Mesh> {
+    let mut mesh = Mesh::load(path)?;
+    if header.kind == Kind::Radiance {
+        mesh = shining(mesh, radiance.unwrap_or(Vec3::ONE), path)?;
+    } else if radiance.is_some() {
+        return Err(Error::Usage("--radiance goes with a radiance field, and this one holds occlusion".into()));
+    }
+    if bake::hash_text(&mesh) == header.mesh_hash {
         return Ok(mesh);
     }
+    let (centre, radius_m) = mesh.bounding_sphere();
     let of = |centre: [f32; 3], radius_m: f32| format!("centre {centre:?} m, radius {radius_m} m");
-    Err(Error::input(
-        path,
-        format!(
-            "is not the mesh {} that the field was baked from ({}; this one has {})",
-            header.mesh,
-            of(header.centre_m, header.radius_m),
-            of(centre.to_array(), radius_m)
-        ),
-    ))
+    let same_size = centre.to_array() == header.centre_m && radius_m == header.radius_m;
+    let why = match (header.kind, same_size) {
+        (Kind::Radiance, true) => {
+            "it is as large: say with --radiance which colour the field was baked with".to_owned()
+        }
+        (_, true) => "it is as large, but has other triangles".to_owned(),
+        _ => format!("{}; this one has {}", of(header.centre_m, header.radius_m), of(centre.to_array(), radius_m)),
+    };
+    Err(Error::input(path, format!("is not the mesh {} that the field was baked from ({why})", header.mesh)))
 }
 
 /// Coefficients at a place in the mesh's frame, metres.
@@ -190,12 +195,25 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
     }
     let columns: Vec<String> = (0..LONGITUDES).map(|c| format!("{} deg", 360 * c / LONGITUDES)).collect();
     let per_column = if mesh.is_some() { 2 } else { 1 };
-    let brightest = rows.iter().flat_map(|(_, cells)| cells.iter().flatten()).fold(1.0_f32, |m, c| m.max(*c));
-    sheet::write(path, &columns, per_column, &rows, FACE_PX, brightest)?;
+    // Visibility has one white for the whole sheet; radiance falls with the square of the distance, so each row has its own.
+    let brightest = |rows: &[(String, Vec<Cell>)], least: f32| {
+        rows.iter().flat_map(|(_, cells)| cells.iter().flatten()).fold(least, |m, c| m.max(*c))
+    };
+    let whites: Vec<f32> = match field.header.kind {
+        Kind::Occlusion => vec![brightest(&rows, 1.0); rows.len()],
+        Kind::Radiance => rows.chunks(1).map(|row| brightest(row, f32::MIN_POSITIVE)).collect(),
+    };
+    for ((label, _), white) in rows.iter_mut().zip(&whites) {
+        *label += &format!(", white {}", text::three(f64::from(*white)));
+    }
+    sheet::write(path, &columns, per_column, &rows, FACE_PX, &whites)?;
     let pairs = if mesh.is_some() { ", each captured (left) and from the coefficients (right)" } else { "" };
     output::note(
         global,
-        format!("{}: cubes unfolded: -X +Z +X -Z in a row, +Y above, -Y below{pairs}", path.display()),
+        format!(
+            "{}: cubes unfolded: -X +Z +X -Z in a row, +Y above, -Y below; \"white\": the value shown as white{pairs}",
+            path.display()
+        ),
     );
     Ok(())
 }

@@ -34,7 +34,8 @@ impl Canvas {
     }
 }
 
-/// Writes a sheet: `per_column` cells under each column's label, a row label on the left. Values up to `brightest` are shown.
+/// Writes a sheet: `per_column` cells under each column's label, a row label of up to three lines, parted by ", ", on the left.
+/// Values up to a row's white are shown.
 ///
 /// # Errors
 /// As [`picture::write_png`].
@@ -44,7 +45,7 @@ pub fn write(
     per_column: usize,
     rows: &[(String, Vec<Cell>)],
     face_px: usize,
-    brightest: f32,
+    whites: &[f32],
 ) -> Result<()> {
     let (cell_width, cell_height) = (4 * face_px + GAP, 3 * face_px + GAP);
     let width = MARGIN + columns.len() * per_column * cell_width;
@@ -53,17 +54,17 @@ pub fn write(
     for (index, label) in columns.iter().enumerate() {
         canvas.text(MARGIN + index * per_column * cell_width, 2, label);
     }
-    for (row, (label, cells)) in rows.iter().enumerate() {
+    for (row, ((label, cells), white)) in rows.iter().zip(whites).enumerate() {
         let top = TEXT + GAP + row * cell_height;
-        let mut lines = label.split(", ");
-        canvas.text(GAP, top + face_px, lines.next().unwrap_or_default());
-        canvas.text(GAP, top + face_px + TEXT + 2, lines.next().unwrap_or_default());
+        for (line, words) in label.split(", ").enumerate() {
+            canvas.text(GAP, top + face_px / 2 + (TEXT + 2) * line, words);
+        }
         for (column, cell) in cells.iter().enumerate() {
             let left = MARGIN + column * cell_width;
             for (texel, rgb) in cell.chunks_exact(3).enumerate() {
                 let (face, x, y) = (texel / (face_px * face_px), texel % face_px, texel / face_px % face_px);
                 let (right, down) = PLACES[face];
-                let value = [rgb[0], rgb[1], rgb[2]].map(|c| c / brightest);
+                let value = [rgb[0], rgb[1], rgb[2]].map(|c| c / white);
                 canvas.set(left + right * face_px + x, top + down * face_px + y, value);
             }
         }

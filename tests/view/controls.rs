@@ -1,0 +1,133 @@
+//! Keys and the pointer give the commands that the help names.
+
+use super::{SMALL, from_text, picture_place, step};
+use glam::DVec3;
+use shadow_fields::view::input::{Button, CONTROLS, Event, Input, Key, help};
+use shadow_fields::view::{Command, Editor, Request, Step};
+
+#[test]
+fn every_control_has_its_command() {
+    let editor = from_text(SMALL);
+    let mut input = Input::new(1.0);
+    let mut key = |key, control, repeat| input.commands(Event::Key { key, control, repeat }, &editor);
+    let letter = |c| Key::Letter(c);
+    for (k, control, expected) in [
+        (letter('q'), false, Command::SelectNext),
+        (letter('a'), false, Command::SelectPrevious),
+        (Key::Escape, false, Command::SelectNone),
+        (letter('j'), false, step(Step::Left)),
+        (letter('l'), false, step(Step::Right)),
+        (letter('i'), false, step(Step::Up)),
+        (letter('k'), false, step(Step::Down)),
+        (letter('o'), false, step(Step::Back)),
+        (letter('p'), false, step(Step::Forth)),
+        (letter('n'), false, step(Step::Larger)),
+        (letter('m'), false, step(Step::Smaller)),
+        (letter('r'), false, step(Step::TurnLeft)),
+        (letter('t'), false, step(Step::TurnRight)),
+        (letter('e'), false, Command::ToggleLight),
+        (letter('z'), false, Command::NextScene),
+        (letter('z'), true, Command::Undo),
+        (letter('y'), true, Command::Redo),
+        (letter('s'), true, Command::Save),
+        (letter('q'), true, Command::Quit),
+        (Key::Space, false, Command::ToggleRunning),
+        (letter('g'), false, Command::ToggleReference),
+        (letter('x'), false, Command::ToggleError),
+        (letter('h'), false, Command::ToggleOverlay),
+        (Key::Function(1), false, Command::ToggleOverlay),
+        (Key::Function(12), false, Command::Screenshot),
+        (Key::Home, false, Command::Home),
+    ] {
+        assert_eq!(key(k, control, false), [expected], "{k:?}");
+        // Held, a toggle does not flutter and a step goes on.
+        let repeated = key(k, control, true);
+        match expected {
+            Command::Step { step, .. } => assert_eq!(repeated, [Command::Step { step, repeat: true }]),
+            Command::Undo | Command::Redo | Command::SelectNext | Command::SelectPrevious => {
+                assert_eq!(repeated, [expected])
+            }
+            _ => assert_eq!(repeated, []),
+        }
+    }
+    for unbound in [letter('w'), letter('5'), Key::Function(3)] {
+        assert_eq!(key(unbound, false, false), []);
+    }
+    assert_eq!(key(letter('s'), false, false), [], "s alone does not save");
+    // Every row of the help is one line, short enough for the overlay.
+    let text = help();
+    assert_eq!(text.lines().count(), CONTROLS.len());
+    assert!(text.lines().all(|line| line.len() <= 90), "{text}");
+}
+
+#[test]
+fn the_pointer_clicks_turns_pans_and_drags() {
+    let mut editor = from_text(SMALL);
+    editor.apply(Command::ToggleRunning);
+    let mut input = Input::new(2.0);
+    let ball = picture_place(&editor, DVec3::new(0.0, 0.5, 0.5));
+    let near = [ball[0] + 5.0, ball[1]];
+    // A press that hardly moves is a click where it began.
+    assert_eq!(input.commands(Event::Press(Button::Left, ball), &editor), []);
+    assert_eq!(input.commands(Event::Move(near), &editor), []);
+    assert_eq!(input.commands(Event::Release(Button::Left), &editor), [Command::Pick(ball)]);
+    // Not selected: a drag turns the camera, by all of the way.
+    let far = [ball[0] + 20.0, ball[1] + 6.0];
+    input.commands(Event::Press(Button::Left, ball), &editor);
+    assert_eq!(input.commands(Event::Move(far), &editor), [Command::Orbit([20.0, 6.0])]);
+    assert_eq!(input.commands(Event::Move([far[0] + 1.0, far[1]]), &editor), [Command::Orbit([1.0, 0.0])]);
+    assert_eq!(input.commands(Event::Release(Button::Left), &editor), []);
+    assert_eq!(input.commands(Event::Move(ball), &editor), []);
+    // Selected: it is dragged from where it was grabbed.
+    editor.apply(Command::Pick(ball));
+    assert_eq!(editor.selection(), Some(1));
+    input.commands(Event::Press(Button::Left, ball), &editor);
+    assert_eq!(input.commands(Event::Move(far), &editor), [Command::DragStart(ball), Command::DragTo(far)]);
+    assert!(input.is_dragging());
+    assert_eq!(input.commands(Event::Lost, &editor), [Command::DragEnd]);
+    assert!(!input.is_dragging());
+    assert_eq!(input.commands(Event::Release(Button::Left), &editor), []);
+    // The other buttons move the camera, and a click of theirs is nothing.
+    for button in [Button::Right, Button::Middle] {
+        input.commands(Event::Press(button, ball), &editor);
+        assert_eq!(input.commands(Event::Move(far), &editor), [Command::Pan([20.0, 6.0])]);
+        assert_eq!(input.commands(Event::Release(Button::Left), &editor), [], "not the button that is held");
+        assert_eq!(input.commands(Event::Release(button), &editor), []);
+        input.commands(Event::Press(button, ball), &editor);
+        assert_eq!(input.commands(Event::Release(button), &editor), []);
+    }
+    assert_eq!(input.commands(Event::Wheel(-2.0), &editor), [Command::Zoom(-2.0)]);
+    // In the reference beside the picture, a place stands for the same place of the picture, and so does a drag from there.
+    let beside = |[x, y]: [f32; 2]| [x + 200.0, y];
+    input.commands(Event::Press(Button::Left, beside(ball)), &editor);
+    assert_eq!(input.commands(Event::Move(far), &editor).len(), 2);
+    assert_eq!(input.commands(Event::Move(beside(far)), &editor), [Command::DragTo(far)]);
+    assert_eq!(input.commands(Event::Release(Button::Left), &editor), [Command::DragEnd]);
+    input.commands(Event::Press(Button::Left, beside(near)), &editor);
+    assert_eq!(input.commands(Event::Release(Button::Left), &editor), [Command::Pick(near)]);
+    // A second button ends what the first began.
+    input.commands(Event::Press(Button::Left, ball), &editor);
+    input.commands(Event::Move(far), &editor);
+    assert_eq!(input.commands(Event::Press(Button::Right, far), &editor), [Command::DragEnd]);
+}
+
+#[test]
+fn requests_reach_the_window() {
+    let mut editor = from_text(SMALL);
+    for (command, request) in
+        [(Command::Screenshot, Request::Screenshot), (Command::Save, Request::Save), (Command::Quit, Request::Quit)]
+    {
+        let effect = editor.apply(command);
+        assert!(effect.request == Some(request) && !effect.changed.any());
+    }
+    let flags = |e: &Editor| [e.is_running(), e.shows_reference(), e.shows_error(), e.shows_overlay()];
+    let before = flags(&editor);
+    for command in [Command::ToggleRunning, Command::ToggleReference, Command::ToggleError, Command::ToggleOverlay] {
+        assert!(editor.apply(command).changed.display);
+    }
+    assert_eq!(flags(&editor), before.map(|flag| !flag));
+    assert!(editor.apply(Command::SetVariant(Some("texel"))).changed.variant);
+    assert_eq!(editor.variant(), Some("texel"));
+    assert!(!editor.apply(Command::Resize([0, 0])).changed.any(), "a minimised window has no picture");
+    assert_eq!(editor.size(), [200, 100]);
+}

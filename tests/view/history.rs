@@ -1,0 +1,135 @@
+//! Undo and redo.
+
+use super::{SMALL, from_text, step};
+use proptest::prelude::*;
+use shadow_fields::scene::Data;
+use shadow_fields::view::input::CONTROLS;
+use shadow_fields::view::{Command, Step};
+use std::path::Path;
+
+#[test]
+fn a_held_key_is_one_step_of_undo_and_two_presses_are_two() {
+    let mut editor = from_text(SMALL);
+    editor.apply(Command::SelectNext);
+    editor.apply(Command::SelectNext);
+    let start = editor.scene().data.clone();
+    editor.apply(step(Step::Left));
+    for _ in 0..9 {
+        editor.apply(Command::Step { step: Step::Left, repeat: true });
+    }
+    let first = editor.scene().data.clone();
+    editor.apply(step(Step::Left));
+    assert_eq!(editor.undo_count(), 2);
+    editor.apply(Command::Undo);
+    assert_eq!(editor.scene().data, first);
+    editor.apply(Command::Undo);
+    assert_eq!(editor.scene().data, start);
+    editor.apply(Command::Redo);
+    assert_eq!(editor.scene().data, first);
+    // A new change forgets what was taken back.
+    editor.apply(step(Step::Up));
+    assert!(editor.apply(Command::Redo).message.is_some());
+}
+
+#[test]
+fn history_is_bounded() {
+    let mut editor = from_text(SMALL);
+    for _ in 0..2000 {
+        editor.apply(step(Step::TurnLeft));
+    }
+    assert_eq!(editor.undo_count(), shadow_fields::view::history::STEP_LIMIT);
+}
+
+fn any_command() -> impl Strategy<Value = Command> {
+    let number = || prop_oneof![-300.0_f32..300.0, Just(f32::NAN), Just(f32::INFINITY), Just(-1e30), Just(0.0)];
+    let place = move || [number(), number()];
+    prop_oneof![
+        place().prop_map(Command::Orbit),
+        place().prop_map(Command::Pan),
+        number().prop_map(Command::Zoom),
+        place().prop_map(Command::Pick),
+        place().prop_map(Command::DragStart),
+        place().prop_map(Command::DragTo),
+        number().prop_map(Command::SetSkyTurn),
+        number().prop_map(Command::SetSky),
+        number().prop_map(Command::SetLight),
+        number().prop_map(Command::SetExposure),
+        (number(), any::<bool>()).prop_map(|(by_deg, repeat)| Command::TurnSky { by_deg, repeat }),
+        [0_u32..2000, 0_u32..2000].prop_map(Command::Resize),
+        (0_usize..CONTROLS.len(), any::<bool>()).prop_flat_map(|(row, repeat)| {
+            let keys: Vec<Command> = row_commands(row).into_iter().map(|c| repeated(c, repeat)).collect();
+            proptest::sample::select(keys)
+        }),
+        (0_usize..10, any::<bool>()).prop_map(|(i, repeat)| repeated(
+            step(
+                [
+                    Step::Left,
+                    Step::Right,
+                    Step::Up,
+                    Step::Down,
+                    Step::Forth,
+                    Step::Back,
+                    Step::Larger,
+                    Step::Smaller,
+                    Step::TurnLeft,
+                    Step::TurnRight
+                ][i]
+            ),
+            repeat
+        )),
+    ]
+}
+
+fn repeated(command: Command, repeat: bool) -> Command {
+    match command {
+        Command::Step { step, .. } => Command::Step { step, repeat },
+        other => other,
+    }
+}
+
+fn row_commands(row: usize) -> Vec<Command> {
+    let commands = CONTROLS[row].commands();
+    if commands.is_empty() { vec![Command::DragEnd, Command::EndSlide] } else { commands }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 150, rng_seed: proptest::test_runner::RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever is done: everything stays finite and within what a scene file holds, undo takes it all back, redo brings it again.
+    #[test]
+    fn any_commands(commands in prop::collection::vec(any_command(), 1..60)) {
+        let mut editor = from_text(SMALL);
+        let start = editor.scene().clone();
+        let mut done = 0;
+        for command in commands.into_iter().filter(|c| *c != Command::NextScene) {
+            let before = editor.scene().data.clone();
+            let effect = editor.apply(command);
+            editor.advance(0.01);
+            let after = &editor.scene().data;
+            // What is said to have changed is what changed.
+            let changed = effect.changed;
+            prop_assert!(changed.placements || changed.emission || changed.roles || before.entities == after.entities, "{command:?}");
+            prop_assert_eq!(changed.sky, before.environment != after.environment, "{:?}", command);
+            prop_assert_eq!(changed.exposure, before.output != after.output, "{:?}", command);
+            prop_assert!(changed.camera || before.camera == after.camera);
+            prop_assert!(editor.placements().iter().all(|p| p.position.is_finite() && p.scale > 0.0 && p.rotation.is_normalized()));
+            done += 1;
+        }
+        prop_assert!(done < shadow_fields::view::history::STEP_LIMIT);
+        let saved = Data::parse(&editor.data(Path::new("")).unwrap().to_toml(), Path::new("p.toml"));
+        prop_assert!(saved.is_ok(), "{saved:?}");
+        let end = editor.scene().data.clone();
+        let mut undone = 0;
+        while editor.undo_count() > 0 {
+            editor.apply(Command::Undo);
+            undone += 1;
+        }
+        prop_assert_eq!(&editor.scene().data.entities, &start.data.entities);
+        prop_assert_eq!(&editor.scene().entities, &start.entities);
+        prop_assert_eq!(&editor.scene().data.environment, &start.data.environment);
+        prop_assert_eq!(editor.exposure_ev(), start.data.output.exposure_ev);
+        (0..undone).for_each(|_| drop(editor.apply(Command::Redo)));
+        prop_assert_eq!(&editor.scene().data.entities, &end.entities);
+        prop_assert_eq!(&editor.scene().data.environment, &end.environment);
+    }
+}

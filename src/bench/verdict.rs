@@ -4,6 +4,7 @@ use super::budget::Budget;
 use super::rival::Comparison;
 use super::sweep::Point;
 use super::text::three;
+use crate::render::variant::PRODUCTS;
 use std::fmt::Write;
 
 /// Changes of time, error or bytes by less than this factor count as none: medians of quiet runs differ by as much.
@@ -69,6 +70,23 @@ impl Ratios {
     }
 }
 
+/// The program's defaults.
+fn default_in_words() -> String {
+    let options = super::default_options();
+    let (bake, chain) = (options.bake, options.chain);
+    let product = PRODUCTS.iter().find(|(_, product)| *product == chain.product).map_or("", |(name, _)| name);
+    format!(
+        "lattice {}, {} lookup, {}, {} px a face, {} bands of transfer and {} of visibility, {product} products{}",
+        bake.lattice,
+        format!("{:?}", options.lookup).to_lowercase(),
+        format!("{:?}", bake.storage).to_lowercase(),
+        bake.face_px,
+        bake.bands,
+        bake.occlusion_bands(),
+        if chain.guard { ", guarded" } else { "" },
+    )
+}
+
 fn plural(count: usize, one: &str) -> String {
     if count == 1 { format!("1 {one}") } else { format!("{count} {one}s") }
 }
@@ -86,13 +104,18 @@ pub fn defaults(points: &[Point]) -> String {
     let of_case = |case: &str| points.iter().filter(|p| p.case == case).collect::<Vec<_>>();
     let by_case: Vec<Vec<&Point>> = cases.iter().map(|case| of_case(case)).collect();
     let defaults: Vec<&Point> = by_case.iter().filter_map(|points| points.first().copied()).collect();
-    let Some(default) = defaults.first() else { return "Nothing was swept.\n".into() };
+    if defaults.is_empty() {
+        return "Nothing was swept.\n".into();
+    }
     let count = by_case[0].len();
     let mut text = format!(
         "Which setting is the default, and why\n\n\
-         The default is {}, trilinear lookup, f16, 64 px a face, 4 bands of transfer and of visibility, guarded factored products.\n",
-        default.name
+         The default is {}.\n",
+        default_in_words()
     );
+    if let [only] = cases[..] {
+        let _ = writeln!(text, "Only {only} was swept; a run of all cases judges by two.");
+    }
     for default in &defaults {
         let _ = writeln!(
             text,
@@ -111,10 +134,10 @@ pub fn defaults(points: &[Point]) -> String {
     }
     let _ = writeln!(
         text,
-        "\nThe rule: another setting takes its place if time multiplied by error falls by more than {:.0} % (what two quiet runs \
-         may differ\nby) in every swept case, with fields of at most {MORE_BYTES} times its bytes. A saving that costs more error \
-         than it brings time, or a\ngain that costs more time than it brings error, is left to the user as an option. What\nleaves chains without a bound does not take its \
-         place (bench stability).",
+        "\nThe rule: another setting takes its place if time multiplied by error falls by more than {:.0} % (what two quiet runs may \
+         differ\nby) in every swept case, with fields of at most {MORE_BYTES} times its bytes. A saving that costs more error \
+         than it brings time, or a\ngain that costs more time than it brings error, is left to the user as an option; so is what \
+         leaves long chains without a bound.",
         (NOISE - 1.0) * 100.0
     );
     let (mut lines, mut better, mut axis) = (String::new(), Vec::new(), "");

@@ -153,7 +153,8 @@ impl Drop for Instance {
 /// Cheap to share: everything that owns a Vulkan object holds an `Arc<Device>`.
 pub struct Device {
     pub(super) handle: ash::Device,
-    #[cfg_attr(not(feature = "view"), allow(dead_code))] // windows ask it
+    /// Only windows ask it.
+    #[cfg(feature = "view")]
     pub(super) physical: vk::PhysicalDevice,
     pub(super) queue: Mutex<vk::Queue>,
     /// Fences of launched recordings; see `flight`.
@@ -236,6 +237,7 @@ impl Device {
         let names = instance.has_debug_utils.then(|| ash::ext::debug_utils::Device::new(&instance.handle, &handle));
         let mut device = Device {
             handle,
+            #[cfg(feature = "view")]
             physical,
             queue: Mutex::new(queue),
             flights: Mutex::default(),

@@ -121,7 +121,7 @@ pub const CONTROLS: &[Row] = &[
     row("G", "ray-cast reference beside the picture", &[letter('g', Command::ToggleReference)]),
     row("X", "error in false colour", &[letter('x', Command::ToggleError)]),
     row("F12", "write PNG and EXR", &[(Key::Function(12), false, Command::Screenshot)]),
-    row("Ctrl-S", "write the scene as TOML", &[(Key::Letter('s'), true, Command::Save)]),
+    row("Ctrl-S", "write NAME-edited.toml, then -2, -3", &[(Key::Letter('s'), true, Command::Save)]),
     row(
         "Ctrl-Z / Ctrl-Y",
         "undo, redo",

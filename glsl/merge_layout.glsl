@@ -1,4 +1,4 @@
-// What the merge reads besides fields; src/layout.rs holds the same structs and tests/layouts.rs compares the two.
+// What gather and merge read besides fields; src/layout.rs holds the same structs and tests/layouts.rs compares the two.
 
 struct Entity {
     vec4 centre;       // world, metres; w = 1 / (scale x bounding radius), 1/m
@@ -7,7 +7,7 @@ struct Entity {
     uint blocked_base; // first quad of the occlusion field
     uint radiance_base;// first quad of the radiance field
     vec4 radial;       // shell coordinate = x * spacing coordinate + y; z = inner, w = outer shell radius in r
-    vec4 emission;     // radiance factor of its light; w unused
+    vec4 emission;     // radiance factor of its light; w = its albedo, of the brightest colour
     vec4 albedo;       // albedo / pi; w = uniform scale of the object
 };
 
@@ -40,7 +40,7 @@ struct Cluster {
     uint radiosity_first; // in the radiosity buffer
     uint step_first;
     uint step_count;      // at least 1
-    uint spare;
+    uint bounds;          // for the gather
 };
 
 // A step: what one lookup is for. Bits 0-13: entity. Bits 14-27: the light whose chain this is, SKY_CHAIN for the sky's.

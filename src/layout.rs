@@ -18,7 +18,7 @@ pub struct Entity {
     pub radiance_base: u32,
     /// Slope and offset of the shell coordinate, inner and outer shell radius in r.
     pub radial: [f32; 4],
-    /// Radiance factor of the entity's light.
+    /// Radiance factor of the entity's light; w = its albedo, of its brightest colour.
     pub emission: [f32; 4],
     /// Albedo / pi; w = uniform scale of the object.
     pub albedo: [f32; 4],
@@ -42,8 +42,8 @@ pub struct Cluster {
     pub step_first: u32,
     /// Steps, at least 1.
     pub step_count: u32,
-    /// Not in use.
-    pub spare: u32,
+    /// Where the gather on the device finds its bounds.
+    pub bounds: u32,
 }
 
 /// "No such thing" among indices.

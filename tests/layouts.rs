@@ -8,6 +8,7 @@ use shadow_fields::bake::project::{Job, Project, Projection};
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::gpu::reflect::Reflection;
 use shadow_fields::layout::{Cluster, Entity};
+use shadow_fields::render::gather::{Bounds, Gather, Group, Report};
 use shadow_fields::render::variant::{Chain, Form, Skip, VARIANTS, Variant};
 use std::mem::offset_of;
 
@@ -52,7 +53,7 @@ fn entities_and_clusters_of_the_merge() {
                 radiosity_first,
                 step_first,
                 step_count,
-                spare,
+                bounds,
             }
         );
         assert_eq!(reflection.strides.get("Cluster"), Some(&(size_of::<Cluster>() as u32)));
@@ -65,6 +66,20 @@ fn entities_and_clusters_of_the_merge() {
             Entity { centre, alpha_beta, gamma, blocked_base, radiance_base, radial, emission, albedo }
         );
         assert_eq!(entity.len(), 8);
+        assert_eq!(reflection.strides.get("Entity"), Some(&(size_of::<Entity>() as u32)));
+    }
+}
+
+#[test]
+fn structs_of_the_gather() {
+    for texel in [false, true] {
+        let reflection = library().shader(&Gather::row(texel)).unwrap().reflection;
+        same_layout!(reflection, Group { first, count, bounds, spare });
+        assert_eq!(reflection.strides.get("Group"), Some(&(size_of::<Group>() as u32)));
+        same_layout!(reflection, Report { longest, most_found, step_total, spare });
+        // Two quads: centre and radius, axis and cosine.
+        assert_eq!(reflection.strides.get("Bounds"), Some(&(size_of::<Bounds>() as u32)));
+        assert_eq!([offset_of!(Bounds, radius_m), offset_of!(Bounds, axis), offset_of!(Bounds, cosine)], [12, 16, 28]);
         assert_eq!(reflection.strides.get("Entity"), Some(&(size_of::<Entity>() as u32)));
     }
 }

@@ -7,6 +7,7 @@ use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::field::{Lattice, Lookup, Storage};
+use shadow_fields::render::gather::Gather;
 use shadow_fields::render::product::{Products, Shape};
 use shadow_fields::render::variant::{Chain, Form, PRODUCTS, Skip, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, Row};
@@ -26,6 +27,10 @@ fn baking() -> Vec<Row> {
 fn drawing() -> Vec<Row> {
     let fragment = [false, true].map(|display| Row::new("draw.frag", 4).define("DISPLAY", display));
     fragment.into_iter().chain(["draw.vert", "show.vert", "show.frag"].map(|file| Row::new(file, 4))).collect()
+}
+
+fn gathering() -> Vec<Row> {
+    [false, true].map(Gather::row).into()
 }
 
 fn measuring() -> Vec<Row> {
@@ -150,6 +155,7 @@ fn drawing_shaders_are_valid() {
 #[test]
 fn measuring_shaders_are_valid() {
     check(measuring());
+    check(gathering());
 }
 
 #[test]
@@ -165,8 +171,11 @@ fn merge_of_seven_bands_is_valid() {
 
 #[test]
 fn every_entry_point_is_among_the_rows() {
-    let compiled: BTreeSet<&str> =
-        [baking(), drawing(), measuring(), merging(), multiplying()].concat().iter().map(|row| row.file).collect();
+    let compiled: BTreeSet<&str> = [baking(), drawing(), gathering(), measuring(), merging(), multiplying()]
+        .concat()
+        .iter()
+        .map(|row| row.file)
+        .collect();
     let there: BTreeSet<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| !name.ends_with(".glsl")).collect();
     assert_eq!(compiled, there);
 }

@@ -1,90 +1,19 @@
-//! What is not done: lists made through a tree are those of a look at everything; an unmoved scene merges nothing, and one in
-//! which something moves comes to the bits of a full merge; what is dropped as small stays within its bound.
+//! What is not done: an unmoved scene merges nothing, and one in which something moves comes to the bits of a full merge; what is
+//! dropped as small stays within its bound.
 
 mod common;
 #[path = "common/stage.rs"]
 mod stage;
 
 use common::report;
-use glam::{DQuat, DVec3, Quat, Vec3};
+use glam::{Quat, Vec3};
 use shadow_fields::frame::Options;
-use shadow_fields::render::gather::{self, Body, Bounds, Chains, Moment, Pose};
 use shadow_fields::render::variant::Skip;
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::truth::raycast::RayCast;
 use shadow_fields::truth::{Shapes, Vertex, World};
 use stage::{at, scene, small, stage};
 use std::fmt::Write;
-
-fn random_direction(rng: &mut fastrand::Rng) -> DVec3 {
-    loop {
-        let p = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5);
-        if (1e-3..0.25).contains(&p.length_squared()) {
-            return p.normalize();
-        }
-    }
-}
-
-/// Groups of clusters in random scenes, near and far, with and without a sky, lights and each skip.
-#[test]
-fn the_tree_leaves_every_list_as_it_is() {
-    let mut rng = fastrand::Rng::with_seed(21);
-    let (mut listed, mut offered, mut all) = (0, 0, 0);
-    for round in 0..60 {
-        let spread_m = if round % 2 == 0 { 60.0 } else { 8.0 };
-        let bodies: Vec<Body> = (0..200)
-            .map(|i| Body {
-                centre: DVec3::new(rng.f64() - 0.5, 0.1 * rng.f64(), rng.f64() - 0.5) * spread_m,
-                radius_m: 0.1 + 0.4 * rng.f64(),
-                occludes: i % 5 != 0,
-                emits: i % 25 == 0,
-                coloured: i % 50 == 0,
-                radiance: 3.0 * rng.f64(),
-                facing: (i % 50 == 25).then(|| (random_direction(&mut rng), 1.8)),
-            })
-            .collect();
-        let pose = Pose {
-            entity: rng.usize(0..200),
-            centre: DVec3::new(rng.f64(), rng.f64(), rng.f64()) * 3.0,
-            rotation: DQuat::from_axis_angle(random_direction(&mut rng), 6.0 * rng.f64()),
-            scale: 0.5 + rng.f64(),
-            reflectance: 0.3 + 0.7 * rng.f64(),
-        };
-        let skips = [Skip::ALL, Skip::NONE, Skip::without("cones"), Skip::without("behind"), Skip::without("horizon")];
-        let eps = if round % 6 == 5 { 0.0 } else { 10_f64.powf(-1.5 - 2.5 * rng.f64()) };
-        let moment = Moment::new(bodies, (round % 4 != 3).then_some(1.2), skips[round % skips.len()], eps);
-        let facing = random_direction(&mut rng);
-        let clusters: Vec<Bounds> = (0..32)
-            .map(|_| Bounds {
-                centre: 2.0 * random_direction(&mut rng) * rng.f64(),
-                radius_m: 0.3 * rng.f64(),
-                axis: (facing + 0.5 * random_direction(&mut rng)).normalize(),
-                spread_rad: 0.4 * rng.f64(),
-            })
-            .collect();
-        let group = Chains::of_group(&moment, &pose, &Bounds::union(&clusters));
-        let everything = Chains::all(&moment, &pose);
-        offered += group.occluder_count();
-        all += everything.occluder_count();
-        for bounds in &clusters {
-            let (mut found, mut expected) = (Vec::new(), Vec::new());
-            gather::steps(&moment, &pose, bounds, &group, &mut found);
-            gather::steps(&moment, &pose, bounds, &everything, &mut expected);
-            assert_eq!(found, expected, "round {round}");
-            listed += expected.len();
-            let counts = gather::counts(&moment, &pose, bounds);
-            let left =
-                counts.below_horizon + counts.behind_light + counts.apart + counts.facing_away + counts.below_eps;
-            assert_eq!(left + expected.len() as u64, counts.considered, "every lookup is listed or has a reason");
-            for step in expected {
-                let [entity, _] = shadow_fields::layout::Step::entities(step);
-                assert!(gather::may_matter(&moment, &pose, bounds, &moment.bodies[entity as usize]), "round {round}");
-            }
-        }
-    }
-    report(&format!("{listed} steps; the tree offers {offered} of {all} occluders to groups"));
-    assert!(listed > 10_000 && 2 * offered < all, "the tree is of use: {offered} of {all}");
-}
 
 /// Balls and rings on a floor, some of them lights, on a grid with `step_m` between them.
 fn town(edge: usize, step_m: f32, lights: usize) -> Scene {

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::field::{Lattice, Lookup, Storage};
 use crate::frame;
 use crate::gpu::{self, Device, Validation};
+use crate::render::gather::Place;
 use crate::render::variant::{Chain, EPS, Product, Skip};
 use crate::render::{Variant, calibrate};
 use crate::scene::Scene;
@@ -104,6 +105,10 @@ pub struct MergeArguments {
     /// Leave out light and shadow that is bounded below this share of white, a vertex and entity; 0 leaves none out
     #[arg(long, default_value_t = EPS, value_name = "SHARE", value_parser = eps, allow_negative_numbers = true)]
     pub eps: f32,
+    /// Where the lists of what concerns each cluster of vertices are made, with the same outcome; default: device, but host
+    /// for fewer than 256 entities on a software device
+    #[arg(long, value_name = "host|device")]
+    pub lists: Option<Place>,
     /// How an occluder's visibility is multiplied in: factored, pairs, matrix and points compute the same in different ways;
     /// point-chain keeps chains at 32 points and projects once, which is quicker and less exact
     #[arg(long, default_value = "factored", value_name = "NAME")]

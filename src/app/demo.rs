@@ -139,6 +139,7 @@ fn options(arguments: &Arguments, scene: &Scene) -> Options {
         skip: arguments.merge.skip,
         chain: arguments.merge.chain(),
         eps: arguments.merge.eps,
+        lists: arguments.merge.lists,
         size: arguments.size.unwrap_or([shape.width, shape.height]),
         multisample: true,
     }

@@ -89,6 +89,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         skip: arguments.merge.skip,
         chain: arguments.merge.chain(),
         eps: arguments.merge.eps,
+        lists: arguments.merge.lists,
         size: arguments.size.unwrap_or([shape.width, shape.height]),
         multisample: true,
     };

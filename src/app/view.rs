@@ -178,6 +178,7 @@ impl App<'_> {
                 variant: merge.variant,
                 chain: merge.chain(),
                 eps: merge.eps,
+                lists: merge.lists,
                 skip: merge.skip,
                 size: own,
                 multisample: self.arguments.multisample.unwrap_or(!device.info.is_software()),

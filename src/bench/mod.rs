@@ -68,6 +68,7 @@ pub fn default_options() -> frame::Options {
         // Frames are timed at rest: each must merge everything.
         skip: crate::render::variant::Skip::without("unmoved"),
         eps: crate::render::variant::EPS,
+        lists: None,
         variant: None,
         size: [16, 16],
         multisample: false,

@@ -10,9 +10,9 @@ use super::{Bench, default_options};
 use crate::error::{Error, Result};
 use crate::frame::memory::Memory;
 use crate::frame::{self, Frame};
-use crate::render::gather::Counts;
+use crate::render::gather::{Counts, Place};
 use crate::render::variant::Skip;
-use crate::scene::Placement;
+use crate::scene::{Placement, Scene};
 use crate::truth::{RayCast, Shapes, World, sample_vertices};
 use serde::Serialize;
 use serde_json::json;
@@ -40,6 +40,11 @@ pub struct Point {
     pub one_moves_ms: Spread,
     /// Wall time of a frame at rest, milliseconds.
     pub rest_ms: Spread,
+    /// What a frame in which everything but the floor moves takes besides the merge, uploads included, with lists made by the host:
+    /// milliseconds, median. Along the entities alone.
+    pub host_lists_ms: Option<f64>,
+    /// The same with lists made by the device, in turns with the other.
+    pub device_lists_ms: Option<f64>,
     /// Lookups a vertex.
     pub steps_a_vertex: f64,
     /// What the lists leave off.
@@ -83,7 +88,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Point>> {
 /// vertices: what is near a vertex stays the same.
 fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
     let cells: &[usize] = if quick { &[31, 63, 127, 255] } else { &[31, 63, 127, 255, 511, 1023] };
-    let things: &[usize] = if quick { &[64, 1024, 4095] } else { &[1, 4, 16, 64, 256, 1024, 4095] };
+    let things: &[usize] = if quick { &[16, 64, 1024, 4095] } else { &[1, 4, 16, 64, 256, 1024, 4095] };
     let lights: &[usize] = if quick { &[1, 16] } else { &[1, 4, 16, 64] };
     let base = Town { things: 64, lights: 0, cells: 64, receive: false };
     let with = |of: &[usize], town: &dyn Fn(usize) -> Town| of.iter().map(|&n| town(n)).collect::<Vec<_>>();
@@ -110,6 +115,27 @@ fn error(bench: &Bench<'_>, frame: &mut Frame, placements: &[Placement]) -> Resu
     let truth: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
     frame.render(placements, None)?;
     Ok(difference(&device_radiosity(frame, &vertices)?, &truth, rms(&truth).max(f64::MIN_POSITIVE)).rms)
+}
+
+/// Makes lists by host and device, in turns: medians in milliseconds.
+fn lists(bench: &Bench<'_>, scene: &Scene, at: &dyn Fn(usize) -> Vec<Placement>) -> Result<[f64; 2]> {
+    let mut frames = Vec::new();
+    for place in [Place::Host, Place::Device] {
+        let options = frame::Options { skip: Skip::ALL, lists: Some(place), ..default_options() };
+        frames.push((bench.frame(scene, options)?, Vec::new()));
+    }
+    for round in 0..if bench.quick { 7 } else { 15 } {
+        for (frame, times) in &mut frames {
+            let now = at(round);
+            let started = Instant::now();
+            let merge = merge_ms(&frame.render(&now, None)?);
+            // The first frames compile and make room.
+            if round >= 2 {
+                times.push(started.elapsed().as_secs_f64() * 1e3 - merge);
+            }
+        }
+    }
+    Ok([spread(&frames[0].1).median, spread(&frames[1].1).median])
 }
 
 fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<Point> {
@@ -148,6 +174,8 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<Point> {
         now
     })?;
     let (rest, _) = timed(&mut frame, &|_| placements.clone())?;
+    let lists_ms = axis.starts_with("entities").then(|| lists(bench, &scene, &|round| everything(round as f64)));
+    let lists_ms = lists_ms.transpose()?;
     let merge_ms = spread(&merges);
     (bench.progress)(&format!("{axis}: {vertices} vertices, {} entities measured", scene.entities.len()));
     Ok(Point {
@@ -160,6 +188,8 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<Point> {
         merge_ns_a_vertex: merge_ms.median * 1e6 / vertices as f64,
         one_moves_ms: spread(&one),
         rest_ms: spread(&rest),
+        host_lists_ms: lists_ms.map(|[host, _]| host),
+        device_lists_ms: lists_ms.map(|[_, device]| device),
         steps_a_vertex,
         counts: frame.counts(&placements),
         error: error(bench, &mut frame, &placements)?,

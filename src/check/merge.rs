@@ -82,6 +82,7 @@ pub fn options() -> Options {
         skip: Skip::ALL,
         chain: Chain::default(),
         eps: 0.0,
+        lists: Some(crate::render::gather::Place::Host),
         size: [64, 48],
         multisample: true,
     }

@@ -1,25 +1,21 @@
-//! The steps of every cluster, kept from frame to frame: a cluster is merged again only when its receiver, its list or an
-//! entity on its list has changed since.
+//! Which clusters a frame merges, and their steps where the host makes them: a cluster is merged again only when its receiver
+//! or an entity that stands on its list has changed, before or now.
 //!
-//! What a cluster's merge reads is its receiver, its list and the entities on it, and nothing else that ever changes. So one
-//! for which they are as before would give the same bits again.
+//! What a cluster's merge reads is its receiver, its list and the entities on it, and nothing else that ever changes; and what
+//! keeps an entity on or off a list is that entity, the receiver and, for an occluder, a light that stands there itself. So a
+//! cluster for which none of these has changed would come to the same bits again.
 
 use crate::layout::{self, Step};
-use crate::render::gather::{self, Bounds, Chains, Counts, Moment, Pose};
+use crate::render::gather::{self, Bounds, Chains, Counts, GROUP_CLUSTERS, Moment, Scope};
 use crate::scene::Placement;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-/// Neighbouring clusters that are gathered together: enough to share a walk through the tree, few enough to stay near.
-const GROUP_CLUSTERS: usize = 32;
-
 /// All that lists and merge depend on at one moment.
 pub(super) struct State {
     /// For the lists.
     pub moment: Moment,
-    /// Of every entity.
-    pub poses: Vec<Pose>,
     /// As the device sees them.
     pub entities: Vec<layout::Entity>,
     /// From which all of the above follows.
@@ -33,14 +29,26 @@ struct Group {
     bounds: Bounds,
 }
 
-/// Clusters with their lists.
+/// Clusters of one group that are to be merged.
+pub(super) struct Dirty {
+    group: usize,
+    clusters: Vec<usize>,
+}
+
+impl Dirty {
+    /// How many they are.
+    pub fn cluster_count(&self) -> usize {
+        self.clusters.len()
+    }
+}
+
+/// All clusters.
 #[derive(Default)]
 pub(super) struct Lists {
-    /// All clusters, without their steps.
+    /// Without their steps.
     pub clusters: Vec<layout::Cluster>,
     bounds: Vec<Bounds>,
     groups: Vec<Group>,
-    steps: Vec<Vec<u32>>,
     now: Option<State>,
 }
 
@@ -51,7 +59,7 @@ pub struct Merged {
     pub clusters: usize,
     /// Those that were merged; the others kept their light.
     pub merged_clusters: usize,
-    /// Lookups in the lists of those, one for 64 vertices.
+    /// Lookups in the lists of those, one for 64 vertices. In a window with lists made on the device, of an earlier frame.
     pub merged_steps: usize,
 }
 
@@ -59,15 +67,26 @@ impl Lists {
     /// Adds the clusters of one receiver, neighbours beside each other.
     pub fn add(&mut self, receiver: usize, clusters: Vec<(layout::Cluster, Bounds)>) {
         let first = self.clusters.len();
-        for (index, run) in clusters.chunks(GROUP_CLUSTERS).enumerate() {
-            let start = first + index * GROUP_CLUSTERS;
-            let bounds: Vec<Bounds> = run.iter().map(|(_, bounds)| *bounds).collect();
-            let clusters = start..start + run.len();
-            self.groups.push(Group { receiver, clusters, bounds: Bounds::union(&bounds) });
+        let all: Vec<Bounds> = clusters.iter().map(|(_, bounds)| *bounds).collect();
+        let mut start = 0;
+        while start < all.len() {
+            let mut end = start + 1;
+            while end < all.len() && end - start < GROUP_CLUSTERS && gather::compact(&all[start..=end]) {
+                end += 1;
+            }
+            let clusters = first + start..first + end;
+            self.groups.push(Group { receiver, clusters, bounds: Bounds::union(&all[start..end]) });
+            start = end;
         }
-        self.bounds.extend(clusters.iter().map(|(_, bounds)| *bounds));
-        self.clusters.extend(clusters.into_iter().map(|(cluster, _)| cluster));
-        self.steps.resize(self.clusters.len(), Vec::new());
+        for (cluster, bounds) in clusters {
+            self.clusters.push(layout::Cluster { bounds: self.clusters.len() as u32, ..cluster });
+            self.bounds.push(bounds);
+        }
+    }
+
+    /// Bounds of all clusters and then of all groups.
+    pub fn all_bounds(&self) -> Vec<Bounds> {
+        self.bounds.iter().copied().chain(self.groups.iter().map(|group| group.bounds)).collect()
     }
 
     /// Forgets what was merged: the next update takes every cluster.
@@ -75,77 +94,93 @@ impl Lists {
         self.now = None;
     }
 
-    /// Keeps what the lists were brought to.
-    pub fn keep(&mut self, now: State) {
-        self.now = Some(now);
-    }
-
-    /// Entities as last kept.
-    pub fn entities(&self) -> &[layout::Entity] {
-        self.now.as_ref().map_or(&[], |now| &now.entities)
-    }
-
     /// Brings the lists to this moment and returns the clusters to merge.
-    pub fn update(&mut self, now: &State) -> Vec<usize> {
-        let skip = now.moment.skip.unmoved;
-        let before = self.now.take().filter(|before| skip && now.moment.is_like(&before.moment));
-        let moved: Option<Moved<'_>> = before.as_ref().map(|before| Moved::new(before, now));
-        if moved.as_ref().is_some_and(|moved| moved.list.is_empty()) {
-            return Vec::new();
-        }
-        let found: Vec<Vec<(usize, Vec<u32>)>> =
-            self.groups.par_iter().map(|group| self.regather(group, now, moved.as_ref())).collect();
-        let mut dirty = Vec::new();
-        for (cluster, steps) in found.into_iter().flatten() {
-            self.steps[cluster] = steps;
-            dirty.push(cluster);
-        }
+    pub fn update(&mut self, now: State) -> Vec<Dirty> {
+        let before = self.now.take().filter(|before| now.moment.skip.unmoved && now.moment.is_like(&before.moment));
+        let moved = before.as_ref().map(|before| Moved::new(before, &now));
+        let dirty = match moved {
+            Some(moved) if moved.list.is_empty() => Vec::new(),
+            moved => {
+                let groups = 0..self.groups.len();
+                groups.into_par_iter().filter_map(|group| self.dirty(group, &now, moved.as_ref())).collect()
+            }
+        };
+        self.now = Some(now);
         dirty
     }
 
-    /// Clusters of a group that must be merged again, with their lists.
-    fn regather(&self, group: &Group, now: &State, moved: Option<&Moved<'_>>) -> Vec<(usize, Vec<u32>)> {
-        let pose = &now.poses[group.receiver];
-        let whole = moved.is_none_or(|moved| moved.flags[group.receiver]);
-        let movers = match moved {
-            Some(moved) if !whole => moved.near(now, pose, &group.bounds, &moved.list),
-            _ => Vec::new(),
+    /// The moment of the last update.
+    ///
+    /// # Panics
+    /// Before there was one.
+    pub fn now(&self) -> &State {
+        self.now.as_ref().expect("updated before")
+    }
+
+    /// Clusters of a group that must be merged again.
+    fn dirty(&self, index: usize, now: &State, moved: Option<&Moved<'_>>) -> Option<Dirty> {
+        let group = &self.groups[index];
+        let whole = || Some(Dirty { group: index, clusters: group.clusters.clone().collect() });
+        let Some(moved) = moved else { return whole() };
+        if moved.most || moved.flags[group.receiver] {
+            return whole();
+        }
+        let near = moved.near(now, group.receiver, &group.bounds);
+        let mut clusters: Vec<usize> = group.clusters.clone().collect();
+        clusters.retain(|&cluster| moved.any_on_list(now, group.receiver, &self.bounds[cluster], &near));
+        (!clusters.is_empty()).then_some(Dirty { group: index, clusters })
+    }
+
+    /// The steps of clusters at the last update's moment, by the host: clusters that know their place among the steps, and the
+    /// steps.
+    pub fn gather(&self, dirty: &[Dirty]) -> (Vec<layout::Cluster>, Vec<u32>) {
+        let now = self.now();
+        let of_group = |dirty: &Dirty| {
+            let group = &self.groups[dirty.group];
+            let entity = &now.entities[group.receiver];
+            let chains = Chains::of_group(&now.moment, group.receiver as u32, entity, &group.bounds);
+            let (mut ends, mut steps) = (Vec::with_capacity(dirty.clusters.len()), Vec::new());
+            for &cluster in &dirty.clusters {
+                gather::reference(&now.moment, entity, &self.bounds[cluster], &chains, &mut steps);
+                ends.push(steps.len());
+            }
+            (ends, steps)
         };
-        if !whole && movers.is_empty() {
-            return Vec::new();
-        }
-        let chains = Chains::of_group(&now.moment, pose, &group.bounds);
-        let mut out = Vec::new();
-        for cluster in group.clusters.clone() {
-            let bounds = &self.bounds[cluster];
-            if let Some(moved) = moved
-                && !whole
-                && moved.near(now, pose, bounds, &movers).is_empty()
-            {
-                continue;
+        let found: Vec<(Vec<usize>, Vec<u32>)> = dirty.par_iter().map(of_group).collect();
+        let (mut clusters, mut all) = (Vec::new(), Vec::with_capacity(found.iter().map(|(_, s)| s.len()).sum()));
+        for (dirty, (ends, steps)) in dirty.iter().zip(found) {
+            let mut start = 0;
+            for (&cluster, end) in dirty.clusters.iter().zip(ends) {
+                let (step_first, step_count) = ((all.len() + start) as u32, (end - start) as u32);
+                clusters.push(layout::Cluster { step_first, step_count, ..self.clusters[cluster] });
+                start = end;
             }
-            let mut steps = Vec::new();
-            gather::steps(&now.moment, pose, bounds, &chains, &mut steps);
-            let same = |moved: &Moved<'_>| steps == self.steps[cluster] && !moved.any_on(&steps);
-            if whole || !moved.is_some_and(same) {
-                out.push((cluster, steps));
-            }
+            all.extend(steps);
         }
-        out
+        (clusters, all)
     }
 
-    /// The steps of a cluster.
-    pub fn steps(&self, cluster: usize) -> &[u32] {
-        &self.steps[cluster]
+    /// Clusters to merge, and groups of them, for the gather on the device.
+    pub fn groups(&self, dirty: &[Dirty]) -> (Vec<layout::Cluster>, Vec<gather::Group>) {
+        let (mut clusters, mut groups) = (Vec::new(), Vec::new());
+        for dirty in dirty {
+            let count = dirty.clusters.len();
+            // One alone is its own group.
+            let bounds = if count == 1 { dirty.clusters[0] } else { self.clusters.len() + dirty.group };
+            let (first, count, bounds) = (clusters.len() as u32, count as u32, bounds as u32);
+            groups.push(gather::Group { first, count, bounds, spare: 0 });
+            clusters.extend(dirty.clusters.iter().map(|&cluster| self.clusters[cluster]));
+        }
+        (clusters, groups)
     }
 
-    /// What all lists of the last moment leave off, and why.
+    /// What all lists of a moment leave off, and why.
     pub fn counts(&self, state: &State) -> Counts {
         let of_group = |group: &Group| {
-            let pose = &state.poses[group.receiver];
+            let entity = &state.entities[group.receiver];
             let clusters = self.bounds[group.clusters.clone()].iter();
             clusters.fold(Counts::default(), |mut counts, bounds| {
-                counts += gather::counts(&state.moment, pose, bounds);
+                counts += gather::counts(&state.moment, group.receiver as u32, entity, bounds);
                 counts
             })
         };
@@ -157,19 +192,18 @@ impl Lists {
 
     /// Entities on the lists of a receiver's clusters at a moment.
     pub fn entities_on(&self, state: &State, receiver: usize) -> BTreeSet<usize> {
-        let (mut steps, pose) = (Vec::new(), &state.poses[receiver]);
+        let (mut steps, entity) = (Vec::new(), &state.entities[receiver]);
         for group in self.groups.iter().filter(|group| group.receiver == receiver) {
-            let chains = Chains::of_group(&state.moment, pose, &group.bounds);
+            let chains = Chains::of_group(&state.moment, receiver as u32, entity, &group.bounds);
             let clusters = &self.bounds[group.clusters.clone()];
-            clusters.iter().for_each(|bounds| gather::steps(&state.moment, pose, bounds, &chains, &mut steps));
+            clusters.iter().for_each(|bounds| gather::reference(&state.moment, entity, bounds, &chains, &mut steps));
         }
         steps.into_iter().map(|step| Step::entities(step)[0] as usize).collect()
     }
 
-    /// Host memory of the lists, bytes.
+    /// Host memory of the clusters, bytes.
     pub fn size_bytes(&self) -> u64 {
-        let of_steps: usize = self.steps.iter().map(|steps| size_of::<Vec<u32>>() + 4 * steps.capacity()).sum();
-        (of_steps + self.clusters.len() * (size_of::<layout::Cluster>() + size_of::<Bounds>())) as u64
+        (self.clusters.len() * (size_of::<layout::Cluster>() + size_of::<Bounds>())) as u64
     }
 }
 
@@ -178,7 +212,7 @@ struct Moved<'b> {
     before: &'b State,
     flags: Vec<bool>,
     list: Vec<usize>,
-    /// So many that asking for each whether it matters costs more than gathering anew.
+    /// So many that asking for each whether it matters costs more than merging anew.
     most: bool,
 }
 
@@ -194,21 +228,22 @@ impl<'b> Moved<'b> {
         Moved { before, most: list.len() * 8 > flags.len().max(64), flags, list }
     }
 
-    /// Those of `list` that may stand on the list of a cluster with these bounds, before or now; its receiver has not moved.
-    fn near(&self, now: &State, pose: &Pose, bounds: &Bounds, list: &[usize]) -> Vec<usize> {
-        if self.most {
-            return list.to_vec();
-        }
-        let at = |moment: &Moment, j: usize| {
-            let body = &moment.bodies[j];
-            (body.occludes || body.emits) && gather::may_matter(moment, pose, bounds, body)
+    /// Those that may stand on the list of a cluster within these bounds, before or now; its receiver has not moved.
+    fn near(&self, now: &State, receiver: usize, bounds: &Bounds) -> Vec<usize> {
+        let moments = [&self.before.moment, &now.moment];
+        let scopes = moments.map(|moment| Scope::new(moment, &now.entities[receiver], bounds));
+        let near = |j: usize| {
+            j != receiver && moments.iter().zip(&scopes).any(|(m, scope)| scope.may_list(&m.bodies[j], m.spheres[j]))
         };
-        let near = |&j: &usize| j != pose.entity && (at(&self.before.moment, j) || at(&now.moment, j));
-        list.iter().copied().filter(near).collect()
+        self.list.iter().copied().filter(|&j| near(j)).collect()
     }
 
-    fn any_on(&self, steps: &[u32]) -> bool {
-        let flag = |e: u32| self.flags.get(e as usize).copied().unwrap_or(false);
-        steps.iter().any(|&step| Step::entities(step).into_iter().any(flag))
+    /// Whether any of `list` stands on the list of a cluster, before or now.
+    fn any_on_list(&self, now: &State, receiver: usize, bounds: &Bounds, list: &[usize]) -> bool {
+        let on = |moment: &Moment| {
+            let scope = Scope::new(moment, &now.entities[receiver], bounds);
+            list.iter().any(|&j| scope.lists(j as u32, &moment.bodies[j], receiver as u32))
+        };
+        on(&self.before.moment) || on(&now.moment)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Frame;
 use super::form::usable;
+use super::gathering::Gathering;
 use super::store::Store;
 use crate::bake::cache::Cache;
 use crate::error::Result;
@@ -45,6 +46,7 @@ impl Frame {
             self.lists.forget();
         }
         *self.recorded.get_mut() = false;
+        self.heed_report();
         self.upload(placements)
     }
 
@@ -55,9 +57,7 @@ impl Frame {
     /// As [`Frame::render`].
     pub fn record_light<'f>(&'f self, commands: &mut Commands<'f>) -> Result<()> {
         if self.merged.merged_clusters > 0 {
-            let inputs = self.inputs()?;
-            let cluster_count = self.merged.merged_clusters as u32;
-            commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))?;
+            self.record_merge(commands)?;
             commands.barrier(Access::ComputeWrite, Access::VertexRead);
         }
         self.recorded.store(true, Ordering::Relaxed);
@@ -173,10 +173,16 @@ impl Frame {
     fn light_and_show(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
         self.prepare(placements)?;
         let area = [0, 0, self.options.size[0], self.options.size[1]];
-        let mut commands = Commands::new(&self.device, "frame")?;
-        self.record_light(&mut commands)?;
-        self.record_picture(&mut commands, placements, &[Part { area, lit: Lit::Merged }], white)?;
-        commands.submit()
+        loop {
+            let mut commands = Commands::new(&self.device, "frame")?;
+            self.record_light(&mut commands)?;
+            self.record_picture(&mut commands, placements, &[Part { area, lit: Lit::Merged }], white)?;
+            let timings = commands.submit()?;
+            if self.all_gathered() {
+                return Ok(timings);
+            }
+            self.prepare(placements)?;
+        }
     }
 
     /// Whether the fields that `scene` needs are here; it has the meshes and entities that this frame was made for.
@@ -248,6 +254,10 @@ impl Frame {
         if uses(&self.library.files("draw.vert")) || uses(&self.library.files("draw.frag")) {
             let options = self.options;
             self.draw = Draw::new(&self.device, &self.library, options.size, options.multisample, self.draw.finish())?;
+        }
+        if uses(&self.library.files("gather.comp")) && self.gathering.is_some() {
+            self.gathering = Some(Gathering::new(&self.device, &self.library, &self.lists)?);
+            self.lists.forget();
         }
         if uses(&self.library.files("merge.comp")) {
             self.merge = Merge::new(&self.device, &self.library, self.form)?;

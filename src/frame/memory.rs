@@ -1,6 +1,7 @@
 //! What a scene takes of the device's memory and of the host's.
 
 use super::Frame;
+use super::gathering::Gathering;
 use crate::gpu::Volume;
 use serde::Serialize;
 
@@ -42,7 +43,8 @@ impl Frame {
             vertices: self.store.vertices.size_bytes,
             radiosity: self.radiosity.size_bytes,
             drawables: self.store.geometries.iter().map(|geometry| geometry.drawable.size_bytes()).sum(),
-            lists: uploads.iter().map(|upload| upload.all_bytes()).sum(),
+            lists: uploads.iter().map(|upload| upload.all_bytes()).sum::<u64>()
+                + self.gathering.as_ref().map_or(0, Gathering::size_bytes),
             pictures: self.readback.size_bytes + self.draw.size_bytes(),
             host_lists: self.lists.size_bytes(),
         }

@@ -1,12 +1,13 @@
 //! A frame on one screen: upload, passes in order, the barriers between them.
 //!
 //! ```text
-//! placements -> entities, rotations, steps of every cluster (host) -> merge -> radiosity -> draw -> picture -> read back
+//! placements -> entities, rotations, clusters to merge (host) -> gather (device or host) -> steps of every cluster -> merge -> radiosity -> draw -> picture -> read back
 //! ```
 
 pub mod camera;
 mod draw_twin;
 mod form;
+mod gathering;
 pub mod lists;
 mod live;
 pub mod memory;
@@ -25,7 +26,7 @@ use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing, Upload, V
 use crate::layout;
 use crate::render::calibrate;
 use crate::render::draw::{Draw, Finish, Item};
-use crate::render::gather::Counts;
+use crate::render::gather::{Counts, Place};
 use crate::render::merge::{Inputs, Merge, Readable};
 use crate::render::variant::{Chain, Form, Skip, Variant, uniform_entities};
 use crate::scene::{Placement, Scene};
@@ -33,6 +34,7 @@ use crate::sh::basis::{Y00, coefficient_count};
 use crate::shaders::Library;
 use ash::vk;
 use form::{form, usable};
+use gathering::Gathering;
 use glam::{DMat4, DVec3, Vec3};
 use half::f16;
 use lists::{Lists, Merged};
@@ -59,6 +61,8 @@ pub struct Options {
     /// Light that the merge leaves out: contributions to a vertex that are bounded below this share of the radiance that the
     /// scene's exposure shows as white; 0 leaves none out.
     pub eps: f32,
+    /// Where the lists of clusters are made; `None` takes what is known to be quicker on the device.
+    pub lists: Option<Place>,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
     /// Whether pictures are multisampled where the device can.
@@ -88,6 +92,8 @@ pub struct Frame {
     radiosity_offsets: Vec<u64>,
     readback: Buffer,
     lists: Lists,
+    /// Where the device makes the lists.
+    gathering: Option<Gathering>,
     /// What the last frame did about its clusters.
     pub merged: Merged,
     /// Whether the merge that was prepared last was recorded.
@@ -124,6 +130,9 @@ impl Frame {
             radiosity_size += 16 * geometry.vertices.len() as u64;
         }
         let merge = Merge::new(device, library, form)?;
+        let gathers =
+            options.lists.unwrap_or_else(|| Place::quicker(device, scene.entities.len())) == Place::Device && !lists.clusters.is_empty();
+        let gathering = gathers.then(|| Gathering::new(device, library, &lists)).transpose()?;
         let draw = Draw::new(device, library, options.size, options.multisample, Finish::Linear)?;
         let count = scene.entities.len().max(entity_limit as usize) as u64;
         let upload = |name: &str, bytes: u64| Upload::new(device, name, bytes);
@@ -154,6 +163,7 @@ impl Frame {
                 8 * u64::from(options.size[0]) * u64::from(options.size[1]),
             )?,
             lists,
+            gathering,
             merged: Merged::default(),
             recorded: AtomicBool::new(true),
             sky_radiance: 0.0,
@@ -195,21 +205,35 @@ impl Frame {
     }
 
     fn light_and_draw(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
-        self.upload(placements)?;
-        let cluster_count = self.merged.merged_clusters as u32;
-        let inputs = self.inputs()?;
-        let items = self.items(placements, self.aspect());
-        let mut commands = Commands::new(&self.device, "frame")?;
-        if cluster_count > 0 {
-            commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))?;
-        }
-        if let Some(white) = white {
-            if cluster_count > 0 {
-                commands.barrier(Access::ComputeWrite, Access::VertexRead);
+        loop {
+            self.upload(placements)?;
+            let items = self.items(placements, self.aspect());
+            let mut commands = Commands::new(&self.device, "frame")?;
+            self.record_merge(&mut commands)?;
+            if let Some(white) = white {
+                if self.merged.merged_clusters > 0 {
+                    commands.barrier(Access::ComputeWrite, Access::VertexRead);
+                }
+                self.record_draw(&mut commands, &items, self.background, white)?;
             }
-            self.record_draw(&mut commands, &items, self.background, white)?;
+            let timings = commands.submit()?;
+            if self.all_gathered() {
+                return Ok(timings);
+            }
         }
-        commands.submit()
+    }
+
+    /// The passes that bring light to the clusters of the last upload; nothing where there are none.
+    fn record_merge<'f>(&'f self, commands: &mut Commands<'f>) -> Result<()> {
+        let cluster_count = self.merged.merged_clusters as u32;
+        if cluster_count == 0 {
+            return Ok(());
+        }
+        if let Some(gathering) = &self.gathering {
+            gathering.record(commands, &self.entities, &self.clusters)?;
+        }
+        let inputs = self.inputs()?;
+        commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))
     }
 
     /// Draws the picture from the radiosity as it stands, the last merge's or what [`Frame::set_radiosity`] put there.
@@ -337,7 +361,7 @@ impl Frame {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         Ok(Inputs {
             entities: Readable::shared(&self.entities, self.variant)?,
-            steps: &self.steps,
+            steps: self.gathering.as_ref().and_then(Gathering::steps).unwrap_or(&self.steps),
             clusters: &self.clusters,
             fields: Readable::fields(&self.store.fields, self.image.as_ref(), &self.form)?,
             transfers: Readable::new(&self.store.transfers, self.variant, floats)?,

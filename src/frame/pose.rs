@@ -1,13 +1,14 @@
 //! What an entity is to the merge at a moment: its place, rotation and light, and the steps of every cluster.
 
 use super::Frame;
-use super::lists::{Merged, State};
+use super::gathering::Gathering;
+use super::lists::{Dirty, Merged, State};
 use super::store::{self, Slot};
 use crate::error::Result;
 use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::render::gather::{Body, Bounds, Moment, Pose};
+use crate::render::gather::{Body, Bounds, Moment, Report};
 use crate::scene::Placement;
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use crate::sh::cube::{self, FACE_COUNT, texel_st};
@@ -18,44 +19,60 @@ use std::f64::consts::PI;
 impl Frame {
     /// Writes what has changed for the merge at this moment: clusters to light, their steps, and all entities.
     pub(super) fn upload(&mut self, placements: &[Placement]) -> Result<()> {
-        let state = self.state(placements);
-        let dirty = self.lists.update(&state);
-        self.lists.keep(state);
-        self.merged = Merged { clusters: self.lists.clusters.len(), merged_clusters: dirty.len(), merged_steps: 0 };
+        let dirty = self.lists.update(self.state(placements));
+        let merged_clusters = dirty.iter().map(Dirty::cluster_count).sum();
+        self.merged = Merged { clusters: self.lists.clusters.len(), merged_clusters, ..self.merged };
         if dirty.is_empty() {
+            self.merged.merged_steps = 0;
             return Ok(());
         }
-        let (mut steps, mut clusters) = (Vec::new(), Vec::with_capacity(dirty.len()));
-        for cluster in dirty {
-            let list = self.lists.steps(cluster);
-            let (step_first, step_count) = (steps.len() as u32, list.len() as u32);
-            clusters.push(layout::Cluster { step_first, step_count, ..self.lists.clusters[cluster] });
-            steps.extend_from_slice(list);
+        self.entities.write(&self.lists.now().entities)?;
+        if let Some(gathering) = &mut self.gathering
+            && let Some(clusters) = gathering.prepare(&self.lists, &dirty)?
+        {
+            return self.clusters.write(&clusters);
         }
+        let (clusters, steps) = self.lists.gather(&dirty);
         self.merged.merged_steps = steps.len();
-        self.entities.write(self.lists.entities())?;
         self.steps.write(&steps)?;
         self.clusters.write(&clusters)
+    }
+
+    /// Whether every list of the last frame was as long as it had to be, now that all that was submitted has ended; otherwise the
+    /// next upload takes every cluster.
+    pub(super) fn all_gathered(&mut self) -> bool {
+        if self.merged.merged_clusters == 0 {
+            return true;
+        }
+        let report = self.gathering.as_mut().and_then(Gathering::report);
+        !report.is_some_and(|report| self.heed(&report))
+    }
+
+    /// Goes on to the next frame of a window: where lists were lost two frames ago, every cluster is merged again.
+    pub(super) fn heed_report(&mut self) {
+        if let Some(report) = self.gathering.as_mut().and_then(Gathering::next_frame) {
+            self.heed(&report);
+        }
+    }
+
+    fn heed(&mut self, report: &Report) -> bool {
+        self.merged.merged_steps = report.step_total as usize;
+        let lost = self.gathering.as_mut().is_some_and(|gathering| gathering.lost(report));
+        if lost {
+            self.lists.forget();
+        }
+        lost
     }
 
     /// All that lists and merge depend on at this moment.
     pub(super) fn state(&self, placements: &[Placement]) -> State {
         let bodies: Vec<Body> = placements.iter().enumerate().map(|(index, p)| self.body(index, p)).collect();
-        let pose = |(entity, placement): (usize, &Placement)| Pose {
-            entity,
-            centre: bodies[entity].centre,
-            rotation: placement.rotation.as_dquat().normalize(),
-            scale: placement.scale.into(),
-            reflectance: self.scene.entities[entity].albedo.max_element().into(),
-        };
-        let poses = placements.iter().enumerate().map(pose).collect();
         let white = f64::from(-self.scene.data.output.exposure_ev).exp2();
         let sky = (!self.scene.environment.is_none()).then_some(self.sky_radiance);
         let eps = f64::from(self.options.eps) * white;
         State {
             entities: placements.iter().enumerate().map(|(index, p)| self.entity(index, p)).collect(),
             moment: Moment::new(bodies, sky, self.options.skip, eps),
-            poses,
             placements: placements.to_vec(),
         }
     }
@@ -109,7 +126,7 @@ impl Frame {
             centre: centre.extend((1.0 / radius_m) as f32).to_array(),
             alpha_beta: [cos_a, sin_a, cos_b, sin_b],
             gamma: [cos_c, sin_c],
-            emission: emission.extend(0.0).to_array(),
+            emission: emission.extend(entity.albedo.max_element()).to_array(),
             albedo: (entity.albedo.as_dvec3() / PI).as_vec3().extend(placement.scale).to_array(),
             radial,
             blocked_base: geometry.blocked.as_ref().map_or(0, base),
@@ -130,16 +147,11 @@ impl Frame {
         entity.occludes && self.store.geometries[entity.mesh].blocked.is_some()
     }
 
-    /// Occluders of a receiver, near to far from its bounding sphere's centre, ties by index; itself left out. One order for
-    /// the whole receiver: products truncated in another order differ (by up to .006 over twelve occluders), which would show
-    /// as seams between clusters.
-    pub(super) fn occluders(&self, centres: &[DVec3], receiver: usize) -> Vec<usize> {
-        let mut order: Vec<(f64, usize)> = (0..centres.len())
-            .filter(|&j| self.occludes(j) && j != receiver)
-            .map(|j| (centres[j].distance(centres[receiver]), j))
-            .collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        order.into_iter().map(|(_, j)| j).collect()
+    /// Occluders of a receiver in their order, [`Moment::order`]; itself left out.
+    pub(super) fn occluders(&self, moment: &Moment, receiver: usize) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..moment.spheres.len()).filter(|&j| self.occludes(j) && j != receiver).collect();
+        order.sort_by_cached_key(|&j| moment.order(receiver as u32, j as u32));
+        order
     }
 }
 

@@ -45,7 +45,6 @@ impl Frame {
             .collect();
         let lights = indices(&self.scene, |e| e.emits);
         let sky = self.scene.environment.coefficients(self.options.bake.bands);
-        let centres: Vec<DVec3> = objects.iter().map(|o| o.centre).collect();
         let state = self.state(placements);
         let mut out = Vec::new();
         for receiver in indices(&self.scene, |e| e.receives) {
@@ -64,7 +63,7 @@ impl Frame {
             let task = Task {
                 objects: &objects,
                 receiver,
-                occluders: &self.occluders(&centres, receiver),
+                occluders: &self.occluders(&state.moment, receiver),
                 lights: &lights,
                 sky: (!self.scene.environment.is_none()).then_some(&sky),
                 positions: &positions,
@@ -86,15 +85,15 @@ impl Frame {
 type Listed = (Vec<usize>, Vec<HashSet<(u32, u32)>>);
 
 fn listed(state: &State, receiver: usize, geometry: &Geometry) -> Listed {
-    let (moment, pose) = (&state.moment, &state.poses[receiver]);
+    let (moment, entity) = (&state.moment, &state.entities[receiver]);
     let mut cluster_of = vec![0; geometry.order.len()];
     for (place, &v) in geometry.order.iter().enumerate() {
         cluster_of[v as usize] = place / CLUSTER_VERTICES as usize;
     }
-    let chains = Chains::all(moment, pose);
+    let chains = Chains::all(moment, receiver as u32);
     let of_cluster = |bounds| {
         let mut steps = Vec::new();
-        gather::steps(moment, pose, bounds, &chains, &mut steps);
+        gather::reference(moment, entity, bounds, &chains, &mut steps);
         steps.into_iter().map(|step| Step::entities(step).into()).collect()
     };
     (cluster_of, geometry.clusters.iter().map(of_cluster).collect())

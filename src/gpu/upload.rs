@@ -42,6 +42,16 @@ impl Upload {
         Ok(())
     }
 
+    /// Place of the buffer that was written last.
+    pub fn place(&self) -> usize {
+        self.last
+    }
+
+    /// What the device has written into the buffer at that place, once the flight that it belongs to has ended.
+    pub fn at(&self, place: usize) -> &Buffer {
+        &self.buffers[place]
+    }
+
     /// Bytes of all flights together.
     pub fn all_bytes(&self) -> u64 {
         self.buffers.iter().map(|buffer| buffer.size_bytes).sum()

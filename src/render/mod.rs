@@ -8,6 +8,8 @@ pub mod merge;
 pub mod moment;
 pub mod product;
 pub mod reference;
+pub mod repeatable;
+pub mod scope;
 pub mod shelf;
 pub mod show;
 pub mod tree;

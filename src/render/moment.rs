@@ -1,27 +1,42 @@
 //! What the lists of step "gather" are made from at one moment: bounds of clusters, bodies of entities, poses of receivers; and
 //! counts of what they leave off.
 
+use super::repeatable::dot;
+use super::scope::SLACK_RAD;
 use super::tree::Tree;
 use super::variant::Skip;
-use glam::{DQuat, DVec3, Vec3};
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
 use serde::Serialize;
 use std::f64::consts::PI;
 
-/// Where a cluster's vertices are and where they face: in its mesh's frame (metres from the bounding sphere's centre), or
-/// in the world once [placed](Bounds::placed).
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Where a cluster's vertices are and where they face, in its mesh's frame: metres from the bounding sphere's centre.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Bounds {
     /// Centre of a sphere around the vertices.
-    pub centre: DVec3,
+    pub centre: [f32; 3],
     /// Its radius in metres.
-    pub radius_m: f64,
-    /// Axis of a cone around the normals.
-    pub axis: DVec3,
-    /// Its half-angle; pi when it bounds nothing.
-    pub spread_rad: f64,
+    pub radius_m: f32,
+    /// Unit axis of a cone around the normals.
+    pub axis: [f32; 3],
+    /// Cosine of its half-angle with [`SLACK_RAD`]; -1 where it bounds nothing.
+    pub cosine: f32,
 }
 
 impl Bounds {
+    /// A sphere around the vertices and a cone around their normals, angle in radians, pi where it bounds nothing.
+    pub fn from_parts(centre: DVec3, radius_m: f64, axis: DVec3, spread_rad: f64) -> Self {
+        let rounded = centre.as_vec3();
+        Bounds {
+            centre: rounded.to_array(),
+            // What rounding of the centre, here and where it is turned, may add.
+            radius_m: ((radius_m + centre.distance(rounded.as_dvec3()) + 1e-6 * centre.length()) * (1.0 + 1e-6)) as f32,
+            axis: axis.as_vec3().to_array(),
+            cosine: (spread_rad + SLACK_RAD).min(PI).cos() as f32,
+        }
+    }
+
     /// Bounds of some vertices.
     pub fn new(positions: &[Vec3], normals: &[Vec3]) -> Self {
         let spheres = positions.iter().map(|p| (p.as_dvec3(), 0.0));
@@ -31,8 +46,10 @@ impl Bounds {
 
     /// Bounds of neighbouring clusters.
     pub fn union(parts: &[Bounds]) -> Self {
-        let spheres = parts.iter().map(|b| (b.centre, b.radius_m));
-        Self::around(spheres.collect(), parts.iter().map(|b| (b.axis, b.spread_rad)).collect())
+        let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
+        let spheres = parts.iter().map(|b| (vector(b.centre), f64::from(b.radius_m)));
+        let cones = parts.iter().map(|b| (vector(b.axis), f64::from(b.cosine).acos()));
+        Self::around(spheres.collect(), cones.collect())
     }
 
     fn around(spheres: Vec<(DVec3, f64)>, cones: Vec<(DVec3, f64)>) -> Self {
@@ -45,18 +62,7 @@ impl Bounds {
         let widest = cones.iter().map(|(a, spread)| a.angle_between(axis) + spread).fold(0.0, f64::max);
         // No angle to a direction that is none.
         let unknown = axis == DVec3::ZERO || cones.iter().any(|(a, _)| *a == DVec3::ZERO);
-        let spread_rad = if unknown { PI } else { widest.min(PI) };
-        Bounds { centre, radius_m, axis, spread_rad }
-    }
-
-    /// In the world.
-    pub fn placed(&self, pose: &Pose) -> Self {
-        Bounds {
-            centre: pose.centre + pose.rotation * (self.centre * pose.scale),
-            radius_m: self.radius_m * pose.scale,
-            axis: pose.rotation * self.axis,
-            spread_rad: self.spread_rad,
-        }
+        Self::from_parts(centre, radius_m, axis, if unknown { PI } else { widest.min(PI) })
     }
 }
 
@@ -79,56 +85,80 @@ pub struct Body {
     pub facing: Option<(DVec3, f64)>,
 }
 
-/// A receiver's place and surface.
-#[derive(Clone, Copy, Debug)]
-pub struct Pose {
-    /// Index of the entity.
-    pub entity: usize,
-    /// Centre of its bounding sphere in the world, metres.
-    pub centre: DVec3,
-    /// Rotation to the world.
-    pub rotation: DQuat,
-    /// Uniform scale.
-    pub scale: f64,
-    /// Albedo, of its brightest colour.
-    pub reflectance: f64,
+/// A light as the gather sees it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Lamp {
+    /// Axis (world) and cosine of the half-angle, with [`SLACK_RAD`], of a cone of directions outside of which its radiance
+    /// field is zero; cosine -2 where it shines all round.
+    pub facing: [f32; 4],
+    /// Largest radiance that it shines with, of any colour.
+    pub radiance: f32,
+    /// The entity.
+    pub entity: u32,
+    /// 1 where it shines through a radiance field of three channels, else 0.
+    pub coloured: u32,
+    /// Not in use.
+    pub spare: u32,
 }
 
 /// What the lists are made from at one moment.
 pub struct Moment {
     /// All entities.
     pub bodies: Vec<Body>,
+    /// Their bounding spheres: centre in the world and radius, metres.
+    pub spheres: Vec<[f32; 4]>,
     /// Those that occlude.
     pub tree: Tree,
     /// Indices of those that occlude.
     pub occluders: Vec<u32>,
-    /// Indices of those that shine.
-    pub lights: Vec<u32>,
+    /// Those that shine, in the order of entities.
+    pub lamps: Vec<Lamp>,
     /// Largest radiance of distant light, if there is any.
-    pub sky: Option<f64>,
+    pub sky: Option<f32>,
+    /// Radiance of the brightest light, distant or not.
+    pub brightest: f32,
     /// What is left off.
     pub skip: Skip,
     /// Radiance below which a contribution is left off; 0 leaves nothing off.
-    pub eps: f64,
+    pub eps: f32,
 }
 
 impl Moment {
     /// Sorts `bodies` for the lists.
     pub fn new(bodies: Vec<Body>, sky: Option<f64>, skip: Skip, eps: f64) -> Self {
-        let having = |switch: &dyn Fn(&Body) -> bool| -> Vec<u32> {
-            (0..bodies.len()).filter(|&j| switch(&bodies[j])).map(|j| j as u32).collect()
-        };
-        let (occluders, lights) = (having(&|b| b.occludes), having(&|b| b.emits));
-        let tree = Tree::new(occluders.iter().map(|&j| {
-            let body = &bodies[j as usize];
-            (j as usize, body.centre, body.radius_m)
-        }));
-        Moment { tree, occluders, lights, sky, skip, eps, bodies }
+        let sphere = |body: &Body| body.centre.as_vec3().extend(body.radius_m as f32).to_array();
+        let spheres: Vec<[f32; 4]> = bodies.iter().map(sphere).collect();
+        let occluders: Vec<u32> = (0..bodies.len()).filter(|&j| bodies[j].occludes).map(|j| j as u32).collect();
+        let lamps = bodies.iter().enumerate().filter(|(_, body)| body.emits).map(|(j, body)| Lamp {
+            facing: body.facing.map_or([0.0, 0.0, 0.0, -2.0], |(axis, half_angle)| {
+                axis.as_vec3().extend((half_angle + SLACK_RAD).min(PI).cos() as f32).to_array()
+            }),
+            radiance: body.radiance as f32,
+            entity: j as u32,
+            coloured: u32::from(body.coloured),
+            spare: 0,
+        });
+        let lamps: Vec<Lamp> = lamps.collect();
+        let sky = sky.map(|sky| sky as f32);
+        let brightest = lamps.iter().map(|lamp| lamp.radiance).fold(sky.unwrap_or(0.0), f32::max);
+        let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));
+        Moment { tree, occluders, lamps, sky, brightest, skip, eps: eps as f32, spheres, bodies }
     }
 
     /// Whether lists of the other moment hold here too where no body has changed.
     pub fn is_like(&self, other: &Moment) -> bool {
         self.bodies.len() == other.bodies.len() && (self.sky, self.skip, self.eps) == (other.sky, other.skip, other.eps)
+    }
+
+    /// The key by which the occluders of a receiver are ordered, near to far from the centre of its bounding sphere: products
+    /// truncated in another order differ (by up to .006 over twelve occluders), which would show as seams, so there is one order
+    /// for a whole receiver. Equal distances go by index.
+    pub fn order(&self, receiver: u32, occluder: u32) -> (u32, u32) {
+        let ([x, y, z, _], [cx, cy, cz, _]) = (self.spheres[occluder as usize], self.spheres[receiver as usize]);
+        let to = [x - cx, y - cy, z - cz];
+        // Of what is not negative, more is more in bits too.
+        (dot(to, to).to_bits(), occluder)
     }
 }
 

@@ -1,7 +1,7 @@
 //! A tree of spheres over the bodies of a scene, so that a group of clusters finds those that matter to it without looking at
 //! the rest.
 
-use glam::DVec3;
+use glam::Vec3;
 use std::ops::Range;
 
 /// Bodies in a leaf: below this, looking at each costs less than another level.
@@ -11,11 +11,29 @@ const LEAF_BODIES: usize = 4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crowd {
     /// World, metres.
-    pub centre: DVec3,
+    pub centre: [f32; 3],
     /// Metres.
-    pub reach_m: f64,
+    pub reach_m: f32,
     /// Largest bounding radius, metres.
-    pub radius_m: f64,
+    pub radius_m: f32,
+}
+
+impl Crowd {
+    /// Around spheres: centre and radius.
+    pub fn around(spheres: impl Iterator<Item = [f32; 4]> + Clone) -> Self {
+        let places = spheres.clone().map(|[x, y, z, _]| Vec3::new(x, y, z));
+        let (low, high) = places
+            .clone()
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), place| (low.min(place), high.max(place)));
+        let centre = low.midpoint(high);
+        let reach_m = places.map(|p| p.as_dvec3().distance_squared(centre.as_dvec3())).fold(0.0, f64::max).sqrt();
+        Crowd {
+            centre: centre.to_array(),
+            // Rounding must not make it smaller.
+            reach_m: (reach_m * (1.0 + 1e-6)) as f32,
+            radius_m: spheres.map(|[.., radius]| radius).fold(0.0, f32::max),
+        }
+    }
 }
 
 /// A node: what it holds, its members, and the node that follows where it is left out.
@@ -34,34 +52,37 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// A tree over the given bodies: index, centre and radius in metres.
-    pub fn new(bodies: impl Iterator<Item = (usize, DVec3, f64)>) -> Self {
-        let mut bodies: Vec<(usize, DVec3, f64)> = bodies.collect();
+    /// A tree over the given bodies: index, and sphere of centre and radius.
+    pub fn new(bodies: impl Iterator<Item = (u32, [f32; 4])>) -> Self {
+        let mut bodies: Vec<(u32, [f32; 4])> = bodies.collect();
         let mut tree = Tree::default();
         if !bodies.is_empty() {
             let count = bodies.len();
             tree.split(&mut bodies, 0..count);
         }
-        tree.members = bodies.iter().map(|body| body.0 as u32).collect();
+        tree.members = bodies.iter().map(|body| body.0).collect();
         tree
     }
 
-    fn split(&mut self, bodies: &mut [(usize, DVec3, f64)], members: Range<usize>) {
+    /// Its bodies, neighbours beside each other.
+    pub fn members(&self) -> &[u32] {
+        &self.members
+    }
+
+    fn split(&mut self, bodies: &mut [(u32, [f32; 4])], members: Range<usize>) {
         let of = &mut bodies[members.clone()];
-        let (low, high) = of
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), body| (low.min(body.1), high.max(body.1)));
-        let centre = (low + high) / 2.0;
-        let crowd = Crowd {
-            centre,
-            reach_m: of.iter().map(|body| body.1.distance(centre)).fold(0.0, f64::max),
-            radius_m: of.iter().map(|body| body.2).fold(0.0, f64::max),
-        };
+        let crowd = Crowd::around(of.iter().map(|body| body.1));
         let at = self.nodes.len();
         let leaf = of.len() <= LEAF_BODIES;
         self.nodes.push(Node { crowd, members: members.clone(), next: 0, leaf });
         if !leaf {
-            let axis = (high - low).max_position();
+            let along = |axis: usize| {
+                let (low, high) = of.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), body| {
+                    (low.min(body.1[axis]), high.max(body.1[axis]))
+                });
+                high - low
+            };
+            let axis = (0..3).max_by(|&a, &b| along(a).total_cmp(&along(b))).unwrap_or(0);
             let middle = of.len() / 2;
             of.select_nth_unstable_by(middle, |a, b| a.1[axis].total_cmp(&b.1[axis]));
             self.split(bodies, members.start..members.start + middle);
@@ -91,23 +112,25 @@ mod tests {
     fn finds_what_a_look_at_each_finds() {
         let mut rng = fastrand::Rng::with_seed(11);
         for count in [0, 1, 4, 5, 300] {
-            let point = |rng: &mut fastrand::Rng| DVec3::new(rng.f64(), rng.f64(), rng.f64());
-            let bodies: Vec<(usize, DVec3, f64)> = (0..count).map(|i| (i, point(&mut rng), 0.1 * rng.f64())).collect();
+            let point = |rng: &mut fastrand::Rng| Vec3::new(rng.f32(), rng.f32(), rng.f32());
+            let bodies: Vec<(u32, [f32; 4])> =
+                (0..count).map(|i| (i, point(&mut rng).extend(0.1 * rng.f32()).to_array())).collect();
             let tree = Tree::new(bodies.iter().copied());
             let mut visited = 0;
             for _ in 0..20 {
-                let (eye, reach) = (point(&mut rng), 0.3 * rng.f64());
-                let far = |centre: DVec3, radius: f64| centre.distance(eye) - radius > reach;
+                let (eye, reach) = (point(&mut rng), 0.3 * rng.f32());
+                let far = |[x, y, z]: [f32; 3], radius: f32| Vec3::new(x, y, z).distance(eye) - radius > reach;
                 let mut found = Vec::new();
-                tree.find(|crowd| far(crowd.centre, crowd.reach_m + crowd.radius_m), |body| found.push(body as usize));
+                tree.find(|crowd| far(crowd.centre, crowd.reach_m + crowd.radius_m), |body| found.push(body));
                 visited += found.len();
-                for (index, centre, radius) in &bodies {
-                    assert!(far(*centre, *radius) || found.contains(index), "{index} of {count}");
+                for (index, [x, y, z, radius]) in &bodies {
+                    // Less a little, for rounding.
+                    assert!(far([*x, *y, *z], *radius - 1e-5) || found.contains(index), "{index} of {count}");
                 }
                 found.sort_unstable();
                 assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "found twice");
             }
-            assert!(count < 300 || visited < 20 * count / 2, "the tree leaves nothing out: {visited}");
+            assert!(count < 300 || visited < 20 * count as usize / 2, "the tree leaves nothing out: {visited}");
         }
     }
 }

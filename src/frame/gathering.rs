@@ -1,0 +1,153 @@
+//! The buffers of the gather on the device, and what becomes of lists that do not fit: nothing is merged by half a list, and the
+//! next frame merges again with more room, or with lists that the host makes.
+
+use super::lists::{Dirty, Lists};
+use crate::error::Result;
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, FLIGHTS, Upload};
+use crate::render::gather::{FOUND, Gather, Inputs, Packed, Report};
+use crate::shaders::Library;
+use std::sync::Arc;
+
+/// Steps that a list has room for at first, unless it cannot become as long.
+const FIRST_CAPACITY: u64 = 64;
+/// Bytes of all lists: beyond this the host makes them, one behind the other.
+const MOST_BYTES: u64 = 1 << 28;
+
+/// Everything that the pass needs from frame to frame.
+pub(super) struct Gathering {
+    device: Arc<Device>,
+    pass: Gather,
+    bounds: Buffer,
+    bodies: Upload,
+    groups: Upload,
+    report: Upload,
+    /// Steps of all clusters.
+    steps: Buffer,
+    /// Steps that every list has room for.
+    capacity: u64,
+    /// A group found more than there is room for: the host makes the lists from now on.
+    refused: bool,
+    /// What the frame in preparation gathers.
+    packed: Option<(Packed, u32, u32)>,
+    /// Frames that were prepared, and in which of them each report was begun.
+    frames: u64,
+    begun: [Option<u64>; FLIGHTS],
+}
+
+impl Gathering {
+    /// For all clusters of a scene.
+    ///
+    /// # Errors
+    /// As [`Gather::new`] and [`Buffer::new`].
+    pub fn new(device: &Arc<Device>, library: &Library, lists: &Lists) -> Result<Self> {
+        let upload = |name: &str, bytes: u64| Upload::new(device, name, bytes);
+        Ok(Gathering {
+            device: device.clone(),
+            pass: Gather::new(device, library, device.info.is_software())?,
+            bounds: Buffer::with_data(device, "bounds", &lists.all_bounds())?,
+            bodies: upload("bodies", 16)?,
+            groups: upload("groups", 16)?,
+            report: upload("report", size_of::<Report>() as u64)?,
+            steps: Buffer::new(device, "lists", BufferKind::Device, 4)?,
+            capacity: FIRST_CAPACITY,
+            refused: false,
+            packed: None,
+            frames: 0,
+            begun: [None; FLIGHTS],
+        })
+    }
+
+    /// Prepares to gather for clusters at the last update's moment, and returns them; `None` where the host has to.
+    ///
+    /// # Errors
+    /// As [`Buffer::new`].
+    pub fn prepare(&mut self, lists: &Lists, dirty: &[Dirty]) -> Result<Option<Vec<crate::layout::Cluster>>> {
+        self.packed = None;
+        if self.refused {
+            return Ok(None);
+        }
+        let packed = Packed::new(&lists.now().moment);
+        let (clusters, groups) = lists.groups(dirty);
+        let capacity = self.capacity.min(packed.longest()).max(1);
+        let bytes = 4 * capacity * clusters.len() as u64;
+        if bytes > MOST_BYTES.min(self.device.limits.max_storage_buffer_range.into()) {
+            log::info!("lists on the device would take {bytes} bytes; the host makes them");
+            self.refused = true;
+            return Ok(None);
+        }
+        if bytes > self.steps.size_bytes {
+            self.steps = Buffer::new(&self.device, "lists", BufferKind::Device, bytes)?;
+        }
+        self.bodies.write(&packed.quads)?;
+        self.groups.write(&groups)?;
+        self.report.write(&[Report::default()])?;
+        self.begun[self.report.place()] = Some(self.frames);
+        self.packed = Some((packed, capacity as u32, groups.len() as u32));
+        Ok(Some(clusters))
+    }
+
+    /// The steps, where the frame in preparation gathers.
+    pub fn steps(&self) -> Option<&Buffer> {
+        self.packed.as_ref().map(|_| &self.steps)
+    }
+
+    /// Records the pass, if the frame gathers, and makes its lists known to the merge.
+    ///
+    /// # Errors
+    /// As [`Gather::record`].
+    pub fn record<'f>(&'f self, commands: &mut Commands<'f>, entities: &'f Buffer, clusters: &'f Buffer) -> Result<()> {
+        let Some((packed, capacity, group_count)) = &self.packed else { return Ok(()) };
+        let inputs = Inputs {
+            bodies: &self.bodies,
+            entities,
+            bounds: &self.bounds,
+            groups: &self.groups,
+            clusters,
+            steps: &self.steps,
+            report: &self.report,
+        };
+        commands.pass("gather", |c| self.pass.record(c, &inputs, packed, *capacity, *group_count))?;
+        commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+        commands.barrier(Access::ComputeWrite, Access::HostRead);
+        Ok(())
+    }
+
+    /// Goes on to the next frame of a window: what the flight before the last one reported, if it gathered. It has ended.
+    pub fn next_frame(&mut self) -> Option<Report> {
+        self.frames += 1;
+        let ended = |begun: &Option<u64>| begun.is_some_and(|frame| frame + FLIGHTS as u64 <= self.frames);
+        let place = self.begun.iter().position(ended)?;
+        self.begun[place] = None;
+        Some(self.report.at(place).peek(0, 1)[0])
+    }
+
+    /// What the last frame reported, if it gathered; everything that was submitted has ended.
+    pub fn report(&mut self) -> Option<Report> {
+        self.packed.as_ref()?;
+        self.begun = [None; FLIGHTS];
+        Some(self.report.read(0, 1)[0])
+    }
+
+    /// Whether lists were lost, after making room for them.
+    pub fn lost(&mut self, report: &Report) -> bool {
+        if report.most_found as usize > FOUND {
+            log::info!(
+                "{} occluders near one place are more than a group has room for; the host makes the lists",
+                report.most_found
+            );
+            self.refused = true;
+        }
+        let longest = u64::from(report.longest);
+        let short = longest > self.capacity;
+        if short {
+            self.capacity = longest + longest / 4;
+        }
+        short || self.refused
+    }
+
+    /// Bytes on the device.
+    pub fn size_bytes(&self) -> u64 {
+        let uploads = self.bodies.all_bytes() + self.groups.all_bytes() + self.report.all_bytes();
+        self.bounds.size_bytes + self.steps.size_bytes + uploads
+    }
+}

@@ -1,0 +1,294 @@
+//! Lists of clusters: those made through a tree are those of a look at everything, and those of the device are those of the host
+//! to the bit; what does not fit is said and never merged by half.
+
+mod common;
+#[path = "common/stage.rs"]
+mod stage;
+
+use common::report;
+use glam::{DQuat, DVec3};
+use shadow_fields::frame::Options;
+use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands};
+use shadow_fields::layout::{Cluster, Entity, Step};
+use shadow_fields::render::gather::{
+    self, Body, Bounds, Chains, FOUND, GROUP_CLUSTERS, Gather, Group, Inputs, Moment, Packed, Place, Report, Scope,
+};
+use shadow_fields::render::variant::Skip;
+use shadow_fields::sh::rotation::turns;
+use stage::{Stage, scene, small, stage};
+use std::fmt::Write;
+
+fn random_direction(rng: &mut fastrand::Rng) -> DVec3 {
+    loop {
+        let p = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5);
+        if (1e-3..0.25).contains(&p.length_squared()) {
+            return p.normalize();
+        }
+    }
+}
+
+/// A receiver among many things, with clusters of its own.
+struct Crowded {
+    moment: Moment,
+    receiver: u32,
+    entity: Entity,
+    clusters: Vec<Bounds>,
+}
+
+/// Near and far, with and without a sky, lights and each skip; every other round at a corner of the world.
+fn crowded(rng: &mut fastrand::Rng, round: usize, count: usize) -> Crowded {
+    let spread_m = if round.is_multiple_of(2) { 60.0 } else { 8.0 };
+    let corner = if round % 3 == 2 { DVec3::new(4e3, -7e3, 1e4) } else { DVec3::ZERO };
+    let bodies: Vec<Body> = (0..count)
+        .map(|i| Body {
+            centre: corner + DVec3::new(rng.f64() - 0.5, 0.1 * rng.f64(), rng.f64() - 0.5) * spread_m,
+            radius_m: 0.1 + 0.4 * rng.f64(),
+            occludes: i % 5 != 0,
+            emits: i % 25 == 0,
+            coloured: i % 50 == 0,
+            radiance: 3.0 * rng.f64(),
+            facing: (i % 50 == 25).then(|| (random_direction(rng), 1.8)),
+        })
+        .collect();
+    let receiver = rng.u32(0..count as u32);
+    let rotation = DQuat::from_axis_angle(random_direction(rng), 6.0 * rng.f64());
+    let turns = turns(rotation).map(|x| x as f32);
+    let body = bodies[receiver as usize];
+    let entity = Entity {
+        centre: body.centre.as_vec3().extend(1.0 / body.radius_m as f32).to_array(),
+        alpha_beta: [turns[0], turns[1], turns[2], turns[3]],
+        gamma: [turns[4], turns[5]],
+        emission: [0.0, 0.0, 0.0, 0.3 + 0.7 * rng.f32()],
+        albedo: [0.0, 0.0, 0.0, 0.5 + rng.f32()],
+        ..Default::default()
+    };
+    let skips = [Skip::ALL, Skip::NONE, Skip::without("cones"), Skip::without("behind"), Skip::without("horizon")];
+    let eps = if round % 6 == 5 { 0.0 } else { 10_f64.powf(-1.5 - 2.5 * rng.f64()) };
+    let moment = Moment::new(bodies, (round % 4 != 3).then_some(1.2), skips[round % skips.len()], eps);
+    let facing = random_direction(rng);
+    let clusters = (0..GROUP_CLUSTERS)
+        .map(|_| {
+            let centre = 2.0 * random_direction(rng) * rng.f64();
+            let axis = (facing + 0.5 * random_direction(rng)).normalize();
+            Bounds::from_parts(centre, 0.3 * rng.f64(), axis, 0.4 * rng.f64())
+        })
+        .collect();
+    Crowded { moment, receiver, entity, clusters }
+}
+
+impl Crowded {
+    /// Lists by a look at everything.
+    fn expected(&self) -> Vec<Vec<u32>> {
+        let everything = Chains::all(&self.moment, self.receiver);
+        let of = |bounds| {
+            let mut steps = Vec::new();
+            gather::reference(&self.moment, &self.entity, bounds, &everything, &mut steps);
+            steps
+        };
+        self.clusters.iter().map(of).collect()
+    }
+
+    /// Lists by the device, each with its cluster, and its report.
+    fn on_device(&self, stage: &Stage, texel: bool, capacity: u32) -> (Vec<(Cluster, Vec<u32>)>, Report) {
+        let device = &stage.gpu.device;
+        let count = self.clusters.len() as u32;
+        let mut bounds = self.clusters.clone();
+        bounds.push(Bounds::union(&self.clusters));
+        let cluster = |i: u32| Cluster { receiver: self.receiver, vertex_count: 64, bounds: i, ..Default::default() };
+        let mut entities = vec![Entity::default(); self.moment.spheres.len()];
+        entities[self.receiver as usize] = self.entity;
+        let packed = Packed::new(&self.moment);
+        let bodies = Buffer::with_data(device, "bodies", &packed.quads).unwrap();
+        let entities = Buffer::with_data(device, "entities", &entities).unwrap();
+        let bounds = Buffer::with_data(device, "bounds", &bounds).unwrap();
+        // Two groups, the second of one cluster that is bounded by itself.
+        let groups = [
+            Group { first: 0, count: count - 1, bounds: count, spare: 0 },
+            Group { first: count - 1, count: 1, bounds: count - 1, spare: 0 },
+        ];
+        let groups = Buffer::with_data(device, "groups", &groups).unwrap();
+        let clusters: Vec<Cluster> = (0..count).map(cluster).collect();
+        let clusters = Buffer::with_data(device, "clusters", &clusters).unwrap();
+        let steps = Buffer::new(device, "steps", BufferKind::Device, 4 * u64::from(count * capacity)).unwrap();
+        let told = Buffer::with_data(device, "report", &[Report::default()]).unwrap();
+        let pass = Gather::new(device, &stage.gpu.library, texel).unwrap();
+        let inputs = Inputs {
+            bodies: &bodies,
+            entities: &entities,
+            bounds: &bounds,
+            groups: &groups,
+            clusters: &clusters,
+            steps: &steps,
+            report: &told,
+        };
+        let mut commands = Commands::new(device, "gather").unwrap();
+        commands.pass("gather", |c| pass.record(c, &inputs, &packed, capacity, 2)).unwrap();
+        commands.barrier(Access::ComputeWrite, Access::TransferRead);
+        commands.submit().unwrap();
+        let clusters: Vec<Cluster> = clusters.download(count as usize).unwrap();
+        let steps: Vec<u32> = steps.download((count * capacity) as usize).unwrap();
+        let list = |cluster: &Cluster| steps[cluster.step_first as usize..][..cluster.step_count as usize].to_vec();
+        (clusters.iter().map(|cluster| (*cluster, list(cluster))).collect(), told.download(1).unwrap()[0])
+    }
+}
+
+#[test]
+fn the_tree_leaves_every_list_as_it_is() {
+    let mut rng = fastrand::Rng::with_seed(21);
+    let (mut listed, mut offered, mut all) = (0, 0, 0);
+    for round in 0..60 {
+        let crowded = crowded(&mut rng, round, 200);
+        let Crowded { moment, receiver, entity, clusters } = &crowded;
+        let group = Chains::of_group(moment, *receiver, entity, &Bounds::union(clusters));
+        offered += group.occluder_count();
+        all += Chains::all(moment, *receiver).occluder_count();
+        for (bounds, expected) in clusters.iter().zip(crowded.expected()) {
+            let mut found = Vec::new();
+            gather::reference(moment, entity, bounds, &group, &mut found);
+            assert_eq!(found, expected, "round {round}");
+            listed += expected.len();
+            let counts = gather::counts(moment, *receiver, entity, bounds);
+            let left =
+                counts.below_horizon + counts.behind_light + counts.apart + counts.facing_away + counts.below_eps;
+            assert_eq!(left + expected.len() as u64, counts.considered, "every lookup is listed or has a reason");
+            let scope = Scope::new(moment, entity, bounds);
+            for (j, body) in moment.bodies.iter().enumerate().filter(|(j, _)| *j != *receiver as usize) {
+                let on = expected.iter().any(|&step| Step::entities(step)[0] as usize == j);
+                assert_eq!(scope.lists(j as u32, body, *receiver), on, "round {round}, entity {j}");
+                assert!(!on || scope.may_list(body, moment.spheres[j]), "round {round}, entity {j}");
+            }
+        }
+    }
+    report(&format!("{listed} steps; the tree offers {offered} of {all} occluders to groups"));
+    assert!(listed > 10_000 && 2 * offered < all, "the tree is of use: {offered} of {all}");
+}
+
+#[test]
+fn the_device_makes_the_lists_of_its_twin() {
+    let Some(stage) = stage() else { return };
+    let mut rng = fastrand::Rng::with_seed(4);
+    for round in 0..40 {
+        // Few, several blocks, and a block that is not full.
+        let crowded = crowded(&mut rng, round, [30, 200, 700][round % 3]);
+        let expected = crowded.expected();
+        let (lists, said) =
+            crowded.on_device(&stage, round.is_multiple_of(2), Packed::new(&crowded.moment).longest() as u32);
+        for (i, ((cluster, found), expected)) in lists.iter().zip(&expected).enumerate() {
+            assert!(found == expected, "round {round}, cluster {i}: {} steps for {}", found.len(), expected.len());
+            assert_eq!(cluster.vertex_count, 64);
+        }
+        let longest = expected.iter().map(Vec::len).max().unwrap();
+        let steps: usize = expected.iter().map(Vec::len).sum();
+        assert_eq!((said.longest as usize, said.step_total as usize), (longest, steps), "round {round}");
+    }
+}
+
+/// Too little room for a list, and more occluders than a group can find: both are told, and the clusters lose their vertices.
+#[test]
+fn what_does_not_fit_is_told() {
+    let Some(stage) = stage() else { return };
+    let mut rng = fastrand::Rng::with_seed(9);
+    let some = crowded(&mut rng, 0, 200);
+    let expected = some.expected();
+    let longest = expected.iter().map(Vec::len).max().unwrap();
+    let room = longest as u32 / 2;
+    let (lists, said) = some.on_device(&stage, true, room);
+    assert_eq!(said.longest as usize, longest);
+    for ((cluster, found), expected) in lists.iter().zip(&expected) {
+        assert_eq!(cluster.vertex_count == 0, expected.len() > room as usize);
+        assert_eq!(found[..], expected[..expected.len().min(room as usize)]);
+    }
+    // Round 5 has no threshold: all 1 600 that occlude are found.
+    let many = crowded(&mut rng, 5, 2000);
+    let (lists, said) = many.on_device(&stage, true, 100);
+    assert!(said.most_found as usize > FOUND, "{said:?}");
+    assert!(lists.iter().all(|(cluster, _)| cluster.vertex_count == 0));
+}
+
+/// A town of balls in which everything is lit.
+fn town(edge: usize) -> shadow_fields::scene::Scene {
+    let mut text = "environment = { uniform = [0.4, 0.5, 0.6] }\n\
+        [[mesh]]\nname = \"floor\"\nplane = { size_m = 16, cells = 31 }\n\
+        [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.3, subdivisions = 1 }\n[[entity]]\nmesh = \"floor\"\n"
+        .to_owned();
+    for i in 0..edge * edge {
+        let at = |k: usize| k as f32 * 1.2 - 0.6 * edge as f32;
+        let light = if i % 13 == 6 { "emission = [4, 5, 6]\nscale = 0.3" } else { "" };
+        let _ = writeln!(
+            text,
+            "[[entity]]\nmesh = \"ball\"\nposition = [{}, 0.5, {}]\n{light}",
+            at(i % edge),
+            at(i / edge)
+        );
+    }
+    scene(&text)
+}
+
+/// Whole frames by both, moving and at rest: the same light to the bit, the same clusters merged, the same steps. Lists of more
+/// than 64 steps need a second try, which nobody sees.
+#[test]
+fn frames_are_the_same_by_either() {
+    let Some(stage) = stage() else { return };
+    for (edge, eps) in [(4, 1e-3), (10, 0.0)] {
+        let scene = town(edge);
+        let options = Options { eps, ..small() };
+        let mut by_host = stage.frame(&scene, Options { lists: Some(Place::Host), ..options });
+        let mut by_device = stage.frame(&scene, Options { lists: Some(Place::Device), ..options });
+        let mut placements = scene.at(0.0);
+        for round in 0..4 {
+            if round > 0 {
+                placements[3 * round].position.x += 0.3;
+            }
+            let passes = by_device.render(&placements, None).unwrap();
+            assert!(passes.iter().any(|pass| pass.pass == "gather"), "{passes:?}");
+            let expected = stage.light(&mut by_host, &placements);
+            let found: Vec<_> = (0..placements.len()).map(|entity| by_device.radiosity(entity).unwrap()).collect();
+            assert!(found == expected, "eps {eps}, round {round}");
+            assert!(by_device.merged.merged_steps > 0);
+            assert_eq!(by_device.merged, by_host.merged, "eps {eps}, round {round}");
+            assert!(by_device.render(&placements, None).unwrap().is_empty(), "at rest nothing is gathered");
+        }
+        report(&format!("{:?}", by_host.merged));
+    }
+}
+
+/// More occluders near one another than the device finds room for: the host makes the lists, with the same light.
+#[test]
+fn a_crowd_goes_to_the_host() {
+    let Some(stage) = stage() else { return };
+    let scene = town(34);
+    let options = Options { eps: 0.0, ..small() };
+    // Lit is one ball alone.
+    let mut alone = scene.clone();
+    alone.entities.iter_mut().enumerate().for_each(|(i, entity)| entity.receives = i == 100);
+    let mut by_host = stage.frame(&alone, Options { lists: Some(Place::Host), ..options });
+    let mut by_device = stage.frame(&alone, Options { lists: Some(Place::Device), ..options });
+    let placements = alone.at(0.0);
+    by_device.render(&placements, None).unwrap();
+    by_host.render(&placements, None).unwrap();
+    assert_eq!(by_device.radiosity(100).unwrap(), by_host.radiosity(100).unwrap());
+    assert_eq!(by_device.merged, by_host.merged);
+}
+
+/// Every sum and product of the pass is rounded by itself: a compiler that contracted some would come to other lists.
+#[test]
+fn nothing_is_contracted() {
+    use rspirv::spirv::{Decoration, Op};
+    for texel in [false, true] {
+        let shader = common::library().shader(&Gather::row(texel)).unwrap();
+        let module = rspirv::dr::load_words(&shader.spirv).unwrap();
+        let exact: std::collections::HashSet<u32> = module
+            .annotations
+            .iter()
+            .filter(|i| i.operands.contains(&rspirv::dr::Operand::Decoration(Decoration::NoContraction)))
+            .map(|i| i.operands[0].unwrap_id_ref())
+            .collect();
+        let arithmetic =
+            [Op::FAdd, Op::FSub, Op::FMul, Op::VectorTimesScalar, Op::Dot, Op::FDiv, Op::FMod, Op::MatrixTimesVector];
+        let found: Vec<_> = module.all_inst_iter().filter(|i| arithmetic.contains(&i.class.opcode)).collect();
+        assert!(found.len() > 100, "{} operations", found.len());
+        let loose: Vec<_> = found.iter().filter(|i| !exact.contains(&i.result_id.unwrap())).collect();
+        assert!(loose.is_empty(), "{} of {}: {loose:?}", loose.len(), found.len());
+        assert!(!found.iter().any(|i| matches!(i.class.opcode, Op::FDiv | Op::Dot)), "by sums and products alone");
+    }
+}

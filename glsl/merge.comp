@@ -2,7 +2,7 @@
 #extension GL_EXT_control_flow_attributes : require
 // Light on receivers, a cluster of neighbouring vertices a workgroup. Every chain begins with the vertex's transfer, is
 // multiplied by the visibility past the occluders that lie before its light, and meets the light; the sky's chain comes last.
-// The host lists these steps for each cluster, so that all its vertices walk one list and only what concerns one of them is on
+// Step "gather" lists these steps for each cluster, so that all its vertices walk one list and only what concerns one of them is on
 // it; what a step does to a single vertex (order, overlap, horizon) is decided here.
 #include "merge_layout.glsl"
 #include "generated/basis.glsl"

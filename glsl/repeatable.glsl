@@ -42,7 +42,8 @@ precise vec2 angle_of_cosine(float cosine) {
 precise vec2 plus(vec2 a, vec2 b) {
     precise float sine = a.y * b.x + a.x * b.y;
     precise float cosine = a.x * b.x - a.y * b.y;
-    return sine < 0.0 ? vec2(-1.0, 0.0) : vec2(cosine, sine);
+    precise float both = a.x + b.x; // 2 cos((a + b) / 2) cos((a - b) / 2)
+    return both < 0.0 ? vec2(-1.0, 0.0) : vec2(cosine, max(sine, 0.0));
 }
 
 precise float cosine_less(vec2 a, vec2 b) {

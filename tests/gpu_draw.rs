@@ -102,6 +102,25 @@ fn nearer_hides_farther() {
     assert!(behind.iter().flatten().all(|c| *c == 0.0), "what is behind the camera is not seen");
 }
 
+/// A picture that several render passes make is the one of a single pass, with samples and without.
+#[test]
+fn batches_change_nothing() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("", &[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
+    let placements = [at(-0.3, 0.0, 0.0), at(0.3, 0.2, 0.5)];
+    for multisample in [false, true] {
+        let mut frame = stage.frame(&scene, options(multisample));
+        frame.render(&placements, Some(1.0)).unwrap();
+        let whole = frame.picture();
+        assert!(whole.iter().any(|c| *c > 0.5));
+        for triangles in [1000, 37] {
+            frame.set_batch(triangles);
+            frame.render(&placements, Some(1.0)).unwrap();
+            assert!(frame.picture() == whole, "batches of {triangles}, multisampled: {multisample}");
+        }
+    }
+}
+
 #[test]
 fn background_is_the_mean_of_the_sky() {
     let Some(stage) = stage() else { return };

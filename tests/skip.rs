@@ -124,7 +124,7 @@ fn exact_skips_change_nothing() {
     let mut all = stage.frame(&scene, small());
     let expected = stage.light(&mut all, &placements);
     let steps = all.merged.merged_steps;
-    for name in ["behind", "facing", "empty", "unmoved"] {
+    for name in ["behind", "facing", "empty", "unseen", "unmoved"] {
         let mut frame = stage.frame(&scene, Options { skip: Skip::without(name), ..small() });
         assert_eq!(stage.light(&mut frame, &placements), expected, "without {name}");
         let counts = all.counts(&placements);
@@ -170,6 +170,29 @@ fn a_light_that_faces_away_is_left_off() {
     let mut with = stage.frame(&scene, options);
     let light = stage.light(&mut with, &placements);
     assert!(light.iter().flatten().flatten().all(|c| *c == 0.0) && with.merged.merged_steps == 0);
+    assert_eq!(with.counts(&placements).empty, 1);
+    let mut without = stage.frame(&scene, Options { skip: Skip::without("empty"), ..options });
+    assert_eq!(stage.light(&mut without, &placements), light);
+    assert!(without.merged.merged_steps > 0 && without.counts(&placements).empty == 0);
+}
+
+/// The one ball that is lit shadows nothing but itself: its field is not baked, and its light is the same as if it were.
+#[test]
+fn what_no_receiver_sees_is_not_baked() {
+    let Some(stage) = stage() else { return };
+    let scene = scene(
+        "environment = { uniform = [0.4, 0.5, 0.6] }\n\
+         [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.3, subdivisions = 2 }\n\
+         [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.3, minor_m = 0.1, segments = 12, sides = 6 }\n\
+         [[entity]]\nmesh = \"ball\"\n[[entity]]\nmesh = \"ring\"\nposition = [0, 0.5, 0]\nreceives = false\n",
+    );
+    let placements = scene.at(0.0);
+    let mut with = stage.frame(&scene, small());
+    let mut without = stage.frame(&scene, Options { skip: Skip::without("unseen"), ..small() });
+    assert_eq!(stage.light(&mut with, &placements), stage.light(&mut without, &placements));
+    let counts = [with.counts(&placements).unseen, without.counts(&placements).unseen];
+    assert_eq!(counts, [1, 0]);
+    assert_eq!(2 * with.memory().fields, without.memory().fields, "one field of two alike is baked");
 }
 
 /// One cluster in a wide town: what rays say that the dropped occluders and lights took and brought is within the bound, and

@@ -97,8 +97,8 @@ pub struct MergeArguments {
     /// Samples that a lookup takes
     #[arg(long, default_value = "trilinear", value_name = "nearest|radial|trilinear")]
     pub lookup: Lookup,
-    /// Work to leave out: all, none, or a list of horizon, cones, behind, facing, empty, unmoved. Horizon and cones leave out
-    /// what true visibility makes zero, which is nearer to ray casting than the stored bands are: pictures differ a little
+    /// Work to leave out: all, none, or a list of horizon, cones, behind, facing, empty, unseen, unmoved. Horizon and cones leave
+    /// out what true visibility makes zero, which is nearer to ray casting than the stored bands are: pictures differ a little
     /// from those of none. The others change nothing
     #[arg(long, default_value = "all", value_name = "all|none|LIST")]
     pub skip: Skip,

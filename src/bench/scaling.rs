@@ -177,6 +177,8 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<Point> {
     let lists_ms = axis.starts_with("entities").then(|| lists(bench, &scene, &|round| everything(round as f64)));
     let lists_ms = lists_ms.transpose()?;
     let merge_ms = spread(&merges);
+    // Before rays are cast, which takes memory of its own.
+    let resident_bytes = resident_bytes();
     (bench.progress)(&format!("{axis}: {vertices} vertices, {} entities measured", scene.entities.len()));
     Ok(Point {
         axis,
@@ -195,7 +197,7 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<Point> {
         error: error(bench, &mut frame, &placements)?,
         memory_bytes: frame.memory(),
         device_bytes: frame.memory().device(),
-        resident_bytes: resident_bytes(),
+        resident_bytes,
     })
 }
 

@@ -224,6 +224,11 @@ impl Frame {
         outcome
     }
 
+    /// Draws at most so many triangles in one render pass from now on, see [`Draw::batch_triangles`]; a multiple of one at least.
+    pub fn set_batch(&mut self, triangles: u32) {
+        self.draw.batch_triangles = triangles.max(1);
+    }
+
     /// What its merge was compiled for.
     pub fn form(&self) -> Form {
         self.form

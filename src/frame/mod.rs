@@ -6,6 +6,7 @@
 
 pub mod camera;
 mod draw_twin;
+mod fits;
 mod form;
 mod gathering;
 pub mod lists;
@@ -26,7 +27,7 @@ use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing, Upload, V
 use crate::layout;
 use crate::render::calibrate;
 use crate::render::draw::{Draw, Finish, Item};
-use crate::render::gather::{Counts, Place};
+use crate::render::gather::Place;
 use crate::render::merge::{Inputs, Merge, Readable};
 use crate::render::variant::{Chain, Form, Skip, Variant, uniform_entities};
 use crate::scene::{Placement, Scene};
@@ -38,7 +39,6 @@ use gathering::Gathering;
 use glam::{DMat4, DVec3, Vec3};
 use half::f16;
 use lists::{Lists, Merged};
-use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use store::{Progress, Store};
@@ -113,7 +113,7 @@ impl Frame {
     pub fn new(baker: &Baker, cache: &Cache, scene: &Scene, options: Options, progress: Progress<'_>) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
         options.chain.product.check(options.bake.bands, options.bake.occlusion_bands())?;
-        let store = Store::new(baker, cache, scene, &options.bake, progress)?;
+        let store = Store::new(baker, cache, scene, &options.bake, options.skip, progress)?;
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
         let (form, image) =
             usable(device, &store, scene.entities.len(), form(&options, wanted, uniform_entities(device)))?;
@@ -130,8 +130,8 @@ impl Frame {
             radiosity_size += 16 * geometry.vertices.len() as u64;
         }
         let merge = Merge::new(device, library, form)?;
-        let gathers =
-            options.lists.unwrap_or_else(|| Place::quicker(device, scene.entities.len())) == Place::Device && !lists.clusters.is_empty();
+        let gathers = options.lists.unwrap_or_else(|| Place::quicker(device, scene.entities.len())) == Place::Device
+            && !lists.clusters.is_empty();
         let gathering = gathers.then(|| Gathering::new(device, library, &lists)).transpose()?;
         let draw = Draw::new(device, library, options.size, options.multisample, Finish::Linear)?;
         let count = scene.entities.len().max(entity_limit as usize) as u64;
@@ -339,17 +339,6 @@ impl Frame {
     /// Vertices that are lit.
     pub fn receiver_vertex_count(&self) -> usize {
         self.lists.clusters.iter().map(|cluster| cluster.vertex_count as usize).sum()
-    }
-
-    /// What the lists of all clusters leave off at this moment, and why, and a bound of the light in it: by looking at every
-    /// cluster and entity, which no frame does.
-    pub fn counts(&self, placements: &[Placement]) -> Counts {
-        self.lists.counts(&self.state(placements))
-    }
-
-    /// Entities that stand on the list of any cluster of a receiver at this moment.
-    pub fn listed(&self, placements: &[Placement], receiver: usize) -> BTreeSet<usize> {
-        self.lists.entities_on(&self.state(placements), receiver)
     }
 
     /// Merges every cluster in the next frame, moved or not.

@@ -1,11 +1,12 @@
 //! What a scene keeps on the device from frame to frame: fields, transfer vectors, vertices, drawables. Only what its
 //! entities need is baked and uploaded.
 
+use super::fits::Needs;
 use crate::asset::mesh::Mesh;
 use crate::bake::cache::Cache;
 use crate::bake::capture::{morton, unit_positions};
 use crate::bake::{self, Baker, Report};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::field::extent::{Extent, extent};
 use crate::field::quantity::{Kind, Storage, channel_stride};
 use crate::field::{Header, ShadowField};
@@ -14,6 +15,7 @@ use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::render::draw::Drawable;
 use crate::render::gather::Bounds;
 use crate::render::shelf::Shelf;
+use crate::render::variant::Skip;
 use crate::scene::{Entity, Scene};
 use glam::{DVec3, Vec3};
 use std::ops::Range;
@@ -65,6 +67,14 @@ pub struct Geometry {
     pub radius_m: f64,
 }
 
+impl Geometry {
+    /// Whether the field that an entity casts shadows with, or shines with, is there and holds nothing but zeros.
+    pub fn is_empty(&self, emits: bool) -> bool {
+        let source = if emits && self.radiance.is_some() { &self.radiance } else { &self.blocked };
+        source.as_ref().is_some_and(|slot| slot.extent == Extent::Nothing)
+    }
+}
+
 /// What one bake cost.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Baked {
@@ -96,15 +106,19 @@ pub struct Store {
 
 /// Which fields the entities of a mesh need: none for what only receives or what nothing else can see, none for shadows where
 /// there is no light, no radiance field for a light of one colour.
-pub fn needs(scene: &Scene, mesh: usize) -> [Option<Kind>; 2] {
-    let receivers = scene.entities.iter().filter(|e| e.receives).count();
-    let seen = |e: &&Entity| receivers > usize::from(e.receives);
-    let entities = || scene.entities.iter().filter(|e| e.mesh == mesh).filter(seen);
+pub fn needs(scene: &Scene, mesh: usize, skip: Skip) -> [Option<Kind>; 2] {
+    let matters = |e: &&Entity| !skip.unseen || is_seen(scene, e);
+    let entities = || scene.entities.iter().filter(|e| e.mesh == mesh).filter(matters);
     let coloured = scene.meshes[mesh].colors.is_some();
     let light = !scene.environment.is_none() || scene.entities.iter().any(|e| e.emits);
     let blocked = entities().any(|e| (e.occludes && light) || (e.emits && !coloured));
     let radiance = coloured && entities().any(|e| e.emits);
     [blocked.then_some(Kind::Occlusion), radiance.then_some(Kind::Radiance)]
+}
+
+/// Whether anything but itself is lit, so that its shadow or light can fall on it.
+pub fn is_seen(scene: &Scene, entity: &Entity) -> bool {
+    scene.entities.iter().filter(|e| e.receives).count() > usize::from(entity.receives)
 }
 
 impl Store {
@@ -117,13 +131,14 @@ impl Store {
         cache: &Cache,
         scene: &Scene,
         options: &bake::Options,
+        skip: Skip,
         progress: Progress<'_>,
     ) -> Result<Self> {
         let device = baker.device();
         let (mut total, mut channels) = (0, 0);
         let mut slots: Vec<[Option<Slot>; 2]> = Vec::new();
         for (index, mesh) in scene.meshes.iter().enumerate() {
-            slots.push(needs(scene, index).map(|kind| {
+            slots.push(needs(scene, index, skip).map(|kind| {
                 kind.map(|kind| {
                     let header = bake::header(mesh, kind, options);
                     let bytes = total..total + header.payload_bytes();
@@ -134,12 +149,7 @@ impl Store {
                 })
             }));
         }
-        let most = u64::from(device.limits.max_storage_buffer_range);
-        if total > most {
-            return Err(Error::Input(format!(
-                "the scene's fields take {total} bytes, the device can bind {most}: use a smaller --lattice or f16 storage"
-            )));
-        }
+        Needs::of(scene, total, options.bands).check(&device.limits, device.heap_bytes())?;
         // Where bands differ, the shader reads as much of any sample as the larger kind has: at the end, past the last.
         let overrun = 8 * channel_stride(options.most_bands()) as u64;
         let mut fields = Buffer::new(
@@ -163,7 +173,10 @@ impl Store {
             slot.extent = extent(&download(&fields, slot)?);
         }
 
-        let (mut transfers, mut vertices, mut geometries) = (Vec::new(), Vec::<[f32; 4]>::new(), Vec::new());
+        // All at once: growing by halves would hold up to three times as much.
+        let quads = 2 * scene.meshes.iter().map(|mesh| mesh.positions.len()).sum::<usize>();
+        let (mut transfers, mut vertices, mut geometries) =
+            (Vec::new(), Vec::<[f32; 4]>::with_capacity(quads), Vec::new());
         for (index, (mesh, [blocked, radiance])) in scene.meshes.iter().zip(slots).enumerate() {
             let (centre, radius_m) = mesh.bounding_sphere();
             let vertex_first = vertices.len() as u32;
@@ -215,7 +228,7 @@ impl Store {
     /// Whether every field that `scene` needs is here; it has the meshes that the store was made for.
     pub fn covers(&self, scene: &Scene) -> bool {
         self.geometries.iter().enumerate().all(|(mesh, geometry)| {
-            let [blocked, radiance] = needs(scene, mesh).map(|kind| kind.is_some());
+            let [blocked, radiance] = needs(scene, mesh, Skip::ALL).map(|kind| kind.is_some());
             (geometry.blocked.is_some() || !blocked) && (geometry.radiance.is_some() || !radiance)
         })
     }
@@ -223,7 +236,7 @@ impl Store {
     /// Whether everything that `scene` needs is in the cache.
     pub fn is_cached(cache: &Cache, scene: &Scene, options: &bake::Options) -> bool {
         scene.meshes.iter().enumerate().all(|(index, mesh)| {
-            let fields = needs(scene, index).into_iter().flatten();
+            let fields = needs(scene, index, Skip::ALL).into_iter().flatten();
             let receives = scene.entities.iter().any(|e| e.mesh == index && e.receives);
             fields.map(|kind| bake::header(mesh, kind, options)).all(|header| cache.has_field(&header))
                 && (!receives || !bakes_transfer(mesh) || cache.has_transfer(mesh, options.bands, options.face_px))

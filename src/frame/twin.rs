@@ -1,4 +1,4 @@
-//! The CPU twin of a frame's merge.
+//! The CPU twin of a frame's merge, and what its lists leave off.
 
 use super::lists::State;
 use super::store::Geometry;
@@ -6,14 +6,35 @@ use super::{Frame, store};
 use crate::error::Result;
 use crate::field;
 use crate::layout::{CLUSTER_VERTICES, STEP_ENTITIES, Step};
-use crate::render::gather::{self, Chains};
+use crate::render::gather::{self, Chains, Counts};
 use crate::render::reference::{Object, Task};
-use crate::scene::{Placement, Scene};
+use crate::scene::{Entity, Placement, Scene};
 use glam::DVec3;
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
 
 impl Frame {
+    /// What the lists of all clusters leave off at this moment, and why, and a bound of the light in it: by looking at every
+    /// cluster and entity, which no frame does.
+    pub fn counts(&self, placements: &[Placement]) -> Counts {
+        let entities = || self.scene.entities.iter().filter(|entity| entity.occludes || entity.emits);
+        let empty = |entity: &&Entity| self.store.geometries[entity.mesh].is_empty(entity.emits);
+        Counts {
+            empty: if self.options.skip.empty { entities().filter(empty).count() as u64 } else { 0 },
+            unseen: if self.options.skip.unseen {
+                entities().filter(|e| !store::is_seen(&self.scene, e)).count() as u64
+            } else {
+                0
+            },
+            ..self.lists.counts(&self.state(placements))
+        }
+    }
+
+    /// Entities that stand on the list of any cluster of a receiver at this moment.
+    pub fn listed(&self, placements: &[Placement], receiver: usize) -> BTreeSet<usize> {
+        self.lists.entities_on(&self.state(placements), receiver)
+    }
+
     /// The CPU twin of the merge in f64: radiosity of every receiver's vertices, by entity. Reads the fields back.
     ///
     /// # Errors

@@ -256,6 +256,12 @@ impl Device {
         Ok(Arc::new(device))
     }
 
+    /// Size of the largest heap that is the device's own, bytes.
+    pub fn heap_bytes(&self) -> u64 {
+        let own = |heap: &&vk::MemoryHeap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
+        self.memory.memory_heaps_as_slice().iter().filter(own).map(|heap| heap.size).max().unwrap_or(u64::MAX)
+    }
+
     /// What the validation layer said since the last call.
     pub fn take_validation_messages(&self) -> Vec<String> {
         self.instance.messages.take()

@@ -33,16 +33,32 @@ impl<'r> Commands<'r> {
         target: &Target<'r>,
         record: impl FnOnce(&mut Drawing<'_, 'r>) -> Result<()>,
     ) -> Result<()> {
+        self.render_part(target, [true, true], record)
+    }
+
+    /// As [`Commands::render`] for a picture that several render passes make, with barriers between them: `ends` says whether this
+    /// is the first, which clears, and the last, which resolves.
+    ///
+    /// # Errors
+    /// What `record` returns.
+    pub fn render_part(
+        &mut self,
+        target: &Target<'r>,
+        ends: [bool; 2],
+        record: impl FnOnce(&mut Drawing<'_, 'r>) -> Result<()>,
+    ) -> Result<()> {
+        let [first, last] = ends;
+        let load = if first { vk::AttachmentLoadOp::CLEAR } else { vk::AttachmentLoadOp::LOAD };
         let pass = self.pass_name();
         let shape = target.color.shape;
         self.tracker.use_image(target.color.id, &target.color.name, Access::ColorWrite, &pass);
         let mut color = vk::RenderingAttachmentInfo::default()
             .image_view(target.color.view())
             .image_layout(Access::ColorWrite.layout())
-            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .load_op(load)
             .store_op(vk::AttachmentStoreOp::STORE)
             .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: target.clear } });
-        if let Some(resolve) = target.resolve {
+        if let Some(resolve) = target.resolve.filter(|_| last) {
             self.tracker.use_image(resolve.id, &resolve.name, Access::ColorWrite, &pass);
             color = color
                 .store_op(vk::AttachmentStoreOp::DONT_CARE)
@@ -55,8 +71,8 @@ impl<'r> Commands<'r> {
             vk::RenderingAttachmentInfo::default()
                 .image_view(depth.view())
                 .image_layout(Access::DepthWrite.layout())
-                .load_op(vk::AttachmentLoadOp::CLEAR)
-                .store_op(vk::AttachmentStoreOp::DONT_CARE)
+                .load_op(load)
+                .store_op(if last { vk::AttachmentStoreOp::DONT_CARE } else { vk::AttachmentStoreOp::STORE })
                 .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } })
         });
         let colors = [color];

@@ -162,7 +162,7 @@ impl Moment {
     }
 }
 
-/// What was considered and left off, in (cluster, chain, entity) triples, and a bound of the light in what was left off.
+/// What was considered and left off, in (cluster, chain, entity) triples unless said otherwise, and a bound of the light in what was left off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Counts {
     /// Lookups that a merge without lists would make.
@@ -177,6 +177,10 @@ pub struct Counts {
     pub facing_away: u64,
     /// Lights and occluders bounded below eps.
     pub below_eps: u64,
+    /// Entities that cast shadows or shine by a field of nothing but zeros, and are left off everywhere.
+    pub empty: u64,
+    /// Entities that cast shadows or shine where nothing but themselves is lit: their fields are not even baked.
+    pub unseen: u64,
     /// Bound of the radiosity that was left off as below eps, of the cluster where it is largest.
     pub dropped_bound: f64,
 }
@@ -189,6 +193,8 @@ impl std::ops::AddAssign for Counts {
         self.apart += other.apart;
         self.facing_away += other.facing_away;
         self.below_eps += other.below_eps;
+        self.empty += other.empty;
+        self.unseen += other.unseen;
         self.dropped_bound = self.dropped_bound.max(other.dropped_bound);
     }
 }

@@ -55,11 +55,12 @@ impl Angle {
 
     /// The sum of two.
     pub fn plus(self, other: Angle) -> Angle {
-        let sine = self.sine * other.cosine + self.cosine * other.sine;
-        if sine < 0.0 {
+        // cos a + cos b = 2 cos((a + b) / 2) cos((a - b) / 2)
+        if self.cosine + other.cosine < 0.0 {
             return Angle { cosine: -1.0, sine: 0.0 };
         }
-        Angle { cosine: self.cosine * other.cosine - self.sine * other.sine, sine }
+        let sine = self.sine * other.cosine + self.cosine * other.sine;
+        Angle { cosine: self.cosine * other.cosine - self.sine * other.sine, sine: sine.max(0.0) }
     }
 
     /// Cosine of what is left of it without `other`; 1 where nothing is left.
@@ -93,7 +94,7 @@ mod tests {
         let mut rng = fastrand::Rng::with_seed(6);
         for _ in 0..10_000 {
             let (a, b) = (PI * rng.f32(), PI * rng.f32());
-            let of = |x: f32| Angle { cosine: x.cos(), sine: x.sin() };
+            let of = |x: f32| Angle { cosine: x.cos(), sine: x.sin().max(0.0) };
             let sum = of(a).plus(of(b));
             assert!((sum.cosine - (a + b).min(PI).cos()).abs() < 1e-5, "{a} {b}");
             assert!((of(a).cosine_less(of(b)) - (a - b).max(0.0).cos()).abs() < 1e-5, "{a} {b}");

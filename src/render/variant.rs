@@ -119,18 +119,28 @@ pub struct Skip {
     pub facing: bool,
     /// Entities whose field holds nothing but zeros.
     pub empty: bool,
+    /// Entities that nothing but themselves is lit by: their fields are not baked.
+    pub unseen: bool,
     /// Clusters of vertices for which nothing has changed since they were last merged.
     pub unmoved: bool,
 }
 
 impl Skip {
     /// Every skip.
-    pub const ALL: Skip = Skip { horizon: true, cones: true, behind: true, facing: true, empty: true, unmoved: true };
+    pub const ALL: Skip =
+        Skip { horizon: true, cones: true, behind: true, facing: true, empty: true, unseen: true, unmoved: true };
     /// No skip.
-    pub const NONE: Skip =
-        Skip { horizon: false, cones: false, behind: false, facing: false, empty: false, unmoved: false };
+    pub const NONE: Skip = Skip {
+        horizon: false,
+        cones: false,
+        behind: false,
+        facing: false,
+        empty: false,
+        unseen: false,
+        unmoved: false,
+    };
     /// Names on the command line.
-    pub const NAMES: [&str; 6] = ["horizon", "cones", "behind", "facing", "empty", "unmoved"];
+    pub const NAMES: [&str; 7] = ["horizon", "cones", "behind", "facing", "empty", "unseen", "unmoved"];
 
     /// The switch of that name.
     pub fn switch(&mut self, name: &str) -> Option<&mut bool> {
@@ -140,6 +150,7 @@ impl Skip {
             "behind" => &mut self.behind,
             "facing" => &mut self.facing,
             "empty" => &mut self.empty,
+            "unseen" => &mut self.unseen,
             "unmoved" => &mut self.unmoved,
             _ => return None,
         })

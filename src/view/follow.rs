@@ -10,7 +10,7 @@ use crate::frame::{self, Frame, is_cached};
 use crate::gpu::Device;
 use crate::gpu::validation::Messages;
 use crate::render::show::Show;
-use crate::render::variant::Variant;
+use crate::render::variant::{Skip, Variant};
 
 impl Viewer {
     /// Brings the frame up to what the editor says.
@@ -64,7 +64,9 @@ impl Viewer {
             worker.report("opening the device for it", 0, 1);
             let device = Device::new(&options)?;
             let baker = Baker::new(&device, &library);
-            let store = Store::new(&baker, &cache, &scene, &bake, &|what, done, all| worker.report(what, done, all))?;
+            let store = Store::new(&baker, &cache, &scene, &bake, Skip::ALL, &|what, done, all| {
+                worker.report(what, done, all)
+            })?;
             drop((store, baker));
             Messages::into_result(device.take_validation_messages())
         }));

@@ -10,6 +10,7 @@ use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::capture::unit_positions;
 use shadow_fields::bake::inside::{inside, pushed_out};
 use shadow_fields::bake::project::{self, Projection};
+use shadow_fields::bake::surface::Surface;
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::bake::{TRANSFER_OFFSET, capture};
 use shadow_fields::field::quantity::channel_stride;
@@ -173,7 +174,9 @@ fn samples_in_the_tube_are_filled_from_outside() {
     let header = &field.header;
     let lattice = header.lattice;
     let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
-    let marks = inside(&unit_positions(&mesh), &mesh.triangles, &positions);
+    let unit = unit_positions(&mesh);
+    let surface = Surface::new(&unit, &mesh.triangles);
+    let marks = inside(&surface, &positions);
     // Closed form: in the tube where the distance from the ring's circle is below its radius, in units of 1.35.
     let from_circle = |p: DVec3| (DVec3::new(p.x, 0.0, p.z).length() - 1.0 / 1.35).hypot(p.y) * 1.35;
     for (p, mark) in positions.iter().zip(&marks) {
@@ -185,8 +188,7 @@ fn samples_in_the_tube_are_filled_from_outside() {
     assert!(count > 0 && header.filled_samples == count, "{} of {count}", header.filled_samples);
 
     // Each of them is captured just off the surface instead, outside.
-    let unit = unit_positions(&mesh);
-    let eyes = pushed_out(&unit, &mesh.triangles, &positions, &marks);
+    let eyes = pushed_out(&surface, &positions, &marks);
     let own: Vec<u32> = {
         let planes = lattice.sources();
         let find = |d: u32| planes.iter().position(|s| *s == [d]).unwrap() as u32;
@@ -343,7 +345,7 @@ fn progress_is_told_up_to_the_end() {
     let progress = |done, all| told.borrow_mut().push((done, all));
     Baker::new(&gpu.device, &gpu.library).field(&mesh, &mut header, (&store, 0), &progress).unwrap();
     let told = told.into_inner();
-    let count = header.lattice.sample_count();
+    let count = header.captured_samples;
     assert_eq!(told.last(), Some(&(count, count)));
     assert!(told.windows(2).all(|w| w[0].0 < w[1].0));
 }

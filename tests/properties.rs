@@ -147,6 +147,8 @@ fn field(lattice: Lattice, seed: u64) -> ShadowField {
         lattice,
         face_px: 8,
         filled_samples: 0,
+        captured_samples: 0,
+        symmetry: String::new(),
         growth: 0.0,
         centre_m: [0.0; 3],
         radius_m: 1.0,

@@ -1,6 +1,6 @@
 //! `shadow-fields bake`
 
-use super::context::{BakeArguments, Context};
+use super::context::{BakeArguments, Context, on_or_off};
 use super::{Global, output};
 use crate::asset::Mesh;
 use crate::asset::environment::RADIANCE_LIMIT;
@@ -29,6 +29,10 @@ pub struct Arguments {
     /// mostly stand far from it
     #[arg(long)]
     simplify: bool,
+    /// Capture only one of samples that turns and mirrors of the mesh carry into one another, and turn its coefficients for the
+    /// rest: symmetric meshes, bodies of revolution, spheres; at most a quarter of a texel off
+    #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
+    orbit: bool,
     #[command(flatten)]
     bake: BakeArguments,
 }
@@ -69,6 +73,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     let mut context = Context::new(global)?;
     context.baker.simplify = arguments.simplify;
+    context.baker.orbit = arguments.orbit;
     let mut header = bake::header(&mesh, kind, &arguments.bake.options());
     header.validate().map_err(|error| error.context(arguments.mesh.display()))?;
     context.baker.fits(&header).map_err(|error| error.context(arguments.mesh.display()))?;
@@ -94,10 +99,11 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(result.to_string());
     } else {
         output::say(format!(
-            "{}: {} samples ({} filled), {} triangles, {} bytes, {:.2} s",
+            "{}: {} samples ({} filled, {} captured), {} triangles, {} bytes, {:.2} s",
             arguments.output.display(),
             report.samples + report.filled,
             report.filled,
+            field.header.captured_samples,
             mesh.triangles.len(),
             field.payload.len(),
             report.total.as_secs_f64()

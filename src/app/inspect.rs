@@ -88,6 +88,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("lattice", lattice.to_string()),
         ("shells", format!("{} r", shells.join(" "))),
         ("samples", format!("{} ({} inside, seen from the surface)", lattice.sample_count(), header.filled_samples)),
+        ("captured", format!("{} of them, the others turned", header.captured_samples)),
+        ("symmetry", header.symmetry.clone()),
         ("stored", format!("{} samples, {storage}, {} bytes", lattice.stored_count(), field.payload.len())),
         ("face", format!("{0} x {0} texels", header.face_px)),
     ];

@@ -46,7 +46,14 @@ fn key(header: &impl Serialize) -> String {
 
 /// What decides a field: the header without the name for people and without what only the bake finds out.
 fn identity(header: &Header) -> Header {
-    Header { mesh: String::new(), filled_samples: 0, growth: 0.0, ..header.clone() }
+    Header {
+        mesh: String::new(),
+        filled_samples: 0,
+        captured_samples: 0,
+        symmetry: String::new(),
+        growth: 0.0,
+        ..header.clone()
+    }
 }
 
 impl Cache {
@@ -86,8 +93,7 @@ impl Cache {
         if let Some(path) = path.as_ref().filter(|path| path.exists()) {
             match ShadowField::read(path) {
                 Ok(found) if identity(&found.header) == identity(header) => {
-                    header.filled_samples = found.header.filled_samples;
-                    header.growth = found.header.growth;
+                    *header = Header { mesh: header.mesh.clone(), ..found.header };
                     store.fill(offset_bytes, &found.payload)?;
                     return Ok(None);
                 }

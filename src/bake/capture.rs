@@ -3,8 +3,10 @@
 //! Inputs: the mesh in units of its bounding radius around its centre; eyes in the same frame. Output: an atlas of square
 //! faces. Occlusion: R8, white background, black object, no depth. Radiance: RGBA32F, black background, the mesh's colours,
 //! with depth. A face that the object's bounding sphere does not reach is not drawn and gets no place in the atlas; of the
-//! rest only the chunks of neighbouring triangles are drawn whose bounding spheres reach into the face.
+//! rest only the chunks of neighbouring triangles are drawn whose bounding spheres reach into the face, and of a closed mesh only
+//! those that may show a front.
 
+use super::chunk::{Chunk, Chunked, chunk, joined, reaches};
 use super::simplify::Level;
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
@@ -16,27 +18,16 @@ use crate::shaders::{Library, Row};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Edge of the atlas in texels, where the device allows it: 1 024 faces of 64 px, 4 MB of coverage.
 const ATLAS_PX: u32 = 2048;
-/// Triangles in a chunk: small enough to be culled on its own, large enough that a draw call costs little beside it.
-const CHUNK_TRIANGLES: usize = 256;
 /// Nearest distance that a radiance capture sees, in r.
 const NEAR: f32 = 1e-4;
 /// Mark of a face that is not in the atlas.
 pub const NO_SLOT: u32 = u32::MAX;
 
-/// A run of triangles with the sphere around them, in r.
-#[derive(Clone, Debug)]
-struct Chunk {
-    indices: Range<u32>,
-    centre: Vec3,
-    radius: f32,
-}
-
-/// A mesh on the device, centred and scaled to bounding radius 1, with its triangles in spatial order.
+/// A mesh on the device, centred and scaled to bounding radius 1, its triangles in chunks.
 pub struct Model {
     positions: Buffer,
     colors: Option<Buffer>,
@@ -51,43 +42,34 @@ impl Model {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, mesh: &Mesh, with_colors: bool) -> Result<Self> {
-        let positions = unit_positions(mesh);
-        let (triangles, chunks) = chunk(&positions, &mesh.triangles);
-        let flat: Vec<[f32; 3]> = positions.iter().map(Vec3::to_array).collect();
-        let colors = with_colors
-            .then(|| {
-                let white = vec![Vec3::ONE; positions.len()];
-                let colors: Vec<[f32; 3]> = mesh.colors.as_ref().unwrap_or(&white).iter().map(Vec3::to_array).collect();
-                Buffer::with_data(device, "capture colors", &colors)
-            })
-            .transpose()?;
-        Ok(Model {
-            positions: Buffer::with_data(device, "capture positions", &flat)?,
-            colors,
-            indices: Buffer::with_data(device, "capture indices", &triangles)?,
-            chunks,
-            closed: mesh.is_closed(),
-        })
+        let colors = with_colors.then(|| mesh.colors.clone().unwrap_or_else(|| vec![Vec3::ONE; mesh.positions.len()]));
+        Self::build(device, &unit_positions(mesh), &mesh.triangles, colors, mesh.is_closed())
     }
-}
 
-impl Model {
     /// Uploads a mesh that stands for another, in r, of one colour where `color` is given.
     ///
     /// # Errors
     /// As [`Model::new`].
     pub fn stand_in(device: &Arc<Device>, level: &Level, color: Option<Vec3>) -> Result<Self> {
-        let (triangles, chunks) = chunk(&level.positions, &level.triangles);
-        let flat: Vec<[f32; 3]> = level.positions.iter().map(Vec3::to_array).collect();
-        let colors = color
-            .map(|color| Buffer::with_data(device, "capture colors", &vec![color.to_array(); flat.len()]))
-            .transpose()?;
+        let colors = color.map(|color| vec![color; level.positions.len()]);
+        Self::build(device, &level.positions, &level.triangles, colors, level.closed)
+    }
+
+    fn build(
+        device: &Arc<Device>,
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        colors: Option<Vec<Vec3>>,
+        closed: bool,
+    ) -> Result<Self> {
+        let Chunked { vertices, triangles, chunks } = chunk(positions, triangles)?;
+        let gather = |of: &[Vec3]| -> Vec<[f32; 3]> { vertices.iter().map(|&v| of[v as usize].to_array()).collect() };
         Ok(Model {
-            positions: Buffer::with_data(device, "capture positions", &flat)?,
-            colors,
+            positions: Buffer::with_data(device, "capture positions", &gather(positions))?,
+            colors: colors.map(|colors| Buffer::with_data(device, "capture colors", &gather(&colors))).transpose()?,
             indices: Buffer::with_data(device, "capture indices", &triangles)?,
             chunks,
-            closed: level.closed,
+            closed,
         })
     }
 }
@@ -96,42 +78,6 @@ impl Model {
 pub fn unit_positions(mesh: &Mesh) -> Vec<Vec3> {
     let (centre, radius_m) = mesh.bounding_sphere();
     mesh.positions.iter().map(|p| ((p.as_dvec3() - centre.as_dvec3()) / f64::from(radius_m)).as_vec3()).collect()
-}
-
-/// Sorts triangles along a space-filling curve and cuts them into chunks.
-fn chunk(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<[u32; 3]>, Vec<Chunk>) {
-    let corners = |t: &[u32; 3]| t.map(|i| positions[i as usize]);
-    let mut order: Vec<_> = triangles.to_vec();
-    order.sort_by_cached_key(|t| morton(corners(t).iter().sum::<Vec3>() / 3.0));
-    let mut first = 0;
-    let chunks = order.chunks(CHUNK_TRIANGLES).map(|run| {
-        let (low, high) = run.iter().flat_map(&corners).fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(p), h.max(p)));
-        let centre = (low + high) / 2.0;
-        let radius = run.iter().flat_map(&corners).map(|p| p.distance(centre)).fold(0.0, f32::max);
-        let count = 3 * run.len() as u32;
-        first += count;
-        Chunk { indices: first - count..first, centre, radius }
-    });
-    let chunks = chunks.collect();
-    (order, chunks)
-}
-
-/// Interleaved bits of a point in [-1, 1]^3, ten an axis.
-pub fn morton(p: Vec3) -> u32 {
-    let spread = |x: f32| {
-        let cell = ((x + 1.0) * 512.0).clamp(0.0, 1023.0) as u32;
-        (0..10).fold(0, |bits, i| bits | (cell >> i & 1) << (3 * i))
-    };
-    spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
-}
-
-/// Whether a sphere reaches into the pyramid of a cube face seen from `eye`; never false for one that does.
-fn reaches(eye: Vec3, centre: Vec3, radius: f32, forward: Vec3, right: Vec3, down: Vec3) -> bool {
-    let q = centre - eye;
-    // Planes through the eye at 45 degrees: their unit normals are (forward +- side) / sqrt 2. The margin covers rounding.
-    let reach = -1.0001 * radius * std::f32::consts::SQRT_2 - 1e-6;
-    let (f, r, d) = (q.dot(forward), q.dot(right), q.dot(down));
-    f + r >= reach && f - r >= reach && f + d >= reach && f - d >= reach && f >= -1.0001 * radius - 1e-6
 }
 
 #[repr(C)]
@@ -166,14 +112,19 @@ impl Capture {
         ["capture.vert", "capture.frag"].map(|file| Row::new(file, 4).define("RADIANCE", radiance))
     }
 
+    /// Faces in a row of the atlas.
+    pub fn columns(device: &Device, face_px: u32, radiance: bool) -> u32 {
+        let atlas_px = ATLAS_PX.min(device.limits.max_image_dimension2_d);
+        // Radiance texels are 20 times as large; six faces always fit.
+        (if radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3)
+    }
+
     /// Pipelines for faces of `face_px`, for occlusion or `radiance`.
     ///
     /// # Errors
     /// `Input` when a face is larger than the device's images.
     pub fn new(device: &Arc<Device>, library: &Library, face_px: u32, radiance: bool) -> Result<Self> {
-        let atlas_px = ATLAS_PX.min(device.limits.max_image_dimension2_d);
-        // Radiance texels are 20 times as large; six faces always fit.
-        let columns = (if radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3);
+        let columns = Self::columns(device, face_px, radiance);
         if columns * face_px > device.limits.max_image_dimension2_d {
             return Err(Error::Input(format!("cube faces of {face_px} px are larger than the device's images allow")));
         }
@@ -217,7 +168,8 @@ impl Capture {
             let mut slots = [NO_SLOT; FACE_COUNT];
             for (face, slot) in slots.iter_mut().enumerate() {
                 let (forward, right, down) = face_axes(face);
-                if model.chunks.iter().any(|c| reaches(eye, c.centre, c.radius, forward, right, down)) {
+                let whole = reaches(eye, Vec3::ZERO, 1.0, forward, right, down);
+                if whole && model.chunks.iter().any(|c| reaches(eye, c.centre, c.radius, forward, right, down)) {
                     *slot = used;
                     used += 1;
                 }
@@ -242,12 +194,16 @@ impl Capture {
     ) -> Result<()> {
         let background = if self.radiance { [0.0, 0.0, 0.0, 1.0] } else { [1.0; 4] };
         let target = Target { color: &self.atlas, clear: background, depth: self.depth.as_ref(), resolve: None };
-        let pipeline = if cull && model.closed { &self.closed } else { &self.open };
+        let closed = cull && model.closed;
+        let pipeline = if closed { &self.closed } else { &self.open };
         let mut vertices = vec![(&model.positions, 0)];
         vertices.extend(model.colors.iter().filter(|_| self.radiance).map(|colors| (colors, 0)));
         commands.render(&target, |drawing| {
             drawing.bind(pipeline, &vertices, &model.indices);
+            let mut facing: Vec<&Chunk> = Vec::new();
             for (&eye, slots) in eyes.iter().zip(plan) {
+                facing.clear();
+                facing.extend(model.chunks.iter().filter(|chunk| !(closed && chunk.turned_away(eye))));
                 for (face, &slot) in slots.iter().enumerate().filter(|(_, slot)| **slot != NO_SLOT) {
                     let (forward, right, down) = face_axes(face);
                     let px = self.face_px;
@@ -258,8 +214,7 @@ impl Capture {
                         down: down.extend(0.0).to_array(),
                         forward: forward.extend(0.0).to_array(),
                     });
-                    let visible = model
-                        .chunks
+                    let visible = facing
                         .iter()
                         .filter(|c| reaches(eye, c.centre, c.radius, forward, right, down))
                         .map(|c| c.indices.clone());
@@ -282,18 +237,6 @@ impl Capture {
 fn face_axes(face: usize) -> (Vec3, Vec3, Vec3) {
     let (forward, right, down) = face_basis(face);
     (forward.as_vec3(), right.as_vec3(), down.as_vec3())
-}
-
-/// Joins ranges that follow on one another.
-fn joined(ranges: impl Iterator<Item = Range<u32>>) -> Vec<Range<u32>> {
-    let mut out: Vec<Range<u32>> = Vec::new();
-    for range in ranges {
-        match out.last_mut() {
-            Some(last) if last.end == range.start => last.end = range.end,
-            _ => out.push(range),
-        }
-    }
-    out
 }
 
 /// The CPU twin, by another method: casts a ray through every texel centre of one face. Row-major, true where the object

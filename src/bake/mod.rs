@@ -8,29 +8,38 @@
 pub mod assemble;
 pub mod cache;
 pub mod capture;
+pub mod chunk;
 pub mod inside;
+pub mod orbit;
 pub mod partial;
 pub mod project;
+pub mod report;
 pub mod simplify;
 pub mod snapshot;
+pub mod surface;
 mod sweep;
+pub mod symmetry;
 
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
 use crate::field::quantity::{Kind, Storage, channel_stride};
 use crate::field::{Header, Lattice, ShadowField, growth};
-use crate::gpu::{Buffer, BufferKind, Commands, Device};
+use crate::gpu::{Buffer, Commands, Device};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
-use capture::{Capture, Model, unit_positions};
+use capture::unit_positions;
 use glam::{DVec3, Vec3};
+use orbit::{Plan, Twin};
 use partial::Partial;
-use project::{Job, Project, Projection};
+use project::{Job, Projection};
+pub use report::{LevelReport, Report};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+use surface::Surface;
 use sweep::Sweep;
+use symmetry::Symmetry;
 
 /// What decides a field besides the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,59 +79,17 @@ impl Options {
 /// surface's own facets stay below the horizon, small enough that contact shadows do not move visibly.
 pub const TRANSFER_OFFSET: f32 = 2e-3;
 
-/// Where the time of a bake went.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Report {
-    /// Samples captured at their own place.
-    pub samples: u32,
-    /// Samples inside the solid, captured off the nearest surface or, where that sees nothing, filled from neighbours.
-    pub filled: u32,
-    /// Meshes that samples were captured from: simplified ones for those far off, the full one last.
-    pub levels: Vec<LevelReport>,
-    /// Device time in capture passes.
-    pub capture_ms: f64,
-    /// Device time in project passes.
-    pub project_ms: f64,
-    /// Device time in the assemble pass.
-    pub assemble_ms: f64,
-    /// Wall time of the whole bake.
-    pub total: Duration,
-}
-
-/// Samples that were captured from one mesh.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct LevelReport {
-    /// Its triangles.
-    pub triangles: usize,
-    /// How many.
-    pub samples: u32,
-}
-
-impl Report {
-    fn add(&mut self, timings: &[crate::gpu::Timing]) {
-        for timing in timings {
-            match timing.pass.as_str() {
-                "capture" => self.capture_ms += timing.milliseconds,
-                "project" => self.project_ms += timing.milliseconds,
-                _ => self.assemble_ms += timing.milliseconds,
-            }
-        }
-    }
-}
-
 /// Told how many of how many samples are done.
 pub type Progress<'p> = &'p dyn Fn(u32, u32);
 
 /// First shell that an object needs, in r: just off the bounding sphere if it fills it; the distance of its surface from the
 /// centre if that is inside the solid, since no receiver comes nearer; else well inside.
 pub fn first_shell(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
-    if inside::winding_number(positions, triangles, DVec3::ZERO) < 0.5 {
+    let surface = Surface::new(positions, triangles);
+    if !surface.encloses(DVec3::ZERO) {
         return ROOMY_INNER;
     }
-    let nearest = triangles
-        .iter()
-        .map(|t| inside::nearest_on_triangle(t.map(|i| positions[i as usize].as_dvec3())).length())
-        .fold(f64::INFINITY, f64::min);
+    let nearest = surface.distance(DVec3::ZERO);
     // A tessellated sphere's facets lie a few percent inside it.
     if nearest > 0.93 { OUTSIDE_INNER } else { nearest.max(ROOMY_INNER) }
 }
@@ -144,6 +111,8 @@ pub fn header(mesh: &Mesh, kind: Kind, options: &Options) -> Header {
         lattice: options.lattice.starting_at(first),
         face_px: options.face_px,
         filled_samples: 0,
+        captured_samples: 0,
+        symmetry: String::new(),
         growth: 0.0,
         centre_m: centre.to_array(),
         radius_m,
@@ -165,12 +134,36 @@ pub struct Baker {
     /// Whether eyes far from a large mesh see a simplified one. Not by default: of the default lattice's samples too few stand far
     /// off, and making the levels costs more than they save (102 400 triangles: 39.3 s with, 34.7 s without).
     pub simplify: bool,
+    /// Whether of samples that a symmetry of the mesh carries into one another only one is captured.
+    pub orbit: bool,
+    /// Most devices that one bake works on.
+    pub devices: usize,
+    siblings: Mutex<Vec<Arc<Device>>>,
 }
+
+/// Most siblings that a software device is worth: they share what draws texels.
+const MOST_DEVICES: usize = 4;
+/// Targets times triangles from which a sibling's start, a tenth of a second, is worth its while.
+const WORTH_A_DEVICE: usize = 6_000_000;
 
 impl Baker {
     /// A baker that compiles its shaders from `library`.
     pub fn new(device: &Arc<Device>, library: &Library) -> Self {
-        Baker { device: device.clone(), library: library.clone(), simplify: false }
+        // A software driver draws on one core for each device, a GPU's devices share all it has.
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let devices = if device.info.is_software() { cores.min(MOST_DEVICES) } else { 1 };
+        let (device, library) = (device.clone(), library.clone());
+        Baker { device, library, simplify: false, orbit: true, devices, siblings: Mutex::default() }
+    }
+
+    /// The devices for `work` (targets times triangles), the baker's own first.
+    fn workers(&self, work: usize) -> Result<Vec<Arc<Device>>> {
+        let wanted = self.devices.min(1 + work / WORTH_A_DEVICE);
+        let mut siblings = self.siblings.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        while siblings.len() + 1 < wanted {
+            siblings.push(self.device.sibling()?);
+        }
+        Ok(std::iter::once(&self.device).chain(&*siblings).take(wanted.max(1)).cloned().collect())
     }
 
     /// Checks that the device can bind the field that `header` describes, and what it is baked from.
@@ -222,33 +215,42 @@ impl Baker {
         let lattice = header.lattice;
         self.fits(header)?;
         let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
-        let inside = inside::inside(&unit_positions(mesh), &mesh.triangles, &positions);
+        let surface = Surface::new(&unit_positions(mesh), &mesh.triangles);
+        let mut inside = inside::inside(&surface, &positions);
+        let pushed = inside::pushed_out(&surface, &positions, &inside);
+        let mut unseen: Vec<bool> = inside.iter().zip(&pushed).map(|(inside, eye)| *inside && eye.is_none()).collect();
+        let plan = self.plan(mesh, header, &surface, &inside);
+        let twins = &plan.twins;
+        for (sample, twin) in twins.iter().enumerate().filter_map(|(sample, twin)| Some((sample, twin.as_ref()?))) {
+            inside[sample] = inside[twin.of as usize];
+            unseen[sample] = unseen[twin.of as usize];
+        }
         header.filled_samples = inside.iter().filter(|i| **i).count() as u32;
-        let pushed = inside::pushed_out(&unit_positions(mesh), &mesh.triangles, &positions, &inside);
-        let unseen: Vec<bool> = inside.iter().zip(&pushed).map(|(inside, eye)| *inside && eye.is_none()).collect();
         let sources = Sources::new(&lattice, &inside, &unseen)?;
 
         let radiance = header.kind == Kind::Radiance;
-        let capture = Capture::new(&self.device, &self.library, header.face_px, radiance)?;
-        let projection = if radiance { Projection::Radiance } else { Projection::Blocked };
-        let project = self.project(header.bands, projection, &capture)?;
-        let model = Model::new(&self.device, mesh, radiance)?;
-        let mut captured = Buffer::new(&self.device, "captured samples", BufferKind::Device, captured_bytes(header))?;
+        let mut values = vec![0.0_f32; captured_bytes(header) as usize / 4];
         let mut targets = Vec::new();
-        for (index, position) in positions.iter().enumerate().filter(|(index, _)| !unseen[*index]) {
+        let seen = positions.iter().enumerate().filter(|(index, _)| !unseen[*index] && twins[*index].is_none());
+        for (index, position) in seen {
             let eye = pushed[index].unwrap_or(*position);
             let scale = lattice.scale(eye.length().max(lattice.inner)) as f32;
             targets.push((eye.as_vec3(), Job { normal: [0.0; 4], slots: [0; 6], target: index as u32, scale }));
         }
-        let sweep = Sweep { capture: &capture, project: &project, model: &model, partial };
+        let projection = if radiance { Projection::Radiance } else { Projection::Blocked };
+        let sweep = Sweep { baker: self, mesh, bands: header.bands, projection, face_px: header.face_px, partial };
         let mut report = if self.simplify {
-            sweep.at_levels(mesh, radiance, &targets, &mut captured, progress)?
+            sweep.at_levels(&targets, &mut values, progress)?
         } else {
-            sweep.alone(&targets, &mut captured, progress)?
+            sweep.alone(&targets, &mut values, progress)?
         };
+        orbit::spread(&mut values, &plan, &lattice, header.bands, header.kind.channels());
+        header.captured_samples = targets.len() as u32;
+        report.turned = twins.iter().flatten().count() as u32;
         report.filled = header.filled_samples;
         report.samples = lattice.sample_count() - report.filled;
 
+        let captured = Buffer::with_data(&self.device, "captured samples", &values)?;
         let assemble = Assemble::new(&self.device, &self.library, header.storage)?;
         let offsets = Buffer::with_data(&self.device, "assemble offsets", &sources.offsets)?;
         let list = Buffer::with_data(&self.device, "assemble sources", &sources.list)?;
@@ -297,11 +299,7 @@ impl Baker {
         progress: Progress<'_>,
     ) -> Result<(Vec<f32>, Report)> {
         let started = Instant::now();
-        let capture = Capture::new(&self.device, &self.library, face_px, false)?;
-        let project = self.project(bands, Projection::Transfer, &capture)?;
-        let model = Model::new(&self.device, mesh, false)?;
-        let floats = mesh.positions.len() * channel_stride(bands);
-        let mut captured = Buffer::new(&self.device, "transfer", BufferKind::Device, 4 * floats as u64)?;
+        let mut transfer = vec![0.0_f32; mesh.positions.len() * channel_stride(bands)];
         let positions = unit_positions(mesh);
         let targets: Vec<(Vec3, Job)> = positions
             .iter()
@@ -313,17 +311,49 @@ impl Baker {
                 (position + TRANSFER_OFFSET * normal, job)
             })
             .collect();
+        let twins = self.vertex_twins(mesh, face_px);
+        let (targets, _): (Vec<_>, Vec<_>) =
+            targets.into_iter().partition(|(_, job)| twins[job.target as usize].is_none());
         // A vertex sees its own surface from nearby: no simplified mesh will do.
-        let sweep = Sweep { capture: &capture, project: &project, model: &model, partial };
-        let mut report = sweep.alone(&targets, &mut captured, progress)?;
-        report.samples = targets.len() as u32;
-        let transfer = captured.download(floats)?;
+        let projection = Projection::Transfer;
+        let sweep = Sweep { baker: self, mesh, bands, projection, face_px, partial };
+        let mut report = sweep.alone(&targets, &mut transfer, progress)?;
+        orbit::turn_all(&mut transfer, &twins, bands, 1);
+        report.samples = positions.len() as u32;
+        report.turned = twins.iter().flatten().count() as u32;
         report.total = started.elapsed();
         Ok((transfer, report))
     }
 
-    fn project(&self, bands: usize, projection: Projection, capture: &Capture) -> Result<Project> {
-        Project::new(&self.device, &self.library, bands, projection, capture.face_px, capture.columns)
+    /// Which samples are turned from which others; says in the header by what symmetries.
+    fn plan(&self, mesh: &Mesh, header: &mut Header, surface: &Surface, inside: &[bool]) -> Plan {
+        if !self.orbit {
+            header.symmetry = "off".to_owned();
+            return Plan { twins: vec![None; inside.len()], round: Vec::new() };
+        }
+        let symmetry = Symmetry::of(mesh, surface, header.kind == Kind::Radiance);
+        header.symmetry = symmetry.describe();
+        let distance = |sample: u32| {
+            let position = header.lattice.position(sample);
+            match inside[sample as usize] {
+                true => f64::from(TRANSFER_OFFSET),
+                // A bound will do for those far off.
+                false if position.length() > 2.0 => position.length() - 1.0,
+                false => surface.distance(position),
+            }
+        };
+        let plan = orbit::plan(&header.lattice, &symmetry, header.face_px, distance);
+        let turned = plan.twins.iter().flatten().count();
+        log::info!("{}: symmetries: {}; {turned} of {} samples turned", mesh.name, header.symmetry, inside.len());
+        plan
+    }
+
+    /// Which vertices' transfer vectors are turned from which others'.
+    fn vertex_twins(&self, mesh: &Mesh, face_px: u32) -> Vec<Option<Twin>> {
+        if !self.orbit {
+            return vec![None; mesh.positions.len()];
+        }
+        orbit::plan_vertices(mesh, &Symmetry::of_vertices(mesh, None), face_px, f64::from(TRANSFER_OFFSET))
     }
 
     /// The library that shaders come from.

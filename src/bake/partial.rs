@@ -1,12 +1,10 @@
 //! What a bake has done so far, kept on disk every few seconds: one that is cancelled, by Ctrl-C or a power cut, goes on from
 //! there. The file is replaced whole, so it is never half-written, and goes once the bake is done.
 
-use crate::error::Result;
 use crate::field::file;
-use crate::gpu::Buffer;
 use serde::{Deserialize, Serialize};
-use std::cell::Cell;
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 const MAGIC: [u8; 8] = *b"SHPART\n\0";
@@ -16,7 +14,7 @@ const INTERVAL: Duration = Duration::from_secs(2);
 /// Samples of one bake, in the order of capture.
 pub struct Partial {
     path: Option<PathBuf>,
-    saved: Cell<Instant>,
+    saved: Mutex<Instant>,
     interval: Duration,
 }
 
@@ -32,7 +30,7 @@ struct Header {
 impl Partial {
     /// Kept at `path`, which is named by everything that decides the samples; without one, nothing is kept.
     pub fn new(path: Option<PathBuf>) -> Self {
-        Partial { path, saved: Cell::new(Instant::now()), interval: INTERVAL }
+        Partial { path, saved: Mutex::new(Instant::now()), interval: INTERVAL }
     }
 
     /// As [`Partial::new`], saving whenever it can.
@@ -40,41 +38,35 @@ impl Partial {
         Partial { interval: Duration::ZERO, ..Self::new(Some(path)) }
     }
 
-    /// Puts what was kept into `samples`, of which `floats` are in use; returns how many of `all` targets it holds.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out. A file that does not fit is as good as none.
-    pub fn load(&self, samples: &mut Buffer, floats: usize, all: u32) -> Result<u32> {
-        let Some(path) = self.path.as_ref().filter(|path| path.exists()) else { return Ok(0) };
+    /// Puts what was kept into `values`; returns how many of `all` targets that holds. A file that does not fit is as good as
+    /// none.
+    pub fn load(&self, values: &mut [f32], all: u32) -> u32 {
+        let Some(path) = self.path.as_ref().filter(|path| path.exists()) else { return 0 };
         match file::read::<Header>(path, MAGIC) {
             Ok((header, payload))
-                if (header.all, header.floats) == (all, floats)
+                if (header.all, header.floats) == (all, values.len())
                     && header.done <= all
-                    && payload.len() == 4 * floats =>
+                    && payload.len() == size_of_val(values) =>
             {
-                samples.fill(0, &payload)?;
+                bytemuck::cast_slice_mut(values).copy_from_slice(&payload);
                 log::info!("{}: going on after {} of {all} samples", path.display(), header.done);
-                Ok(header.done)
+                header.done
             }
-            Ok(_) => Ok(0),
+            Ok(_) => 0,
             Err(error) => {
                 log::warn!("{error}; baking from the start");
-                Ok(0)
+                0
             }
         }
     }
 
     /// Keeps the samples after `done` of `all` targets, if it is time.
-    pub fn save(&self, samples: &Buffer, floats: usize, done: u32, all: u32) {
-        let Some(path) = self.path.as_ref().filter(|_| done < all && self.saved.get().elapsed() >= self.interval)
-        else {
-            return;
-        };
-        self.saved.set(Instant::now());
-        let kept = samples
-            .download::<f32>(floats)
-            .and_then(|values| file::write(path, MAGIC, &Header { done, all, floats }, bytemuck::cast_slice(&values)));
-        if let Err(error) = kept {
+    pub fn save(&self, values: &[f32], done: u32, all: u32) {
+        let mut saved = self.saved.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(path) = self.path.as_ref().filter(|_| done < all && saved.elapsed() >= self.interval) else { return };
+        *saved = Instant::now();
+        let header = Header { done, all, floats: values.len() };
+        if let Err(error) = file::write(path, MAGIC, &header, bytemuck::cast_slice(values)) {
             log::warn!("{error}; a cancelled bake would start anew");
         }
     }

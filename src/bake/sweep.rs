@@ -1,108 +1,150 @@
-//! One run of capture and project over the eyes of a field or a transfer, an atlas at a time: far eyes on simplified meshes, and
-//! from where a cancelled bake was.
+//! One run of capture and project over the eyes of a field or a transfer: far eyes on simplified meshes, from where a cancelled
+//! bake was, and on several devices where the driver draws on one core for each.
 
 use super::capture::{Capture, Model, Slots, unit_positions};
 use super::partial::Partial;
-use super::project::{Job, Project};
-use super::{LevelReport, Progress, Report, simplify};
+use super::project::{Job, Project, Projection};
+use super::simplify::{self, Level};
+use super::{Baker, LevelReport, Progress, Report};
 use crate::asset::Mesh;
 use crate::error::Result;
-use crate::gpu::{Access, Buffer, Commands};
+use crate::field::quantity::channel_stride;
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use glam::Vec3;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// What all captures of one bake share.
 pub(super) struct Sweep<'s> {
-    pub capture: &'s Capture,
-    pub project: &'s Project,
-    /// The full mesh.
-    pub model: &'s Model,
+    pub baker: &'s Baker,
+    pub mesh: &'s Mesh,
+    pub bands: usize,
+    pub projection: Projection,
+    pub face_px: u32,
     pub partial: &'s Partial,
 }
 
+/// A mesh that stands for the swept one, and its colour in radiance captures.
+type StandIn<'s> = Option<(&'s Level, Option<Vec3>)>;
+
+/// An eye and what is made of what it sees.
+pub(super) type Aim = (Vec3, Job);
+
+/// What one device needs to work.
+struct Worker {
+    capture: Capture,
+    project: Project,
+    model: Model,
+    jobs: Buffer,
+    /// Projected samples of one batch, on the device and on their way to the host.
+    samples: [Buffer; 2],
+}
+
+/// Where results go.
+struct Ledger<'v> {
+    values: &'v mut [f32],
+    /// For each portion of the targets how many it has; 0 until they are done.
+    finished: Vec<u32>,
+    report: Report,
+}
+
+/// Leaves nothing to take for the other workers when one ends, by an error or a cancelled bake.
+struct Stop<'c>(&'c AtomicUsize);
+
+impl Drop for Stop<'_> {
+    fn drop(&mut self) {
+        self.0.store(usize::MAX / 2, Ordering::Relaxed);
+    }
+}
+
 impl Sweep<'_> {
-    /// Captures every eye and projects it into `samples`, an atlas at a time.
-    fn run(&self, targets: &[(Vec3, Job)], samples: &Buffer, progress: Progress<'_>) -> Result<Report> {
-        let eyes: Vec<Vec3> = targets.iter().map(|(eye, _)| *eye).collect();
-        let texels = self.project.texel_view()?;
-        let mut jobs = Project::job_buffer(samples.device(), self.capture.capacity())?;
-        let mut report = Report::default();
-        let mut done = 0;
-        while done < eyes.len() {
-            // An eye takes at least one job, and a job at most one capacity.
-            let rest = done..eyes.len().min(done + self.capture.capacity() as usize);
-            let plan: Vec<Slots> = self.capture.plan(self.model, &eyes[rest]);
-            let batch = done..done + plan.len();
-            let filled: Vec<Job> = targets[batch.clone()]
-                .iter()
-                .zip(&plan)
-                .map(|((_, job), slots)| Job { slots: *slots, ..*job })
-                .collect();
-            jobs.write(0, &filled);
-            report.add(&self.batch(&eyes[batch.clone()], &plan, &jobs, &texels, samples)?);
-            done = batch.end;
-            progress(done as u32, eyes.len() as u32);
-        }
-        Ok(report)
+    fn sample_floats(&self) -> usize {
+        self.projection.channels() * channel_stride(self.bands)
     }
 
-    fn batch(
+    /// Captures every eye and puts what is projected into `values`, samples in the order of their numbers. `begun` of `all`
+    /// targets were done before.
+    fn run(
         &self,
-        eyes: &[Vec3],
-        plan: &[Slots],
-        jobs: &Buffer,
-        texels: &crate::gpu::TexelView<'_>,
-        samples: &Buffer,
-    ) -> Result<Vec<crate::gpu::Timing>> {
-        let atlas = &self.capture.atlas;
-        let mut commands = Commands::new(samples.device(), "bake batch")?;
-        commands.image_barrier(atlas, None, Access::ColorWrite);
-        if let Some(depth) = self.capture.depth() {
-            commands.image_barrier(depth, None, Access::DepthWrite);
+        stand_in: StandIn<'_>,
+        targets: &[Aim],
+        values: &mut [f32],
+        (begun, all): (u32, u32),
+        progress: Progress<'_>,
+    ) -> Result<Report> {
+        let triangles = stand_in.map_or(self.mesh.triangles.len(), |(level, _)| level.triangles.len());
+        let devices = self.baker.workers(targets.len() * triangles)?;
+        // All fit into one atlas where faces are reached as seldom as they mostly are; few targets are dealt out evenly.
+        let capacity = Capture::columns(self.baker.device(), self.face_px, self.projection == Projection::Radiance)
+            .pow(2) as usize;
+        let portion = (capacity / 3).min(targets.len().div_ceil(4 * devices.len())).max(1);
+        let count = targets.len().div_ceil(portion);
+        let ledger = Mutex::new(Ledger {
+            values,
+            finished: vec![0; count],
+            report: Report { devices: devices.len(), ..Report::default() },
+        });
+        let next = AtomicUsize::new(0);
+        let told = std::cell::Cell::new(begun);
+        let work = |device: &Arc<Device>, tell: &dyn Fn(&Ledger<'_>)| -> Result<()> {
+            let _stop = Stop(&next);
+            let mut worker = Worker::new(self, device, stand_in)?;
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                let Some(portion) = targets.chunks(portion).nth(index) else { return Ok(()) };
+                worker.capture(portion, self.sample_floats(), &ledger)?;
+                let mut ledger = ledger.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+                ledger.finished[index] = portion.len() as u32;
+                tell(&ledger);
+            }
+        };
+        let tell = |ledger: &Ledger<'_>| {
+            let whole: u32 = ledger.finished.iter().take_while(|count| **count > 0).sum();
+            self.partial.save(ledger.values, begun + whole, all);
+            told.set(begun + ledger.finished.iter().sum::<u32>());
+            progress(told.get(), all);
+        };
+        std::thread::scope(|scope| {
+            let silent = |_: &Ledger<'_>| ();
+            let others: Vec<_> = devices[1..].iter().map(|device| scope.spawn(move || work(device, &silent))).collect();
+            let mut outcome = work(&devices[0], &tell);
+            for other in others {
+                outcome = outcome.and(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            }
+            outcome
+        })?;
+        let end = begun + targets.len() as u32;
+        if told.get() < end {
+            progress(end, all);
         }
-        commands.pass("capture", |c| self.capture.record(c, self.model, eyes, plan, true))?;
-        commands.image_barrier(atlas, Some(Access::ColorWrite), Access::ComputeSampled);
-        commands.pass("project", |c| self.project.record(c, atlas, jobs, texels, samples, plan.len() as u32))?;
-        commands.submit()
+        Ok(ledger.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()).report)
     }
 
     /// Captures every target from the full mesh.
-    pub fn alone(&self, targets: &[(Vec3, Job)], samples: &mut Buffer, progress: Progress<'_>) -> Result<Report> {
-        let floats = samples.size_bytes as usize / 4;
+    pub fn alone(&self, targets: &[Aim], values: &mut [f32], progress: Progress<'_>) -> Result<Report> {
         let all = targets.len() as u32;
-        let begun = self.partial.load(samples, floats, all)?;
-        let samples = &*samples;
-        let report = self.run(&targets[begun as usize..], samples, &|now, _| {
-            self.partial.save(samples, floats, begun + now, all);
-            progress(begun + now, all);
-        })?;
+        let begun = self.partial.load(values, all);
+        let report = self.run(None, &targets[begun as usize..], values, (begun, all), progress)?;
         self.partial.remove();
         Ok(report)
     }
 
     /// Captures every target, those far off from simplified meshes.
-    pub fn at_levels(
-        &self,
-        mesh: &Mesh,
-        radiance: bool,
-        targets: &[(Vec3, Job)],
-        samples: &mut Buffer,
-        progress: Progress<'_>,
-    ) -> Result<Report> {
+    pub fn at_levels(&self, targets: &[Aim], values: &mut [f32], progress: Progress<'_>) -> Result<Report> {
+        let (mesh, radiance) = (self.mesh, self.projection == Projection::Radiance);
         // Colours that vary over the surface would have to be simplified with it.
         let color = mesh.colors.as_ref().map_or(Some(Vec3::ONE), |c| c.iter().all(|x| *x == c[0]).then_some(c[0]));
         let eyes: Vec<Vec3> = targets.iter().map(|(eye, _)| *eye).collect();
         let levels = match color {
             None if radiance => Vec::new(),
-            _ => simplify::levels(&unit_positions(mesh), &mesh.triangles, &eyes, self.capture.face_px),
+            _ => simplify::levels(&unit_positions(mesh), &mesh.triangles, &eyes, self.face_px),
         };
-        let chosen = simplify::choose(&levels, &eyes, self.capture.face_px);
-        let floats = samples.size_bytes as usize / 4;
+        let chosen = simplify::choose(&levels, &eyes, self.face_px);
         let all = targets.len() as u32;
-        let begun = self.partial.load(samples, floats, all)?;
-        let samples = &*samples;
+        let begun = self.partial.load(values, all);
         let (mut done, mut report) = (0, Report::default());
         for level in (0..levels.len()).map(Some).chain([None]) {
-            let part: Vec<(Vec3, Job)> =
+            let part: Vec<Aim> =
                 targets.iter().zip(&chosen).filter(|(_, of)| **of == level).map(|(target, _)| *target).collect();
             let triangles = level.map_or(mesh.triangles.len(), |i| levels[i].triangles.len());
             report.levels.push(LevelReport { triangles, samples: part.len() as u32 });
@@ -113,19 +155,78 @@ impl Sweep<'_> {
             if part.is_empty() {
                 continue;
             }
-            let device = samples.device();
-            let color = color.filter(|_| radiance);
-            let stand_in = level.map(|i| Model::stand_in(device, &levels[i], color)).transpose()?;
-            let sweep = Sweep { model: stand_in.as_ref().unwrap_or(self.model), ..*self };
-            let of_part = sweep.run(part, samples, &|now, _| {
-                self.partial.save(samples, floats, done + now, all);
-                progress(done + now, all);
-            })?;
+            let stand_in = level.map(|i| (&levels[i], color.filter(|_| radiance)));
+            let of_part = self.run(stand_in, part, values, (done, all), progress)?;
+            report.devices = report.devices.max(of_part.devices);
             report.capture_ms += of_part.capture_ms;
             report.project_ms += of_part.project_ms;
             done += part.len() as u32;
         }
         self.partial.remove();
         Ok(report)
+    }
+}
+
+impl Worker {
+    fn new(sweep: &Sweep<'_>, device: &Arc<Device>, stand_in: StandIn<'_>) -> Result<Self> {
+        let radiance = sweep.projection == Projection::Radiance;
+        let library = sweep.baker.library();
+        let capture = Capture::new(device, library, sweep.face_px, radiance)?;
+        let bytes = 4 * u64::from(capture.capacity()) * sweep.sample_floats() as u64;
+        let columns = capture.columns;
+        Ok(Worker {
+            project: Project::new(device, library, sweep.bands, sweep.projection, sweep.face_px, columns)?,
+            model: match stand_in {
+                Some((level, color)) => Model::stand_in(device, level, color)?,
+                None => Model::new(device, sweep.mesh, radiance)?,
+            },
+            jobs: Project::job_buffer(device, capture.capacity())?,
+            samples: [
+                Buffer::new(device, "batch samples", BufferKind::Device, bytes)?,
+                Buffer::new(device, "batch results", BufferKind::Readback, bytes)?,
+            ],
+            capture,
+        })
+    }
+
+    /// Captures and projects the targets, an atlas at a time.
+    fn capture(&mut self, targets: &[Aim], floats: usize, ledger: &Mutex<Ledger<'_>>) -> Result<()> {
+        let mut rest = targets;
+        while !rest.is_empty() {
+            let eyes: Vec<Vec3> = rest.iter().map(|(eye, _)| *eye).collect();
+            let plan: Vec<Slots> = self.capture.plan(&self.model, &eyes);
+            let (batch, after) = rest.split_at(plan.len());
+            let numbered = batch.iter().zip(&plan).enumerate();
+            let jobs: Vec<Job> =
+                numbered.map(|(i, ((_, job), slots))| Job { slots: *slots, target: i as u32, ..*job }).collect();
+            self.jobs.write(0, &jobs);
+            let timings = self.batch(&eyes[..plan.len()], &plan, floats)?;
+            let found: Vec<f32> = self.samples[1].read(0, plan.len() * floats);
+            let mut ledger = ledger.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            ledger.report.add(&timings);
+            for ((_, job), sample) in batch.iter().zip(found.chunks_exact(floats)) {
+                ledger.values[job.target as usize * floats..][..floats].copy_from_slice(sample);
+            }
+            rest = after;
+        }
+        Ok(())
+    }
+
+    fn batch(&self, eyes: &[Vec3], plan: &[Slots], floats: usize) -> Result<Vec<crate::gpu::Timing>> {
+        let atlas = &self.capture.atlas;
+        let [samples, results] = &self.samples;
+        let texels = self.project.texel_view()?;
+        let mut commands = Commands::new(samples.device(), "bake batch")?;
+        commands.image_barrier(atlas, None, Access::ColorWrite);
+        if let Some(depth) = self.capture.depth() {
+            commands.image_barrier(depth, None, Access::DepthWrite);
+        }
+        commands.pass("capture", |c| self.capture.record(c, &self.model, eyes, plan, true))?;
+        commands.image_barrier(atlas, Some(Access::ColorWrite), Access::ComputeSampled);
+        commands.pass("project", |c| self.project.record(c, atlas, &self.jobs, &texels, samples, plan.len() as u32))?;
+        commands.barrier(Access::ComputeWrite, Access::TransferRead);
+        commands.copy_range(samples, 0..4 * (plan.len() * floats) as u64, results, 0);
+        commands.barrier(Access::TransferWrite, Access::HostRead);
+        commands.submit()
     }
 }

@@ -25,8 +25,14 @@ pub fn growth(field: &ShadowField) -> f64 {
     let (lattice, bands) = (header.lattice, header.bands);
     let tensor = Tensor::new(TRANSFER_BANDS, bands, TRANSFER_BANDS);
     let directions = lattice.stored_direction_count();
+    // What stands on the border of a cube's face is a copy of another face's, but for corners, which are means.
+    let sources = lattice.sources();
+    let mut seen = vec![false; lattice.direction_count() as usize];
+    let own = |of: &Vec<u32>| of.len() > 1 || !std::mem::replace(&mut seen[of[0] as usize], true);
+    let planes: Vec<bool> = sources.iter().map(own).collect();
     (0..lattice.stored_count())
         .into_par_iter()
+        .filter(|sample| planes[(sample % directions) as usize])
         .map(|sample| {
             let coefficients: Vec<f64> = (0..coefficient_count(bands)).map(|k| field.stored(sample, 0, k)).collect();
             let values = eigenvalues(&tensor.matrix(&coefficients));
@@ -80,6 +86,8 @@ mod tests {
             lattice,
             face_px: 64,
             filled_samples: 0,
+            captured_samples: 0,
+            symmetry: String::new(),
             growth: 0.0,
             centre_m: [0.0; 3],
             radius_m: 1.0,

@@ -30,6 +30,10 @@ pub struct Header {
     pub face_px: u32,
     /// Samples that lay inside the solid: they hold what is seen just off the surface nearest to them.
     pub filled_samples: u32,
+    /// Samples that were captured; the others are made of these, by the mesh's symmetries or from neighbours.
+    pub captured_samples: u32,
+    /// The symmetries that the bake found, in words.
+    pub symmetry: String,
     /// Occlusion fields: what one product may lengthen a transfer vector by at most (see [`growth`]), from the stored numbers;
     /// 0 before the bake, and in radiance fields, which are not multiplied.
     pub growth: f64,

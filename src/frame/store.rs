@@ -4,7 +4,8 @@
 use super::fits::Needs;
 use crate::asset::mesh::Mesh;
 use crate::bake::cache::Cache;
-use crate::bake::capture::{morton, unit_positions};
+use crate::bake::capture::unit_positions;
+use crate::bake::chunk::morton;
 use crate::bake::{self, Baker, Report};
 use crate::error::Result;
 use crate::field::extent::{Extent, extent};

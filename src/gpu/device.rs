@@ -153,8 +153,6 @@ impl Drop for Instance {
 /// Cheap to share: everything that owns a Vulkan object holds an `Arc<Device>`.
 pub struct Device {
     pub(super) handle: ash::Device,
-    /// Only windows ask it.
-    #[cfg(feature = "view")]
     pub(super) physical: vk::PhysicalDevice,
     pub(super) queue: Mutex<vk::Queue>,
     /// Fences of launched recordings; see `flight`.
@@ -172,7 +170,7 @@ pub struct Device {
     pub(super) next_resource: AtomicU64,
     omitted_barrier: AtomicUsize,
     /// Last: the instance outlives the device.
-    pub(super) instance: Instance,
+    pub(super) instance: Arc<Instance>,
 }
 
 impl Device {
@@ -207,7 +205,25 @@ impl Device {
         if info.is_software() {
             super::heap::keep_freed_memory();
         }
+        Self::open(&Arc::new(instance), physical, info, swapchain, options.cache_dir.clone())
+    }
 
+    /// A second logical device on the same physical one, with a queue of its own. A software driver works off one queue on one
+    /// core, vertices at least: two halves of a job on two devices take half as long.
+    ///
+    /// # Errors
+    /// As [`Device::new`].
+    pub fn sibling(&self) -> Result<Arc<Self>> {
+        Self::open(&self.instance, self.physical, self.info.clone(), &[], self.cache_dir.clone())
+    }
+
+    fn open(
+        instance: &Arc<Instance>,
+        physical: vk::PhysicalDevice,
+        info: Candidate,
+        extensions: &[&'static CStr],
+        cache_dir: Option<PathBuf>,
+    ) -> Result<Arc<Self>> {
         // SAFETY: queries on a handle that the live instance returned.
         let (families, memory, properties) = unsafe {
             (
@@ -224,7 +240,7 @@ impl Device {
             .dynamic_rendering(true)
             .synchronization2(true)
             .maintenance4(true);
-        let extension_names: Vec<_> = swapchain.iter().map(|name| name.as_ptr()).collect();
+        let extension_names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
         let create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extension_names)
@@ -237,7 +253,6 @@ impl Device {
         let names = instance.has_debug_utils.then(|| ash::ext::debug_utils::Device::new(&instance.handle, &handle));
         let mut device = Device {
             handle,
-            #[cfg(feature = "view")]
             physical,
             queue: Mutex::new(queue),
             flights: Mutex::default(),
@@ -247,10 +262,10 @@ impl Device {
             pipeline_cache: vk::PipelineCache::null(),
             limits: properties.limits,
             info,
-            cache_dir: options.cache_dir.clone(),
+            cache_dir,
             next_resource: AtomicU64::new(1),
             omitted_barrier: AtomicUsize::new(usize::MAX),
-            instance,
+            instance: instance.clone(),
         };
         device.pipeline_cache = device.load_pipeline_cache(&properties)?;
         Ok(Arc::new(device))

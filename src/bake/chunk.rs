@@ -1,0 +1,153 @@
+//! Chunks: runs of neighbouring triangles that are drawn or left out together, with what tells which.
+
+use crate::error::{Error, Result};
+use glam::{DVec3, Vec3};
+use meshopt::{VertexDataAdapter, build_meshlets};
+use std::ops::Range;
+
+/// Triangles in a chunk: small enough to be culled on its own, large enough that a draw call costs little beside it.
+const CHUNK_TRIANGLES: usize = 128;
+/// How much likeness of normals counts against nearness where chunks are made.
+const CONE_WEIGHT: f32 = 0.5;
+/// A run of triangles with the sphere around them, in r, and the cone around their normals.
+#[derive(Clone, Debug)]
+pub(super) struct Chunk {
+    pub indices: Range<u32>,
+    pub centre: Vec3,
+    pub radius: f32,
+    axis: Vec3,
+    /// Sine of the half-angle; 2 where normals point everywhere.
+    sine: f32,
+}
+
+impl Chunk {
+    /// Of triangles given by their corners.
+    fn new(indices: Range<u32>, triangles: &[[Vec3; 3]]) -> Self {
+        let corners = || triangles.iter().flatten();
+        let (low, high) = corners().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
+        let centre = (low + high) / 2.0;
+        let radius = corners().map(|p| p.distance(centre)).fold(0.0, f32::max);
+        let normals =
+            || triangles.iter().filter_map(|[a, b, c]| (b - a).as_dvec3().cross((c - a).as_dvec3()).try_normalize());
+        let axis = normals().sum::<DVec3>().normalize_or_zero();
+        let cosine = normals().map(|n| n.dot(axis)).fold(1.0, f64::min);
+        let sine = if cosine > 0.0 { (1.0 - cosine * cosine).max(0.0).sqrt() as f32 } else { 2.0 };
+        Chunk { indices, centre, radius, axis: axis.as_vec3(), sine }
+    }
+
+    /// Whether only backs are seen from `eye`; never true where a front is.
+    ///
+    /// The direction to any of its points is within asin(radius / distance) of that to the centre, its normal within the cone of
+    /// the axis: all backs where these two and the angle between the directions stay below a right angle together. The bound
+    /// a . q >= sine |q| + radius implies that.
+    pub fn turned_away(&self, eye: Vec3) -> bool {
+        let q = self.centre - eye;
+        // The margin covers rounding.
+        self.axis.dot(q) > (self.sine * q.length() + self.radius) * 1.0001 + 1e-5
+    }
+}
+
+/// Sorts triangles along a space-filling curve; positions within the unit sphere.
+pub fn sort_spatially(positions: &[Vec3], triangles: &mut [[u32; 3]]) {
+    triangles.sort_by_cached_key(|t| morton(t.iter().map(|i| positions[*i as usize]).sum::<Vec3>() / 3.0));
+}
+
+/// A mesh cut into chunks, one after another along a space-filling curve.
+pub(super) struct Chunked {
+    /// Which vertices, chunk by chunk, so that a chunk's lie together; those on its rim come again in its neighbours.
+    pub vertices: Vec<u32>,
+    pub triangles: Vec<[u32; 3]>,
+    pub chunks: Vec<Chunk>,
+}
+
+/// Cuts a mesh into chunks of neighbouring triangles that face alike.
+pub(super) fn chunk(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Chunked> {
+    let adapter = VertexDataAdapter::new(bytemuck::cast_slice(positions), size_of::<Vec3>(), 0)
+        .map_err(|error| Error::Failed(format!("the mesh cannot be cut into chunks: {error}")))?;
+    let flat: &[u32] = bytemuck::cast_slice(triangles);
+    let meshlets = build_meshlets(flat, &adapter, CHUNK_TRIANGLES, CHUNK_TRIANGLES, CONE_WEIGHT);
+    let mut order: Vec<_> = meshlets.iter().collect();
+    order.sort_by_cached_key(|meshlet| {
+        let sum: Vec3 = meshlet.vertices.iter().map(|&v| positions[v as usize]).sum();
+        morton(sum / meshlet.vertices.len().max(1) as f32)
+    });
+    let mut out = Chunked { vertices: Vec::new(), triangles: Vec::new(), chunks: Vec::new() };
+    for meshlet in order {
+        let (first, start) = (out.vertices.len() as u32, 3 * out.triangles.len() as u32);
+        let local = || meshlet.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(usize::from));
+        let corners: Vec<_> = local().map(|t| t.map(|i| positions[meshlet.vertices[i] as usize])).collect();
+        out.vertices.extend(meshlet.vertices);
+        out.triangles.extend(local().map(|t| t.map(|i| first + i as u32)));
+        out.chunks.push(Chunk::new(start..3 * out.triangles.len() as u32, &corners));
+    }
+    Ok(out)
+}
+
+/// Interleaved bits of a point in [-1, 1]^3, ten an axis.
+pub fn morton(p: Vec3) -> u32 {
+    let spread = |x: f32| {
+        let cell = ((x + 1.0) * 512.0).clamp(0.0, 1023.0) as u32;
+        (0..10).fold(0, |bits, i| bits | (cell >> i & 1) << (3 * i))
+    };
+    spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
+}
+
+/// Whether a sphere reaches into the pyramid of a cube face seen from `eye`; never false for one that does.
+pub(super) fn reaches(eye: Vec3, centre: Vec3, radius: f32, forward: Vec3, right: Vec3, down: Vec3) -> bool {
+    let q = centre - eye;
+    // Planes through the eye at 45 degrees: their unit normals are (forward +- side) / sqrt 2. The margin covers rounding.
+    let reach = -1.0001 * radius * std::f32::consts::SQRT_2 - 1e-6;
+    let (f, r, d) = (q.dot(forward), q.dot(right), q.dot(down));
+    f + r >= reach && f - r >= reach && f + d >= reach && f - d >= reach && f >= -1.0001 * radius - 1e-6
+}
+
+/// Joins ranges that follow on one another.
+pub(super) fn joined(ranges: impl Iterator<Item = Range<u32>>) -> Vec<Range<u32>> {
+    let mut out: Vec<Range<u32>> = Vec::new();
+    for range in ranges {
+        match out.last_mut() {
+            Some(last) if last.end == range.start => last.end = range.end,
+            _ => out.push(range),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate;
+    use crate::bake::capture::unit_positions;
+
+    #[test]
+    fn chunks_hold_every_triangle_once_and_only_backs_are_turned_away() {
+        let mesh = generate::torus(1.0, 0.4, 60, 30);
+        let unit = unit_positions(&mesh);
+        let Chunked { vertices, triangles, chunks } = chunk(&unit, &mesh.triangles).unwrap();
+        let canonical = |mut t: [u32; 3]| {
+            let least = (0..3).min_by_key(|&i| t[i]).unwrap();
+            t.rotate_left(least);
+            t
+        };
+        let mut found: Vec<_> = triangles.iter().map(|t| canonical(t.map(|i| vertices[i as usize]))).collect();
+        let mut expected: Vec<_> = mesh.triangles.iter().map(|t| canonical(*t)).collect();
+        found.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(found, expected);
+        let mut rng = fastrand::Rng::with_seed(4);
+        let (mut away, mut all) = (0, 0);
+        for _ in 0..300 {
+            let eye = 4.0 * Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5);
+            for chunk in chunks.iter().filter(|c| c.turned_away(eye)) {
+                away += chunk.indices.len() / 3;
+                for t in &triangles[chunk.indices.start as usize / 3..chunk.indices.end as usize / 3] {
+                    let [a, b, c] = t.map(|i| unit[vertices[i as usize] as usize].as_dvec3());
+                    assert!((b - a).cross(c - a).dot(a - eye.as_dvec3()) >= 0.0, "a front is seen from {eye}");
+                }
+            }
+            all += mesh.triangles.len();
+        }
+        // From most places nearly half of the surface is turned away; chunks at its rim are not.
+        assert!(5 * away > all, "{away} of {all}");
+    }
+}

@@ -1,0 +1,48 @@
+//! What a bake did, and where its time went.
+
+use serde::Serialize;
+use std::time::Duration;
+
+/// Where the time of a bake went.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// Samples that stand at their own place.
+    pub samples: u32,
+    /// Of these, samples that were not captured but turned from others (see [`orbit`]).
+    pub turned: u32,
+    /// Samples inside the solid, captured off the nearest surface or, where that sees nothing, filled from neighbours.
+    pub filled: u32,
+    /// Meshes that samples were captured from: simplified ones for those far off, the full one last.
+    pub levels: Vec<LevelReport>,
+    /// Devices that worked on it.
+    pub devices: usize,
+    /// Device time in capture passes, of all of them.
+    pub capture_ms: f64,
+    /// Device time in project passes.
+    pub project_ms: f64,
+    /// Device time in the assemble pass.
+    pub assemble_ms: f64,
+    /// Wall time of the whole bake.
+    pub total: Duration,
+}
+
+/// Samples that were captured from one mesh.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct LevelReport {
+    /// Its triangles.
+    pub triangles: usize,
+    /// How many.
+    pub samples: u32,
+}
+
+impl Report {
+    pub(super) fn add(&mut self, timings: &[crate::gpu::Timing]) {
+        for timing in timings {
+            match timing.pass.as_str() {
+                "capture" => self.capture_ms += timing.milliseconds,
+                "project" => self.project_ms += timing.milliseconds,
+                _ => self.assemble_ms += timing.milliseconds,
+            }
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! A mesh's surface, ready to be asked how near it is and whether it encloses a point: a tree of neighbouring triangles, so that
+//! most are judged together.
+//!
+//! Winding number: the mesh's signed solid angle over 4 pi (Van Oosterom, Strackee 1983, equation 8, a triangle). A node that is
+//! far against its size counts as a dipole, its area normals added up at its middle, after Barill, Dickson, Schmidt, Levin,
+//! Jacobson, *Fast Winding Numbers for Soups and Clouds*, SIGGRAPH 2018, equation 11.
+
+use super::chunk::sort_spatially;
+use super::inside::nearest_on_triangle;
+use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
+use std::ops::Range;
+
+/// Most triangles in a leaf.
+const LEAF_TRIANGLES: usize = 8;
+/// A node is a dipole from this many of its radii on: what is left out is of second order, a hundredth of its share. What is
+/// asked is whether the sum is nearer to 0 or to 1.
+const FAR: f64 = 5.0;
+/// Above this a winding number is that of a point inside.
+const INSIDE: f64 = 0.5;
+
+/// Neighbouring triangles with the sphere around them.
+struct Node {
+    triangles: Range<usize>,
+    centre: DVec3,
+    radius: f64,
+    /// Sum of normals as long as the triangles' areas.
+    dipole: DVec3,
+    /// The first child comes next, the second here; 0 for a leaf.
+    second: usize,
+}
+
+/// Triangles in a tree.
+pub struct Surface {
+    triangles: Vec<[DVec3; 3]>,
+    nodes: Vec<Node>,
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Surface {
+    /// The surface of a mesh; positions within the unit sphere (see [`super::capture::unit_positions`]).
+    pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let mut order = triangles.to_vec();
+        sort_spatially(positions, &mut order);
+        let triangles: Vec<[DVec3; 3]> = order.iter().map(|t| t.map(|i| positions[i as usize].as_dvec3())).collect();
+        let (low, high) = bounds(&triangles);
+        let mut surface = Surface { triangles, nodes: Vec::new(), low, high };
+        if !surface.triangles.is_empty() {
+            surface.build(0..surface.triangles.len());
+        }
+        surface
+    }
+
+    fn build(&mut self, range: Range<usize>) {
+        let within = &self.triangles[range.clone()];
+        let (low, high) = bounds(within);
+        let centre = (low + high) / 2.0;
+        let radius = within.iter().flatten().map(|p| p.distance(centre)).fold(0.0, f64::max);
+        let dipole = within.iter().map(|[a, b, c]| (b - a).cross(c - a) / 2.0).sum();
+        let node = self.nodes.len();
+        self.nodes.push(Node { triangles: range.clone(), centre, radius, dipole, second: 0 });
+        if range.len() > LEAF_TRIANGLES {
+            let middle = range.start + range.len() / 2;
+            self.build(range.start..middle);
+            self.nodes[node].second = self.nodes.len();
+            self.build(middle..range.end);
+        }
+    }
+
+    /// The point of the surface nearest to `point`; `None` without any.
+    pub fn nearest(&self, point: DVec3) -> Option<DVec3> {
+        let mut best = (f64::INFINITY, DVec3::ZERO);
+        let bound = |node: usize| point.distance(self.nodes[node].centre) - self.nodes[node].radius;
+        let mut open = Vec::with_capacity(64);
+        open.extend((!self.nodes.is_empty()).then(|| (bound(0), 0)));
+        while let Some((least, index)) = open.pop() {
+            if least >= best.0 {
+                continue;
+            }
+            let node = &self.nodes[index];
+            if node.second == 0 {
+                for triangle in &self.triangles[node.triangles.clone()] {
+                    let towards = nearest_on_triangle(triangle.map(|corner| corner - point));
+                    let distance = towards.length();
+                    if distance < best.0 {
+                        best = (distance, point + towards);
+                    }
+                }
+            } else {
+                // The nearer child is looked into first.
+                let mut children = [(bound(index + 1), index + 1), (bound(node.second), node.second)];
+                children.sort_by(|a, b| b.0.total_cmp(&a.0));
+                open.extend(children);
+            }
+        }
+        (best.0 < f64::INFINITY).then_some(best.1)
+    }
+
+    /// Distance of the surface from `point`; infinite without any.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        self.nearest(point).map_or(f64::INFINITY, |near| near.distance(point))
+    }
+
+    /// Whether a point lies inside the solid that the surface bounds.
+    pub fn encloses(&self, point: DVec3) -> bool {
+        let boxed = point.cmpge(self.low).all() && point.cmple(self.high).all();
+        boxed && self.winding_number(point) > INSIDE
+    }
+
+    /// Generalised winding number around a point: 1 inside and 0 outside a closed mesh, in between near the holes of an open one.
+    pub fn winding_number(&self, point: DVec3) -> f64 {
+        let (mut total, mut index) = (0.0, 0);
+        let mut open = Vec::with_capacity(64);
+        while let Some(node) = self.nodes.get(index) {
+            let q = node.centre - point;
+            let distance = q.length();
+            let far = distance > FAR * node.radius;
+            if far {
+                total += q.dot(node.dipole) / distance.powi(3);
+            } else if node.second == 0 {
+                let leaf = &self.triangles[node.triangles.clone()];
+                total += leaf.iter().map(|t| solid_angle(t.map(|corner| corner - point))).sum::<f64>();
+            } else {
+                open.push(node.second);
+                index += 1;
+                continue;
+            }
+            index = open.pop().unwrap_or(usize::MAX);
+        }
+        total / (4.0 * PI)
+    }
+}
+
+fn bounds(triangles: &[[DVec3; 3]]) -> (DVec3, DVec3) {
+    triangles.iter().flatten().fold((DVec3::MAX, DVec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)))
+}
+
+/// Signed solid angle of a triangle seen from the origin, positive where its back is seen.
+fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    2.0 * a.dot(b.cross(c)).atan2(denominator)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate;
+    use crate::bake::capture::unit_positions;
+
+    #[test]
+    fn the_tree_agrees_with_single_triangles() {
+        let mesh = generate::torus(1.0, 0.3, 48, 24);
+        let unit = unit_positions(&mesh);
+        let surface = Surface::new(&unit, &mesh.triangles);
+        let corners: Vec<[DVec3; 3]> = mesh.triangles.iter().map(|t| t.map(|i| unit[i as usize].as_dvec3())).collect();
+        let mut rng = fastrand::Rng::with_seed(3);
+        let mut inside = 0;
+        for _ in 0..500 {
+            let p = DVec3::from_array([(); 3].map(|()| 2.4 * (rng.f64() - 0.5)));
+            let distance = corners.iter().map(|t| nearest_on_triangle(t.map(|c| c - p)).length());
+            let distance = distance.fold(f64::INFINITY, f64::min);
+            assert!((surface.distance(p) - distance).abs() < 1e-12, "{p}");
+            let exact = corners.iter().map(|t| solid_angle(t.map(|c| c - p))).sum::<f64>() / (4.0 * PI);
+            assert!((surface.winding_number(p) - exact).abs() < 0.02, "{p}: {exact}");
+            inside += usize::from(exact > 0.5);
+        }
+        assert!((20..480).contains(&inside), "{inside}");
+    }
+}

@@ -1,0 +1,255 @@
+//! What leaves an object as it is: the 48 turns and mirrors of a cube, of which the lattice of a cube is made too; turns by any
+//! angle about x, y or z; every turn.
+//!
+//! A mesh is seldom exactly as symmetric as what it stands for: facets turn with it, and squares are cut along one diagonal. So
+//! each symmetry has a deviation: no point of the moved surface is farther than this from the surface, in r. The first kind is
+//! found by matching vertices, its deviation measured where the matched triangles differ; a turn by any angle is tried at a few
+//! odd ones; a sphere's deviation is the depth of its facets.
+
+use super::capture::unit_positions;
+use super::inside::nearest_on_triangle;
+use super::surface::Surface;
+use crate::asset::Mesh;
+use glam::{DMat3, DVec3, IVec3, Vec3};
+use rayon::prelude::*;
+use std::collections::{HashMap, HashSet};
+
+/// Farthest that a vertex may lie from where a symmetry wants it, in r: what files with six digits leave.
+const MATCH: f64 = 2e-5;
+/// A deviation beyond this, in r, is of no use: it would be seen from everywhere.
+const USELESS: f64 = 0.05;
+/// Angles, in radians, at which a body of revolution is tried: no small multiples of parts of a circle.
+const ANGLES_RAD: [f64; 3] = [0.1234, 0.5077, -1.0609];
+/// Vertices lie between the facets of a turned ring at any place; the angles tried come near the middle, within this.
+const ANGLE_MARGIN: f64 = 1.15;
+
+/// A turn or mirror with how far the surface is from being moved onto itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Operation {
+    /// Orthogonal: entries 0 and +-1.
+    pub matrix: DMat3,
+    /// In r.
+    pub deviation: f64,
+}
+
+/// The symmetries of an object around its bounding sphere's centre.
+#[derive(Clone, Debug, Default)]
+pub struct Symmetry {
+    /// Turns and mirrors of a cube, the least deviation first; without the identity.
+    pub operations: Vec<Operation>,
+    /// Deviation of turns about x, y and z.
+    pub revolution: [Option<f64>; 3],
+    /// Deviation of turns about every axis.
+    pub sphere: Option<f64>,
+}
+
+impl Symmetry {
+    /// Finds the symmetries of a mesh, with its colours where it has any and `with_colors` is set.
+    pub fn of(mesh: &Mesh, surface: &Surface, with_colors: bool) -> Self {
+        let colors = mesh.colors.as_ref().filter(|_| with_colors);
+        let varied = colors.filter(|colors| colors.iter().any(|c| *c != colors[0]));
+        let symmetry = Self::of_vertices(mesh, varied);
+        if varied.is_some() {
+            return symmetry;
+        }
+        let points = Points::new(mesh, None);
+        let revolution = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| points.revolution(axis, surface));
+        let sphere = (mesh.is_closed() && surface.encloses(DVec3::ZERO))
+            .then(|| 1.0 - surface.distance(DVec3::ZERO))
+            .filter(|deviation| *deviation < USELESS);
+        Symmetry { revolution, sphere, ..symmetry }
+    }
+
+    /// The turns and mirrors alone, of the mesh with the colours of its vertices, if any.
+    pub fn of_vertices(mesh: &Mesh, colors: Option<&Vec<Vec3>>) -> Self {
+        let points = Points::new(mesh, colors);
+        let mut operations: Vec<Operation> = cube_group()
+            .into_par_iter()
+            .skip(1)
+            .filter_map(|matrix| Some(Operation { matrix, deviation: points.deviation(matrix)? }))
+            .collect();
+        operations.sort_by(|a, b| a.deviation.total_cmp(&b.deviation));
+        Symmetry { operations, ..Symmetry::default() }
+    }
+
+    /// In words, for headers.
+    pub fn describe(&self) -> String {
+        let exact = self.operations.iter().filter(|o| o.deviation < MATCH).count();
+        let mut words = vec![];
+        if exact > 0 {
+            words.push(format!("{exact} turns and mirrors"));
+        }
+        let rest = &self.operations[exact..];
+        if let Some(worst) = rest.last() {
+            words.push(format!("{} more within {:.1e} r", rest.len(), worst.deviation));
+        }
+        for (name, deviation) in ["x", "y", "z"].iter().zip(self.revolution) {
+            words.extend(deviation.map(|deviation| format!("revolution about {name} within {deviation:.1e} r")));
+        }
+        words.extend(self.sphere.map(|deviation| format!("sphere within {deviation:.1e} r")));
+        if words.is_empty() { "none".to_owned() } else { words.join(", ") }
+    }
+}
+
+/// The 48 turns and mirrors of a cube, the identity first.
+pub fn cube_group() -> Vec<DMat3> {
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+    let sign = |bits: usize, k: usize| if bits >> k & 1 == 1 { -1.0 } else { 1.0 };
+    let of_order = |[i, j, k]: [usize; 3]| {
+        (0..8).map(move |b| DMat3::from_cols(sign(b, 0) * axes[i], sign(b, 1) * axes[j], sign(b, 2) * axes[k]))
+    };
+    orders.into_iter().flat_map(of_order).collect()
+}
+
+/// The mesh's vertices, joined where they coincide, to be found by place.
+pub struct Points {
+    places: Vec<DVec3>,
+    colors: Vec<Vec3>,
+    /// Joined vertex of each of the mesh's.
+    of_vertex: Vec<u32>,
+    cells: HashMap<IVec3, Vec<u32>>,
+    triangles: Vec<[u32; 3]>,
+    known: HashSet<[u32; 3]>,
+    /// Triangles around each joined vertex.
+    around: Vec<Vec<u32>>,
+}
+
+impl Points {
+    /// Joins vertices that agree in place, and in colour where given.
+    pub fn new(mesh: &Mesh, colors: Option<&Vec<Vec3>>) -> Self {
+        let unit = unit_positions(mesh);
+        let mut points = Points {
+            places: Vec::new(),
+            colors: Vec::new(),
+            of_vertex: Vec::new(),
+            cells: HashMap::new(),
+            triangles: Vec::new(),
+            known: HashSet::new(),
+            around: Vec::new(),
+        };
+        for (vertex, position) in unit.iter().enumerate() {
+            let place = position.as_dvec3();
+            let color = colors.map_or(Vec3::ONE, |colors| colors[vertex]);
+            let index = points.find(place, color).unwrap_or_else(|| {
+                let index = points.places.len() as u32;
+                points.places.push(place);
+                points.colors.push(color);
+                points.cells.entry(cell(place)).or_default().push(index);
+                index
+            });
+            points.of_vertex.push(index);
+        }
+        points.around = vec![Vec::new(); points.places.len()];
+        for triangle in &mesh.triangles {
+            let joined = triangle.map(|i| points.of_vertex[i as usize]);
+            for corner in joined {
+                points.around[corner as usize].push(points.triangles.len() as u32);
+            }
+            points.known.insert(sorted(joined));
+            points.triangles.push(joined);
+        }
+        points
+    }
+
+    /// The vertex at a place, if one is.
+    fn find(&self, place: DVec3, color: Vec3) -> Option<u32> {
+        let (low, high) = (cell(place - MATCH), cell(place + MATCH));
+        let mut best: Option<(f64, u32)> = None;
+        for x in low.x..=high.x {
+            for y in low.y..=high.y {
+                for z in low.z..=high.z {
+                    for &index in self.cells.get(&IVec3::new(x, y, z)).into_iter().flatten() {
+                        let distance = self.places[index as usize].distance(place);
+                        let same = (self.colors[index as usize] - color).abs().max_element() <= 1e-6;
+                        if same && distance <= best.map_or(MATCH, |(least, _)| least) {
+                            best = Some((distance, index));
+                        }
+                    }
+                }
+            }
+        }
+        best.map(|(_, index)| index)
+    }
+
+    /// Where each joined vertex goes; `None` unless every one has a counterpart.
+    fn image(&self, matrix: DMat3) -> Option<Vec<u32>> {
+        self.places.iter().zip(&self.colors).map(|(place, color)| self.find(matrix * *place, *color)).collect()
+    }
+
+    /// How far the moved surface is from the surface; `None` where a vertex has no counterpart or it is too far.
+    fn deviation(&self, matrix: DMat3) -> Option<f64> {
+        // Most meshes fail at once.
+        let few = self.places.len().div_ceil(50);
+        let tried = || self.places.iter().zip(&self.colors).step_by(few);
+        if self.triangles.is_empty() || tried().any(|(p, color)| self.find(matrix * *p, *color).is_none()) {
+            return None;
+        }
+        let image = self.image(matrix)?;
+        let moved = |vertex: u32| matrix * self.places[vertex as usize];
+        let off = |(vertex, to): (usize, &u32)| moved(vertex as u32).distance(self.places[*to as usize]);
+        let mut worst = image.iter().enumerate().map(off).fold(0.0, f64::max);
+        for triangle in &self.triangles {
+            let to = triangle.map(|i| image[i as usize]);
+            if self.known.contains(&sorted(to)) {
+                continue;
+            }
+            let [a, b, c] = triangle.map(moved);
+            for point in [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0] {
+                let near = to.iter().flat_map(|&i| &self.around[i as usize]).map(|&t| {
+                    let corners = self.triangles[t as usize].map(|i| self.places[i as usize] - point);
+                    nearest_on_triangle(corners).length()
+                });
+                worst = near.fold(f64::INFINITY, f64::min).max(worst);
+            }
+        }
+        (worst < USELESS).then_some(worst)
+    }
+
+    /// How far the surface turned about an axis through the centre is from the surface; `None` where that is too far.
+    fn revolution(&self, axis: DVec3, surface: &Surface) -> Option<f64> {
+        let farthest = |points: &[DVec3], angle: f64| -> Option<f64> {
+            let turn = DMat3::from_axis_angle(axis, angle);
+            let off = |p: &DVec3| Some(surface.distance(turn * *p)).filter(|d| *d < USELESS);
+            points.par_iter().map(off).try_reduce(|| 0.0, |a, b| Some(a.max(b)))
+        };
+        // Most meshes fail at once.
+        let few: Vec<DVec3> = self.places.iter().copied().step_by(self.places.len().div_ceil(50)).collect();
+        farthest(&few, ANGLES_RAD[0])?;
+        let middle = |t: &[u32; 3]| t.iter().map(|i| self.places[*i as usize]).sum::<DVec3>() / 3.0;
+        let all: Vec<DVec3> = self.places.iter().copied().chain(self.triangles.iter().map(middle)).collect();
+        let mut worst = 0.0_f64;
+        for angle in ANGLES_RAD {
+            worst = worst.max(farthest(&all, angle)?);
+        }
+        Some(ANGLE_MARGIN * worst)
+    }
+
+    /// The mesh's vertices to which those of a mesh are moved, where place and normal agree; `None` unless all do.
+    pub fn vertices(&self, matrix: DMat3, mesh: &Mesh) -> Option<Vec<u32>> {
+        let image = self.image(matrix)?;
+        let mut at: Vec<Vec<u32>> = vec![Vec::new(); self.places.len()];
+        for (vertex, joined) in self.of_vertex.iter().enumerate() {
+            at[*joined as usize].push(vertex as u32);
+        }
+        let of = |(vertex, joined): (usize, &u32)| {
+            let normal = matrix * mesh.normals[vertex].as_dvec3();
+            let agrees = |v: &&u32| mesh.normals[**v as usize].as_dvec3().distance(normal) < NORMAL_MATCH;
+            at[image[*joined as usize] as usize].iter().find(agrees).copied()
+        };
+        self.of_vertex.iter().enumerate().map(of).collect()
+    }
+}
+
+/// Largest distance of unit normals that count as one.
+const NORMAL_MATCH: f64 = 1e-4;
+
+fn cell(place: DVec3) -> IVec3 {
+    // Cells much larger than what is sought: a search looks into one, seldom into two.
+    (place / (50.0 * MATCH)).floor().as_ivec3()
+}
+
+fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
+    triangle.sort_unstable();
+    triangle
+}

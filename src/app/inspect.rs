@@ -184,6 +184,15 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
             rows.push((format!("{latitude_deg:+.0} deg, {distance:.2} r"), cells));
         }
     }
+    // Visibility has one white for the whole sheet. What coefficients say of radiance falls with the square of the distance, so
+    // each row has its own; what is captured keeps the surface's radiance and is cut at that white.
+    let brightest = |rows: &[(String, Vec<Cell>)], least: f32| {
+        rows.iter().flat_map(|(_, cells)| cells.iter().flatten()).fold(least, |m, c| m.max(*c))
+    };
+    let whites: Vec<f32> = match field.header.kind {
+        Kind::Occlusion => vec![brightest(&rows, 1.0); rows.len()],
+        Kind::Radiance => rows.chunks(1).map(|row| brightest(row, f32::MIN_POSITIVE)).collect(),
+    };
     if let Some(mesh) = mesh {
         let context = Context::new(global)?;
         let radiance = field.header.kind == Kind::Radiance;
@@ -197,14 +206,6 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
     }
     let columns: Vec<String> = (0..LONGITUDES).map(|c| format!("{} deg", 360 * c / LONGITUDES)).collect();
     let per_column = if mesh.is_some() { 2 } else { 1 };
-    // Visibility has one white for the whole sheet; radiance falls with the square of the distance, so each row has its own.
-    let brightest = |rows: &[(String, Vec<Cell>)], least: f32| {
-        rows.iter().flat_map(|(_, cells)| cells.iter().flatten()).fold(least, |m, c| m.max(*c))
-    };
-    let whites: Vec<f32> = match field.header.kind {
-        Kind::Occlusion => vec![brightest(&rows, 1.0); rows.len()],
-        Kind::Radiance => rows.chunks(1).map(|row| brightest(row, f32::MIN_POSITIVE)).collect(),
-    };
     for ((label, _), white) in rows.iter_mut().zip(&whites) {
         *label += &format!(", white {}", text::three(f64::from(*white)));
     }

@@ -56,10 +56,13 @@ fn quote(cell: &str) -> String {
     if cell.contains([',', '"', '\n']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
 }
 
-/// A number with three significant digits.
+/// A number with three significant digits; from a million on as a power of ten.
 pub fn three(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
-        return x.to_string();
+        return (x + 0.0).to_string();
+    }
+    if x.abs() >= 1e6 {
+        return format!("{x:.2e}");
     }
     // Of the rounded number: 0.9996 is 1.00.
     let rounded: f64 = format!("{x:.2e}").parse().unwrap_or(x);
@@ -90,7 +93,7 @@ mod tests {
 
     #[test]
     fn three_digits() {
-        let shown: Vec<String> = [0.012_345, 123.4, 0.0, 9876.5, 0.9996, -0.5].map(three).to_vec();
-        assert_eq!(shown, [".0123", "123", "0", "9876", "1.00", "-0.500"]);
+        let shown: Vec<String> = [0.012_345, 123.4, -0.0, 9876.5, 0.9996, -0.5, -1.5e22].map(three).to_vec();
+        assert_eq!(shown, [".0123", "123", "0", "9876", "1.00", "-0.500", "-1.50e22"]);
     }
 }

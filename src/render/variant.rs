@@ -31,7 +31,8 @@ pub struct Variant {
 /// Every variant. What lost where it was measured is not among them, on llvmpipe 22.3 in milliseconds for 65 536 vertices and 4
 /// occluders: uniform blocks with texel fields 11.8 against 8.2 without, since llvmpipe gathers them lane by lane; rotations
 /// as matrix elements 8.5 against 6.4 as angles; entities fetched by the lanes of a subgroup and handed round 14.4 against
-/// 8.3, since each broadcast there walks through the lanes.
+/// 8.3, since each broadcast there walks through the lanes. `bench/MEASURED.md` has what else was tried: several vertices a
+/// thread, unrolled loops, other workgroups, lookups as a pass of their own.
 pub const VARIANTS: &[Variant] = &[
     Variant { name: "storage", ..STORAGE },
     Variant { name: "storage-uniform", uniform: true, ..STORAGE },

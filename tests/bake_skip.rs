@@ -5,12 +5,16 @@ mod common;
 use common::{gpu, report};
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::capture::unit_positions;
 use shadow_fields::bake::inside::nearest_on_triangle;
 use shadow_fields::bake::partial::Partial;
 use shadow_fields::bake::{self, Baker, simplify};
 use shadow_fields::field::{Header, Kind, Storage};
+use shadow_fields::frame::store::Store;
 use shadow_fields::gpu::{Buffer, BufferKind};
+use shadow_fields::render::variant::Skip;
+use shadow_fields::scene::Scene;
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -147,4 +151,50 @@ fn a_cancelled_bake_goes_on() {
     let partial = Partial::eager(path);
     baker.field_from(&partial, &mesh, &mut again, (&store, 0), &|_, _| ()).unwrap();
     assert_eq!(floats(&store, &again), whole);
+}
+
+#[test]
+fn the_same_mesh_under_two_names_is_baked_once() {
+    let Some(gpu) = gpu() else { return };
+    let meshes = |names: [&str; 2], sides: [u32; 2]| {
+        let mesh = |(name, sides): (&str, u32)| {
+            let size = format!("major_m = 1.0, minor_m = 0.3, segments = 12, sides = {sides}");
+            let entity = format!("[[entity]]\nmesh = \"{name}\"\n");
+            format!("[[mesh]]\nname = \"{name}\"\ntorus = {{ {size} }}\n{entity}")
+        };
+        let text: String = names.into_iter().zip(sides).map(mesh).collect();
+        let rest = "[environment]\nuniform = [1, 1, 1]\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n";
+        Scene::parse(&format!("{text}{rest}"), "test.toml".as_ref(), &shadow_fields::asset::embedded::read).unwrap()
+    };
+    let baker = Baker::new(&gpu.device, &gpu.library);
+    let options = bake::Options { lattice: "cube:3x3".parse().unwrap(), face_px: 16, ..Default::default() };
+    let store =
+        |scene: &Scene| Store::new(&baker, &Cache::new(None), scene, &options, Skip::ALL, &|_, _, _| ()).unwrap();
+    let (same, other) = (store(&meshes(["a", "b"], [8, 8])), store(&meshes(["a", "b"], [8, 10])));
+    let names = |store: &Store| store.baked.iter().map(|b| b.what.clone()).collect::<Vec<_>>();
+    report(&format!("{:?} and {:?}", names(&same), names(&other)));
+    assert_eq!(names(&same), ["a shadow", "a transfer"]);
+    assert_eq!(names(&other), ["a shadow", "b shadow", "a transfer", "b transfer"]);
+    assert!(same.fields.size_bytes < other.fields.size_bytes);
+    let [a, b] = [0, 1].map(|i| same.geometries[i].blocked.as_ref().unwrap());
+    assert!(a.bytes == b.bytes && a.header.growth == b.header.growth && b.header.growth >= 1.0);
+    assert_eq!(same.geometries[0].transfer_first, same.geometries[1].transfer_first);
+}
+
+#[test]
+fn faces_and_backs_that_are_left_out_change_nothing() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::torus(1.0, 0.3, 48, 24);
+    let bake = |faces: bool| {
+        let mut baker = Baker::new(&gpu.device, &gpu.library);
+        (baker.faces, baker.orbit) = (faces, false);
+        let mut header = header(&mesh, "cube:4x3");
+        let store = Buffer::new(&gpu.device, "field", BufferKind::Device, header.payload_bytes()).unwrap();
+        let found = baker.field(&mesh, &mut header, (&store, 0), &|_, _| ()).unwrap();
+        (found.faces, header.captured_samples, floats(&store, &header))
+    };
+    let (some, all) = (bake(true), bake(false));
+    report(&format!("{} of {} faces drawn", some.0, all.0));
+    assert!(all.0 == 6 * all.1 && some.1 == all.1 && 4 * some.0 < 3 * all.0);
+    assert!(some.2 == all.2, "the same to the bit");
 }

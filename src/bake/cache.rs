@@ -56,6 +56,11 @@ fn identity(header: &Header) -> Header {
     }
 }
 
+/// Name of a field: the same for all that come out the same.
+pub fn field_name(header: &Header) -> String {
+    key(&identity(header))
+}
+
 impl Cache {
     /// A cache below `folder`, or none.
     pub fn new(folder: Option<&Path>) -> Self {
@@ -68,7 +73,7 @@ impl Cache {
 
     /// Whether the field that `header` describes is on disk.
     pub fn has_field(&self, header: &Header) -> bool {
-        self.path(&key(&identity(header)), "sf").is_some_and(|path| path.exists())
+        self.path(&field_name(header), "sf").is_some_and(|path| path.exists())
     }
 
     /// Whether the transfer vectors of a mesh are on disk.
@@ -89,7 +94,7 @@ impl Cache {
         (store, offset_bytes): (&mut Buffer, u64),
         progress: Progress<'_>,
     ) -> Result<Option<Report>> {
-        let path = self.path(&key(&identity(header)), "sf");
+        let path = self.path(&field_name(header), "sf");
         if let Some(path) = path.as_ref().filter(|path| path.exists()) {
             match ShadowField::read(path) {
                 Ok(found) if identity(&found.header) == identity(header) => {

@@ -104,6 +104,8 @@ pub struct Capture {
     /// Faces in a row of the atlas.
     pub columns: u32,
     radiance: bool,
+    /// Whether faces and chunks that cannot matter are left out.
+    pub skips: bool,
 }
 
 impl Capture {
@@ -148,6 +150,7 @@ impl Capture {
             face_px,
             columns,
             radiance,
+            skips: true,
         })
     }
 
@@ -169,7 +172,8 @@ impl Capture {
             for (face, slot) in slots.iter_mut().enumerate() {
                 let (forward, right, down) = face_axes(face);
                 let whole = reaches(eye, Vec3::ZERO, 1.0, forward, right, down);
-                if whole && model.chunks.iter().any(|c| reaches(eye, c.centre, c.radius, forward, right, down)) {
+                let reached = || model.chunks.iter().any(|c| reaches(eye, c.centre, c.radius, forward, right, down));
+                if !self.skips || (whole && reached()) {
                     *slot = used;
                     used += 1;
                 }
@@ -203,7 +207,7 @@ impl Capture {
             let mut facing: Vec<&Chunk> = Vec::new();
             for (&eye, slots) in eyes.iter().zip(plan) {
                 facing.clear();
-                facing.extend(model.chunks.iter().filter(|chunk| !(closed && chunk.turned_away(eye))));
+                facing.extend(model.chunks.iter().filter(|chunk| !(closed && self.skips && chunk.turned_away(eye))));
                 for (face, &slot) in slots.iter().enumerate().filter(|(_, slot)| **slot != NO_SLOT) {
                     let (forward, right, down) = face_axes(face);
                     let px = self.face_px;
@@ -216,7 +220,7 @@ impl Capture {
                     });
                     let visible = facing
                         .iter()
-                        .filter(|c| reaches(eye, c.centre, c.radius, forward, right, down))
+                        .filter(|c| !self.skips || reaches(eye, c.centre, c.radius, forward, right, down))
                         .map(|c| c.indices.clone());
                     for run in joined(visible) {
                         drawing.indexed(run);

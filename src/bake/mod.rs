@@ -136,13 +136,15 @@ pub struct Baker {
     pub simplify: bool,
     /// Whether of samples that a symmetry of the mesh carries into one another only one is captured.
     pub orbit: bool,
+    /// Whether only faces that the object reaches are drawn, of these only what reaches into them, and of closed meshes no backs.
+    pub faces: bool,
     /// Most devices that one bake works on.
     pub devices: usize,
     siblings: Mutex<Vec<Arc<Device>>>,
 }
 
 /// Most siblings that a software device is worth: they share what draws texels.
-const MOST_DEVICES: usize = 4;
+pub const MOST_DEVICES: usize = 4;
 /// Targets times triangles from which a sibling's start, a tenth of a second, is worth its while.
 const WORTH_A_DEVICE: usize = 6_000_000;
 
@@ -153,7 +155,7 @@ impl Baker {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let devices = if device.info.is_software() { cores.min(MOST_DEVICES) } else { 1 };
         let (device, library) = (device.clone(), library.clone());
-        Baker { device, library, simplify: false, orbit: true, devices, siblings: Mutex::default() }
+        Baker { device, library, simplify: false, orbit: true, faces: true, devices, siblings: Mutex::default() }
     }
 
     /// The devices for `work` (targets times triangles), the baker's own first.

@@ -10,6 +10,8 @@ pub struct Report {
     pub samples: u32,
     /// Of these, samples that were not captured but turned from others (see [`orbit`]).
     pub turned: u32,
+    /// Cube faces that were drawn; six a captured sample where none is left out.
+    pub faces: u32,
     /// Samples inside the solid, captured off the nearest surface or, where that sees nothing, filled from neighbours.
     pub filled: u32,
     /// Meshes that samples were captured from: simplified ones for those far off, the full one last.

@@ -1,7 +1,7 @@
 //! One run of capture and project over the eyes of a field or a transfer: far eyes on simplified meshes, from where a cancelled
 //! bake was, and on several devices where the driver draws on one core for each.
 
-use super::capture::{Capture, Model, Slots, unit_positions};
+use super::capture::{Capture, Model, NO_SLOT, Slots, unit_positions};
 use super::partial::Partial;
 use super::project::{Job, Project, Projection};
 use super::simplify::{self, Level};
@@ -158,6 +158,7 @@ impl Sweep<'_> {
             let stand_in = level.map(|i| (&levels[i], color.filter(|_| radiance)));
             let of_part = self.run(stand_in, part, values, (done, all), progress)?;
             report.devices = report.devices.max(of_part.devices);
+            report.faces += of_part.faces;
             report.capture_ms += of_part.capture_ms;
             report.project_ms += of_part.project_ms;
             done += part.len() as u32;
@@ -171,7 +172,8 @@ impl Worker {
     fn new(sweep: &Sweep<'_>, device: &Arc<Device>, stand_in: StandIn<'_>) -> Result<Self> {
         let radiance = sweep.projection == Projection::Radiance;
         let library = sweep.baker.library();
-        let capture = Capture::new(device, library, sweep.face_px, radiance)?;
+        let mut capture = Capture::new(device, library, sweep.face_px, radiance)?;
+        capture.skips = sweep.baker.faces;
         let bytes = 4 * u64::from(capture.capacity()) * sweep.sample_floats() as u64;
         let columns = capture.columns;
         Ok(Worker {
@@ -204,6 +206,7 @@ impl Worker {
             let found: Vec<f32> = self.samples[1].read(0, plan.len() * floats);
             let mut ledger = ledger.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             ledger.report.add(&timings);
+            ledger.report.faces += plan.iter().flatten().filter(|slot| **slot != NO_SLOT).count() as u32;
             for ((_, job), sample) in batch.iter().zip(found.chunks_exact(floats)) {
                 ledger.values[job.target as usize * floats..][..floats].copy_from_slice(sample);
             }

@@ -3,6 +3,7 @@
 #![doc = ""]
 #![doc = include_str!("MEASURED.md")]
 
+pub mod bake_skips;
 pub mod budget;
 pub mod cases;
 pub mod ceilings;

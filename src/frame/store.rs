@@ -3,7 +3,7 @@
 
 use super::fits::Needs;
 use crate::asset::mesh::Mesh;
-use crate::bake::cache::Cache;
+use crate::bake::cache::{Cache, field_name};
 use crate::bake::capture::unit_positions;
 use crate::bake::chunk::morton;
 use crate::bake::{self, Baker, Report};
@@ -19,6 +19,7 @@ use crate::render::shelf::Shelf;
 use crate::render::variant::Skip;
 use crate::scene::{Entity, Scene};
 use glam::{DVec3, Vec3};
+use std::collections::HashMap;
 use std::ops::Range;
 
 /// Alignment of everything that a pass may bind as a range: the largest that Vulkan lets a device ask for.
@@ -137,15 +138,20 @@ impl Store {
     ) -> Result<Self> {
         let device = baker.device();
         let (mut total, mut channels) = (0, 0);
+        // Meshes that are the same under two names share what is baked.
+        let mut places = HashMap::<String, (Range<u64>, u32)>::new();
         let mut slots: Vec<[Option<Slot>; 2]> = Vec::new();
         for (index, mesh) in scene.meshes.iter().enumerate() {
             slots.push(needs(scene, index, skip).map(|kind| {
                 kind.map(|kind| {
                     let header = bake::header(mesh, kind, options);
-                    let bytes = total..total + header.payload_bytes();
-                    total = bytes.end.next_multiple_of(ALIGNMENT);
-                    let channel = channels;
-                    channels += kind.channels() as u32;
+                    let new = || {
+                        let bytes = total..total + header.payload_bytes();
+                        total = bytes.end.next_multiple_of(ALIGNMENT);
+                        channels += kind.channels() as u32;
+                        (bytes, channels - kind.channels() as u32)
+                    };
+                    let (bytes, channel) = places.entry(field_name(&header)).or_insert_with(new).clone();
                     Slot { header, bytes, channel, extent: Extent::All }
                 })
             }));
@@ -160,11 +166,17 @@ impl Store {
             total.max(ALIGNMENT) + if options.field_bands.is_some() { overrun } else { 0 },
         )?;
         let mut baked = Vec::new();
+        let mut ready = HashMap::<u64, (Header, Extent)>::new();
         for (mesh, slot) in slots
             .iter_mut()
             .zip(&scene.meshes)
             .flat_map(|(pair, mesh)| pair.iter_mut().flatten().map(move |slot| (mesh, slot)))
         {
+            if let Some((header, extent)) = ready.get(&slot.bytes.start) {
+                slot.header = Header { mesh: slot.header.mesh.clone(), ..header.clone() };
+                slot.extent = *extent;
+                continue;
+            }
             let what = format!("{} {}", mesh.name, if slot.header.kind == Kind::Radiance { "light" } else { "shadow" });
             let done = |now, all| progress(&what, now, all);
             let target = (&mut fields, slot.bytes.start);
@@ -172,12 +184,14 @@ impl Store {
                 baked.push(Baked { what, report });
             }
             slot.extent = extent(&download(&fields, slot)?);
+            ready.insert(slot.bytes.start, (slot.header.clone(), slot.extent));
         }
 
         // All at once: growing by halves would hold up to three times as much.
         let quads = 2 * scene.meshes.iter().map(|mesh| mesh.positions.len()).sum::<usize>();
         let (mut transfers, mut vertices, mut geometries) =
             (Vec::new(), Vec::<[f32; 4]>::with_capacity(quads), Vec::new());
+        let mut transfer_of = HashMap::<[u8; 32], u32>::new();
         for (index, (mesh, [blocked, radiance])) in scene.meshes.iter().zip(slots).enumerate() {
             let (centre, radius_m) = mesh.bounding_sphere();
             let vertex_first = vertices.len() as u32;
@@ -187,15 +201,20 @@ impl Store {
                 vertices.push(mesh.normals[v as usize].extend(0.0).to_array());
             }
             let receives = scene.entities.iter().any(|e| e.mesh == index && e.receives);
-            let transfer_first = if receives && bakes_transfer(mesh) {
+            let bakes = receives && bakes_transfer(mesh);
+            let known = transfer_of.get(&mesh.content_hash()).copied().filter(|_| bakes);
+            let transfer_first = if let Some(first) = known {
+                first
+            } else if bakes {
                 let what = format!("{} transfer", mesh.name);
                 let done = |now, all| progress(&what, now, all);
                 let (floats, report) = cache.transfer(baker, mesh, options.bands, options.face_px, &done)?;
                 baked.extend(report.map(|report| Baked { what, report }));
-                let first = transfers.len() / 4;
+                let first = (transfers.len() / 4) as u32;
+                transfer_of.insert(mesh.content_hash(), first);
                 let stride = channel_stride(options.bands);
                 transfers.extend(order.iter().flat_map(|&v| &floats[v as usize * stride..][..stride]));
-                first as u32
+                first
             } else {
                 NONE
             };

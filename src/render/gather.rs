@@ -45,7 +45,7 @@ pub enum Place {
 
 impl Place {
     /// Where lists are made unless somebody says otherwise: llvmpipe takes .1 ms longer than the host among 64 entities, and half
-    /// as long among 1 024.
+    /// as long among 1 024. Where a group finds more than [`FOUND`], the host makes them after all.
     pub fn quicker(device: &Device, entity_count: usize) -> Self {
         if device.info.is_software() && entity_count < 256 { Place::Host } else { Place::Device }
     }
@@ -152,8 +152,8 @@ fn walk(moment: &Moment, scope: &Scope<'_>, chains: &Chains, out: &mut Vec<u32>,
     }
 }
 
-/// Whether clusters are as near one another as neighbours on a surface are, so that they make a group. A space-filling curve leaps
-/// at times, and what spans a leap finds everything between.
+/// Whether clusters are as near one another as neighbours on a surface are, so that they make a group: a space-filling curve leaps
+/// at times. It does not help against a single cluster that spans a leap.
 pub fn compact(clusters: &[Bounds]) -> bool {
     let largest = clusters.iter().map(|bounds| bounds.radius_m).fold(0.0, f32::max);
     Bounds::union(clusters).radius_m <= 2.0 * largest * (clusters.len() as f32).sqrt()

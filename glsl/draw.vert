@@ -4,15 +4,14 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 emission;
 layout(location = 2) in vec4 radiosity;
 layout(location = 0) out vec3 radiance;
-layout(location = 1) flat out float white;
 
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
     vec4 emission_white; // radiance factor; w = radiance that is shown as white
+    float tag;           // tells entities apart
 } push;
 
 void main() {
     radiance = push.emission_white.rgb * emission + radiosity.rgb;
-    white = push.emission_white.w;
     gl_Position = push.clip_from_object * vec4(position, 1.0);
 }

@@ -25,8 +25,11 @@ embedded!(
     "draw.frag",
     "draw.vert",
     "field.glsl",
+    "finish.glsl",
     "gather.comp",
     "gather_scope.glsl",
+    "grid.frag",
+    "grid.vert",
     "merge.comp",
     "merge_cone.glsl",
     "merge_layout.glsl",
@@ -36,6 +39,9 @@ embedded!(
     "repeatable.glsl",
     "show.frag",
     "show.vert",
+    "smooth.frag",
+    "smooth.vert",
+    "srgb.glsl",
 );
 
 /// One compilation of one entry point. Everything that changes the code is in here; the cache key is the whole row.

@@ -56,7 +56,9 @@ fn a_wrong_shader_is_found() {
         ("project.comp", "total *= jobs[job].scale;", "total *= 1.0001 * jobs[job].scale;", "project"),
         ("assemble.comp", "sum *= push.factor;", "sum *= 1.01 * push.factor;", "assemble"),
         ("merge.comp", "float weight = above_horizon", "float weight = 0.999 * above_horizon", "merge"),
-        ("draw.frag", "color = vec4(shown,", "color = vec4(1.01 * shown,", "draw"),
+        ("draw.frag", "finish(radiance,", "1.01 * finish(radiance,", "draw"),
+        ("grid.frag", "push.emission_white.rgb + light", "1.01 * light", "draw"),
+        ("smooth.frag", "float share = 0.5", "float share = 0.6", "draw"),
     ];
     for (file, from, to, pass) in wrong {
         let text = FILES.iter().find(|(name, _)| *name == file).unwrap().1;

@@ -7,15 +7,15 @@ mod stage;
 use common::report;
 use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::frame::Options;
-use shadow_fields::render::draw::Finish;
+use shadow_fields::render::draw::{Antialias, Finish};
 use shadow_fields::scene::{Placement, Scene};
 use stage::{at, scene, small, stage};
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 64;
 
-fn options(multisample: bool) -> Options {
-    Options { size: [WIDTH as u32, HEIGHT as u32], multisample, ..small() }
+fn options(antialias: Antialias) -> Options {
+    Options { size: [WIDTH as u32, HEIGHT as u32], antialias, ..small() }
 }
 
 /// Balls of radius .4 m that shine and are not lit, seen from z = 5 m along -z.
@@ -30,9 +30,9 @@ fn balls(environment: &str, emissions: &[[f32; 3]]) -> Scene {
 
 type Picture = Vec<[f32; 3]>;
 
-fn draw(stage: &stage::Stage, scene: &Scene, places: &[[f32; 3]], multisample: bool, white: f32) -> Picture {
+fn draw(stage: &stage::Stage, scene: &Scene, places: &[[f32; 3]], antialias: Antialias, white: f32) -> Picture {
     let placements: Vec<_> = places.iter().map(|&[x, y, z]| at(x, y, z)).collect();
-    let mut frame = stage.frame(scene, options(multisample));
+    let mut frame = stage.frame(scene, options(antialias));
     frame.render(&placements, Some(white)).unwrap();
     let picture = frame.picture();
     assert_eq!(picture.len(), 3 * WIDTH * HEIGHT);
@@ -59,7 +59,7 @@ fn things_stand_where_they_should() {
     let scene = balls("", &[RED]);
     // 40 degrees over 64 pixels at 5 m: 17.58 pixels a metre.
     let px_per_m = HEIGHT as f32 / (2.0 * 5.0 * 20_f32.to_radians().tan());
-    let see = |place| middle(&draw(&stage, &scene, &[place], true, 1.0), 0);
+    let see = |place| middle(&draw(&stage, &scene, &[place], Antialias::Samples, 1.0), 0);
     for (place, x, y) in [
         ([0.0, 0.0, 0.0], 0.0, 0.0),
         ([1.0, 0.0, 0.0], 1.0, 0.0),
@@ -85,20 +85,20 @@ fn nearer_hides_farther() {
     let scene = balls("", &[RED, BLUE]);
     let centre = WIDTH / 2 + HEIGHT / 2 * WIDTH;
     for (places, front) in [([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], RED), ([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], BLUE)] {
-        let picture = draw(&stage, &scene, &places, true, 1.0);
+        let picture = draw(&stage, &scene, &places, Antialias::Samples, 1.0);
         assert_eq!(picture[centre], front, "places {places:?}");
         let back = if front == RED { 2 } else { 0 };
         assert_eq!(middle(&picture, back)[2].max(0.0), 0.0, "the nearer ball covers the farther one");
     }
     // Large balls 300 m away, 1 cm one behind the other: reversed depth in f32 tells them apart.
-    let mut frame = stage.frame(&scene, options(true));
+    let mut frame = stage.frame(&scene, options(Antialias::Samples));
     let far = |z| Placement { scale: 40.0, ..at(0.0, 0.0, z) };
     for (placements, front) in [([far(-300.0), far(-300.01)], RED), ([far(-300.01), far(-300.0)], BLUE)] {
         frame.render(&placements, Some(1.0)).unwrap();
         let found = frame.picture()[3 * centre..][..3].iter().map(|c| c.round()).collect::<Vec<_>>();
         assert_eq!(found, front);
     }
-    let behind = draw(&stage, &scene, &[[0.0, 0.0, 7.0], [0.0, 0.0, 6.0]], true, 1.0);
+    let behind = draw(&stage, &scene, &[[0.0, 0.0, 7.0], [0.0, 0.0, 6.0]], Antialias::Samples, 1.0);
     assert!(behind.iter().flatten().all(|c| *c == 0.0), "what is behind the camera is not seen");
 }
 
@@ -108,15 +108,15 @@ fn batches_change_nothing() {
     let Some(stage) = stage() else { return };
     let scene = balls("", &[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
     let placements = [at(-0.3, 0.0, 0.0), at(0.3, 0.2, 0.5)];
-    for multisample in [false, true] {
-        let mut frame = stage.frame(&scene, options(multisample));
+    for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
+        let mut frame = stage.frame(&scene, options(antialias));
         frame.render(&placements, Some(1.0)).unwrap();
         let whole = frame.picture();
         assert!(whole.iter().any(|c| *c > 0.5));
         for triangles in [1000, 37] {
             frame.set_batch(triangles);
             frame.render(&placements, Some(1.0)).unwrap();
-            assert!(frame.picture() == whole, "batches of {triangles}, multisampled: {multisample}");
+            assert!(frame.picture() == whole, "batches of {triangles}, {antialias:?}");
         }
     }
 }
@@ -126,7 +126,7 @@ fn background_is_the_mean_of_the_sky() {
     let Some(stage) = stage() else { return };
     // The gradient's mean: base .2 + rise .8 / 4.
     let sky = "environment = { uniform = [0.1, 0.2, 0.3], gradient = { radiance = [1, 0.5, 0] } }";
-    let picture = draw(&stage, &balls(sky, &[RED]), &[[0.0, 0.0, 0.0]], true, 1.0);
+    let picture = draw(&stage, &balls(sky, &[RED]), &[[0.0, 0.0, 0.0]], Antialias::Samples, 1.0);
     for corner in [0, WIDTH - 1, WIDTH * (HEIGHT - 1), WIDTH * HEIGHT - 1] {
         for (found, expected) in picture[corner].iter().zip([0.5, 0.4, 0.3]) {
             // Half floats: 11 bits.
@@ -139,16 +139,68 @@ fn background_is_the_mean_of_the_sky() {
 fn edges_are_smooth_with_samples_only() {
     let Some(stage) = stage() else { return };
     let scene = balls("", &[[1.0, 1.0, 1.0]]);
-    let between = |multisample| {
-        let picture = draw(&stage, &scene, &[[0.0, 0.0, 0.0]], multisample, 1.0);
+    let between = |antialias| {
+        let picture = draw(&stage, &scene, &[[0.0, 0.0, 0.0]], antialias, 1.0);
         // Rounded: interpolated vertex attributes and half floats are off by 5e-4.
         let mut levels: Vec<i32> = picture.iter().map(|p| (400.0 * p[0]).round() as i32).collect();
         levels.sort_unstable();
         levels.dedup();
         levels
     };
-    assert_eq!(between(false), [0, 400]);
-    assert_eq!(between(true), [0, 100, 200, 300, 400], "quarters, from four samples a pixel");
+    assert_eq!(between(Antialias::None), [0, 400]);
+    assert_eq!(between(Antialias::Samples), [0, 100, 200, 300, 400], "quarters, from four samples a pixel");
+}
+
+/// A ball before another, a box with creases and a floor that ends in sight, judged by 64 samples a pixel.
+#[test]
+fn outlines_are_smoother_than_four_samples() {
+    let Some(stage) = stage() else { return };
+    let ball = |color: &str| format!("[[entity]]\nmesh = \"ball\"\nreceives = false\nemission = {color}\n");
+    let text = "environment = { key = { radiance = [3, 3, 3], toward = [1, 2, 3], sharpness = 2 } }\n\
+        [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.4, subdivisions = 3 }\n\
+        [[mesh]]\nname = \"box\"\ncuboid = { size_m = [0.8, 0.8, 0.8], cells = 1 }\n\
+        [[mesh]]\nname = \"floor\"\nplane = { size_m = 3, cells = 4 }\n\
+        [[entity]]\nmesh = \"box\"\n[[entity]]\nmesh = \"floor\"\nalbedo = [0.3, 0.6, 0.3]\n";
+    let scene = scene(&(text.to_owned() + &ball("[0.9, 0.5, 0.3]") + &ball("[0.2, 0.6, 0.9]")));
+    let turned = glam::Quat::from_euler(glam::EulerRot::YXZ, 0.5, 0.6, 0.2);
+    let tilted = glam::Quat::from_rotation_x(0.4);
+    let placements = [
+        Placement { rotation: turned, ..at(0.6, 0.3, 0.3) },
+        Placement { rotation: tilted, ..at(0.1, -0.4, 0.0) },
+        at(-0.8, 0.2, 0.0),
+        at(-0.5, 0.4, -0.6),
+    ];
+    let grid: Vec<glam::DVec2> =
+        (0..64).map(|i| (glam::DVec2::new(f64::from(i % 8), f64::from(i / 8)) + 0.5) / 8.0).collect();
+    let mut wanted = Vec::new();
+    let [none, samples, outlines] = [Antialias::None, Antialias::Samples, Antialias::Outlines].map(|antialias| {
+        let mut frame = stage.frame(&scene, options(antialias));
+        frame.render(&placements, Some(1.0)).unwrap();
+        if wanted.is_empty() {
+            wanted = frame.reference_texels(&placements, 1.0, &grid).unwrap();
+        }
+        frame.picture()
+    });
+    let error = |picture: &[f32]| {
+        let squares = picture.chunks_exact(3).zip(&wanted).map(|(found, wanted)| {
+            let found = glam::DVec3::new(found[0].into(), found[1].into(), found[2].into());
+            found.distance_squared(wanted.color)
+        });
+        (squares.sum::<f64>() / wanted.len() as f64).sqrt()
+    };
+    let [none, samples, outlines] = [none, samples, outlines].map(|picture| error(&picture));
+    report(&format!("error of a pixel: none {none:.4}, samples {samples:.4}, outlines {outlines:.4}"));
+    assert!(outlines < 0.4 * none && outlines < samples, "none {none}, samples {samples}, outlines {outlines}");
+}
+
+/// Lines of what is hidden leave no trace, also where the same entity hides itself.
+#[test]
+fn hidden_outlines_leave_no_trace() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("environment = { uniform = [0.1, 0.1, 0.1] }", &[RED, BLUE]);
+    let picture = |place| draw(&stage, &scene, &[[0.0, 0.0, 1.0], place], Antialias::Outlines, 1.0);
+    assert!(picture([0.0, 0.0, -1.0]) == picture([0.0, 0.0, 9.0]), "behind the first and behind the camera");
+    assert!(picture([0.5, 0.0, -1.0]) != picture([0.0, 0.0, 9.0]), "beside it, it is seen");
 }
 
 #[test]
@@ -158,7 +210,7 @@ fn white_keeps_hue() {
     let places = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
     let centre = |picture: &Picture, x: f32| picture[(48.0 + 17.58 * x) as usize + HEIGHT / 2 * WIDTH];
     for (white, bright) in [(1.0, [1.0, 0.5, 0.25]), (4.0, [4.0, 2.0, 1.0]), (f32::INFINITY, [8.0, 4.0, 2.0])] {
-        let picture = draw(&stage, &scene, &places, true, white);
+        let picture = draw(&stage, &scene, &places, Antialias::Samples, white);
         for (x, expected) in [(-1.0, bright), (1.0, [0.25, 0.5, 0.125])] {
             let found = centre(&picture, x);
             // Two half-float steps.
@@ -176,7 +228,7 @@ fn lit_surfaces_have_their_radiosity() {
         [[entity]]\nmesh = \"wall\"\nalbedo = [0.25, 0.5, 0.75]\nemission = [0.5, 0, 0]\nemits = false\n\
         rotation = { axis = [1, 0, 0], angle_deg = 90 }\n";
     let scene = scene(text);
-    let mut frame = stage.frame(&scene, options(true));
+    let mut frame = stage.frame(&scene, options(Antialias::Samples));
     frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
     let picture = frame.picture();
     for (found, expected) in picture.chunks_exact(3).flatten().zip([0.75_f32, 0.5, 0.75].iter().cycle()) {
@@ -190,11 +242,11 @@ fn screens_are_shown_the_same() {
     let Some(stage) = stage() else { return };
     let scene = balls("environment = { uniform = [0.2, 0.5, 0.05] }", &[[4.0, 1.0, 0.3], [0.1, 0.2, 0.001]]);
     let placements = [at(-0.5, 0.0, 0.0), at(0.6, 0.2, 0.0)];
-    let mut frame = stage.frame(&scene, options(false));
+    let mut frame = stage.frame(&scene, options(Antialias::None));
     let white = 2.0;
     frame.render(&placements, Some(white)).unwrap();
     let linear = frame.picture();
-    frame.set_finish(Finish::Display, false).unwrap();
+    frame.set_finish(Finish::Display, Antialias::None).unwrap();
     frame.render(&placements, Some(white)).unwrap();
     for (shown, linear) in frame.picture().iter().zip(&linear) {
         let levels = 255.0 * (srgb_from_linear(*shown) - srgb_from_linear(linear / white));

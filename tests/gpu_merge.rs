@@ -269,6 +269,8 @@ fn every_barrier_is_needed() {
         outcome.err().map(|error| error.to_string())
     };
     let expected = [
+        // Vertices of triangles, and what fragments of a grid look up.
+        ("radiosity", "pass merge and pass draw"),
         ("radiosity", "pass merge and pass draw"),
         ("picture", "pass draw and pass read back"),
         ("readback", "pass read back and pass host"),

@@ -107,7 +107,7 @@ fn a_scene_is_timed_pass_by_pass() {
     );
     let passes: Vec<_> = rows.iter().map(|row| row["pass"].as_str().unwrap()).collect();
     assert_eq!(passes[..2], ["merge", "merge"]);
-    assert_eq!(passes[passes.len() - 8..], ["draw", "frame"].repeat(4));
+    assert_eq!(passes[passes.len() - 12..], ["draw", "frame"].repeat(6));
     rows.iter().for_each(|row| positive(row, &["/ms/median"]));
     positive(&document["ratios"][0], &["/ratio/p10", "/ratio/median", "/ratio/p90"]);
 }

@@ -10,6 +10,7 @@ use cli::good;
 use shadow_fields::asset::picture;
 use shadow_fields::frame::Options;
 use shadow_fields::render::Variant;
+use shadow_fields::render::draw::Antialias;
 use shadow_fields::scene::Scene;
 use shadow_fields::view::{Command, Editor, Step};
 use stage::{small, stage};
@@ -88,7 +89,8 @@ fn a_saved_state_is_rendered_to_the_picture_that_was_shown() {
 
     let variant = Variant::named("storage").unwrap();
     let bake = shadow_fields::bake::Options { lattice: "cube:4x3".parse().unwrap(), face_px: 16, ..Default::default() };
-    let options = Options { bake, variant: Some(variant), size: editor.size(), multisample: true, ..small() };
+    let options =
+        Options { bake, variant: Some(variant), size: editor.size(), antialias: Antialias::Samples, ..small() };
     let mut frame = stage.frame(editor.scene(), options);
     let white = (-editor.exposure_ev()).exp2();
     frame.render(&editor.placements(), Some(white)).unwrap();

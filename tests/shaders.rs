@@ -25,8 +25,11 @@ fn baking() -> Vec<Row> {
 }
 
 fn drawing() -> Vec<Row> {
-    let fragment = [false, true].map(|display| Row::new("draw.frag", 4).define("DISPLAY", display));
-    fragment.into_iter().chain(["draw.vert", "show.vert", "show.frag"].map(|file| Row::new(file, 4))).collect()
+    let finished = |file| [false, true].map(|display| Row::new(file, 4).define("DISPLAY", display));
+    let fragments = ["draw.frag", "grid.frag", "smooth.frag"].into_iter().flat_map(finished);
+    fragments
+        .chain(["draw.vert", "grid.vert", "show.vert", "show.frag", "smooth.vert"].map(|file| Row::new(file, 4)))
+        .collect()
 }
 
 fn gathering() -> Vec<Row> {

@@ -276,16 +276,18 @@ fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
     let error = stand.viewer.shader_error().unwrap().to_owned();
     assert!(error.contains("draw.frag:3") && error.contains("nonsense"), "{error}");
     assert_eq!(apart(&plain, &stand.shown()), 0, "the pipeline before stays");
-    write(
-        "draw.frag",
-        "#version 460\nlayout(location = 0) out vec4 color;\nvoid main() { color = vec4(1, 0, 0, 1); }\n",
-    );
+    // The floor is drawn as a grid, by a shader of its own.
+    for file in ["grid.frag", "draw.frag"] {
+        write(file, "#version 460\nlayout(location = 0) out vec4 color;\nvoid main() { color = vec4(1, 0, 0, 1); }\n");
+    }
     stand.until("a good shader", |viewer| viewer.shader_error().is_none());
     let red = stand.shown().iter().filter(|p| p[0] > 250 && p[1] == 0 && p[2] == 0).count();
     assert!(red > 10_000, "{red} red pixels");
     // A file that others include: the entry point itself is as it was.
-    std::fs::remove_file(folder.path().join("draw.frag")).unwrap();
-    stand.until("the built-in shader", |viewer| viewer.message().is_some_and(|m| m.ends_with("draw.frag")));
+    for file in ["draw.frag", "grid.frag"] {
+        std::fs::remove_file(folder.path().join(file)).unwrap();
+        stand.until("the built-in shader", |viewer| viewer.message().is_some_and(|m| m.ends_with(file)));
+    }
     let cone = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl/merge_layout.glsl")).unwrap();
     write("merge_layout.glsl", &format!("{cone}\nnonsense\n"));
     stand.until("the including shader's error", |viewer| viewer.shader_error().is_some());

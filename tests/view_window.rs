@@ -178,7 +178,7 @@ fn open<'d>(display: &'d Display, folder: &Path) -> View<'d> {
 /// Small bakes, the window's size, samples as `render` takes them.
 fn arguments() -> Vec<&'static str> {
     let small = &SMALL[..4];
-    ["scene.toml", "--size", "480x320", "--paused", "--no-overlay", "--multisample", "on", "--validation", "sync"]
+    ["scene.toml", "--size", "480x320", "--paused", "--no-overlay", "--antialias", "samples", "--validation", "sync"]
         .into_iter()
         .chain(small.iter().copied())
         .collect()

@@ -8,7 +8,7 @@ use crate::bake;
 use crate::error::{Error, Result};
 use crate::field::Lookup;
 use crate::frame::{Frame, Options};
-use crate::render::draw::Finish;
+use crate::render::draw::{Antialias, Finish};
 use crate::scene::Scene;
 use clap::Args;
 use serde_json::json;
@@ -27,6 +27,9 @@ pub struct Arguments {
     /// Frames that are timed, after two to warm up
     #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     timed_frames: u32,
+    /// How stairs along edges are smoothed in the pictures; all ways are timed
+    #[arg(long, default_value = "samples", value_name = "samples|outlines|none")]
+    antialias: Antialias,
     /// No animations
     #[arg(long)]
     no_animations: bool,
@@ -77,8 +80,19 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(json!({ "origin": origin, "scenes": rows, "pictures": files }).to_string());
         return Ok(());
     }
-    let header =
-        ["scene", "vertices", "entities", "bake s", "merge ms", "draw ms", "frame ms", "frames/s", "at 1 sample"];
+    // Draw, frame and frames/s are with one sample a pixel and smoothed outlines; the last two are frames/s.
+    let header = [
+        "scene",
+        "vertices",
+        "entities",
+        "bake s",
+        "merge ms",
+        "draw ms",
+        "frame ms",
+        "frames/s",
+        "4 samples",
+        "1 sample",
+    ];
     output::table(&header, &rows.iter().map(Row::cells).collect::<Vec<_>>());
     let first = rows.first().map_or(0.0, |row| row.first_picture_s);
     output::say(format!("first picture after {first:.2} s, all after {:.1} s", started.elapsed().as_secs_f64()));
@@ -98,6 +112,8 @@ struct Row {
     merge_ms: f64,
     draw_ms: f64,
     frame_ms: f64,
+    draw_4_samples_ms: f64,
+    frame_4_samples_ms: f64,
     draw_1_sample_ms: f64,
     frame_1_sample_ms: f64,
     first_picture_s: f64,
@@ -116,6 +132,7 @@ impl Row {
             format!("{:.2}", self.draw_ms),
             format!("{:.2}", self.frame_ms),
             format!("{:.1}", 1e3 / self.frame_ms),
+            format!("{:.1}", 1e3 / self.frame_4_samples_ms),
             format!("{:.1}", 1e3 / self.frame_1_sample_ms),
         ]
     }
@@ -141,12 +158,12 @@ fn options(arguments: &Arguments, scene: &Scene) -> Options {
         eps: arguments.merge.eps,
         lists: arguments.merge.lists,
         size: arguments.size.unwrap_or([shape.width, shape.height]),
-        multisample: true,
+        antialias: arguments.antialias,
     }
 }
 
-/// The scene's picture, and its frame time while it moves: frames as a window shows them, not read back, with and without
-/// multisampling.
+/// The scene's picture, and its frame time while it moves: frames as a window shows them, not read back, edges smoothed one way
+/// and another.
 fn still(
     context: &Context,
     arguments: &Arguments,
@@ -162,9 +179,10 @@ fn still(
     let first_picture_s = started.elapsed().as_secs_f64();
     written.push(path);
 
-    let mut timed = [true, false].map(|multisample| (multisample, Times::default()));
-    for (multisample, times) in &mut timed {
-        frame.set_finish(Finish::Display, *multisample)?;
+    let ways = [Antialias::Outlines, Antialias::Samples, Antialias::None];
+    let mut timed = ways.map(|antialias| (antialias, Times::default()));
+    for (antialias, times) in &mut timed {
+        frame.set_finish(Finish::Display, *antialias)?;
         for index in 0..arguments.timed_frames + 2 {
             let placements = scene.at(f64::from(index) / 30.0);
             let start = Instant::now();
@@ -173,12 +191,12 @@ fn still(
             if index >= 2 {
                 let of = |name: &str| passes.iter().find(|t| t.pass == name).map_or(0.0, |t| t.milliseconds);
                 times.merge.push(of("merge"));
-                times.draw.push(of("draw"));
+                times.draw.push(of("draw") + of("smooth"));
                 times.whole.push(wall);
             }
         }
     }
-    let [(_, times), (_, single)] = &timed;
+    let [(_, times), (_, samples), (_, single)] = &timed;
     Ok(Row {
         scene: name,
         vertices: frame.receiver_vertex_count(),
@@ -187,6 +205,8 @@ fn still(
         merge_ms: output::median(&times.merge),
         draw_ms: output::median(&times.draw),
         frame_ms: output::median(&times.whole),
+        draw_4_samples_ms: output::median(&samples.draw),
+        frame_4_samples_ms: output::median(&samples.whole),
         draw_1_sample_ms: output::median(&single.draw),
         frame_1_sample_ms: output::median(&single.whole),
         first_picture_s,

@@ -7,6 +7,7 @@ use crate::asset::picture;
 use crate::bench::text;
 use crate::error::{Error, Result};
 use crate::frame::{Frame, Options};
+use crate::render::draw::Antialias;
 use crate::scene::Scene;
 use crate::truth::{self, ErrorMap, error_map, raycast::RayCast};
 use clap::Args;
@@ -60,6 +61,9 @@ pub struct Arguments {
     /// With --reference or --error: rays a vertex for the sky and for each light
     #[arg(long, default_value_t = 1024, value_name = "N", requires = "judge", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
     rays: u32,
+    /// How stairs along edges are smoothed: four samples a pixel, outlines and creases alone (quick on a software device), or not
+    #[arg(long, default_value = "samples", value_name = "samples|outlines|none")]
+    antialias: Antialias,
     #[command(flatten)]
     merge: MergeArguments,
     #[command(flatten)]
@@ -91,7 +95,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         eps: arguments.merge.eps,
         lists: arguments.merge.lists,
         size: arguments.size.unwrap_or([shape.width, shape.height]),
-        multisample: true,
+        antialias: arguments.antialias,
     };
     let mut frame = context.frame(&scene, options).map_err(|error| match error {
         Error::Input(_) => error.context(arguments.scene.display()),
@@ -168,7 +172,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "options": {
             "bake": options.bake, "lattice": options.bake.lattice.to_string(), "lookup": options.lookup, "skip": options.skip,
             "eps": options.eps,
-            "size": options.size, "multisample": options.multisample,
+            "size": options.size, "antialias": options.antialias,
         },
         "prepare_ms": prepared.as_secs_f64() * 1e3,
         "baked": frame.store.baked,

@@ -1,11 +1,12 @@
 //! `shadow-fields view`
 
 use super::Global;
-use super::context::{BakeArguments, Context, MergeArguments, on_or_off, size};
+use super::context::{BakeArguments, Context, MergeArguments, size};
 use crate::bake::cache::Cache;
 use crate::error::{Error, Result};
 use crate::frame;
 use crate::gpu::{self, Device, PresentMode, Window};
+use crate::render::draw::Antialias;
 use crate::scene::Scene;
 use crate::view::command::Command;
 use crate::view::input::{Button, Event, Key};
@@ -42,9 +43,10 @@ pub struct Arguments {
     /// When finished frames are shown
     #[arg(long, default_value = "fifo", value_name = "fifo|fifo-relaxed|mailbox|immediate")]
     present_mode: PresentMode,
-    /// Four samples a pixel; default: on a GPU, not on a software device
-    #[arg(long, value_name = "on|off", value_parser = on_or_off)]
-    multisample: Option<bool>,
+    /// How stairs along edges are smoothed: four samples a pixel (default on a GPU), outlines and creases alone (default on a
+    /// software device), or not
+    #[arg(long, value_name = "samples|outlines|none")]
+    antialias: Option<Antialias>,
     /// Start with the motion paused
     #[arg(long)]
     paused: bool,
@@ -181,7 +183,7 @@ impl App<'_> {
                 lists: merge.lists,
                 skip: merge.skip,
                 size: own,
-                multisample: self.arguments.multisample.unwrap_or(!device.info.is_software()),
+                antialias: self.arguments.antialias.unwrap_or_else(|| Antialias::usual(device)),
             },
             format: target.format(),
             encodes_srgb: target.encodes_srgb(),

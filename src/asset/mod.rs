@@ -9,12 +9,14 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 
+pub mod edges;
 pub mod embedded;
 pub mod enclose;
 pub mod environment;
 pub mod equirect;
 pub mod false_color;
 pub mod generate;
+pub mod grid;
 pub mod lettering;
 pub mod mesh;
 pub mod obj;

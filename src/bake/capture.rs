@@ -197,7 +197,7 @@ impl Capture {
         cull: bool,
     ) -> Result<()> {
         let background = if self.radiance { [0.0, 0.0, 0.0, 1.0] } else { [1.0; 4] };
-        let target = Target { color: &self.atlas, clear: background, depth: self.depth.as_ref(), resolve: None };
+        let target = Target { color: &self.atlas, clear: Some(background), depth: self.depth.as_ref(), resolve: None };
         let closed = cull && model.closed;
         let pipeline = if closed { &self.closed } else { &self.open };
         let mut vertices = vec![(&model.positions, 0)];

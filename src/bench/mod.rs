@@ -72,6 +72,6 @@ pub fn default_options() -> frame::Options {
         lists: None,
         variant: None,
         size: [16, 16],
-        multisample: false,
+        antialias: crate::render::draw::Antialias::None,
     }
 }

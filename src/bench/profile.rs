@@ -5,7 +5,7 @@ use super::ceilings::Ceilings;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
 use crate::gpu::census::{Census, disassemble};
-use crate::render::draw::Finish;
+use crate::render::draw::{Antialias, Finish};
 use crate::render::merge::Merge;
 use crate::render::variant::{Chain, Form, PRODUCTS, Product, VARIANTS, Variant};
 use crate::render::workload::Workload;
@@ -252,15 +252,20 @@ pub fn scene(
     others.into_iter().for_each(|(pass, times)| add(&pass, "", times));
     let Some((_, frame, ..)) = frames.first_mut() else { return Ok(rows) };
     for (finish, word) in [(Finish::Display, "screen"), (Finish::Linear, "file")] {
-        for (multisample, samples) in [(true, "multisampled"), (false, "1 sample")] {
-            frame.set_finish(finish, multisample)?;
+        for (antialias, samples) in [
+            (Antialias::Samples, "4 samples"),
+            (Antialias::Outlines, "1 sample, outlines"),
+            (Antialias::None, "1 sample"),
+        ] {
+            frame.set_finish(finish, antialias)?;
             let (mut draws, mut walls) = (Vec::new(), Vec::new());
             for run in 0..=runs {
                 let start = Instant::now();
                 let passes = frame.show(&scene.at(f64::from(run) / 30.0), 1.0)?;
                 if run > 0 {
                     walls.push(start.elapsed().as_secs_f64() * 1e3);
-                    draws.extend(passes.iter().filter(|t| t.pass == "draw").map(|t| t.milliseconds));
+                    let drawn = passes.iter().filter(|t| ["draw", "smooth"].contains(&t.pass.as_str()));
+                    draws.push(drawn.map(|t| t.milliseconds).sum::<f64>());
                 }
             }
             let variant = format!("{word}, {samples}");

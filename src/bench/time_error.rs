@@ -10,6 +10,7 @@ use super::{Bench, default_options, verdict};
 use crate::asset::false_color::Scheme;
 use crate::error::{Error, Result};
 use crate::frame::Options;
+use crate::render::draw::Antialias;
 use crate::truth::error_map::Shown;
 use crate::truth::{self, ErrorMap, RayCast, error_map};
 use serde::Serialize;
@@ -102,7 +103,7 @@ const PICTURE_SIZE: [u32; 2] = [720, 480];
 /// Writes the error of every lit vertex in false colour, as `error-` and the case's name.
 fn error_picture(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<Shown> {
     let placements = case.scene.at(case.time_s);
-    let options = Options { size: PICTURE_SIZE, multisample: true, ..default_options() };
+    let options = Options { size: PICTURE_SIZE, antialias: Antialias::Samples, ..default_options() };
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, None)?;
     let share = PICTURE_RAYS[usize::from(!bench.quick)] / frame.receiver_vertex_count().max(1);

@@ -7,6 +7,7 @@ use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::error::Result;
 use crate::frame::{Frame, Options};
+use crate::render::draw::Antialias;
 use crate::scene::Placement;
 
 /// Two half-float steps, and two roundings of interpolated f32.
@@ -41,16 +42,17 @@ pub fn against_twin(frame: &mut Frame, placements: &[Placement], white: f32) -> 
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
     let scene = scene(MIXED)?;
     let placements = scene.at(0.0);
-    for multisample in [false, true] {
-        let mut options = Options { size: [96, 64], multisample, ..options() };
+    for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
+        let mut options = Options { size: [96, 64], antialias, ..options() };
         options.bake.lattice = "cube:2x1".parse().expect("a lattice");
         let mut frame = Frame::new(baker, &Cache::default(), &scene, options, &|_, _, _| ())?;
         for white in [1.0, f32::INFINITY] {
             let worst = against_twin(&mut frame, &placements, white)?;
             let what = format!(
-                "{} sample{} a pixel, white {white}",
+                "{} sample{} a pixel{}, white {white}",
                 frame.samples(),
-                if frame.samples() > 1 { "s" } else { "" }
+                if frame.samples() > 1 { "s" } else { "" },
+                if antialias == Antialias::Outlines { ", outlines" } else { "" }
             );
             add(Row::new("draw", what, "share of pixels", worst, EDGES * snapping(baker.device())));
         }

@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::field::{Lookup, Storage};
 use crate::frame::{Frame, Options};
 use crate::render::Variant;
+use crate::render::draw::Antialias;
 use crate::render::variant::{Chain, PRODUCTS, Skip, VARIANTS};
 use crate::scene::{Placement, Scene};
 use std::path::Path;
@@ -84,7 +85,7 @@ pub fn options() -> Options {
         eps: 0.0,
         lists: Some(crate::render::gather::Place::Host),
         size: [64, 48],
-        multisample: true,
+        antialias: Antialias::Samples,
     }
 }
 

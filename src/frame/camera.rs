@@ -1,8 +1,8 @@
 //! The camera: world to clip space.
 
-use crate::scene::Camera;
-use glam::DMat4;
+use crate::scene::{Camera, Placement};
 use glam::dcamera::rh::{proj::vulkan, view};
+use glam::{DMat4, DVec3};
 
 /// World to Vulkan clip space: y down, reversed depth (1 at the near plane, 0 at infinity). `aspect` is width / height.
 ///
@@ -12,4 +12,12 @@ pub fn clip_from_world(camera: &Camera, aspect: f64) -> DMat4 {
     let near = 1e-3 * eye.distance(target);
     let view = view::look_at_mat4(eye, target, camera.up().as_dvec3());
     vulkan::perspective_infinite_reverse(f64::from(camera.fov_deg).to_radians(), aspect, near) * view
+}
+
+/// From a mesh's frame, metres from the centre of its bounding sphere, to the world; `centre_m` is that centre in the file's.
+pub fn world_from_centred(placement: &Placement, centre_m: DVec3) -> DMat4 {
+    let rotation = placement.rotation.as_dquat().normalize();
+    let scale = f64::from(placement.scale);
+    let centre = placement.position.as_dvec3() + rotation * (centre_m * scale);
+    DMat4::from_scale_rotation_translation(DVec3::splat(scale), rotation, centre)
 }

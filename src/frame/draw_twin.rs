@@ -2,6 +2,8 @@
 
 use super::{Frame, camera};
 use crate::error::Result;
+use crate::render::draw::Drawable;
+use crate::render::smooth::{self, Smooth, Texel};
 use crate::scene::Placement;
 use glam::{DMat3, DVec2, DVec3, DVec4};
 use rayon::prelude::*;
@@ -17,6 +19,10 @@ struct Corners {
     weights: DMat3,
     /// Radiance at the corners: emission and radiosity.
     radiance: [DVec3; 3],
+    /// The entity's tag.
+    tag: f32,
+    /// The entity, where it is drawn as a grid.
+    grid: Option<usize>,
     /// Pixels that it may touch: from and to, in x and y.
     pixels: [[f64; 2]; 2],
 }
@@ -33,24 +39,52 @@ impl Frame {
     /// `Device` when memory ran out.
     pub fn reference_picture(&self, placements: &[Placement], white: f32) -> Result<Vec<[f64; 3]>> {
         let [width, height] = self.options.size;
-        let triangles = self.triangles(placements)?;
         let samples: &[DVec2] = if self.samples() > 1 { &FOUR } else { &ONE };
+        let texels = self.reference_texels(placements, white, samples)?;
+        if self.draw.smooth.is_none() {
+            return Ok(texels.iter().map(|texel| texel.color.to_array()).collect());
+        }
+        let lines = self.outlines(placements, f64::from(width) / f64::from(height));
+        Ok(Smooth::reference(&texels, [width, height], &lines).iter().map(|color| color.to_array()).collect())
+    }
+
+    /// The same for samples at other places of a pixel, (0, 0) to (1, 1), as it is before outlines are smoothed. Depth and tag are
+    /// those of the last sample.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn reference_texels(&self, placements: &[Placement], white: f32, samples: &[DVec2]) -> Result<Vec<Texel>> {
+        let [width, height] = self.options.size;
+        let triangles = self.triangles(placements)?;
+        let camera = &self.scene.data.camera;
+        let near_m = 1e-3 * camera.eye.as_dvec3().distance(camera.target.as_dvec3());
         let shade = |pixel: u32| {
             let corner = DVec2::new(f64::from(pixel % width), f64::from(pixel / width));
             let clip =
                 |at: DVec2| DVec3::new(2.0 * at.x / f64::from(width) - 1.0, 2.0 * at.y / f64::from(height) - 1.0, 1.0);
             let near: Vec<&Corners> = triangles.iter().filter(|t| t.may_touch(corner)).collect();
-            let mut sum = DVec3::ZERO;
+            let mut texel = Texel { color: DVec3::ZERO, depth: 0.0, tag: 1.0 };
             for sample in samples {
                 let at = clip(corner + *sample);
                 let seen = near.iter().filter_map(|t| Some((t.nearness(at)?, t)));
-                sum += match seen.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                let color = match seen.max_by(|a, b| a.0.total_cmp(&b.0)) {
                     // The shader runs once a pixel, at its centre, for all samples that a triangle covers.
-                    Some((_, triangle)) => shown(triangle.at(clip(corner + DVec2::splat(0.5))), f64::from(white)),
-                    None => self.background.as_dvec3(),
+                    Some((nearness, triangle)) => {
+                        (texel.depth, texel.tag) = (near_m * nearness, triangle.tag);
+                        let centre = clip(corner + DVec2::splat(0.5));
+                        // That of a grid looks there for the triangle too.
+                        let same = near.iter().filter(|t| triangle.grid.is_some() && t.grid == triangle.grid);
+                        let at_centre = same.max_by(|a, b| a.depth_within(centre).total_cmp(&b.depth_within(centre)));
+                        shown(at_centre.unwrap_or(triangle).at(centre), f64::from(white))
+                    }
+                    None => {
+                        (texel.depth, texel.tag) = (0.0, 1.0);
+                        self.background.as_dvec3()
+                    }
                 };
+                texel.color += color / samples.len() as f64;
             }
-            (sum / samples.len() as f64).to_array()
+            texel
         };
         Ok((0..width * height).into_par_iter().map(shade).collect())
     }
@@ -65,6 +99,7 @@ impl Frame {
             let mesh = &self.scene.meshes[entity.mesh];
             let radiosity = self.radiosity(index)?;
             let rotation = placement.rotation.as_dquat().normalize();
+            let grid = matches!(self.store.geometries[entity.mesh].drawable, Drawable::Grid(_)).then_some(index);
             let corner = |&i: &u32| {
                 let v = i as usize;
                 let world = placement.position.as_dvec3()
@@ -75,7 +110,10 @@ impl Frame {
             };
             for triangle in &mesh.triangles {
                 let [a, b, c] = [corner(&triangle[0]), corner(&triangle[1]), corner(&triangle[2])];
-                out.extend(Corners::new([a.0, b.0, c.0], [a.1, b.1, c.1], [width, height]));
+                out.extend(
+                    Corners::new([a.0, b.0, c.0], [a.1, b.1, c.1], [width, height], smooth::tag(index))
+                        .map(|corners| Corners { grid, ..corners }),
+                );
             }
         }
         Ok(out)
@@ -90,7 +128,7 @@ fn shown(radiance: DVec3, white: f64) -> DVec3 {
 
 impl Corners {
     /// `None` for a triangle that is seen from its edge.
-    fn new(clip: [DVec4; 3], radiance: [DVec3; 3], size: [f64; 2]) -> Option<Self> {
+    fn new(clip: [DVec4; 3], radiance: [DVec3; 3], size: [f64; 2], tag: f32) -> Option<Self> {
         let matrix = DMat3::from_cols_array_2d(&clip.map(|c| [c.x, c.y, c.w]));
         let weights = matrix.inverse();
         if !weights.is_finite() || matrix.determinant() == 0.0 {
@@ -107,7 +145,7 @@ impl Corners {
                 whole
             }
         };
-        Some(Corners { weights, radiance, pixels: [range(0), range(1)] })
+        Some(Corners { weights, radiance, tag, grid: None, pixels: [range(0), range(1)] })
     }
 
     /// Whether it may cover any of the pixel whose corner is given.
@@ -119,6 +157,12 @@ impl Corners {
     fn nearness(&self, at: DVec3) -> Option<f64> {
         let weights = self.weights * at;
         (weights.min_element() >= 0.0).then(|| weights.element_sum())
+    }
+
+    /// The least weight of its corners at a place on the screen: how far within it is, or beyond where negative.
+    fn depth_within(&self, at: DVec3) -> f64 {
+        let weights = self.weights * at;
+        (weights / weights.element_sum()).min_element()
     }
 
     /// Its radiance at a place on the screen, also beyond its edges.

@@ -6,14 +6,12 @@ use super::gathering::Gathering;
 use super::store::Store;
 use crate::bake::cache::Cache;
 use crate::error::Result;
-use crate::gpu::{Access, Buffer, BufferKind, Commands, Image, Timing};
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Timing};
 use crate::render::calibrate;
-use crate::render::draw::{Draw, Finish, Item, Pane};
+use crate::render::draw::Draw;
 use crate::render::merge::Merge;
 use crate::render::variant::{Form, Variant};
 use crate::scene::{Camera, Placement, Scene};
-use ash::vk;
-use glam::Vec3;
 use std::sync::atomic::Ordering;
 
 /// Where the radiosity of a part of the picture comes from.
@@ -59,53 +57,10 @@ impl Frame {
         if self.merged.merged_clusters > 0 {
             self.record_merge(commands)?;
             commands.barrier(Access::ComputeWrite, Access::VertexRead);
+            commands.barrier(Access::ComputeWrite, Access::FragmentSampled);
         }
         self.recorded.store(true, Ordering::Relaxed);
         Ok(())
-    }
-
-    /// Records the picture, part by part, to be read by a fragment shader. `white` as in [`Frame::render`].
-    ///
-    /// # Errors
-    /// As [`Frame::render`].
-    pub fn record_picture<'f>(
-        &'f self,
-        commands: &mut Commands<'f>,
-        placements: &[Placement],
-        parts: &[Part],
-        white: f32,
-    ) -> Result<()> {
-        let lists: Vec<Vec<Item<'f>>> = parts
-            .iter()
-            .map(|part| {
-                let mut items = self.items(placements, f64::from(part.area[2]) / f64::from(part.area[3].max(1)));
-                if matches!(part.lit, Lit::Colors(_)) {
-                    items.iter_mut().for_each(|item| item.emission = Vec3::ZERO);
-                }
-                items
-            })
-            .collect();
-        let radiosity = |lit| match lit {
-            Lit::Merged => &self.radiosity,
-            Lit::Panel(i) | Lit::Colors(i) => self.panels[i].as_ref().unwrap_or(&self.radiosity),
-        };
-        let panes: Vec<Pane<'_, 'f>> = parts
-            .iter()
-            .zip(&lists)
-            .map(|(part, items)| Pane { items, radiosity: radiosity(part.lit), area: part.area })
-            .collect();
-        for image in self.draw.attachments() {
-            let depth = image.shape.format == vk::Format::D32_SFLOAT;
-            commands.image_barrier(image, None, if depth { Access::DepthWrite } else { Access::ColorWrite });
-        }
-        commands.pass("draw", |c| self.draw.record_panes(c, &panes, self.background, white))?;
-        commands.image_barrier(&self.draw.picture, Some(Access::ColorWrite), Access::FragmentSampled);
-        Ok(())
-    }
-
-    /// The picture that was recorded last: linear RGBA, white as it was recorded with.
-    pub fn shown(&self) -> &Image {
-        &self.draw.picture
     }
 
     /// Radiosity of every entity's vertices from elsewhere, by entity in the mesh's order, for the panel at that place: 0 or 1.
@@ -132,32 +87,6 @@ impl Frame {
         buffer.fill(0, &quads)
     }
 
-    /// Makes pictures of another size from now on.
-    ///
-    /// # Errors
-    /// `Input` when it is larger than the device's images.
-    pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
-        if size != self.options.size {
-            self.draw = Draw::new(&self.device, &self.library, size, self.options.multisample, self.draw.finish())?;
-            let bytes = 8 * u64::from(size[0]) * u64::from(size[1]);
-            self.readback = Buffer::new(&self.device, "readback", BufferKind::Readback, bytes)?;
-            self.options.size = size;
-        }
-        Ok(())
-    }
-
-    /// Makes pictures for files or for a screen from now on, multisampled or not. A frame begins with linear ones.
-    ///
-    /// # Errors
-    /// `Failed` when a shader does not compile.
-    pub fn set_finish(&mut self, finish: Finish, multisample: bool) -> Result<()> {
-        if (finish, multisample) != (self.draw.finish(), self.options.multisample) {
-            self.draw = Draw::new(&self.device, &self.library, self.options.size, multisample, finish)?;
-            self.options.multisample = multisample;
-        }
-        Ok(())
-    }
-
     /// As [`Frame::render`] with a picture that stays on the device, as a window would show it.
     ///
     /// # Errors
@@ -172,11 +101,12 @@ impl Frame {
 
     fn light_and_show(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
         self.prepare(placements)?;
-        let area = [0, 0, self.options.size[0], self.options.size[1]];
+        let whole = self.whole(Lit::Merged);
+        self.prepare_picture(placements, &[whole])?;
         loop {
             let mut commands = Commands::new(&self.device, "frame")?;
             self.record_light(&mut commands)?;
-            self.record_picture(&mut commands, placements, &[Part { area, lit: Lit::Merged }], white)?;
+            self.record_picture(&mut commands, placements, &[whole], white)?;
             let timings = commands.submit()?;
             if self.all_gathered() {
                 return Ok(timings);
@@ -208,20 +138,6 @@ impl Frame {
     /// Sees the scene from elsewhere from now on.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.scene.data.camera = camera.clone();
-    }
-
-    /// The picture at full quality, whatever is shown: multisampled where the device can, linear RGB, three floats a pixel, rows
-    /// from the top; `white` as in [`Frame::render`]. Waits.
-    ///
-    /// # Errors
-    /// As [`Frame::render`].
-    pub fn still(&mut self, placements: &[Placement], white: f32) -> Result<Vec<f32>> {
-        self.device.settle();
-        let fine = Draw::new(&self.device, &self.library, self.options.size, true, Finish::Linear)?;
-        let usual = std::mem::replace(&mut self.draw, fine);
-        let outcome = self.render(placements, Some(white)).map(|_| self.picture());
-        self.draw = usual;
-        outcome
     }
 
     /// Draws at most so many triangles in one render pass from now on, see [`Draw::batch_triangles`]; a multiple of one at least.
@@ -256,9 +172,10 @@ impl Frame {
     /// `Failed` with the compiler's lines.
     pub fn reload(&mut self, changed: &[String]) -> Result<()> {
         let uses = |files: &[String]| files.iter().any(|file| changed.contains(file));
-        if uses(&self.library.files("draw.vert")) || uses(&self.library.files("draw.frag")) {
+        let drawing = ["draw.vert", "draw.frag", "grid.vert", "grid.frag", "smooth.vert", "smooth.frag"];
+        if drawing.iter().any(|entry| uses(&self.library.files(entry))) {
             let options = self.options;
-            self.draw = Draw::new(&self.device, &self.library, options.size, options.multisample, self.draw.finish())?;
+            self.draw = Draw::new(&self.device, &self.library, options.size, options.antialias, self.draw.finish())?;
         }
         if uses(&self.library.files("gather.comp")) && self.gathering.is_some() {
             self.gathering = Some(Gathering::new(&self.device, &self.library, &self.lists)?);

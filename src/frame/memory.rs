@@ -18,7 +18,7 @@ pub struct Memory {
     pub radiosity: u64,
     /// What is drawn: positions, emission and indices of meshes.
     pub drawables: u64,
-    /// Entities, clusters, steps and sky.
+    /// Entities, clusters, steps, sky and outlines.
     pub lists: u64,
     /// Images and the buffer that a picture is read back through.
     pub pictures: u64,
@@ -44,6 +44,7 @@ impl Frame {
             radiosity: self.radiosity.size_bytes,
             drawables: self.store.geometries.iter().map(|geometry| geometry.drawable.size_bytes()).sum(),
             lists: uploads.iter().map(|upload| upload.all_bytes()).sum::<u64>()
+                + self.lines.size_bytes()
                 + self.gathering.as_ref().map_or(0, Gathering::size_bytes),
             pictures: self.readback.size_bytes + self.draw.size_bytes(),
             host_lists: self.lists.size_bytes(),

@@ -12,11 +12,12 @@ mod gathering;
 pub mod lists;
 mod live;
 pub mod memory;
+mod picture;
 mod pose;
 pub mod store;
 mod twin;
 
-use crate::asset::picture::linear_from_srgb;
+use crate::asset::edges::Edges;
 use crate::bake;
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
@@ -26,9 +27,10 @@ use crate::field::quantity::channel_stride;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing, Upload, Volume};
 use crate::layout;
 use crate::render::calibrate;
-use crate::render::draw::{Draw, Finish, Item};
+use crate::render::draw::{Antialias, Draw, Finish};
 use crate::render::gather::Place;
 use crate::render::merge::{Inputs, Merge, Readable};
+use crate::render::smooth::Lines;
 use crate::render::variant::{Chain, Form, Skip, Variant, uniform_entities};
 use crate::scene::{Placement, Scene};
 use crate::sh::basis::{Y00, coefficient_count};
@@ -36,9 +38,9 @@ use crate::shaders::Library;
 use ash::vk;
 use form::{form, usable};
 use gathering::Gathering;
-use glam::{DMat4, DVec3, Vec3};
-use half::f16;
+use glam::Vec3;
 use lists::{Lists, Merged};
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use store::{Progress, Store};
@@ -65,8 +67,8 @@ pub struct Options {
     pub lists: Option<Place>,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
-    /// Whether pictures are multisampled where the device can.
-    pub multisample: bool,
+    /// How edges are kept from showing as stairs.
+    pub antialias: Antialias,
 }
 
 /// A scene on a device, ready to be lit and drawn at any time.
@@ -103,6 +105,11 @@ pub struct Frame {
     background: Vec3,
     /// Radiosity from elsewhere that is shown beside the merged one or in its place.
     panels: [Option<Buffer>; 2],
+    /// Outlines and creases of the picture that was prepared last, and which of them belong to each of its parts.
+    lines: Lines,
+    line_ranges: Vec<Range<u32>>,
+    /// Edges of each mesh, once a picture wants its outlines.
+    edges: Vec<Edges>,
 }
 
 impl Frame {
@@ -133,7 +140,7 @@ impl Frame {
         let gathers = options.lists.unwrap_or_else(|| Place::quicker(device, scene.entities.len())) == Place::Device
             && !lists.clusters.is_empty();
         let gathering = gathers.then(|| Gathering::new(device, library, &lists)).transpose()?;
-        let draw = Draw::new(device, library, options.size, options.multisample, Finish::Linear)?;
+        let draw = Draw::new(device, library, options.size, options.antialias, Finish::Linear)?;
         let count = scene.entities.len().max(entity_limit as usize) as u64;
         let upload = |name: &str, bytes: u64| Upload::new(device, name, bytes);
         let bands = options.bake.bands;
@@ -150,6 +157,9 @@ impl Frame {
             draw,
             library: library.clone(),
             panels: Default::default(),
+            lines: Lines::new(device)?,
+            line_ranges: Vec::new(),
+            edges: Vec::new(),
             entities: upload("entities", count * size_of::<layout::Entity>() as u64)?,
             clusters: upload("clusters", (lists.clusters.len() * size_of::<layout::Cluster>()) as u64)?,
             steps: upload("steps", 4 * lists.clusters.len() as u64)?,
@@ -205,6 +215,9 @@ impl Frame {
     }
 
     fn light_and_draw(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
+        if white.is_some() {
+            self.prepare_picture(placements, &[self.whole(Lit::Merged)])?;
+        }
         loop {
             self.upload(placements)?;
             let items = self.items(placements, self.aspect());
@@ -213,8 +226,9 @@ impl Frame {
             if let Some(white) = white {
                 if self.merged.merged_clusters > 0 {
                     commands.barrier(Access::ComputeWrite, Access::VertexRead);
+                    commands.barrier(Access::ComputeWrite, Access::FragmentSampled);
                 }
-                self.record_draw(&mut commands, &items, self.background, white)?;
+                self.record_file(&mut commands, &items, self.background, white)?;
             }
             let timings = commands.submit()?;
             if self.all_gathered() {
@@ -236,51 +250,6 @@ impl Frame {
         commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))
     }
 
-    /// Draws the picture from the radiosity as it stands, the last merge's or what [`Frame::set_radiosity`] put there.
-    ///
-    /// # Errors
-    /// As [`Frame::render`].
-    pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
-        let items = self.items(placements, self.aspect());
-        let mut commands = Commands::new(&self.device, "redraw")?;
-        self.record_draw(&mut commands, &items, self.background, white)?;
-        commands.submit()
-    }
-
-    /// As [`Frame::redraw`] for numbers that are no light: nothing shines, nothing is brought down, and the background is given.
-    ///
-    /// # Errors
-    /// As [`Frame::render`].
-    pub fn redraw_unlit(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
-        let mut items = self.items(placements, self.aspect());
-        items.iter_mut().for_each(|item| item.emission = Vec3::ZERO);
-        let mut commands = Commands::new(&self.device, "redraw unlit")?;
-        self.record_draw(&mut commands, &items, background.into(), f32::INFINITY)?;
-        commands.submit()
-    }
-
-    fn record_draw<'f>(
-        &'f self,
-        commands: &mut Commands<'f>,
-        items: &[Item<'f>],
-        background: Vec3,
-        white: f32,
-    ) -> Result<()> {
-        for image in self.draw.attachments() {
-            let depth = image.shape.format == vk::Format::D32_SFLOAT;
-            commands.image_barrier(image, None, if depth { Access::DepthWrite } else { Access::ColorWrite });
-        }
-        commands.pass("draw", |c| self.draw.record(c, items, &self.radiosity, background, white))?;
-        let picture = &self.draw.picture;
-        commands.image_barrier(picture, Some(Access::ColorWrite), Access::TransferRead);
-        commands.pass("read back", |commands| {
-            commands.copy_image(picture, &self.readback);
-            Ok(())
-        })?;
-        commands.barrier(Access::TransferWrite, Access::HostRead);
-        Ok(())
-    }
-
     /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what was computed elsewhere.
     ///
     /// # Errors
@@ -295,18 +264,6 @@ impl Frame {
         };
         let quads: Vec<[f32; 4]> = order.iter().map(quad).collect();
         self.radiosity.fill(self.radiosity_offsets[entity], &quads)
-    }
-
-    /// The last picture: linear RGB, three floats a pixel, rows from the top. Made for a screen, it is decoded: white is 1.
-    pub fn picture(&self) -> Vec<f32> {
-        let pixels = (self.options.size[0] * self.options.size[1]) as usize;
-        if self.draw.finish() == Finish::Display {
-            let bytes: Vec<u8> = self.readback.read(0, 4 * pixels);
-            let linear = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
-            return bytes.chunks_exact(4).flat_map(|p| [linear(p[0]), linear(p[1]), linear(p[2])]).collect();
-        }
-        let halves: Vec<f16> = self.readback.read(0, 4 * pixels);
-        halves.chunks_exact(4).flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
     }
 
     /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without emission;
@@ -357,28 +314,5 @@ impl Frame {
             vertices: Readable::new(&self.store.vertices, self.variant, floats)?,
             sky: Readable::new(&self.sky, self.variant, floats)?,
         })
-    }
-
-    fn aspect(&self) -> f64 {
-        f64::from(self.options.size[0]) / f64::from(self.options.size[1])
-    }
-
-    fn items(&self, placements: &[Placement], aspect: f64) -> Vec<Item<'_>> {
-        let clip_from_world = camera::clip_from_world(&self.scene.data.camera, aspect);
-        let items = placements.iter().enumerate().map(|(index, placement)| {
-            let entity = &self.scene.entities[index];
-            let world_from_object = DMat4::from_scale_rotation_translation(
-                DVec3::splat(placement.scale.into()),
-                placement.rotation.as_dquat().normalize(),
-                self.centre(index, placement),
-            );
-            Item {
-                drawable: &self.store.geometries[entity.mesh].drawable,
-                clip_from_object: (clip_from_world * world_from_object).as_mat4(),
-                emission: entity.emission,
-                radiosity_offset: self.radiosity_offsets[index],
-            }
-        });
-        items.collect()
     }
 }

@@ -192,6 +192,7 @@ impl Store {
         let (mut transfers, mut vertices, mut geometries) =
             (Vec::new(), Vec::<[f32; 4]>::with_capacity(quads), Vec::new());
         let mut transfer_of = HashMap::<[u8; 32], u32>::new();
+        let drawn = scene.entities.iter().map(|entity| scene.meshes[entity.mesh].positions.len()).sum();
         for (index, (mesh, [blocked, radiance])) in scene.meshes.iter().zip(slots).enumerate() {
             let (centre, radius_m) = mesh.bounding_sphere();
             let vertex_first = vertices.len() as u32;
@@ -224,7 +225,7 @@ impl Store {
                 transfer_first,
                 blocked,
                 radiance,
-                drawable: Drawable::new(device, mesh, &order)?,
+                drawable: Drawable::new(device, mesh, &order, drawn)?,
                 order,
                 centre_m: centre.as_dvec3(),
                 radius_m: f64::from(radius_m),

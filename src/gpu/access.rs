@@ -24,7 +24,7 @@ pub enum Access {
     ComputeWrite,
     /// A compute shader reads a texel buffer or a sampled image.
     ComputeSampled,
-    /// A fragment shader reads an image with `texelFetch`.
+    /// A fragment shader reads an image or a texel buffer with `texelFetch`.
     FragmentSampled,
     /// Vertex attributes and indices.
     VertexRead,

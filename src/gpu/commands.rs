@@ -259,6 +259,41 @@ impl<'r> Commands<'r> {
         }
     }
 
+    /// Copies a whole single-sampled image into another of its shape.
+    ///
+    /// # Panics
+    /// When their sizes or formats differ.
+    pub fn copy_between(&mut self, from: &'r Image, to: &'r Image) {
+        let of = |image: &Image| (image.shape.format, image.shape.width, image.shape.height);
+        assert_eq!(of(from), of(to), "{} and {}", from.name, to.name);
+        let pass = self.pass_name();
+        self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
+        self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
+        let range = whole(from.shape.format);
+        let layers = vk::ImageSubresourceLayers {
+            aspect_mask: range.aspect_mask,
+            mip_level: 0,
+            base_array_layer: 0,
+            layer_count: 1,
+        };
+        let region = vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(vk::Extent3D {
+            width: from.shape.width,
+            height: from.shape.height,
+            depth: 1,
+        });
+        // SAFETY: both are borrowed until the commands have run; the layouts are those of the accesses (tracked).
+        unsafe {
+            self.recording.device.handle.cmd_copy_image(
+                self.recording.buffer,
+                from.raw(),
+                Access::TransferRead.layout(),
+                to.raw(),
+                Access::TransferWrite.layout(),
+                &[region],
+            );
+        }
+    }
+
     /// Ends the recording, runs it and waits. Returns the duration of each pass, in order.
     ///
     /// # Errors

@@ -70,6 +70,8 @@ impl<'r> Commands<'r> {
         }
         let set = self.descriptor_set(layout)?;
         let pass = self.pass_name();
+        let graphics = point == vk::PipelineBindPoint::GRAPHICS;
+        let sampled = if graphics { Access::FragmentSampled } else { Access::ComputeSampled };
         for binding in &layout.bindings {
             let resource = resources.get(binding.index as usize).unwrap_or(&Bind::None);
             let complain =
@@ -118,21 +120,16 @@ impl<'r> Commands<'r> {
                 }
                 (BindingKind::Texel, Bind::Texel(view)) => {
                     let buffer = view.buffer;
-                    self.tracker.use_range(buffer.id, &buffer.name, buffer.all(), Access::ComputeSampled, &pass);
+                    self.tracker.use_range(buffer.id, &buffer.name, buffer.all(), sampled, &pass);
                     views = [view.handle];
                     write = write.texel_buffer_view(&views);
                 }
                 (BindingKind::Image, Bind::Image(image)) => {
-                    let access = if point == vk::PipelineBindPoint::GRAPHICS {
-                        Access::FragmentSampled
-                    } else {
-                        Access::ComputeSampled
-                    };
-                    self.tracker.use_image(image.id, &image.name, access, &pass);
+                    self.tracker.use_image(image.id, &image.name, sampled, &pass);
                     images = [vk::DescriptorImageInfo {
                         sampler: vk::Sampler::null(),
                         image_view: image.view(),
-                        image_layout: access.layout(),
+                        image_layout: sampled.layout(),
                     }];
                     write = write.image_info(&images);
                 }

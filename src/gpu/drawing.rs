@@ -11,13 +11,13 @@ use ash::vk;
 use bytemuck::Pod;
 use std::ops::Range;
 
-/// What a render pass draws into. The colour image is cleared, and resolved into `resolve` where one is given.
+/// What a render pass draws into. The colour image is resolved into `resolve` where one is given.
 pub struct Target<'r> {
     /// Colour attachment.
     pub color: &'r Image,
-    /// Colour that it starts with.
-    pub clear: [f32; 4],
-    /// Depth attachment, cleared to 0 (the far end of reversed depth).
+    /// Colour that it starts with; `None` keeps what it holds.
+    pub clear: Option<[f32; 4]>,
+    /// Depth attachment, cleared to 0 (the far end of reversed depth); kept where it has one sample a pixel.
     pub depth: Option<&'r Image>,
     /// Single-sampled image that the multisampled colour is averaged into.
     pub resolve: Option<&'r Image>,
@@ -55,9 +55,9 @@ impl<'r> Commands<'r> {
         let mut color = vk::RenderingAttachmentInfo::default()
             .image_view(target.color.view())
             .image_layout(Access::ColorWrite.layout())
-            .load_op(load)
+            .load_op(if target.clear.is_some() { load } else { vk::AttachmentLoadOp::LOAD })
             .store_op(vk::AttachmentStoreOp::STORE)
-            .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: target.clear } });
+            .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32: target.clear.unwrap_or_default() } });
         if let Some(resolve) = target.resolve.filter(|_| last) {
             self.tracker.use_image(resolve.id, &resolve.name, Access::ColorWrite, &pass);
             color = color
@@ -72,7 +72,11 @@ impl<'r> Commands<'r> {
                 .image_view(depth.view())
                 .image_layout(Access::DepthWrite.layout())
                 .load_op(load)
-                .store_op(if last { vk::AttachmentStoreOp::DONT_CARE } else { vk::AttachmentStoreOp::STORE })
+                .store_op(if last && depth.shape.samples > 1 {
+                    vk::AttachmentStoreOp::DONT_CARE
+                } else {
+                    vk::AttachmentStoreOp::STORE
+                })
                 .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } })
         });
         let colors = [color];
@@ -144,6 +148,18 @@ impl<'r> Drawing<'_, 'r> {
             handle.cmd_draw(buffer, 3, 1, 0, 0);
         }
         Ok(())
+    }
+
+    /// Binds images that the bound pipeline's fragment shader reads, at their binding numbers.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    ///
+    /// # Panics
+    /// Before [`Drawing::bind`], and when resources are not what the shaders declare.
+    pub fn resources(&mut self, resources: &[Bind<'r>]) -> Result<()> {
+        let pipeline = self.pipeline.expect("a pipeline is bound before its resources");
+        self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)
     }
 
     #[cfg(feature = "view")]

@@ -69,9 +69,10 @@ impl Image {
         }
         let depth = shape.format == vk::Format::D32_SFLOAT;
         let usage = match (depth, shape.samples > 1) {
-            (true, _) => Use::DEPTH_STENCIL_ATTACHMENT,
+            (true, true) => Use::DEPTH_STENCIL_ATTACHMENT,
+            (true, false) => Use::DEPTH_STENCIL_ATTACHMENT | Use::SAMPLED,
             (false, true) => Use::COLOR_ATTACHMENT,
-            (false, false) => Use::COLOR_ATTACHMENT | Use::SAMPLED | Use::TRANSFER_SRC,
+            (false, false) => Use::COLOR_ATTACHMENT | Use::SAMPLED | Use::TRANSFER_SRC | Use::TRANSFER_DST,
         };
         let create = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)

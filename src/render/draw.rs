@@ -1,9 +1,12 @@
 //! Pass "draw": lit vertices to a picture.
 //!
 //! Inputs: a mesh an entity (positions from its sphere's centre in metres, emission pattern, indices) and the entity's part
-//! of the radiosity buffer. Output: RGBA of `width` x `height`, multisampled with depth and resolved, linear or as a screen
-//! shows it.
+//! of the radiosity buffer. Output: RGBA of `width` x `height`, linear or as a screen shows it: with one sample a pixel, that
+//! one's entity in alpha and its depth beside it, or multisampled and resolved.
 
+use super::grid::{DrawGrid, GridDrawable};
+use super::smooth::Smooth;
+use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
 use crate::asset::picture::srgb_from_linear;
 use crate::error::Result;
@@ -34,31 +37,76 @@ pub enum Finish {
     Display,
 }
 
+/// How the edges of what is drawn are kept from showing as stairs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Antialias {
+    /// They are not: one sample a pixel.
+    None,
+    /// One sample a pixel, and outlines and creases smoothed by pass "smooth".
+    Outlines,
+    /// Four samples a pixel where the device can.
+    #[default]
+    Samples,
+}
+
+impl Antialias {
+    /// What a device draws at interactive rates: a GPU has samples for next to nothing, a software device shades and resolves each.
+    pub fn usual(device: &Device) -> Self {
+        if device.info.is_software() { Antialias::Outlines } else { Antialias::Samples }
+    }
+}
+
+impl std::str::FromStr for Antialias {
+    type Err = String;
+    fn from_str(word: &str) -> std::result::Result<Self, String> {
+        match word {
+            "none" => Ok(Antialias::None),
+            "outlines" => Ok(Antialias::Outlines),
+            "samples" => Ok(Antialias::Samples),
+            _ => Err(format!("\"{word}\" is none of none, outlines and samples")),
+        }
+    }
+}
+
 /// A mesh as it is drawn.
-pub struct Drawable {
-    positions: Buffer,
-    emission: Buffer,
-    indices: Buffer,
-    index_count: u32,
+pub enum Drawable {
+    /// By its triangles.
+    Triangles {
+        /// Positions from the sphere's centre, metres.
+        positions: Buffer,
+        /// Emission pattern.
+        emission: Buffer,
+        /// Three a triangle.
+        indices: Buffer,
+        /// How many.
+        index_count: u32,
+    },
+    /// As a whole.
+    Grid(GridDrawable),
 }
 
 impl Drawable {
-    /// Uploads a mesh, its vertices in `order`; without colours its emission pattern is white.
+    /// Uploads a mesh, its vertices in `order`; without colours its emission pattern is white. `vertices` are those of all that
+    /// will be drawn together.
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32]) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32], vertices: usize) -> Result<Self> {
         let (centre, _) = mesh.bounding_sphere();
-        let color = |v: usize| mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[v]);
-        let positions: Vec<[f32; 3]> =
-            order.iter().map(|&v| (mesh.positions[v as usize] - centre).to_array()).collect();
-        let emission: Vec<[f32; 3]> = order.iter().map(|&v| color(v as usize).to_array()).collect();
         let mut place = vec![0; order.len()];
         for (at, &v) in order.iter().enumerate() {
             place[v as usize] = at as u32;
         }
+        if let Some(grid) = Grid::find(mesh).filter(|grid| GridDrawable::fits(device, grid.vertices.len(), vertices)) {
+            return Ok(Drawable::Grid(GridDrawable::new(device, &grid, centre, &place)?));
+        }
+        let color = |v: usize| mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[v]);
+        let positions: Vec<[f32; 3]> =
+            order.iter().map(|&v| (mesh.positions[v as usize] - centre).to_array()).collect();
+        let emission: Vec<[f32; 3]> = order.iter().map(|&v| color(v as usize).to_array()).collect();
         let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(|t| t.map(|v| place[v as usize])).collect();
-        Ok(Drawable {
+        Ok(Drawable::Triangles {
             positions: Buffer::with_data(device, "draw positions", &positions)?,
             emission: Buffer::with_data(device, "draw emission", &emission)?,
             indices: Buffer::with_data(device, "draw indices", &triangles)?,
@@ -68,9 +116,22 @@ impl Drawable {
 }
 
 impl Drawable {
+    /// Indices of its triangles.
+    fn index_count(&self) -> u32 {
+        match self {
+            Drawable::Triangles { index_count, .. } => *index_count,
+            Drawable::Grid(_) => GridDrawable::INDEX_COUNT,
+        }
+    }
+
     /// Device memory, bytes.
     pub fn size_bytes(&self) -> u64 {
-        self.positions.size_bytes + self.emission.size_bytes + self.indices.size_bytes
+        match self {
+            Drawable::Triangles { positions, emission, indices, .. } => {
+                positions.size_bytes + emission.size_bytes + indices.size_bytes
+            }
+            Drawable::Grid(grid) => grid.size_bytes(),
+        }
     }
 }
 
@@ -84,6 +145,8 @@ pub struct Item<'d> {
     pub emission: Vec3,
     /// Byte offset of its vertices in the radiosity buffer.
     pub radiosity_offset: u64,
+    /// What a picture's alpha says where it is seen.
+    pub tag: f32,
 }
 
 /// Items in a part of the picture, lit one way.
@@ -101,22 +164,27 @@ pub struct Pane<'i, 'd> {
 struct Push {
     clip_from_object: [f32; 16],
     emission_white: [f32; 4],
+    tag: f32,
 }
 
 /// The pipeline and its images.
 pub struct Draw {
     pipeline: GraphicsPipeline,
+    grid: DrawGrid,
     samples: Option<Image>,
-    depth: Image,
-    /// The finished picture.
+    /// Depth, reversed: of every sample.
+    pub depth: Image,
+    /// The picture as it is drawn.
     pub picture: Image,
     /// Triangles that a render pass draws at most before the next goes on. llvmpipe keeps what is drawn until it has filled it in:
     /// of two million triangles 300 MiB, of which 250 went when it filled each in at once.
     pub batch_triangles: u32,
+    /// What comes after, where outlines are smoothed.
+    pub smooth: Option<Smooth>,
 }
 
 impl Draw {
-    /// For pictures of `width` x `height`, with 4 samples a pixel where `multisample` is set and the device offers it.
+    /// For pictures of `width` x `height`.
     ///
     /// # Errors
     /// `Input` when the picture is larger than the device's images.
@@ -124,12 +192,13 @@ impl Draw {
         device: &Arc<Device>,
         library: &Library,
         [width, height]: [u32; 2],
-        multisample: bool,
+        antialias: Antialias,
         finish: Finish,
     ) -> Result<Self> {
         let limits = &device.limits;
         let offered = limits.framebuffer_color_sample_counts & limits.framebuffer_depth_sample_counts;
-        let samples = if multisample && offered.contains(vk::SampleCountFlags::TYPE_4) { 4 } else { 1 };
+        let samples =
+            if antialias == Antialias::Samples && offered.contains(vk::SampleCountFlags::TYPE_4) { 4 } else { 1 };
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
         let shape = ImageShape { format: color, width, height, samples: 1 };
         let state = GraphicsState { color, depth: Some(DEPTH), samples, cull: vk::CullModeFlags::NONE };
@@ -137,12 +206,16 @@ impl Draw {
         let fragment = library.shader(&Row::new("draw.frag", 4).define("DISPLAY", finish == Finish::Display))?;
         Ok(Draw {
             pipeline: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
+            grid: DrawGrid::new(device, library, state, finish == Finish::Display)?,
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))
                 .transpose()?,
             depth: Image::new(device, "draw depth", ImageShape { format: DEPTH, samples, ..shape })?,
             picture: Image::new(device, "picture", shape)?,
             batch_triangles: if device.info.is_software() { 1 << 18 } else { u32::MAX / 3 },
+            smooth: (antialias == Antialias::Outlines)
+                .then(|| Smooth::new(device, library, shape, finish == Finish::Display))
+                .transpose()?,
         })
     }
 
@@ -156,42 +229,32 @@ impl Draw {
         self.samples.as_ref().map_or(1, |image| image.shape.samples)
     }
 
+    /// The finished picture.
+    pub fn finished(&self) -> &Image {
+        self.smooth.as_ref().map_or(&self.picture, |smooth| &smooth.picture)
+    }
+
     /// Images whose content is thrown away before each frame: colour ones first, the depth image last.
     pub fn attachments(&self) -> impl Iterator<Item = &Image> {
         self.samples.iter().chain([&self.picture, &self.depth])
     }
 
-    /// Device memory of the images, bytes: 8 a sample of colour, 4 of depth.
+    /// Device memory of the images, bytes: 8 a sample of linear colour, 4 of encoded colour and of depth.
     pub fn size_bytes(&self) -> u64 {
         let texels = |image: &Image| {
             let shape = image.shape;
-            let texel_bytes = if shape.format == DEPTH { 4 } else { 8 };
+            let texel_bytes = if shape.format == COLOR { 8 } else { 4 };
             texel_bytes * u64::from(shape.width) * u64::from(shape.height) * u64::from(shape.samples)
         };
-        self.attachments().map(texels).sum()
+        self.attachments().chain(self.smooth.iter().map(|smooth| &smooth.picture)).map(texels).sum()
     }
 
-    /// Draws all items over a background of one colour. Radiance above `white` is brought down to it, hue kept.
+    /// Draws all panes, one after the other, over a background of one colour. Radiance above `white` is brought down to it, hue
+    /// kept.
     ///
     /// # Errors
     /// What recording returns.
     pub fn record<'r>(
-        &'r self,
-        commands: &mut Commands<'r>,
-        items: &[Item<'r>],
-        radiosity: &'r Buffer,
-        background: Vec3,
-        white: f32,
-    ) -> Result<()> {
-        let ImageShape { width, height, .. } = self.picture.shape;
-        self.record_panes(commands, &[Pane { items, radiosity, area: [0, 0, width, height] }], background, white)
-    }
-
-    /// As [`Draw::record`], one pane after the other.
-    ///
-    /// # Errors
-    /// What recording returns.
-    pub fn record_panes<'r>(
         &'r self,
         commands: &mut Commands<'r>,
         panes: &[Pane<'_, 'r>],
@@ -204,7 +267,7 @@ impl Draw {
         };
         let target = Target {
             color: self.samples.as_ref().unwrap_or(&self.picture),
-            clear: background.extend(1.0).to_array(),
+            clear: Some(background.extend(1.0).to_array()),
             depth: Some(&self.depth),
             resolve: self.samples.as_ref().map(|_| &self.picture),
         };
@@ -220,14 +283,21 @@ impl Draw {
             }
             commands.render_part(&target, [number == 0, number + 1 == count], |drawing| {
                 for (pane, item, indices) in batch {
-                    let mesh = item.drawable;
-                    let vertices = [(&mesh.positions, 0), (&mesh.emission, 0), (pane.radiosity, item.radiosity_offset)];
-                    drawing.bind(&self.pipeline, &vertices, &mesh.indices);
                     let [left, top, width, height] = pane.area;
                     drawing.area(left, top, width, height);
+                    let (positions, emission, triangles) = match item.drawable {
+                        Drawable::Triangles { positions, emission, indices, .. } => (positions, emission, indices),
+                        Drawable::Grid(grid) => {
+                            self.grid.record(drawing, (grid, indices), item, pane.radiosity, white)?;
+                            continue;
+                        }
+                    };
+                    let vertices = [(positions, 0), (emission, 0), (pane.radiosity, item.radiosity_offset)];
+                    drawing.bind(&self.pipeline, &vertices, triangles);
                     drawing.push(&Push {
                         clip_from_object: item.clip_from_object.to_cols_array(),
                         emission_white: item.emission.extend(white).to_array(),
+                        tag: item.tag,
                     });
                     drawing.indexed(indices);
                 }
@@ -245,7 +315,7 @@ fn batches<'p, 'i, 'd>(
 ) -> Vec<Vec<(&'p Pane<'i, 'd>, &'i Item<'d>, Range<u32>)>> {
     let (mut batches, mut room) = (vec![Vec::new()], most);
     for (pane, item) in items {
-        let (mut first, end) = (0, item.drawable.index_count);
+        let (mut first, end) = (0, item.drawable.index_count());
         while first < end {
             if room == 0 {
                 batches.push(Vec::new());

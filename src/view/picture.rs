@@ -1,8 +1,9 @@
 //! The viewer's frames: into a window, into an image, into files.
 
-use super::outline::Edges;
+use super::outline::outline;
 use super::save::unedited;
 use super::viewer::{ERROR, HISTORY, REFERENCE, Viewer};
+use crate::asset::edges::Edges;
 use crate::asset::picture;
 use crate::error::{Error, Result};
 use crate::frame::camera::clip_from_world;
@@ -65,6 +66,9 @@ impl Viewer {
             if light {
                 frame.prepare(&placements)?;
             }
+            if pending.any() || resized {
+                frame.prepare_picture(&placements, &parts)?;
+            }
         }
         let mut commands = Commands::new(&self.setup.device, "frame")?;
         commands.after_flights();
@@ -78,7 +82,7 @@ impl Viewer {
         }
         commands.image_barrier(target, None, Access::ColorWrite);
         let (frame, show, overlay, paint) = (&self.frame, &self.show, &mut self.overlay, &self.paint);
-        let color = Target { color: target, clear: [0.02, 0.02, 0.025, 1.0], depth: None, resolve: None };
+        let color = Target { color: target, clear: Some([0.02, 0.02, 0.025, 1.0]), depth: None, resolve: None };
         commands.pass("show", |c| {
             c.render(&color, |drawing| {
                 if let Some(frame) = frame {
@@ -157,11 +161,13 @@ impl Viewer {
         let scene = self.editor.scene();
         let mesh = scene.entities[selected].mesh;
         let edges = self.edges.entry(mesh).or_insert_with(|| Edges::new(&scene.meshes[mesh]));
+        let centre = scene.meshes[mesh].bounding_sphere().0.as_dvec3();
         let [width, height] = self.editor.size().map(f64::from);
         let camera = self.editor.camera();
         let size = DVec2::new(width, height) / f64::from(self.paint.pixels_per_point);
         let placement = self.editor.placements()[selected];
-        let lines = edges.outline(&placement, clip_from_world(camera, width / height), camera.eye.as_dvec3(), size);
+        let clip = clip_from_world(camera, width / height);
+        let lines = outline(edges, centre, &placement, clip, camera.eye.as_dvec3(), size);
         let point = |p: DVec2| egui::pos2(p.x as f32, p.y as f32);
         lines.into_iter().map(|line| line.map(point)).collect()
     }

@@ -5,11 +5,11 @@
 use super::Editor;
 use super::command::{Changed, Command, Effect, Request};
 use super::input::{Event, Input};
-use super::outline::Edges;
 use super::panel::{self, Status};
 use super::reference::Reference;
 use super::reload::Watch;
 use super::task::{Progress, Task};
+use crate::asset::edges::Edges;
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::error::{Error, Result};

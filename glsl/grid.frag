@@ -1,0 +1,39 @@
+#version 460
+#include "finish.glsl"
+// A point of a grid: the radiance that its cell's triangle has there. One fetch finds the triangle, three its corners, which on a
+// software rasteriser is a fraction of what small triangles cost.
+layout(binding = 0) uniform utextureBuffer corners;  // vertices of each cell; see asset::grid
+layout(binding = 1) uniform textureBuffer radiosity; // of every vertex of the scene
+layout(location = 0) in vec2 place;
+layout(location = 0) out vec4 color; // alpha: the entity's tag
+
+layout(push_constant) uniform Push {
+    mat4 clip_from_object;
+    vec4 emission_white; // radiance factor; w = radiance that is shown as white
+    float tag;
+    uint first;  // its first vertex in the radiosity buffer
+    uvec2 cells; // in a row, and rows
+} push;
+
+void main() {
+    uvec2 cell = uvec2(clamp(ivec2(floor(place)), ivec2(0), ivec2(push.cells) - 1));
+    vec2 at = place - vec2(cell);
+    uvec4 corner = texelFetch(corners, int(cell.y * push.cells.x + cell.x));
+    bool upwards = corner.x >= 0x80000000u;
+    corner.x &= 0x7fffffffu;
+    // Two corners lie on the line that the cell's triangles share, the third on this point's side of it.
+    bool far = upwards ? at.y > at.x : at.x + at.y > 1.0;
+    uvec3 triangle = upwards ? uvec3(corner.x, corner.w, far ? corner.z : corner.y)
+                             : uvec3(corner.y, corner.z, far ? corner.w : corner.x);
+    vec3 weight;
+    if (upwards) {
+        weight = far ? vec3(1.0 - at.y, at.x, at.y - at.x) : vec3(1.0 - at.x, at.y, at.x - at.y);
+    } else {
+        weight = far ? vec3(1.0 - at.y, 1.0 - at.x, at.x + at.y - 1.0) : vec3(at.x, at.y, 1.0 - at.x - at.y);
+    }
+    triangle += push.first;
+    vec3 light = weight.x * texelFetch(radiosity, int(triangle.x)).rgb
+               + weight.y * texelFetch(radiosity, int(triangle.y)).rgb
+               + weight.z * texelFetch(radiosity, int(triangle.z)).rgb;
+    color = vec4(finish(push.emission_white.rgb + light, push.emission_white.w), push.tag);
+}

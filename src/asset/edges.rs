@@ -1,0 +1,182 @@
+//! Edges of a mesh, and those of them that a picture shows as lines: outlines and creases.
+
+use super::Mesh;
+use glam::{DMat3, DMat4, DVec3, DVec4, Vec3};
+use std::collections::HashMap;
+
+/// Cosine between normals of one place below which a surface has a crease there: 5 degrees.
+const CREASE_COSINE: f32 = 0.996;
+/// Sine between two faces up to which they lie in one plane and their edge is never seen: rounding of f32 positions.
+const COPLANAR_SINE: f64 = 1e-5;
+
+/// How an edge is seen.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Where exactly one of its two faces looks at the eye; `flipped` where they are wound against one another.
+    Fold { flipped: bool },
+    /// Shaded differently on both sides, and a fold too.
+    Crease { flipped: bool },
+    /// From everywhere: it has one face, or more than two.
+    Border,
+}
+
+struct Edge {
+    ends: [u32; 2],
+    /// Corner of its first face that is on no end of it.
+    far: u32,
+    faces: [u32; 2],
+    kind: Kind,
+}
+
+/// An edge as it is seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    /// In clip space, before the eye and within the picture.
+    pub ends: [DVec4; 2],
+    /// On which side its face lies, going from the first end to the second with x to the right and y down: positive is right.
+    /// A crease has a face on the other side too.
+    pub side: f64,
+}
+
+/// Edges of a mesh with the faces beside them.
+pub struct Edges {
+    /// Places, metres from the centre of the bounding sphere. Vertices at one place are one corner, whatever their normals.
+    corners: Vec<DVec3>,
+    edges: Vec<Edge>,
+    /// Normal of each face, and its product with a point of it.
+    planes: Vec<(DVec3, f64)>,
+}
+
+impl Edges {
+    /// Finds the edges of a mesh, those within a plane left out.
+    pub fn new(mesh: &Mesh) -> Self {
+        let (centre, _) = mesh.bounding_sphere();
+        let mut numbers: HashMap<[u32; 3], u32> = HashMap::with_capacity(mesh.positions.len());
+        let mut corners: Vec<DVec3> = Vec::new();
+        let welded: Vec<u32> = mesh
+            .positions
+            .iter()
+            .map(|position| {
+                // -0 and 0 are one place.
+                *numbers.entry((*position + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert_with(|| {
+                    corners.push((*position - centre).as_dvec3());
+                    corners.len() as u32 - 1
+                })
+            })
+            .collect();
+        let planes = mesh.triangles.iter().map(|t| {
+            let [a, b, c] = t.map(|v| corners[welded[v as usize] as usize]);
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            (normal, normal.dot(a))
+        });
+        let planes: Vec<(DVec3, f64)> = planes.collect();
+        // A side of a triangle: its ends in order of number, whether it runs against that, its place among the corners.
+        let side = |corner: usize| {
+            let triangle = mesh.triangles[corner / 3];
+            let [from, to] = [corner % 3, (corner + 1) % 3].map(|k| welded[triangle[k] as usize]);
+            ([from.min(to), from.max(to)], from > to, corner)
+        };
+        let mut sides: Vec<_> = (0..3 * mesh.triangles.len()).map(side).collect();
+        sides.sort_unstable();
+        // Vertices of the mesh at the ends of a side, in order of the corners' numbers.
+        let vertices = |&(_, reversed, corner): &([u32; 2], bool, usize)| {
+            let triangle = mesh.triangles[corner / 3];
+            let pair = [triangle[corner % 3], triangle[(corner + 1) % 3]].map(|v| v as usize);
+            if reversed { [pair[1], pair[0]] } else { pair }
+        };
+        let differ = |[a, b]: [usize; 2]| {
+            a != b
+                && (mesh.normals[a].dot(mesh.normals[b]) < CREASE_COSINE
+                    || mesh.colors.as_ref().is_some_and(|colors| colors[a] != colors[b]))
+        };
+        let edge = |sides: &[([u32; 2], bool, usize)]| {
+            let (ends, _, first) = sides[0];
+            let far = welded[mesh.triangles[first / 3][(first + 2) % 3] as usize];
+            let face = |side: &([u32; 2], bool, usize)| (side.2 / 3) as u32;
+            let [one, other] = sides else {
+                return Some(Edge { ends, far, faces: [face(&sides[0]); 2], kind: Kind::Border });
+            };
+            let (u, v) = (vertices(one), vertices(other));
+            let crease = differ([u[0], v[0]]) || differ([u[1], v[1]]);
+            let flipped = one.1 == other.1;
+            let [m, n] = [one, other].map(|side| planes[face(side) as usize].0);
+            let straight = m.cross(n).length() < COPLANAR_SINE && (m.dot(n) > 0.0) != flipped;
+            let kind = if crease { Kind::Crease { flipped } } else { Kind::Fold { flipped } };
+            (crease || !straight).then_some(Edge { ends, far, faces: [face(one), face(other)], kind })
+        };
+        let edges = sides.chunk_by(|a, b| a.0 == b.0).filter_map(edge).collect();
+        Edges { corners, edges, planes }
+    }
+
+    /// Edges that the surface ends or folds away at, as seen from `eye` (metres from the centre of the bounding sphere, in the
+    /// mesh's frame), and with `creases` those that it is bent at in sight. Whether something hides them is not asked.
+    pub fn lines(&self, clip_from_object: DMat4, eye: DVec3, creases: bool) -> Vec<Line> {
+        let seen: Vec<bool> = self.planes.iter().map(|(normal, offset)| normal.dot(eye) > *offset).collect();
+        let place = |corner: u32| clip_from_object * self.corners[corner as usize].extend(1.0);
+        let line = |edge: &Edge| {
+            let [a, b] = edge.faces.map(|face| seen[face as usize]);
+            let shown = match edge.kind {
+                Kind::Fold { flipped } => (a == b) == flipped,
+                Kind::Crease { flipped } => (a == b) == flipped || (creases && (a || b)),
+                Kind::Border => true,
+            };
+            if !shown {
+                return None;
+            }
+            let ends = edge.ends.map(place);
+            let [p, q, far] = [ends[0], ends[1], place(edge.far)].map(|c| DVec3::new(c.x, c.y, c.w));
+            let side = DMat3::from_cols(p, q, far).determinant();
+            clipped(ends).map(|ends| Line { ends, side })
+        };
+        self.edges.iter().filter_map(line).collect()
+    }
+}
+
+/// The part of a segment in clip coordinates that is before the eye and between the picture's edges.
+fn clipped([from, to]: [DVec4; 2]) -> Option<[DVec4; 2]> {
+    let sides = |c: DVec4| [c.w - 1e-6, c.w - c.x, c.w + c.x, c.w - c.y, c.w + c.y];
+    let (mut first, mut last) = (0.0, 1.0);
+    for (a, b) in sides(from).into_iter().zip(sides(to)) {
+        if a < 0.0 && b < 0.0 {
+            return None;
+        }
+        let crossing = a / (a - b);
+        if a < 0.0 {
+            first = f64::max(first, crossing);
+        } else if b < 0.0 {
+            last = f64::min(last, crossing);
+        }
+    }
+    (first < last).then(|| [first, last].map(|t| from.lerp(to, t)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate::cuboid;
+
+    /// Clip space of a camera at the origin that looks along -z and sees 90 degrees.
+    const CLIP: DMat4 = DMat4::from_cols_array_2d(&[
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, -1.0],
+        [0.0, 0.0, 0.01, 0.0],
+    ]);
+
+    #[test]
+    fn a_box_shows_its_creases_where_asked() {
+        let edges = Edges::new(&cuboid(Vec3::ONE, 2));
+        // Three faces are seen: six sides of the outline and three creases, two edges each.
+        let place = DVec3::new(-1.0, -1.0, -4.0);
+        let lines = |creases| edges.lines(CLIP * DMat4::from_translation(place), -place, creases);
+        assert_eq!((lines(false).len(), lines(true).len()), (12, 18));
+        // The middle of the picture of the box lies on its side of every outline.
+        for line in lines(false) {
+            let [p, q] = line.ends.map(|c| c.truncate() / c.w);
+            let middle = CLIP * place.extend(1.0);
+            let middle = middle.truncate() / middle.w;
+            let turn = (q - p).truncate().perp_dot((middle - p).truncate());
+            assert!(turn * line.side > 0.0, "{line:?}");
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! Pass "smooth": outlines and creases of a picture with one sample a pixel, smoothed by where they are.
+//!
+//! Every line that the geometry has there cuts the pixels that it runs through; of each, the share beyond the line is mixed in
+//! from the pixel on its other side (Persson, *Geometric Post-process Anti-Aliasing*, 2011). Only those pixels are touched, which
+//! is what makes it cheap where the rasteriser is software. Not smoothed are surfaces that run through one another, and what
+//! is thinner than a pixel stays as broken as one sample leaves it.
+//!
+//! Inputs: the picture with the entity's tag in alpha, its depth (reversed), and two triangles a line that cover the pixels whose
+//! centres lie within half a pixel of it, along y where it is rather level and along x where it is steep. Output: the picture.
+
+use crate::asset::edges::Line;
+use crate::error::Result;
+use crate::gpu::{Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Target, Upload};
+use crate::shaders::{Library, Row};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec2, DVec3, IVec2};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// What lies behind a line may seem nearer by this share of its distance, as in `smooth.frag`.
+const TOLERANCE: f64 = 1e-3;
+
+/// Pixels that a corner may be moved by, as in `smooth.frag`.
+const SNAPPED: f64 = 0.01;
+
+/// How far tags are apart: as 8 bits of alpha tell.
+const TAG_STEP: f32 = 1.0 / 255.0;
+/// Tags in use; the last value is the background's.
+const TAGS: usize = 254;
+
+/// The tag of an entity in a picture's alpha. The 255th has the first one's again: their lines are then told apart by depth alone.
+pub fn tag(entity: usize) -> f32 {
+    (1 + entity % TAGS) as f32 * TAG_STEP
+}
+
+/// Lines as the device draws them, four corners each.
+#[derive(Default)]
+pub struct Strips {
+    corners: Vec<[f32; 4]>,
+    marks: Vec<[f32; 3]>,
+}
+
+impl Strips {
+    /// Adds a line of an entity in a picture, or a part of one, of `size` pixels.
+    pub fn add(&mut self, line: &Line, size: [u32; 2], tag: f32) {
+        let Some(strip) = Strip::new(line, size) else { return };
+        let half = if strip.steep { DVec2::new(0.5, 0.0) } else { DVec2::new(0.0, 0.5) };
+        let size = DVec2::new(size[0].into(), size[1].into());
+        for (end, depth) in strip.ends.iter().zip(strip.depths) {
+            for offset in [-1.0, 1.0] {
+                let at = (*end + half * offset) / size * 2.0 - 1.0;
+                self.corners.push([at.x as f32, at.y as f32, depth as f32, 0.5 * offset as f32]);
+                self.marks.push([strip.inner as f32, f32::from(u8::from(strip.steep)), tag]);
+            }
+        }
+    }
+
+    /// Lines so far.
+    pub fn count(&self) -> usize {
+        self.corners.len() / 4
+    }
+}
+
+/// A line in a picture.
+struct Strip {
+    /// Pixels from the picture's left and top.
+    ends: [DVec2; 2],
+    depths: [f64; 2],
+    /// Whether offsets from it go along x.
+    steep: bool,
+    /// Sign of offsets on the side of its face.
+    inner: f64,
+}
+
+impl Strip {
+    /// `None` for what is a point.
+    fn new(line: &Line, size: [u32; 2]) -> Option<Self> {
+        let size = DVec2::new(size[0].into(), size[1].into());
+        let ends = line.ends.map(|c| (DVec2::new(c.x, c.y) / c.w + 1.0) / 2.0 * size);
+        let along = ends[1] - ends[0];
+        let steep = along.y.abs() > along.x.abs();
+        let inner = line.side.signum() * if steep { -along.y.signum() } else { along.x.signum() };
+        let depths = line.ends.map(|c| c.z / c.w);
+        (along.abs().max_element() > 1e-6).then_some(Strip { ends, depths, steep, inner })
+    }
+}
+
+/// Lines on the device.
+pub struct Lines {
+    corners: Upload,
+    marks: Upload,
+    indices: Upload,
+}
+
+impl Lines {
+    /// None yet.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        Ok(Lines {
+            corners: Upload::new(device, "line corners", 16)?,
+            marks: Upload::new(device, "line marks", 12)?,
+            indices: Upload::new(device, "line indices", 24)?,
+        })
+    }
+
+    /// Uploads lines.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn write(&mut self, strips: &Strips) -> Result<()> {
+        if strips.count() == 0 {
+            return Ok(());
+        }
+        let two = |line: u32| [0, 1, 2, 2, 1, 3].map(|corner| 4 * line + corner);
+        let indices: Vec<[u32; 6]> = (0..strips.count() as u32).map(two).collect();
+        self.corners.write(&strips.corners)?;
+        self.marks.write(&strips.marks)?;
+        self.indices.write(&indices)
+    }
+
+    /// Device memory, bytes.
+    pub fn size_bytes(&self) -> u64 {
+        self.corners.all_bytes() + self.marks.all_bytes() + self.indices.all_bytes()
+    }
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    area: [i32; 4],
+}
+
+/// The pipeline and its picture.
+pub struct Smooth {
+    pipeline: GraphicsPipeline,
+    /// The smoothed picture.
+    pub picture: Image,
+}
+
+impl Smooth {
+    /// For pictures of a shape; `display` where they are encoded.
+    ///
+    /// # Errors
+    /// `Failed` when a shader does not compile.
+    pub fn new(device: &Arc<Device>, library: &Library, shape: ImageShape, display: bool) -> Result<Self> {
+        let state = GraphicsState { color: shape.format, depth: None, samples: 1, cull: vk::CullModeFlags::NONE };
+        let vertex = library.shader(&Row::new("smooth.vert", 4))?;
+        let fragment = library.shader(&Row::new("smooth.frag", 4).define("DISPLAY", display))?;
+        Ok(Smooth {
+            pipeline: GraphicsPipeline::new(device, "smooth", &vertex, &fragment, state)?,
+            picture: Image::new(device, "smooth picture", shape)?,
+        })
+    }
+
+    /// Copies `picture` and smooths the copy. `panes` are parts of the picture, left, top, width and height, and the lines
+    /// of each. Expects the picture as source of a copy and its own one as target, and leaves it as colour attachment.
+    ///
+    /// # Errors
+    /// What recording returns.
+    pub fn record<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        (picture, depth): (&'r Image, &'r Image),
+        lines: &'r Lines,
+        panes: &[([u32; 4], Range<u32>)],
+    ) -> Result<()> {
+        commands.copy_between(picture, &self.picture);
+        commands.image_barrier(&self.picture, Some(Access::TransferWrite), Access::ColorWrite);
+        if panes.iter().all(|(_, range)| range.is_empty()) {
+            return Ok(());
+        }
+        commands.image_barrier(picture, Some(Access::TransferRead), Access::FragmentSampled);
+        commands.image_barrier(depth, Some(Access::DepthWrite), Access::FragmentSampled);
+        let target = Target { color: &self.picture, clear: None, depth: None, resolve: None };
+        commands.render(&target, |drawing| {
+            drawing.bind(&self.pipeline, &[(&lines.corners, 0), (&lines.marks, 0)], &lines.indices);
+            drawing.resources(&[Bind::Image(picture), Bind::Image(depth)])?;
+            for ([left, top, width, height], range) in panes.iter().filter(|(_, range)| !range.is_empty()) {
+                drawing.area(*left, *top, *width, *height);
+                drawing.push(&Push { area: [*left, *top, left + width - 1, top + height - 1].map(u32::cast_signed) });
+                drawing.indexed(6 * range.start..6 * range.end);
+            }
+            Ok(())
+        })
+    }
+
+    /// The twin: smooths a linear picture of `width` x `height`.
+    pub fn reference(texels: &[Texel], [width, height]: [u32; 2], lines: &[(Line, f32)]) -> Vec<DVec3> {
+        let last = IVec2::new(width.cast_signed() - 1, height.cast_signed() - 1);
+        let at = |pixel: IVec2| {
+            let pixel = pixel.clamp(IVec2::ZERO, last);
+            &texels[(pixel.y * width.cast_signed() + pixel.x) as usize]
+        };
+        let mut out: Vec<DVec3> = texels.iter().map(|texel| texel.color).collect();
+        for (line, tag) in lines {
+            let Some(strip) = Strip::new(line, [width, height]) else { continue };
+            let (major, minor) = if strip.steep { (1, 0) } else { (0, 1) };
+            let step = IVec2::from(if strip.steep { (1, 0) } else { (0, 1) });
+            let [from, to] = strip.ends;
+            let (first, end) = (from[major].min(to[major]), from[major].max(to[major]));
+            for column in (first - 0.5).ceil() as i32..(end - 0.5).ceil() as i32 {
+                let share = (f64::from(column) + 0.5 - from[major]) / (to[major] - from[major]);
+                let place = from[minor] + share * (to[minor] - from[minor]);
+                let row = place.floor() as i32;
+                let pixel = if strip.steep { IVec2::new(row, column) } else { IVec2::new(column, row) };
+                if pixel.clamp(IVec2::ZERO, last) != pixel {
+                    continue;
+                }
+                let offset = f64::from(row) + 0.5 - place;
+                let mut across = if offset > 0.0 { -step } else { step };
+                let mut inside = offset * strip.inner > 0.0;
+                let shows = |pixel: IVec2| (at(pixel).tag - tag).abs() < TAG_STEP / 2.0;
+                let [own, beyond, opposite] = [pixel, pixel + across, pixel - across].map(shows);
+                if offset.abs() < SNAPPED && own == beyond && own != opposite {
+                    (across, inside) = (-across, !inside);
+                }
+                let (inner, outer) = if inside { (pixel, pixel + across) } else { (pixel + across, pixel) };
+                let outwards = if inside { across } else { -across };
+                if !shows(inner) {
+                    continue;
+                }
+                let behind = at(outer).depth;
+                let slope = behind - at(outer.clamp(IVec2::ZERO, last) + outwards).depth;
+                let reach = if inside { 1.0 - offset.abs() } else { offset.abs() };
+                let depth = strip.depths[0] + share * (strip.depths[1] - strip.depths[0]);
+                if behind.min(behind + slope * reach) <= depth * (1.0 + TOLERANCE) {
+                    let beyond = at(pixel + across).color;
+                    let number = (pixel.y * width.cast_signed() + pixel.x) as usize;
+                    out[number] = at(pixel).color.lerp(beyond, 0.5 - offset.abs());
+                }
+            }
+        }
+        out
+    }
+}
+
+/// A pixel as the twin of "smooth" reads it.
+#[derive(Clone, Copy, Debug)]
+pub struct Texel {
+    /// Linear.
+    pub color: DVec3,
+    /// Reversed: greater is nearer, 0 infinitely far.
+    pub depth: f64,
+    /// [`tag`] of the entity seen, 1 for the background.
+    pub tag: f32,
+}

@@ -26,6 +26,8 @@ const TOWARD: [f64; 3] = [0.5, 0.707, 0.5];
 const GAP: f64 = 0.02;
 /// Distance of the sphere lights from the teapot's centre, in bounding radii.
 const LIGHT_DISTANCE: f64 = 5.0;
+/// Distance of a disc in the sky: over the floor its direction changes by a quarter of a degree.
+const FAR: f64 = 1000.0;
 
 /// The embedded scenes at their start.
 ///
@@ -72,6 +74,15 @@ pub fn light(scene: &Scene) -> String {
 /// # Errors
 /// None that a test does not show.
 pub fn teapot_lights() -> Result<Vec<Case>> {
+    Ok(floor()?.into_iter().filter(|case| !case.name.contains("disc")).collect())
+}
+
+/// As [`teapot_lights`], and with discs of half-angles of 30 and 15 degrees in the sky last: sphere lights so far away that they look
+/// the same from everywhere.
+///
+/// # Errors
+/// None that a test does not show.
+pub fn floor() -> Result<Vec<Case>> {
     let mesh = Mesh::parse(&embedded::read(Path::new("assets/meshes/teapot.obj"))?, Path::new("teapot.obj"))?;
     let (centre, radius_m) = mesh.bounding_sphere();
     let (centre, scale) = (centre.as_dvec3(), 1.0 / f64::from(radius_m));
@@ -101,10 +112,10 @@ pub fn teapot_lights() -> Result<Vec<Case>> {
         receives = false
         "#
     );
-    let bulb = |half_angle_deg: f64| {
+    let bulb = |half_angle_deg: f64, distance: f64| {
         let length = TOWARD.iter().map(|c| c * c).sum::<f64>().sqrt();
-        let at = TOWARD.map(|c| c * LIGHT_DISTANCE / length);
-        let scale = LIGHT_DISTANCE * half_angle_deg.to_radians().sin();
+        let at = TOWARD.map(|c| c * distance / length);
+        let scale = distance * half_angle_deg.to_radians().sin();
         // As bright at the centre as a unit of cosine-weighted irradiance over pi.
         let radiance = half_angle_deg.to_radians().sin().powi(-2);
         format!(
@@ -122,8 +133,10 @@ pub fn teapot_lights() -> Result<Vec<Case>> {
             format!("[environment]\nkey = {{ radiance = [1, 1, 1], toward = {TOWARD:?}, sharpness = 4 }}"),
             Distant::Bands(4),
         ),
-        ("teapot, (d) sphere light of 15 degrees", bulb(15.0), Distant::Exact),
-        ("teapot, (d) sphere light of 7.5 degrees", bulb(7.5), Distant::Exact),
+        ("teapot, (d) sphere light of 15 degrees", bulb(15.0, LIGHT_DISTANCE), Distant::Exact),
+        ("teapot, (d) sphere light of 7.5 degrees", bulb(7.5, LIGHT_DISTANCE), Distant::Exact),
+        ("teapot, disc of half-angle 30 degrees", bulb(30.0, FAR), Distant::Exact),
+        ("teapot, disc of half-angle 15 degrees", bulb(15.0, FAR), Distant::Exact),
     ];
     let case = |(name, light, distant): (&str, String, Distant)| {
         let path = Path::new("assets/scenes/teapot_over_plane.toml");

@@ -8,6 +8,7 @@ pub mod budget;
 pub mod cases;
 pub mod ceilings;
 pub mod figures;
+pub mod floor;
 pub mod plot;
 pub mod product;
 pub mod profile;

@@ -1,6 +1,7 @@
 //! `shadow-fields bench`: the measurements behind the documentation's figures.
 
 mod common;
+mod floor;
 mod product;
 mod scaling;
 mod skip;
@@ -22,6 +23,8 @@ pub struct Arguments {
 enum What {
     /// What a picture's error is made of, what run time buys, and ray casting beside the merge
     TimeError(time_error::Arguments),
+    /// What band-limiting and sampling cost below a teapot, beside an independent ray caster's figures
+    Floor(floor::Arguments),
     /// What one product costs in every form, alone on the device
     Product(product::Arguments),
     /// What long chains, odd places and odd numbers do to the merge; exit code 1 where one goes wrong
@@ -36,6 +39,7 @@ enum What {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     match &arguments.what {
         What::TimeError(arguments) => time_error::run(global, arguments),
+        What::Floor(arguments) => floor::run(global, arguments),
         What::Product(arguments) => product::run(global, arguments),
         What::Stability(arguments) => stability::run(global, arguments),
         What::Skip(arguments) => skip::run(global, arguments),

@@ -1,0 +1,49 @@
+//! `shadow-fields bench floor`
+
+use super::common::start;
+use crate::app::{Global, output};
+use crate::bench::{floor, text::three};
+use crate::error::{Error, Result};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `bench floor`.
+#[derive(Args)]
+pub struct Arguments {
+    /// Fewer rays
+    #[arg(long)]
+    quick: bool,
+    /// Folder for floor.csv and floor.json
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Measures and prints the table; fails where the bands rung is not what was found independently.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let (context, rows) = start(global, arguments.quick, |bench| floor::run(bench, &arguments.out))?;
+    if global.json {
+        output::say(serde_json::to_value(&rows).expect("results are plain data").to_string());
+    } else {
+        output::say("A teapot over a floor: RMS of radiosity over all vertices, in units of the unoccluded value's");
+        let lines: Vec<Vec<String>> = rows
+            .iter()
+            .map(|row| {
+                let independent = row.independent_bands_per_unoccluded.map_or("-".into(), three);
+                let mut line = vec![row.case.clone(), three(row.bands_per_unoccluded), independent];
+                line.extend([row.below_bands_per_unoccluded, row.total_per_unoccluded].map(three));
+                line.push(three(row.below_bands_per_bands_ratio));
+                line.push(if row.keeps_goal() { "kept" } else { "missed" }.into());
+                line
+            })
+            .collect();
+        let header = ["light", "bands", "independent", "below bands", "total", "below / bands", "goal"];
+        output::table(&header, &lines);
+        output::say(format!("Goal: what is below the bands rung at most {} of it", floor::GOAL));
+    }
+    context.finish()?;
+    let apart: Vec<&str> = rows.iter().filter(|row| !row.agrees()).map(|row| row.case.as_str()).collect();
+    if apart.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Failed(format!("bands rung off by more than a fifth of the independent figure: {}", apart.join("; "))))
+}

@@ -1,0 +1,87 @@
+//! `bench floor`: the teapot alone over a floor, against an independent ray caster's figures for four bands.
+
+use super::Bench;
+use super::budget::{Budget, Effort, Truth, budget};
+use super::cases;
+use super::text::{csv, write};
+use crate::error::{Error, Result};
+use serde::Serialize;
+use serde_json::json;
+use std::path::Path;
+
+/// The independent check's bands rung, root mean square of T0-T1 over that of the unoccluded value, where there is one, in the
+/// order of [`cases::floor`].
+const INDEPENDENT: [Option<f64>; 7] = [Some(0.0023), Some(0.0054), Some(0.0064), None, None, Some(0.036), Some(0.061)];
+
+/// Most that T1-T3 should be of T0-T1.
+pub const GOAL: f64 = 0.45;
+
+/// One light.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Teapot and light.
+    pub case: String,
+    /// T0-T1, root mean square over that of the unoccluded value.
+    pub bands_per_unoccluded: f64,
+    /// The same by the independent check.
+    pub independent_bands_per_unoccluded: Option<f64>,
+    /// T1-T3 in the same unit.
+    pub below_bands_per_unoccluded: f64,
+    /// T0-T3 in the same unit.
+    pub total_per_unoccluded: f64,
+    /// T1-T3 over T0-T1.
+    pub below_bands_per_bands_ratio: f64,
+    /// Everything, relative to T0.
+    pub budget: Budget,
+}
+
+impl Row {
+    fn new(budget: Budget, independent: Option<f64>) -> Self {
+        let unit = budget.t0_per_unoccluded;
+        Row {
+            case: budget.case.clone(),
+            bands_per_unoccluded: unit * budget.bands.rms,
+            independent_bands_per_unoccluded: independent,
+            below_bands_per_unoccluded: unit * budget.below_bands.rms,
+            total_per_unoccluded: unit * budget.total.rms,
+            below_bands_per_bands_ratio: budget.below_bands.rms / budget.bands.rms,
+            budget,
+        }
+    }
+
+    /// Whether the bands rung is within a fifth of the independent check's.
+    pub fn agrees(&self) -> bool {
+        self.independent_bands_per_unoccluded.is_none_or(|known| (self.bands_per_unoccluded / known - 1.0).abs() <= 0.2)
+    }
+
+    /// Whether the rungs below keep to the goal.
+    pub fn keeps_goal(&self) -> bool {
+        self.below_bands_per_bands_ratio <= GOAL
+    }
+}
+
+/// Measures, and writes `floor.csv` and `floor.json` into `folder`.
+///
+/// # Errors
+/// `Failed` when the folder cannot be written; else as [`crate::frame::Frame::new`].
+pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Row>> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+    // All 1 600 vertices: most of the error sits in the few under the teapot.
+    let rays = if bench.quick { 4096 } else { 16384 };
+    let effort = Effort { vertices: usize::MAX, t0_rays: rays, t1_rays: rays };
+    let mut rows = Vec::new();
+    for (case, independent) in cases::floor()?.into_iter().zip(INDEPENDENT) {
+        (bench.progress)(&format!("{}: casting rays", case.name));
+        let truth = Truth::new(&case, effort, bench.seed);
+        rows.push(Row::new(budget(bench, &case, &truth)?, independent));
+    }
+    let origin = json!({
+        "origin": bench.origin, "quick": bench.quick, "seed": bench.seed,
+        "errors": "root mean square over all 1600 vertices, relative to that of the unoccluded value",
+    });
+    let values: Vec<_> = rows.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect();
+    write(&folder.join("floor.csv"), &csv(&origin, &values))?;
+    write(&folder.join("floor.json"), &format!("{:#}\n", json!({ "origin": origin, "rows": rows })))?;
+    Ok(rows)
+}

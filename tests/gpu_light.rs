@@ -322,18 +322,21 @@ fn spinning_sphere_shows_the_interpolation_error() {
 }
 
 #[test]
-fn instances_share_one_field() {
+fn instances_and_equal_meshes_share_one_field() {
     let Some(stage) = stage() else { return };
-    let ball = |name: &str| format!("[[mesh]]\nname = \"{name}\"\nsphere = {{ radius_m = 0.4, subdivisions = 2 }}\n");
-    let two = |second: &str| {
-        let entities =
-            entity("one", "position = [0.3, 0.7, 0.1]") + &entity(second, "position = [-0.4, 0.9, 0]\nscale = 0.7");
-        scene(&format!("{WHITE_SKY}{PATCH}{}{}{}{entities}", ball("one"), ball("two"), entity("patch", "")))
+    let ball = |name: &str, radius_m: f32| {
+        format!("[[mesh]]\nname = \"{name}\"\nsphere = {{ radius_m = {radius_m}, subdivisions = 2 }}\n")
     };
-    let (shared, separate) = (two("one"), two("two"));
-    let bytes = |scene: &Scene| stage.frame(scene, small()).store.fields.size_bytes;
-    assert_eq!(2 * bytes(&shared), bytes(&separate), "instances share a field");
-    assert_eq!(lit(&shared, small(), &stage), lit(&separate, small(), &stage));
+    let pair = |second: &str| {
+        let entities =
+            entity("ball", "position = [0.3, 0.7, 0.1]") + &entity(second, "position = [-0.4, 0.9, 0]\nscale = 0.7");
+        let meshes = ball("ball", 0.4) + &ball("equal", 0.4) + &ball("other", 0.5);
+        scene(&format!("{WHITE_SKY}{PATCH}{meshes}{}{entities}", entity("patch", "")))
+    };
+    let bytes = |second: &str| stage.frame(&pair(second), small()).store.fields.size_bytes;
+    assert_eq!(bytes("equal"), bytes("ball"), "a mesh of another name and the same contents shares the field");
+    assert_eq!(bytes("other"), 2 * bytes("ball"), "another mesh has a field of its own");
+    assert_eq!(lit(&pair("ball"), small(), &stage), lit(&pair("equal"), small(), &stage));
 }
 
 /// The cosine of DESIGN's convention: light from the side that a normal faces, and none from behind.

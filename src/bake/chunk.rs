@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn chunks_hold_every_triangle_once_and_only_backs_are_turned_away() {
-        let mesh = generate::torus(1.0, 0.4, 60, 30);
+        let mesh = generate::torus(1.0, 0.4, 240, 120);
         let unit = unit_positions(&mesh);
         let Chunked { vertices, triangles, chunks } = chunk(&unit, &mesh.triangles).unwrap();
         let canonical = |mut t: [u32; 3]| {

@@ -23,10 +23,10 @@ layout(std140, binding = 0) uniform Entities { Entity entities[ENTITY_LIMIT]; };
 #elif TEXEL
 layout(binding = 0) uniform textureBuffer entities;
 Entity entity_at(uint e) {
-    int at = int(e) * 6;
+    int at = int(e) * 7;
     vec4 third = texelFetch(entities, at + 2);
     return Entity(texelFetch(entities, at), texelFetch(entities, at + 1), third.xy, floatBitsToUint(third.z),
-        floatBitsToUint(third.w), texelFetch(entities, at + 3), texelFetch(entities, at + 4), texelFetch(entities, at + 5));
+        floatBitsToUint(third.w), texelFetch(entities, at + 3), texelFetch(entities, at + 4), texelFetch(entities, at + 5), texelFetch(entities, at + 6));
 }
 #define ENTITY(e) entity_at(e)
 #else
@@ -123,7 +123,7 @@ void main() {
             if (!shines && l != SKY_CHAIN) {
                 weight *= before(e, cone, l, light);
             }
-            vec3 p = to_object(entity, (position - entity.centre.xyz) * entity.centre.w);
+            vec3 p = to_lattice(entity, to_object(entity, (position - entity.centre.xyz) * entity.centre.w));
             uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_STEP : entity.blocked_base;
             float b[FETCHED];
             FieldPlace place = field_place(p, entity.radial);

@@ -8,6 +8,7 @@ struct Entity {
     uint radiance_base;// first quad of the radiance field
     vec4 radial;       // shell coordinate = x * spacing coordinate + y; z = inner, w = outer shell radius in r
     vec4 emission;     // radiance factor of its light; w = its albedo, of the brightest colour
+    vec4 shift;        // added after stretching, in r; w = stretch of its fields, packed
     vec4 albedo;       // albedo / pi; w = uniform scale of the object
 };
 
@@ -29,6 +30,14 @@ vec3 to_object(Entity entity, vec3 p) {
     p.zx = turn_back(entity.alpha_beta.zw, p.zx);
     p.xy = turn_back(entity.gamma, p.xy);
     return p;
+}
+
+// A place (object's frame, in r) in the space of the object's lattice. The stretch of each axis is 1 and 64ths, 0 to 64 of them, of
+// which seven bits an axis make one whole number.
+vec3 to_lattice(Entity entity, vec3 p) {
+    uint packed = uint(entity.shift.w);
+    vec3 sixty_fourths = vec3(packed & 127u, packed >> 7 & 127u, packed >> 14);
+    return p + p * sixty_fourths / 64.0 + entity.shift.xyz;
 }
 
 // A workgroup's worth of neighbouring vertices.

@@ -20,6 +20,8 @@ pub struct Entity {
     pub radial: [f32; 4],
     /// Radiance factor of the entity's light; w = its albedo, of its brightest colour.
     pub emission: [f32; 4],
+    /// What is added to a place after it was stretched, in r; w = what its axes are stretched by ([`crate::field::Fit::packed`]).
+    pub shift: [f32; 4],
     /// Albedo / pi; w = uniform scale of the object.
     pub albedo: [f32; 4],
 }

@@ -210,7 +210,7 @@ fn samples_in_the_tube_are_filled_from_outside() {
             let covered: bool = faces[face][y * px as usize + x];
             [if covered { 0.0 } else { 1.0 }, 0.0, 0.0]
         };
-        let scale = lattice.scale(eye.length().max(lattice.inner)) as f32;
+        let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
         let wanted = project::reference(4, Projection::Blocked, px as usize, Vec3::Y, scale, texel);
         let stored = (sample / directions) as u32 * lattice.stored_direction_count() + own[sample % directions];
         for (k, wanted) in wanted.iter().enumerate() {
@@ -243,7 +243,8 @@ fn one_colour_shines_where_it_blocks() {
                 let wanted: Vec<f64> = b.iter().map(|b| scale * b).collect();
                 let found: Vec<f64> = (0..16).map(|k| radiance.stored(sample, channel, k)).collect();
                 let error = difference(&found, &wanted);
-                assert!(error < 1e-3 * norm(wanted), "{}: sample {sample} channel {channel}: {error}", mesh.name);
+                // Edge-on from afar faces this small may miss a ring altogether.
+                assert!(error <= 1e-3 * norm(wanted), "{}: sample {sample} channel {channel}: {error}", mesh.name);
             }
         }
     }

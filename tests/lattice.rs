@@ -7,7 +7,7 @@ use shadow_fields::bake;
 use shadow_fields::field::lattice::{
     CELL_WARP, Directions, OUTSIDE_INNER, Spacing, cap_cosine, cap_height, unwarp, warp,
 };
-use shadow_fields::field::{Header, Kind, Lattice, Lookup, ShadowField, Storage};
+use shadow_fields::field::{Fit, Header, Kind, Lattice, Lookup, ShadowField, Storage};
 use std::f64::consts::{PI, TAU};
 
 /// A few f64 roundings, widened by the steepest slope of a shell coordinate (some hundreds a unit of distance).
@@ -87,6 +87,40 @@ fn samples_lie_on_their_shells() {
             assert!((position.length() - lattice.shell(shell)).abs() < 1e-12 * lattice.outer, "{lattice}");
             assert!((position - lattice.shell(shell) * unit).length() < 1e-12 * lattice.outer, "{lattice}");
         }
+    }
+}
+
+/// The space of a fitted lattice is that of a round one: the same weights at the mapped place.
+#[test]
+fn fitted_lattices_are_round_ones_in_their_own_space() {
+    let round: Lattice = "cube:6x5,inner=0.4".parse().unwrap();
+    let fitted: Lattice = "cube:6x5,inner=0.4,centre=0.125:-0.25:0,stretch=1:1.5:1.25".parse().unwrap();
+    let mut rng = Rng::with_seed(11);
+    for _ in 0..300 {
+        let q = unit(&mut rng) * 10.0 * rng.f64();
+        let p = DVec3::new(q.x + 0.125, q.y / 1.5 - 0.25, q.z / 1.25);
+        assert!((fitted.distance(p) - q.length()).abs() < 1e-12);
+        let (a, b) = (fitted.corners(p, Lookup::Trilinear), round.corners(q, Lookup::Trilinear));
+        assert_eq!(a.index, b.index, "{p}");
+        assert!(a.weight.iter().zip(b.weight).all(|(a, b)| (a - b).abs() < 1e-9), "{p}");
+    }
+    for index in 0..round.sample_count() {
+        assert!((fitted.fit().apply(fitted.position(index)) - round.position(index)).length() < 1e-12);
+    }
+    // What is chosen once stays.
+    let flat = Fit { centre: [0.0, 0.25, 0.0], stretch: [1.0, 1.5, 1.0] };
+    let chosen = Lattice::default().fitted(flat, |fit| if *fit == flat { 0.375 } else { 9.0 });
+    assert_eq!((chosen.fit(), chosen.inner, chosen.outer), (flat, 0.375, 8.0));
+    assert_eq!(chosen.fitted(Fit::ROUND, |_| 0.5), chosen);
+    assert_eq!(fitted.fitted(flat, |_| 0.5), fitted);
+    assert_eq!(round.fitted(flat, |_| 0.5).fit(), Fit::ROUND, "a first shell of its own");
+    let round_by_word: Lattice = "cube:6x5,round".parse().unwrap();
+    assert_eq!(round_by_word.fitted(flat, |_| 0.5).fit(), Fit::ROUND);
+    for text in [chosen.to_string(), fitted.to_string(), round.to_string(), round_by_word.to_string()] {
+        assert_eq!(text.parse::<Lattice>().unwrap().to_string(), text);
+    }
+    for text in ["cube:6x5,stretch=1:3:1", "cube:6x5,stretch=1:1", "cube:6x5,centre=2:0:0", "cube:6x5,centre=a:0:0"] {
+        text.parse::<Lattice>().expect_err(text);
     }
 }
 
@@ -406,6 +440,13 @@ fn first_shell_follows_the_shape() {
     };
     assert_eq!(first(&generate::sphere(3.0, 3)), OUTSIDE_INNER);
     assert_eq!(first(&generate::torus(1.0, 0.3, 24, 12)), 0.25, "room up to the centre");
+    // A box of 4 x 1 x 2: its middle is the shells', its short edges are stretched by half their proportions.
+    let slab =
+        bake::header(&generate::cuboid(glam::Vec3::new(4.0, 1.0, 2.0), 2), Kind::Occlusion, &bake::Options::default());
+    let lattice = slab.lattice;
+    assert_eq!((lattice.fit().stretch, lattice.outer), ([1.0, 2.0, 1.421875], 8.0));
+    // Half an edge of 1 in bounding radii of sqrt 21 / 2, stretched by 2.
+    assert!((lattice.inner - 2.0 / 21.0_f64.sqrt()).abs() < 1e-6, "{}", lattice.inner);
     // A cube's faces stand 1 / sqrt 3 of the bounding radius from the centre.
     let cube = first(&generate::cuboid(glam::Vec3::ONE, 2));
     assert!((cube - 3.0_f64.sqrt().recip()).abs() < 1e-6, "{cube}");

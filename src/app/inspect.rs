@@ -87,6 +87,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("bands", format!("{} ({} coefficients a channel)", header.bands, header.bands * header.bands)),
         ("lattice", lattice.to_string()),
         ("shells", format!("{} r", shells.join(" "))),
+        ("fit", format!("about {:?} r, stretched by {:?}", lattice.fit().centre, lattice.fit().stretch)),
         ("samples", format!("{} ({} inside, seen from the surface)", lattice.sample_count(), header.filled_samples)),
         ("captured", format!("{} of them, the others turned", header.captured_samples)),
         ("symmetry", header.symmetry.clone()),
@@ -178,8 +179,9 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
                 let longitude = std::f64::consts::TAU * column as f64 / LONGITUDES as f64;
                 let direction =
                     DVec3::new(latitude.cos() * longitude.cos(), latitude.sin(), latitude.cos() * longitude.sin());
-                eyes.push(direction * distance);
-                cells.push(reconstruct(field, direction * distance));
+                let eye = lattice.fit().invert(direction * distance);
+                eyes.push(eye);
+                cells.push(reconstruct(field, eye));
             }
             rows.push((format!("{latitude_deg:+.0} deg, {distance:.2} r"), cells));
         }

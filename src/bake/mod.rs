@@ -24,7 +24,7 @@ use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
 use crate::field::quantity::{Kind, Storage, channel_stride};
-use crate::field::{Header, Lattice, ShadowField, growth};
+use crate::field::{Fit, Header, Lattice, ShadowField, growth};
 use crate::gpu::{Buffer, Commands, Device};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
@@ -82,16 +82,18 @@ pub const TRANSFER_OFFSET: f32 = 2e-3;
 /// Told how many of how many samples are done.
 pub type Progress<'p> = &'p dyn Fn(u32, u32);
 
-/// First shell that an object needs, in r: just off the bounding sphere if it fills it; the distance of its surface from the
-/// centre if that is inside the solid, since no receiver comes nearer; else well inside.
-pub fn first_shell(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
-    let surface = Surface::new(positions, triangles);
+/// First shell that an object needs, in the lattice's space: just off a ball if the object fills one; the distance of its surface
+/// from the centre if that is inside the solid, since no receiver comes nearer; else well inside.
+pub fn first_shell(fit: &Fit, positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
+    let placed: Vec<Vec3> = positions.iter().map(|p| fit.apply(p.as_dvec3()).as_vec3()).collect();
+    let surface = Surface::new(&placed, triangles);
     if !surface.encloses(DVec3::ZERO) {
         return ROOMY_INNER;
     }
     let nearest = surface.distance(DVec3::ZERO);
+    let farthest = placed.iter().map(|p| f64::from(p.length())).fold(0.0, f64::max);
     // A tessellated sphere's facets lie a few percent inside it.
-    if nearest > 0.93 { OUTSIDE_INNER } else { nearest.max(ROOMY_INNER) }
+    if nearest > 0.93 * farthest { OUTSIDE_INNER * farthest.max(1.0) } else { nearest.max(ROOMY_INNER) }
 }
 
 /// The hash of a mesh's contents as headers hold it.
@@ -102,13 +104,14 @@ pub fn hash_text(mesh: &Mesh) -> String {
 /// Header of the field that a bake of `mesh` would make.
 pub fn header(mesh: &Mesh, kind: Kind, options: &Options) -> Header {
     let (centre, radius_m) = mesh.bounding_sphere();
-    let first = first_shell(&unit_positions(mesh), &mesh.triangles);
+    let positions = unit_positions(mesh);
+    let first = |fit: &Fit| first_shell(fit, &positions, &mesh.triangles);
     let brightest = mesh.colors.iter().flatten().map(|c| c.max_element()).fold(0.0, f32::max);
     Header {
         kind,
         bands: if kind == Kind::Occlusion { options.occlusion_bands() } else { options.bands },
         storage: options.storage,
-        lattice: options.lattice.starting_at(first),
+        lattice: options.lattice.fitted(Fit::new(&positions), first),
         face_px: options.face_px,
         filled_samples: 0,
         captured_samples: 0,
@@ -236,7 +239,7 @@ impl Baker {
         let seen = positions.iter().enumerate().filter(|(index, _)| !unseen[*index] && twins[*index].is_none());
         for (index, position) in seen {
             let eye = pushed[index].unwrap_or(*position);
-            let scale = lattice.scale(eye.length().max(lattice.inner)) as f32;
+            let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
             targets.push((eye.as_vec3(), Job { normal: [0.0; 4], slots: [0; 6], target: index as u32, scale }));
         }
         let projection = if radiance { Projection::Radiance } else { Projection::Blocked };
@@ -333,7 +336,7 @@ impl Baker {
             header.symmetry = "off".to_owned();
             return Plan { twins: vec![None; inside.len()], round: Vec::new() };
         }
-        let symmetry = Symmetry::of(mesh, surface, header.kind == Kind::Radiance);
+        let symmetry = Symmetry::of(mesh, surface, header.kind == Kind::Radiance).kept_by(&header.lattice.fit());
         header.symmetry = symmetry.describe();
         let distance = |sample: u32| {
             let position = header.lattice.position(sample);

@@ -10,6 +10,7 @@ use super::capture::unit_positions;
 use super::inside::nearest_on_triangle;
 use super::surface::Surface;
 use crate::asset::Mesh;
+use crate::field::Fit;
 use glam::{DMat3, DVec3, IVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -70,6 +71,16 @@ impl Symmetry {
             .collect();
         operations.sort_by(|a, b| a.deviation.total_cmp(&b.deviation));
         Symmetry { operations, ..Symmetry::default() }
+    }
+
+    /// Those under which the lattice's space stays as it is: only they take samples to samples.
+    pub fn kept_by(mut self, fit: &Fit) -> Self {
+        self.operations.retain(|operation| fit.keeps(operation.matrix));
+        for (axis, revolution) in DVec3::AXES.into_iter().zip(&mut self.revolution) {
+            *revolution = revolution.filter(|_| fit.keeps(DMat3::from_axis_angle(axis, 1.0)));
+        }
+        self.sphere = self.sphere.filter(|_| *fit == Fit::ROUND);
+        self
     }
 
     /// In words, for headers.

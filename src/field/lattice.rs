@@ -1,10 +1,11 @@
 //! Where a field is sampled around its object, and which samples a receiver interpolates.
 //!
-//! Distances are in units of the bounding-sphere radius r, directions in the object's frame. A lattice is a product of
-//! shells (radii) and directions. Interpolation runs over a *stored* arrangement in which every cube face carries a border
+//! Distances are in units of the bounding-sphere radius r, directions in the object's frame, both taken in the space that
+//! [`Fit`] makes of it. A lattice is a product of shells (radii) and directions. Interpolation runs over a *stored* arrangement in which every cube face carries a border
 //! of one cell copied from its neighbours (a corner cell is the mean of the three cells that meet there), so that bilinear
 //! interpolation needs no branch and is continuous across face edges: both faces see the same two rows of cells there.
 
+use super::Fit;
 use crate::error::{Error, Result};
 use crate::sh::cube;
 use glam::DVec3;
@@ -81,11 +82,13 @@ pub struct Lattice {
     pub directions: Directions,
     /// Whether b / (1 - c) is what is stored and interpolated rather than b itself: [`cap_height`] at [`Lattice::reach`].
     pub scaled: bool,
+    /// Where it lies around the object; `None` leaves that to the bake, and is round until then.
+    pub fit: Option<Fit>,
 }
 
 impl Default for Lattice {
-    /// 16 shells to 8 r, equal steps of sin(half-angle / 2), 6 x 8 x 8 directions, b / (1 - c) interpolated; the first shell is
-    /// chosen by the object's shape.
+    /// 16 shells to 8 r, equal steps of sin(half-angle / 2), 6 x 8 x 8 directions, b / (1 - c) interpolated; fit and first
+    /// shell are chosen by the object's shape.
     fn default() -> Self {
         Lattice {
             shells: 16,
@@ -94,6 +97,7 @@ impl Default for Lattice {
             spacing: Spacing::Chord,
             directions: Directions::Cube { cells: 8 },
             scaled: true,
+            fit: None,
         }
     }
 }
@@ -227,6 +231,27 @@ impl Lattice {
         self
     }
 
+    /// This lattice around an object, unless that was chosen before: the given fit (with a first shell of its own it is round), and
+    /// the first shell that `first` finds for the fit in force.
+    pub fn fitted(mut self, fit: Fit, first: impl FnOnce(&Fit) -> f64) -> Self {
+        let fit = *self.fit.get_or_insert(if self.inner == AUTOMATIC { fit } else { Fit::ROUND });
+        if self.inner == AUTOMATIC {
+            self.inner = first(&fit);
+        }
+        self
+    }
+
+    /// Where it lies around the object.
+    pub fn fit(&self) -> Fit {
+        self.fit.unwrap_or(Fit::ROUND)
+    }
+
+    /// Distance of a place (object's frame, in r) from the shells' centre in the lattice's space: what all that is said of
+    /// distances here is about.
+    pub fn distance(&self, position: DVec3) -> f64 {
+        self.fit().apply(position).length()
+    }
+
     /// Factor by which the blocked part captured at distance d is multiplied before it is stored.
     pub fn scale(&self, d: f64) -> f64 {
         if self.scaled { 1.0 / cap_height(self.reach(d)) } else { 1.0 }
@@ -266,7 +291,7 @@ impl Lattice {
         self.shells * self.stored_direction_count()
     }
 
-    /// Unit direction of the `index`-th captured sample of a shell.
+    /// Unit direction of the `index`-th captured sample of a shell, in the lattice's space.
     pub fn direction(&self, index: u32) -> DVec3 {
         match self.directions {
             Directions::Cube { cells } => {
@@ -282,10 +307,11 @@ impl Lattice {
         }
     }
 
-    /// Position of the `index`-th captured sample, in r from the sphere's centre; shells come one after another, innermost
-    /// first.
+    /// Position of the `index`-th captured sample, in r from the sphere's centre, object's frame; shells come one after another,
+    /// innermost first.
     pub fn position(&self, index: u32) -> DVec3 {
-        self.shell(index / self.direction_count()) * self.direction(index % self.direction_count())
+        let at = self.shell(index / self.direction_count()) * self.direction(index % self.direction_count());
+        self.fit().invert(at)
     }
 
     /// For every stored direction, the captured directions whose mean it is: one for a cell, one for a border, three for
@@ -352,8 +378,9 @@ impl Lattice {
     /// Stored samples around a receiver at `position` (in r, object's frame). Non-negative weights that sum to 1; a
     /// receiver at the very centre takes direction +x.
     pub fn corners(&self, position: DVec3, lookup: Lookup) -> Corners {
-        let d = position.length();
-        let direction = if d > 0.0 { position / d } else { DVec3::X };
+        let within = self.fit().apply(position);
+        let d = within.length();
+        let direction = if d > 0.0 { within / d } else { DVec3::X };
         let (slope, offset) = self.radial_map();
         let last = f64::from(self.shells - 1);
         let mut t = (slope * self.coordinate(d.max(self.inner)) + offset).clamp(0.0, last);
@@ -432,6 +459,9 @@ impl Lattice {
         if !radii || self.outer > 1e4 {
             return bad(format!("shells from {} to {} r", self.inner, self.outer));
         }
+        if !self.fit().is_usable() {
+            return bad("its centre or stretch is out of range".into());
+        }
         Ok(())
     }
 }
@@ -464,7 +494,13 @@ impl std::fmt::Display for Lattice {
         if self.inner != AUTOMATIC {
             write!(f, ",inner={}", self.inner)?;
         }
-        write!(f, ",outer={}", self.outer)
+        write!(f, ",outer={}", self.outer)?;
+        let words = |of: [f64; 3]| of.map(|x| x.to_string()).join(":");
+        match self.fit {
+            Some(fit) if fit == Fit::ROUND => write!(f, ",round"),
+            Some(fit) => write!(f, ",centre={},stretch={}", words(fit.centre), words(fit.stretch)),
+            None => Ok(()),
+        }
     }
 }
 
@@ -472,12 +508,12 @@ impl std::str::FromStr for Lattice {
     type Err = String;
 
     /// `cube:SHELLSxCELLS` or `latlon:SHELLSxLATITUDESxLONGITUDES`, then any of `,chord` `,log` `,linear` `,scaled`
-    /// `,raw` `,inner=R` `,outer=R`.
+    /// `,raw` `,inner=R` `,outer=R` `,round`, or `,centre=X:Y:Z` and `,stretch=X:Y:Z`.
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let explain = || {
             format!(
                 "cannot read lattice \"{text}\" (cube:16x8 or latlon:8x4x4, then optionally ,chord|log|linear \
-                 ,scaled|raw ,inner=R ,outer=R)"
+                 ,scaled|raw ,inner=R ,outer=R ,round)"
             )
         };
         let mut words = text.split(',');
@@ -494,12 +530,19 @@ impl std::str::FromStr for Lattice {
             match word.split_once('=') {
                 Some(("inner", radius)) => lattice.inner = radius.parse().map_err(|_| explain())?,
                 Some(("outer", radius)) => lattice.outer = radius.parse().map_err(|_| explain())?,
+                Some(("centre", words)) => {
+                    lattice.fit.get_or_insert(Fit::ROUND).centre = triple(words).ok_or_else(explain)?;
+                }
+                Some(("stretch", words)) => {
+                    lattice.fit.get_or_insert(Fit::ROUND).stretch = triple(words).ok_or_else(explain)?;
+                }
                 _ => match word {
                     "chord" => lattice.spacing = Spacing::Chord,
                     "log" => lattice.spacing = Spacing::Log,
                     "linear" => lattice.spacing = Spacing::Linear,
                     "scaled" => lattice.scaled = true,
                     "raw" => lattice.scaled = false,
+                    "round" => lattice.fit = Some(Fit::ROUND),
                     _ => return Err(explain()),
                 },
             }
@@ -507,4 +550,10 @@ impl std::str::FromStr for Lattice {
         lattice.validate().map_err(|error| error.to_string())?;
         Ok(lattice)
     }
+}
+
+/// Three numbers with colons between.
+fn triple(words: &str) -> Option<[f64; 3]> {
+    let numbers: Vec<f64> = words.split(':').map(|w| w.parse().ok()).collect::<Option<_>>()?;
+    numbers.try_into().ok()
 }

@@ -2,10 +2,12 @@
 
 pub mod extent;
 pub mod file;
+pub mod fit;
 pub mod growth;
 pub mod lattice;
 pub mod quantity;
 
+pub use fit::Fit;
 pub use lattice::{Lattice, Lookup};
 pub use quantity::{Kind, Storage};
 
@@ -118,7 +120,7 @@ impl ShadowField {
     pub fn lookup(&self, position: DVec3, lookup: Lookup, channel: usize, out: &mut [f64]) {
         let lattice = &self.header.lattice;
         let corners = lattice.corners(position, lookup);
-        let unscale = lattice.unscale(position.length());
+        let unscale = lattice.unscale(lattice.distance(position));
         for (coefficient, value) in out.iter_mut().enumerate().take(coefficient_count(self.header.bands)) {
             *value = (0..8)
                 .filter(|&k| corners.weight[k] != 0.0)

@@ -5,6 +5,7 @@ use super::gathering::Gathering;
 use super::lists::{Dirty, Merged, State};
 use super::store::{self, Slot};
 use crate::error::Result;
+use crate::field::Fit;
 use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
@@ -122,11 +123,13 @@ impl Frame {
             let (slope, offset) = lattice.radial_map();
             [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32]
         });
+        let shift = slot.map_or(Fit::ROUND, |slot| slot.header.lattice.fit()).packed();
         layout::Entity {
             centre: centre.extend((1.0 / radius_m) as f32).to_array(),
             alpha_beta: [cos_a, sin_a, cos_b, sin_b],
             gamma: [cos_c, sin_c],
             emission: emission.extend(entity.albedo.max_element()).to_array(),
+            shift,
             albedo: (entity.albedo.as_dvec3() / PI).as_vec3().extend(placement.scale).to_array(),
             radial,
             blocked_base: geometry.blocked.as_ref().map_or(0, base),

@@ -43,6 +43,7 @@ impl Workload {
     pub fn new(device: &Arc<Device>, vertex_count: u32, occluder_count: u32) -> Result<Self> {
         let vertex_count = vertex_count.next_multiple_of(CLUSTER_VERTICES);
         let lattice = Lattice::default().starting_at(1.0);
+        let shift = lattice.fit().packed();
         let (slope, offset) = lattice.radial_map();
         let entity_limit = uniform_entities(device);
         let count = (1 + occluder_count).max(entity_limit) as usize;
@@ -59,6 +60,7 @@ impl Workload {
                 alpha_beta: [a, b, c, d],
                 gamma: [e, f],
                 albedo: [0.3, 0.3, 0.3, 1.0],
+                shift,
                 radial: [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32],
                 ..Default::default()
             };

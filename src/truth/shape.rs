@@ -3,6 +3,7 @@
 use crate::asset::mesh::Mesh;
 use crate::bake::capture::unit_positions;
 use crate::bake::first_shell;
+use crate::field::Fit;
 use crate::field::lattice::ROOMY_INNER;
 use crate::frame::store::bakes_transfer;
 use crate::scene::Scene;
@@ -50,7 +51,7 @@ impl Shape {
             .colors
             .as_ref()
             .map(|colors| order.clone().map(|i| mesh.triangles[i].map(|corner| colors[corner as usize])).collect());
-        let inner = if mesh.is_convex() { first_shell(&positions, &mesh.triangles) } else { ROOMY_INNER };
+        let inner = if mesh.is_convex() { first_shell(&Fit::ROUND, &positions, &mesh.triangles) } else { ROOMY_INNER };
         Shape {
             triangles: order.map(|i| unsorted[i]).collect(),
             hierarchy,

@@ -1,0 +1,126 @@
+//! How a lattice lies around an object that is no ball: about the middle of its box, the short axes stretched.
+//!
+//! Shells around the bounding sphere's centre miss most objects' surfaces, near which the blocked part changes fastest: the
+//! first shell must start where the nearest part of the surface is, and shells are spent on places inside the solid elsewhere.
+//! Stretching by the square root of the box's proportions, which takes half of them away, costs a lookup three multiply-adds.
+
+use glam::{DMat3, DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// A point p (object's frame, in r from the bounding sphere's centre) lies at (p - centre) * stretch in the lattice's own space,
+/// where directions and distances are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fit {
+    /// Centre of the shells in r from the bounding sphere's centre, a multiple of 1/1024.
+    pub centre: [f64; 3],
+    /// Factor of each axis, 1 to 2, a multiple of 1/64, of which a shader is given the number.
+    pub stretch: [f64; 3],
+}
+
+/// A box thinner than this share of its longest edge is a sheet: what is captured on its two sides differs at once, and no
+/// stretching helps.
+const SHEET: f64 = 0.02;
+
+impl Fit {
+    /// Spheres around the bounding sphere's centre.
+    pub const ROUND: Fit = Fit { centre: [0.0; 3], stretch: [1.0; 3] };
+
+    /// Largest factor of an axis.
+    pub const MOST: f64 = 2.0;
+
+    /// The fit of a mesh, its positions in r from the bounding sphere's centre: the middle of its box, and the square root of
+    /// longest edge over edge. A ball and a cube stay round.
+    pub fn new(positions: &[Vec3]) -> Self {
+        let (low, high) = positions.iter().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
+        let (low, high) = (low.as_dvec3(), high.as_dvec3());
+        let (size, middle) = (high - low, (high + low) / 2.0);
+        let longest = size.max_element();
+        if !(size.min_element() > SHEET * longest && longest.is_finite()) {
+            return Fit::ROUND;
+        }
+        let to = |x: f64, steps: f64| (x * steps).round() / steps;
+        Fit {
+            centre: middle.to_array().map(|c| to(c, 1024.0)),
+            stretch: size.to_array().map(|s| to((longest / s).sqrt().min(Fit::MOST), 64.0)),
+        }
+    }
+
+    /// From the object's frame to the lattice's space.
+    pub fn apply(&self, p: DVec3) -> DVec3 {
+        (p - DVec3::from(self.centre)) * DVec3::from(self.stretch)
+    }
+
+    /// From the lattice's space to the object's frame.
+    pub fn invert(&self, q: DVec3) -> DVec3 {
+        q / DVec3::from(self.stretch) + DVec3::from(self.centre)
+    }
+
+    /// Largest factor: no angle grows by more from the lattice's space to the object's frame.
+    pub fn largest(&self) -> f64 {
+        self.stretch.into_iter().fold(1.0, f64::max)
+    }
+
+    /// Whether the numbers are such as [`Fit::new`] makes.
+    pub fn is_usable(&self) -> bool {
+        self.centre.iter().all(|c| c.abs() <= 1.0) && self.stretch.iter().all(|s| (1.0..=Fit::MOST).contains(s))
+    }
+
+    /// Whether a turn or mirror about the bounding sphere's centre leaves the lattice's space as it is.
+    pub fn keeps(&self, matrix: DMat3) -> bool {
+        let (centre, stretch) = (DVec3::from(self.centre), DMat3::from_diagonal(DVec3::from(self.stretch)));
+        let same = |a: DMat3, b: DMat3| (a - b).to_cols_array().iter().all(|x| x.abs() < 1e-9);
+        (matrix * centre - centre).length() < 1e-9 && same(matrix * stretch, stretch * matrix)
+    }
+
+    /// For a shader: what is added after stretching, and 64ths of each factor beyond 1 as one whole number.
+    pub fn packed(&self) -> [f32; 4] {
+        let shift = -DVec3::from(self.centre) * DVec3::from(self.stretch);
+        let [x, y, z] = self.stretch.map(|s| ((s - 1.0) * 64.0).round() as u32);
+        shift.as_vec3().extend((x | y << 7 | z << 14) as f32).to_array()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cuboid(middle: Vec3, half: Vec3) -> Vec<Vec3> {
+        let sign = |bit: usize, i: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        (0..8).map(|i| middle + half * Vec3::new(sign(0, i), sign(1, i), sign(2, i))).collect()
+    }
+
+    #[test]
+    fn cubes_and_sheets_stay_round() {
+        for half in [Vec3::ONE, Vec3::new(1.0, 0.0, 1.0), Vec3::new(1.0, 0.01, 1.0)] {
+            assert_eq!(Fit::new(&cuboid(Vec3::ZERO, half)), Fit::ROUND, "{half}");
+        }
+        assert_eq!(Fit::new(&[]), Fit::ROUND);
+    }
+
+    #[test]
+    fn turns_and_mirrors_that_keep_it() {
+        let flat = Fit { centre: [0.0, 0.25, 0.0], stretch: [1.0, 1.5, 1.0] };
+        let about = |axis: DVec3, angle: f64| DMat3::from_axis_angle(axis, angle);
+        assert!(flat.keeps(about(DVec3::Y, 0.3)) && flat.keeps(DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0))));
+        assert!(!flat.keeps(DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0))), "the centre moves");
+        let low = Fit { centre: [0.0; 3], ..flat };
+        assert!(low.keeps(DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0))) && !low.keeps(about(DVec3::X, 0.3)));
+        assert!(Fit::ROUND.keeps(about(DVec3::X, 0.3)));
+    }
+
+    #[test]
+    fn half_of_a_boxs_proportions_is_taken_away() {
+        let middle = Vec3::new(0.0, 0.3, -0.1);
+        let fit = Fit::new(&cuboid(middle, Vec3::new(0.8, 0.4, 0.1)));
+        assert_eq!(fit.stretch, [1.0, 1.421875, 2.0], "square roots of 2 and of 8, at most 2, in steps of 1/64");
+        assert!(fit.apply(middle.as_dvec3()).length() < 2e-3, "to 1/1024 a component");
+        let p = DVec3::new(0.3, -0.2, 0.9);
+        assert!((fit.invert(fit.apply(p)) - p).length() < 1e-15);
+        // What a shader makes of the packed numbers.
+        let [x, y, z, packed] = fit.packed();
+        let steps = [packed as u32 & 127, packed as u32 >> 7 & 127, packed as u32 >> 14].map(f64::from);
+        let found = p * (1.0 + DVec3::from(steps) / 64.0) + Vec3::new(x, y, z).as_dvec3();
+        assert!((found - fit.apply(p)).length() < 1e-6);
+        assert!(fit.is_usable() && !Fit { stretch: [1.0, 3.0, 1.0], ..fit }.is_usable());
+    }
+}

@@ -236,6 +236,8 @@ fn one_colour_shines_where_it_blocks() {
         let blocked = bake_field(&gpu.device, &mesh, Kind::Occlusion, &options);
         let radiance = bake_field(&gpu.device, &bright, Kind::Radiance, &options);
         assert_eq!(radiance.header.radiance_scale, 7.0);
+        let px = f64::from(radiance.header.face_px);
+        let mut odd = 0;
         for sample in 0..blocked.header.lattice.stored_count() {
             let b: Vec<f64> = (0..16).map(|k| blocked.stored(sample, 0, k)).collect();
             for channel in 0..3 {
@@ -243,10 +245,21 @@ fn one_colour_shines_where_it_blocks() {
                 let wanted: Vec<f64> = b.iter().map(|b| scale * b).collect();
                 let found: Vec<f64> = (0..16).map(|k| radiance.stored(sample, channel, k)).collect();
                 let error = difference(&found, &wanted);
-                // Edge-on from afar faces this small may miss a ring altogether.
-                assert!(error <= 1e-3 * norm(wanted), "{}: sample {sample} channel {channel}: {error}", mesh.name);
+                if error <= 1e-3 * norm(wanted) {
+                    continue;
+                }
+                // The two were captured at different places of an atlas: a texel whose centre an edge runs through may fall to
+                // either side. Sixteen functions of such a direction make up sqrt(16 / 4 pi).
+                odd += 1;
+                let texel = 4.0 / (px * px) * (4.0 / std::f64::consts::PI).sqrt() * scale;
+                assert!(error <= 2.0 * texel, "{}: sample {sample} channel {channel}: {error}", mesh.name);
             }
         }
+        assert!(
+            100 * odd <= 3 * blocked.header.lattice.stored_count(),
+            "{}: {odd} channels of samples differ",
+            mesh.name
+        );
     }
 }
 

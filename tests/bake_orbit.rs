@@ -200,6 +200,7 @@ fn a_turned_sphere_is_as_near_to_the_closed_form_as_a_captured_one() {
 }
 
 #[test]
+#[ignore = "llvmpipe may crash where two devices compile at once; run by hand with --ignored"]
 fn two_devices_bake_what_one_does() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::torus(1.0, 0.3, 90, 60);

@@ -141,24 +141,21 @@ pub struct Baker {
     pub orbit: bool,
     /// Whether only faces that the object reaches are drawn, of these only what reaches into them, and of closed meshes no backs.
     pub faces: bool,
-    /// Most devices that one bake works on.
+    /// Most devices that one bake works on. A software driver draws on one core for each, so two would be faster there; but
+    /// llvmpipe (Mesa 22.3) now and then crashes when two devices compile at once (1 of 8 starts with a cold shader cache), so it
+    /// is one unless asked for.
     pub devices: usize,
     siblings: Mutex<Vec<Arc<Device>>>,
 }
 
-/// Most siblings that a software device is worth: they share what draws texels.
-pub const MOST_DEVICES: usize = 4;
 /// Targets times triangles from which a sibling's start, a tenth of a second, is worth its while.
 const WORTH_A_DEVICE: usize = 6_000_000;
 
 impl Baker {
     /// A baker that compiles its shaders from `library`.
     pub fn new(device: &Arc<Device>, library: &Library) -> Self {
-        // A software driver draws on one core for each device, a GPU's devices share all it has.
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let devices = if device.info.is_software() { cores.min(MOST_DEVICES) } else { 1 };
         let (device, library) = (device.clone(), library.clone());
-        Baker { device, library, simplify: false, orbit: true, faces: true, devices, siblings: Mutex::default() }
+        Baker { device, library, simplify: false, orbit: true, faces: true, devices: 1, siblings: Mutex::default() }
     }
 
     /// The devices for `work` (targets times triangles), the baker's own first.

@@ -44,13 +44,12 @@ pub struct Row {
 type Set = fn(&mut Baker);
 
 /// The skips by name, and what sets them.
-const SKIPS: [(&str, Set); 5] = [
+const SKIPS: [(&str, Set); 4] = [
     ("faces", |baker| baker.faces = true),
     ("orbit", |baker| baker.orbit = true),
     ("simplify", |baker| baker.simplify = true),
-    ("one device", |baker| baker.devices = bake::MOST_DEVICES),
     ("all but simplify", |baker| {
-        (baker.faces, baker.orbit, baker.devices) = (true, true, bake::MOST_DEVICES);
+        (baker.faces, baker.orbit) = (true, true);
     }),
 ];
 
@@ -106,7 +105,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Row>> {
 /// An occlusion field in f32 on half of the default shells and directions, nothing left out but what `set` sets.
 fn bake_once(bench: &Bench<'_>, mesh: &Mesh, face_px: u32, set: impl Fn(&mut Baker)) -> Result<(Report, Vec<f32>)> {
     let mut baker = Baker::new(bench.baker.device(), bench.baker.library());
-    (baker.faces, baker.orbit, baker.simplify, baker.devices) = (false, false, false, 1);
+    (baker.faces, baker.orbit, baker.simplify) = (false, false, false);
     set(&mut baker);
     let lattice = "cube:8x5".parse().expect("a lattice");
     let options = bake::Options { lattice, storage: Storage::F32, face_px, ..Default::default() };

@@ -13,7 +13,7 @@
 //! | bands | n bands = n^2 coefficients; "order 4" in the literature is 4 bands, 16 coefficients |
 //! | space | right-handed, +y up, metres; SH are taken on world x, y, z as they stand |
 //! | cube faces | +X -X +Y -Y +Z -Z with Vulkan's s/t on each; texel centres; exact texel solid angle, weights sum to 4 pi |
-//! | field distances | in units of the object's bounding-sphere radius r, from the sphere's centre |
+//! | field distances | in units of the object's bounding-sphere radius r, from the sphere's centre; shells lie about the middle of the mesh's box, short axes stretched ([`field::fit`]) |
 //! | occlusion field | stores the *blocked* part b = P[1 - V]: 0 where nothing blocks; samples inside the solid are captured off the nearest surface |
 //! | between shells | b / (1 - cos a) is interpolated over sin(a/2), a the half-angle of the bounding sphere, samples lowered by a twelfth of their second differences; beyond 8 r it falls as (8r/d)^2 |
 //! | order | an occluder precedes a light whose bounding sphere's centre is farther from the vertex; ties by entity index |

@@ -89,15 +89,21 @@ fn two_variants_side_by_side() {
     assert_eq!(words[..4], 0x0723_0203_u32.to_le_bytes(), "SPIR-V's magic number");
 }
 
+/// A folder that holds `floor.toml`, a scene of one floor under a uniform sky.
+fn folder_with_floor() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "camera = { eye = [0, 2, 3], target = [0, 0, 0] }\nenvironment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"floor\"\nplane = { size_m = 2, cells = 9 }\n\
+        [[entity]]\nmesh = \"floor\"\n";
+    std::fs::write(folder.path().join("floor.toml"), text).unwrap();
+    folder
+}
+
 #[test]
 fn a_scene_is_timed_pass_by_pass() {
     if !has_device() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    let text = "camera = { eye = [0, 2, 3], target = [0, 0, 0] }\nenvironment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"floor\"\nplane = { size_m = 2, cells = 9 }\n\
-        [[entity]]\nmesh = \"floor\"\n";
-    std::fs::write(folder.path().join("floor.toml"), text).unwrap();
+    let folder = folder_with_floor();
     let document = json(folder.path(), &["floor.toml", "--size", "64x48", "--compare", "texel-packed", "texel"]);
     let rows = document["passes"].as_array().unwrap();
     assert!(
@@ -118,10 +124,7 @@ fn a_device_never_seen_gets_a_default_at_once() {
     if !has_device() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    let text = "camera = { eye = [0, 2, 3], target = [0, 0, 0] }\nenvironment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"floor\"\nplane = { size_m = 2, cells = 9 }\n\
-        [[entity]]\nmesh = \"floor\"\n";
-    std::fs::write(folder.path().join("floor.toml"), text).unwrap();
+    let folder = folder_with_floor();
     let variant = || {
         // A cache of its own, in which nothing is known.
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_shadow-fields"));

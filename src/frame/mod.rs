@@ -5,6 +5,7 @@
 //! ```
 
 pub mod camera;
+mod cluster;
 mod draw_twin;
 mod fits;
 mod form;

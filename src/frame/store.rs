@@ -1,24 +1,23 @@
 //! What a scene keeps on the device from frame to frame: fields, transfer vectors, vertices, drawables. Only what its
 //! entities need is baked and uploaded.
 
+use super::cluster;
 use super::fits::Needs;
 use crate::asset::mesh::Mesh;
 use crate::bake::cache::{Cache, field_name};
-use crate::bake::capture::unit_positions;
-use crate::bake::chunk::morton;
 use crate::bake::{self, Baker, Report};
 use crate::error::Result;
 use crate::field::extent::{Extent, extent};
 use crate::field::quantity::{Kind, Storage, channel_stride};
 use crate::field::{Header, ShadowField};
 use crate::gpu::{Buffer, BufferKind, Volume};
-use crate::layout::{CLUSTER_VERTICES, NONE};
+use crate::layout::NONE;
 use crate::render::draw::Drawable;
 use crate::render::gather::Bounds;
 use crate::render::shelf::Shelf;
 use crate::render::variant::Skip;
 use crate::scene::{Entity, Scene};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -53,7 +52,7 @@ pub struct Geometry {
     pub vertices: Range<u32>,
     /// Which vertex of the mesh stands at each place of that range: neighbours stand together.
     pub order: Vec<u32>,
-    /// Bounds of every run of [`CLUSTER_VERTICES`] of them.
+    /// Bounds of every run of [`crate::layout::CLUSTER_VERTICES`] of them.
     pub clusters: Vec<Bounds>,
     /// First quad of its transfer vectors, or [`NONE`] where the cosine of the normal is exact.
     pub transfer_first: u32,
@@ -196,7 +195,7 @@ impl Store {
         for (index, (mesh, [blocked, radiance])) in scene.meshes.iter().zip(slots).enumerate() {
             let (centre, radius_m) = mesh.bounding_sphere();
             let vertex_first = vertices.len() as u32;
-            let order = spatial_order(mesh);
+            let order = cluster::order(mesh);
             for &v in &order {
                 vertices.push((mesh.positions[v as usize] - centre).extend(0.0).to_array());
                 vertices.push(mesh.normals[v as usize].extend(0.0).to_array());
@@ -221,7 +220,7 @@ impl Store {
             };
             geometries.push(Geometry {
                 vertices: vertex_first / 2..vertices.len() as u32 / 2,
-                clusters: cluster_bounds(mesh, &order),
+                clusters: cluster::bounds(mesh, &order),
                 transfer_first,
                 blocked,
                 radiance,
@@ -325,27 +324,4 @@ fn download(fields: &Buffer, slot: &Slot) -> Result<ShadowField> {
 /// Whether a mesh can shadow itself; if not, its transfer is the cosine of the normal.
 pub fn bakes_transfer(mesh: &Mesh) -> bool {
     !mesh.is_flat() && !mesh.is_convex()
-}
-
-/// Vertices along a space-filling curve, those of different facing apart: runs of them are near one another.
-fn spatial_order(mesh: &Mesh) -> Vec<u32> {
-    let positions = unit_positions(mesh);
-    let mut order: Vec<u32> = (0..positions.len() as u32).collect();
-    order.sort_by_cached_key(|&v| {
-        let n = mesh.normals[v as usize];
-        let axis = n.abs().max_position();
-        (if mesh.is_flat() { 0 } else { 2 * axis + usize::from(n[axis] < 0.0) }, morton(positions[v as usize]), v)
-    });
-    order
-}
-
-/// Bounds of every run of [`CLUSTER_VERTICES`], relative to the bounding sphere's centre.
-fn cluster_bounds(mesh: &Mesh, order: &[u32]) -> Vec<Bounds> {
-    let (centre, _) = mesh.bounding_sphere();
-    let bounds = |run: &[u32]| {
-        let positions: Vec<Vec3> = run.iter().map(|&v| mesh.positions[v as usize] - centre).collect();
-        let normals: Vec<Vec3> = run.iter().map(|&v| mesh.normals[v as usize]).collect();
-        Bounds::new(&positions, &normals)
-    };
-    order.chunks(CLUSTER_VERTICES as usize).map(bounds).collect()
 }

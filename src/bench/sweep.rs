@@ -1,14 +1,15 @@
 //! What the choices in bake and merge cost and give, one axis at a time round the default.
 
-use super::budget::{Truth, device_radiosity};
+use super::budget::{Truth, device_radiosity, select};
 use super::cases::Case;
-use super::figures::{Difference, Spread, difference, spread};
+use super::figures::{Difference, Radiosity, Spread, difference, spread};
 use super::{Bench, default_options};
 use crate::error::Result;
 use crate::field::{Lookup, Storage};
 use crate::frame::{self, Frame};
 use crate::gpu::Timing;
-use crate::render::variant::PRODUCTS;
+use crate::render::chain::Method;
+use crate::render::variant::{Chain, PRODUCTS, Product};
 use crate::scene::Placement;
 use serde::Serialize;
 use std::time::Instant;
@@ -24,6 +25,8 @@ pub struct Variation {
     pub name: String,
     /// Everything.
     pub options: frame::Options,
+    /// Merged by the CPU twin, in f64 on all threads, rather than on the device: how.
+    pub on_cpu: Option<Method>,
 }
 
 /// What was measured of it.
@@ -35,17 +38,19 @@ pub struct Point {
     pub axis: &'static str,
     /// Its setting.
     pub name: String,
+    /// What merges: "device", or "CPU" for the twin in f64 on all threads, whose times are wall times and compare with one another.
+    pub runs_on: &'static str,
     /// Whether long chains are bounded: by the guard.
     pub guarded: bool,
     /// Bytes of all fields of the scene.
     pub field_bytes: u64,
     /// Device time of the bakes, milliseconds; none where all was in the cache.
     pub bake_ms: Option<f64>,
-    /// Device time of the first merge, shader compilation by the driver included, milliseconds.
+    /// Device time of the first merge, shader compilation by the driver included, milliseconds; on the CPU wall time.
     pub first_merge_ms: f64,
-    /// Device time of the merge pass, milliseconds.
+    /// Device time of the merge pass, milliseconds; on the CPU wall time.
     pub merge_ms: Spread,
-    /// Merge time over that of the default in the same round: median over rounds.
+    /// Merge time over that of the default in the same round: median over rounds. On the CPU over the default's median.
     #[serde(rename = "time_per_default_ratio")]
     pub time_per_default: f64,
     /// T0 to T3.
@@ -57,11 +62,11 @@ pub struct Point {
 /// The settings, the default first.
 pub fn variations(quick: bool) -> Vec<Variation> {
     let base = default_options();
-    let mut all = vec![Variation { axis: "default", name: base.bake.lattice.to_string(), options: base }];
+    let mut all = vec![Variation { axis: "default", name: base.bake.lattice.to_string(), options: base, on_cpu: None }];
     let mut add = |axis, name: &str, change: &dyn Fn(&mut frame::Options)| {
         let mut options = base;
         change(&mut options);
-        all.push(Variation { axis, name: name.to_owned(), options });
+        all.push(Variation { axis, name: name.to_owned(), options, on_cpu: None });
     };
     add("lookup", "nearest", &|o| o.lookup = Lookup::Nearest);
     add("lookup", "radial", &|o| o.lookup = Lookup::Radial);
@@ -125,8 +130,22 @@ pub fn variations(quick: bool) -> Vec<Variation> {
             (o.bake.lattice, o.bake.storage, o.bake.face_px) = (fine, Storage::F32, 128);
         });
     }
+    let after = all.iter().rposition(|v| v.axis == "product").map_or(all.len(), |last| last + 1);
+    let on_cpu = |(name, method): (&str, Method)| Variation {
+        axis: "product",
+        name: name.to_owned(),
+        options: base,
+        on_cpu: Some(method),
+    };
+    all.splice(after..after, CPU_PRODUCTS.map(on_cpu));
     all
 }
+
+/// The first is what the second is to be compared with: the default's products in the same program.
+const CPU_PRODUCTS: [(&str, Method); 2] = [
+    ("pairs, CPU", Method::Products(Chain { product: Product::Pairs, guard: true })),
+    ("log-space with the matrix logarithm, CPU", Method::Logarithms),
+];
 
 /// Device time of the merge in milliseconds.
 pub fn merge_ms(timings: &[Timing]) -> f64 {
@@ -153,11 +172,57 @@ pub fn interleaved(frames: &mut [Frame], placements: &[Placement], rounds: usize
     Ok(times)
 }
 
+/// What one variation gave.
+struct Measured {
+    field_bytes: u64,
+    bake_ms: Option<f64>,
+    first_merge_ms: f64,
+    times_ms: Vec<f64>,
+    found: Vec<Radiosity>,
+}
+
 /// Measures every variation on one case.
 ///
 /// # Errors
 /// As [`Frame::new`] and [`Frame::render`].
 pub fn sweep(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variation]) -> Result<Vec<Point>> {
+    let (on_device, on_cpu): (Vec<usize>, Vec<usize>) =
+        (0..variations.len()).partition(|&i| variations[i].on_cpu.is_none());
+    let of = |indices: &[usize]| indices.iter().map(|&i| &variations[i]).collect::<Vec<_>>();
+    let mut measured: Vec<(usize, Measured)> = Vec::new();
+    measured.extend(on_device.iter().copied().zip(by_device(bench, case, truth, &of(&on_device))?));
+    measured.extend(on_cpu.iter().copied().zip(by_cpu(bench, case, truth, &of(&on_cpu))?));
+    measured.sort_by_key(|(index, _)| *index);
+    let default_ms = measured[0].1.times_ms.clone();
+    let point = |(index, m): (usize, Measured)| {
+        let variation = &variations[index];
+        let merge_ms = spread(&m.times_ms);
+        let ratios: Vec<f64> = m.times_ms.iter().zip(&default_ms).map(|(t, default)| t / default).collect();
+        Point {
+            case: case.name.clone(),
+            axis: variation.axis,
+            name: variation.name.clone(),
+            runs_on: if variation.on_cpu.is_some() { "CPU" } else { "device" },
+            guarded: match variation.on_cpu {
+                None => variation.options.chain.guard,
+                Some(method) => matches!(method, Method::Products(chain) if chain.guard),
+            },
+            field_bytes: m.field_bytes,
+            bake_ms: m.bake_ms,
+            first_merge_ms: m.first_merge_ms,
+            time_per_default: match variation.on_cpu {
+                None => spread(&ratios).median,
+                Some(_) => merge_ms.median / spread(&default_ms).median,
+            },
+            merge_ms,
+            total: truth.error(&m.found),
+            below_bands: difference(&m.found, &truth.t1, truth.unit),
+        }
+    };
+    Ok(measured.into_iter().map(point).collect())
+}
+
+fn by_device(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[&Variation]) -> Result<Vec<Measured>> {
     let placements = case.scene.at(case.time_s);
     let (mut frames, mut first) = (Vec::new(), Vec::new());
     for variation in variations {
@@ -169,27 +234,52 @@ pub fn sweep(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variat
         (bench.progress)(&format!("{}: {} {} prepared in {seconds:.1} s", case.name, variation.axis, variation.name));
     }
     let times = interleaved(&mut frames, &placements, if bench.quick { 15 } else { 31 })?;
-    let mut points = Vec::new();
-    for (index, (variation, frame)) in variations.iter().zip(&frames).enumerate() {
-        let t3 = device_radiosity(frame, &truth.vertices)?;
-        let ratios: Vec<f64> = times[index].iter().zip(&times[0]).map(|(t, default)| t / default).collect();
+    let measured = frames.iter().zip(first).zip(times).map(|((frame, first_merge_ms), times_ms)| {
         let baked = &frame.store.baked;
         let bake_ms = baked.iter().map(|b| b.report.capture_ms + b.report.project_ms + b.report.assemble_ms);
-        points.push(Point {
-            case: case.name.clone(),
-            axis: variation.axis,
-            name: variation.name.clone(),
-            guarded: variation.options.chain.guard,
+        Ok(Measured {
             field_bytes: frame.store.fields.size_bytes,
             bake_ms: (!baked.is_empty()).then(|| bake_ms.sum()),
-            first_merge_ms: first[index],
-            merge_ms: spread(&times[index]),
-            time_per_default: spread(&ratios).median,
-            total: truth.error(&t3),
-            below_bands: difference(&t3, &truth.t1, truth.unit),
-        });
+            first_merge_ms,
+            times_ms,
+            found: device_radiosity(frame, &truth.vertices)?,
+        })
+    });
+    measured.collect()
+}
+
+fn by_cpu(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[&Variation]) -> Result<Vec<Measured>> {
+    let placements = case.scene.at(case.time_s);
+    let methods = variations.iter().filter_map(|v| Some((v.options, v.on_cpu?)));
+    let frames = methods
+        .map(|(options, method)| Ok((bench.frame(&case.scene, options)?, method)))
+        .collect::<Result<Vec<_>>>()?;
+    let mut twins = Vec::new();
+    for (frame, method) in &frames {
+        let mut twin = frame.twin(&placements)?;
+        if *method == Method::Logarithms {
+            twin.take_logarithms();
+            (bench.progress)(&format!("{}: logarithms taken", case.name));
+        }
+        twins.push((twin, *method));
     }
-    Ok(points)
+    let mut found = vec![Vec::new(); twins.len()];
+    let mut times = vec![Vec::new(); twins.len()];
+    for _ in 0..=if bench.quick { 5 } else { 15 } {
+        for (index, (twin, method)) in twins.iter().enumerate() {
+            let started = Instant::now();
+            found[index] = twin.run(*method);
+            times[index].push(started.elapsed().as_secs_f64() * 1e3);
+        }
+    }
+    let measured = twins.iter().zip(found).zip(times).map(|(((twin, method), found), mut times_ms)| Measured {
+        field_bytes: twin.field_bytes(*method),
+        bake_ms: None,
+        first_merge_ms: times_ms.remove(0),
+        times_ms,
+        found: select(&found, &truth.vertices),
+    });
+    Ok(measured.collect())
 }
 
 /// Indices of the points that no other beats in both numbers (smaller is better), by the first.
@@ -223,8 +313,8 @@ mod tests {
             for variation in &all[1..] {
                 variation.options.bake.lattice.starting_at(0.5).validate().unwrap();
                 assert_ne!(
-                    format!("{:?}", variation.options),
-                    format!("{:?}", all[0].options),
+                    format!("{:?} {:?}", variation.options, variation.on_cpu),
+                    format!("{:?} {:?}", all[0].options, all[0].on_cpu),
                     "{} {}",
                     variation.axis,
                     variation.name

@@ -163,6 +163,10 @@ pub fn defaults(points: &[Point]) -> String {
             ratios.word()
         );
     }
+    if points.iter().any(|p| p.runs_on == "CPU") {
+        text += "What says CPU is no shader but the f64 twin on all threads: its wall times compare with one another, less so with the \
+                 device's.\n";
+    }
     text += &match better.is_empty() {
         true => format!("By this rule none of the {} takes its place.\n", plural(count - 1, "other setting")),
         false => format!("By this rule these would take its place: {}.\n", better.join("; ")),

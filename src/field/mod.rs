@@ -5,6 +5,7 @@ pub mod file;
 pub mod fit;
 pub mod growth;
 pub mod lattice;
+pub mod log_space;
 pub mod quantity;
 
 pub use fit::Fit;

@@ -4,8 +4,10 @@ use super::lists::State;
 use super::store::Geometry;
 use super::{Frame, store};
 use crate::error::Result;
-use crate::field;
+use crate::field::ShadowField;
+use crate::field::log_space::{logarithms, widened};
 use crate::layout::{CLUSTER_VERTICES, STEP_ENTITIES, Step};
+use crate::render::chain::Method;
 use crate::render::gather::{self, Chains, Counts};
 use crate::render::reference::{Object, Task};
 use crate::scene::{Entity, Placement, Scene};
@@ -40,65 +42,134 @@ impl Frame {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn reference(&self, placements: &[Placement]) -> Result<Vec<(usize, Vec<[f64; 3]>)>> {
-        let mut fields: Vec<[Option<field::ShadowField>; 2]> = Vec::new();
+        Ok(self.twin(placements)?.run(Method::Products(self.options.chain)))
+    }
+
+    /// Everything that the CPU twin of a merge reads.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn twin<'f>(&'f self, placements: &'f [Placement]) -> Result<Twin<'f>> {
+        let mut fields: Vec<[Option<ShadowField>; 2]> = Vec::new();
         for geometry in &self.store.geometries {
             let load = |slot: &Option<store::Slot>| slot.as_ref().map(|slot| self.store.field(slot)).transpose();
-            fields.push([load(&geometry.blocked)?, load(&geometry.radiance)?]);
+            fields.push([load(&geometry.blocked)?, load(&geometry.radiance)?].map(|field| field.as_ref().map(widened)));
         }
-        let objects: Vec<Object<'_>> = placements
-            .iter()
-            .enumerate()
-            .map(|(index, placement)| {
-                let entity = &self.scene.entities[index];
-                let [blocked, radiance] = &fields[entity.mesh];
-                let over_pi = entity.albedo.as_dvec3() / PI;
-                Object {
-                    centre: self.centre(index, placement),
-                    rotation: placement.rotation.as_dquat().normalize(),
-                    scale: placement.scale.into(),
-                    radius_m: self.store.geometries[entity.mesh].radius_m * f64::from(placement.scale),
-                    albedo_over_pi: over_pi.to_array(),
-                    emission: entity.emission.as_dvec3().to_array(),
-                    blocked: blocked.as_ref(),
-                    radiance: radiance.as_ref().filter(|_| entity.emits),
-                }
-            })
-            .collect();
-        let lights = indices(&self.scene, |e| e.emits);
-        let sky = self.scene.environment.coefficients(self.options.bake.bands);
         let state = self.state(placements);
-        let mut out = Vec::new();
-        for receiver in indices(&self.scene, |e| e.receives) {
-            let mesh_index = self.scene.entities[receiver].mesh;
+        let mut receivers = Vec::new();
+        for index in indices(&self.scene, |e| e.receives) {
+            let mesh_index = self.scene.entities[index].mesh;
             let mesh = &self.scene.meshes[mesh_index];
             let geometry = &self.store.geometries[mesh_index];
-            let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3() - geometry.centre_m).collect();
-            let normals: Vec<DVec3> = mesh.normals.iter().map(|n| n.as_dvec3()).collect();
-            let transfer = self.store.transfer(geometry)?;
-            // Without a threshold the twin looks at everything, which is what the lists are held against.
-            let listed = (self.options.eps > 0.0).then(|| listed(&state, receiver, geometry));
+            receivers.push(Receiver {
+                index,
+                occluders: self.occluders(&state.moment, index),
+                positions: mesh.positions.iter().map(|p| p.as_dvec3() - geometry.centre_m).collect(),
+                normals: mesh.normals.iter().map(|n| n.as_dvec3()).collect(),
+                transfer: self.store.transfer(geometry)?,
+                // Without a threshold the twin looks at everything, which is what the lists are held against.
+                listed: (self.options.eps > 0.0).then(|| listed(&state, index, geometry)),
+            });
+        }
+        Ok(Twin {
+            frame: self,
+            placements,
+            fields,
+            logarithms: vec![None; self.store.geometries.len()],
+            receivers,
+            lights: indices(&self.scene, |e| e.emits),
+            sky: self.scene.environment.coefficients(self.options.bake.bands),
+        })
+    }
+}
+
+/// The CPU twin of a merge, ready to run.
+pub struct Twin<'f> {
+    frame: &'f Frame,
+    placements: &'f [Placement],
+    /// Occlusion and radiance by mesh.
+    fields: Vec<[Option<ShadowField>; 2]>,
+    logarithms: Vec<Option<ShadowField>>,
+    receivers: Vec<Receiver>,
+    lights: Vec<usize>,
+    sky: [Vec<f64>; 3],
+}
+
+/// What is lit: an entity with what its task borrows.
+struct Receiver {
+    index: usize,
+    occluders: Vec<usize>,
+    positions: Vec<DVec3>,
+    normals: Vec<DVec3>,
+    transfer: Option<(Vec<f32>, usize)>,
+    listed: Option<Listed>,
+}
+
+impl Twin<'_> {
+    /// Takes the logarithm of every field that blocks: once, as a bake would.
+    pub fn take_logarithms(&mut self) {
+        let blocks = |mesh: usize| self.frame.scene.entities.iter().any(|e| e.mesh == mesh && e.occludes);
+        let take = |(mesh, [blocked, _]): (usize, &[Option<ShadowField>; 2])| {
+            blocked.as_ref().filter(|_| blocks(mesh)).map(logarithms)
+        };
+        self.logarithms = self.fields.iter().enumerate().map(take).collect();
+    }
+
+    /// Bytes of all fields that a method reads: logarithms stand in for what blocks, not for what shines.
+    pub fn field_bytes(&self, method: Method) -> u64 {
+        let shines = |mesh: usize| self.frame.scene.entities.iter().any(|e| e.mesh == mesh && e.emits);
+        let kept = |mesh: usize| method != Method::Logarithms || shines(mesh);
+        let fields = self.fields.iter().enumerate().flat_map(|(mesh, [blocked, radiance])| {
+            [blocked.as_ref().filter(|_| kept(mesh)), self.logarithms[mesh].as_ref(), radiance.as_ref()]
+        });
+        fields.flatten().map(|field| field.payload.len() as u64).sum()
+    }
+
+    /// Radiosity of every receiver's vertices, by entity, on all threads.
+    ///
+    /// # Panics
+    /// When logarithms are to be added that were not taken.
+    pub fn run(&self, method: Method) -> Vec<(usize, Vec<[f64; 3]>)> {
+        let Frame { scene, store, options, .. } = self.frame;
+        let object = |(index, placement): (usize, &Placement)| {
+            let entity = &scene.entities[index];
+            let [blocked, radiance] = &self.fields[entity.mesh];
+            Object {
+                centre: self.frame.centre(index, placement),
+                rotation: placement.rotation.as_dquat().normalize(),
+                scale: placement.scale.into(),
+                radius_m: store.geometries[entity.mesh].radius_m * f64::from(placement.scale),
+                albedo_over_pi: (entity.albedo.as_dvec3() / PI).to_array(),
+                emission: entity.emission.as_dvec3().to_array(),
+                blocked: blocked.as_ref(),
+                logarithm: self.logarithms[entity.mesh].as_ref(),
+                radiance: radiance.as_ref().filter(|_| entity.emits),
+            }
+        };
+        let objects: Vec<Object<'_>> = self.placements.iter().enumerate().map(object).collect();
+        let lit = |receiver: &Receiver| {
             let leaves = |v: usize, j: usize, light: Option<usize>| {
-                let Some((cluster_of, listed)) = &listed else { return false };
+                let Some((cluster_of, listed)) = &receiver.listed else { return false };
                 !listed[cluster_of[v]].contains(&(j as u32, light.map_or(STEP_ENTITIES, |l| l as u32)))
             };
             let task = Task {
                 objects: &objects,
-                receiver,
-                occluders: &self.occluders(&state.moment, receiver),
-                lights: &lights,
-                sky: (!self.scene.environment.is_none()).then_some(&sky),
-                positions: &positions,
-                normals: &normals,
-                transfer: transfer.as_ref().map(|(floats, stride)| (&floats[..], *stride)),
-                bands: self.options.bake.bands,
-                lookup: self.options.lookup,
-                skip: self.options.skip,
-                chain: self.options.chain,
+                receiver: receiver.index,
+                occluders: &receiver.occluders,
+                lights: &self.lights,
+                sky: (!scene.environment.is_none()).then_some(&self.sky),
+                positions: &receiver.positions,
+                normals: &receiver.normals,
+                transfer: receiver.transfer.as_ref().map(|(floats, stride)| (&floats[..], *stride)),
+                bands: options.bake.bands,
+                lookup: options.lookup,
+                skip: options.skip,
+                method,
                 leaves: &leaves,
             };
-            out.push((receiver, task.run()));
-        }
-        Ok(out)
+            (receiver.index, task.run())
+        };
+        self.receivers.iter().map(lit).collect()
     }
 }
 

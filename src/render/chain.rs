@@ -2,11 +2,25 @@
 
 use super::variant::Chain;
 use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
+use crate::sh::log_space::LogSpace;
 use crate::sh::points;
 use crate::sh::product::Tensor;
 
-/// Coefficients, or values at points times the weights; zero past the last.
+/// Coefficients, or values at points times the weights; zero past the last. In log space the transfer, and from `SUM` on the sum
+/// of the factors' logarithms.
 pub type State = [f64; MAX_COEFFICIENTS];
+
+/// Where the sum of logarithms begins.
+const SUM: usize = MAX_COEFFICIENTS / 2;
+
+/// How factors come into a chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// One product after the other, as the device does it.
+    Products(Chain),
+    /// Their logarithms are added, and the exponential of the sum is multiplied in at the end. For comparison, on the CPU only.
+    Logarithms,
+}
 
 /// Multiplies chains of some bands by factors of some bands.
 pub struct Multiplier {
@@ -14,6 +28,7 @@ pub struct Multiplier {
     guard: bool,
     /// The basis at each point with the point's weight, where a chain stays at points.
     points: Option<Vec<(State, f64)>>,
+    logarithms: Option<LogSpace>,
 }
 
 impl Multiplier {
@@ -29,6 +44,25 @@ impl Multiplier {
             tensor: Tensor::new(bands, field_bands, bands),
             guard: chain.guard,
             points: chain.product.stays_at_points().then(points),
+            logarithms: None,
+        }
+    }
+
+    /// For a method, transfers of `bands` bands and factors of `field_bands`.
+    ///
+    /// # Panics
+    /// When logarithms are to be added of more than 5 bands, or of others than the transfer's.
+    pub fn by(method: Method, bands: usize, field_bands: usize) -> Self {
+        match method {
+            Method::Products(chain) => Self::new(chain, bands, field_bands),
+            Method::Logarithms => {
+                assert!(
+                    bands == field_bands && coefficient_count(bands) <= SUM,
+                    "{bands} and {field_bands} bands in log space"
+                );
+                let plain = Chain { guard: false, ..Chain::default() };
+                Multiplier { logarithms: Some(LogSpace::new(bands)), ..Self::new(plain, bands, field_bands) }
+            }
         }
     }
 
@@ -46,7 +80,15 @@ impl Multiplier {
         state
     }
 
-    /// The integral of the chain against a function of as many bands as the transfer.
+    /// Ends a chain: nothing more is multiplied in.
+    pub fn finish(&self, state: &mut State) {
+        if let Some(space) = &self.logarithms {
+            let (transfer, sum) = state.split_at_mut(SUM);
+            space.multiply(transfer, sum);
+        }
+    }
+
+    /// The integral of a finished chain against a function of as many bands as the transfer.
     pub fn meet(&self, state: &State, function: &[f64]) -> f64 {
         match &self.points {
             None => dot(state, &function[..self.count()]),
@@ -56,8 +98,12 @@ impl Multiplier {
         }
     }
 
-    /// Multiplies by 1 - `blocked`.
+    /// Multiplies by 1 - `blocked`; in log space `blocked` is that factor's logarithm.
     pub fn multiply(&self, state: &mut State, blocked: &[f64]) {
+        if self.logarithms.is_some() {
+            state[SUM..].iter_mut().zip(&blocked[..self.count()]).for_each(|(sum, log)| *sum += log);
+            return;
+        }
         let before = self.parts(state);
         match &self.points {
             None => {

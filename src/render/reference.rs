@@ -1,7 +1,7 @@
 //! The CPU twin of "merge", in f64 and vertex by vertex, from the same stored numbers.
 
-use super::chain::Multiplier;
-use super::variant::{Chain, SKIP_FADE_RAD, Skip};
+use super::chain::{Method, Multiplier};
+use super::variant::{SKIP_FADE_RAD, Skip};
 use crate::field::{Lookup, ShadowField};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count};
 use crate::sh::lobe::clamped_cosine;
@@ -25,6 +25,8 @@ pub struct Object<'f> {
     pub emission: [f64; 3],
     /// Occlusion field, if one was baked.
     pub blocked: Option<&'f ShadowField>,
+    /// The same field's logarithms (see [`crate::field::log_space`]), where factors come in as such.
+    pub logarithm: Option<&'f ShadowField>,
     /// Radiance field, if its light varies over the surface.
     pub radiance: Option<&'f ShadowField>,
 }
@@ -49,8 +51,8 @@ pub struct Task<'t> {
     pub transfer: Option<(&'t [f32], usize)>,
     /// SH bands of transfer and light; an occlusion field has its own.
     pub bands: usize,
-    /// How factors are multiplied.
-    pub chain: Chain,
+    /// How factors come into a chain.
+    pub method: Method,
     /// Which samples a lookup takes.
     pub lookup: Lookup,
     /// What is left out.
@@ -66,7 +68,7 @@ impl Task<'_> {
     /// Radiosity of every vertex: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self) -> Vec<[f64; 3]> {
         let field_bands = self.field_bands();
-        let multiplier = Multiplier::new(self.chain, self.bands, field_bands);
+        let multiplier = Multiplier::by(self.method, self.bands, field_bands);
         let bands = self.bands.max(field_bands);
         let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(bands, o.rotation)).collect();
         (0..self.positions.len()).into_par_iter().map(|v| self.vertex(v, &multiplier, &rotations)).collect()
@@ -90,7 +92,7 @@ impl Task<'_> {
             .iter()
             .map(|&j| {
                 let reach = cones[j].above_horizon(normal, self.skip);
-                (j, self.field(j, position, None, rotations).map(|b| b * reach))
+                (j, self.factor(j, position, rotations).map(|b| b * reach))
             })
             .collect();
         // The chain of the occluders, each as much as `share` says.
@@ -99,6 +101,7 @@ impl Task<'_> {
             for (j, b) in &factors {
                 multiplier.multiply(&mut state, &b.map(|b| b * share(*j)));
             }
+            multiplier.finish(&mut state);
             state
         };
 
@@ -138,14 +141,36 @@ impl Task<'_> {
         out
     }
 
+    /// What object `j` multiplies a chain at a world position by, in the world frame: the blocked part, or the logarithm of the rest.
+    fn factor(&self, j: usize, position: DVec3, rotations: &[Rotation]) -> Coefficients {
+        match self.method {
+            Method::Products(_) => self.field(j, position, None, rotations),
+            Method::Logarithms => {
+                let field = self.objects[j].logarithm.expect("what blocks has logarithms");
+                self.look_up(j, position, (field, 0), rotations)
+            }
+        }
+    }
+
     /// The field of object `j` at a world position, in the world frame: radiance of a channel, or the blocked part.
     fn field(&self, j: usize, position: DVec3, channel: Option<usize>, rotations: &[Rotation]) -> Coefficients {
         let object = &self.objects[j];
-        let local = object.rotation.inverse() * (position - object.centre) / object.radius_m;
-        let (field, channel) = match (object.radiance, channel) {
+        let source = match (object.radiance, channel) {
             (Some(field), Some(channel)) => (field, channel),
             _ => (object.blocked.expect("what blocks or shines in one colour has an occlusion field"), 0),
         };
+        self.look_up(j, position, source, rotations)
+    }
+
+    fn look_up(
+        &self,
+        j: usize,
+        position: DVec3,
+        (field, channel): (&ShadowField, usize),
+        rotations: &[Rotation],
+    ) -> Coefficients {
+        let object = &self.objects[j];
+        let local = object.rotation.inverse() * (position - object.centre) / object.radius_m;
         let (mut found, mut out) = ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
         field.lookup(local, self.lookup, channel, &mut found);
         rotations[j].apply(&found, &mut out);

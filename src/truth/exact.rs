@@ -77,6 +77,7 @@ impl Exact {
                 let share = share(occluder);
                 multiplier.multiply(&mut state, &blocked.map(|b| b * share));
             }
+            multiplier.finish(&mut state);
             state
         };
 

@@ -1,8 +1,8 @@
 //! The error of a picture split into its causes, rung by rung of the ladder of [`crate::truth`].
 
+use super::Bench;
 use super::cases::Case;
 use super::figures::{Difference, Radiosity, difference, rms};
-use super::{Bench, default_options};
 use crate::error::Result;
 use crate::field::Storage;
 use crate::frame::{self, Frame};
@@ -132,13 +132,12 @@ pub struct Budget {
     pub t0_per_unoccluded: f64,
 }
 
-/// Climbs down the ladder.
+/// Climbs down the ladder, with fields and a merge of the given options.
 ///
 /// # Errors
 /// As [`Frame::new`].
-pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Budget> {
+pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Options) -> Result<Budget> {
     let placements = case.scene.at(case.time_s);
-    let options = default_options();
     let wide = frame::Options { bake: crate::bake::Options { storage: Storage::F32, ..options.bake }, ..options };
     let t2 = select(&bench.frame(&case.scene, wide)?.reference(&placements)?, &truth.vertices);
     let mut frame = bench.frame(&case.scene, options)?;

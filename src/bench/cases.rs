@@ -1,7 +1,7 @@
 //! What is measured: the embedded scenes, and a teapot over a plane under one kind of light at a time.
 
 use crate::asset::{Mesh, embedded};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::truth::raycast::Distant;
 use std::path::Path;
@@ -28,6 +28,21 @@ const GAP: f64 = 0.02;
 const LIGHT_DISTANCE: f64 = 5.0;
 /// Distance of a disc in the sky: over the floor its direction changes by a quarter of a degree.
 const FAR: f64 = 1000.0;
+
+/// What has any of the texts in its name, in its order; all where there is no text.
+///
+/// # Errors
+/// `Usage` that lists the names when a text is in none.
+pub fn named<T>(mut all: Vec<T>, texts: &[String], name: impl Fn(&T) -> &str) -> Result<Vec<T>> {
+    for text in texts {
+        if !all.iter().any(|case| name(case).contains(text)) {
+            let names: Vec<&str> = all.iter().map(&name).collect();
+            return Err(Error::Usage(format!("no case has \"{text}\" in its name ({})", names.join("; "))));
+        }
+    }
+    all.retain(|case| texts.is_empty() || texts.iter().any(|text| name(case).contains(text)));
+    Ok(all)
+}
 
 /// The embedded scenes at their start.
 ///

@@ -79,7 +79,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection) -> Result<Ou
         };
         let truth = Truth::new(case, effort, bench.seed);
         took(&mut outcome, "casting the truth's rays");
-        outcome.budgets.push(budget(bench, case, &truth)?);
+        outcome.budgets.push(budget(bench, case, &truth, default_options())?);
         took(&mut outcome, "baking and budgets");
         outcome.pictures.push(error_picture(bench, case, folder)?);
         took(&mut outcome, "error pictures");
@@ -123,16 +123,8 @@ fn chosen(quick: bool, named: &[String]) -> Result<Vec<Case>> {
     if named.is_empty() {
         let cheap = |name: &str| ["sphere_over_plane", "torus_over_plane"].contains(&name) || name.contains("(b)");
         all.retain(|case| !quick || cheap(&case.name));
-        return Ok(all);
     }
-    for name in named {
-        if !all.iter().any(|case| case.name.contains(name)) {
-            let names: Vec<&str> = all.iter().map(|case| case.name.as_str()).collect();
-            return Err(Error::Usage(format!("no case has \"{name}\" in its name ({})", names.join("; "))));
-        }
-    }
-    all.retain(|case| named.iter().any(|name| case.name.contains(name)));
-    Ok(all)
+    cases::named(all, named, |case| &case.name)
 }
 
 /// The default and the settings of the axes that are named, or of all.

@@ -2,8 +2,10 @@
 
 use super::common::start;
 use crate::app::{Global, output};
+use crate::bake;
 use crate::bench::{floor, text::three};
 use crate::error::{Error, Result};
+use crate::field::Lattice;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -13,6 +15,18 @@ pub struct Arguments {
     /// Fewer rays
     #[arg(long)]
     quick: bool,
+    /// Only lights that have TEXT in their names; may be given again; a text that none has lists them
+    #[arg(long, value_name = "TEXT")]
+    case: Vec<String>,
+    /// Rays a vertex, light and factor; default: 16384, with --quick 4096
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=1_048_576))]
+    rays: Option<u32>,
+    /// Sample points, as `bake --lattice` takes them
+    #[arg(long, default_value_t = Lattice::default(), value_name = "LATTICE")]
+    lattice: Lattice,
+    /// Edge of a captured cube face in texels
+    #[arg(long, default_value_t = 64, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=1024))]
+    face_px: u32,
     /// Folder for floor.csv and floor.json
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -20,7 +34,10 @@ pub struct Arguments {
 
 /// Measures and prints the table; fails where the bands rung is not what was found independently.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let (context, rows) = start(global, arguments.quick, |bench| floor::run(bench, &arguments.out))?;
+    let bake = bake::Options { lattice: arguments.lattice, face_px: arguments.face_px, ..Default::default() };
+    let (context, rows) = start(global, arguments.quick, |bench| {
+        floor::run(bench, &arguments.out, &arguments.case, arguments.rays, bake)
+    })?;
     if global.json {
         output::say(serde_json::to_value(&rows).expect("results are plain data").to_string());
     } else {

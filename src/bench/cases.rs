@@ -82,22 +82,25 @@ pub fn light(scene: &Scene) -> String {
     words.join(" + ")
 }
 
-/// Teapot of bounding radius 1 over a floor of 40 x 40 vertices and 6 x 6 m that alone is lit, under one light at a time:
+/// Cells along a side of the floor of [`teapot_lights`]: as many vertices as the floors of the embedded scenes have.
+const FINE_CELLS: usize = 112;
+
+/// Teapot of bounding radius 1 over a floor of 113 x 113 vertices and 6 x 6 m that alone is lit, under one light at a time:
 /// (a) a uniform sky, (b) a sky that brightens upwards, (c) a soft key light that is defined by its 4 bands, (d) a sphere
 /// light seen from the teapot's centre under a half angle of 15 and of 7.5 degrees.
 ///
 /// # Errors
 /// None that a test does not show.
 pub fn teapot_lights() -> Result<Vec<Case>> {
-    Ok(floor()?.into_iter().filter(|case| !case.name.contains("disc")).collect())
+    Ok(floor(FINE_CELLS)?.into_iter().filter(|case| !case.name.contains("disc")).collect())
 }
 
-/// As [`teapot_lights`], and with discs of half-angles of 30 and 15 degrees in the sky last: sphere lights so far away that they look
-/// the same from everywhere.
+/// As [`teapot_lights`] over a floor of so many cells along a side, and with discs of half-angles of 30 and 15 degrees in the sky
+/// last: sphere lights so far away that they look the same from everywhere.
 ///
 /// # Errors
 /// None that a test does not show.
-pub fn floor() -> Result<Vec<Case>> {
+pub fn floor(cells: usize) -> Result<Vec<Case>> {
     let mesh = Mesh::parse(&embedded::read(Path::new("assets/meshes/teapot.obj"))?, Path::new("teapot.obj"))?;
     let (centre, radius_m) = mesh.bounding_sphere();
     let (centre, scale) = (centre.as_dvec3(), 1.0 / f64::from(radius_m));
@@ -111,7 +114,7 @@ pub fn floor() -> Result<Vec<Case>> {
         target = [0, 0.5, 0]
         [[mesh]]
         name = "floor"
-        plane = {{ size_m = 6, cells = 39 }}
+        plane = {{ size_m = 6, cells = {cells} }}
         [[mesh]]
         name = "teapot"
         file = "../meshes/teapot.obj"

@@ -179,7 +179,8 @@ fn rival_rows(comparison: &Comparison) -> Vec<Value> {
         json!({
             "case": comparison.case, "light": comparison.light, "what": what, "vertex_count": comparison.vertices, "thread_count": comparison.threads,
             "wall_ms": wall_ms, "error": error,
-            "speed_up_at_equal_rms_ratio": comparison.speed_up_at_equal_rms, "rays_at_equal_rms_count": comparison.rays_at_equal_rms,
+            "speed_up_at_equal_rms_ratio": comparison.speed_up_at_equal_rms,
+            "merge_speed_up_at_equal_rms_ratio": comparison.merge_speed_up_at_equal_rms, "rays_at_equal_rms_count": comparison.rays_at_equal_rms,
         })
     };
     let merge = row("merge".into(), comparison.frame_wall_ms.median, comparison.merge_error);

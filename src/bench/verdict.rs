@@ -199,7 +199,7 @@ pub fn rivals(comparisons: &[Comparison]) -> String {
         };
         let _ = writeln!(
             text,
-            "  {}: {} times {} ({} ms at an error of {}; {} {} ms)",
+            "  {}: {} times {} ({} ms at an error of {}; {} {} ms; the merge alone {} times)",
             c.title(),
             three(if times >= 1.0 { times } else { 1.0 / times }),
             if times >= 1.0 { "faster" } else { "SLOWER" },
@@ -207,6 +207,7 @@ pub fn rivals(comparisons: &[Comparison]) -> String {
             three(c.merge_error.rms),
             if rays <= 1.0 { "one ray errs less and takes".into() } else { format!("{} rays take", three(rays)) },
             three(c.rival_ms_at_equal_rms.unwrap_or(f64::NAN)),
+            three(c.merge_speed_up_at_equal_rms.unwrap_or(f64::NAN)),
         );
         if times < 1.0 {
             losses.push(c.title());

@@ -55,11 +55,12 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             let or_none = |x: Option<f64>| x.map_or("-".into(), three);
             let mut row = vec![c.case.clone(), c.light.clone()];
             row.extend([c.frame_wall_ms.median, c.merge_error.rms].map(three));
-            row.extend([c.rays_at_equal_rms, c.rival_ms_at_equal_rms, c.speed_up_at_equal_rms].map(or_none));
+            row.extend([c.rays_at_equal_rms, c.rival_ms_at_equal_rms].map(or_none));
+            row.extend([c.speed_up_at_equal_rms, c.merge_speed_up_at_equal_rms].map(or_none));
             row
         })
         .collect();
-    output::table(&["scene", "light", "frame ms", "error", "rays", "rays ms", "times faster"], &rows);
+    output::table(&["scene", "light", "frame ms", "error", "rays", "rays ms", "times faster", "merge alone"], &rows);
     let folder = arguments.out.display();
     output::say(format!("\n{folder}: {} settings measured, {}", outcome.points.len(), outcome.took()));
     output::say(format!("{folder}/time-error.txt says which setting is the default and why"));

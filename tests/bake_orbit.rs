@@ -200,41 +200,6 @@ fn a_turned_sphere_is_as_near_to_the_closed_form_as_a_captured_one() {
 }
 
 #[test]
-#[ignore = "llvmpipe may crash where two devices compile at once; run by hand with --ignored"]
-fn two_devices_bake_what_one_does() {
-    let Some(gpu) = gpu() else { return };
-    let mesh = generate::torus(1.0, 0.3, 90, 60);
-    let bake = |devices: usize| {
-        let mut baker = Baker::new(&gpu.device, &gpu.library);
-        (baker.orbit, baker.devices) = (false, devices);
-        let options =
-            bake::Options { lattice: "cube:6x4".parse().unwrap(), storage: Storage::F32, ..Default::default() };
-        let mut header = bake::header(&mesh, Kind::Occlusion, &options);
-        let store = Buffer::new(&gpu.device, "field", BufferKind::Device, header.payload_bytes()).unwrap();
-        let last = std::cell::Cell::new(0);
-        let found = baker.field(&mesh, &mut header, (&store, 0), &|done, _| last.set(done)).unwrap();
-        assert_eq!(last.get(), lattice_count(&header));
-        report(&format!("{devices}: {} devices", found.devices));
-        (found.devices, store.download_range::<u8>(0..header.payload_bytes()).unwrap())
-    };
-    let (one, two) = (bake(1), bake(2));
-    assert!(one.0 == 1 && two.0 == 2);
-    // A face lies elsewhere in the other atlas, where a silhouette through a texel's centre may round to its other side.
-    let numbers = |bytes: &[u8]| -> Vec<f32> {
-        bytes.chunks_exact(4).map(|number| f32::from_le_bytes(number.try_into().unwrap())).collect()
-    };
-    let apart: Vec<f32> = numbers(&one.1).iter().zip(numbers(&two.1)).map(|(a, b)| (a - b).abs()).collect();
-    let (differing, worst) =
-        (apart.iter().filter(|d| **d > 0.0).count(), apart.iter().fold(0.0_f32, |worst, d| worst.max(*d)));
-    report(&format!("{differing} of {} coefficients differ, by {worst:.1e} at most", apart.len()));
-    assert!(40 * differing < apart.len() && worst < 3e-3, "{differing} differ, by {worst:e} at most");
-}
-
-fn lattice_count(header: &Header) -> u32 {
-    header.lattice.sample_count()
-}
-
-#[test]
 fn transfer_of_symmetric_vertices_is_turned() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::torus(1.0, 0.4, 24, 12);

@@ -165,7 +165,8 @@ impl Capture {
         let mut used = 0;
         let mut out = Vec::new();
         for &eye in eyes {
-            if used + FACE_COUNT as u32 > self.capacity() {
+            // An eye that sees nothing has no face, but a job all the same.
+            if used.max(out.len() as u32) + FACE_COUNT as u32 > self.capacity() {
                 break;
             }
             let mut slots = [NO_SLOT; FACE_COUNT];

@@ -35,7 +35,7 @@ use partial::Partial;
 use project::{Job, Projection};
 pub use report::{LevelReport, Report};
 use serde::{Deserialize, Serialize};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Instant;
 use surface::Surface;
 use sweep::Sweep;
@@ -141,31 +141,13 @@ pub struct Baker {
     pub orbit: bool,
     /// Whether only faces that the object reaches are drawn, of these only what reaches into them, and of closed meshes no backs.
     pub faces: bool,
-    /// Most devices that one bake works on. A software driver draws on one core for each, so two would be faster there; but
-    /// llvmpipe (Mesa 22.3) now and then crashes when two devices compile at once (1 of 8 starts with a cold shader cache), so it
-    /// is one unless asked for.
-    pub devices: usize,
-    siblings: Mutex<Vec<Arc<Device>>>,
 }
-
-/// Targets times triangles from which a sibling's start, a tenth of a second, is worth its while.
-const WORTH_A_DEVICE: usize = 6_000_000;
 
 impl Baker {
     /// A baker that compiles its shaders from `library`.
     pub fn new(device: &Arc<Device>, library: &Library) -> Self {
         let (device, library) = (device.clone(), library.clone());
-        Baker { device, library, simplify: false, orbit: true, faces: true, devices: 1, siblings: Mutex::default() }
-    }
-
-    /// The devices for `work` (targets times triangles), the baker's own first.
-    fn workers(&self, work: usize) -> Result<Vec<Arc<Device>>> {
-        let wanted = self.devices.min(1 + work / WORTH_A_DEVICE);
-        let mut siblings = self.siblings.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        while siblings.len() + 1 < wanted {
-            siblings.push(self.device.sibling()?);
-        }
-        Ok(std::iter::once(&self.device).chain(&*siblings).take(wanted.max(1)).cloned().collect())
+        Baker { device, library, simplify: false, orbit: true, faces: true }
     }
 
     /// Checks that the device can bind the field that `header` describes, and what it is baked from.

@@ -16,9 +16,7 @@ pub struct Report {
     pub filled: u32,
     /// Meshes that samples were captured from: simplified ones for those far off, the full one last.
     pub levels: Vec<LevelReport>,
-    /// Devices that worked on it.
-    pub devices: usize,
-    /// Device time in capture passes, of all of them.
+    /// Device time in capture passes.
     pub capture_ms: f64,
     /// Device time in project passes.
     pub project_ms: f64,

@@ -1,5 +1,5 @@
-//! One run of capture and project over the eyes of a field or a transfer: far eyes on simplified meshes, from where a cancelled
-//! bake was, and on several devices where the driver draws on one core for each.
+//! One run of capture and project over the eyes of a field or a transfer: far eyes on simplified meshes, and from where a cancelled
+//! bake was.
 
 use super::capture::{Capture, Model, NO_SLOT, Slots, unit_positions};
 use super::partial::Partial;
@@ -9,10 +9,8 @@ use super::{Baker, LevelReport, Progress, Report};
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::quantity::channel_stride;
-use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
+use crate::gpu::{Access, Buffer, BufferKind, Commands};
 use glam::Vec3;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
 
 /// What all captures of one bake share.
 pub(super) struct Sweep<'s> {
@@ -40,30 +38,13 @@ struct Worker {
     samples: [Buffer; 2],
 }
 
-/// Where results go.
-struct Ledger<'v> {
-    values: &'v mut [f32],
-    /// For each portion of the targets how many it has; 0 until they are done.
-    finished: Vec<u32>,
-    report: Report,
-}
-
-/// Leaves nothing to take for the other workers when one ends, by an error or a cancelled bake.
-struct Stop<'c>(&'c AtomicUsize);
-
-impl Drop for Stop<'_> {
-    fn drop(&mut self) {
-        self.0.store(usize::MAX / 2, Ordering::Relaxed);
-    }
-}
-
 impl Sweep<'_> {
     fn sample_floats(&self) -> usize {
         self.projection.channels() * channel_stride(self.bands)
     }
 
-    /// Captures every eye and puts what is projected into `values`, samples in the order of their numbers. `begun` of `all`
-    /// targets were done before.
+    /// Captures every eye, an atlas at a time, and puts what is projected into `values`, samples in the order of their numbers.
+    /// `begun` of `all` targets were done before.
     fn run(
         &self,
         stand_in: StandIn<'_>,
@@ -72,52 +53,16 @@ impl Sweep<'_> {
         (begun, all): (u32, u32),
         progress: Progress<'_>,
     ) -> Result<Report> {
-        let triangles = stand_in.map_or(self.mesh.triangles.len(), |(level, _)| level.triangles.len());
-        let devices = self.baker.workers(targets.len() * triangles)?;
-        // All fit into one atlas where faces are reached as seldom as they mostly are; few targets are dealt out evenly.
-        let capacity = Capture::columns(self.baker.device(), self.face_px, self.projection == Projection::Radiance)
-            .pow(2) as usize;
-        let portion = (capacity / 3).min(targets.len().div_ceil(4 * devices.len())).max(1);
-        let count = targets.len().div_ceil(portion);
-        let ledger = Mutex::new(Ledger {
-            values,
-            finished: vec![0; count],
-            report: Report { devices: devices.len(), ..Report::default() },
-        });
-        let next = AtomicUsize::new(0);
-        let told = std::cell::Cell::new(begun);
-        let work = |device: &Arc<Device>, tell: &dyn Fn(&Ledger<'_>)| -> Result<()> {
-            let _stop = Stop(&next);
-            let mut worker = Worker::new(self, device, stand_in)?;
-            loop {
-                let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(portion) = targets.chunks(portion).nth(index) else { return Ok(()) };
-                worker.capture(portion, self.sample_floats(), &ledger)?;
-                let mut ledger = ledger.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-                ledger.finished[index] = portion.len() as u32;
-                tell(&ledger);
-            }
-        };
-        let tell = |ledger: &Ledger<'_>| {
-            let whole: u32 = ledger.finished.iter().take_while(|count| **count > 0).sum();
-            self.partial.save(ledger.values, begun + whole, all);
-            told.set(begun + ledger.finished.iter().sum::<u32>());
-            progress(told.get(), all);
-        };
-        std::thread::scope(|scope| {
-            let silent = |_: &Ledger<'_>| ();
-            let others: Vec<_> = devices[1..].iter().map(|device| scope.spawn(move || work(device, &silent))).collect();
-            let mut outcome = work(&devices[0], &tell);
-            for other in others {
-                outcome = outcome.and(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-            }
-            outcome
-        })?;
-        let end = begun + targets.len() as u32;
-        if told.get() < end {
-            progress(end, all);
+        let mut worker = Worker::new(self, stand_in)?;
+        let mut report = Report::default();
+        let mut rest = targets;
+        while !rest.is_empty() {
+            rest = worker.capture(rest, self.sample_floats(), values, &mut report)?;
+            let done = begun + (targets.len() - rest.len()) as u32;
+            self.partial.save(values, done, all);
+            progress(done, all);
         }
-        Ok(ledger.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()).report)
+        Ok(report)
     }
 
     /// Captures every target from the full mesh.
@@ -157,7 +102,6 @@ impl Sweep<'_> {
             }
             let stand_in = level.map(|i| (&levels[i], color.filter(|_| radiance)));
             let of_part = self.run(stand_in, part, values, (done, all), progress)?;
-            report.devices = report.devices.max(of_part.devices);
             report.faces += of_part.faces;
             report.capture_ms += of_part.capture_ms;
             report.project_ms += of_part.project_ms;
@@ -169,9 +113,9 @@ impl Sweep<'_> {
 }
 
 impl Worker {
-    fn new(sweep: &Sweep<'_>, device: &Arc<Device>, stand_in: StandIn<'_>) -> Result<Self> {
+    fn new(sweep: &Sweep<'_>, stand_in: StandIn<'_>) -> Result<Self> {
         let radiance = sweep.projection == Projection::Radiance;
-        let library = sweep.baker.library();
+        let (device, library) = (sweep.baker.device(), sweep.baker.library());
         let mut capture = Capture::new(device, library, sweep.face_px, radiance)?;
         capture.skips = sweep.baker.faces;
         let bytes = 4 * u64::from(capture.capacity()) * sweep.sample_floats() as u64;
@@ -191,28 +135,28 @@ impl Worker {
         })
     }
 
-    /// Captures and projects the targets, an atlas at a time.
-    fn capture(&mut self, targets: &[Aim], floats: usize, ledger: &Mutex<Ledger<'_>>) -> Result<()> {
-        let mut rest = targets;
-        while !rest.is_empty() {
-            let eyes: Vec<Vec3> = rest.iter().map(|(eye, _)| *eye).collect();
-            let plan: Vec<Slots> = self.capture.plan(&self.model, &eyes);
-            let (batch, after) = rest.split_at(plan.len());
-            let numbered = batch.iter().zip(&plan).enumerate();
-            let jobs: Vec<Job> =
-                numbered.map(|(i, ((_, job), slots))| Job { slots: *slots, target: i as u32, ..*job }).collect();
-            self.jobs.write(0, &jobs);
-            let timings = self.batch(&eyes[..plan.len()], &plan, floats)?;
-            let found: Vec<f32> = self.samples[1].read(0, plan.len() * floats);
-            let mut ledger = ledger.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-            ledger.report.add(&timings);
-            ledger.report.faces += plan.iter().flatten().filter(|slot| **slot != NO_SLOT).count() as u32;
-            for ((_, job), sample) in batch.iter().zip(found.chunks_exact(floats)) {
-                ledger.values[job.target as usize * floats..][..floats].copy_from_slice(sample);
-            }
-            rest = after;
+    /// Captures and projects as many of the targets as fit into one atlas, and returns the others.
+    fn capture<'t>(
+        &mut self,
+        targets: &'t [Aim],
+        floats: usize,
+        values: &mut [f32],
+        report: &mut Report,
+    ) -> Result<&'t [Aim]> {
+        let eyes: Vec<Vec3> = targets.iter().map(|(eye, _)| *eye).collect();
+        let plan: Vec<Slots> = self.capture.plan(&self.model, &eyes);
+        let (batch, rest) = targets.split_at(plan.len());
+        let numbered = batch.iter().zip(&plan).enumerate();
+        let jobs: Vec<Job> =
+            numbered.map(|(i, ((_, job), slots))| Job { slots: *slots, target: i as u32, ..*job }).collect();
+        self.jobs.write(0, &jobs);
+        report.add(&self.batch(&eyes[..plan.len()], &plan, floats)?);
+        report.faces += plan.iter().flatten().filter(|slot| **slot != NO_SLOT).count() as u32;
+        let found: Vec<f32> = self.samples[1].read(0, plan.len() * floats);
+        for ((_, job), sample) in batch.iter().zip(found.chunks_exact(floats)) {
+            values[job.target as usize * floats..][..floats].copy_from_slice(sample);
         }
-        Ok(())
+        Ok(rest)
     }
 
     fn batch(&self, eyes: &[Vec3], plan: &[Slots], floats: usize) -> Result<Vec<crate::gpu::Timing>> {

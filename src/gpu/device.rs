@@ -208,15 +208,6 @@ impl Device {
         Self::open(&Arc::new(instance), physical, info, swapchain, options.cache_dir.clone())
     }
 
-    /// A second logical device on the same physical one, with a queue of its own. A software driver works off one queue on one
-    /// core, vertices at least: two halves of a job on two devices take half as long.
-    ///
-    /// # Errors
-    /// As [`Device::new`].
-    pub fn sibling(&self) -> Result<Arc<Self>> {
-        Self::open(&self.instance, self.physical, self.info.clone(), &[], self.cache_dir.clone())
-    }
-
     fn open(
         instance: &Arc<Instance>,
         physical: vk::PhysicalDevice,

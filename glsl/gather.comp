@@ -2,7 +2,9 @@
 // The steps of every cluster, a group of neighbouring clusters of one receiver a workgroup. First all invocations look for the
 // occluders that may matter to any of the clusters, by the block and then one by one, and put them into the receiver's order;
 // then each walks its own cluster through what was found, light by light and at last the sky, and writes what it keeps.
+// A group that finds more than there is room for is left to a second round (ROOMY), which keeps what it finds in a buffer.
 // Decisions come from sums and products alone (repeatable.glsl), so that the host can make the same lists.
+#extension GL_KHR_memory_scope_semantics : enable
 #include "merge_layout.glsl"
 
 layout(local_size_x = LANES) in;
@@ -15,7 +17,7 @@ struct Group {
     uint first;
     uint count;
     uint bounds;
-    uint spare;
+    uint left; // of the group at this place among those that are left to the second round: its number
 };
 
 // Spheres of all entities (centre in the world, radius), then blocks of occluders, their members, and lights.
@@ -32,14 +34,14 @@ vec4 body(uint i) {
 #endif
 layout(std430, binding = 1) readonly buffer Entities { Entity entities[]; };
 layout(std430, binding = 2) readonly buffer AllBounds { Bounds bounds[]; };
-layout(std430, binding = 3) readonly buffer Groups { Group groups[]; };
+layout(std430, binding = 3) buffer Groups { Group groups[]; };
 layout(std430, binding = 4) buffer Clusters { Cluster clusters[]; };
 layout(std430, binding = 5) writeonly buffer Steps { uint steps[]; };
 layout(std430, binding = 6) buffer Report {
     uint longest;
     uint most_found;
     uint step_total;
-    uint spare;
+    uint left_count; // groups left to the second round
 };
 layout(push_constant) uniform Push {
     uint occluder_count;
@@ -55,14 +57,38 @@ layout(push_constant) uniform Push {
 };
 #include "gather_scope.glsl"
 
+// What is found: distances, occluders, and these in order.
+#if ROOMY
+layout(std430, binding = 7) coherent buffer Room { uint room[]; };
+#define FOUND occluder_count
+#define KEY(i) room[2 * (i) * gl_NumWorkGroups.x + 2 * gl_WorkGroupID.x]
+#define OCCLUDER(i) room[2 * (i) * gl_NumWorkGroups.x + 2 * gl_WorkGroupID.x + 1]
+#define ORDERED(i) OCCLUDER(i)
+#else
+shared uint keys[ROOM];
+shared uint occluders[ROOM];
+shared uint ordered[ROOM];
+#define FOUND ROOM
+#define KEY(i) keys[i]
+#define OCCLUDER(i) occluders[i]
+#define ORDERED(i) ordered[i]
+#endif
+
 shared uint block_count;
 shared uint found;
 shared uint blocks[BLOCKS];
-shared uint keys[FOUND];
-shared uint occluders[FOUND];
-shared uint ordered[FOUND];
 shared uint nearest, farthest;
 shared uint buckets[BUCKETS + 1]; // where each begins
+
+// All invocations come here, and see what each of them has written.
+void meet() {
+#if ROOMY
+    controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsShared | gl_StorageSemanticsBuffer,
+        gl_SemanticsAcquireRelease);
+#else
+    barrier();
+#endif
+}
 
 // Occluders that may matter to any cluster of the group, in no order.
 void find(Scope scope, uint receiver, uint lane) {
@@ -73,7 +99,7 @@ void find(Scope scope, uint receiver, uint lane) {
             blocks[atomicAdd(block_count, 1)] = b;
         }
     }
-    barrier();
+    meet();
     for (uint i = lane; i < block_count * BLOCK; i += LANES) {
         uint m = blocks[i / BLOCK] * BLOCK + i % BLOCK;
         if (m >= occluder_count) {
@@ -86,75 +112,86 @@ void find(Scope scope, uint receiver, uint lane) {
             uint at = atomicAdd(found, 1);
             if (at < FOUND) {
                 precise vec3 to = sphere.xyz - scope.origin;
-                keys[at] = floatBitsToUint(sum_of_products(to, to)); // not negative: more in bits is more
-                occluders[at] = e;
+                KEY(at) = floatBitsToUint(sum_of_products(to, to)); // not negative: more in bits is more
+                OCCLUDER(at) = e;
             }
         }
     }
 }
 
-// Near to far from the receiver's centre, ties by index: first into stretches of equal length in bits, then within each.
+// Near to far from the receiver's centre, ties by index.
+#if ROOMY
+bool follows(uint a, uint b) {
+    return KEY(a) > KEY(b) || (KEY(a) == KEY(b) && OCCLUDER(a) > OCCLUDER(b));
+}
+
+// Batcher's bitonic sort: what it takes does not depend on how distances are spread.
+void order(uint count, uint lane) {
+    uint padded = 1u << (count > 1 ? findMSB(count - 1) + 1 : 0);
+    for (uint i = count + lane; i < padded; i += LANES) {
+        KEY(i) = ~0u;
+        OCCLUDER(i) = ~0u;
+    }
+    meet();
+    for (uint run = 2; run <= padded; run *= 2) {
+        for (uint apart = run / 2; apart > 0; apart /= 2) {
+            for (uint i = lane; i < padded / 2; i += LANES) {
+                uint a = 2 * i - i % apart, b = a + apart;
+                if (follows(a, b) == ((a & run) == 0)) {
+                    uint key = KEY(a), e = OCCLUDER(a);
+                    KEY(a) = KEY(b);
+                    OCCLUDER(a) = OCCLUDER(b);
+                    KEY(b) = key;
+                    OCCLUDER(b) = e;
+                }
+            }
+            meet();
+        }
+    }
+}
+#else
+// First into stretches of equal length in bits, then within each.
 void order(uint count, uint lane) {
     for (uint i = lane; i < count; i += LANES) {
-        atomicMin(nearest, keys[i]);
-        atomicMax(farthest, keys[i]);
+        atomicMin(nearest, KEY(i));
+        atomicMax(farthest, KEY(i));
     }
-    barrier();
+    meet();
     uint width = count > 0 ? (farthest - nearest) / BUCKETS + 1 : 1;
     for (uint i = lane; i < count; i += LANES) {
-        atomicAdd(buckets[(keys[i] - nearest) / width + 1], 1);
+        atomicAdd(buckets[(KEY(i) - nearest) / width + 1], 1);
     }
-    barrier();
+    meet();
     if (lane == 0) {
         for (uint b = 1; b <= BUCKETS; b++) {
             buckets[b] += buckets[b - 1];
         }
     }
-    barrier();
+    meet();
     // Each takes a place of its bucket, from the end: afterwards buckets[b + 1] is where bucket b begins.
     for (uint i = lane; i < count; i += LANES) {
-        ordered[atomicAdd(buckets[(keys[i] - nearest) / width + 1], uint(-1)) - 1] = i;
+        uint end = atomicAdd(buckets[(KEY(i) - nearest) / width + 1], uint(-1));
+        ORDERED(end - 1) = i;
     }
-    barrier();
+    meet();
     for (uint i = lane; i < count; i += LANES) {
-        uint key = keys[i], e = occluders[i], b = (key - nearest) / width + 1;
+        uint key = KEY(i), e = OCCLUDER(i), b = (key - nearest) / width + 1;
         uint end = b < BUCKETS ? buckets[b + 1] : count, rank = buckets[b];
         for (uint j = buckets[b]; j < end; j++) {
-            uint other = ordered[j];
-            rank += uint(keys[other] < key || (keys[other] == key && (occluders[other] & SKY_CHAIN) < e));
+            uint other = ORDERED(j);
+            rank += uint(KEY(other) < key || (KEY(other) == key && (OCCLUDER(other) & SKY_CHAIN) < e));
         }
-        atomicOr(occluders[i], rank << STEP_BITS);
+        atomicOr(OCCLUDER(i), rank << STEP_BITS);
     }
-    barrier();
+    meet();
     for (uint i = lane; i < count; i += LANES) {
-        ordered[occluders[i] >> STEP_BITS] = occluders[i] & SKY_CHAIN;
+        ORDERED(OCCLUDER(i) >> STEP_BITS) = OCCLUDER(i) & SKY_CHAIN;
     }
 }
+#endif
 
-void main() {
-    Group group = groups[gl_WorkGroupID.x];
-    uint lane = gl_LocalInvocationIndex;
-    uint at = group.first + min(lane, group.count - 1);
-    uint receiver_index = clusters[at].receiver;
-    Entity receiver = entities[receiver_index];
-    if (lane == 0) {
-        block_count = 0;
-        found = 0;
-        nearest = ~0u;
-        farthest = 0;
-    }
-    for (uint b = lane; b <= BUCKETS; b += LANES) {
-        buckets[b] = 0;
-    }
-    barrier();
-    find(scope_of(receiver, bounds[group.bounds]), receiver_index, lane);
-    barrier();
-    uint count = min(found, FOUND);
-    order(count, lane);
-    barrier();
-    if (lane >= group.count) {
-        return;
-    }
+// One cluster: its steps.
+void walk(uint at, Entity receiver, uint receiver_index, uint count) {
     Scope scope = scope_of(receiver, bounds[clusters[at].bounds]);
     uint first = at * capacity, made = 0;
     uint chains = lamp_count + uint(sky >= 0.0);
@@ -170,7 +207,7 @@ void main() {
         }
         uint chain = (of_sky ? SKY_CHAIN : lamp_index) << STEP_BITS;
         for (uint k = 0; k < count; k++) {
-            uint e = ordered[k];
+            uint e = ORDERED(k);
             View view = view_of(scope, body(e));
             bool needed = of_sky ? occluder_listed(scope, view, sky)
                                  : e != lamp_index && occluder_listed(scope, view, light, lamp.x);
@@ -194,10 +231,59 @@ void main() {
     }
     clusters[at].step_first = first;
     clusters[at].step_count = min(made, capacity);
-    if (made > capacity || found > FOUND) {
+    if (made > capacity) {
         clusters[at].vertex_count = 0;
     }
     atomicMax(longest, made);
-    atomicMax(most_found, found);
     atomicAdd(step_total, made);
+}
+
+// One group.
+void gather(uint number) {
+    uint lane = gl_LocalInvocationIndex;
+    uint group_count = groups[number].count;
+    uint at = groups[number].first + min(lane, group_count - 1);
+    uint receiver_index = clusters[at].receiver;
+    Entity receiver = entities[receiver_index];
+    if (lane == 0) {
+        block_count = 0;
+        found = 0;
+        nearest = ~0u;
+        farthest = 0;
+    }
+    for (uint b = lane; b <= BUCKETS; b += LANES) {
+        buckets[b] = 0;
+    }
+    meet();
+    find(scope_of(receiver, bounds[groups[number].bounds]), receiver_index, lane);
+    meet();
+    if (lane == 0) {
+        atomicMax(most_found, found);
+    }
+    if (found * (lamp_count + 1) > TURNS) {
+        // llvmpipe ends all loops of an invocation after 65 535 turns together.
+        clusters[at].vertex_count = 0;
+        atomicMax(longest, ~0u);
+    } else if (found > FOUND) {
+        if (lane == 0) {
+            groups[atomicAdd(left_count, 1)].left = number;
+        }
+    } else {
+        order(found, lane);
+        meet();
+        if (lane < group_count) {
+            walk(at, receiver, receiver_index, found);
+        }
+    }
+}
+
+void main() {
+#if ROOMY
+    for (uint i = gl_WorkGroupID.x; i < left_count; i += gl_NumWorkGroups.x) {
+        gather(groups[i].left);
+        meet();
+    }
+#else
+    gather(gl_WorkGroupID.x);
+#endif
 }

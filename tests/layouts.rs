@@ -72,11 +72,11 @@ fn entities_and_clusters_of_the_merge() {
 
 #[test]
 fn structs_of_the_gather() {
-    for texel in [false, true] {
-        let reflection = library().shader(&Gather::row(texel)).unwrap().reflection;
-        same_layout!(reflection, Group { first, count, bounds, spare });
+    for (texel, roomy) in [(false, false), (true, false), (false, true), (true, true)] {
+        let reflection = library().shader(&Gather::row(texel, roomy)).unwrap().reflection;
+        same_layout!(reflection, Group { first, count, bounds, left });
         assert_eq!(reflection.strides.get("Group"), Some(&(size_of::<Group>() as u32)));
-        same_layout!(reflection, Report { longest, most_found, step_total, spare });
+        same_layout!(reflection, Report { longest, most_found, step_total, left_count });
         // Two quads: centre and radius, axis and cosine.
         assert_eq!(reflection.strides.get("Bounds"), Some(&(size_of::<Bounds>() as u32)));
         assert_eq!([offset_of!(Bounds, radius_m), offset_of!(Bounds, axis), offset_of!(Bounds, cosine)], [12, 16, 28]);

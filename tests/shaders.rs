@@ -33,7 +33,7 @@ fn drawing() -> Vec<Row> {
 }
 
 fn gathering() -> Vec<Row> {
-    [false, true].map(Gather::row).into()
+    [false, true].into_iter().flat_map(|texel| [false, true].map(|roomy| Gather::row(texel, roomy))).collect()
 }
 
 fn measuring() -> Vec<Row> {

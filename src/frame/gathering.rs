@@ -4,7 +4,7 @@
 use super::lists::{Dirty, Lists};
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, FLIGHTS, Upload};
-use crate::render::gather::{FOUND, Gather, Inputs, Packed, Report};
+use crate::render::gather::{Gather, Inputs, Packed, Report};
 use crate::shaders::Library;
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ pub(super) struct Gathering {
     steps: Buffer,
     /// Steps that every list has room for.
     capacity: u64,
-    /// A group found more than there is room for: the host makes the lists from now on.
+    /// The lists would take more than [`MOST_BYTES`], or than the pass can go through: the host makes them from now on.
     refused: bool,
     /// What the frame in preparation gathers.
     packed: Option<(Packed, u32, u32)>,
@@ -35,15 +35,15 @@ pub(super) struct Gathering {
 }
 
 impl Gathering {
-    /// For all clusters of a scene.
+    /// For all clusters of a scene of so many entities.
     ///
     /// # Errors
     /// As [`Gather::new`] and [`Buffer::new`].
-    pub fn new(device: &Arc<Device>, library: &Library, lists: &Lists) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, library: &Library, lists: &Lists, entity_count: usize) -> Result<Self> {
         let upload = |name: &str, bytes: u64| Upload::new(device, name, bytes);
         Ok(Gathering {
             device: device.clone(),
-            pass: Gather::new(device, library, device.info.is_software())?,
+            pass: Gather::new(device, library, device.info.is_software(), entity_count)?,
             bounds: Buffer::with_data(device, "bounds", &lists.all_bounds())?,
             bodies: upload("bodies", 16)?,
             groups: upload("groups", 16)?,
@@ -130,24 +130,25 @@ impl Gathering {
 
     /// Whether lists were lost, after making room for them.
     pub fn lost(&mut self, report: &Report) -> bool {
-        if report.most_found as usize > FOUND {
+        if report.longest == u32::MAX {
             log::info!(
-                "{} occluders near one place are more than a group has room for; the host makes the lists",
+                "{} occluders near one place and their lights are more than a pass can go through; the host makes the lists",
                 report.most_found
             );
             self.refused = true;
+            return true;
         }
         let longest = u64::from(report.longest);
         let short = longest > self.capacity;
         if short {
             self.capacity = longest + longest / 4;
         }
-        short || self.refused
+        short
     }
 
     /// Bytes on the device.
     pub fn size_bytes(&self) -> u64 {
         let uploads = self.bodies.all_bytes() + self.groups.all_bytes() + self.report.all_bytes();
-        self.bounds.size_bytes + self.steps.size_bytes + uploads
+        self.bounds.size_bytes + self.steps.size_bytes + self.pass.size_bytes() + uploads
     }
 }

@@ -168,7 +168,7 @@ impl Lists {
             // One alone is its own group.
             let bounds = if count == 1 { dirty.clusters[0] } else { self.clusters.len() + dirty.group };
             let (first, count, bounds) = (clusters.len() as u32, count as u32, bounds as u32);
-            groups.push(gather::Group { first, count, bounds, spare: 0 });
+            groups.push(gather::Group { first, count, bounds, left: 0 });
             clusters.extend(dirty.clusters.iter().map(|&cluster| self.clusters[cluster]));
         }
         (clusters, groups)

@@ -178,7 +178,7 @@ impl Frame {
             self.draw = Draw::new(&self.device, &self.library, options.size, options.antialias, self.draw.finish())?;
         }
         if uses(&self.library.files("gather.comp")) && self.gathering.is_some() {
-            self.gathering = Some(Gathering::new(&self.device, &self.library, &self.lists)?);
+            self.gathering = Some(Gathering::new(&self.device, &self.library, &self.lists, self.scene.entities.len())?);
             self.lists.forget();
         }
         if uses(&self.library.files("merge.comp")) {

@@ -140,7 +140,7 @@ impl Frame {
         let merge = Merge::new(device, library, form)?;
         let gathers = options.lists.unwrap_or_else(|| Place::quicker(device, scene.entities.len())) == Place::Device
             && !lists.clusters.is_empty();
-        let gathering = gathers.then(|| Gathering::new(device, library, &lists)).transpose()?;
+        let gathering = gathers.then(|| Gathering::new(device, library, &lists, scene.entities.len())).transpose()?;
         let draw = Draw::new(device, library, options.size, options.antialias, Finish::Linear)?;
         let count = scene.entities.len().max(entity_limit as usize) as u64;
         let upload = |name: &str, bytes: u64| Upload::new(device, name, bytes);

@@ -9,12 +9,12 @@
 //! looking at blocks of them and then into those that matter. The lists depend on neither: what a group leaves out, each cluster
 //! would leave off by itself.
 
-pub use super::moment::{Body, Bounds, Counts, Lamp, Moment};
+pub use super::moment::{Body, Bounds, Counts, Lamp, Moment, distance_key};
 pub use super::scope::Scope;
 use super::scope::{BELOW, Fate, GROUP_SLACK, SLACK, SLACK_RAD, View, fade, fade_sine};
 use super::tree::Crowd;
 use crate::error::Result;
-use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
+use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{self, Step};
 use crate::shaders::{Library, Row};
 use ash::vk;
@@ -30,8 +30,15 @@ const LANES: u32 = 32;
 const BUCKETS: u32 = 64;
 /// Occluders that are looked at as one first.
 const BLOCK: usize = 64;
-/// Occluders that a group may find: 12 bytes each of a workgroup's memory, of which every device has 16 384.
+/// Occluders that a group may find: 12 bytes each of a workgroup's memory, of which every device has 16 384. A group that finds
+/// more is gathered in a second round.
 pub const FOUND: usize = 1024;
+/// Workgroups of the second round, each with memory of its own for as many occluders as there are: 8 bytes for each, 512 KiB in all
+/// for 4 096. Each takes one such group after the other.
+const ROOMS: u32 = 16;
+/// Occluders times chains that the pass looks at for a cluster on a software device: llvmpipe (Mesa 22.3) ends all loops of an
+/// invocation after 65 535 turns together, without a word, and to sort 1 024 occluders takes up to half of them.
+const TURNS: u32 = 30_000;
 
 /// Where lists are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
@@ -45,7 +52,7 @@ pub enum Place {
 
 impl Place {
     /// Where lists are made unless somebody says otherwise: llvmpipe takes .1 ms longer than the host among 64 entities, and half
-    /// as long among 1 024. Where a group finds more than [`FOUND`], the host makes them after all.
+    /// as long among 1 024.
     pub fn quicker(device: &Device, entity_count: usize) -> Self {
         if device.info.is_software() && entity_count < 256 { Place::Host } else { Place::Device }
     }
@@ -169,22 +176,22 @@ pub struct Group {
     pub count: u32,
     /// Bounds around them all.
     pub bounds: u32,
-    /// Not in use.
-    pub spare: u32,
+    /// Written by the pass: of the group at this place among those that are left to the second round, the number.
+    pub left: u32,
 }
 
 /// What the device says of the lists that it made.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Report {
-    /// Steps of the longest list, as long as it should have been.
+    /// Steps of the longest list, as long as it should have been; `u32::MAX` where a group has more to look at than the device can.
     pub longest: u32,
     /// Most occluders that a group found.
     pub most_found: u32,
     /// Steps of all lists.
     pub step_total: u32,
-    /// Not in use.
-    pub spare: u32,
+    /// Groups that found more than [`FOUND`] and were gathered in the second round.
+    pub left_count: u32,
 }
 
 #[repr(C)]
@@ -278,27 +285,46 @@ pub struct Inputs<'b> {
 pub struct Gather {
     pipeline: ComputePipeline,
     texel: bool,
+    second: Option<Second>,
+}
+
+/// The round of groups that find more than a workgroup's memory holds.
+struct Second {
+    pipeline: ComputePipeline,
+    /// Memory of its workgroups: two words an occluder each, padded to a power of two.
+    room: Buffer,
+    occluder_count: u32,
 }
 
 impl Gather {
-    /// `texel`: whether spheres are read through a texel view.
+    /// `texel`: whether spheres are read through a texel view, which is for software devices; `entity_count`: entities that there will be at most. With no more than
+    /// [`FOUND`] there is no second round.
     ///
     /// # Errors
-    /// `Failed` when the shader does not compile.
-    pub fn new(device: &Arc<Device>, library: &Library, texel: bool) -> Result<Self> {
-        let shader = library.shader(&Self::row(texel))?;
-        Ok(Gather { pipeline: ComputePipeline::new(device, "gather", &shader, &[])?, texel })
+    /// `Failed` when the shader does not compile; as [`Buffer::new`].
+    pub fn new(device: &Arc<Device>, library: &Library, texel: bool, entity_count: usize) -> Result<Self> {
+        let pipeline =
+            |name, roomy| ComputePipeline::new(device, name, &library.shader(&Self::row(texel, roomy))?, &[]);
+        let second = || -> Result<Second> {
+            let bytes = 8 * u64::from(ROOMS) * entity_count.next_power_of_two() as u64;
+            let room = Buffer::new(device, "gather room", BufferKind::Device, bytes)?;
+            Ok(Second { pipeline: pipeline("gather again", true)?, room, occluder_count: entity_count as u32 })
+        };
+        let second = (entity_count > FOUND).then(second).transpose()?;
+        Ok(Gather { pipeline: pipeline("gather", false)?, texel, second })
     }
 
-    /// The row of the shader table.
-    pub fn row(texel: bool) -> Row {
+    /// The row of the shader table; `roomy` for the second round.
+    pub fn row(texel: bool, roomy: bool) -> Row {
         Row::new("gather.comp", 4)
             .define("TEXEL", texel)
+            .define("ROOMY", roomy)
             .define("LANES", LANES)
             .define("BUCKETS", BUCKETS)
             .define("BLOCK", BLOCK as u32)
             .define("BLOCKS", layout::STEP_ENTITIES.div_ceil(BLOCK as u32))
-            .define("FOUND", FOUND as u32)
+            .define("ROOM", FOUND as u32)
+            .define("TURNS", if texel { TURNS } else { u32::MAX })
             .number("FADE_SINE", fade_sine().into())
             .number("FADE_SINE_SLACK", fade().sine.into())
             .number("FADE_COSINE_SLACK", fade().cosine.into())
@@ -327,8 +353,18 @@ impl Gather {
         };
         let others = [inputs.entities, inputs.bounds, inputs.groups, inputs.clusters, inputs.steps, inputs.report]
             .map(Bind::Buffer);
-        let resources: Vec<Bind<'r>> = std::iter::once(bodies).chain(others).collect();
+        let mut resources: Vec<Bind<'r>> = std::iter::once(bodies).chain(others).collect();
         let push = Push { capacity, ..packed.push };
-        commands.dispatch(&self.pipeline, &resources, &push, [group_count * LANES, 1, 1])
+        commands.dispatch(&self.pipeline, &resources, &push, [group_count * LANES, 1, 1])?;
+        let Some(second) = self.second.as_ref().filter(|_| push.occluder_count as usize > FOUND) else { return Ok(()) };
+        assert!(push.occluder_count <= second.occluder_count, "more occluders than entities");
+        resources.push(Bind::Buffer(&second.room));
+        commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
+        commands.dispatch(&second.pipeline, &resources, &push, [ROOMS.min(group_count) * LANES, 1, 1])
+    }
+
+    /// Bytes of the second round's memory.
+    pub fn size_bytes(&self) -> u64 {
+        self.second.as_ref().map_or(0, |second| second.room.size_bytes)
     }
 }

@@ -155,11 +155,16 @@ impl Moment {
     /// truncated in another order differ (by up to .006 over twelve occluders), which would show as seams, so there is one order
     /// for a whole receiver. Equal distances go by index.
     pub fn order(&self, receiver: u32, occluder: u32) -> (u32, u32) {
-        let ([x, y, z, _], [cx, cy, cz, _]) = (self.spheres[occluder as usize], self.spheres[receiver as usize]);
-        let to = [x - cx, y - cy, z - cz];
-        // Of what is not negative, more is more in bits too.
-        (dot(to, to).to_bits(), occluder)
+        let [[x, y, z, _], [cx, cy, cz, _]] = [occluder, receiver].map(|i| self.spheres[i as usize]);
+        (distance_key([x, y, z], [cx, cy, cz]), occluder)
     }
+}
+
+/// Bits of the squared distance of two centres, in f32, by which [`Moment::order`] goes: of what is not negative, more is more in bits
+/// too. Centres that differ by less than a part in 10^7 may come as equal; the f64 twins go by the same key.
+pub fn distance_key(a: [f32; 3], b: [f32; 3]) -> u32 {
+    let to = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    dot(to, to).to_bits()
 }
 
 /// What was considered and left off, in (cluster, chain, entity) triples unless said otherwise, and a bound of the light in what was left off.

@@ -5,6 +5,7 @@ use super::Vertex;
 use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
 use super::world::{Sight, View, World};
 use crate::render::chain::Multiplier;
+use crate::render::gather::distance_key;
 use crate::render::reference::Cone;
 use crate::render::variant::{Chain, Skip};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
@@ -54,14 +55,14 @@ impl Exact {
             Sequence::new(self.seed, [u64::MAX, vertex.entity as u64, (vertex.index as u64) << 16 | stream as u64])
         };
         let transfer = self.transfer(world, &view, points(0));
-        let centre = world.bodies[vertex.entity].centre;
+        let centre = |entity: usize| world.bodies[entity].centre.as_vec3().to_array();
         let cone = |sight: &Sight| {
             let body = &world.bodies[sight.entity];
             Cone::new(body.centre, body.radius_m, view.position)
         };
         let mut occluders = world.occluders(&view);
-        let from_centre = |sight: &Sight| world.bodies[sight.entity].centre.distance(centre);
-        occluders.sort_by(|a, b| from_centre(a).total_cmp(&from_centre(b)).then(a.entity.cmp(&b.entity)));
+        // The merge's order: ties of its f32 key go by index here too.
+        occluders.sort_by_key(|sight| (distance_key(centre(sight.entity), centre(vertex.entity)), sight.entity));
         let factors: Vec<(Sight, Coefficients)> = occluders
             .into_iter()
             .map(|occluder| {

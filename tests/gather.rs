@@ -341,7 +341,7 @@ fn a_crowd_is_gathered_in_a_window() {
             let flight: shadow_fields::gpu::Flight = flights.pop_front().unwrap();
             flight.wait().unwrap();
         }
-        frame.prepare(&placements).unwrap();
+        frame.prepare(&placements, &[]).unwrap();
         let mut commands = Commands::new(device, "frame").unwrap();
         commands.after_flights();
         frame.record_light(&mut commands).unwrap();

@@ -279,6 +279,11 @@ fn pieces_and_contacts() {
     let cube = cuboid(Vec3::ONE, 1);
     let apart = union(&cube, &cube, Vec3::new(3.0, 0.0, 0.0));
     assert!(apart.is_closed() && !apart.is_convex() && apart.euler_characteristic() == 4);
+    assert!(apart.is_solid() && sphere(1.0, 2).is_solid() && torus(1.0, 0.3, 12, 8).is_solid() && !pot().is_solid());
+    let turned = cube.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect();
+    let wall = Mesh::new("wall", cube.positions.clone(), cube.normals.clone(), None, turned).unwrap();
+    let hollow = union(&cuboid(Vec3::splat(3.0), 1), &wall, Vec3::ZERO);
+    assert!(hollow.is_closed() && !hollow.is_solid(), "a hollow in a box");
     assert!(!union(&cube, &cube, Vec3::ONE).is_closed(), "two boxes that share one corner are no manifold");
     assert!(!union(&cube, &cube, Vec3::new(1.0, 1.0, 0.0)).is_closed(), "nor are two that share an edge");
 }

@@ -135,8 +135,13 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             picture::write_png(&path, width, height, &draw(index)?, shape.exposure_ev)?;
         }
     }
+    let last_frame = frame.merged;
     let last = scene.at(timings.last().map_or(first_s, |(time_s, ..)| *time_s));
     if let Some(path) = &arguments.vertices {
+        if !arguments.reference {
+            // What no picture showed is lit for this.
+            frame.render(&last, None)?;
+        }
         text::write(path, &vertex_table(&frame, &last)?)?;
     }
 
@@ -164,7 +169,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "receiver_vertices": frame.receiver_vertex_count(),
         "variant": frame.variant.name,
         "lookups": frame.counts(&last),
-        "last_frame": frame.merged,
+        "last_frame": last_frame,
         "memory_bytes": frame.memory(),
         "device_bytes": frame.memory().device(),
         "reference_standard_error": arguments.reference.then_some(worst_error),

@@ -98,6 +98,17 @@ impl Grid {
         let sides = [steps[0] * columns as f64, steps[1] * rows as f64].map(|side| side.as_vec3());
         Some(Grid { corner: corner.as_vec3(), sides, cells: [columns as u32, rows as u32], vertices: cells })
     }
+
+    /// Vertices of the cells at its four sides; some come more than once.
+    pub fn rim(&self) -> impl Iterator<Item = u32> {
+        let [columns, rows] = self.cells.map(|n| n as usize);
+        let at_side = move |cell: usize| {
+            let (x, y) = (cell % columns, cell / columns);
+            x == 0 || y == 0 || x + 1 == columns || y + 1 == rows
+        };
+        let cells = self.vertices.iter().enumerate().filter(move |(cell, _)| at_side(*cell));
+        cells.flat_map(|(_, vertices)| vertices.map(|v| v & !UPWARDS))
+    }
 }
 
 #[cfg(test)]

@@ -106,6 +106,12 @@ impl Mesh {
         self.shape.closed
     }
 
+    /// Whether the mesh is closed and each of its pieces has positive volume: none is the wall of a hollow or inside out. From
+    /// outside only its fronts are seen.
+    pub fn is_solid(&self) -> bool {
+        self.shape.solid
+    }
+
     /// Whether the mesh is closed, in one piece, without handles, and bends outwards (or not at all) at every edge.
     pub fn is_convex(&self) -> bool {
         self.shape.convex

@@ -9,6 +9,8 @@ use glam::{DVec3, Vec3};
 pub struct Shape {
     /// 2-manifold without boundary, wound consistently, positive volume.
     pub closed: bool,
+    /// Closed, and every piece has positive volume: from outside no back is seen, unless pieces run through themselves inside out.
+    pub solid: bool,
     /// Closed, in one piece, Euler characteristic 2, no edge bends inwards.
     pub convex: bool,
     /// All vertices in one plane.
@@ -45,20 +47,22 @@ pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m:
     let closed = paired
         && fan_count(&edges, corners.len()) == vertex_count
         && volume_m3(positions, triangles, centre) > VERTEX_NOISE * f64::from(radius_m).powi(3);
+    let solid = closed && has_solid_pieces(&edges, positions, triangles, centre);
     let convex = closed
         && euler_characteristic == 2
-        && piece_count(&edges, triangles.len()) == 1
+        && pieces(&edges, triangles.len()).count == 1
         && edges.iter().all(|e| bends_outwards(e, positions, triangles, f64::from(radius_m)));
-    Shape { closed, convex, flat: is_flat(positions, f64::from(radius_m)), euler_characteristic }
+    Shape { closed, solid, convex, flat: is_flat(positions, f64::from(radius_m)), euler_characteristic }
 }
 
 /// Signed volume in cubic metres: the sum of the tetrahedra from `centre` to every triangle.
 pub fn volume_m3(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3) -> f64 {
-    let volume = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(|i| positions[i as usize].as_dvec3() - centre.as_dvec3());
-        a.dot(b.cross(c)) / 6.0
-    };
-    triangles.iter().map(volume).sum()
+    triangles.iter().map(|triangle| tetrahedron_m3(positions, triangle, centre)).sum()
+}
+
+fn tetrahedron_m3(positions: &[Vec3], triangle: &[u32; 3], centre: Vec3) -> f64 {
+    let [a, b, c] = triangle.map(|i| positions[i as usize].as_dvec3() - centre.as_dvec3());
+    a.dot(b.cross(c)) / 6.0
 }
 
 /// Numbers equal positions alike (-0 is 0): (number of every position, how many there are).
@@ -94,10 +98,21 @@ fn fan_count(edges: &[&[Side]], corner_count: usize) -> usize {
     sets.count
 }
 
-fn piece_count(edges: &[&[Side]], triangle_count: usize) -> usize {
+/// Triangles that hang together.
+fn pieces(edges: &[&[Side]], triangle_count: usize) -> Sets {
     let mut sets = Sets::new(triangle_count);
     edges.iter().for_each(|e| sets.join(e[0].corner as usize / 3, e[1].corner as usize / 3));
-    sets.count
+    sets
+}
+
+/// Whether every piece of a closed surface is wound outwards: it is no hollow's wall, and nothing inside out.
+fn has_solid_pieces(edges: &[&[Side]], positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3) -> bool {
+    let mut pieces = pieces(edges, triangles.len());
+    let mut volumes = HashMap::<usize, f64>::new();
+    for (number, triangle) in triangles.iter().enumerate() {
+        *volumes.entry(pieces.root(number)).or_default() += tetrahedron_m3(positions, triangle, centre);
+    }
+    volumes.values().all(|volume| *volume > 0.0)
 }
 
 /// Disjoint sets with path halving.

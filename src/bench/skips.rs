@@ -9,6 +9,7 @@ use super::town::{Town, moved};
 use super::{Bench, default_options};
 use crate::error::{Error, Result};
 use crate::frame;
+use crate::render::draw::Antialias;
 use crate::render::gather::Counts;
 use crate::render::variant::{EPS, Skip};
 use crate::scene::Placement;
@@ -67,6 +68,7 @@ fn left_off(skip: &str, counts: &Counts) -> Option<u64> {
         "behind" => "behind_light",
         "facing" => "facing_away",
         eps if eps.starts_with("eps") => "below_eps",
+        hidden if hidden.starts_with("hidden") => "hidden",
         other => other,
     };
     serde_json::to_value(counts).ok()?.get(name)?.as_u64()
@@ -166,17 +168,34 @@ fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<Row>> {
         frame::Options { skip, ..at_rest }
     };
     let mut rows = Vec::new();
-    for name in Skip::NAMES.into_iter().filter(|name| *name != "unmoved") {
-        rows.push(judge.row(bench, case, &placements, name, [skip_without(name), at_rest], false)?);
+    for name in Skip::NAMES.into_iter().filter(|name| !["unmoved", "hidden"].contains(name)) {
+        rows.push(judge.row(bench, case, &placements, name, [skip_without(name), at_rest], Timed::AtRest)?);
     }
     let eps = format!("eps {EPS}");
     let without_eps = frame::Options { eps: 0.0, ..at_rest };
-    rows.push(judge.row(bench, case, &placements, &eps, [without_eps, at_rest], false)?);
+    rows.push(judge.row(bench, case, &placements, &eps, [without_eps, at_rest], Timed::AtRest)?);
     let none = frame::Options { eps: 0.0, skip: Skip::NONE, ..at_rest };
-    rows.push(judge.row(bench, case, &placements, "all but unmoved", [none, at_rest], false)?);
+    rows.push(judge.row(bench, case, &placements, "all but unmoved", [none, at_rest], Timed::AtRest)?);
     let kept = frame::Options { skip: Skip::ALL, ..at_rest };
-    rows.push(judge.row(bench, case, &placements, "unmoved, one moves", [at_rest, kept], true)?);
+    rows.push(judge.row(bench, case, &placements, "unmoved, one moves", [at_rest, kept], Timed::OneMoves)?);
+    let shown = frame::Options { size: PICTURE, antialias: Antialias::usual(bench.baker.device()), ..kept };
+    let all_shown = frame::Options { skip: Skip::without("hidden"), ..shown };
+    rows.push(judge.row(bench, case, &placements, "hidden, all move", [all_shown, shown], Timed::Pictures)?);
     Ok(rows)
+}
+
+/// Size of the pictures where they are timed.
+const PICTURE: [u32; 2] = [1280, 720];
+
+/// What is timed.
+#[derive(Clone, Copy, PartialEq)]
+enum Timed {
+    /// Frames of a scene at rest, without drawing.
+    AtRest,
+    /// The same while one thing moves.
+    OneMoves,
+    /// Frames as a window shows them, while all that casts shadows or shines moves.
+    Pictures,
 }
 
 /// What results are held against.
@@ -187,7 +206,7 @@ struct Judge {
 }
 
 impl Judge {
-    /// One row: both sides in turns, at rest or with one entity that moves.
+    /// One row: both sides in turns.
     fn row(
         &self,
         bench: &Bench<'_>,
@@ -195,20 +214,30 @@ impl Judge {
         placements: &[Placement],
         skip: &str,
         [off, on]: [frame::Options; 2],
-        moves: bool,
+        timed: Timed,
     ) -> Result<Row> {
         let mut frames = [bench.frame(&case.scene, off)?, bench.frame(&case.scene, on)?];
-        let mover = case.scene.entities.iter().position(|e| e.occludes).unwrap_or(0);
+        let entities = &case.scene.entities;
+        let mut movers: Vec<usize> = (0..entities.len()).filter(|&i| entities[i].occludes).collect();
+        match timed {
+            Timed::AtRest => movers.clear(),
+            Timed::OneMoves => movers.truncate(1),
+            Timed::Pictures => {
+                movers.extend((0..entities.len()).filter(|&i| entities[i].emits && !entities[i].occludes))
+            }
+        }
         let (mut walls, mut merges) = ([Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
         let rounds = if bench.quick { 5 } else { 11 };
         for round in 0..rounds + 2 {
             let mut now = placements.to_vec();
-            if moves {
+            for &mover in &movers {
                 now[mover] = moved(&placements[mover], 0.2 * f64::from(round));
             }
             for (side, frame) in frames.iter_mut().enumerate() {
                 let started = Instant::now();
-                let merge = merge_ms(&frame.render(&now, None)?);
+                let passes =
+                    if timed == Timed::Pictures { frame.show(&now, 1.0)? } else { frame.render(&now, None)? };
+                let merge = merge_ms(&passes);
                 // The first frames compile.
                 if round >= 2 {
                     walls[side].push(started.elapsed().as_secs_f64() * 1e3);

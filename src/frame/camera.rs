@@ -8,10 +8,20 @@ use glam::{DMat4, DVec3};
 ///
 /// The near plane lies at a thousandth of the distance from eye to target.
 pub fn clip_from_world(camera: &Camera, aspect: f64) -> DMat4 {
-    let (eye, target) = (camera.eye.as_dvec3(), camera.target.as_dvec3());
-    let near = 1e-3 * eye.distance(target);
+    let (eye, target, near) = (camera.eye.as_dvec3(), camera.target.as_dvec3(), near_m(camera));
     let view = view::look_at_mat4(eye, target, camera.up().as_dvec3());
     vulkan::perspective_infinite_reverse(f64::from(camera.fov_deg).to_radians(), aspect, near) * view
+}
+
+/// Distance of the near plane in metres.
+fn near_m(camera: &Camera) -> f64 {
+    1e-3 * camera.eye.as_dvec3().distance(camera.target.as_dvec3())
+}
+
+/// Distance from the eye to a corner of the near plane's part in the picture, metres.
+pub fn near_corner_m(camera: &Camera, aspect: f64) -> f64 {
+    let high = (f64::from(camera.fov_deg).to_radians() / 2.0).tan();
+    near_m(camera) * (1.0 + high * high * (1.0 + aspect * aspect)).sqrt()
 }
 
 /// From a mesh's frame, metres from the centre of its bounding sphere, to the world; `centre_m` is that centre in the file's.

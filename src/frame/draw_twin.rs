@@ -2,7 +2,6 @@
 
 use super::{Frame, camera};
 use crate::error::Result;
-use crate::render::draw::Drawable;
 use crate::render::smooth::{self, Smooth, Texel};
 use crate::scene::Placement;
 use glam::{DMat3, DVec2, DVec3, DVec4};
@@ -99,7 +98,7 @@ impl Frame {
             let mesh = &self.scene.meshes[entity.mesh];
             let radiosity = self.radiosity(index)?;
             let rotation = placement.rotation.as_dquat().normalize();
-            let grid = matches!(self.store.geometries[entity.mesh].drawable, Drawable::Grid(_)).then_some(index);
+            let grid = self.store.geometries[entity.mesh].drawable.is_grid().then_some(index);
             let corner = |&i: &u32| {
                 let v = i as usize;
                 let world = placement.position.as_dvec3()

@@ -4,9 +4,13 @@
 //! What a cluster's merge reads is its receiver, its list and the entities on it, and nothing else that ever changes; and what
 //! keeps an entity on or off a list is that entity, the receiver and, for an occluder, a light that stands there itself. So a
 //! cluster for which none of these has changed would come to the same bits again.
+//!
+//! What the camera cannot see is left as it is while things move, and remembered as stale: it is merged once it may be seen, or
+//! once nothing moves any more.
 
 use crate::layout::{self, Step};
 use crate::render::gather::{self, Bounds, Chains, Counts, GROUP_CLUSTERS, Moment, Scope};
+use crate::render::sight::{Faces, Sight};
 use crate::scene::Placement;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -42,14 +46,30 @@ impl Dirty {
     }
 }
 
+/// A cluster of one receiver.
+pub(super) struct Member {
+    /// Without its steps.
+    pub cluster: layout::Cluster,
+    /// Of its vertices.
+    pub bounds: Bounds,
+    /// By which they are seen.
+    pub faces: Faces,
+}
+
 /// All clusters.
 #[derive(Default)]
 pub(super) struct Lists {
     /// Without their steps.
     pub clusters: Vec<layout::Cluster>,
     bounds: Vec<Bounds>,
+    faces: Vec<Faces>,
     groups: Vec<Group>,
     now: Option<State>,
+    /// Every cluster has changed since the last update, by something that no moment tells.
+    renewed: bool,
+    /// Clusters that have changed since they were merged, and how many they are.
+    stale: Vec<bool>,
+    stale_count: usize,
 }
 
 /// What a frame did about its clusters.
@@ -61,13 +81,15 @@ pub struct Merged {
     pub merged_clusters: usize,
     /// Lookups in the lists of those, one for 64 vertices. In a window with lists made on the device, of an earlier frame.
     pub merged_steps: usize,
+    /// Clusters that have changed since they were merged and are not seen.
+    pub stale_clusters: usize,
 }
 
 impl Lists {
     /// Adds the clusters of one receiver, neighbours beside each other.
-    pub fn add(&mut self, receiver: usize, clusters: Vec<(layout::Cluster, Bounds)>) {
+    pub fn add(&mut self, receiver: usize, clusters: Vec<Member>) {
         let first = self.clusters.len();
-        let all: Vec<Bounds> = clusters.iter().map(|(_, bounds)| *bounds).collect();
+        let all: Vec<Bounds> = clusters.iter().map(|member| member.bounds).collect();
         let mut start = 0;
         while start < all.len() {
             let mut end = start + 1;
@@ -78,9 +100,11 @@ impl Lists {
             self.groups.push(Group { receiver, clusters, bounds: Bounds::union(&all[start..end]) });
             start = end;
         }
-        for (cluster, bounds) in clusters {
+        for Member { cluster, bounds, faces } in clusters {
             self.clusters.push(layout::Cluster { bounds: self.clusters.len() as u32, ..cluster });
             self.bounds.push(bounds);
+            self.faces.push(faces);
+            self.stale.push(false);
         }
     }
 
@@ -94,19 +118,57 @@ impl Lists {
         self.now = None;
     }
 
-    /// Brings the lists to this moment and returns the clusters to merge.
-    pub fn update(&mut self, now: State) -> Vec<Dirty> {
-        let before = self.now.take().filter(|before| now.moment.skip.unmoved && now.moment.is_like(&before.moment));
+    /// Takes every cluster for changed, as when the sky is another.
+    pub fn renew(&mut self) {
+        self.renewed = true;
+    }
+
+    /// Brings the lists to this moment and returns the clusters to merge: those that have changed, and where `sights` are given, of
+    /// every entity, those of them that may be seen by one. At first and where nothing has changed since the last update, none is
+    /// left out.
+    pub fn update(&mut self, now: State, sights: Option<&[Vec<Sight>]>) -> Vec<Dirty> {
+        let before = self.now.take();
+        let first = before.is_none();
+        let renewed = std::mem::take(&mut self.renewed);
+        let before = before.filter(|before| !renewed && now.moment.is_like(&before.moment));
         let moved = before.as_ref().map(|before| Moved::new(before, &now));
-        let dirty = match moved {
-            Some(moved) if moved.list.is_empty() => Vec::new(),
-            moved => {
-                let groups = 0..self.groups.len();
-                groups.into_par_iter().filter_map(|group| self.dirty(group, &now, moved.as_ref())).collect()
-            }
+        let at_rest = moved.as_ref().is_some_and(|moved| moved.list.is_empty());
+        let sights = sights.filter(|_| now.moment.skip.hidden && !first && !at_rest);
+        // Without the skip all clusters count as changed.
+        let moved = moved.filter(|_| now.moment.skip.unmoved);
+        let found: Vec<[Dirty; 2]> = if moved.is_some() && at_rest && self.stale_count == 0 {
+            Vec::new()
+        } else {
+            let groups = (0..self.groups.len()).into_par_iter();
+            groups.filter_map(|group| self.changed(group, &now, moved.as_ref(), sights)).collect()
         };
+        let mut dirty = Vec::with_capacity(found.len());
+        for [seen, hidden] in found {
+            for (list, stale) in [(&seen, false), (&hidden, true)] {
+                for &cluster in &list.clusters {
+                    let was = std::mem::replace(&mut self.stale[cluster], stale);
+                    self.stale_count = self.stale_count + usize::from(stale) - usize::from(was);
+                }
+            }
+            dirty.extend((!seen.clusters.is_empty()).then_some(seen));
+        }
         self.now = Some(now);
         dirty
+    }
+
+    /// Clusters that have changed since they were merged.
+    pub fn stale_count(&self) -> usize {
+        self.stale_count
+    }
+
+    /// Clusters that none of the sights of their receivers sees.
+    pub fn hidden_count(&self, sights: &[Vec<Sight>]) -> usize {
+        (0..self.clusters.len()).filter(|&cluster| !self.is_seen(cluster, sights)).count()
+    }
+
+    fn is_seen(&self, cluster: usize, sights: &[Vec<Sight>]) -> bool {
+        let receiver = self.clusters[cluster].receiver as usize;
+        sights[receiver].iter().any(|sight| sight.may_see(&self.faces[cluster]))
     }
 
     /// The moment of the last update.
@@ -117,18 +179,29 @@ impl Lists {
         self.now.as_ref().expect("updated before")
     }
 
-    /// Clusters of a group that must be merged again.
-    fn dirty(&self, index: usize, now: &State, moved: Option<&Moved<'_>>) -> Option<Dirty> {
+    /// Clusters of a group that have changed since they were merged: those that are seen, and the others.
+    fn changed(
+        &self,
+        index: usize,
+        now: &State,
+        moved: Option<&Moved<'_>>,
+        sights: Option<&[Vec<Sight>]>,
+    ) -> Option<[Dirty; 2]> {
         let group = &self.groups[index];
-        let whole = || Some(Dirty { group: index, clusters: group.clusters.clone().collect() });
-        let Some(moved) = moved else { return whole() };
-        if moved.most || moved.flags[group.receiver] {
-            return whole();
-        }
-        let near = moved.near(now, group.receiver, &group.bounds);
         let mut clusters: Vec<usize> = group.clusters.clone().collect();
-        clusters.retain(|&cluster| moved.any_on_list(now, group.receiver, &self.bounds[cluster], &near));
-        (!clusters.is_empty()).then_some(Dirty { group: index, clusters })
+        if let Some(moved) = moved.filter(|moved| !(moved.most || moved.flags[group.receiver])) {
+            let near = moved.near(now, group.receiver, &group.bounds);
+            let on_list = |cluster: usize| {
+                !near.is_empty() && moved.any_on_list(now, group.receiver, &self.bounds[cluster], &near)
+            };
+            clusters.retain(|&cluster| self.stale[cluster] || on_list(cluster));
+        }
+        if clusters.is_empty() {
+            return None;
+        }
+        let is_seen = |cluster: &usize| sights.is_none_or(|sights| self.is_seen(*cluster, sights));
+        let (seen, hidden) = clusters.into_iter().partition(is_seen);
+        Some([seen, hidden].map(|clusters| Dirty { group: index, clusters }))
     }
 
     /// The steps of clusters at the last update's moment, by the host: clusters that know their place among the steps, and the
@@ -203,7 +276,7 @@ impl Lists {
 
     /// Host memory of the clusters, bytes.
     pub fn size_bytes(&self) -> u64 {
-        (self.clusters.len() * (size_of::<layout::Cluster>() + size_of::<Bounds>())) as u64
+        (self.clusters.len() * (size_of::<layout::Cluster>() + size_of::<Bounds>() + size_of::<Faces>() + 1)) as u64
     }
 }
 

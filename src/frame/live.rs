@@ -35,17 +35,19 @@ pub struct Part {
 }
 
 impl Frame {
-    /// Writes what the next recording's merge reads, in buffers of that flight's own.
+    /// Writes what the next recording's merge reads, in buffers of that flight's own. While things move only what may be seen in
+    /// `parts` that show merged light is merged; where there are none, or nothing has changed since the last call, everything is
+    /// that is not merged yet.
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn prepare(&mut self, placements: &[Placement]) -> Result<()> {
+    pub fn prepare(&mut self, placements: &[Placement], parts: &[Part]) -> Result<()> {
         if !*self.recorded.get_mut() {
             self.lists.forget();
         }
         *self.recorded.get_mut() = false;
         self.heed_report();
-        self.upload(placements)
+        self.upload(placements, parts)
     }
 
     /// Records the merge of what has changed, after [`Frame::prepare`]; nothing where nothing has. When the recording does not
@@ -100,8 +102,8 @@ impl Frame {
     }
 
     fn light_and_show(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
-        self.prepare(placements)?;
         let whole = self.whole(Lit::Merged);
+        self.prepare(placements, &[whole])?;
         self.prepare_picture(placements, &[whole])?;
         loop {
             let mut commands = Commands::new(&self.device, "frame")?;
@@ -111,7 +113,7 @@ impl Frame {
             if self.all_gathered() {
                 return Ok(timings);
             }
-            self.prepare(placements)?;
+            self.prepare(placements, &[whole])?;
         }
     }
 

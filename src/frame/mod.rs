@@ -196,13 +196,16 @@ impl Frame {
         }
         self.sky_radiance = pose::brightest(&channels, bands);
         self.background = Vec3::from_array(channels.map(|c| (c[0] * Y00) as f32));
-        self.lists.forget();
+        self.lists.renew();
         self.sky.write(&floats)
     }
 
     /// Lights every receiver as far as anything has changed since the last call, and draws the picture where `white` is given:
     /// radiance above it is brought down to it, hue kept, before samples are averaged, so that edges of lights are smooth;
     /// infinity leaves radiance as it is. Returns each pass's duration.
+    ///
+    /// While things move a picture lights only what it may show ([`Skip::hidden`]): whoever wants radiosity rather than a picture
+    /// calls this without `white`, which lights everything.
     ///
     /// # Errors
     /// `Device` when the device was lost, `Failed` when a barrier is missing.
@@ -216,12 +219,13 @@ impl Frame {
     }
 
     fn light_and_draw(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
+        let parts: &[Part] = if white.is_some() { &[self.whole(Lit::Merged)] } else { &[] };
         if white.is_some() {
-            self.prepare_picture(placements, &[self.whole(Lit::Merged)])?;
+            self.prepare_picture(placements, parts)?;
         }
         loop {
-            self.upload(placements)?;
-            let items = self.items(placements, self.aspect());
+            self.upload(placements, parts)?;
+            let items = self.items(placements, self.options.size);
             let mut commands = Commands::new(&self.device, "frame")?;
             self.record_merge(&mut commands)?;
             if let Some(white) = white {
@@ -268,7 +272,8 @@ impl Frame {
     }
 
     /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without emission;
-    /// zero where it does not receive.
+    /// zero where it does not receive. After a picture of things that move, what it does not show may be of an earlier moment;
+    /// see [`Frame::render`].
     ///
     /// # Errors
     /// `Device` when memory ran out.
@@ -297,6 +302,11 @@ impl Frame {
     /// Vertices that are lit.
     pub fn receiver_vertex_count(&self) -> usize {
         self.lists.clusters.iter().map(|cluster| cluster.vertex_count as usize).sum()
+    }
+
+    /// Clusters whose light is of an earlier moment, as no picture since then showed them.
+    pub fn stale_count(&self) -> usize {
+        self.lists.stale_count()
     }
 
     /// Merges every cluster in the next frame, moved or not.

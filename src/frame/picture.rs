@@ -7,11 +7,14 @@ use crate::asset::picture::linear_from_srgb;
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Image, Timing};
 use crate::render::draw::{Antialias, Draw, Finish, Item, Pane};
+use crate::render::sight::{self, Sight};
 use crate::render::smooth::{self, Strips};
 use crate::scene::Placement;
 use ash::vk;
 use glam::Vec3;
 use half::f16;
+use rayon::prelude::*;
+use std::ops::Range;
 
 impl Frame {
     /// Finds outlines and creases for the next recording of a picture, in buffers of that flight's own; nothing where they are not
@@ -43,7 +46,7 @@ impl Frame {
     pub(super) fn outlines(&self, placements: &[Placement], aspect: f64) -> Vec<(Line, f32)> {
         let camera = &self.scene.data.camera;
         let clip_from_world = camera::clip_from_world(camera, aspect);
-        let lines = placements.iter().enumerate().flat_map(|(index, placement)| {
+        let lines = placements.par_iter().enumerate().flat_map_iter(|(index, placement)| {
             let mesh = self.scene.entities[index].mesh;
             let world = camera::world_from_centred(placement, self.store.geometries[mesh].centre_m);
             let eye = world.inverse().transform_point3(camera.eye.as_dvec3());
@@ -64,7 +67,7 @@ impl Frame {
     /// As [`Frame::render`].
     pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
         self.prepare_picture(placements, &[self.whole(Lit::Merged)])?;
-        let items = self.items(placements, self.aspect());
+        let items = self.items(placements, self.options.size);
         let mut commands = Commands::new(&self.device, "redraw")?;
         self.record_file(&mut commands, &items, self.background, white)?;
         commands.submit()
@@ -76,7 +79,7 @@ impl Frame {
     /// As [`Frame::render`].
     pub fn redraw_unlit(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
         self.prepare_picture(placements, &[self.whole(Lit::Merged)])?;
-        let mut items = self.items(placements, self.aspect());
+        let mut items = self.items(placements, self.options.size);
         items.iter_mut().for_each(|item| item.emission = Vec3::ZERO);
         let mut commands = Commands::new(&self.device, "redraw unlit")?;
         self.record_file(&mut commands, &items, background.into(), f32::INFINITY)?;
@@ -141,7 +144,7 @@ impl Frame {
         let lists: Vec<Vec<Item<'f>>> = parts
             .iter()
             .map(|part| {
-                let mut items = self.items(placements, f64::from(part.area[2]) / f64::from(part.area[3].max(1)));
+                let mut items = self.items(placements, [part.area[2], part.area[3]]);
                 if matches!(part.lit, Lit::Colors(_)) {
                     items.iter_mut().for_each(|item| item.emission = Vec3::ZERO);
                 }
@@ -219,24 +222,64 @@ impl Frame {
         outcome
     }
 
-    pub(super) fn aspect(&self) -> f64 {
-        f64::from(self.options.size[0]) / f64::from(self.options.size[1])
+    /// Triangles that the whole picture leaves out.
+    pub(super) fn undrawn_count(&self, placements: &[Placement]) -> usize {
+        let count = |indices: Vec<Range<u32>>| indices.iter().map(|range| range.len() / 3).sum::<usize>();
+        let items = self.items(placements, self.options.size);
+        items.into_iter().map(|item| count(item.drawable.seen(None)) - count(item.indices)).sum()
     }
 
-    pub(super) fn items(&self, placements: &[Placement], aspect: f64) -> Vec<Item<'_>> {
-        let clip_from_world = camera::clip_from_world(&self.scene.data.camera, aspect);
+    /// The camera for a part of the picture.
+    pub(super) fn camera(&self, size: [u32; 2]) -> sight::Camera {
+        let camera = &self.scene.data.camera;
+        let aspect = f64::from(size[0]) / f64::from(size[1].max(1));
+        sight::Camera {
+            clip_from_world: camera::clip_from_world(camera, aspect),
+            eye: camera.eye.as_dvec3(),
+            near_m: camera::near_corner_m(camera, aspect),
+            size,
+            samples: self.draw.samples() > 1,
+        }
+    }
+
+    /// How an entity is seen.
+    pub(super) fn sight(&self, camera: &sight::Camera, index: usize, placement: &Placement) -> Sight {
+        let mesh = self.scene.entities[index].mesh;
+        let geometry = &self.store.geometries[mesh];
+        let world_from_object = camera::world_from_centred(placement, geometry.centre_m);
+        Sight::new(camera, world_from_object, geometry.radius_m, self.scene.meshes[mesh].is_solid())
+    }
+
+    /// All entities as they are drawn, in the order in which they are.
+    pub(super) fn items(&self, placements: &[Placement], size: [u32; 2]) -> Vec<Item<'_>> {
+        let camera = self.camera(size);
         let items = placements.iter().enumerate().map(|(index, placement)| {
             let entity = &self.scene.entities[index];
             let geometry = &self.store.geometries[entity.mesh];
             let world_from_object = camera::world_from_centred(placement, geometry.centre_m);
+            let sight = self.sight(&camera, index, placement);
             Item {
                 drawable: &geometry.drawable,
-                clip_from_object: (clip_from_world * world_from_object).as_mat4(),
+                indices: geometry.drawable.seen(self.options.skip.hidden.then_some(&sight)),
+                clip_from_object: (camera.clip_from_world * world_from_object).as_mat4(),
+                culls: sight.culls(),
                 emission: entity.emission,
                 radiosity_offset: self.radiosity_offsets[index],
                 tag: smooth::tag(index),
             }
         });
-        items.collect()
+        // Near to far, so that little is shaded that something nearer then hides; grids, whose shading costs most, at the end.
+        let mut items: Vec<(bool, f64, Item<'_>)> = items
+            .zip(placements)
+            .enumerate()
+            .map(|(index, (item, placement))| {
+                let radius_m =
+                    self.store.geometries[self.scene.entities[index].mesh].radius_m * f64::from(placement.scale);
+                let distance = self.centre(index, placement).distance(camera.eye) - radius_m;
+                (item.drawable.is_grid(), distance, item)
+            })
+            .collect();
+        items.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        items.into_iter().map(|(_, _, item)| item).collect()
     }
 }

@@ -2,7 +2,8 @@
 
 use super::Frame;
 use super::gathering::Gathering;
-use super::lists::{Dirty, Merged, State};
+use super::lists::{Dirty, Member, Merged, State};
+use super::live::{Lit, Part};
 use super::store::{self, Slot};
 use crate::error::Result;
 use crate::field::Fit;
@@ -10,6 +11,7 @@ use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
 use crate::render::gather::{Body, Bounds, Moment, Report};
+use crate::render::sight::{Faces, Sight};
 use crate::scene::Placement;
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use crate::sh::cube::{self, FACE_COUNT, texel_st};
@@ -18,11 +20,14 @@ use glam::DVec3;
 use std::f64::consts::PI;
 
 impl Frame {
-    /// Writes what has changed for the merge at this moment: clusters to light, their steps, and all entities.
-    pub(super) fn upload(&mut self, placements: &[Placement]) -> Result<()> {
-        let dirty = self.lists.update(self.state(placements));
+    /// Writes what has changed for the merge at this moment: clusters to light, their steps, and all entities. Where merged light
+    /// is shown in `parts` of the picture, only what they may show has to be lit.
+    pub(super) fn upload(&mut self, placements: &[Placement], parts: &[Part]) -> Result<()> {
+        let sights = self.sights(placements, parts);
+        let dirty = self.lists.update(self.state(placements), sights.as_deref());
         let merged_clusters = dirty.iter().map(Dirty::cluster_count).sum();
-        self.merged = Merged { clusters: self.lists.clusters.len(), merged_clusters, ..self.merged };
+        let stale_clusters = self.lists.stale_count();
+        self.merged = Merged { clusters: self.lists.clusters.len(), merged_clusters, stale_clusters, ..self.merged };
         if dirty.is_empty() {
             self.merged.merged_steps = 0;
             return Ok(());
@@ -63,6 +68,20 @@ impl Frame {
             self.lists.forget();
         }
         lost
+    }
+
+    /// How each entity is seen in each of the parts that show merged light; `None` where there is none, and light is for others to read.
+    fn sights(&self, placements: &[Placement], parts: &[Part]) -> Option<Vec<Vec<Sight>>> {
+        let shown = parts.iter().filter(|part| part.lit == Lit::Merged);
+        let cameras: Vec<_> = shown.map(|part| self.camera([part.area[2], part.area[3]])).collect();
+        let of = |(index, placement)| cameras.iter().map(|camera| self.sight(camera, index, placement)).collect();
+        (!cameras.is_empty()).then(|| placements.iter().enumerate().map(of).collect())
+    }
+
+    /// Clusters that the camera does not see in the whole picture.
+    pub(super) fn hidden_count(&self, placements: &[Placement]) -> usize {
+        let sights = self.sights(placements, &[self.whole(Lit::Merged)]);
+        sights.map_or(0, |sights| self.lists.hidden_count(&sights))
     }
 
     /// All that lists and merge depend on at this moment.
@@ -159,14 +178,9 @@ impl Frame {
 }
 
 /// Clusters of one receiver, without steps; `radiosity_first` is its first vertex in the radiosity buffer.
-pub(super) fn clusters(
-    receiver: usize,
-    geometry: &store::Geometry,
-    radiosity_first: u64,
-    bands: usize,
-) -> Vec<(layout::Cluster, Bounds)> {
+pub(super) fn clusters(receiver: usize, geometry: &store::Geometry, radiosity_first: u64, bands: usize) -> Vec<Member> {
     let transfer_quads = (channel_stride(bands) / 4) as u32;
-    let cluster = |(i, bounds): (usize, &Bounds)| {
+    let cluster = |(i, (bounds, faces)): (usize, (&Bounds, &Faces))| {
         let first = i as u32 * CLUSTER_VERTICES;
         let cluster = layout::Cluster {
             receiver: receiver as u32,
@@ -179,9 +193,9 @@ pub(super) fn clusters(
             radiosity_first: radiosity_first as u32 + first,
             ..Default::default()
         };
-        (cluster, *bounds)
+        Member { cluster, bounds: *bounds, faces: *faces }
     };
-    geometry.clusters.iter().enumerate().map(cluster).collect()
+    geometry.clusters.iter().zip(&geometry.faces).enumerate().map(cluster).collect()
 }
 
 /// Largest value of a projected sky, of any colour, on a grid of directions that is fine against its bands; at least 0.

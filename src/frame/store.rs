@@ -11,10 +11,11 @@ use crate::field::extent::{Extent, extent};
 use crate::field::quantity::{Kind, Storage, channel_stride};
 use crate::field::{Header, ShadowField};
 use crate::gpu::{Buffer, BufferKind, Volume};
-use crate::layout::NONE;
+use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::render::draw::Drawable;
 use crate::render::gather::Bounds;
 use crate::render::shelf::Shelf;
+use crate::render::sight::Faces;
 use crate::render::variant::Skip;
 use crate::scene::{Entity, Scene};
 use glam::DVec3;
@@ -54,6 +55,8 @@ pub struct Geometry {
     pub order: Vec<u32>,
     /// Bounds of every run of [`crate::layout::CLUSTER_VERTICES`] of them.
     pub clusters: Vec<Bounds>,
+    /// What each of these runs is seen by.
+    pub faces: Vec<Faces>,
     /// First quad of its transfer vectors, or [`NONE`] where the cosine of the normal is exact.
     pub transfer_first: u32,
     /// Occlusion field, if an entity needs one.
@@ -221,6 +224,7 @@ impl Store {
             geometries.push(Geometry {
                 vertices: vertex_first / 2..vertices.len() as u32 / 2,
                 clusters: cluster::bounds(mesh, &order),
+                faces: Faces::around(mesh, &order, CLUSTER_VERTICES as usize),
                 transfer_first,
                 blocked,
                 radiance,

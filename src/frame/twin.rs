@@ -28,6 +28,8 @@ impl Frame {
             } else {
                 0
             },
+            hidden: if self.options.skip.hidden { self.hidden_count(placements) as u64 } else { 0 },
+            undrawn: self.undrawn_count(placements) as u64,
             ..self.lists.counts(&self.state(placements))
         }
     }

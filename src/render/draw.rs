@@ -5,6 +5,7 @@
 //! one's entity in alpha and its depth beside it, or multisampled and resolved.
 
 use super::grid::{DrawGrid, GridDrawable};
+use super::sight::{Faces, Sight};
 use super::smooth::Smooth;
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
@@ -77,14 +78,17 @@ pub enum Drawable {
         positions: Buffer,
         /// Emission pattern.
         emission: Buffer,
-        /// Three a triangle.
+        /// Three a triangle, neighbours together.
         indices: Buffer,
-        /// How many.
-        index_count: u32,
+        /// Runs of them, one after the other.
+        runs: Vec<(Range<u32>, Faces)>,
     },
     /// As a whole.
-    Grid(GridDrawable),
+    Grid(GridDrawable, Faces),
 }
+
+/// Triangles of a run: few enough that most runs lie on one side of an object, enough that a draw call costs little beside them.
+const RUN_TRIANGLES: usize = 128;
 
 impl Drawable {
     /// Uploads a mesh, its vertices in `order`; without colours its emission pattern is white. `vertices` are those of all that
@@ -99,29 +103,56 @@ impl Drawable {
             place[v as usize] = at as u32;
         }
         if let Some(grid) = Grid::find(mesh).filter(|grid| GridDrawable::fits(device, grid.vertices.len(), vertices)) {
-            return Ok(Drawable::Grid(GridDrawable::new(device, &grid, centre, &place)?));
+            return Ok(Drawable::Grid(
+                GridDrawable::new(device, &grid, centre, &place)?,
+                Faces::of(mesh, &mesh.triangles),
+            ));
         }
         let color = |v: usize| mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[v]);
         let positions: Vec<[f32; 3]> =
             order.iter().map(|&v| (mesh.positions[v as usize] - centre).to_array()).collect();
         let emission: Vec<[f32; 3]> = order.iter().map(|&v| color(v as usize).to_array()).collect();
-        let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(|t| t.map(|v| place[v as usize])).collect();
+        let mut triangles = mesh.triangles.clone();
+        triangles.sort_by_cached_key(|t| t.map(|v| place[v as usize]).into_iter().min());
+        let mut runs = Vec::with_capacity(triangles.len().div_ceil(RUN_TRIANGLES));
+        let mut first = 0;
+        for run in triangles.chunks(RUN_TRIANGLES) {
+            let end = first + 3 * run.len() as u32;
+            runs.push((first..end, Faces::of(mesh, run)));
+            first = end;
+        }
+        triangles.iter_mut().flatten().for_each(|v| *v = place[*v as usize]);
         Ok(Drawable::Triangles {
             positions: Buffer::with_data(device, "draw positions", &positions)?,
             emission: Buffer::with_data(device, "draw emission", &emission)?,
             indices: Buffer::with_data(device, "draw indices", &triangles)?,
-            index_count: 3 * triangles.len() as u32,
+            runs,
         })
     }
 }
 
 impl Drawable {
-    /// Indices of its triangles.
-    fn index_count(&self) -> u32 {
+    /// Indices that have to be drawn, in order: all, or those of runs that may be seen.
+    pub fn seen(&self, sight: Option<&Sight>) -> Vec<Range<u32>> {
+        let may_see = |faces: &Faces| sight.is_none_or(|sight| sight.may_see(faces));
+        let mut out: Vec<Range<u32>> = Vec::new();
         match self {
-            Drawable::Triangles { index_count, .. } => *index_count,
-            Drawable::Grid(_) => GridDrawable::INDEX_COUNT,
+            Drawable::Grid(_, faces) => out.extend(may_see(faces).then_some(0..GridDrawable::INDEX_COUNT)),
+            Drawable::Triangles { runs, .. } => {
+                for (range, _) in runs.iter().filter(|(_, faces)| may_see(faces)) {
+                    match out.last_mut() {
+                        Some(last) if last.end == range.start => last.end = range.end,
+                        _ => out.push(range.clone()),
+                    }
+                }
+            }
         }
+        out
+    }
+
+    /// Whether it is drawn as a whole.
+    pub fn is_grid(&self) -> bool {
+        matches!(self, Drawable::Grid(..))
     }
 
     /// Device memory, bytes.
@@ -130,7 +161,7 @@ impl Drawable {
             Drawable::Triangles { positions, emission, indices, .. } => {
                 positions.size_bytes + emission.size_bytes + indices.size_bytes
             }
-            Drawable::Grid(grid) => grid.size_bytes(),
+            Drawable::Grid(grid, _) => grid.size_bytes(),
         }
     }
 }
@@ -141,6 +172,10 @@ pub struct Item<'d> {
     pub drawable: &'d Drawable,
     /// From the mesh's frame (metres from its sphere's centre) to clip space, reversed depth.
     pub clip_from_object: Mat4,
+    /// Indices of it to draw.
+    pub indices: Vec<Range<u32>>,
+    /// Whether its backs are left out: they are never seen.
+    pub culls: bool,
     /// Radiance factor of its emission pattern.
     pub emission: Vec3,
     /// Byte offset of its vertices in the radiosity buffer.
@@ -167,9 +202,12 @@ struct Push {
     tag: f32,
 }
 
-/// The pipeline and its images.
+/// The pipelines and their images.
 pub struct Draw {
-    pipeline: GraphicsPipeline,
+    /// For meshes that are seen from both sides.
+    open: GraphicsPipeline,
+    /// For those of which only fronts are seen.
+    solid: GraphicsPipeline,
     grid: DrawGrid,
     samples: Option<Image>,
     /// Depth, reversed: of every sample.
@@ -205,7 +243,14 @@ impl Draw {
         let vertex = library.shader(&Row::new("draw.vert", 4))?;
         let fragment = library.shader(&Row::new("draw.frag", 4).define("DISPLAY", finish == Finish::Display))?;
         Ok(Draw {
-            pipeline: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
+            open: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
+            solid: GraphicsPipeline::new(
+                device,
+                "draw solid",
+                &vertex,
+                &fragment,
+                GraphicsState { cull: vk::CullModeFlags::BACK, ..state },
+            )?,
             grid: DrawGrid::new(device, library, state, finish == Finish::Display)?,
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))
@@ -282,24 +327,28 @@ impl Draw {
                 }
             }
             commands.render_part(&target, [number == 0, number + 1 == count], |drawing| {
+                let mut bound: Option<&Item<'_>> = None;
                 for (pane, item, indices) in batch {
-                    let [left, top, width, height] = pane.area;
-                    drawing.area(left, top, width, height);
-                    let (positions, emission, triangles) = match item.drawable {
-                        Drawable::Triangles { positions, emission, indices, .. } => (positions, emission, indices),
-                        Drawable::Grid(grid) => {
-                            self.grid.record(drawing, (grid, indices), item, pane.radiosity, white)?;
-                            continue;
+                    if bound.is_none_or(|bound| !std::ptr::eq(bound, item)) {
+                        let [left, top, width, height] = pane.area;
+                        drawing.area(left, top, width, height);
+                        if let Drawable::Triangles { positions, emission, indices, .. } = item.drawable {
+                            let vertices = [(positions, 0), (emission, 0), (pane.radiosity, item.radiosity_offset)];
+                            drawing.bind(if item.culls { &self.solid } else { &self.open }, &vertices, indices);
+                            drawing.push(&Push {
+                                clip_from_object: item.clip_from_object.to_cols_array(),
+                                emission_white: item.emission.extend(white).to_array(),
+                                tag: item.tag,
+                            });
                         }
-                    };
-                    let vertices = [(positions, 0), (emission, 0), (pane.radiosity, item.radiosity_offset)];
-                    drawing.bind(&self.pipeline, &vertices, triangles);
-                    drawing.push(&Push {
-                        clip_from_object: item.clip_from_object.to_cols_array(),
-                        emission_white: item.emission.extend(white).to_array(),
-                        tag: item.tag,
-                    });
-                    drawing.indexed(indices);
+                        bound = Some(item);
+                    }
+                    match item.drawable {
+                        Drawable::Triangles { .. } => drawing.indexed(indices),
+                        Drawable::Grid(grid, _) => {
+                            self.grid.record(drawing, (grid, indices), item, pane.radiosity, white)?;
+                        }
+                    }
                 }
                 Ok(())
             })?;
@@ -315,16 +364,17 @@ fn batches<'p, 'i, 'd>(
 ) -> Vec<Vec<(&'p Pane<'i, 'd>, &'i Item<'d>, Range<u32>)>> {
     let (mut batches, mut room) = (vec![Vec::new()], most);
     for (pane, item) in items {
-        let (mut first, end) = (0, item.drawable.index_count());
-        while first < end {
-            if room == 0 {
-                batches.push(Vec::new());
-                room = most;
+        for &Range { mut start, end } in &item.indices {
+            while start < end {
+                if room == 0 {
+                    batches.push(Vec::new());
+                    room = most;
+                }
+                let next = end.min(start.saturating_add(room));
+                room -= next - start;
+                batches.last_mut().expect("one at least").push((pane, item, start..next));
+                start = next;
             }
-            let next = end.min(first.saturating_add(room));
-            room -= next - first;
-            batches.last_mut().expect("one at least").push((pane, item, first..next));
-            first = next;
         }
     }
     batches

@@ -13,6 +13,7 @@ pub mod repeatable;
 pub mod scope;
 pub mod shelf;
 pub mod show;
+pub mod sight;
 pub mod smooth;
 pub mod tree;
 pub mod variant;

@@ -186,6 +186,10 @@ pub struct Counts {
     pub empty: u64,
     /// Entities that cast shadows or shine where nothing but themselves is lit: their fields are not even baked.
     pub unseen: u64,
+    /// Clusters that the camera does not see.
+    pub hidden: u64,
+    /// Triangles that are not drawn since the camera does not see them.
+    pub undrawn: u64,
     /// Bound of the radiosity that was left off as below eps, of the cluster where it is largest.
     pub dropped_bound: f64,
 }
@@ -200,6 +204,8 @@ impl std::ops::AddAssign for Counts {
         self.below_eps += other.below_eps;
         self.empty += other.empty;
         self.unseen += other.unseen;
+        self.hidden += other.hidden;
+        self.undrawn += other.undrawn;
         self.dropped_bound = self.dropped_bound.max(other.dropped_bound);
     }
 }

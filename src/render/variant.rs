@@ -124,12 +124,22 @@ pub struct Skip {
     pub unseen: bool,
     /// Clusters of vertices for which nothing has changed since they were last merged.
     pub unmoved: bool,
+    /// Clusters of vertices that the camera cannot see, while things move, in pictures; and drawing what it cannot see.
+    pub hidden: bool,
 }
 
 impl Skip {
     /// Every skip.
-    pub const ALL: Skip =
-        Skip { horizon: true, cones: true, behind: true, facing: true, empty: true, unseen: true, unmoved: true };
+    pub const ALL: Skip = Skip {
+        horizon: true,
+        cones: true,
+        behind: true,
+        facing: true,
+        empty: true,
+        unseen: true,
+        unmoved: true,
+        hidden: true,
+    };
     /// No skip.
     pub const NONE: Skip = Skip {
         horizon: false,
@@ -139,9 +149,10 @@ impl Skip {
         empty: false,
         unseen: false,
         unmoved: false,
+        hidden: false,
     };
     /// Names on the command line.
-    pub const NAMES: [&str; 7] = ["horizon", "cones", "behind", "facing", "empty", "unseen", "unmoved"];
+    pub const NAMES: [&str; 8] = ["horizon", "cones", "behind", "facing", "empty", "unseen", "unmoved", "hidden"];
 
     /// The switch of that name.
     pub fn switch(&mut self, name: &str) -> Option<&mut bool> {
@@ -153,6 +164,7 @@ impl Skip {
             "empty" => &mut self.empty,
             "unseen" => &mut self.unseen,
             "unmoved" => &mut self.unmoved,
+            "hidden" => &mut self.hidden,
             _ => return None,
         })
     }

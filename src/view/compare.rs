@@ -45,6 +45,10 @@ impl Viewer {
     /// Colours of the error of what was merged last, where they are not known yet.
     pub(super) fn compare(&mut self) -> Result<()> {
         let (Some(frame), Some(reference)) = (&mut self.frame, &self.reference) else { return Ok(()) };
+        if frame.stale_count() > 0 {
+            // The next frame lights what none has shown.
+            return Ok(());
+        }
         if self
             .error_shown
             .as_ref()

@@ -11,6 +11,11 @@ use crate::frame::{Lit, Part};
 use crate::gpu::{Access, Commands, FLIGHTS, Image, Target, Window};
 use glam::DVec2;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How long nothing has to happen before what was hidden is lit: shorter than a pause between two looks, longer than between
+/// events of a drag.
+const REST: Duration = Duration::from_millis(100);
 
 /// What a frame is drawn into.
 pub enum Canvas<'c> {
@@ -60,11 +65,14 @@ impl Viewer {
         let placements = self.editor.placements();
         let white = (-self.editor.exposure_ev()).exp2();
         let pending = std::mem::take(&mut self.pending);
-        let light = pending.light() || pending.variant;
+        // What was hidden while things moved is lit once they rest.
+        let stale = self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0);
+        let light = pending.light() || pending.variant || stale;
         if let Some(frame) = &mut self.frame {
             frame.resize(size)?;
             if light {
-                frame.prepare(&placements)?;
+                // An error is compared everywhere.
+                frame.prepare(&placements, if self.editor.shows_error() { &[] } else { &parts })?;
             }
             if pending.any() || resized {
                 frame.prepare_picture(&placements, &parts)?;
@@ -98,6 +106,10 @@ impl Viewer {
             _ => commands.launch()?,
         };
         self.flights.push_back(flight);
+        if self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0) {
+            let soon = Instant::now() + REST;
+            self.repaint_at = Some(self.repaint_at.map_or(soon, |at| at.min(soon)));
+        }
         assert!(self.setup.device.flight_count() <= FLIGHTS, "more than {FLIGHTS} frames are queued");
         self.frame_count += 1;
         Ok(true)

@@ -29,8 +29,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         return context.finish();
     }
     output::say(
-        "Frame without drawing, the skip off and on in turns; what it left off (a cluster of 64 vertices, chain, entity); lookups \
-         listed\n(one for a cluster); RMS error against ray casting and the most that a vertex changes, both in units of the RMS \
+        "Frame without drawing (of \"hidden\" with it, 1280x720), the skip off and on in turns; what it left off (a cluster of 64 \
+         vertices, chain, entity;\nof \"hidden\" clusters); lookups listed (one for a cluster); RMS error against ray casting and the most that a vertex changes, both in units of the RMS \
          radiosity",
     );
     let cells = rows.iter().map(|row| {

@@ -211,9 +211,15 @@ void walk(uint at, Entity receiver, uint receiver_index, uint count) {
             View view = view_of(scope, body(e));
             bool needed = of_sky ? occluder_listed(scope, view, sky)
                                  : e != lamp_index && occluder_listed(scope, view, light, lamp.x);
-            if (needed) {
+            if (needed && view.whole) {
                 if (made < capacity) {
                     steps[first + made] = e | chain;
+                }
+                made++;
+            }
+            if (needed && view.cap) {
+                if (made < capacity) {
+                    steps[first + made] = e | chain | STEP_CAP;
                 }
                 made++;
             }

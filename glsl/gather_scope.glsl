@@ -2,7 +2,7 @@
 #include "repeatable.glsl"
 
 const float EVERYTHING = 1e30;
-const uint SKIPS_HORIZON = 1, SKIPS_CONES = 2, SKIPS_BEHIND = 4, SKIPS_FACING = 8;
+const uint SKIPS_HORIZON = 1, SKIPS_CONES = 2, SKIPS_BEHIND = 4, SKIPS_FACING = 8, SKIPS_CAPS = 16;
 
 // Places are world axes from the receiver's centre.
 struct Scope {
@@ -63,6 +63,8 @@ struct View {
     bool outside;
     bool below;
     float weight;
+    bool whole;
+    bool cap;
 };
 
 precise vec3 way(Scope scope, vec3 place) {
@@ -85,6 +87,11 @@ View view_of(Scope scope, vec4 sphere) {
     precise float threshold = (sphere.w + FADE_SINE * (distance + scope.radius)) * BELOW;
     view.below = (switches & SKIPS_HORIZON) != 0 && highest < threshold;
     precise float nearest = distance - scope.radius;
+    bool caps = (switches & SKIPS_CAPS) != 0;
+    precise float large = CAP_SINE_LEAST * nearest;
+    precise float small = CAP_SINE_MOST * (distance + scope.radius);
+    view.whole = !caps || sphere.w > large;
+    view.cap = caps && sphere.w < small;
     view.outside = nearest > max(sphere.w, 1e-15);
     precise float sine = sphere.w * inverse(max(nearest, 1e-15));
     vec2 half_angle = angle_of_sine(min(sine, 1.0));

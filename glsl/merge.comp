@@ -23,10 +23,11 @@ layout(std140, binding = 0) uniform Entities { Entity entities[ENTITY_LIMIT]; };
 #elif TEXEL
 layout(binding = 0) uniform textureBuffer entities;
 Entity entity_at(uint e) {
-    int at = int(e) * 7;
+    int at = int(e) * 10;
     vec4 third = texelFetch(entities, at + 2);
     return Entity(texelFetch(entities, at), texelFetch(entities, at + 1), third.xy, floatBitsToUint(third.z),
-        floatBitsToUint(third.w), texelFetch(entities, at + 3), texelFetch(entities, at + 4), texelFetch(entities, at + 5), texelFetch(entities, at + 6));
+        floatBitsToUint(third.w), texelFetch(entities, at + 3), texelFetch(entities, at + 4), texelFetch(entities, at + 5), texelFetch(entities, at + 6),
+        texelFetch(entities, at + 7), texelFetch(entities, at + 8), texelFetch(entities, at + 9));
 }
 #define ENTITY(e) entity_at(e)
 #else
@@ -67,6 +68,7 @@ layout(std430, binding = 7) writeonly buffer Radiosity { vec4 radiosity[]; };
 #include "generated/rotate.glsl"
 
 #include "merge_cone.glsl"
+#include "merge_cap.glsl"
 
 // Transfer in the world frame: the receiver's own shadow times cosine. `at` is its first quad.
 void transfer(uint at, Entity receiver, out float t[COEFFICIENTS]) {
@@ -75,6 +77,85 @@ void transfer(uint at, Entity receiver, out float t[COEFFICIENTS]) {
     }
     sh_rotate(t, receiver.alpha_beta, receiver.gamma);
 }
+
+// What a vertex brings to every step, and what becomes of it.
+struct Vertex {
+    vec3 receiver; // centre, world
+    vec3 position; // world axes, from there
+    vec3 normal;
+};
+
+// Of an occluder in the chain of l, as far as order and skips decide.
+float share(Vertex vertex, uint e, Cone cone, uint l) {
+    // The sky's chain has no light; any entity will do to keep the read in bounds.
+    vec4 light_centre = ENTITY(l == SKY_CHAIN ? e : l).centre;
+    light_centre.xyz -= vertex.receiver;
+    Cone light = cone_of(light_centre, vertex.position);
+    return l == SKY_CHAIN ? 1.0 : before(e, cone, l, light);
+}
+
+// A step that reads a field.
+void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN], inout vec3 sum) {
+    uint e = packed & SKY_CHAIN;
+    uint l = (packed >> STEP_BITS) & SKY_CHAIN;
+    bool shines = (packed & STEP_LIGHT) != 0;
+    uint channel = (packed >> STEP_CHANNEL) & 3;
+    bool of_radiance = shines && channel != 3;
+
+    Entity entity = ENTITY(e);
+    entity.centre.xyz -= vertex.receiver;
+    Cone cone = cone_of(entity.centre, vertex.position);
+    float weight = above_horizon(cone, vertex.normal);
+    float counts = share(vertex, e, cone, l) * field_share(cone);
+    weight *= shines ? 1.0 : counts;
+    vec3 p = to_lattice(entity, to_object(entity, (vertex.position - entity.centre.xyz) * entity.centre.w));
+    uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_STEP : entity.blocked_base;
+    float b[FETCHED];
+    FieldPlace place = field_place(p, entity.radial);
+    [[unroll]] for (uint k = 0; k < CORNERS; k++) {
+        place.weight[k] *= weight;
+    }
+    field_gather(place, base, of_radiance ? 3 * CHANNEL_QUADS : FIELD_QUADS, b);
+    // Occlusion and radiance of different bands are read alike; what one of them does not have belongs to the next sample.
+    [[unroll]] for (uint k = FIELD_COEFFICIENTS; k < FETCHED; k++) {
+        b[k] = of_radiance ? b[k] : 0.0;
+    }
+    sh_rotate(b, entity.alpha_beta, entity.gamma);
+
+    float s[COEFFICIENTS];
+    [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
+        s[k] = b[k];
+    }
+    float met = chain_meet(t, s);
+    [[unroll]] for (uint k = 0; k < FETCHED; k++) {
+        b[k] = shines ? 0.0 : b[k];
+    }
+    vec3 color = of_radiance ? vec3(channel == 0, channel == 1, channel == 2) : vec3(1.0);
+    sum += (shines ? met : 0.0) * color * entity.emission.rgb;
+    chain_multiply(t, b);
+    bool anew = (packed & STEP_LAST) != 0;
+    [[unroll]] for (uint k = 0; k < CHAIN; k++) {
+        t[k] = anew ? t_start[k] : t[k];
+    }
+}
+
+#if CAPS
+bool is_cap(uint packed) {
+    return (packed & (STEP_LIGHT | STEP_CAP)) == STEP_CAP;
+}
+
+// A step that takes an occluder for a cap.
+void cover(Vertex vertex, uint packed, inout float t[CHAIN]) {
+    uint e = packed & SKY_CHAIN;
+    Entity entity = ENTITY(e);
+    entity.centre.xyz -= vertex.receiver;
+    Cone cone = cone_of(entity.centre, vertex.position);
+    float weight = above_horizon(cone, vertex.normal) * share(vertex, e, cone, (packed >> STEP_BITS) & SKY_CHAIN);
+    float y[COEFFICIENTS];
+    float solid_angle = cap_of(entity, cone, y);
+    chain_cover(t, y, weight * (1.0 - field_share(cone)) * solid_angle);
+}
+#endif
 
 void main() {
     Cluster cluster = clusters[gl_WorkGroupID.x];
@@ -102,57 +183,31 @@ void main() {
     vec3 sum = vec3(0.0);
     // Nothing may be read without a step: the scene may have no field at all.
     if (cluster.step_count > 0) {
+        Vertex vertex = Vertex(receiver.centre.xyz, position, normal);
         uint i = 0;
-        // Tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the loop.
+        uint packed = steps[cluster.step_first];
+        // Loops are tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the loop. It jumps
+        // nowhere else, so steps of either kind run as loops of their own, each in turn as long as there are such steps.
         do {
-            uint packed = steps[cluster.step_first + i];
-            uint e = packed & SKY_CHAIN;
-            uint l = (packed >> STEP_BITS) & SKY_CHAIN;
-            bool shines = (packed & STEP_LIGHT) != 0;
-            uint channel = (packed >> STEP_CHANNEL) & 3;
-            bool of_radiance = shines && channel != 3;
-
-            Entity entity = ENTITY(e);
-            entity.centre.xyz -= receiver.centre.xyz;
-            Cone cone = cone_of(entity.centre, position);
-            float weight = above_horizon(cone, normal);
-            // The sky's chain has no light; any entity will do to keep the read in bounds.
-            vec4 light_centre = ENTITY(l == SKY_CHAIN ? e : l).centre;
-            light_centre.xyz -= receiver.centre.xyz;
-            Cone light = cone_of(light_centre, position);
-            if (!shines && l != SKY_CHAIN) {
-                weight *= before(e, cone, l, light);
-            }
-            vec3 p = to_lattice(entity, to_object(entity, (position - entity.centre.xyz) * entity.centre.w));
-            uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_STEP : entity.blocked_base;
-            float b[FETCHED];
-            FieldPlace place = field_place(p, entity.radial);
-            [[unroll]] for (uint k = 0; k < CORNERS; k++) {
-                place.weight[k] *= weight;
-            }
-            field_gather(place, base, of_radiance ? 3 * CHANNEL_QUADS : FIELD_QUADS, b);
-            // Occlusion and radiance of different bands are read alike; what one of them does not have belongs to the next sample.
-            [[unroll]] for (uint k = FIELD_COEFFICIENTS; k < FETCHED; k++) {
-                b[k] = of_radiance ? b[k] : 0.0;
-            }
-            sh_rotate(b, entity.alpha_beta, entity.gamma);
-
-            float s[COEFFICIENTS];
-            [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
-                s[k] = b[k];
-            }
-            float met = chain_meet(t, s);
-            [[unroll]] for (uint k = 0; k < FETCHED; k++) {
-                b[k] = shines ? 0.0 : b[k];
-            }
-            vec3 color = of_radiance ? vec3(channel == 0, channel == 1, channel == 2) : vec3(1.0);
-            sum += (shines ? met : 0.0) * color * entity.emission.rgb;
-            chain_multiply(t, b);
-            bool anew = (packed & STEP_LAST) != 0;
-            [[unroll]] for (uint k = 0; k < CHAIN; k++) {
-                t[k] = anew ? t_start[k] : t[k];
-            }
+#if CAPS
+            do {
+                if (!is_cap(packed)) {
+                    look(vertex, packed, t_start, t, sum);
+                    i++;
+                    packed = steps[cluster.step_first + min(i, cluster.step_count - 1)];
+                }
+            } while (i < cluster.step_count && !is_cap(packed));
+            do {
+                if (i < cluster.step_count && is_cap(packed)) {
+                    cover(vertex, packed, t);
+                    i++;
+                    packed = steps[cluster.step_first + min(i, cluster.step_count - 1)];
+                }
+            } while (i < cluster.step_count && is_cap(packed));
+#else
+            look(vertex, steps[cluster.step_first + i], t_start, t, sum);
             i++;
+#endif
         } while (i < cluster.step_count);
     }
 

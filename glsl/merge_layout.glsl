@@ -10,6 +10,9 @@ struct Entity {
     vec4 emission;     // radiance factor of its light; w = its albedo, of the brightest colour
     vec4 shift;        // added after stretching, in r; w = stretch of its fields, packed
     vec4 albedo;       // albedo / pi; w = uniform scale of the object
+    vec4 area_x;       // first axis of its projected area, world; w = the constant term
+    vec4 area_y;       // second axis, world; w = factor of u
+    vec4 area_terms;   // factors of v, u u, v v, u v
 };
 
 // The rotation that a cosine and sine stand for, applied to two coordinates, and its inverse.
@@ -58,3 +61,4 @@ const uint SKY_CHAIN = (1u << STEP_BITS) - 1u;
 const uint STEP_LIGHT = 1u << 28;    // meets the light rather than multiplying an occluder
 const uint STEP_CHANNEL = 29;        // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour
 const uint STEP_LAST = 1u << 31;     // ends the chain: the next step begins anew from the transfer
+const uint STEP_CAP = 1u << 29;      // without STEP_LIGHT: an occluder as a cap

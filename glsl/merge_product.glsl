@@ -77,6 +77,36 @@ float chain_meet(float c[CHAIN], float f[COEFFICIENTS]) {
     return sum;
 }
 
+#if CAPS
+// Takes away what comes from one direction: the chain's value there, over a small solid angle. `y` is the basis in that direction, each
+// band a little less for the cap's extent. What a chain has of light is not negative, so a value that is takes nothing, and coefficient
+// 0 does not change sign; with that, and up to 1.5 sr, it is no longer than before: the guard has nothing to take back.
+void chain_cover(inout float c[CHAIN], float y[COEFFICIENTS], float solid_angle) {
+#if POINT_CHAIN
+    float v[TERMS];
+    sh_points(y, v);
+#define COVER_VALUE v
+#else
+#define COVER_VALUE y
+#endif
+    float value = 0.0;
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+        value += COVER_VALUE[k] * c[k];
+    }
+    float taken = min(solid_angle * max(value, 0.0), max(chain_first(c), 0.0) / CHAIN_Y00);
+    [[unroll]] for (uint k = 0; k < TERMS; k++) {
+#if POINT_CHAIN
+        c[k] -= taken * POINT_WEIGHTS[k] * v[k];
+#else
+        c[k] -= taken * y[k];
+#endif
+    }
+#if GUARD
+    c[TERMS] = chain_rest(c, chain_first(c));
+#endif
+}
+#endif
+
 // Multiplies by 1 - b.
 //
 // A factor between 0 and 1 makes neither the integral of a function that is nowhere negative larger, nor its length. Cut to a few

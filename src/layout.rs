@@ -24,6 +24,12 @@ pub struct Entity {
     pub shift: [f32; 4],
     /// Albedo / pi; w = uniform scale of the object.
     pub albedo: [f32; 4],
+    /// First axis of its projected area ([`crate::field::Area`]), world; w = the area's constant term.
+    pub area_x: [f32; 4],
+    /// Second axis, world; w = factor of u, the square of a direction's cosine to the first.
+    pub area_y: [f32; 4],
+    /// Factors of v, likewise of the second, of u u, v v and u v.
+    pub area_terms: [f32; 4],
 }
 
 /// A workgroup's worth of neighbouring vertices of one receiver.
@@ -70,6 +76,13 @@ pub enum Step {
         /// Whose chain it is.
         light: Option<u32>,
     },
+    /// As [`Step::Occlude`], for vertices that see the entity small.
+    Cap {
+        /// The occluder.
+        entity: u32,
+        /// Whose chain it is.
+        light: Option<u32>,
+    },
     /// Meet a light; `channel` is `None` for a light of one colour, which shares the occlusion field.
     Shine {
         /// The light.
@@ -91,6 +104,7 @@ impl Step {
     pub fn pack(self) -> u32 {
         match self {
             Step::Occlude { entity, light } => entity | light.unwrap_or(STEP_ENTITIES) << STEP_BITS,
+            Step::Cap { entity, light } => Step::Occlude { entity, light }.pack() | 1 << (2 * STEP_BITS + 1),
             Step::Shine { entity, channel, last } => {
                 let flags = 1 | channel.unwrap_or(3) << 1 | u32::from(last) << 3;
                 entity | entity << STEP_BITS | flags << (2 * STEP_BITS)

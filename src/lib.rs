@@ -17,6 +17,7 @@
 //! | occlusion field | stores the *blocked* part b = P[1 - V]: 0 where nothing blocks; samples inside the solid are captured off the nearest surface |
 //! | between shells | b / (1 - cos a) is interpolated over sin(a/2), a the half-angle of the bounding sphere, samples lowered by a twelfth of their second differences; beyond 8 r it falls as (8r/d)^2 |
 //! | order | an occluder precedes a light whose bounding sphere's centre is farther from the vertex; ties by entity index |
+//! | small occluders | bounding spheres of a half-angle below 12 degrees (16 with shares between) block a point: the chain's value there times the solid angle of a projected area fitted to the outermost shell ([`field::Area`]) |
 //! | switches | an emitter does not occlude, flat ground only receives, all else does both; each can be set per entity |
 //! | scale | uniform and positive |
 //! | light | linear Rec.709 radiance; radiosity B = albedo/pi * integral L V max(0, n.w) dw |
@@ -33,7 +34,7 @@
 //! # Beyond one device
 //!
 //! On paper, not built. *Merges over many devices*: a cluster reads its list, the entities on it and their fields, and writes its
-//! own vertices only, so clusters can be dealt out by receiver and place with no exchange but the entities' 4 200 bytes a frame
+//! own vertices only, so clusters can be dealt out by receiver and place with no exchange but the entities' 5 600 bytes a frame
 //! for every 30 of them; each device needs the fields and vertices of its own clusters, and sends 16 bytes a vertex to the one
 //! that draws. What a device merges again is what moved near its clusters. *Farms of bakes*: a field depends on mesh, lattice,
 //! bands, face size and format, whose hash names its cache file, and every file is replaced whole: workers that share a cache

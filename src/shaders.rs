@@ -31,6 +31,7 @@ embedded!(
     "grid.frag",
     "grid.vert",
     "merge.comp",
+    "merge_cap.glsl",
     "merge_cone.glsl",
     "merge_layout.glsl",
     "merge_product.glsl",

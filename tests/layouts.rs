@@ -63,9 +63,22 @@ fn entities_and_clusters_of_the_merge() {
         }
         let entity = same_layout!(
             reflection,
-            Entity { centre, alpha_beta, gamma, blocked_base, radiance_base, radial, emission, shift, albedo }
+            Entity {
+                centre,
+                alpha_beta,
+                gamma,
+                blocked_base,
+                radiance_base,
+                radial,
+                emission,
+                shift,
+                albedo,
+                area_x,
+                area_y,
+                area_terms,
+            }
         );
-        assert_eq!(entity.len(), 9);
+        assert_eq!(entity.len(), 12);
         assert_eq!(reflection.strides.get("Entity"), Some(&(size_of::<Entity>() as u32)));
     }
 }

@@ -62,6 +62,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
             albedo_over_pi: (entity.albedo.as_dvec3() / std::f64::consts::PI).to_array(),
             emission: entity.emission.as_dvec3().to_array(),
             blocked: fields[entity.mesh].as_ref(),
+            area: geometry.blocked.as_ref().map_or(Default::default(), |slot| slot.area),
             logarithm: None,
             radiance: None,
         }

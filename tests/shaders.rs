@@ -64,7 +64,7 @@ fn usual_form() -> Form {
 fn merging() -> Vec<Row> {
     let usual = usual_form();
     let mut forms = vec![usual];
-    forms.extend(["none", "horizon", "cones"].map(|skip| Form { skip: skip.parse().unwrap(), ..usual }));
+    forms.extend(["none", "horizon", "cones", "caps"].map(|skip| Form { skip: skip.parse().unwrap(), ..usual }));
     // Seven bands take 33 s to optimise, six 5 s, four 0.6 s; see the ignored test.
     forms.extend((2..=6).map(|bands| Form { bands, field_bands: bands, ..usual }));
     for &variant in VARIANTS {

@@ -250,6 +250,58 @@ fn what_is_dropped_stays_within_its_bound() {
     }
 }
 
+/// A ball, a ring and a box that go away from a floor, turning, through the sizes at which their fields are left for caps: the light of
+/// every vertex goes on as smoothly as with fields alone, and stays near to it.
+#[test]
+fn nothing_pops_as_fields_become_caps() {
+    let Some(stage) = stage() else { return };
+    for shape in [
+        "sphere = { radius_m = 0.5, subdivisions = 2 }",
+        "torus = { major_m = 0.35, minor_m = 0.15, segments = 16, sides = 8 }",
+        "cuboid = { size_m = [0.7, 0.5, 0.4], cells = 1 }",
+    ] {
+        let scene = scene(&format!(
+            "environment = {{ gradient = {{ radiance = [1, 1, 1] }} }}\n[[mesh]]\nname = \"floor\"\nplane = {{ size_m = 1, cells = 7 }}\n\
+             [[mesh]]\nname = \"thing\"\n{shape}\n[[mesh]]\nname = \"bulb\"\nsphere = {{ radius_m = 0.5, subdivisions = 2 }}\n\
+             [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"thing\"\n[[entity]]\nmesh = \"bulb\"\nemission = [9, 9, 9]\n",
+        ));
+        // Fine enough that what a lookup is off by does not hide what caps change.
+        let bake = shadow_fields::bake::Options { face_px: 32, lattice: "cube:12x8".parse().unwrap(), ..small().bake };
+        let options = Options { bake, ..small() };
+        let mut caps = stage.frame(&scene, options);
+        let mut fields = stage.frame(&scene, Options { skip: Skip::without("caps"), ..options });
+        let (mut walk, mut apart, mut brightest) = (Vec::new(), 0.0_f32, 0.0);
+        let mut kinds = std::collections::BTreeSet::new();
+        for i in 0..100 {
+            let d = 1.0 + 0.03 * i as f32;
+            let turn = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 0.02 * i as f32);
+            let thing = Placement { rotation: turn, ..at(0.8 * d, 0.6 * d, 0.2) };
+            let placements = [at(0.0, 0.0, 0.0), thing, at(5.0, 4.0, 0.5)];
+            let by_caps = stage.light(&mut caps, &placements).swap_remove(0);
+            let by_fields = stage.light(&mut fields, &placements).swap_remove(0);
+            let (far, bright) = stage::difference(&by_caps, &by_fields);
+            (apart, brightest) = (apart.max(far), bright);
+            kinds.insert([caps.merged.merged_steps, caps.counts(&placements).caps as usize]);
+            walk.push([by_caps, by_fields]);
+        }
+        // What a step changes in how far the two are apart, less what the one before it did, of any vertex: a pop is as large as they
+        // are apart, what is smooth over the range of sizes a small part of it.
+        let apart_at = |step: &[Vec<[f32; 3]>; 2], v: usize| step[0][v][0] - step[1][v][0];
+        let kink = walk
+            .windows(3)
+            .flat_map(|w| (0..64).map(move |v| apart_at(&w[0], v) - 2.0 * apart_at(&w[1], v) + apart_at(&w[2], v)))
+            .fold(0.0_f32, |most, kink| most.max(kink.abs()));
+        report(&format!(
+            "{shape}: {:.4} of what is brightest apart, kink {:.5}, {kinds:?}",
+            apart / brightest,
+            kink / brightest
+        ));
+        assert!(kinds.len() > 2, "the walk goes from field to cap: {kinds:?}");
+        assert!(apart > 1e-5 && apart < 0.01 * brightest, "{shape}: {apart} of {brightest}");
+        assert!(kink < 0.3 * apart, "{shape}: {kink} of {apart}");
+    }
+}
+
 /// As an occluder passes eps nothing changes by more than it.
 #[test]
 fn nothing_pops_by_more_than_eps() {

@@ -97,9 +97,10 @@ pub struct MergeArguments {
     /// Samples that a lookup takes
     #[arg(long, default_value = "trilinear", value_name = "nearest|radial|trilinear")]
     pub lookup: Lookup,
-    /// Work to leave out: all, none, or a list of horizon, cones, behind, facing, empty, unseen, unmoved, hidden. Horizon and cones
-    /// leave out what true visibility makes zero, which is nearer to ray casting than the stored bands are: pictures differ a little
-    /// from those of none. The others change nothing that is shown: hidden leaves unlit what the camera cannot see while things move
+    /// Work to leave out: all, none, or a list of horizon, cones, behind, facing, empty, unseen, caps, unmoved, hidden. Horizon and
+    /// cones leave out what true visibility makes zero, which is nearer to ray casting than the stored bands are, and caps looks up
+    /// no field of an occluder that is small as seen from a vertex but takes it for a point: pictures differ a little from those
+    /// of none. The others change nothing that is shown: hidden leaves unlit what the camera cannot see while things move
     #[arg(long, default_value = "all", value_name = "all|none|LIST")]
     pub skip: Skip,
     /// Leave out light and shadow that is bounded below this share of white, a vertex and entity; 0 leaves none out

@@ -176,15 +176,9 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
             compare(what, Options { variant: Some(variant), bake, ..base })?;
         }
     }
-    for skip in [Skip::NONE, Skip::without("cones"), Skip::without("horizon")] {
-        let what = if skip == Skip::NONE {
-            "no skip"
-        } else if skip.horizon {
-            "skip horizon"
-        } else {
-            "skip cones"
-        };
-        compare(what.into(), Options { skip, ..base })?;
+    compare("no skip".into(), Options { skip: Skip::NONE, ..base })?;
+    for name in ["cones", "horizon", "caps"] {
+        compare(format!("without {name}"), Options { skip: Skip::without(name), ..base })?;
     }
     for &(name, product) in PRODUCTS {
         let chain = Chain { product, ..base.chain };

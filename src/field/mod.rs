@@ -1,5 +1,6 @@
 //! A baked field: where it is sampled ([`lattice`]), what is stored, and its file ([`mod@file`]).
 
+pub mod area;
 pub mod extent;
 pub mod file;
 pub mod fit;
@@ -8,6 +9,7 @@ pub mod lattice;
 pub mod log_space;
 pub mod quantity;
 
+pub use area::Area;
 pub use fit::Fit;
 pub use lattice::{Lattice, Lookup};
 pub use quantity::{Kind, Storage};

@@ -6,9 +6,9 @@ use super::lists::{Dirty, Member, Merged, State};
 use super::live::{Lit, Part};
 use super::store::{self, Slot};
 use crate::error::Result;
-use crate::field::Fit;
 use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
+use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
 use crate::render::gather::{Body, Bounds, Moment, Report};
 use crate::render::sight::{Faces, Sight};
@@ -142,6 +142,9 @@ impl Frame {
             let (slope, offset) = lattice.radial_map();
             [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32]
         });
+        let area = geometry.blocked.as_ref().map_or(Area::default(), |slot| slot.area);
+        let [area_x, area_y] = area.axes.map(|axis| (rotation * axis).as_vec3());
+        let terms = area.terms.map(|term| term as f32);
         let shift = slot.map_or(Fit::ROUND, |slot| slot.header.lattice.fit()).packed();
         layout::Entity {
             centre: centre.extend((1.0 / radius_m) as f32).to_array(),
@@ -151,6 +154,9 @@ impl Frame {
             shift,
             albedo: (entity.albedo.as_dvec3() / PI).as_vec3().extend(placement.scale).to_array(),
             radial,
+            area_x: area_x.extend(terms[0]).to_array(),
+            area_y: area_y.extend(terms[1]).to_array(),
+            area_terms: [terms[2], terms[3], terms[4], terms[5]],
             blocked_base: geometry.blocked.as_ref().map_or(0, base),
             radiance_base: geometry.radiance.as_ref().map_or(0, base),
         }

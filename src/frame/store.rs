@@ -9,7 +9,7 @@ use crate::bake::{self, Baker, Report};
 use crate::error::Result;
 use crate::field::extent::{Extent, extent};
 use crate::field::quantity::{Kind, Storage, channel_stride};
-use crate::field::{Header, ShadowField};
+use crate::field::{Area, Header, ShadowField};
 use crate::gpu::{Buffer, BufferKind, Volume};
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::render::draw::Drawable;
@@ -38,6 +38,8 @@ pub struct Slot {
     pub channel: u32,
     /// Directions in which it is not zero.
     pub extent: Extent,
+    /// What its object covers from afar, if it is an occlusion field.
+    pub area: Area,
 }
 
 impl Slot {
@@ -154,7 +156,7 @@ impl Store {
                         (bytes, channels - kind.channels() as u32)
                     };
                     let (bytes, channel) = places.entry(field_name(&header)).or_insert_with(new).clone();
-                    Slot { header, bytes, channel, extent: Extent::All }
+                    Slot { header, bytes, channel, extent: Extent::All, area: Area::default() }
                 })
             }));
         }
@@ -168,15 +170,15 @@ impl Store {
             total.max(ALIGNMENT) + if options.field_bands.is_some() { overrun } else { 0 },
         )?;
         let mut baked = Vec::new();
-        let mut ready = HashMap::<u64, (Header, Extent)>::new();
+        let mut ready = HashMap::<u64, (Header, Extent, Area)>::new();
         for (mesh, slot) in slots
             .iter_mut()
             .zip(&scene.meshes)
             .flat_map(|(pair, mesh)| pair.iter_mut().flatten().map(move |slot| (mesh, slot)))
         {
-            if let Some((header, extent)) = ready.get(&slot.bytes.start) {
+            if let Some((header, extent, area)) = ready.get(&slot.bytes.start) {
                 slot.header = Header { mesh: slot.header.mesh.clone(), ..header.clone() };
-                slot.extent = *extent;
+                (slot.extent, slot.area) = (*extent, *area);
                 continue;
             }
             let what = format!("{} {}", mesh.name, if slot.header.kind == Kind::Radiance { "light" } else { "shadow" });
@@ -185,8 +187,12 @@ impl Store {
             if let Some(report) = cache.field(baker, mesh, &mut slot.header, target, &done)? {
                 baked.push(Baked { what, report });
             }
-            slot.extent = extent(&download(&fields, slot)?);
-            ready.insert(slot.bytes.start, (slot.header.clone(), slot.extent));
+            let field = download(&fields, slot)?;
+            slot.extent = extent(&field);
+            if slot.header.kind == Kind::Occlusion {
+                slot.area = Area::new(&field);
+            }
+            ready.insert(slot.bytes.start, (slot.header.clone(), slot.extent, slot.area));
         }
 
         // All at once: growing by halves would hold up to three times as much.

@@ -4,8 +4,8 @@ use super::lists::State;
 use super::store::Geometry;
 use super::{Frame, store};
 use crate::error::Result;
-use crate::field::ShadowField;
 use crate::field::log_space::{logarithms, widened};
+use crate::field::{Area, ShadowField};
 use crate::layout::{CLUSTER_VERTICES, STEP_ENTITIES, Step};
 use crate::render::chain::Method;
 use crate::render::gather::{self, Chains, Counts};
@@ -144,6 +144,7 @@ impl Twin<'_> {
                 albedo_over_pi: (entity.albedo.as_dvec3() / PI).to_array(),
                 emission: entity.emission.as_dvec3().to_array(),
                 blocked: blocked.as_ref(),
+                area: store.geometries[entity.mesh].blocked.as_ref().map_or(Area::default(), |slot| slot.area),
                 logarithm: self.logarithms[entity.mesh].as_ref(),
                 radiance: radiance.as_ref().filter(|_| entity.emits),
             }

@@ -122,6 +122,21 @@ impl Multiplier {
         }
     }
 
+    /// Takes away the chain's value in the direction whose basis is `y`, over a solid angle: `chain_cover`.
+    pub fn cover(&self, state: &mut State, y: &[f64], solid_angle: f64) {
+        let value = self.meet(state, y);
+        let [first, _] = self.parts(state);
+        let taken = (solid_angle * value.max(0.0)).min(first.max(0.0) / Y00);
+        match &self.points {
+            None => state.iter_mut().zip(&y[..self.count()]).for_each(|(t, y)| *t -= taken * y),
+            Some(points) => {
+                for (value, (basis, weight)) in state.iter_mut().zip(points) {
+                    *value -= taken * weight * dot(basis, &y[..self.count()]);
+                }
+            }
+        }
+    }
+
     /// Coefficient 0, and the square of the length of the others.
     fn parts(&self, state: &State) -> [f64; 2] {
         match &self.points {
@@ -161,4 +176,41 @@ impl Multiplier {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::reference::Cone;
+    use crate::render::variant::{CAP_SINES, PRODUCTS};
+    use crate::sh::lobe::clamped_cosine;
+    use glam::DVec3;
+    use std::f64::consts::PI;
+
+    /// Caps about one place and caps all over the view, as large as there are: no chain becomes longer, its light neither grows nor
+    /// becomes less than none.
+    #[test]
+    fn caps_never_brighten() {
+        let mut rng = fastrand::Rng::with_seed(9);
+        for (name, product) in PRODUCTS {
+            let multiplier = Multiplier::new(Chain { product: *product, guard: true }, 4, 4);
+            for spread in [0.0, 0.2, 3.0] {
+                let mut state = multiplier.begin(&clamped_cosine(4, DVec3::Y));
+                let [mut first, mut rest] = multiplier.parts(&state);
+                for _ in 0..1000 {
+                    let mut aside = || spread * (rng.f64() - 0.5);
+                    let toward = DVec3::new(0.3 + aside(), 1.0 + aside(), aside()).normalize();
+                    let cone = Cone::new(toward / CAP_SINES[1], 1.0, DVec3::ZERO);
+                    cone.cap(1.0).cover(&multiplier, &mut state);
+                    let [now, others] = multiplier.parts(&state);
+                    let lengths = [first * first + rest, now * now + others];
+                    assert!(now <= first + 1e-14 && now >= -1e-14, "{name}, {spread}: {first} to {now}");
+                    assert!(lengths[1] <= lengths[0] * (1.0 + 1e-12), "{name}, {spread}: {lengths:?}");
+                    (first, rest) = (now, others);
+                }
+                let left = first / (PI.sqrt() / 2.0);
+                assert!(if spread < 1.0 { left > 0.5 && left < 0.95 } else { left < 0.2 }, "{name}, {spread}: {left}");
+            }
+        }
+    }
 }

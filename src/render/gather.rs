@@ -11,7 +11,7 @@
 
 pub use super::moment::{Body, Bounds, Counts, Lamp, Moment, distance_key};
 pub use super::scope::Scope;
-use super::scope::{BELOW, Fate, GROUP_SLACK, SLACK, SLACK_RAD, View, fade, fade_sine};
+use super::scope::{BELOW, Fate, GROUP_SLACK, SLACK, SLACK_RAD, View, cap_sines, fade, fade_sine};
 use super::tree::Crowd;
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
@@ -115,6 +115,7 @@ pub fn counts(moment: &Moment, receiver: u32, entity: &layout::Entity, bounds: &
         counts.considered += lookups;
         match fate {
             Fate::Listed => {}
+            Fate::Cap => counts.caps += lookups,
             Fate::BelowHorizon => counts.below_horizon += lookups,
             Fate::BehindLight => counts.behind_light += lookups,
             Fate::Apart => counts.apart += lookups,
@@ -143,10 +144,15 @@ fn walk(moment: &Moment, scope: &Scope<'_>, chains: &Chains, out: &mut Vec<u32>,
         }
         let radiance = lamp.map_or(moment.sky.unwrap_or(0.0), |lamp| lamp.radiance);
         for &j in occluders {
-            let fate = scope.occluder_fate(&scope.view(moment.spheres[j as usize]), light.as_ref(), radiance);
-            tell(fate, 1);
-            if fate == Fate::Listed {
-                out.push(Step::Occlude { entity: j, light: lamp.map(|lamp| lamp.entity) }.pack());
+            let view = scope.view(moment.spheres[j as usize]);
+            let fate = scope.occluder_fate(&view, light.as_ref(), radiance);
+            tell(if fate == Fate::Listed && !view.whole { Fate::Cap } else { fate }, 1);
+            let (entity, light) = (j, lamp.map(|lamp| lamp.entity));
+            if fate == Fate::Listed && view.whole {
+                out.push(Step::Occlude { entity, light }.pack());
+            }
+            if fate == Fate::Listed && view.cap {
+                out.push(Step::Cap { entity, light }.pack());
             }
         }
         if let Some(lamp) = lamp {
@@ -236,7 +242,7 @@ impl Packed {
             quads.extend([lamp.facing, numbers]);
         }
         let skip = moment.skip;
-        let switches = [skip.horizon, skip.cones, skip.behind, skip.facing];
+        let switches = [skip.horizon, skip.cones, skip.behind, skip.facing, skip.caps];
         Packed {
             push: Push {
                 occluder_count: members.len() as u32,
@@ -257,7 +263,8 @@ impl Packed {
     /// Steps of the longest list that there can be.
     pub fn longest(&self) -> u64 {
         let Push { occluder_count, lamp_count, sky, .. } = self.push;
-        let (occluders, lamps) = (u64::from(occluder_count), u64::from(lamp_count));
+        // Each by its field and as a cap.
+        let (occluders, lamps) = (2 * u64::from(occluder_count), u64::from(lamp_count));
         lamps * (occluders + 3) + if sky >= 0.0 { occluders } else { 0 }
     }
 }
@@ -329,6 +336,8 @@ impl Gather {
             .number("FADE_SINE_SLACK", fade().sine.into())
             .number("FADE_COSINE_SLACK", fade().cosine.into())
             .number("SLACK_ANGLE", SLACK_RAD)
+            .number("CAP_SINE_LEAST", cap_sines()[0].into())
+            .number("CAP_SINE_MOST", cap_sines()[1].into())
             .number("BELOW", BELOW.into())
             .number("SLACK", SLACK.into())
             .number("GROUP_SLACK", GROUP_SLACK.into())

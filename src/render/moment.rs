@@ -182,6 +182,8 @@ pub struct Counts {
     pub facing_away: u64,
     /// Lights and occluders bounded below eps.
     pub below_eps: u64,
+    /// Occluders that stand on the list as a cap alone.
+    pub caps: u64,
     /// Entities that cast shadows or shine by a field of nothing but zeros, and are left off everywhere.
     pub empty: u64,
     /// Entities that cast shadows or shine where nothing but themselves is lit: their fields are not even baked.
@@ -202,6 +204,7 @@ impl std::ops::AddAssign for Counts {
         self.apart += other.apart;
         self.facing_away += other.facing_away;
         self.below_eps += other.below_eps;
+        self.caps += other.caps;
         self.empty += other.empty;
         self.unseen += other.unseen;
         self.hidden += other.hidden;

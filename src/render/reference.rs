@@ -1,13 +1,14 @@
 //! The CPU twin of "merge", in f64 and vertex by vertex, from the same stored numbers.
 
-use super::chain::{Method, Multiplier};
-use super::variant::{SKIP_FADE_RAD, Skip};
-use crate::field::{Lookup, ShadowField};
-use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count};
+use super::chain::{Method, Multiplier, State};
+use super::variant::{CAP_SINES, CAP_SPREAD, SKIP_FADE_RAD, Skip};
+use crate::field::{Area, Lookup, ShadowField};
+use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
+use std::f64::consts::PI;
 
 /// One object, as the merge sees it.
 pub struct Object<'f> {
@@ -27,6 +28,8 @@ pub struct Object<'f> {
     pub blocked: Option<&'f ShadowField>,
     /// The same field's logarithms (see [`crate::field::log_space`]), where factors come in as such.
     pub logarithm: Option<&'f ShadowField>,
+    /// What it covers from afar.
+    pub area: Area,
     /// Radiance field, if its light varies over the surface.
     pub radiance: Option<&'f ShadowField>,
 }
@@ -87,19 +90,29 @@ impl Task<'_> {
 
         let normal = receiver.rotation * self.normals[v];
         let cones: Vec<Cone> = self.objects.iter().map(|o| Cone::new(o.centre, o.radius_m, position)).collect();
-        let factors: Vec<(usize, Coefficients)> = self
+        let factors: Vec<(usize, f64, Coefficients, Option<Cap>)> = self
             .occluders
             .iter()
             .map(|&j| {
-                let reach = cones[j].above_horizon(normal, self.skip);
-                (j, self.factor(j, position, rotations).map(|b| b * reach))
+                // A logarithm of a cap there is not: in log space all factors are looked up.
+                let caps = self.skip.caps && self.method != Method::Logarithms;
+                let share = cones[j].field_share(Skip { caps, ..self.skip });
+                let blocked = self.factor(j, position, rotations).map(|b| b * share);
+                let object = &self.objects[j];
+                let area = || object.area.at(object.rotation.inverse() * cones[j].toward);
+                let cap = (share < 1.0).then(|| cones[j].cap(area()).by(1.0 - share));
+                (j, cones[j].above_horizon(normal, self.skip), blocked, cap)
             })
             .collect();
         // The chain of the occluders, each as much as `share` says.
         let chain = |share: &dyn Fn(usize) -> f64| {
             let mut state = multiplier.begin(&transfer[..count]);
-            for (j, b) in &factors {
-                multiplier.multiply(&mut state, &b.map(|b| b * share(*j)));
+            for (j, reach, b, cap) in &factors {
+                let share = reach * share(*j);
+                multiplier.multiply(&mut state, &b.map(|b| b * share));
+                if let Some(cap) = cap {
+                    cap.by(share).cover(multiplier, &mut state);
+                }
             }
             multiplier.finish(&mut state);
             state
@@ -202,6 +215,31 @@ impl Cone {
         if skip.horizon { smoothstep(-sine - SKIP_FADE_RAD.sin(), -sine, normal.dot(self.toward)) } else { 1.0 }
     }
 
+    /// Share of an occluder's field; the rest of it is a [`Cap`].
+    pub fn field_share(&self, skip: Skip) -> f64 {
+        let sine = self.half_angle_rad.map_or(1.0, f64::sin);
+        if skip.caps { smoothstep(CAP_SINES[0], CAP_SINES[1], sine) } else { 1.0 }
+    }
+
+    /// An occluder as a cap of this solid angle, sr.
+    pub fn cap_of(&self, solid_angle: f64) -> Cap {
+        let (sine, cosine) = self.half_angle_rad.map_or((1.0, 0.0), f64::sin_cos);
+        self.cap(solid_angle * (1.0 + cosine) / (2.0 * PI * sine * sine))
+    }
+
+    /// An occluder as a cap whose projected area is this share of its sphere's.
+    pub fn cap(&self, area: f64) -> Cap {
+        let (sine, cosine) = self.half_angle_rad.map_or((1.0, 0.0), f64::sin_cos);
+        let covered = area * sine * sine;
+        let mut y = [0.0; MAX_COEFFICIENTS];
+        evaluate(MAX_BANDS, self.toward, &mut y);
+        for l in 1..MAX_BANDS {
+            let band = (1.0 - (l * (l + 1)) as f64 * CAP_SPREAD * covered / 4.0).max(0.0);
+            y[l * l..(l + 1) * (l + 1)].iter_mut().for_each(|y| *y *= band);
+        }
+        Cap { solid_angle: 2.0 * PI * covered / (1.0 + cosine), y }
+    }
+
     /// Share with which an occluder counts before a light: 1 where their spheres overlap, fading to 0 beside each other.
     pub fn overlap(&self, other: &Cone, skip: Skip) -> f64 {
         match (self.half_angle_rad, other.half_angle_rad) {
@@ -210,6 +248,27 @@ impl Cone {
             }
             _ => 1.0,
         }
+    }
+}
+
+/// An occluder as a point that blocks: the twin of `glsl/merge_cap.glsl`.
+#[derive(Clone, Copy, Debug)]
+pub struct Cap {
+    /// What it takes away, sr.
+    pub solid_angle: f64,
+    /// The basis in its direction, each band less for its extent.
+    y: Coefficients,
+}
+
+impl Cap {
+    /// A share of it.
+    pub fn by(self, share: f64) -> Self {
+        Cap { solid_angle: self.solid_angle * share, ..self }
+    }
+
+    /// Takes it out of a chain.
+    pub fn cover(&self, multiplier: &Multiplier, state: &mut State) {
+        multiplier.cover(state, &self.y, self.solid_angle);
     }
 }
 

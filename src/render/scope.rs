@@ -5,7 +5,7 @@
 use super::moment::{Body, Bounds, Lamp, Moment};
 use super::repeatable::{Angle, dot, inverse, inverse_root};
 use super::tree::Crowd;
-use super::variant::SKIP_FADE_RAD;
+use super::variant::{CAP_SINES, SKIP_FADE_RAD};
 use crate::layout;
 
 /// Slack on angles, for the rounding of cosines near 0 and pi and of the merge's own.
@@ -22,6 +22,11 @@ pub const BELOW: f32 = -1.0 - SLACK_RAD as f32;
 pub fn fade_sine() -> f32 {
     SKIP_FADE_RAD.sin() as f32
 }
+/// What a radius is compared with per distance, for whether a vertex may see a sphere so large that its field is looked up, and so
+/// small that it is a cap.
+pub fn cap_sines() -> [f32; 2] {
+    [(CAP_SINES[0] * (1.0 - 1e-4)) as f32, (CAP_SINES[1] * (1.0 + 1e-4)) as f32]
+}
 /// Fade and slack together.
 pub fn fade() -> Angle {
     let angle = SKIP_FADE_RAD + SLACK_RAD;
@@ -33,6 +38,8 @@ pub fn fade() -> Angle {
 pub enum Fate {
     /// It stands on the list.
     Listed,
+    /// It stands there as a cap alone.
+    Cap,
     /// No vertex sees it above its horizon.
     BelowHorizon,
     /// It is farther than the light from every vertex.
@@ -56,6 +63,10 @@ pub struct View {
     turn: Angle,
     below: bool,
     weight: f32,
+    /// Whether a vertex may see it too large for a cap.
+    pub whole: bool,
+    /// Whether a vertex may see it small enough for one.
+    pub cap: bool,
 }
 
 /// Share of the irradiance under a uniform sky that a small cap takes whose nearest point to the normal stands at this cosine,
@@ -127,13 +138,18 @@ impl<'m> Scope<'m> {
         let threshold = radius + fade_sine() * (distance + self.radius);
         let below = self.moment.skip.horizon && highest < threshold * BELOW;
         let nearest = distance - self.radius;
+        let [least, most] = cap_sines();
+        let caps = self.moment.skip.caps;
+        let (whole, cap) = (!caps || radius > least * nearest, caps && radius < most * (distance + self.radius));
+        let inside =
+            View { to, inverse: inverse_distance, distance, spread: None, turn, below, weight: EVERYTHING, whole, cap };
         if nearest <= radius.max(1e-15) {
-            return View { to, inverse: inverse_distance, distance, spread: None, turn, below, weight: EVERYTHING };
+            return inside;
         }
         let half = Angle::of_sine((radius * inverse(nearest)).min(1.0));
         let spread = half.plus(turn);
         let weight = weight(half, toward.cosine_less(self.spread.plus(spread)));
-        View { to, inverse: inverse_distance, distance, spread: Some(spread), turn, below, weight }
+        View { spread: Some(spread), weight, ..inside }
     }
 
     /// What becomes of a light.

@@ -107,7 +107,8 @@ pub struct Form {
 }
 
 /// Work that a frame leaves out. `horizon` and `cones` follow from true visibility, which makes it zero; the band-limited
-/// product is not zero there, so each fades out over [`SKIP_FADE_RAD`] beyond its threshold. The others change no number.
+/// product is not zero there, so each fades out over [`SKIP_FADE_RAD`] beyond its threshold. `caps` takes what is small as seen from
+/// a vertex for a point ([`CAP_SINES`]). The others change no number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 pub struct Skip {
     /// Lights and occluders whose bounding spheres lie below the horizon of the receiving surface.
@@ -122,6 +123,9 @@ pub struct Skip {
     pub empty: bool,
     /// Entities that nothing but themselves is lit by: their fields are not baked.
     pub unseen: bool,
+    /// The fields of occluders that are small as seen from a vertex: what they block is taken at one direction, with the solid
+    /// angle that a fit of the field's outermost shell has for it ([`crate::field::Area`]).
+    pub caps: bool,
     /// Clusters of vertices for which nothing has changed since they were last merged.
     pub unmoved: bool,
     /// Clusters of vertices that the camera cannot see, while things move, in pictures; and drawing what it cannot see.
@@ -137,6 +141,7 @@ impl Skip {
         facing: true,
         empty: true,
         unseen: true,
+        caps: true,
         unmoved: true,
         hidden: true,
     };
@@ -148,11 +153,13 @@ impl Skip {
         facing: false,
         empty: false,
         unseen: false,
+        caps: false,
         unmoved: false,
         hidden: false,
     };
     /// Names on the command line.
-    pub const NAMES: [&str; 8] = ["horizon", "cones", "behind", "facing", "empty", "unseen", "unmoved", "hidden"];
+    pub const NAMES: [&str; 9] =
+        ["horizon", "cones", "behind", "facing", "empty", "unseen", "caps", "unmoved", "hidden"];
 
     /// The switch of that name.
     pub fn switch(&mut self, name: &str) -> Option<&mut bool> {
@@ -163,6 +170,7 @@ impl Skip {
             "facing" => &mut self.facing,
             "empty" => &mut self.empty,
             "unseen" => &mut self.unseen,
+            "caps" => &mut self.caps,
             "unmoved" => &mut self.unmoved,
             "hidden" => &mut self.hidden,
             _ => return None,
@@ -204,6 +212,14 @@ pub const EPS: f32 = 1e-3;
 
 /// Angle over which a skip fades out: 10 degrees.
 pub const SKIP_FADE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
+
+/// Sines of the half-angle of an occluder's bounding sphere: it is looked up in its field from the second on, a cap up to the
+/// first, and both by shares between.
+pub const CAP_SINES: [f64; 2] = [0.21, 0.27];
+
+/// Mean square distance from the middle of what an occluder covers, per solid angle and pi: .5 for a disc, .52 for a cube, .69 and
+/// .67 for torus and teapot.
+pub const CAP_SPREAD: f64 = 0.58;
 
 /// How a factor is multiplied into a chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
@@ -339,6 +355,10 @@ impl Form {
             .define("SKIP_HORIZON", self.skip.horizon)
             .define("SKIP_CONES", self.skip.cones)
             .number("FADE", SKIP_FADE_RAD)
+            .define("CAPS", self.skip.caps)
+            .number("CAP_SINE_LEAST", CAP_SINES[0])
+            .number("CAP_SINE_MOST", CAP_SINES[1])
+            .number("CAP_SPREAD", CAP_SPREAD)
             .define(
                 "LOOKUP",
                 match self.lookup {

@@ -6,9 +6,9 @@ use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
 use super::world::{Sight, View, World};
 use crate::render::chain::Multiplier;
 use crate::render::gather::distance_key;
-use crate::render::reference::Cone;
+use crate::render::reference::{Cap, Cone};
 use crate::render::variant::{Chain, Skip};
-use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
+use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -63,20 +63,26 @@ impl Exact {
         let mut occluders = world.occluders(&view);
         // The merge's order: ties of its f32 key go by index here too.
         occluders.sort_by_key(|sight| (distance_key(centre(sight.entity), centre(vertex.entity)), sight.entity));
-        let factors: Vec<(Sight, Coefficients)> = occluders
+        let factors: Vec<(Sight, f64, Coefficients, Option<Cap>)> = occluders
             .into_iter()
             .map(|occluder| {
-                let share = cone(&occluder).above_horizon(view.normal, self.skip);
+                let cone = cone(&occluder);
+                let share = cone.field_share(self.skip);
                 let blocked = self.blocked(world, &occluder, points(1 + occluder.entity));
-                (occluder, blocked.map(|b| b * share))
+                // Of as much area as the blocked part says, and not a fit of it.
+                let cap = (share < 1.0).then(|| cone.cap_of(blocked[0] / Y00).by(1.0 - share));
+                (occluder, cone.above_horizon(view.normal, self.skip), blocked.map(|b| b * share), cap)
             })
             .collect();
         // The chain of the occluders, each as much as `share` says.
         let chain = |share: &dyn Fn(&Sight) -> f64| {
             let mut state = multiplier.begin(&transfer[..count]);
-            for (occluder, blocked) in &factors {
-                let share = share(occluder);
+            for (occluder, reach, blocked, cap) in &factors {
+                let share = reach * share(occluder);
                 multiplier.multiply(&mut state, &blocked.map(|b| b * share));
+                if let Some(cap) = cap {
+                    cap.by(share).cover(multiplier, &mut state);
+                }
             }
             multiplier.finish(&mut state);
             state

@@ -1,0 +1,35 @@
+// Occluders that a vertex sees small block about a point: the chain's value in their direction, over the solid angle that their
+// projected area (src/field/area.rs) has from there. From CAP_SINE_LEAST to CAP_SINE_MOST, sines of the bounding sphere's half-angle,
+// the field takes over by shares, so that nothing pops.
+
+// Share of the field; the rest is the cap's.
+float field_share(Cone cone) {
+#if CAPS
+    return smoothstep(CAP_SINE_LEAST, CAP_SINE_MOST, cone.sine);
+#else
+    return 1.0;
+#endif
+}
+
+#if CAPS
+// The cap: solid angle and, in the world, the basis in its direction. Cut to a few bands a disc of mean square radius q (radians)
+// has 1 - l (l + 1) q / 4 of what a point has in band l.
+float cap_of(Entity entity, Cone cone, out float y[COEFFICIENTS]) {
+    float u = dot(entity.area_x.xyz, cone.toward);
+    float v = dot(entity.area_y.xyz, cone.toward);
+    u *= u;
+    v *= v;
+    vec4 terms = entity.area_terms;
+    float area = entity.area_x.w + u * (entity.area_y.w + terms.y * u + terms.w * v) + v * (terms.x + terms.z * v);
+    float square = cone.sine * cone.sine;
+    float covered = max(area, 0.0) * square;
+    sh_basis(cone.toward, y);
+    float quarter = 0.25 * CAP_SPREAD * covered;
+    // One loop, not one in another, which Mesa does not unroll.
+    [[unroll]] for (uint k = 1; k < COEFFICIENTS; k++) {
+        uint l = uint(sqrt(float(k) + 0.5));
+        y[k] *= max(1.0 - float(l * (l + 1)) * quarter, 0.0);
+    }
+    return 6.28318531 * covered / (1.0 + cone.cosine);
+}
+#endif

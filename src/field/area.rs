@@ -1,0 +1,138 @@
+//! How much of the view an object covers from afar, by direction: its projected area as a polynomial, fitted to the outermost
+//! shell of its field, so that what is computed from the one agrees there with what is looked up in the other.
+
+use super::lattice::cap_height;
+use super::{Lookup, ShadowField};
+use crate::sh::basis::{MAX_COEFFICIENTS, Y00};
+use crate::sh::quadrature::sphere_rule;
+use glam::{DMat3, DVec3};
+use std::f64::consts::PI;
+
+const TERMS: usize = 6;
+
+/// Projected area as a share of the bounding sphere's, for a direction d to or from the object: a polynomial in the squares of
+/// d's cosines with two of three axes. It is the same from opposite sides, as an area is, and with mirror images at the three axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Area {
+    /// Unit, object's frame.
+    pub axes: [DVec3; 2],
+    /// Factors of 1, u, v, u u, v v, u v.
+    pub terms: [f64; TERMS],
+    /// Largest deviation from the outermost shell, as a share of the bounding sphere.
+    pub deviation: f64,
+}
+
+impl Area {
+    /// The area that an occlusion field tells of.
+    pub fn new(field: &ShadowField) -> Self {
+        let outer = field.header.lattice.outer;
+        let mut found = [0.0; MAX_COEFFICIENTS];
+        let samples: Vec<(DVec3, f64, f64)> = sphere_rule(12)
+            .into_iter()
+            .map(|(direction, weight)| {
+                field.lookup(outer * direction, Lookup::Trilinear, 0, &mut found);
+                (direction, weight, found[0] / (Y00 * 2.0 * PI * cap_height(outer)))
+            })
+            .collect();
+        Self::fit(&samples)
+    }
+
+    /// The best fit to samples: direction, weight, area.
+    fn fit(samples: &[(DVec3, f64, f64)]) -> Self {
+        let outer = |d: DVec3| DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+        let moment = samples.iter().fold(DMat3::ZERO, |sum, &(d, weight, area)| sum + outer(d) * (weight * area));
+        let axes = principal_axes(moment);
+        let mut area = Area { axes: [axes.x_axis, axes.y_axis], ..Area::default() };
+        // Normal equations, the right side as a seventh column.
+        let mut rows = [[0.0; TERMS + 1]; TERMS];
+        for &(d, weight, value) in samples {
+            let basis = area.basis(d);
+            for (row, b) in rows.iter_mut().zip(basis) {
+                row[..TERMS].iter_mut().zip(basis).for_each(|(sum, c)| *sum += weight * b * c);
+                row[TERMS] += weight * b * value;
+            }
+        }
+        area.terms = solve(rows);
+        area.deviation = samples.iter().map(|&(d, _, value)| (area.at(d) - value).abs()).fold(0.0, f64::max);
+        area
+    }
+
+    /// The area for a direction (unit, object's frame).
+    pub fn at(&self, direction: DVec3) -> f64 {
+        let basis = self.basis(direction);
+        self.terms.iter().zip(basis).map(|(term, b)| term * b).sum::<f64>().max(0.0)
+    }
+
+    fn basis(&self, direction: DVec3) -> [f64; TERMS] {
+        let [u, v] = self.axes.map(|axis| axis.dot(direction).powi(2));
+        [1.0, u, v, u * u, v * v, u * v]
+    }
+}
+
+/// Eigenvectors of a symmetric matrix by Jacobi's rotations. Where values are nearly the same any will do, and the frame's own axes
+/// are taken: what is made in it tends to be mirrored there.
+fn principal_axes(mut matrix: DMat3) -> DMat3 {
+    let mut axes = DMat3::IDENTITY;
+    let least = 1e-3 * (matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z);
+    for _ in 0..16 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            let off = matrix.col(p)[q];
+            if off.abs() <= least {
+                continue;
+            }
+            let angle = 0.5 * (2.0 * off).atan2(matrix.col(p)[p] - matrix.col(q)[q]);
+            let (sin, cos) = angle.sin_cos();
+            let mut turn = DMat3::IDENTITY;
+            (turn.col_mut(p)[p], turn.col_mut(p)[q]) = (cos, sin);
+            (turn.col_mut(q)[p], turn.col_mut(q)[q]) = (-sin, cos);
+            matrix = turn.transpose() * matrix * turn;
+            axes *= turn;
+        }
+    }
+    axes
+}
+
+/// Gauss's elimination of a positive definite system.
+fn solve(mut rows: [[f64; TERMS + 1]; TERMS]) -> [f64; TERMS] {
+    for pivot in 0..TERMS {
+        let scale = rows[pivot][pivot].recip();
+        rows[pivot].iter_mut().for_each(|x| *x *= scale);
+        let of = rows[pivot];
+        for (_, row) in rows.iter_mut().enumerate().filter(|(other, _)| *other != pivot) {
+            let factor = row[pivot];
+            row.iter_mut().zip(of).for_each(|(x, p)| *x -= factor * p);
+        }
+    }
+    rows.map(|row| row[TERMS])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DQuat;
+
+    fn fitted(of: impl Fn(DVec3) -> f64) -> Area {
+        Area::fit(&sphere_rule(12).into_iter().map(|(d, weight)| (d, weight, of(d))).collect::<Vec<_>>())
+    }
+
+    /// Sphere, ellipsoid, plate, cube: as they are and turned.
+    #[test]
+    fn areas_of_plain_shapes() {
+        let turn = DQuat::from_axis_angle(DVec3::new(0.36, 0.48, 0.8), 0.9);
+        let cube = |d: DVec3| d.abs().element_sum() / 3_f64.sqrt();
+        type Shape<'s> = (&'s str, &'s dyn Fn(DVec3) -> f64, f64);
+        let shapes: [Shape<'_>; 5] = [
+            ("sphere", &|_| 0.7, 1e-12),
+            ("ellipsoid", &|d| (d * DVec3::new(1.0, 0.5, 0.7)).length(), 0.02),
+            ("turned ellipsoid", &|d| ((turn * d) * DVec3::new(1.0, 0.5, 0.7)).length(), 0.02),
+            ("turned plate", &|d| (turn * d).y.abs(), 0.12),
+            ("cube", &|d| cube(d), 0.11),
+        ];
+        for (name, of, most) in shapes {
+            let area = fitted(of);
+            assert!(area.deviation <= most, "{name}: {}", area.deviation);
+            let d = DVec3::new(0.2, -0.7, 0.4).normalize();
+            assert!((area.at(d) - of(d)).abs() <= 1.5 * most && area.at(d) == area.at(-d), "{name}");
+        }
+    }
+}

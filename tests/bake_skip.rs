@@ -9,12 +9,14 @@ use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::capture::unit_positions;
 use shadow_fields::bake::inside::nearest_on_triangle;
 use shadow_fields::bake::partial::Partial;
-use shadow_fields::bake::{self, Baker, simplify};
-use shadow_fields::field::{Header, Kind, Storage};
+use shadow_fields::bake::{self, Baker, capture, simplify};
+use shadow_fields::field::{Header, Kind, Lookup, ShadowField, Storage};
 use shadow_fields::frame::store::Store;
 use shadow_fields::gpu::{Buffer, BufferKind};
 use shadow_fields::render::variant::Skip;
 use shadow_fields::scene::Scene;
+use shadow_fields::sh::basis::Y00;
+use shadow_fields::sh::cube;
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -201,4 +203,47 @@ fn faces_and_backs_that_are_left_out_change_nothing() {
     report(&format!("{} of {} faces drawn", some.0, all.0));
     assert!(all.0 == 6 * all.1 && some.1 == all.1 && 4 * some.0 < 3 * all.0);
     assert!(some.2 == all.2, "the same to the bit");
+}
+
+/// Just off a solid's surface a lookup lies between samples outside and inside. Those captured off the nearest surface leave it near
+/// what is seen there; those captured where they stand see all dark, and darken it.
+#[test]
+fn samples_inside_a_solid_are_captured_off_its_surface() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::torus(1.0, 0.3, 48, 24);
+    let positions = unit_positions(&mesh);
+    let bake = |inside: bool| {
+        let mut baker = Baker::new(&gpu.device, &gpu.library);
+        (baker.inside, baker.orbit) = (inside, false);
+        let mut header = header(&mesh, "cube:12x8");
+        let store = Buffer::new(&gpu.device, "field", BufferKind::Device, header.payload_bytes()).unwrap();
+        let found = baker.field(&mesh, &mut header, (&store, 0), &|_, _| ()).unwrap();
+        let payload = store.download_range(0..header.payload_bytes()).unwrap();
+        (found.filled, ShadowField { header, payload })
+    };
+    let ((some, with), (none, without)) = (bake(true), bake(false));
+    assert!(some > 100 && none == 0, "{some} and {none} samples inside");
+    let weights = cube::solid_angle(16);
+    let (mut errors, mut count) = ([0.0; 2], 0.0);
+    for turn in 0..12 {
+        // Off the tube by a tenth of its radius, all round it.
+        let (around, along) = (0.5 * f64::from(turn), 2.1 * f64::from(turn));
+        let radius = 1.0 + 0.33 * around.cos();
+        let p = DVec3::new(radius * along.cos(), 0.33 * around.sin(), radius * along.sin()) / 1.3;
+        let mut seen = 0.0;
+        for face in 0..6 {
+            let covered = capture::reference(&positions, &mesh.triangles, p, face, 16);
+            let texels = covered.iter().enumerate().filter(|(_, covered)| **covered);
+            seen += texels.map(|(i, _)| weights[i]).sum::<f64>() * Y00;
+        }
+        for (error, field) in errors.iter_mut().zip([&with, &without]) {
+            let mut found = [0.0; 16];
+            field.lookup(p, Lookup::Trilinear, 0, &mut found);
+            *error += (found[0] - seen).powi(2);
+        }
+        count += 1.0;
+    }
+    let [with, without] = errors.map(|sum| (sum / count).sqrt());
+    report(&format!("{some} samples inside; off by {with:.3}, where they stand {without:.3}"));
+    assert!(2.0 * with < without, "{with} and {without}");
 }

@@ -36,7 +36,7 @@ fn a_round_of_a_loop_is_counted() {
 }
 
 fn json(folder: &Path, arguments: &[&str]) -> serde_json::Value {
-    let ran = good(folder, &[&["profile", "--runs", "2", "--json", "--validation", "sync"], arguments].concat());
+    let ran = good(folder, &[&["profile", "--json", "--validation", "sync"], arguments].concat());
     serde_json::from_str(&ran.stdout).unwrap()
 }
 
@@ -53,8 +53,21 @@ fn two_variants_side_by_side() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let more =
-        ["--grid", "65536", "--occluders", "2", "--compare", "texel", "storage", "--out", "out", "--spirv", "spirv"];
+    let more = [
+        "--runs",
+        "2",
+        "--grid",
+        "65536",
+        "--occluders",
+        "2",
+        "--compare",
+        "texel",
+        "storage",
+        "--out",
+        "out",
+        "--spirv",
+        "spirv",
+    ];
     let document = json(folder.path(), &more);
     positive(
         &document["ceilings"],
@@ -104,7 +117,8 @@ fn a_scene_is_timed_pass_by_pass() {
         return;
     }
     let folder = folder_with_floor();
-    let document = json(folder.path(), &["floor.toml", "--size", "64x48", "--compare", "texel-packed", "texel"]);
+    let document =
+        json(folder.path(), &["floor.toml", "--runs", "2", "--size", "64x48", "--compare", "texel-packed", "texel"]);
     let rows = document["passes"].as_array().unwrap();
     assert!(
         rows[0]["arithmetic_share"].is_null() && rows[0]["ns_a_pair"].is_null(),
@@ -116,6 +130,27 @@ fn a_scene_is_timed_pass_by_pass() {
     assert_eq!(passes[passes.len() - 12..], ["draw", "frame"].repeat(6));
     rows.iter().for_each(|row| positive(row, &["/ms/median"]));
     positive(&document["ratios"][0], &["/ratio/p10", "/ratio/median", "/ratio/p90"]);
+}
+
+#[test]
+fn a_bake_is_timed_pass_by_pass() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let solid = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    std::fs::write(folder.path().join("solid.obj"), solid).unwrap();
+    let document = json(folder.path(), &["--bake", "solid.obj", "--runs", "1"]);
+    let rows = document["passes"].as_array().unwrap();
+    let passes: Vec<_> =
+        rows.iter().map(|row| (row["variant"].as_str().unwrap(), row["pass"].as_str().unwrap())).collect();
+    let field = ["assemble", "bake", "capture", "project"];
+    let expected = ["occlusion", "radiance"].into_iter().flat_map(|kind| field.map(|pass| (kind, pass)));
+    assert_eq!(
+        passes,
+        expected.chain(["bake", "capture", "project"].map(|pass| ("transfer", pass))).collect::<Vec<_>>()
+    );
+    rows.iter().for_each(|row| positive(row, &["/ms/median"]));
 }
 
 /// A first run does not wait for a calibration, and the next goes by what it found.

@@ -33,6 +33,13 @@ pub struct Arguments {
     /// rest: symmetric meshes, bodies of revolution, spheres; at most a quarter of a texel off
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
     orbit: bool,
+    /// Draw only cube faces that the object reaches, of these only what reaches into them, and of closed meshes no backs
+    #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
+    faces: bool,
+    /// Capture samples inside the solid off its nearest surface, or fill them from their neighbours, rather than see all dark where
+    /// they stand
+    #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
+    inside: bool,
     #[command(flatten)]
     bake: BakeArguments,
 }
@@ -74,6 +81,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let mut context = Context::new(global)?;
     context.baker.simplify = arguments.simplify;
     context.baker.orbit = arguments.orbit;
+    context.baker.faces = arguments.faces;
+    context.baker.inside = arguments.inside;
     let mut header = bake::header(&mesh, kind, &arguments.bake.options());
     header.validate().map_err(|error| error.context(arguments.mesh.display()))?;
     context.baker.fits(&header).map_err(|error| error.context(arguments.mesh.display()))?;

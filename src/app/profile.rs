@@ -2,6 +2,7 @@
 
 use super::context::{Context, size};
 use super::{Global, output};
+use crate::asset::Mesh;
 use crate::bench::ceilings::{self, Ceilings};
 use crate::bench::profile::{self, Contender, Row, Start, Tenths};
 use crate::bench::{Bench, text};
@@ -19,6 +20,10 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// Scene file, or the name of a built-in scene, whose passes are timed; without one a made-up merge of known size
     scene: Option<PathBuf>,
+    /// Time the passes of a bake of this mesh instead: capture, project and assemble of an occlusion field, of a radiance field and of
+    /// transfers
+    #[arg(long, value_name = "MESH.obj", conflicts_with_all = ["scene", "variant", "compare", "spirv"])]
+    bake: Option<PathBuf>,
     /// Size of the scene's pictures
     #[arg(long, default_value = "1280x720", value_parser = size, value_name = "WxH")]
     size: [u32; 2],
@@ -73,7 +78,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     let at_best = ceilings::measure(&context.device, library, small.field_bytes())?;
     let mut cases = Vec::new();
-    if let Some(path) = &arguments.scene {
+    if let Some(path) = &arguments.bake {
+        cases.push(profile::bake(&bench, &Mesh::load(path)?, arguments.runs)?);
+    } else if let Some(path) = &arguments.scene {
         let scene = Scene::load(path)?;
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         cases.push(profile::scene(&bench, &name, &scene, arguments.size, &chosen, arguments.runs, &at_best)?);
@@ -91,7 +98,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         }
     }
     let rows: Vec<Row> = cases.into_iter().flatten().map(|(row, _)| row).collect();
-    if arguments.variant.is_none() && arguments.compare.is_none() {
+    if arguments.variant.is_none() && arguments.compare.is_none() && arguments.bake.is_none() {
         context.learn(global)?;
     }
     let usual = calibrate::best_known(&context.device).name;
@@ -100,7 +107,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         validation: Validation::Off,
         cache_dir: None,
     })?;
-    let starts = profile::starts(&fresh, library, &chosen)?;
+    let starts = if arguments.bake.is_some() { Vec::new() } else { profile::starts(&fresh, library, &chosen)? };
     let document = json!({
         "origin": bench.origin,
         "ceilings": at_best,
@@ -186,6 +193,9 @@ fn print(
     }
     for (what, ratio) in ratios {
         output::say(format!("{what}: {:.3} ({:.3} - {:.3})", ratio.median, ratio.p10, ratio.p90));
+    }
+    if starts.is_empty() {
+        return;
     }
     output::say("\nbefore the first merge, ms");
     let cells = |start: &Start| {

@@ -141,13 +141,16 @@ pub struct Baker {
     pub orbit: bool,
     /// Whether only faces that the object reaches are drawn, of these only what reaches into them, and of closed meshes no backs.
     pub faces: bool,
+    /// Whether samples inside a solid are captured off its nearest surface, or left out and filled from their neighbours where that
+    /// sees nothing either. If not, they are captured where they stand, from where both sides of every face are drawn: all dark.
+    pub inside: bool,
 }
 
 impl Baker {
     /// A baker that compiles its shaders from `library`.
     pub fn new(device: &Arc<Device>, library: &Library) -> Self {
         let (device, library) = (device.clone(), library.clone());
-        Baker { device, library, simplify: false, orbit: true, faces: true }
+        Baker { device, library, simplify: false, orbit: true, faces: true, inside: true }
     }
 
     /// Checks that the device can bind the field that `header` describes, and what it is baked from.
@@ -200,7 +203,7 @@ impl Baker {
         self.fits(header)?;
         let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
         let surface = Surface::new(&unit_positions(mesh), &mesh.triangles);
-        let mut inside = inside::inside(&surface, &positions);
+        let mut inside = if self.inside { inside::inside(&surface, &positions) } else { vec![false; positions.len()] };
         let pushed = inside::pushed_out(&surface, &positions, &inside);
         let mut unseen: Vec<bool> = inside.iter().zip(&pushed).map(|(inside, eye)| *inside && eye.is_none()).collect();
         let plan = self.plan(mesh, header, &surface, &inside);

@@ -34,6 +34,8 @@ struct Worker {
     project: Project,
     model: Model,
     jobs: Buffer,
+    /// Whether backs of closed meshes are left out, which only an eye inside would see.
+    culls: bool,
     /// Projected samples of one batch, on the device and on their way to the host.
     samples: [Buffer; 2],
 }
@@ -127,6 +129,7 @@ impl Worker {
                 None => Model::new(device, sweep.mesh, radiance)?,
             },
             jobs: Project::job_buffer(device, capture.capacity())?,
+            culls: sweep.baker.inside,
             samples: [
                 Buffer::new(device, "batch samples", BufferKind::Device, bytes)?,
                 Buffer::new(device, "batch results", BufferKind::Readback, bytes)?,
@@ -168,7 +171,7 @@ impl Worker {
         if let Some(depth) = self.capture.depth() {
             commands.image_barrier(depth, None, Access::DepthWrite);
         }
-        commands.pass("capture", |c| self.capture.record(c, &self.model, eyes, plan, true))?;
+        commands.pass("capture", |c| self.capture.record(c, &self.model, eyes, plan, self.culls))?;
         commands.image_barrier(atlas, Some(Access::ColorWrite), Access::ComputeSampled);
         commands.pass("project", |c| self.project.record(c, atlas, &self.jobs, &texels, samples, plan.len() as u32))?;
         commands.barrier(Access::ComputeWrite, Access::TransferRead);

@@ -17,9 +17,12 @@ pub struct Side {
     pub bake_ms: f64,
     /// Samples that were captured.
     pub captured_count: u32,
+    /// Samples inside the solid that were captured off its surface or filled from neighbours.
+    pub filled_count: u32,
     /// Cube faces that were drawn.
     pub face_count: u32,
-    /// Of the coefficients against a bake that leaves nothing out, on faces of twice the edge: relative root mean square.
+    /// Of the coefficients against a bake that leaves nothing out, on faces of twice the edge: relative root mean square. Of the
+    /// large mesh against the bake without the skip.
     pub error: f64,
 }
 
@@ -30,9 +33,11 @@ pub struct Row {
     pub case: String,
     /// Its triangles.
     pub triangle_count: usize,
+    /// Sample points.
+    pub lattice: String,
     /// Name of the skip.
     pub skip: String,
-    /// With nothing else left out either.
+    /// With nothing else left out either; on the large mesh with all others.
     pub off: Side,
     /// With this alone.
     pub on: Side,
@@ -43,42 +48,53 @@ pub struct Row {
 
 type Set = fn(&mut Baker);
 
-/// The skips by name, and what sets them.
-const SKIPS: [(&str, Set); 4] = [
-    ("faces", |baker| baker.faces = true),
-    ("orbit", |baker| baker.orbit = true),
-    ("simplify", |baker| baker.simplify = true),
-    ("all but simplify", |baker| {
-        (baker.faces, baker.orbit) = (true, true);
-    }),
+/// The skips by name, and what sets them off and on.
+const SKIPS: [(&str, Set, Set); 5] = [
+    ("faces", |_| (), |baker| baker.faces = true),
+    ("orbit", |_| (), |baker| baker.orbit = true),
+    ("inside", |baker| baker.inside = false, |_| ()),
+    ("simplify", |_| (), |baker| baker.simplify = true),
+    ("all but simplify", |_| (), |baker| (baker.faces, baker.orbit) = (true, true)),
 ];
 
-/// Measures every skip on a few meshes, and writes `skip_bake.csv` and `skip_bake.json` into `folder`.
+/// Half of the default shells and directions.
+const SMALL: &str = "cube:8x5";
+/// As many samples as by default, most of them far off: where simplified meshes gain.
+const FAR: &str = "cube:16x8,log,outer=64";
+
+/// Measures every skip on a few meshes, and writes `skip_bake.csv` and `skip_bake.json` into `folder`. `cases`: of all meshes only
+/// those that have one of these texts in their names.
 ///
 /// # Errors
 /// `Failed` when a file cannot be written; else as [`Baker::field`].
-pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Row>> {
-    let mut meshes = vec![generate::sphere(0.5, 4), generate::torus(0.5, 0.2, 96, 48)];
+pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Row>> {
+    let mut meshes = vec![(generate::sphere(0.5, 4), SMALL), (generate::torus(0.5, 0.2, 96, 48), SMALL)];
     if !bench.quick {
-        meshes.push(generate::torus(0.5, 0.2, 200, 100));
+        meshes.push((generate::torus(0.5, 0.2, 200, 100), SMALL));
+        meshes.push((large(), FAR));
     }
+    meshes.retain(|(mesh, _)| cases.is_empty() || cases.iter().any(|text| mesh.name.contains(text)));
     let mut rows = Vec::new();
-    for mesh in &meshes {
-        let exact = bake_once(bench, mesh, 128, |_| ())?.1;
-        for (skip, set) in SKIPS {
-            let (mut sides, rounds) = ([None::<Side>; 2], if bench.quick { 1 } else { 3 });
+    for (mesh, lattice) in &meshes {
+        let far = *lattice == FAR;
+        let exact = if far { None } else { Some(bake_once(bench, mesh, lattice, 128, &|_| ())?.1) };
+        for (skip, off, on) in SKIPS.into_iter().filter(|(skip, ..)| !far || *skip == "simplify") {
+            let (mut sides, rounds) = ([None::<Side>; 2], if bench.quick || far { 1 } else { 3 });
+            let mut exact = exact.clone();
             for _ in 0..rounds {
-                for (side, on) in sides.iter_mut().zip([false, true]) {
-                    let (report, values) = bake_once(bench, mesh, 64, |baker| {
-                        if on {
-                            set(baker)
-                        }
+                for (side, set) in sides.iter_mut().zip([off, on]) {
+                    // Faces and orbits as usual where the mesh is large: without them it would take minutes.
+                    let (report, values) = bake_once(bench, mesh, lattice, 64, &|baker| {
+                        (baker.faces, baker.orbit) = (far, far);
+                        set(baker);
                     })?;
+                    let exact = exact.get_or_insert_with(|| values.clone());
                     let now = Side {
                         bake_ms: report.total.as_secs_f64() * 1e3,
                         captured_count: report.samples + report.filled - report.turned,
+                        filled_count: report.filled,
                         face_count: report.faces,
-                        error: relative(&values, &exact),
+                        error: relative(&values, exact),
                     };
                     *side = Some(side.filter(|before| before.bake_ms < now.bake_ms).unwrap_or(now));
                 }
@@ -88,6 +104,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Row>> {
             rows.push(Row {
                 case: mesh.name.clone(),
                 triangle_count: mesh.triangles.len(),
+                lattice: (*lattice).to_owned(),
                 skip: skip.to_owned(),
                 times_faster: off.bake_ms / on.bake_ms,
                 off,
@@ -102,12 +119,26 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// An occlusion field in f32 on half of the default shells and directions, nothing left out but what `set` sets.
-fn bake_once(bench: &Bench<'_>, mesh: &Mesh, face_px: u32, set: impl Fn(&mut Baker)) -> Result<(Report, Vec<f32>)> {
+/// A ring of 102 400 triangles with waves on it.
+fn large() -> Mesh {
+    let ring = generate::torus(0.5, 0.2, 320, 160);
+    let wave = |p: &glam::Vec3| 0.01 * (18.0 * p.x).sin() * (22.0 * p.z + 4.0 * p.y).cos();
+    let moved = ring.positions.iter().zip(&ring.normals).map(|(p, n)| *p + wave(p) * *n).collect();
+    Mesh::new("large", moved, Vec::new(), None, ring.triangles).expect("a ring with waves is a mesh")
+}
+
+/// An occlusion field in f32, nothing left out but what `set` sets.
+fn bake_once(
+    bench: &Bench<'_>,
+    mesh: &Mesh,
+    lattice: &str,
+    face_px: u32,
+    set: &dyn Fn(&mut Baker),
+) -> Result<(Report, Vec<f32>)> {
     let mut baker = Baker::new(bench.baker.device(), bench.baker.library());
     (baker.faces, baker.orbit, baker.simplify) = (false, false, false);
     set(&mut baker);
-    let lattice = "cube:8x5".parse().expect("a lattice");
+    let lattice = lattice.parse().expect("a lattice");
     let options = bake::Options { lattice, storage: Storage::F32, face_px, ..Default::default() };
     let mut header = bake::header(mesh, Kind::Occlusion, &options);
     let store = Buffer::new(baker.device(), "field", BufferKind::Device, header.payload_bytes())?;

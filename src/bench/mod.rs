@@ -9,6 +9,7 @@ pub mod cases;
 pub mod ceilings;
 pub mod figures;
 pub mod floor;
+pub mod house;
 pub mod plot;
 pub mod product;
 pub mod profile;
@@ -32,6 +33,7 @@ use crate::scene::Scene;
 use serde_json::Value;
 
 /// What every measurement needs.
+#[derive(Clone)]
 pub struct Bench<'b> {
     /// Bakes on the device that is measured.
     pub baker: &'b Baker,

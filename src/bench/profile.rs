@@ -2,9 +2,12 @@
 
 use super::Bench;
 use super::ceilings::Ceilings;
+use crate::asset::Mesh;
+use crate::bake;
 use crate::error::{Error, Result};
-use crate::gpu::Device;
+use crate::field::Kind;
 use crate::gpu::census::{Census, disassemble};
+use crate::gpu::{Buffer, BufferKind, Device};
 use crate::render::draw::{Antialias, Finish};
 use crate::render::merge::Merge;
 use crate::render::variant::{Chain, Form, PRODUCTS, Product, VARIANTS, Variant};
@@ -234,21 +237,7 @@ pub fn scene(
         let census = Census::new(&library.shader(&form.row())?)?;
         rows.push((row(name, &contender.name, *pairs, times, &form, &census, at_best), times.clone()));
     }
-    let mut add = |pass: &str, variant: &str, times: Vec<f64>| {
-        let row = Row {
-            case: name.to_owned(),
-            pass: pass.to_owned(),
-            variant: variant.to_owned(),
-            ms: Tenths::new(&times),
-            ns_a_pair: None,
-            work: None,
-            gflops: None,
-            gb_s: None,
-            arithmetic_share: None,
-            read_share: None,
-        };
-        rows.push((row, times));
-    };
+    let mut add = |pass: &str, variant: &str, times: Vec<f64>| rows.push((plain(name, pass, variant, &times), times));
     others.into_iter().for_each(|(pass, times)| add(&pass, "", times));
     let Some((_, frame, ..)) = frames.first_mut() else { return Ok(rows) };
     for (finish, word) in [(Finish::Display, "screen"), (Finish::Linear, "file")] {
@@ -274,6 +263,61 @@ pub fn scene(
         }
     }
     Ok(rows)
+}
+
+/// Bakes a mesh's occlusion field, radiance field and transfers a few times, at most three, after a small one that compiles, and
+/// times the passes: device time of all of a bake's dispatches and draws together, and "bake" by the host's clock.
+///
+/// # Errors
+/// As [`crate::bake::Baker::field`].
+pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(Row, Vec<f64>)>> {
+    let options = bake::Options::default();
+    let small = bake::Options { lattice: "cube:1x1".parse().expect("a lattice"), ..options };
+    let mut times: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
+    let field = |kind: Kind, options: &bake::Options| -> Result<bake::Report> {
+        let mut header = bake::header(mesh, kind, options);
+        let store = Buffer::new(bench.baker.device(), "field", BufferKind::Device, header.payload_bytes())?;
+        bench.baker.field(mesh, &mut header, (&store, 0), &|_, _| ())
+    };
+    for kind in [Kind::Occlusion, Kind::Radiance] {
+        field(kind, &small)?;
+    }
+    for _ in 0..runs.min(3) {
+        let (bands, face_px) = (options.bands, options.face_px);
+        let reports = [
+            ("occlusion", field(Kind::Occlusion, &options)?),
+            ("radiance", field(Kind::Radiance, &options)?),
+            ("transfer", bench.baker.transfer(mesh, bands, face_px, &|_, _| ())?.1),
+        ];
+        for (what, report) in reports {
+            let mut add = |pass, ms: f64| times.entry((what, pass)).or_default().push(ms);
+            add("capture", report.capture_ms);
+            add("project", report.project_ms);
+            if what != "transfer" {
+                add("assemble", report.assemble_ms);
+            }
+            add("bake", report.total.as_secs_f64() * 1e3);
+            (bench.progress)(&format!("{}: {what} baked", mesh.name));
+        }
+    }
+    let row = |((what, pass), times): ((&str, &str), Vec<f64>)| (plain(&mesh.name, pass, what, &times), times);
+    Ok(times.into_iter().map(row).collect())
+}
+
+/// A row of a pass of which nothing but its time is known.
+fn plain(case: &str, pass: &str, variant: &str, times: &[f64]) -> Row {
+    Row {
+        case: case.to_owned(),
+        pass: pass.to_owned(),
+        variant: variant.to_owned(),
+        ms: Tenths::new(times),
+        ns_a_pair: None,
+        work: None,
+        gflops: None,
+        gb_s: None,
+        arithmetic_share: None,
+        read_share: None,
+    }
 }
 
 /// What a variant costs before its first run is over, in milliseconds.

@@ -10,6 +10,7 @@ use super::{Bench, default_options};
 use crate::error::{Error, Result};
 use crate::frame::memory::Memory;
 use crate::frame::{self, Frame};
+use crate::layout::CLUSTER_VERTICES;
 use crate::render::gather::{Counts, Place};
 use crate::render::variant::Skip;
 use crate::scene::{Placement, Scene};
@@ -60,16 +61,23 @@ pub struct Point {
     pub resident_bytes: Option<u64>,
 }
 
-/// Measures, and writes `scaling.csv`, `scaling.json` and a plot an axis into `folder`.
+/// Measures, and writes `scaling.csv`, `scaling.json` and a plot an axis into `folder`. `chosen`: these axes alone, all where there
+/// is none.
 ///
 /// # Errors
-/// `Failed` when the folder cannot be written; else as [`Frame::new`].
-pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Point>> {
+/// `Usage` when there is no such axis, `Failed` when the folder cannot be written; else as [`Frame::new`].
+pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Point>> {
+    let mut axes = axes(bench.quick);
+    if let Some(name) = chosen.iter().find(|name| !axes.iter().any(|(axis, _)| axis == name)) {
+        let names: Vec<&str> = axes.iter().map(|(axis, _)| *axis).collect();
+        return Err(Error::Usage(format!("unknown axis \"{name}\" ({})", names.join(", "))));
+    }
+    axes.retain(|(axis, _)| chosen.is_empty() || chosen.iter().any(|name| name == axis));
     std::fs::create_dir_all(folder)
         .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
     let mut points = Vec::new();
-    for (axis, towns) in axes(bench.quick) {
-        for town in towns {
+    for (axis, towns) in &axes {
+        for &town in towns {
             points.push(point(bench, axis, town)?);
         }
     }
@@ -77,7 +85,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Point>> {
     let rows: Vec<_> = points.iter().map(|p| serde_json::to_value(p).expect("points are plain data")).collect();
     write(&folder.join("scaling.csv"), &csv(&origin, &rows))?;
     write(&folder.join("scaling.json"), &format!("{:#}\n", json!({ "origin": origin, "points": points })))?;
-    for (axis, _) in axes(bench.quick) {
+    for (axis, _) in axes {
         let of_axis: Vec<&Point> = points.iter().filter(|p| p.axis == axis).collect();
         write(&folder.join(format!("scaling-{}.svg", axis.replace(' ', "-"))), &plot(axis, &of_axis).svg())?;
     }
@@ -96,7 +104,8 @@ fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
     let mut axes = vec![
         ("vertices", with(cells, &|cells| Town { cells, things: 16, ..base })),
         ("entities", with(things, &|things| Town { things, cells: 4 * edge(things), ..base })),
-        ("lights", with(lights, &|lights| Town { lights, ..base })),
+        // Among so many things that lights are few.
+        ("lights", with(lights, &|lights| Town { lights, things: 256, ..base })),
     ];
     if !quick {
         let lit = |things| Town { things, cells: 4 * edge(things), receive: true, ..base };
@@ -124,7 +133,12 @@ fn lists(bench: &Bench<'_>, scene: &Scene, at: &dyn Fn(usize) -> Vec<Placement>)
         let options = frame::Options { skip: Skip::ALL, lists: Some(place), ..default_options() };
         frames.push((bench.frame(scene, options)?, Vec::new()));
     }
+    let begun = Instant::now();
     for round in 0..if bench.quick { 7 } else { 15 } {
+        // Long frames need fewer repetitions.
+        if round >= 5 && begun.elapsed().as_secs_f64() > 5.0 {
+            break;
+        }
         for (frame, times) in &mut frames {
             let now = at(round);
             let started = Instant::now();
@@ -214,21 +228,66 @@ fn plot(axis: &str, points: &[&Point]) -> Plot {
         "lights" => p.lights,
         _ => p.entities,
     } as f64;
-    let curve = |label: &str, value: &dyn Fn(&Point) -> f64| Curve {
-        label: format!("{label}, slope {:.2}", slope(points.iter().map(|p| (size(p), value(p))))),
-        points: points.iter().map(|p| (size(p), value(p))).collect(),
-        notes: points.iter().map(|p| super::text::three(value(p))).collect(),
+    // A town grows with its entities: what a vertex costs tells whether what exists matters, or only what is near.
+    let town = axis.starts_with("entities");
+    let words = if town { "entities" } else { axis };
+    let time = |p: &Point, ms: f64| if town { ms * 1e3 / p.vertices as f64 } else { ms };
+    // A slope in logarithms says how cost follows size: 0 not at all, 1 in proportion.
+    let curve = |label: &str, noted: bool, value: &dyn Fn(&Point) -> Option<f64>| {
+        let known: Vec<(f64, f64)> = points.iter().filter_map(|p| Some((size(p), value(p)?))).collect();
+        (known.len() > 1).then(|| Curve {
+            label: format!("{label}: slope {:.2}", slope(known.iter().copied())),
+            notes: known.iter().filter(|_| noted).map(|p| super::text::three(p.1)).collect(),
+            points: known,
+        })
     };
-    let panel = Panel {
-        x_label: if axis.starts_with("entities") { "entities".into() } else { axis.into() },
-        y_label: "milliseconds (median)".into(),
-        curves: vec![
-            curve("all move", &|p: &Point| p.all_move_ms.median),
-            curve("one moves", &|p: &Point| p.one_moves_ms.median),
-        ],
+    let panel = |title: &str, y_label: &str, curves: Vec<Option<Curve>>| Panel {
+        title: title.into(),
+        x_label: words.into(),
+        y_label: y_label.into(),
+        curves: curves.into_iter().flatten().collect(),
         ..Panel::default()
     };
-    Plot { title: format!("A frame without drawing as {axis} grow"), panels: vec![panel] }
+    let mib = |bytes: u64| bytes as f64 / 1_048_576.0;
+    let each = |p: &Point, of: f64| of / (p.vertices as f64 / f64::from(CLUSTER_VERTICES));
+    Plot {
+        title: if town {
+            format!(
+                "A frame without drawing as a town grows: {axis}, and vertices in proportion (slope 0: a vertex costs the same)"
+            )
+        } else {
+            format!("A frame without drawing as {axis} grow in number (slope 0: not at all, 1: in proportion)")
+        },
+        panels: vec![
+            panel(
+                "Time",
+                if town { "microseconds a vertex (median)" } else { "milliseconds (median)" },
+                vec![
+                    curve("all move, whole frame", true, &|p| Some(time(p, p.all_move_ms.median))),
+                    curve("one moves", true, &|p| Some(time(p, p.one_moves_ms.median))),
+                    curve("at rest", false, &|p| Some(time(p, p.rest_ms.median))),
+                    curve("of all move, lists by the host", false, &|p| Some(time(p, p.host_lists_ms?))),
+                    curve("of all move, lists by the device", false, &|p| Some(time(p, p.device_lists_ms?))),
+                ],
+            ),
+            panel(
+                "Work a vertex",
+                "lookups a vertex",
+                vec![
+                    curve("lookups, nothing skipped", true, &|p| Some(each(p, p.counts.considered as f64))),
+                    curve("lookups done", true, &|p| Some(p.steps_a_vertex)),
+                ],
+            ),
+            panel(
+                "Memory",
+                "MiB",
+                vec![
+                    curve("resident, whole process", true, &|p| p.resident_bytes.map(mib)),
+                    curve("on the device", true, &|p| Some(mib(p.device_bytes))),
+                ],
+            ),
+        ],
+    }
 }
 
 /// Least-squares slope in logarithms: 1 where cost is in proportion to size.

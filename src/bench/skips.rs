@@ -6,13 +6,16 @@ use super::figures::{Difference, Radiosity, Spread, difference, rms, spread};
 use super::plot::{Column, Group, Rows, Scale};
 use super::sweep::merge_ms;
 use super::town::{Town, moved};
-use super::{Bench, default_options};
+use super::{Bench, default_options, house};
+use crate::asset::embedded;
+use crate::bake::cache::Cache;
 use crate::error::{Error, Result};
-use crate::frame;
+use crate::frame::store::is_seen;
+use crate::frame::{self, Frame};
 use crate::render::draw::Antialias;
 use crate::render::gather::Counts;
 use crate::render::variant::{EPS, Skip};
-use crate::scene::Placement;
+use crate::scene::{Placement, Scene};
 use crate::truth::raycast::{Distant, relative_error};
 use crate::truth::{RayCast, Shapes, Vertex, World, sample_vertices};
 use serde::Serialize;
@@ -32,6 +35,10 @@ pub struct Side {
     pub steps: usize,
     /// Against ray casting.
     pub error: Difference,
+    /// Fields on the device, bytes.
+    pub field_bytes: u64,
+    /// Wall time until the frame was ready with no fields in a cache, milliseconds; where something is not baked alone.
+    pub ready_ms: Option<f64>,
 }
 
 /// One skip in one case.
@@ -69,20 +76,25 @@ fn left_off(skip: &str, counts: &Counts) -> Option<u64> {
         "facing" => "facing_away",
         eps if eps.starts_with("eps") => "below_eps",
         hidden if hidden.starts_with("hidden") => "hidden",
+        empty if empty.starts_with("empty") => "empty",
         other => other,
     };
     serde_json::to_value(counts).ok()?.get(name)?.as_u64()
 }
 
-/// Measures, and writes `skip.csv`, `skip.json` and `skip.svg` into `folder`.
+/// Measures, and writes `skip.csv`, `skip.json` and `skip.svg` into `folder`. `chosen`: of all cases only those that have one of these
+/// texts in their names.
 ///
 /// # Errors
 /// `Failed` when the folder cannot be written; else as [`frame::Frame::new`].
-pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Row>> {
+pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Row>> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
     let mut rows = Vec::new();
-    for case in chosen(bench.quick)? {
+    for case in all(bench.quick)? {
+        if !chosen.is_empty() && !chosen.iter().any(|text| case.name.contains(text)) {
+            continue;
+        }
         rows.extend(of_case(bench, &case)?);
     }
     let origin = json!({
@@ -127,7 +139,7 @@ fn plot(rows: &[Row]) -> Rows {
     }
 }
 
-fn chosen(quick: bool) -> Result<Vec<Case>> {
+fn all(quick: bool) -> Result<Vec<Case>> {
     let town = |things, lights, cells| -> Result<Case> {
         let scene = Town { things, lights, cells, receive: true }.scene()?;
         let light = cases::light(&scene);
@@ -140,12 +152,30 @@ fn chosen(quick: bool) -> Result<Vec<Case>> {
         })
     };
     if quick {
-        return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?]);
+        return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?, house()?, alone()?]);
     }
     let mut cases = cases::scenes()?;
     cases.push(town(64, 4, 160)?);
     cases.push(town(256, 8, 160)?);
+    cases.extend([house()?, alone()?]);
     Ok(cases)
+}
+
+/// A storey of a house: a floor with things on it below a ceiling, flat lamps between that shine down, of which most are out, and an
+/// attic full of things.
+fn house() -> Result<Case> {
+    let scene = house::scene()?;
+    let light = cases::light(&scene);
+    Ok(Case { name: "house".into(), light, scene, time_s: 0.0, distant: Distant::Exact })
+}
+
+/// One ring under a sky: nothing but itself is lit, so its shadow falls on nothing that its transfer does not know of.
+fn alone() -> Result<Case> {
+    let text = "environment = { gradient = { radiance = [0.8, 0.9, 1.0] } }\n[camera]\neye = [0, 2, 4]\ntarget = [0, 0, 0]\n\
+                [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.7, minor_m = 0.3, segments = 48, sides = 24 }\n\
+                [[entity]]\nmesh = \"ring\"\n";
+    let scene = Scene::parse(text, Path::new("assets/scenes/alone.toml"), &embedded::read)?;
+    Ok(Case { name: "ring alone".into(), light: cases::light(&scene), scene, time_s: 0.0, distant: Distant::Exact })
 }
 
 fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<Row>> {
@@ -169,7 +199,12 @@ fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<Row>> {
     };
     let mut rows = Vec::new();
     for name in Skip::NAMES.into_iter().filter(|name| !["unmoved", "hidden"].contains(name)) {
-        rows.push(judge.row(bench, case, &placements, name, [skip_without(name), at_rest], Timed::AtRest)?);
+        let mut sides = [skip_without(name), at_rest];
+        // With a threshold what shines with nothing is below it in any case.
+        let exact = name == "empty";
+        sides.iter_mut().filter(|_| exact).for_each(|side| side.eps = 0.0);
+        let row = if exact { "empty, eps 0" } else { name };
+        rows.push(judge.row(bench, case, &placements, row, sides, Timed::AtRest)?);
     }
     let eps = format!("eps {EPS}");
     let without_eps = frame::Options { eps: 0.0, ..at_rest };
@@ -216,7 +251,16 @@ impl Judge {
         [off, on]: [frame::Options; 2],
         timed: Timed,
     ) -> Result<Row> {
-        let mut frames = [bench.frame(&case.scene, off)?, bench.frame(&case.scene, on)?];
+        let none = Cache::new(None);
+        let anew = skip == "unseen" && case.scene.entities.iter().any(|e| e.occludes && !is_seen(&case.scene, e));
+        let bench = &if anew { Bench { cache: &none, origin: json!(null), ..*bench } } else { bench.clone() };
+        let ready = |options| -> Result<(Frame, Option<f64>)> {
+            let started = Instant::now();
+            let frame = bench.frame(&case.scene, options)?;
+            Ok((frame, anew.then(|| started.elapsed().as_secs_f64() * 1e3)))
+        };
+        let ((first, first_ms), (second, second_ms)) = (ready(off)?, ready(on)?);
+        let (mut frames, ready_ms) = ([first, second], [first_ms, second_ms]);
         let entities = &case.scene.entities;
         let mut movers: Vec<usize> = (0..entities.len()).filter(|&i| entities[i].occludes).collect();
         match timed {
@@ -256,6 +300,8 @@ impl Judge {
             merge_ms: spread(&merges[i]),
             steps: steps[i],
             error: difference(&found[i], &self.truth, self.unit),
+            field_bytes: frames[i].memory().fields,
+            ready_ms: ready_ms[i],
         };
         let (off, on) = (side(0), side(1));
         let counts = frames[1].counts(placements);

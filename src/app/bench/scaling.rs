@@ -13,6 +13,9 @@ pub struct Arguments {
     /// A minute on two cores instead of five: fewer and smaller sizes
     #[arg(long)]
     quick: bool,
+    /// Measure only this axis; may be given again; an unknown name lists them
+    #[arg(long, value_name = "NAME")]
+    axis: Vec<String>,
     /// Folder for scaling.csv, scaling.json and plots
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -20,7 +23,8 @@ pub struct Arguments {
 
 /// Measures and prints a row a size.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let (context, points) = start(global, arguments.quick, |bench| scaling::run(bench, &arguments.out))?;
+    let (context, points) =
+        start(global, arguments.quick, |bench| scaling::run(bench, &arguments.out, &arguments.axis))?;
     if global.json {
         output::say(serde_json::to_value(&points).expect("results are plain data").to_string());
         return context.finish();

@@ -13,6 +13,9 @@ pub struct Arguments {
     /// A minute on two cores instead of five: two scenes, fewer rays and rounds
     #[arg(long)]
     quick: bool,
+    /// Measure only scenes and meshes that have TEXT in their names; may be given again
+    #[arg(long, value_name = "TEXT")]
+    case: Vec<String>,
     /// Folder for skip.csv, skip.json, skip.svg, and of bakes skip_bake.csv and skip_bake.json
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -21,7 +24,10 @@ pub struct Arguments {
 /// Measures and prints a row a scene and skip.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let (context, rows) = start(global, arguments.quick, |bench| {
-        Ok((skips::run(bench, &arguments.out)?, bake_skips::run(bench, &arguments.out)?))
+        Ok((
+            skips::run(bench, &arguments.out, &arguments.case)?,
+            bake_skips::run(bench, &arguments.out, &arguments.case)?,
+        ))
     })?;
     let (rows, bakes) = rows;
     if global.json {
@@ -39,6 +45,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         cells.push(row.left_off_count.map_or("-".into(), |count| count.to_string()));
         cells.extend([row.off.steps, row.on.steps].map(|steps| steps.to_string()));
         cells.extend([row.off.error.rms, row.on.error.rms, row.change.max].map(three));
+        cells.extend([row.off.field_bytes, row.on.field_bytes].map(|bytes| (bytes / 1024).to_string()));
         cells
     });
     let header = [
@@ -53,26 +60,32 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "off error/RMS",
         "on error/RMS",
         "most change/RMS",
+        "off KiB of fields",
+        "on KiB",
     ];
     output::table(&header, &cells.collect::<Vec<_>>());
     output::say(
-        "\nA bake of 8 shells of 6 x 5 x 5 samples, nothing left out and this skip alone; the field against one of faces of 128 px",
+        "\nBakes, nothing left out and this skip alone; the field against one of faces of 128 px. Of the large mesh: simplify off and on,\n\
+         all else as usual; the field against that without. Filled: samples inside the solid, captured off its surface or filled",
     );
     let cells = bakes.iter().map(|row| {
-        let mut cells = vec![row.case.clone(), row.triangle_count.to_string(), row.skip.clone()];
+        let mut cells = vec![row.case.clone(), row.triangle_count.to_string(), row.lattice.clone(), row.skip.clone()];
         cells.extend([row.off.bake_ms, row.on.bake_ms, row.times_faster].map(three));
-        cells.extend([row.on.captured_count, row.off.face_count, row.on.face_count].map(|count| count.to_string()));
+        let counts = [row.on.captured_count, row.on.filled_count, row.off.face_count, row.on.face_count];
+        cells.extend(counts.map(|count| count.to_string()));
         cells.extend([row.off.error, row.on.error].map(three));
         cells
     });
     let header = [
         "mesh",
         "triangles",
+        "lattice",
         "skip",
         "off ms",
         "on ms",
         "times faster",
         "captured",
+        "filled",
         "off faces",
         "on faces",
         "off error",

@@ -78,8 +78,9 @@ float field_warp(float s) {
 }
 
 #if DIRECTIONS == 0
-// Base of the face's stored cells, and coordinates among them (cell centres at whole numbers, border included).
-void field_plane(vec3 p, out uint base, out vec2 cell) {
+// Base of the face's stored cells, and coordinates among them (samples at whole numbers, border included). A row's ends are samples
+// (edges 1), or half a step beyond the last that is the face's own (edges 0).
+void field_plane(vec3 p, float edges, out uint base, out vec2 cell) {
     vec3 a = abs(p);
     vec2 st;
     float major;
@@ -100,10 +101,10 @@ void field_plane(vec3 p, out uint base, out vec2 cell) {
     // At the very centre any direction will do; it must only be a number.
     st /= max(major, 1e-30);
     base = face * (CELLS + 2) * (CELLS + 2);
-    cell = vec2(field_warp(st.x), field_warp(st.y)) * (0.5 * CELLS) + (0.5 * CELLS + 0.5);
+    cell = vec2(field_warp(st.x), field_warp(st.y)) * (0.5 * CELLS + 0.5 * edges) + (0.5 * CELLS + 0.5);
 }
 #else
-void field_plane(vec3 p, out uint base, out vec2 cell) {
+void field_plane(vec3 p, float edges, out uint base, out vec2 cell) {
     const float PI = 3.14159265358979;
     float latitude = acos(clamp(p.y * inversesqrt(max(dot(p, p), 1e-30)), -1.0, 1.0)) / PI * LATITUDES - 0.5;
     float turn = p.x == 0.0 && p.z == 0.0 ? 0.0 : atan(p.z, p.x) / (2.0 * PI);
@@ -113,7 +114,8 @@ void field_plane(vec3 p, out uint base, out vec2 cell) {
 #endif
 
 // radial: slope, offset, inner and outer radius of the field's shells.
-FieldPlace field_place(vec3 p, vec4 radial) {
+// edges: see field_plane.
+FieldPlace field_place(vec3 p, vec4 radial, float edges) {
     float d = sqrt(dot(p, p));
     float near = clamp(d, radial.z, radial.w);
     // c: cosine of the half-angle of the bounding sphere, or of what stands for it inside (Lattice::reach);
@@ -139,7 +141,7 @@ FieldPlace field_place(vec3 p, vec4 radial) {
 #if IMAGE
     uint face_base;
     vec2 face_cell;
-    field_plane(p, face_base, face_cell);
+    field_plane(p, edges, face_base, face_cell);
     FieldPlace place;
     place.texel = vec3(face_cell.x, face_cell.y + float(face_base / (CELLS + 2)), t) + 0.5;
     place.weight[0] = unscale;
@@ -153,7 +155,7 @@ FieldPlace field_place(vec3 p, vec4 radial) {
 
     uint base;
     vec2 cell;
-    field_plane(p, base, cell);
+    field_plane(p, edges, base, cell);
 #if LOOKUP != 2
     cell = floor(cell + 0.5);
 #endif

@@ -111,7 +111,7 @@ void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN]
     vec3 p = to_lattice(entity, to_object(entity, (vertex.position - entity.centre.xyz) * entity.centre.w));
     uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_STEP : entity.blocked_base;
     float b[FETCHED];
-    FieldPlace place = field_place(p, entity.radial);
+    FieldPlace place = field_place(p, entity.radial, lattice_edges(entity));
     [[unroll]] for (uint k = 0; k < CORNERS; k++) {
         place.weight[k] *= weight;
     }

@@ -39,8 +39,13 @@ vec3 to_object(Entity entity, vec3 p) {
 // which seven bits an axis make one whole number.
 vec3 to_lattice(Entity entity, vec3 p) {
     uint packed = uint(entity.shift.w);
-    vec3 sixty_fourths = vec3(packed & 127u, packed >> 7 & 127u, packed >> 14);
+    vec3 sixty_fourths = vec3(packed & 127u, packed >> 7 & 127u, packed >> 14 & 127u);
     return p + p * sixty_fourths / 64.0 + entity.shift.xyz;
+}
+
+// 1 where the samples of the object's lattice lie on the edges of a cube's faces, 0 where they are cells' centres: the bit above.
+float lattice_edges(Entity entity) {
+    return float(uint(entity.shift.w) >> 21);
 }
 
 // A workgroup's worth of neighbouring vertices.

@@ -105,7 +105,7 @@ fn twins_lead_to_captured_samples_that_lie_where_they_should() {
     for mesh in [generate::sphere(1.0, 3), generate::torus(1.0, 0.3, 48, 24), chessman(50)] {
         let surface = Surface::new(&unit_positions(&mesh), &mesh.triangles);
         let symmetry = found(&mesh);
-        for lattice in ["cube:6x8", "cube:3x5", "latlon:3x6x8"] {
+        for lattice in ["cube:6x8", "cube:3x5", "cube:3x4,edges", "latlon:3x6x8"] {
             let lattice: bake::Options = bake::Options { lattice: lattice.parse().unwrap(), ..Default::default() };
             let lattice = lattice.lattice;
             let twins = orbit::plan(&lattice, &symmetry, 64, |s| surface.distance(lattice.position(s))).twins;
@@ -149,10 +149,19 @@ fn turned_fields_are_those_that_were_captured_whole() {
         // Facets seen as up to a quarter of a texel.
         (chessman(50), Kind::Occlusion, 4e-3),
     ];
-    for (mesh, kind, most) in cases {
-        let Some((turned, count)) = field(&mesh, kind, "cube:5x4,outer=8", true) else { return };
-        let (whole, none) = field(&mesh, kind, "cube:5x4,outer=8", false).unwrap();
-        assert!(none == 0 && count > 0 && whole.header.symmetry == "off" && turned.header.symmetry != "none");
+    let lattices = ["cube:5x4,outer=8", "cube:5x2,edges,outer=8"];
+    for ((mesh, kind, most), text) in cases.iter().flat_map(|case| lattices.map(|text| (case, text))) {
+        let (kind, most) = (*kind, *most);
+        let Some((turned, count)) = field(mesh, kind, text, true) else { return };
+        let (whole, same) = field(mesh, kind, text, false).unwrap();
+        let lattice = whole.header.lattice;
+        let shared = (0..lattice.direction_count()).filter(|&d| lattice.first_of(d) != d).count() as u32;
+        assert_eq!(
+            same,
+            lattice.shells * shared,
+            "{lattice}: what faces share is captured once, and no symmetry is used"
+        );
+        assert!(count > same && whole.header.symmetry == "off" && turned.header.symmetry != "none");
         let values = |field: &ShadowField| -> Vec<f64> {
             field.payload.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect()
         };
@@ -168,8 +177,8 @@ fn turned_fields_are_those_that_were_captured_whole() {
 fn a_turned_sphere_is_as_near_to_the_closed_form_as_a_captured_one() {
     let mesh = generate::sphere(1.0, 4);
     let mut errors = Vec::new();
-    for orbit in [true, false] {
-        let Some((field, turned)) = field(&mesh, Kind::Occlusion, "cube:12x6", orbit) else { return };
+    for (text, orbit) in [("cube:12x6", true), ("cube:12x6", false), ("cube:12x6,edges", true)] {
+        let Some((field, turned)) = field(&mesh, Kind::Occlusion, text, orbit) else { return };
         let lattice = field.header.lattice;
         let error = |near: f64, far: f64| {
             let mut rng = Rng::with_seed(2);
@@ -197,6 +206,8 @@ fn a_turned_sphere_is_as_near_to_the_closed_form_as_a_captured_one() {
     for (turned, captured) in errors[0].iter().zip(errors[1]) {
         assert!((turned / captured - 1.0).abs() < 0.01, "{errors:?}");
     }
+    // Seven steps along a row instead of six, in as many bytes: by the square of the step where directions decide.
+    assert!(errors[2][0] < 0.9 * errors[0][0], "{errors:?}");
 }
 
 #[test]

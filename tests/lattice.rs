@@ -24,6 +24,8 @@ fn lattices() -> Vec<Lattice> {
         "cube:5x4,linear,scaled,inner=0.5,outer=3.5",
         "cube:1x3,inner=1.5,outer=4",
         "cube:2x1,inner=0.25",
+        "cube:5x4,edges,linear,scaled,inner=0.5,outer=3.5",
+        "cube:2x1,edges,log,inner=0.25",
         "latlon:8x4x4,linear,raw,inner=0.2",
         "latlon:3x1x1,inner=1.02",
         "latlon:4x5x7,log,inner=0.3",
@@ -60,7 +62,13 @@ fn interpolate(lattice: &Lattice, stored: &[f64], position: DVec3, lookup: Looku
 }
 
 fn noise(lattice: &Lattice, rng: &mut Rng) -> Vec<f64> {
-    (0..lattice.sample_count()).map(|_| rng.f64()).collect()
+    let mut values: Vec<f64> = (0..lattice.sample_count()).map(|_| rng.f64()).collect();
+    // What faces share is one sample.
+    let count = lattice.direction_count();
+    for i in 0..values.len() as u32 {
+        values[i as usize] = values[(i / count * count + lattice.first_of(i % count)) as usize];
+    }
+    values
 }
 
 #[test]
@@ -68,6 +76,49 @@ fn default_has_6144_samples() {
     let lattice = Lattice::default();
     assert_eq!((lattice.sample_count(), lattice.stored_count()), (16 * 6 * 8 * 8, 16 * 6 * 10 * 10));
     assert_eq!(lattice.sources().len() as u32, lattice.stored_direction_count());
+}
+
+#[test]
+fn faces_share_the_samples_on_their_edges() {
+    for cells in [1, 2, 7, 8] {
+        let lattice: Lattice = format!("cube:3x{cells},edges,inner=0.5").parse().unwrap();
+        let columns = cells + 2;
+        assert_eq!(
+            (lattice.direction_count(), lattice.stored_direction_count()),
+            (6 * columns * columns, 6 * columns * columns)
+        );
+        let firsts: Vec<u32> = (0..lattice.direction_count()).filter(|&i| lattice.first_of(i) == i).collect();
+        assert_eq!(firsts.len() as u32, 6 * cells * cells + 12 * cells + 8, "faces, edges, corners");
+        for i in 0..lattice.direction_count() {
+            let first = lattice.first_of(i);
+            assert!(first <= i && lattice.first_of(first) == first);
+            assert_eq!(lattice.direction(first), lattice.direction(i), "to the last bit: no jump between faces");
+        }
+        for (n, &a) in firsts.iter().enumerate() {
+            let apart = |b: &u32| lattice.direction(a).angle_between(lattice.direction(*b));
+            assert!(firsts[..n].iter().all(|b| apart(b) > 0.5 / f64::from(columns)), "{cells}: {a} is there twice");
+            // Neighbours are a step away, and those of a pair on opposite sides, save where three faces meet.
+            let around = lattice.cell_neighbours(a);
+            let step = 90.0 / f64::from(cells + 1);
+            assert!(
+                around.iter().all(|b| (0.6 * step..1.3 * step).contains(&apart(b).to_degrees())),
+                "{cells}: {a} {around:?}"
+            );
+            let corner = lattice.direction(a).abs().min_element() > 0.577;
+            for pair in around.chunks_exact(2) {
+                let [u, v] = [pair[0], pair[1]].map(|b| lattice.direction(b) - lattice.direction(a));
+                let angle = u.angle_between(v).to_degrees();
+                assert!(angle > 95.0, "{cells}: {a} {pair:?}: {angle}");
+            }
+            assert!(
+                corner || (0..4).all(|i| around[i + 1..].iter().all(|b| *b != around[i])),
+                "{cells}: {a} {around:?}"
+            );
+        }
+    }
+    let chosen: Lattice = "cube:6x5,edges".parse().unwrap();
+    assert_eq!((chosen.edges, chosen.to_string()), (Some(true), "cube:6x5,chord,scaled,outer=8,edges".to_owned()));
+    assert_eq!("cube:6x5,edges=auto".parse::<Lattice>().unwrap().edges, None);
 }
 
 #[test]
@@ -276,6 +327,7 @@ fn interpolation_is_continuous() {
     let mut rng = Rng::with_seed(6);
     for lattice in lattices() {
         let Directions::Cube { cells } = lattice.directions else { continue };
+        let steps_of_row = if lattice.has_edges() { cells + 1 } else { cells };
         let stored = store(&lattice, &noise(&lattice, &mut rng));
         let (slope, offset) = lattice.radial_map();
         let last = f64::from(lattice.shells - 1);
@@ -302,7 +354,7 @@ fn interpolation_is_continuous() {
                 let next = point(i);
                 let (d0, d1) = (before.length(), next.length());
                 let angle = before.cross(next).length().atan2(before.dot(next));
-                let cell = 2.0 * f64::from(cells) / 2.0 * 4.0 / PI * 6.0_f64.sqrt() * angle;
+                let cell = 2.0 * f64::from(steps_of_row) / 2.0 * 4.0 / PI * 6.0_f64.sqrt() * angle;
                 let shell = (shell_at(d1) - shell_at(d0)).abs();
                 let (u0, u1) = (lattice.unscale(d0), lattice.unscale(d1));
                 let bound = (cell + shell) * u0.max(u1) + (u1 - u0).abs() + 1e-12;

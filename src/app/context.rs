@@ -56,7 +56,8 @@ pub struct Global {
 #[command(next_help_heading = "Baking")]
 pub struct BakeArguments {
     /// Sample points: cube:SHELLSxCELLS or latlon:SHELLSxLATITUDESxLONGITUDES, then optionally ,chord|log|linear (spacing of
-    /// shells) ,scaled|raw (what is interpolated) ,inner=R ,outer=R (in bounding radii)
+    /// shells) ,scaled|raw (what is interpolated) ,inner=R ,outer=R (in bounding radii) ,edges (samples on the edges of a cube's faces,
+    /// shared by them: finer steps in as many bytes; not for boxes) ,edges=auto (by the mesh)
     #[arg(long, default_value_t = Lattice::default(), value_name = "LATTICE")]
     pub lattice: Lattice,
     /// Edge of a captured cube face in texels

@@ -31,6 +31,20 @@ pub struct Twin {
     pub deviation: f64,
 }
 
+impl Twin {
+    /// The same sample under another index.
+    pub fn same(of: u32) -> Self {
+        Twin { of, turn: DMat3::IDENTITY, deviation: 0.0 }
+    }
+}
+
+/// For every sample of a lattice the one that it is, where that stands before it.
+pub fn same(lattice: &Lattice) -> Vec<Option<Twin>> {
+    let count = lattice.direction_count();
+    let first = |sample: u32| sample / count * count + lattice.first_of(sample % count);
+    (0..lattice.sample_count()).map(|s| (first(s) < s).then(|| Twin::same(first(s)))).collect()
+}
+
 /// Deviation, in r, that may be seen from a surface's distance (in r) on faces of `face_px`. A face of N texels spans two units of
 /// position over depth, and depth is at least distance / sqrt 3.
 pub fn allowed(distance: f64, face_px: u32) -> f64 {
@@ -54,7 +68,7 @@ const ROUND_SAMPLES: u32 = 8;
 pub fn plan(lattice: &Lattice, symmetry: &Symmetry, face_px: u32, distance: impl Fn(u32) -> f64 + Sync) -> Plan {
     let count = lattice.direction_count();
     let directions: Vec<DVec3> = (0..count).map(|d| lattice.direction(d)).collect();
-    let places: HashMap<IVec3, u32> = directions.iter().enumerate().map(|(i, d)| (place(*d), i as u32)).collect();
+    let places: HashMap<IVec3, u32> = (0..count).rev().map(|i| (place(directions[i as usize]), i)).collect();
     // For each operation and direction the one that it comes from; an operation that leaves the lattice is of no use.
     let from_where = |matrix: DMat3| -> Option<Vec<u32>> {
         let back = matrix.transpose();
@@ -96,7 +110,7 @@ pub fn plan(lattice: &Lattice, symmetry: &Symmetry, face_px: u32, distance: impl
                 let first: u32 = *of_height.get(&heights[k])?;
                 let turn = about(k, directions[(first % count) as usize], here);
                 // The first of a height may come from elsewhere itself.
-                let before = twins[first as usize].unwrap_or(Twin { of: first, turn: DMat3::IDENTITY, deviation: 0.0 });
+                let before = twins[first as usize].unwrap_or(Twin::same(first));
                 let deviation = symmetry.revolution[k]? + before.deviation;
                 fits(&deviation).then_some(Twin { of: before.of, turn: turn * before.turn, deviation })
             })
@@ -106,6 +120,11 @@ pub fn plan(lattice: &Lattice, symmetry: &Symmetry, face_px: u32, distance: impl
             let turn = DMat3::from_quat(DQuat::from_rotation_arc(directions[(of % count) as usize], here));
             let made = !round[shell as usize].contains(&sample);
             twins[sample as usize] = made.then_some(Twin { of, turn, deviation: symmetry.sphere.unwrap_or(0.0) });
+            continue;
+        }
+        let first = shell * count + lattice.first_of(direction);
+        if first < sample {
+            twins[sample as usize] = Some(twins[first as usize].unwrap_or(Twin::same(first)));
             continue;
         }
         twins[sample as usize] = by_operation().or_else(by_axis);

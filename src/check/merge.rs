@@ -127,11 +127,12 @@ pub fn against_twin(frame: &mut Frame, placements: &[Placement]) -> Result<Agree
 }
 
 /// The lattices that are tried besides the pinned one, with what each is allowed to be off by.
-pub const LATTICES: [(&str, f64); 4] = [
+pub const LATTICES: [(&str, f64); 5] = [
     ("latlon:5x4x6", ANGLES),
     ("latlon:4x1x3,linear,raw", ANGLES),
     ("cube:5x3,log,raw,inner=0.5,outer=5", ARITHMETIC),
     ("cube:1x1", ARITHMETIC),
+    ("cube:5x3,edges", ARITHMETIC),
 ];
 
 /// The comparisons of `check`.

@@ -23,7 +23,7 @@ pub const FIELD_MAGIC: [u8; 8] = *b"SHFIELD\n";
 /// First bytes of a cached transfer file.
 pub const TRANSFER_MAGIC: [u8; 8] = *b"SHTRANS\n";
 /// Version that this program writes and reads. Goes up whenever the meaning of header or payload changes.
-pub const VERSION: u32 = 5;
+pub const VERSION: u32 = 6;
 /// Longest header that is read.
 const HEADER_LIMIT: u64 = 64 << 10;
 /// Largest payload that is read: 4 GiB.

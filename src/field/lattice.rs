@@ -6,39 +6,13 @@
 //! interpolation needs no branch and is continuous across face edges: both faces see the same two rows of cells there.
 
 use super::Fit;
+pub use super::directions::{CELL_WARP, Directions, unwarp, warp};
 use crate::error::{Error, Result};
-use crate::sh::cube;
 use glam::DVec3;
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
-
-/// Cells of a cube face have (almost) equal angles: cell coordinate u = s (c0 + c1 s^2 + c2 s^4) for s in [-1, 1]. This is
-/// (4/pi) atan(s) to 4.3e-3, matched in value at 1 and in slope at 0 and 1; a shader evaluates it with three multiply-adds.
-pub const CELL_WARP: [f64; 3] = {
-    let (slope_0, slope_1) = (4.0 / PI, 2.0 / PI);
-    let c2 = (slope_1 - slope_0 - 3.0 * (1.0 - slope_0)) / 2.0;
-    [slope_0, 1.0 - slope_0 - c2, c2]
-};
+use std::f64::consts::FRAC_PI_2;
 
 /// Most samples that a lattice may have; refused above (a field of 10^7 samples is some 640 MB).
 pub const MAX_SAMPLES: u64 = 4_000_000;
-
-/// How the directions of one shell are arranged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Directions {
-    /// `cells` x `cells` on each of six cube faces.
-    Cube {
-        /// Cells along a face edge.
-        cells: u32,
-    },
-    /// Rings of equal latitude, equal steps of longitude: what student implementations of the method used.
-    LatLon {
-        /// Rings; ring i lies at polar angle (i + 1/2) pi / latitudes from +y.
-        latitudes: u32,
-        /// Points on a ring; point j lies at azimuth 2 pi j / longitudes, counted from +x towards +z.
-        longitudes: u32,
-    },
-}
 
 /// How shells are spaced: the coordinate in which their steps are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -84,6 +58,11 @@ pub struct Lattice {
     pub scaled: bool,
     /// Where it lies around the object; `None` leaves that to the bake, and is round until then.
     pub fit: Option<Fit>,
+    /// Of a cube: whether each face has cells + 2 samples along a row, of which the first and last lie on its edges and are those of
+    /// its neighbours, rather than `cells` at cells' centres and copies of its neighbours'. As many bytes, finer steps. `None`
+    /// leaves that to the bake, and is centres until then.
+    #[serde(default)]
+    pub edges: Option<bool>,
 }
 
 impl Default for Lattice {
@@ -98,6 +77,7 @@ impl Default for Lattice {
             directions: Directions::Cube { cells: 8 },
             scaled: true,
             fit: None,
+            edges: Some(false),
         }
     }
 }
@@ -141,23 +121,6 @@ impl std::str::FromStr for Lookup {
             _ => Err(format!("unknown lookup \"{word}\" (nearest, radial or trilinear)")),
         }
     }
-}
-
-/// Cell coordinate in [-1, 1] of face coordinate s in [-1, 1].
-pub fn warp(s: f64) -> f64 {
-    let q = s * s;
-    s * (CELL_WARP[0] + q * (CELL_WARP[1] + q * CELL_WARP[2]))
-}
-
-/// Inverse of [`warp`], by Newton's method from the arctangent it stands for.
-pub fn unwarp(u: f64) -> f64 {
-    let mut s = (u * PI / 4.0).tan();
-    for _ in 0..8 {
-        let q = s * s;
-        let slope = CELL_WARP[0] + q * (3.0 * CELL_WARP[1] + q * 5.0 * CELL_WARP[2]);
-        s -= (warp(s) - u) / slope;
-    }
-    s
 }
 
 impl Spacing {
@@ -246,6 +209,12 @@ impl Lattice {
         self.fit.unwrap_or(Fit::ROUND)
     }
 
+    /// For a shader: [`Fit::packed`], and in the bit above its factors whether samples lie on edges.
+    pub fn packed(&self) -> [f32; 4] {
+        let [x, y, z, factors] = self.fit().packed();
+        [x, y, z, factors + if self.has_edges() { Fit::PACKED_BITS.exp2() } else { 0.0 }]
+    }
+
     /// Distance of a place (object's frame, in r) from the shells' centre in the lattice's space: what all that is said of
     /// distances here is about.
     pub fn distance(&self, position: DVec3) -> f64 {
@@ -265,25 +234,9 @@ impl Lattice {
         within * (self.outer / d.max(self.outer)).powi(2)
     }
 
-    /// Directions of one shell.
-    pub fn direction_count(&self) -> u32 {
-        match self.directions {
-            Directions::Cube { cells } => 6 * cells * cells,
-            Directions::LatLon { latitudes, longitudes } => latitudes * longitudes,
-        }
-    }
-
     /// Samples that are captured.
     pub fn sample_count(&self) -> u32 {
         self.shells * self.direction_count()
-    }
-
-    /// Directions of one shell as stored, borders included.
-    pub fn stored_direction_count(&self) -> u32 {
-        match self.directions {
-            Directions::Cube { cells } => 6 * (cells + 2) * (cells + 2),
-            Directions::LatLon { .. } => self.direction_count(),
-        }
     }
 
     /// Samples as stored, borders included.
@@ -291,88 +244,11 @@ impl Lattice {
         self.shells * self.stored_direction_count()
     }
 
-    /// Unit direction of the `index`-th captured sample of a shell, in the lattice's space.
-    pub fn direction(&self, index: u32) -> DVec3 {
-        match self.directions {
-            Directions::Cube { cells } => {
-                let (face, cell) = (index / (cells * cells), index % (cells * cells));
-                let st = |i: u32| unwarp((f64::from(i) + 0.5) / f64::from(cells) * 2.0 - 1.0);
-                cube::direction(face as usize, st(cell % cells), st(cell / cells))
-            }
-            Directions::LatLon { latitudes, longitudes } => {
-                let polar = (f64::from(index / longitudes) + 0.5) * PI / f64::from(latitudes);
-                let azimuth = f64::from(index % longitudes) * TAU / f64::from(longitudes);
-                DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin())
-            }
-        }
-    }
-
     /// Position of the `index`-th captured sample, in r from the sphere's centre, object's frame; shells come one after another,
     /// innermost first.
     pub fn position(&self, index: u32) -> DVec3 {
         let at = self.shell(index / self.direction_count()) * self.direction(index % self.direction_count());
         self.fit().invert(at)
-    }
-
-    /// For every stored direction, the captured directions whose mean it is: one for a cell, one for a border, three for
-    /// the corner of a border.
-    pub fn sources(&self) -> Vec<Vec<u32>> {
-        let Directions::Cube { cells } = self.directions else {
-            return (0..self.direction_count()).map(|i| vec![i]).collect();
-        };
-        let n = i64::from(cells);
-        let mut out = Vec::with_capacity(self.stored_direction_count() as usize);
-        for face in 0..6 {
-            for y in -1..=n {
-                for x in -1..=n {
-                    let (inside_x, inside_y) = (x.clamp(0, n - 1), y.clamp(0, n - 1));
-                    out.push(match (x == inside_x, y == inside_y) {
-                        (true, true) => vec![self.cell_index(face, x, y)],
-                        (false, false) => vec![
-                            self.cell_index(face, inside_x, inside_y),
-                            self.neighbour(face, x, inside_y),
-                            self.neighbour(face, inside_x, y),
-                        ],
-                        _ => vec![self.neighbour(face, x, y)],
-                    });
-                }
-            }
-        }
-        out
-    }
-
-    /// The four captured directions around one of a cube lattice.
-    pub fn cell_neighbours(&self, direction: u32) -> Vec<u32> {
-        let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
-        let n = i64::from(cells);
-        let (face, x, y) = (direction / (cells * cells), direction % cells, direction / cells % cells);
-        let (x, y) = (i64::from(x), i64::from(y));
-        [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)]
-            .map(|(x, y)| {
-                let within = (0..n).contains(&x) && (0..n).contains(&y);
-                if within { self.cell_index(face, x, y) } else { self.neighbour(face, x, y) }
-            })
-            .to_vec()
-    }
-
-    fn cell_index(&self, face: u32, x: i64, y: i64) -> u32 {
-        let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
-        (face * cells + y as u32) * cells + x as u32
-    }
-
-    /// The captured direction that lies one cell beyond the edge of `face`, where exactly one of x and y is outside.
-    fn neighbour(&self, face: u32, x: i64, y: i64) -> u32 {
-        let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
-        let n = i64::from(cells);
-        // A hair beyond the edge the other face's cell is found by plain projection.
-        let st = |i: i64| match i {
-            -1 => -1.0 - 1e-6,
-            i if i == n => 1.0 + 1e-6,
-            i => unwarp((i as f64 + 0.5) / f64::from(cells) * 2.0 - 1.0),
-        };
-        let (other, s, t) = cube::face_st(cube::direction(face as usize, st(x), st(y)));
-        let cell = |s: f64| (((warp(s) + 1.0) / 2.0 * f64::from(cells)).floor() as i64).clamp(0, n - 1);
-        self.cell_index(other as u32, cell(s), cell(t))
     }
 
     /// Stored samples around a receiver at `position` (in r, object's frame). Non-negative weights that sum to 1; a
@@ -401,43 +277,6 @@ impl Lattice {
         corners
     }
 
-    /// The four cells around a direction within one shell.
-    fn plane(&self, direction: DVec3, lookup: Lookup) -> Plane {
-        let settle = |x: f64| if lookup == Lookup::Trilinear { x } else { x.round() };
-        match self.directions {
-            Directions::Cube { cells } => {
-                let (face, s, t) = cube::face_st(direction);
-                // Border cells shift the index by one, cell centres by a half.
-                let place = |s: f64| settle((warp(s) + 1.0) / 2.0 * f64::from(cells) + 0.5);
-                let (x, y) = (place(s), place(t));
-                // Rounding may land on cells + 1/2 exactly: stay inside the stored rows.
-                let low = |x: f64| (x.floor() as u32).min(cells);
-                let (x0, y0) = (low(x), low(y));
-                Plane {
-                    base: face as u32 * (cells + 2) * (cells + 2),
-                    columns: cells + 2,
-                    x: [x0, x0 + 1],
-                    y: [y0, y0 + 1],
-                    fraction: [x - f64::from(x0), y - f64::from(y0)],
-                }
-            }
-            Directions::LatLon { latitudes, longitudes } => {
-                let polar = direction.y.clamp(-1.0, 1.0).acos() / PI * f64::from(latitudes) - 0.5;
-                let azimuth = (direction.z.atan2(direction.x) / TAU).rem_euclid(1.0) * f64::from(longitudes);
-                let y = settle(polar.clamp(0.0, f64::from(latitudes - 1)));
-                let x = settle(azimuth);
-                let (x0, y0) = (x.floor() as u32, (y.floor() as u32).min(latitudes.saturating_sub(2)));
-                Plane {
-                    base: 0,
-                    columns: longitudes,
-                    x: [x0 % longitudes, (x0 + 1) % longitudes],
-                    y: [y0, (y0 + 1).min(latitudes - 1)],
-                    fraction: [x - f64::from(x0), y - f64::from(y0)],
-                }
-            }
-        }
-    }
-
     /// Checks counts and radii.
     ///
     /// # Errors
@@ -445,6 +284,9 @@ impl Lattice {
     pub fn validate(&self) -> Result<()> {
         let bad = |what: String| Err(Error::Input(format!("lattice {self}: {what}")));
         let directions = match self.directions {
+            Directions::Cube { cells } if self.has_edges() && cells > 0 => {
+                (u64::from(cells) + 2).pow(2).saturating_mul(6)
+            }
             Directions::Cube { cells } => u64::from(cells).pow(2).saturating_mul(6),
             Directions::LatLon { latitudes, longitudes } => u64::from(latitudes) * u64::from(longitudes),
         };
@@ -464,96 +306,4 @@ impl Lattice {
         }
         Ok(())
     }
-}
-
-/// Four cells of a shell and the place between them.
-struct Plane {
-    base: u32,
-    columns: u32,
-    x: [u32; 2],
-    y: [u32; 2],
-    fraction: [f64; 2],
-}
-
-impl std::fmt::Display for Lattice {
-    /// In the words that the parser takes.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.directions {
-            Directions::Cube { cells } => write!(f, "cube:{}x{cells}", self.shells)?,
-            Directions::LatLon { latitudes, longitudes } => {
-                write!(f, "latlon:{}x{latitudes}x{longitudes}", self.shells)?;
-            }
-        }
-        let spacing = match self.spacing {
-            Spacing::Chord => "chord",
-            Spacing::Log => "log",
-            Spacing::Linear => "linear",
-        };
-        let stored = if self.scaled { "scaled" } else { "raw" };
-        write!(f, ",{spacing},{stored}")?;
-        if self.inner != AUTOMATIC {
-            write!(f, ",inner={}", self.inner)?;
-        }
-        write!(f, ",outer={}", self.outer)?;
-        let words = |of: [f64; 3]| of.map(|x| x.to_string()).join(":");
-        match self.fit {
-            Some(fit) if fit == Fit::ROUND => write!(f, ",round"),
-            Some(fit) => write!(f, ",centre={},stretch={}", words(fit.centre), words(fit.stretch)),
-            None => Ok(()),
-        }
-    }
-}
-
-impl std::str::FromStr for Lattice {
-    type Err = String;
-
-    /// `cube:SHELLSxCELLS` or `latlon:SHELLSxLATITUDESxLONGITUDES`, then any of `,chord` `,log` `,linear` `,scaled`
-    /// `,raw` `,inner=R` `,outer=R` `,round`, or `,centre=X:Y:Z` and `,stretch=X:Y:Z`.
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let explain = || {
-            format!(
-                "cannot read lattice \"{text}\" (cube:16x8 or latlon:8x4x4, then optionally ,chord|log|linear \
-                 ,scaled|raw ,inner=R ,outer=R ,round)"
-            )
-        };
-        let mut words = text.split(',');
-        let (kind, counts) = words.next().and_then(|w| w.split_once(':')).ok_or_else(explain)?;
-        let counts: Vec<u32> =
-            counts.split('x').map(str::parse).collect::<std::result::Result<_, _>>().map_err(|_| explain())?;
-        let mut lattice = Lattice::default();
-        (lattice.shells, lattice.directions) = match (kind, &counts[..]) {
-            ("cube", &[shells, cells]) => (shells, Directions::Cube { cells }),
-            ("latlon", &[shells, latitudes, longitudes]) => (shells, Directions::LatLon { latitudes, longitudes }),
-            _ => return Err(explain()),
-        };
-        for word in words {
-            match word.split_once('=') {
-                Some(("inner", radius)) => lattice.inner = radius.parse().map_err(|_| explain())?,
-                Some(("outer", radius)) => lattice.outer = radius.parse().map_err(|_| explain())?,
-                Some(("centre", words)) => {
-                    lattice.fit.get_or_insert(Fit::ROUND).centre = triple(words).ok_or_else(explain)?;
-                }
-                Some(("stretch", words)) => {
-                    lattice.fit.get_or_insert(Fit::ROUND).stretch = triple(words).ok_or_else(explain)?;
-                }
-                _ => match word {
-                    "chord" => lattice.spacing = Spacing::Chord,
-                    "log" => lattice.spacing = Spacing::Log,
-                    "linear" => lattice.spacing = Spacing::Linear,
-                    "scaled" => lattice.scaled = true,
-                    "raw" => lattice.scaled = false,
-                    "round" => lattice.fit = Some(Fit::ROUND),
-                    _ => return Err(explain()),
-                },
-            }
-        }
-        lattice.validate().map_err(|error| error.to_string())?;
-        Ok(lattice)
-    }
-}
-
-/// Three numbers with colons between.
-fn triple(words: &str) -> Option<[f64; 3]> {
-    let numbers: Vec<f64> = words.split(':').map(|w| w.parse().ok()).collect::<Option<_>>()?;
-    numbers.try_into().ok()
 }

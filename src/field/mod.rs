@@ -1,6 +1,7 @@
 //! A baked field: where it is sampled ([`lattice`]), what is stored, and its file ([`mod@file`]).
 
 pub mod area;
+mod directions;
 pub mod extent;
 pub mod file;
 pub mod fit;
@@ -8,6 +9,7 @@ pub mod growth;
 pub mod lattice;
 pub mod log_space;
 pub mod quantity;
+mod text;
 
 pub use area::Area;
 pub use fit::Fit;

@@ -43,7 +43,7 @@ impl Workload {
     pub fn new(device: &Arc<Device>, vertex_count: u32, occluder_count: u32) -> Result<Self> {
         let vertex_count = vertex_count.next_multiple_of(CLUSTER_VERTICES);
         let lattice = Lattice::default().starting_at(1.0);
-        let shift = lattice.fit().packed();
+        let shift = lattice.packed();
         let (slope, offset) = lattice.radial_map();
         let entity_limit = uniform_entities(device);
         let count = (1 + occluder_count).max(entity_limit) as usize;

@@ -1,0 +1,267 @@
+//! How the directions of a shell are arranged, and between which of them a direction lies.
+
+use super::lattice::{Lattice, Lookup};
+use crate::sh::cube;
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
+
+/// Cells of a cube face have (almost) equal angles: cell coordinate u = s (c0 + c1 s^2 + c2 s^4) for s in [-1, 1]. This is
+/// (4/pi) atan(s) to 4.3e-3, matched in value at 1 and in slope at 0 and 1; a shader evaluates it with three multiply-adds.
+pub const CELL_WARP: [f64; 3] = {
+    let (slope_0, slope_1) = (4.0 / PI, 2.0 / PI);
+    let c2 = (slope_1 - slope_0 - 3.0 * (1.0 - slope_0)) / 2.0;
+    [slope_0, 1.0 - slope_0 - c2, c2]
+};
+
+/// How the directions of one shell are arranged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Directions {
+    /// `cells` x `cells` on each of six cube faces.
+    Cube {
+        /// Cells along a face edge.
+        cells: u32,
+    },
+    /// Rings of equal latitude, equal steps of longitude: what student implementations of the method used.
+    LatLon {
+        /// Rings; ring i lies at polar angle (i + 1/2) pi / latitudes from +y.
+        latitudes: u32,
+        /// Points on a ring; point j lies at azimuth 2 pi j / longitudes, counted from +x towards +z.
+        longitudes: u32,
+    },
+}
+
+/// Cell coordinate in [-1, 1] of face coordinate s in [-1, 1].
+pub fn warp(s: f64) -> f64 {
+    let q = s * s;
+    s * (CELL_WARP[0] + q * (CELL_WARP[1] + q * CELL_WARP[2]))
+}
+
+/// Inverse of [`warp`], by Newton's method from the arctangent it stands for.
+pub fn unwarp(u: f64) -> f64 {
+    let mut s = (u * PI / 4.0).tan();
+    for _ in 0..8 {
+        let q = s * s;
+        let slope = CELL_WARP[0] + q * (3.0 * CELL_WARP[1] + q * 5.0 * CELL_WARP[2]);
+        s -= (warp(s) - u) / slope;
+    }
+    s
+}
+
+/// Face coordinate of the i-th of `columns` nodes along a row, from edge to edge.
+fn node_st(i: u32, columns: u32) -> f64 {
+    match i {
+        0 => -1.0,
+        i if i + 1 == columns => 1.0,
+        i => unwarp(2.0 * f64::from(i) / f64::from(columns - 1) - 1.0),
+    }
+}
+
+/// Inverse of [`node_st`], between nodes too.
+fn node_at(s: f64, columns: u32) -> f64 {
+    (warp(s) + 1.0) / 2.0 * f64::from(columns - 1)
+}
+
+/// Four cells of a shell and the place between them.
+pub(super) struct Plane {
+    pub base: u32,
+    pub columns: u32,
+    pub x: [u32; 2],
+    pub y: [u32; 2],
+    pub fraction: [f64; 2],
+}
+
+impl Lattice {
+    /// Whether samples lie on the edges of a cube's faces.
+    pub fn has_edges(&self) -> bool {
+        self.edges == Some(true) && matches!(self.directions, Directions::Cube { .. })
+    }
+
+    /// Captured directions along a row of a cube's face.
+    fn columns(&self) -> u32 {
+        let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
+        if self.has_edges() { cells + 2 } else { cells }
+    }
+
+    /// Directions of one shell; one that faces share counts on each of them.
+    pub fn direction_count(&self) -> u32 {
+        match self.directions {
+            Directions::Cube { .. } => 6 * self.columns() * self.columns(),
+            Directions::LatLon { latitudes, longitudes } => latitudes * longitudes,
+        }
+    }
+
+    /// The first index of the direction that the `index`-th is: of one that faces share the same for all of them.
+    pub fn first_of(&self, index: u32) -> u32 {
+        if !self.has_edges() {
+            return index;
+        }
+        let columns = self.columns();
+        let (face, x, y) = (index / (columns * columns), index % columns, index / columns % columns);
+        if [x, y].iter().all(|i| (1..columns - 1).contains(i)) {
+            return index;
+        }
+        let direction = cube::direction(face as usize, node_st(x, columns), node_st(y, columns));
+        let most = direction.abs().max_element();
+        let first = (0..cube::FACE_COUNT).find(|&f| cube::face_basis(f).0.dot(direction) > most - 1e-9);
+        let (first, (forward, right, down)) = first.map(|f| (f as u32, cube::face_basis(f))).expect("one is largest");
+        let at = |axis: DVec3| node_at(axis.dot(direction) / forward.dot(direction), columns).round() as u32;
+        (first * columns + at(down)) * columns + at(right)
+    }
+
+    /// The direction of that place on a face, or one step beyond its edge.
+    fn node(&self, face: u32, x: i64, y: i64) -> u32 {
+        let columns = self.columns();
+        let last = i64::from(columns) - 1;
+        let within = |i: i64| (0..=last).contains(&i);
+        if within(x) && within(y) {
+            return self.first_of((face * columns + y as u32) * columns + x as u32);
+        }
+        // A hair beyond the edge, and along it off its ends, another face is found by plain projection; there a step from its edge.
+        let (hair, off_end) = (1e-6, 1e-3);
+        let st = |i: i64| match i {
+            -1 => -1.0 - hair,
+            0 => -1.0 + off_end,
+            i if i == last => 1.0 - off_end,
+            i if i > last => 1.0 + hair,
+            i => node_st(i as u32, columns),
+        };
+        let (other, s, t) = cube::face_st(cube::direction(face as usize, st(x), st(y)));
+        let along = |s: f64| node_at(s, columns).round() as u32;
+        let step = |s: f64| if s < 0.0 { 1 } else { columns - 2 };
+        let (x, y) = if s.abs() > t.abs() { (step(s), along(t)) } else { (along(s), step(t)) };
+        self.first_of((other as u32 * columns + y) * columns + x)
+    }
+
+    /// Directions of one shell as stored, borders included.
+    pub fn stored_direction_count(&self) -> u32 {
+        match self.directions {
+            Directions::Cube { cells } => 6 * (cells + 2) * (cells + 2),
+            Directions::LatLon { .. } => self.direction_count(),
+        }
+    }
+
+    /// Unit direction of the `index`-th captured sample of a shell, in the lattice's space.
+    pub fn direction(&self, index: u32) -> DVec3 {
+        match self.directions {
+            Directions::Cube { cells } if self.has_edges() => {
+                let (index, columns) = (self.first_of(index), cells + 2);
+                let st = |i: u32| node_st(i, columns);
+                let face = (index / (columns * columns)) as usize;
+                cube::direction(face, st(index % columns), st(index / columns % columns))
+            }
+            Directions::Cube { cells } => {
+                let (face, cell) = (index / (cells * cells), index % (cells * cells));
+                let st = |i: u32| unwarp((f64::from(i) + 0.5) / f64::from(cells) * 2.0 - 1.0);
+                cube::direction(face as usize, st(cell % cells), st(cell / cells))
+            }
+            Directions::LatLon { latitudes, longitudes } => {
+                let polar = (f64::from(index / longitudes) + 0.5) * PI / f64::from(latitudes);
+                let azimuth = f64::from(index % longitudes) * TAU / f64::from(longitudes);
+                DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin())
+            }
+        }
+    }
+
+    /// For every stored direction, the captured directions whose mean it is: one for a cell, one for a border, three for
+    /// the corner of a border.
+    pub fn sources(&self) -> Vec<Vec<u32>> {
+        let (Directions::Cube { cells }, false) = (self.directions, self.has_edges()) else {
+            return (0..self.direction_count()).map(|i| vec![self.first_of(i)]).collect();
+        };
+        let n = i64::from(cells);
+        let mut out = Vec::with_capacity(self.stored_direction_count() as usize);
+        for face in 0..6 {
+            for y in -1..=n {
+                for x in -1..=n {
+                    let (inside_x, inside_y) = (x.clamp(0, n - 1), y.clamp(0, n - 1));
+                    out.push(match (x == inside_x, y == inside_y) {
+                        (true, true) => vec![self.cell_index(face, x, y)],
+                        (false, false) => vec![
+                            self.cell_index(face, inside_x, inside_y),
+                            self.neighbour(face, x, inside_y),
+                            self.neighbour(face, inside_x, y),
+                        ],
+                        _ => vec![self.neighbour(face, x, y)],
+                    });
+                }
+            }
+        }
+        out
+    }
+
+    /// The four captured directions around one of a cube lattice, in two opposite pairs. Where three edges meet there are only three:
+    /// the one on the third stands opposite to both others.
+    pub fn cell_neighbours(&self, direction: u32) -> Vec<u32> {
+        let (columns, n) = (self.columns(), i64::from(self.columns()));
+        let (face, x, y) = (direction / (columns * columns), direction % columns, direction / columns % columns);
+        let (x, y) = (i64::from(x), i64::from(y));
+        if self.has_edges() {
+            return [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)].map(|(x, y)| self.node(face, x, y)).to_vec();
+        }
+        [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)]
+            .map(|(x, y)| {
+                let within = (0..n).contains(&x) && (0..n).contains(&y);
+                if within { self.cell_index(face, x, y) } else { self.neighbour(face, x, y) }
+            })
+            .to_vec()
+    }
+
+    fn cell_index(&self, face: u32, x: i64, y: i64) -> u32 {
+        let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
+        (face * cells + y as u32) * cells + x as u32
+    }
+
+    /// The captured direction that lies one cell beyond the edge of `face`, where exactly one of x and y is outside.
+    fn neighbour(&self, face: u32, x: i64, y: i64) -> u32 {
+        let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
+        let n = i64::from(cells);
+        // A hair beyond the edge the other face's cell is found by plain projection.
+        let st = |i: i64| match i {
+            -1 => -1.0 - 1e-6,
+            i if i == n => 1.0 + 1e-6,
+            i => unwarp((i as f64 + 0.5) / f64::from(cells) * 2.0 - 1.0),
+        };
+        let (other, s, t) = cube::face_st(cube::direction(face as usize, st(x), st(y)));
+        let cell = |s: f64| (((warp(s) + 1.0) / 2.0 * f64::from(cells)).floor() as i64).clamp(0, n - 1);
+        self.cell_index(other as u32, cell(s), cell(t))
+    }
+
+    /// The four cells around a direction within one shell.
+    pub(super) fn plane(&self, direction: DVec3, lookup: Lookup) -> Plane {
+        let settle = |x: f64| if lookup == Lookup::Trilinear { x } else { x.round() };
+        match self.directions {
+            Directions::Cube { cells } => {
+                let (face, s, t) = cube::face_st(direction);
+                // From the middle of a row to its ends, of a row without its borders where those are other faces' cells.
+                let half = f64::from(if self.has_edges() { cells + 1 } else { cells }) / 2.0;
+                let place = |s: f64| settle(warp(s) * half + f64::from(cells + 1) / 2.0);
+                let (x, y) = (place(s), place(t));
+                // Rounding may land on cells + 1/2 exactly: stay inside the stored rows.
+                let low = |x: f64| (x.floor() as u32).min(cells);
+                let (x0, y0) = (low(x), low(y));
+                Plane {
+                    base: face as u32 * (cells + 2) * (cells + 2),
+                    columns: cells + 2,
+                    x: [x0, x0 + 1],
+                    y: [y0, y0 + 1],
+                    fraction: [x - f64::from(x0), y - f64::from(y0)],
+                }
+            }
+            Directions::LatLon { latitudes, longitudes } => {
+                let polar = direction.y.clamp(-1.0, 1.0).acos() / PI * f64::from(latitudes) - 0.5;
+                let azimuth = (direction.z.atan2(direction.x) / TAU).rem_euclid(1.0) * f64::from(longitudes);
+                let y = settle(polar.clamp(0.0, f64::from(latitudes - 1)));
+                let x = settle(azimuth);
+                let (x0, y0) = (x.floor() as u32, (y.floor() as u32).min(latitudes.saturating_sub(2)));
+                Plane {
+                    base: 0,
+                    columns: longitudes,
+                    x: [x0 % longitudes, (x0 + 1) % longitudes],
+                    y: [y0, (y0 + 1).min(latitudes - 1)],
+                    fraction: [x - f64::from(x0), y - f64::from(y0)],
+                }
+            }
+        }
+    }
+}

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::field::{Lattice, Lookup, Storage};
 use crate::frame;
 use crate::gpu::{self, Device, Validation};
+use crate::render::draw::Antialias;
 use crate::render::gather::Place;
 use crate::render::variant::{Chain, EPS, Product, Skip};
 use crate::render::{Variant, calibrate};
@@ -121,9 +122,11 @@ pub struct MergeArguments {
 }
 
 impl MergeArguments {
-    /// How occluders are multiplied.
-    pub fn chain(&self) -> Chain {
-        Chain { product: self.product, guard: self.guard }
+    /// A frame of that size, merged as the arguments say.
+    pub fn options(&self, bake: bake::Options, size: [u32; 2], antialias: Antialias) -> frame::Options {
+        let chain = Chain { product: self.product, guard: self.guard };
+        let (lookup, variant, skip, eps, lists) = (self.lookup, self.variant, self.skip, self.eps, self.lists);
+        frame::Options { bake, lookup, variant, skip, chain, eps, lists, size, antialias }
     }
 }
 

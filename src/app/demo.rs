@@ -149,17 +149,8 @@ fn load(name: &str) -> Result<Scene> {
 
 fn options(arguments: &Arguments, scene: &Scene) -> Options {
     let shape = &scene.data.output;
-    Options {
-        bake: bake::Options::default(),
-        lookup: arguments.merge.lookup,
-        variant: arguments.merge.variant,
-        skip: arguments.merge.skip,
-        chain: arguments.merge.chain(),
-        eps: arguments.merge.eps,
-        lists: arguments.merge.lists,
-        size: arguments.size.unwrap_or([shape.width, shape.height]),
-        antialias: arguments.antialias,
-    }
+    let size = arguments.size.unwrap_or([shape.width, shape.height]);
+    arguments.merge.options(bake::Options::default(), size, arguments.antialias)
 }
 
 /// The scene's picture, and its frame time while it moves: frames as a window shows them, not read back, edges smoothed one way

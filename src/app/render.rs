@@ -6,7 +6,7 @@ use crate::asset::false_color::Scheme;
 use crate::asset::picture;
 use crate::bench::text;
 use crate::error::{Error, Result};
-use crate::frame::{Frame, Options};
+use crate::frame::Frame;
 use crate::render::draw::Antialias;
 use crate::scene::Scene;
 use crate::truth::{self, ErrorMap, error_map, raycast::RayCast};
@@ -86,17 +86,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let started = Instant::now();
     let shape = &scene.data.output;
     let first_s = arguments.time.unwrap_or(shape.time_s);
-    let options = Options {
-        bake: arguments.bake.options(),
-        lookup: arguments.merge.lookup,
-        variant: arguments.merge.variant,
-        skip: arguments.merge.skip,
-        chain: arguments.merge.chain(),
-        eps: arguments.merge.eps,
-        lists: arguments.merge.lists,
-        size: arguments.size.unwrap_or([shape.width, shape.height]),
-        antialias: arguments.antialias,
-    };
+    let size = arguments.size.unwrap_or([shape.width, shape.height]);
+    let options = arguments.merge.options(arguments.bake.options(), size, arguments.antialias);
     let mut frame = context.frame(&scene, options).map_err(|error| match error {
         Error::Input(_) => error.context(arguments.scene.display()),
         other => other,

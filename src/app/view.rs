@@ -4,7 +4,6 @@ use super::Global;
 use super::context::{BakeArguments, Context, MergeArguments, size};
 use crate::bake::cache::Cache;
 use crate::error::{Error, Result};
-use crate::frame;
 use crate::gpu::{self, Device, PresentMode, Window};
 use crate::render::draw::Antialias;
 use crate::scene::Scene;
@@ -168,23 +167,13 @@ impl App<'_> {
             None
         };
         let cache = folder.as_ref().map_or_else(|| self.context.cache.clone(), |f| Cache::new(Some(f.path())));
-        let merge = &self.arguments.merge;
+        let antialias = self.arguments.antialias.unwrap_or_else(|| Antialias::usual(device));
         let setup = Setup {
             device: device.clone(),
             options: self.device_options.clone(),
             library: self.context.baker.library().clone(),
             cache,
-            frame: frame::Options {
-                bake: self.arguments.bake.options(),
-                lookup: merge.lookup,
-                variant: merge.variant,
-                chain: merge.chain(),
-                eps: merge.eps,
-                lists: merge.lists,
-                skip: merge.skip,
-                size: own,
-                antialias: self.arguments.antialias.unwrap_or_else(|| Antialias::usual(device)),
-            },
+            frame: self.arguments.merge.options(self.arguments.bake.options(), own, antialias),
             format: target.format(),
             encodes_srgb: target.encodes_srgb(),
             seed: self.global.seed,

@@ -21,6 +21,7 @@ Cone cone_of(vec4 centre, vec3 position) {
 
 const float FADE_SINE = sin(FADE);
 const float FADE_COSINE = cos(FADE);
+const float MEET_SINE = sin(MEET);
 
 // 1 while any of the cone stands above the horizon of the surface, 0 when it lies FADE below. From within FADE of the sphere
 // it never reaches 0.
@@ -32,7 +33,8 @@ float above_horizon(Cone cone, vec3 normal) {
 #endif
 }
 
-// 1 while two cones overlap, 0 when they are FADE apart. Cones that fill the view together always overlap.
+// 0 when two cones are FADE apart, 1 when they reach MEET into one another, or one into the middle of the other; from near a sphere they
+// need reach less. Cones that fill the view together always overlap.
 float overlap(Cone a, Cone b) {
 #if SKIP_CONES
     float cosine = a.cosine * b.cosine - a.sine * b.sine;
@@ -41,7 +43,10 @@ float overlap(Cone a, Cone b) {
     if (max(a.sine, b.sine) == 1.0 || apart >= cosine) {
         return 1.0;
     }
-    return smoothstep(apart, cosine, dot(a.toward, b.toward));
+    float deep_sine = MEET_SINE * min(a.cosine, b.cosine);
+    float deep_cosine = sqrt(1.0 - deep_sine * deep_sine);
+    float met = cosine >= deep_cosine ? 1.0 : cosine * deep_cosine + sine * deep_sine;
+    return smoothstep(apart, met, dot(a.toward, b.toward));
 #else
     return 1.0;
 #endif

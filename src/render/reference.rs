@@ -1,7 +1,7 @@
 //! The CPU twin of "merge", in f64 and vertex by vertex, from the same stored numbers.
 
 use super::chain::{Method, Multiplier, State};
-use super::variant::{CAP_SINES, CAP_SPREAD, SKIP_FADE_RAD, Skip};
+use super::variant::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::field::{Area, Lookup, ShadowField};
 use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
@@ -240,11 +240,14 @@ impl Cone {
         Cap { solid_angle: 2.0 * PI * covered / (1.0 + cosine), y }
     }
 
-    /// Share with which an occluder counts before a light: 1 where their spheres overlap, fading to 0 beside each other.
+    /// Share with which an occluder counts before a light: 1 where their cones reach
+    /// [`CONES_MEET_RAD`] into one another, fading to 0 where they are [`SKIP_FADE_RAD`] apart.
     pub fn overlap(&self, other: &Cone, skip: Skip) -> f64 {
         match (self.half_angle_rad, other.half_angle_rad) {
             (Some(a), Some(b)) if skip.cones && (a + b + SKIP_FADE_RAD).cos() < (a + b).cos() => {
-                smoothstep((a + b + SKIP_FADE_RAD).cos(), (a + b).cos(), self.toward.dot(other.toward))
+                let deep = (CONES_MEET_RAD.sin() * a.cos().min(b.cos())).asin();
+                let met = (a + b - deep).max(0.0);
+                smoothstep((a + b + SKIP_FADE_RAD).cos(), met.cos(), self.toward.dot(other.toward))
             }
             _ => 1.0,
         }
@@ -276,4 +279,30 @@ impl Cap {
 fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As a light passes an occluder its share goes from all to none without a step, ever less; so does a field's as it becomes a cap.
+    #[test]
+    fn shares_fade_without_a_step() {
+        let cone = |rad: f64, sine: f64| Cone::new(DVec3::new(rad.cos(), rad.sin(), 0.0) / sine, 1.0, DVec3::ZERO);
+        for (a, b) in [(0.5, 0.3), (0.2, 0.05), (0.03, 0.02), (0.99, 0.3)] {
+            let share = |i: usize| cone(0.0, a).overlap(&cone(1e-3 * i as f64, b), Skip::ALL);
+            let walk: Vec<f64> = (0..3000).map(share).collect();
+            assert_eq!(walk[0], 1.0, "one behind the other");
+            let touching = (1e3 * (a.asin() + b.asin())) as usize;
+            let past = touching + (1e3 * SKIP_FADE_RAD) as usize + 2;
+            assert!(past >= 3000 || walk[past] == 0.0, "{a} {b}: {}", walk[past]);
+            let step =
+                walk.windows(2).map(|w| w[0] - w[1]).fold((0.0, 0.0), |(l, m): (f64, f64), s| (l.min(s), m.max(s)));
+            assert!(step.0 >= 0.0 && step.1 > 1e-3 && step.1 < 0.012, "{a} {b}: {step:?}");
+        }
+        let share = |i: usize| cone(0.0, 1.0 / (1.0 + 1e-3 * i as f64)).field_share(Skip::ALL);
+        let walk: Vec<f64> = (0..8000).map(share).collect();
+        let step = walk.windows(2).map(|w| w[0] - w[1]).fold(0.0, f64::max);
+        assert!(walk[0] == 1.0 && walk[7999] == 0.0 && step < 2e-3, "{step}");
+    }
 }

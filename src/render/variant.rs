@@ -213,6 +213,10 @@ pub const EPS: f32 = 1e-3;
 /// Angle over which a skip fades out: 10 degrees.
 pub const SKIP_FADE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
+/// Angle by which the cones of occluder and light reach into one another where the occluder counts in full: 20 degrees. Where they meet
+/// less, little of the light is behind the occluder, but four bands darken all of it.
+pub const CONES_MEET_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
+
 /// Sines of the half-angle of an occluder's bounding sphere: it is looked up in its field from the second on, a cap up to the
 /// first, and both by shares between.
 pub const CAP_SINES: [f64; 2] = [0.21, 0.27];
@@ -355,6 +359,7 @@ impl Form {
             .define("SKIP_HORIZON", self.skip.horizon)
             .define("SKIP_CONES", self.skip.cones)
             .number("FADE", SKIP_FADE_RAD)
+            .number("MEET", CONES_MEET_RAD)
             .define("CAPS", self.skip.caps)
             .number("CAP_SINE_LEAST", CAP_SINES[0])
             .number("CAP_SINE_MOST", CAP_SINES[1])

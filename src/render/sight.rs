@@ -1,9 +1,9 @@
 //! What the camera may see of a mesh, run of triangles by run: what it cannot see need not be lit while things move, nor drawn.
 //!
-//! Nothing that a pixel shows is ever taken for unseen. A run lies outside where the sphere around it does, by a pixel at least; its
-//! triangles are backs where the cone of their normals says so for every point of that sphere, with an angle to spare. Backs count as
-//! unseen only where the draw culls them, which it does for solid meshes ([`Mesh::is_solid`]) with the eye outside: whether a pixel
-//! at an outline shows a front or a back is then the rasteriser's decision and not this one's.
+//! Nothing that a pixel shows is ever taken for unseen. A run lies outside where the sphere or the box around it does, by a pixel at
+//! least; its triangles are backs where the cone of their normals says so for every point of that sphere, with an angle to spare.
+//! Backs count as unseen only where the draw culls them, which it does for solid meshes ([`Mesh::is_solid`]) with the eye outside:
+//! whether a pixel at an outline shows a front or a back is then the rasteriser's decision and not this one's.
 
 use super::moment::Bounds;
 use crate::asset::grid::Grid;
@@ -26,6 +26,8 @@ pub struct Faces {
     centre: Vec3,
     /// Its radius in metres.
     radius_m: f32,
+    /// Half the edges of a box around them with that centre, metres.
+    half_m: Vec3,
     /// Axis of a cone around their normals.
     axis: Vec3,
     /// Cosine and sine of its half-angle with [`BACK_RAD`]; the cosine is not positive where they are never all backs.
@@ -78,11 +80,14 @@ impl Faces {
         };
         let normals: Vec<Vec3> = triangles.iter().filter_map(normal).collect();
         let bounds = Bounds::new(&corners, &normals);
+        let centre = Vec3::from_array(bounds.centre);
+        let half = corners.iter().fold(Vec3::ZERO, |half, corner| half.max((*corner - centre).abs()));
         let spread = f64::from(bounds.cosine).acos() + BACK_RAD;
         let known = Vec3::from_array(bounds.axis) != Vec3::ZERO;
         Faces {
-            centre: bounds.centre.into(),
+            centre,
             radius_m: bounds.radius_m,
+            half_m: half + Vec3::splat(1e-6 * (centre.length() + bounds.radius_m)),
             axis: bounds.axis.into(),
             spread: if known { [spread.cos() as f32, spread.sin() as f32] } else { [-1.0, 0.0] },
             rim: false,
@@ -184,7 +189,8 @@ impl Sight {
         if self.samples && faces.rim {
             return true;
         }
-        let outside = |p: &Plane| p.normal.dot(faces.centre) + p.offset < -(faces.radius_m + p.slack);
+        let reach_m = |p: &Plane| p.normal.abs().dot(faces.half_m).min(faces.radius_m) + p.slack;
+        let outside = |p: &Plane| p.normal.dot(faces.centre) + p.offset < -reach_m(p);
         !self.planes.iter().any(outside) && !self.eye.is_some_and(|eye| faces.are_backs(eye))
     }
 }

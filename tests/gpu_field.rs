@@ -79,7 +79,7 @@ fn receivers(count: usize, seed: u64) -> Vec<DVec3> {
     (0..count).map(|_| unit(&mut rng) * 1.05 * (8.0_f64 / 1.05).powf(rng.f64())).collect()
 }
 
-/// The default field of a sphere, baked once: 6 144 samples at 64 px.
+/// The default field of a sphere, baked once.
 fn sphere_field(gpu: &Gpu) -> &'static ShadowField {
     static FIELD: OnceLock<ShadowField> = OnceLock::new();
     FIELD.get_or_init(|| bake_field(&gpu.device, &generate::sphere(2.5, 4), Kind::Occlusion, &bake::Options::default()))

@@ -66,18 +66,18 @@ pub struct Lattice {
 }
 
 impl Default for Lattice {
-    /// 16 shells to 8 r, equal steps of sin(half-angle / 2), 6 x 8 x 8 directions, b / (1 - c) interpolated; fit and first
-    /// shell are chosen by the object's shape.
+    /// 18 shells to 8 r, equal steps of sin(half-angle / 2), 6 x 7 x 7 cells of directions, b / (1 - c) interpolated; fit, first
+    /// shell and whether samples lie on the faces' edges are chosen by the object's shape.
     fn default() -> Self {
         Lattice {
-            shells: 16,
+            shells: 18,
             inner: AUTOMATIC,
             outer: 8.0,
             spacing: Spacing::Chord,
-            directions: Directions::Cube { cells: 8 },
+            directions: Directions::Cube { cells: 7 },
             scaled: true,
             fit: None,
-            edges: Some(false),
+            edges: None,
         }
     }
 }

@@ -45,7 +45,7 @@ impl std::str::FromStr for Lattice {
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let explain = || {
             format!(
-                "cannot read lattice \"{text}\" (cube:16x8 or latlon:8x4x4, then optionally ,chord|log|linear \
+                "cannot read lattice \"{text}\" (cube:18x7 or latlon:8x4x4, then optionally ,chord|log|linear \
                  ,scaled|raw ,inner=R ,outer=R ,edges ,edges=auto ,round)"
             )
         };

@@ -3,6 +3,7 @@
 use super::store::bakes_transfer;
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
+use crate::render::gather::TURNS;
 use crate::scene::Scene;
 use ash::vk;
 
@@ -64,6 +65,20 @@ impl Needs {
     }
 }
 
+/// Refuses a list of steps that a software device would leave off midway.
+///
+/// # Errors
+/// `Input` with how long it is, the limit, and what would help.
+pub fn check_steps(longest: u32) -> Result<()> {
+    if longest > TURNS {
+        return Err(Error::Input(format!(
+            "{longest} lookups of occluders and lights matter to one cluster of vertices, a software device makes at most {TURNS}: \
+             use fewer lights or occluders, or a larger --eps"
+        )));
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,5 +114,13 @@ mod tests {
         let message = refused(needs, 1 << 20, all - 1);
         assert!(message.contains(&all.to_string()) && message.contains(&(all - 1).to_string()), "{message}");
         assert_eq!(needs.check(&limits(1), all).unwrap_err().exit_code(), 4);
+    }
+
+    #[test]
+    fn a_list_beyond_the_loop_limit_is_refused_with_numbers() {
+        check_steps(TURNS).unwrap();
+        let error = check_steps(TURNS + 1).unwrap_err();
+        assert_eq!(error.exit_code(), 4);
+        assert!(error.to_string().contains("30001") && error.to_string().contains("--eps"), "{error}");
     }
 }

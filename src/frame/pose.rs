@@ -1,6 +1,7 @@
 //! What an entity is to the merge at a moment: its place, rotation and light, and the steps of every cluster.
 
 use super::Frame;
+use super::fits;
 use super::gathering::Gathering;
 use super::lists::{Dirty, Member, Merged, State};
 use super::live::{Lit, Part};
@@ -39,6 +40,9 @@ impl Frame {
             return self.clusters.write(&clusters);
         }
         let (clusters, steps) = self.lists.gather(&dirty);
+        if self.device.info.is_software() {
+            fits::check_steps(clusters.iter().map(|cluster| cluster.step_count).max().unwrap_or(0))?;
+        }
         self.merged.merged_steps = steps.len();
         self.steps.write(&steps)?;
         self.clusters.write(&clusters)

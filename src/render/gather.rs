@@ -36,9 +36,10 @@ pub const FOUND: usize = 1024;
 /// Workgroups of the second round, each with memory of its own for as many occluders as there are: 8 bytes for each, 512 KiB in all
 /// for 4 096. Each takes one such group after the other.
 const ROOMS: u32 = 16;
-/// Occluders times chains that the pass looks at for a cluster on a software device: llvmpipe (Mesa 22.3) ends all loops of an
-/// invocation after 65 535 turns together, without a word, and to sort 1 024 occluders takes up to half of them.
-const TURNS: u32 = 30_000;
+/// Occluders times chains that the pass looks at for a cluster on a software device, and steps that a merge takes there: llvmpipe
+/// (Mesa 22.3) ends all loops of an invocation after 65 535 turns together, without a word. To sort 1 024 occluders takes up to
+/// half of them, and a step of the merge up to two.
+pub const TURNS: u32 = 30_000;
 
 /// Where lists are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]

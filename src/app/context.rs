@@ -109,7 +109,7 @@ pub struct MergeArguments {
     #[arg(long, default_value_t = EPS, value_name = "SHARE", value_parser = eps, allow_negative_numbers = true)]
     pub eps: f32,
     /// Where the lists of what concerns each cluster of vertices are made, with the same outcome; default: device, but host
-    /// for fewer than 256 entities on a software device
+    /// for fewer than 128 entities on a software device
     #[arg(long, value_name = "host|device")]
     pub lists: Option<Place>,
     /// How an occluder's visibility is multiplied in: factored, pairs, matrix and points compute the same in different ways;

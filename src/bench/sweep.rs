@@ -81,6 +81,7 @@ pub fn variations(quick: bool) -> Vec<Variation> {
         ("lattice", "cube:12x6"),
         ("lattice", "cube:16x8"),
         ("lattice", "cube:20x7,edges=auto"),
+        ("lattice", "cube:22x9,edges=auto"),
         ("lattice", "cube:16x12"),
         ("lattice", "cube:24x10"),
         ("lattice", "cube:32x8"),

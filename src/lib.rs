@@ -25,11 +25,28 @@
 //!
 //! # Layers
 //!
-//! A module uses only modules before it in this list, and a test holds it to that: [`error`], [`files`], [`sh`] (the maths, and
-//! the GLSL made from it), [`layout`] (structs that shaders read), [`gpu`] (Vulkan, all `unsafe`), [`field`] (what is sampled
-//! where, and its file), [`shaders`] (every entry point), [`asset`] (meshes, distant light, pictures), [`bake`], [`render`] (the
-//! passes of a frame), [`scene`], [`frame`] (their sequence), [`truth`] (ray casting and the exact chain), [`check`] (every pass
-//! against its twin), [`mod@bench`], [`view`] (the state behind the window), [`app`].
+//! A module uses only modules above it in this table, and a test holds it to that.
+//!
+//! | module | what stands there |
+//! |---|---|
+//! | [`error`], [`files`] | errors with their exit codes; files that are replaced whole |
+//! | [`sh`] | spherical harmonics in f64, and the GLSL that is generated from them |
+//! | [`layout`] | structs that two or more shaders read |
+//! | [`gpu`] | Vulkan: device, memory, pipelines, commands, barriers, window; all `unsafe` code |
+//! | [`field`] | what is sampled where, what is stored, and its file |
+//! | [`shaders`] | every shader entry point and its permutations |
+//! | [`asset`] | meshes, distant light, pictures |
+//! | [`scene`] | scenes as plain data, and motion |
+//! | [`bake`] | capture, project, assemble: fields and transfer vectors of a mesh, and their cache |
+//! | [`lists`] | which entities concern which cluster of vertices, and which clusters have to be merged again |
+//! | [`merge`] | the merge pass, its permutations, its CPU twin and its calibration |
+//! | [`draw`] | camera, rasterisation, smoothed outlines, tone and encoding |
+//! | [`scene_buffers`] | what a scene keeps on the device, and whether it fits |
+//! | [`frame`] | the sequence of passes with all barriers |
+//! | [`truth`] | ray casting and the exact SH chain |
+//! | [`check`] | every pass against its CPU twin |
+//! | [`mod@bench`] | what things cost and how wrong they are |
+//! | [`view`], [`app`] | the state behind the window; a file for each subcommand |
 //!
 //! # Beyond one device
 //!
@@ -47,6 +64,7 @@ pub mod asset;
 pub mod bake;
 pub mod bench;
 pub mod check;
+pub mod draw;
 pub mod error;
 pub mod field;
 pub mod files;
@@ -54,8 +72,10 @@ pub mod frame;
 #[allow(unsafe_code)]
 pub mod gpu;
 pub mod layout;
-pub mod render;
+pub mod lists;
+pub mod merge;
 pub mod scene;
+pub mod scene_buffers;
 pub mod sh;
 pub mod shaders;
 pub mod truth;

@@ -10,10 +10,10 @@ use glam::{DQuat, DVec3};
 use shadow_fields::frame::Options;
 use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, FLIGHTS};
 use shadow_fields::layout::{Cluster, Entity, STEP_ENTITIES, Step};
-use shadow_fields::render::gather::{
+use shadow_fields::lists::gather::{
     self, Body, Bounds, Chains, FOUND, GROUP_CLUSTERS, Gather, Group, Inputs, Moment, Packed, Place, Report, Scope,
 };
-use shadow_fields::render::variant::Skip;
+use shadow_fields::lists::skip::Skip;
 use shadow_fields::sh::rotation::turns;
 use stage::{Stage, scene, small, stage};
 use std::fmt::Write;

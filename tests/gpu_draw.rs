@@ -6,8 +6,8 @@ mod stage;
 
 use common::report;
 use shadow_fields::asset::picture::srgb_from_linear;
+use shadow_fields::draw::{Antialias, Finish};
 use shadow_fields::frame::Options;
-use shadow_fields::render::draw::{Antialias, Finish};
 use shadow_fields::scene::{Placement, Scene};
 use stage::{at, scene, small, stage};
 

@@ -8,7 +8,7 @@ use common::report;
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::bake;
 use shadow_fields::frame::Options;
-use shadow_fields::render::variant::Skip;
+use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Placement, Scene};
 use stage::{at, difference, scene, small, stage};
 

@@ -7,10 +7,10 @@ mod stage;
 
 use common::report;
 use glam::{Quat, Vec3};
+use shadow_fields::draw::{Antialias, Finish};
 use shadow_fields::frame::{Frame, Options};
-use shadow_fields::render::draw::{Antialias, Finish};
-use shadow_fields::render::gather::Place;
-use shadow_fields::render::variant::Skip;
+use shadow_fields::lists::gather::Place;
+use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Camera, Placement, Scene};
 use stage::{Stage, scene, small, stage};
 

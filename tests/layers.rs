@@ -6,10 +6,29 @@ use std::path::{Path, PathBuf};
 /// A module may use only modules that stand before it.
 ///
 /// `field` stands before `shaders` because a shader's STRIDE is the stride of stored channels, and before `asset` and `bake`
-/// because it is plain data; `scene` only needs `asset`, and stands after `render` since neither uses the other.
+/// because it is plain data; `scene_buffers` stands behind the passes because it keeps what each of them reads in its form.
 const ORDER: &[&str] = &[
-    "error", "files", "sh", "layout", "gpu", "field", "shaders", "asset", "bake", "render", "scene", "frame", "truth",
-    "check", "bench", "view", "app", "main",
+    "error",
+    "files",
+    "sh",
+    "layout",
+    "gpu",
+    "field",
+    "shaders",
+    "asset",
+    "scene",
+    "bake",
+    "lists",
+    "merge",
+    "draw",
+    "scene_buffers",
+    "frame",
+    "truth",
+    "check",
+    "bench",
+    "view",
+    "app",
+    "main",
 ];
 
 /// The only modules that `gpu` may use: it knows nothing of what it is for.

@@ -8,8 +8,9 @@ use shadow_fields::bake::project::{Job, Project, Projection};
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::gpu::reflect::Reflection;
 use shadow_fields::layout::{Cluster, Entity};
-use shadow_fields::render::gather::{Bounds, Gather, Group, Report};
-use shadow_fields::render::variant::{Chain, Form, Skip, VARIANTS, Variant};
+use shadow_fields::lists::gather::{Bounds, Gather, Group, Report};
+use shadow_fields::lists::skip::Skip;
+use shadow_fields::merge::variant::{Chain, Form, VARIANTS, Variant};
 use std::mem::offset_of;
 
 /// Compares a struct of the shader with a Rust struct, field by field. The pattern names every field, so one that is missing

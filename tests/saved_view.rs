@@ -8,9 +8,9 @@ mod stage;
 
 use cli::good;
 use shadow_fields::asset::picture;
+use shadow_fields::draw::Antialias;
 use shadow_fields::frame::Options;
-use shadow_fields::render::Variant;
-use shadow_fields::render::draw::Antialias;
+use shadow_fields::merge::Variant;
 use shadow_fields::scene::Scene;
 use shadow_fields::view::{Command, Editor, Step};
 use stage::{small, stage};

@@ -8,7 +8,7 @@ mod stage;
 use common::report;
 use glam::{Quat, Vec3};
 use shadow_fields::frame::Options;
-use shadow_fields::render::variant::Skip;
+use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::truth::raycast::RayCast;
 use shadow_fields::truth::{Shapes, Vertex, World};

@@ -9,7 +9,7 @@ use shadow_fields::bake;
 use shadow_fields::bench::trials::{cases, run};
 use shadow_fields::field::Storage;
 use shadow_fields::frame::Options;
-use shadow_fields::render::variant::Skip;
+use shadow_fields::lists::skip::Skip;
 use stage::{small, stage};
 
 #[test]

@@ -1,7 +1,7 @@
 //! Ray casting and the exact chain against closed forms, and against each other.
 
 use glam::{DVec3, Vec3};
-use shadow_fields::render::variant::Skip;
+use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::Scene;
 use shadow_fields::sh::basis::MAX_COEFFICIENTS;
 use shadow_fields::sh::lobe;

@@ -2,14 +2,15 @@
 
 use super::output::{self, Progress};
 use crate::bake::{self, Baker, cache::Cache};
+use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::field::{Lattice, Lookup, Storage};
 use crate::frame;
 use crate::gpu::{self, Device, Validation};
-use crate::render::draw::Antialias;
-use crate::render::gather::Place;
-use crate::render::variant::{Chain, EPS, Product, Skip};
-use crate::render::{Variant, calibrate};
+use crate::lists::gather::Place;
+use crate::lists::skip::{EPS, Skip};
+use crate::merge::variant::{Chain, Product};
+use crate::merge::{Variant, calibrate};
 use crate::scene::Scene;
 use crate::shaders::Library;
 use clap::Args;

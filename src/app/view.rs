@@ -3,9 +3,9 @@
 use super::Global;
 use super::context::{BakeArguments, Context, MergeArguments, size};
 use crate::bake::cache::Cache;
+use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::gpu::{self, Device, PresentMode, Window};
-use crate::render::draw::Antialias;
 use crate::scene::Scene;
 use crate::view::command::Command;
 use crate::view::input::{Button, Event, Key};

@@ -68,13 +68,13 @@ pub fn default_options() -> frame::Options {
     frame::Options {
         bake: crate::bake::Options::default(),
         lookup: crate::field::Lookup::default(),
-        chain: crate::render::variant::Chain::default(),
+        chain: crate::merge::variant::Chain::default(),
         // Frames are timed at rest: each must merge everything.
-        skip: crate::render::variant::Skip::without("unmoved"),
-        eps: crate::render::variant::EPS,
+        skip: crate::lists::skip::Skip::without("unmoved"),
+        eps: crate::lists::skip::EPS,
         lists: None,
         variant: None,
         size: [16, 16],
-        antialias: crate::render::draw::Antialias::None,
+        antialias: crate::draw::Antialias::None,
     }
 }

@@ -4,7 +4,7 @@ use super::budget::Budget;
 use super::rival::Comparison;
 use super::sweep::Point;
 use super::text::three;
-use crate::render::variant::PRODUCTS;
+use crate::merge::variant::PRODUCTS;
 use std::fmt::Write;
 
 /// Changes of time, error or bytes by less than this factor count as none: medians of quiet runs differ by as much.

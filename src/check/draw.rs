@@ -5,9 +5,9 @@ use super::capture::snapping;
 use super::merge::{MIXED, options, scene};
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
+use crate::draw::Antialias;
 use crate::error::Result;
 use crate::frame::{Frame, Options};
-use crate::render::draw::Antialias;
 use crate::scene::Placement;
 
 /// Two half-float steps, and two roundings of interpolated f32.

@@ -5,12 +5,13 @@ use super::Row;
 use crate::asset::embedded;
 use crate::bake::cache::Cache;
 use crate::bake::{self, Baker};
+use crate::draw::Antialias;
 use crate::error::Result;
 use crate::field::{Lookup, Storage};
 use crate::frame::{Frame, Options};
-use crate::render::Variant;
-use crate::render::draw::Antialias;
-use crate::render::variant::{Chain, PRODUCTS, Skip, VARIANTS};
+use crate::lists::skip::Skip;
+use crate::merge::Variant;
+use crate::merge::variant::{Chain, PRODUCTS, VARIANTS};
 use crate::scene::{Placement, Scene};
 use std::path::Path;
 
@@ -83,7 +84,7 @@ pub fn options() -> Options {
         skip: Skip::ALL,
         chain: Chain::default(),
         eps: 0.0,
-        lists: Some(crate::render::gather::Place::Host),
+        lists: Some(crate::lists::gather::Place::Host),
         size: [64, 48],
         antialias: Antialias::Samples,
     }

@@ -1,8 +1,9 @@
 //! The CPU twin of "draw" in f64: a picture of a frame by asking of every sample which triangle lies nearest.
 
-use super::{Frame, camera};
+use super::Frame;
+use crate::draw::camera;
+use crate::draw::smooth::{self, Smooth, Texel};
 use crate::error::Result;
-use crate::render::smooth::{self, Smooth, Texel};
 use crate::scene::Placement;
 use glam::{DMat3, DVec2, DVec3, DVec4};
 use rayon::prelude::*;

@@ -1,10 +1,10 @@
 //! What the merge shader is compiled for, and what of that a scene and device allow.
 
 use super::Options;
-use super::store::Store;
 use crate::error::Result;
 use crate::gpu::{Device, TexelView, Volume};
-use crate::render::variant::{Form, Variant};
+use crate::merge::variant::{Form, Variant};
+use crate::scene_buffers::Store;
 use ash::vk;
 
 /// The form with its variant less the texel views or uniform blocks that cannot hold the scene.

@@ -2,16 +2,16 @@
 
 use super::Frame;
 use super::form::usable;
-use super::gathering::Gathering;
-use super::store::Store;
 use crate::bake::cache::Cache;
+use crate::draw::Draw;
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Timing};
-use crate::render::calibrate;
-use crate::render::draw::Draw;
-use crate::render::merge::Merge;
-use crate::render::variant::{Form, Variant};
+use crate::lists::gathering::Gathering;
+use crate::merge::Merge;
+use crate::merge::calibrate;
+use crate::merge::variant::{Form, Variant};
 use crate::scene::{Camera, Placement, Scene};
+use crate::scene_buffers::Store;
 use std::sync::atomic::Ordering;
 
 /// Where the radiosity of a part of the picture comes from.

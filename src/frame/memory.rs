@@ -1,8 +1,8 @@
 //! What a scene takes of the device's memory and of the host's.
 
 use super::Frame;
-use super::gathering::Gathering;
 use crate::gpu::Volume;
+use crate::lists::gathering::Gathering;
 use serde::Serialize;
 
 /// Bytes by use.

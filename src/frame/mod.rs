@@ -4,47 +4,42 @@
 //! placements -> entities, rotations, clusters to merge (host) -> gather (device or host) -> steps of every cluster -> merge -> radiosity -> draw -> picture -> read back
 //! ```
 
-pub mod camera;
-mod cluster;
 mod draw_twin;
-mod fits;
 mod form;
-mod gathering;
-pub mod lists;
 mod live;
 pub mod memory;
 mod picture;
 mod pose;
-pub mod store;
 mod twin;
 
 use crate::asset::edges::Edges;
 use crate::bake;
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
+use crate::draw::smooth::Lines;
+use crate::draw::{Antialias, Draw, Finish};
 use crate::error::Result;
 use crate::field::Lookup;
 use crate::field::quantity::channel_stride;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing, Upload, Volume};
 use crate::layout;
-use crate::render::calibrate;
-use crate::render::draw::{Antialias, Draw, Finish};
-use crate::render::gather::Place;
-use crate::render::merge::{Inputs, Merge, Readable};
-use crate::render::smooth::Lines;
-use crate::render::variant::{Chain, Form, Skip, Variant, uniform_entities};
+use crate::lists::gather::Place;
+use crate::lists::gathering::Gathering;
+use crate::lists::incremental::{Lists, Merged};
+use crate::lists::skip::Skip;
+use crate::merge::calibrate;
+use crate::merge::variant::{Chain, Form, Variant, uniform_entities};
+use crate::merge::{Inputs, Merge, Readable};
 use crate::scene::{Placement, Scene};
+use crate::scene_buffers::{Progress, Store};
 use crate::sh::basis::{Y00, coefficient_count};
 use crate::shaders::Library;
 use ash::vk;
 use form::{form, usable};
-use gathering::Gathering;
 use glam::Vec3;
-use lists::{Lists, Merged};
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use store::{Progress, Store};
 
 pub use live::{Lit, Part, is_cached};
 
@@ -117,7 +112,7 @@ impl Frame {
     /// Bakes or finds what the scene needs and builds the passes.
     ///
     /// # Errors
-    /// As [`Store::new`], [`Merge::new`] and [`Draw::new`]; `Usage` as [`crate::render::variant::Product::check`].
+    /// As [`Store::new`], [`Merge::new`] and [`Draw::new`]; `Usage` as [`crate::merge::variant::Product::check`].
     pub fn new(baker: &Baker, cache: &Cache, scene: &Scene, options: Options, progress: Progress<'_>) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
         options.chain.product.check(options.bake.bands, options.bake.occlusion_bands())?;

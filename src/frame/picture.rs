@@ -1,14 +1,15 @@
 //! Pictures of a frame: what is drawn of it, in which order, and read back.
 
+use super::Frame;
 use super::live::{Lit, Part};
-use super::{Frame, camera};
 use crate::asset::edges::{Edges, Line};
 use crate::asset::picture::linear_from_srgb;
+use crate::draw::camera;
+use crate::draw::smooth::{self, Strips};
+use crate::draw::{Antialias, Draw, Finish, Item, Pane};
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Image, Timing};
-use crate::render::draw::{Antialias, Draw, Finish, Item, Pane};
-use crate::render::sight::{self, Sight};
-use crate::render::smooth::{self, Strips};
+use crate::lists::sight::{self, Sight};
 use crate::scene::Placement;
 use ash::vk;
 use glam::Vec3;

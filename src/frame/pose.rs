@@ -1,19 +1,19 @@
 //! What an entity is to the merge at a moment: its place, rotation and light, and the steps of every cluster.
 
 use super::Frame;
-use super::fits;
-use super::gathering::Gathering;
-use super::lists::{Dirty, Member, Merged, State};
 use super::live::{Lit, Part};
-use super::store::{self, Slot};
 use crate::error::Result;
 use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::render::gather::{Body, Bounds, Moment, Report};
-use crate::render::sight::{Faces, Sight};
+use crate::lists::gather::{Body, Bounds, Moment, Report};
+use crate::lists::gathering::Gathering;
+use crate::lists::incremental::{Dirty, Member, Merged, State};
+use crate::lists::sight::{Faces, Sight};
 use crate::scene::Placement;
+use crate::scene_buffers::limits;
+use crate::scene_buffers::{self, Slot};
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use crate::sh::cube::{self, FACE_COUNT, texel_st};
 use crate::sh::rotation::turns;
@@ -41,7 +41,7 @@ impl Frame {
         }
         let (clusters, steps) = self.lists.gather(&dirty);
         if self.device.info.is_software() {
-            fits::check_steps(clusters.iter().map(|cluster| cluster.step_count).max().unwrap_or(0))?;
+            limits::check_steps(clusters.iter().map(|cluster| cluster.step_count).max().unwrap_or(0))?;
         }
         self.merged.merged_steps = steps.len();
         self.steps.write(&steps)?;
@@ -188,7 +188,12 @@ impl Frame {
 }
 
 /// Clusters of one receiver, without steps; `radiosity_first` is its first vertex in the radiosity buffer.
-pub(super) fn clusters(receiver: usize, geometry: &store::Geometry, radiosity_first: u64, bands: usize) -> Vec<Member> {
+pub(super) fn clusters(
+    receiver: usize,
+    geometry: &scene_buffers::Geometry,
+    radiosity_first: u64,
+    bands: usize,
+) -> Vec<Member> {
     let transfer_quads = (channel_stride(bands) / 4) as u32;
     let cluster = |(i, (bounds, faces)): (usize, (&Bounds, &Faces))| {
         let first = i as u32 * CLUSTER_VERTICES;

@@ -1,16 +1,17 @@
 //! The CPU twin of a frame's merge, and what its lists leave off.
 
-use super::lists::State;
-use super::store::Geometry;
-use super::{Frame, store};
+use super::Frame;
 use crate::error::Result;
 use crate::field::log_space::{logarithms, widened};
 use crate::field::{Area, ShadowField};
 use crate::layout::{CLUSTER_VERTICES, STEP_ENTITIES, Step};
-use crate::render::chain::Method;
-use crate::render::gather::{self, Chains, Counts};
-use crate::render::reference::{Object, Task};
+use crate::lists::gather::{self, Chains, Counts};
+use crate::lists::incremental::State;
+use crate::merge::chain::Method;
+use crate::merge::reference::{Object, Task};
 use crate::scene::{Entity, Placement, Scene};
+use crate::scene_buffers;
+use crate::scene_buffers::Geometry;
 use glam::DVec3;
 use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
@@ -24,7 +25,7 @@ impl Frame {
         Counts {
             empty: if self.options.skip.empty { entities().filter(empty).count() as u64 } else { 0 },
             unseen: if self.options.skip.unseen {
-                entities().filter(|e| !store::is_seen(&self.scene, e)).count() as u64
+                entities().filter(|e| !scene_buffers::is_seen(&self.scene, e)).count() as u64
             } else {
                 0
             },
@@ -54,7 +55,8 @@ impl Frame {
     pub fn twin<'f>(&'f self, placements: &'f [Placement]) -> Result<Twin<'f>> {
         let mut fields: Vec<[Option<ShadowField>; 2]> = Vec::new();
         for geometry in &self.store.geometries {
-            let load = |slot: &Option<store::Slot>| slot.as_ref().map(|slot| self.store.field(slot)).transpose();
+            let load =
+                |slot: &Option<scene_buffers::Slot>| slot.as_ref().map(|slot| self.store.field(slot)).transpose();
             fields.push([load(&geometry.blocked)?, load(&geometry.radiance)?].map(|field| field.as_ref().map(widened)));
         }
         let state = self.state(placements);

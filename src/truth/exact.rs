@@ -4,10 +4,11 @@
 use super::Vertex;
 use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
 use super::world::{Sight, View, World};
-use crate::render::chain::Multiplier;
-use crate::render::gather::distance_key;
-use crate::render::reference::{Cap, Cone};
-use crate::render::variant::{Chain, Skip};
+use crate::lists::gather::distance_key;
+use crate::lists::skip::Skip;
+use crate::merge::chain::Multiplier;
+use crate::merge::reference::{Cap, Cone};
+use crate::merge::variant::Chain;
 use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use glam::DVec3;

@@ -6,8 +6,8 @@
 //! |---|---|---|
 //! | T0 | rays against the moved meshes, full visibility | [`raycast`] |
 //! | T1 | exact visibility of every occluder projected to SH, exact chain of products | [`exact`] |
-//! | T2 | fields looked up, f64 | [`crate::render::reference`] |
-//! | T3 | the device | [`crate::render::merge`] |
+//! | T2 | fields looked up, f64 | [`crate::merge::reference`] |
+//! | T3 | the device | [`crate::merge`] |
 //!
 //! T0 and T1 agree with the merge on who lights, blocks and receives: a light is preceded by the occluders whose bounding
 //! sphere's centre is nearer to the vertex than its own (ties by index); a receiver is no occluder of its own, but shadows

@@ -95,7 +95,7 @@ pub enum Command {
     SetExposure(f32),
     /// A slider is let go: one undo takes all of its movement back.
     EndSlide,
-    /// Merge variant by name (see [`crate::render::variant::VARIANTS`]); `None` is the device's fastest.
+    /// Merge variant by name (see [`crate::merge::variant::VARIANTS`]); `None` is the device's fastest.
     SetVariant(Option<&'static str>),
     /// Writes the picture as PNG and EXR.
     Screenshot,

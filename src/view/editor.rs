@@ -9,9 +9,9 @@ use crate::asset::environment::Source;
 use crate::asset::sky::Sky;
 use crate::error::Result;
 use crate::field::quantity;
-use crate::frame::store;
-use crate::render::variant::Skip;
+use crate::lists::skip::Skip;
 use crate::scene::{Camera, Placement, Scene};
+use crate::scene_buffers;
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -153,7 +153,7 @@ impl Editor {
 
     /// Fields that a mesh needs as its entities are: occlusion, radiance. What the frame's store lacks is to be baked.
     pub fn needs(&self, mesh: usize) -> [Option<quantity::Kind>; 2] {
-        store::needs(&self.scene, mesh, Skip::ALL)
+        scene_buffers::needs(&self.scene, mesh, Skip::ALL)
     }
 
     /// Lets time pass, if it runs. Where things are depends on the sum of all `dt_s` alone.

@@ -4,13 +4,14 @@ use super::command::Changed;
 use super::task::{Task, Worker};
 use super::viewer::Viewer;
 use crate::bake::Baker;
+use crate::draw::show::Show;
 use crate::error::Result;
-use crate::frame::store::Store;
 use crate::frame::{self, Frame, is_cached};
 use crate::gpu::Device;
 use crate::gpu::validation::Messages;
-use crate::render::show::Show;
-use crate::render::variant::{Skip, Variant};
+use crate::lists::skip::Skip;
+use crate::merge::variant::Variant;
+use crate::scene_buffers::Store;
 
 impl Viewer {
     /// Brings the frame up to what the editor says.

@@ -1,7 +1,7 @@
 //! The outline of an entity as the camera sees it: edges between a face that looks at the eye and one that does not.
 
 use crate::asset::edges::Edges;
-use crate::frame::camera::world_from_centred;
+use crate::draw::camera::world_from_centred;
 use crate::scene::Placement;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
@@ -25,7 +25,7 @@ pub fn outline(
 mod tests {
     use super::{outline as outline_of, *};
     use crate::asset::generate::Generator;
-    use crate::frame::camera::clip_from_world;
+    use crate::draw::camera::clip_from_world;
     use crate::scene::Camera;
     use glam::{Quat, Vec3};
     use std::collections::HashMap;

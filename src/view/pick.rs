@@ -4,7 +4,7 @@ use super::command::{Changed, Command, Effect};
 use super::edit;
 use super::editor::Editor;
 use super::history::{Kind, Snapshot};
-use crate::frame::camera::clip_from_world;
+use crate::draw::camera::clip_from_world;
 use crate::scene::{EntityData, Placement};
 use crate::truth::shape::Shape;
 use glam::{DVec3, DVec4};

@@ -3,7 +3,7 @@
 use super::{SMALL, built_in, from_text, picture_place};
 use glam::{DVec3, DVec4, Vec3};
 use shadow_fields::asset::embedded;
-use shadow_fields::frame::camera::clip_from_world;
+use shadow_fields::draw::camera::clip_from_world;
 use shadow_fields::scene::{Data, Scene};
 use shadow_fields::view::{Command, Editor};
 use std::path::Path;

@@ -9,7 +9,7 @@ mod steps;
 
 use glam::DVec3;
 use shadow_fields::asset::embedded;
-use shadow_fields::frame::camera::clip_from_world;
+use shadow_fields::draw::camera::clip_from_world;
 use shadow_fields::scene::Scene;
 use shadow_fields::view::{Command, Editor, Step};
 use std::path::Path;

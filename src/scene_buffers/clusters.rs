@@ -7,7 +7,7 @@
 use crate::asset::mesh::Mesh;
 use crate::bake::capture::unit_positions;
 use crate::layout::CLUSTER_VERTICES;
-use crate::render::gather::{Bounds, GROUP_CLUSTERS};
+use crate::lists::gather::{Bounds, GROUP_CLUSTERS};
 use glam::Vec3;
 
 /// Bounding radii of distance that a normal's length counts as: a little more than the edge of a cube of that radius (1.15), so that
@@ -22,7 +22,7 @@ const ALONE: usize = 1 << 14;
 type Point = ([f32; 6], u32);
 
 /// Which vertex of the mesh stands at each place.
-pub(super) fn order(mesh: &Mesh) -> Vec<u32> {
+pub(crate) fn order(mesh: &Mesh) -> Vec<u32> {
     let point = |(v, p): (usize, Vec3)| {
         let n = NORMAL_WEIGHT * mesh.normals[v];
         ([p.x, p.y, p.z, n.x, n.y, n.z], v as u32)
@@ -56,7 +56,7 @@ fn halve(points: &mut [Point]) {
 }
 
 /// Bounds of every run of [`CLUSTER_VERTICES`], relative to the bounding sphere's centre.
-pub(super) fn bounds(mesh: &Mesh, order: &[u32]) -> Vec<Bounds> {
+pub(crate) fn bounds(mesh: &Mesh, order: &[u32]) -> Vec<Bounds> {
     let (centre, _) = mesh.bounding_sphere();
     let bounds = |run: &[u32]| {
         let positions: Vec<Vec3> = run.iter().map(|&v| mesh.positions[v as usize] - centre).collect();

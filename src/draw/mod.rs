@@ -4,16 +4,21 @@
 //! of the radiosity buffer. Output: RGBA of `width` x `height`, linear or as a screen shows it: with one sample a pixel, that
 //! one's entity in alpha and its depth beside it, or multisampled and resolved.
 
-use super::grid::{DrawGrid, GridDrawable};
-use super::sight::{Faces, Sight};
-use super::smooth::Smooth;
+pub mod camera;
+pub mod grid;
+pub mod show;
+pub mod smooth;
+
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
 use crate::asset::picture::srgb_from_linear;
+use crate::draw::grid::{DrawGrid, GridDrawable};
+use crate::draw::smooth::Smooth;
 use crate::error::Result;
 use crate::gpu::ImageShape;
 use crate::gpu::Target;
 use crate::gpu::{Access, Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
+use crate::lists::sight::{Faces, Sight};
 use crate::shaders::{Library, Row};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};

@@ -1,8 +1,8 @@
 //! The CPU twin of "merge", in f64 and vertex by vertex, from the same stored numbers.
 
-use super::chain::{Method, Multiplier, State};
-use super::variant::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::field::{Area, Lookup, ShadowField};
+use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
+use crate::merge::chain::{Method, Multiplier, State};
 use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;

@@ -1,23 +1,25 @@
 //! What a scene keeps on the device from frame to frame: fields, transfer vectors, vertices, drawables. Only what its
 //! entities need is baked and uploaded.
 
-use super::cluster;
-use super::fits::Needs;
+pub mod clusters;
+pub mod limits;
+
 use crate::asset::mesh::Mesh;
 use crate::bake::cache::{Cache, field_name};
 use crate::bake::{self, Baker, Report};
+use crate::draw::Drawable;
 use crate::error::Result;
 use crate::field::extent::{Extent, extent};
 use crate::field::quantity::{Kind, Storage, channel_stride};
 use crate::field::{Area, Header, ShadowField};
 use crate::gpu::{Buffer, BufferKind, Volume};
 use crate::layout::{CLUSTER_VERTICES, NONE};
-use crate::render::draw::Drawable;
-use crate::render::gather::Bounds;
-use crate::render::shelf::Shelf;
-use crate::render::sight::Faces;
-use crate::render::variant::Skip;
+use crate::lists::gather::Bounds;
+use crate::lists::sight::Faces;
+use crate::lists::skip::Skip;
+use crate::merge::shelf::Shelf;
 use crate::scene::{Entity, Scene};
+use crate::scene_buffers::limits::Needs;
 use glam::DVec3;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -204,7 +206,7 @@ impl Store {
         for (index, (mesh, [blocked, radiance])) in scene.meshes.iter().zip(slots).enumerate() {
             let (centre, radius_m) = mesh.bounding_sphere();
             let vertex_first = vertices.len() as u32;
-            let order = cluster::order(mesh);
+            let order = clusters::order(mesh);
             for &v in &order {
                 vertices.push((mesh.positions[v as usize] - centre).extend(0.0).to_array());
                 vertices.push(mesh.normals[v as usize].extend(0.0).to_array());
@@ -229,7 +231,7 @@ impl Store {
             };
             geometries.push(Geometry {
                 vertices: vertex_first / 2..vertices.len() as u32 / 2,
-                clusters: cluster::bounds(mesh, &order),
+                clusters: clusters::bounds(mesh, &order),
                 faces: Faces::around(mesh, &order, CLUSTER_VERTICES as usize),
                 transfer_first,
                 blocked,

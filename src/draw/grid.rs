@@ -3,8 +3,8 @@
 //! A floor's cells are small on the screen so that light on them is smooth, and to a software rasteriser small triangles cost
 //! far more than their area. The picture is that of the triangles, but for rounding.
 
-use super::draw::Item;
 use crate::asset::grid::{Grid, UPWARDS};
+use crate::draw::Item;
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
 use crate::shaders::{Library, Row};

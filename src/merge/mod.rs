@@ -1,16 +1,25 @@
 //! Pass "merge": light on every vertex of every receiver.
 //!
-//! Inputs: entities, clusters and their steps (see [`super::gather`]), the field store, transfer vectors,
+//! Inputs: entities, clusters and their steps (see [`crate::lists::gather`]), the field store, transfer vectors,
 //! vertices (position and normal, object frame, two quads each), the sky's coefficients. Output: `radiosity`, four floats a
 //! vertex: radiance that leaves the surface, albedo / pi times the integral of incoming light, without emission.
 
-use super::variant::{Form, Variant};
+pub mod calibrate;
+pub mod chain;
+pub mod product;
+pub mod reference;
+pub mod shelf;
+pub mod variant;
+pub mod workload;
+
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView, Volume};
 use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::Library;
 use ash::vk;
 use std::sync::Arc;
+use variant::Form;
+pub use variant::Variant;
 
 /// A resource that a variant reads as a block, through a texel view, or through a sampler.
 pub struct Readable<'b>(Bind<'b>);

@@ -1,6 +1,6 @@
 //! A chain of occluders on one vertex's transfer, in f64: the twin of `glsl/merge_product.glsl`, and the choices that both have.
 
-use super::variant::Chain;
+use crate::merge::variant::Chain;
 use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
 use crate::sh::log_space::LogSpace;
 use crate::sh::points;
@@ -181,8 +181,9 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::reference::Cone;
-    use crate::render::variant::{CAP_SINES, PRODUCTS};
+    use crate::lists::skip::CAP_SINES;
+    use crate::merge::reference::Cone;
+    use crate::merge::variant::PRODUCTS;
     use crate::sh::lobe::clamped_cosine;
     use glam::DVec3;
     use std::f64::consts::PI;

@@ -5,9 +5,9 @@
 //! Backs count as unseen only where the draw culls them, which it does for solid meshes ([`Mesh::is_solid`]) with the eye outside:
 //! whether a pixel at an outline shows a front or a back is then the rasteriser's decision and not this one's.
 
-use super::moment::Bounds;
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
+use crate::lists::moment::Bounds;
 use glam::{DMat4, DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 

@@ -1,10 +1,10 @@
 //! The buffers of the gather on the device, and what becomes of lists that do not fit: nothing is merged by half a list, and the
 //! next frame merges again with more room, or with lists that the host makes.
 
-use super::lists::{Dirty, Lists};
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, FLIGHTS, Upload};
-use crate::render::gather::{Gather, Inputs, Packed, Report};
+use crate::lists::gather::{Gather, Inputs, Packed, Report};
+use crate::lists::incremental::{Dirty, Lists};
 use crate::shaders::Library;
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ const FIRST_CAPACITY: u64 = 64;
 const MOST_BYTES: u64 = 1 << 28;
 
 /// Everything that the pass needs from frame to frame.
-pub(super) struct Gathering {
+pub(crate) struct Gathering {
     device: Arc<Device>,
     pass: Gather,
     bounds: Buffer,

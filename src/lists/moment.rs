@@ -1,10 +1,10 @@
 //! What the lists of step "gather" are made from at one moment: bounds of clusters, bodies of entities, poses of receivers; and
 //! counts of what they leave off.
 
-use super::repeatable::dot;
-use super::scope::SLACK_RAD;
-use super::tree::Tree;
-use super::variant::Skip;
+use crate::lists::repeatable::dot;
+use crate::lists::scope::SLACK_RAD;
+use crate::lists::skip::Skip;
+use crate::lists::tree::Tree;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use serde::Serialize;

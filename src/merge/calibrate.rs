@@ -1,11 +1,11 @@
 //! Which variant of the merge is fastest on a device: measured once on a small made-up scene, when a command has done its work,
 //! and kept in the cache folder. Until then a device gets a default.
 
-use super::merge::Merge;
-use super::variant::{VARIANTS, Variant};
-use super::workload::Workload;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
+use crate::merge::Merge;
+use crate::merge::variant::{VARIANTS, Variant};
+use crate::merge::workload::Workload;
 use crate::shaders::Library;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;

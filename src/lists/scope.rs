@@ -1,12 +1,12 @@
 //! What a cluster of vertices, or a group of them, sees of spheres: whether a light or an occluder may be left off its list.
 //!
-//! In f32 and by [`super::repeatable`] alone, as `glsl/gather_scope.glsl` has it: host and device decide alike to the bit.
+//! In f32 and by [`crate::lists::repeatable`] alone, as `glsl/gather_scope.glsl` has it: host and device decide alike to the bit.
 
-use super::moment::{Body, Bounds, Lamp, Moment};
-use super::repeatable::{Angle, dot, inverse, inverse_root};
-use super::tree::Crowd;
-use super::variant::{CAP_SINES, SKIP_FADE_RAD};
 use crate::layout;
+use crate::lists::moment::{Body, Bounds, Lamp, Moment};
+use crate::lists::repeatable::{Angle, dot, inverse, inverse_root};
+use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
+use crate::lists::tree::Crowd;
 
 /// Slack on angles, for the rounding of cosines near 0 and pi and of the merge's own.
 pub const SLACK_RAD: f64 = 1e-3;

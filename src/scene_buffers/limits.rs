@@ -1,10 +1,10 @@
 //! Whether a scene fits a device, asked before anything is baked.
 
-use super::store::bakes_transfer;
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
-use crate::render::gather::TURNS;
+use crate::lists::gather::TURNS;
 use crate::scene::Scene;
+use crate::scene_buffers::bakes_transfer;
 use ash::vk;
 
 /// Bytes that a scene keeps on the device, by buffer. Each is bound as a whole.

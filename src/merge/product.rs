@@ -3,10 +3,10 @@
 //! Inputs: `transfers`, the coefficients of a chain an invocation; `factors`, a blocked part each. Output: `products`, the chain's
 //! coefficients after a number of multiplications by 1 - b, where b fades by a factor each step.
 
-use super::chain::Multiplier;
-use super::variant::Chain;
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device};
+use crate::merge::chain::Multiplier;
+use crate::merge::variant::Chain;
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count};
 use crate::sh::product_program::STYLES;
 use crate::shaders::{Library, Row};
@@ -59,7 +59,7 @@ impl Products {
     /// The pipeline of a shape.
     ///
     /// # Errors
-    /// `Usage` as [`super::variant::Product::check`], `Failed` when the shader does not compile.
+    /// `Usage` as [`crate::merge::variant::Product::check`], `Failed` when the shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, shape: Shape, multiply: bool) -> Result<Self> {
         shape.chain.product.check(shape.bands, shape.field_bands)?;
         let shader = library.shader(&Self::row(shape, multiply))?;

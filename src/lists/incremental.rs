@@ -9,15 +9,15 @@
 //! once nothing moves any more.
 
 use crate::layout::{self, Step};
-use crate::render::gather::{self, Bounds, Chains, Counts, GROUP_CLUSTERS, Moment, Scope};
-use crate::render::sight::{Faces, Sight};
+use crate::lists::gather::{self, Bounds, Chains, Counts, GROUP_CLUSTERS, Moment, Scope};
+use crate::lists::sight::{Faces, Sight};
 use crate::scene::Placement;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// All that lists and merge depend on at one moment.
-pub(super) struct State {
+pub(crate) struct State {
     /// For the lists.
     pub moment: Moment,
     /// As the device sees them.
@@ -34,7 +34,7 @@ struct Group {
 }
 
 /// Clusters of one group that are to be merged.
-pub(super) struct Dirty {
+pub(crate) struct Dirty {
     group: usize,
     clusters: Vec<usize>,
 }
@@ -47,7 +47,7 @@ impl Dirty {
 }
 
 /// A cluster of one receiver.
-pub(super) struct Member {
+pub(crate) struct Member {
     /// Without its steps.
     pub cluster: layout::Cluster,
     /// Of its vertices.
@@ -58,7 +58,7 @@ pub(super) struct Member {
 
 /// All clusters.
 #[derive(Default)]
-pub(super) struct Lists {
+pub(crate) struct Lists {
     /// Without their steps.
     pub clusters: Vec<layout::Cluster>,
     bounds: Vec<Bounds>,

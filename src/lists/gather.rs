@@ -4,18 +4,18 @@
 //! Inputs: bounding spheres of the entities, their switches, bounds of the clusters. Output: a list of [`Step`]s a cluster.
 //! A step is left off when it changes no vertex of the cluster (an occluder farther than the light from all of them, or one
 //! that the skips in `merge_cone.glsl` weigh with zero everywhere), and, with a threshold `eps`, when the light that it could
-//! take or bring is bounded below it ([`super::scope`]). Neighbouring clusters are gathered together, so that the work grows with
+//! take or bring is bounded below it ([`crate::lists::scope`]). Neighbouring clusters are gathered together, so that the work grows with
 //! what may matter to any of them and not with what exists: the host finds that through a tree of the occluders, the device by
 //! looking at blocks of them and then into those that matter. The lists depend on neither: what a group leaves out, each cluster
 //! would leave off by itself.
 
-pub use super::moment::{Body, Bounds, Counts, Lamp, Moment, distance_key};
-pub use super::scope::Scope;
-use super::scope::{BELOW, Fate, GROUP_SLACK, SLACK, SLACK_RAD, View, cap_sines, fade, fade_sine};
-use super::tree::Crowd;
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{self, Step};
+pub use crate::lists::moment::{Body, Bounds, Counts, Lamp, Moment, distance_key};
+pub use crate::lists::scope::Scope;
+use crate::lists::scope::{BELOW, Fate, GROUP_SLACK, SLACK, SLACK_RAD, View, cap_sines, fade, fade_sine};
+use crate::lists::tree::Crowd;
 use crate::shaders::{Library, Row};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};

@@ -1,14 +1,15 @@
 //! A made-up merge of known size, for timing: a floor of vertices under turned occluders and a sky, every vertex meeting every
 //! occluder, fields of one shape filled with a constant.
 
-use super::merge::{Inputs, Merge, Readable};
-use super::shelf::Shelf;
-use super::variant::{Chain, Form, Skip, Variant, uniform_entities};
 use crate::error::{Error, Result};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::{Lattice, Lookup};
 use crate::gpu::{Buffer, BufferKind, Commands, Device, Volume};
 use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, NONE, Step};
+use crate::lists::skip::Skip;
+use crate::merge::shelf::Shelf;
+use crate::merge::variant::{Chain, Form, Variant, uniform_entities};
+use crate::merge::{Inputs, Merge, Readable};
 use crate::sh::rotation::turns;
 use ash::vk;
 use glam::{DQuat, DVec3};

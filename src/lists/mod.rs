@@ -1,0 +1,11 @@
+//! Cluster lists: which entities concern which cluster of 64 vertices, and which clusters have to be merged again.
+
+pub mod gather;
+pub mod gathering;
+pub mod incremental;
+pub mod moment;
+pub mod repeatable;
+pub mod scope;
+pub mod sight;
+pub mod skip;
+pub mod tree;

@@ -3,7 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
-use crate::gpu::shader::Source;
+use crate::gpu::shader::ShaderSource;
 use crate::gpu::{Shader, Stage};
 use crate::sh;
 use crate::sh::product_program::{STYLES, glsl_subtract};
@@ -120,7 +120,8 @@ impl Library {
             Some(generated) => generate(generated, row),
             None => self.text(name).ok(),
         };
-        let source = Source { name: row.file, stage, text: self.text(row.file)?, defines: &defines, include: &include };
+        let source =
+            ShaderSource { name: row.file, stage, text: self.text(row.file)?, defines: &defines, include: &include };
         Shader::compile(&source, self.cache_dir.as_deref())
     }
 

@@ -202,7 +202,7 @@ fn more_than_the_device_can_hold() {
 }
 
 fn storage_range() -> u64 {
-    let options = shadow_fields::gpu::Options::default();
+    let options = shadow_fields::gpu::DeviceOptions::default();
     shadow_fields::gpu::Device::new(&options).unwrap().limits.max_storage_buffer_range.into()
 }
 

@@ -12,7 +12,7 @@ use shadow_fields::bake::orbit::{self, Turn};
 use shadow_fields::bake::surface::Surface;
 use shadow_fields::bake::symmetry::{Symmetry, cube_group};
 use shadow_fields::bake::{self, Baker};
-use shadow_fields::field::{Header, Kind, Lookup, ShadowField, Storage};
+use shadow_fields::field::{FieldHeader, FieldKind, Lookup, ShadowField, Storage};
 use shadow_fields::gpu::{Buffer, BufferKind};
 use shadow_fields::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use shadow_fields::sh::lobe::cap;
@@ -126,12 +126,12 @@ fn twins_lead_to_captured_samples_that_lie_where_they_should() {
 }
 
 /// The field of a mesh, and how many samples were turned.
-fn field(mesh: &Mesh, kind: Kind, lattice: &str, orbit: bool) -> Option<(ShadowField, u32)> {
+fn field(mesh: &Mesh, kind: FieldKind, lattice: &str, orbit: bool) -> Option<(ShadowField, u32)> {
     let gpu = gpu()?;
     let mut baker = Baker::new(&gpu.device, &gpu.library);
     baker.orbit = orbit;
     let options = bake::Options { lattice: lattice.parse().unwrap(), storage: Storage::F32, ..Default::default() };
-    let mut header: Header = bake::header(mesh, kind, &options);
+    let mut header: FieldHeader = bake::header(mesh, kind, &options);
     let store = Buffer::new(&gpu.device, "field", BufferKind::Device, header.payload_bytes()).unwrap();
     let found = baker.field(mesh, &mut header, (&store, 0), &|_, _| ()).unwrap();
     assert_eq!(header.captured_samples + found.turned, header.lattice.sample_count(), "no sample is blind here");
@@ -144,10 +144,10 @@ fn turned_fields_are_those_that_were_captured_whole() {
     let two = generate::torus_two_colour(1.0, 0.3, 48, 24);
     let cases = [
         // Exact symmetries: what is left is which of two texels a corner between them falls to.
-        (generate::torus(1.0, 0.3, 48, 24), Kind::Occlusion, 1e-3),
-        (two, Kind::Radiance, 2e-3),
+        (generate::torus(1.0, 0.3, 48, 24), FieldKind::Occlusion, 1e-3),
+        (two, FieldKind::Radiance, 2e-3),
         // Facets seen as up to a quarter of a texel.
-        (chessman(50), Kind::Occlusion, 4e-3),
+        (chessman(50), FieldKind::Occlusion, 4e-3),
     ];
     let lattices = ["cube:5x4,outer=8", "cube:5x2,edges,outer=8"];
     for ((mesh, kind, most), text) in cases.iter().flat_map(|case| lattices.map(|text| (case, text))) {
@@ -178,7 +178,7 @@ fn a_turned_sphere_is_as_near_to_the_closed_form_as_a_captured_one() {
     let mesh = generate::sphere(1.0, 4);
     let mut errors = Vec::new();
     for (text, orbit) in [("cube:12x6", true), ("cube:12x6", false), ("cube:12x6,edges", true)] {
-        let Some((field, turned)) = field(&mesh, Kind::Occlusion, text, orbit) else { return };
+        let Some((field, turned)) = field(&mesh, FieldKind::Occlusion, text, orbit) else { return };
         let lattice = field.header.lattice;
         let error = |near: f64, far: f64| {
             let mut rng = Rng::with_seed(2);

@@ -10,7 +10,7 @@ use shadow_fields::bake::capture::unit_positions;
 use shadow_fields::bake::inside::nearest_on_triangle;
 use shadow_fields::bake::partial::Partial;
 use shadow_fields::bake::{self, Baker, capture, simplify};
-use shadow_fields::field::{Header, Kind, Lookup, ShadowField, Storage};
+use shadow_fields::field::{FieldHeader, FieldKind, Lookup, ShadowField, Storage};
 use shadow_fields::gpu::{Buffer, BufferKind};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::Scene;
@@ -79,13 +79,13 @@ fn levels_keep_their_error_and_eyes_their_share_of_a_texel() {
     assert!(count > 20 && count < eyes.len(), "{count} of {} eyes", eyes.len());
 }
 
-fn header(mesh: &Mesh, lattice: &str) -> Header {
+fn header(mesh: &Mesh, lattice: &str) -> FieldHeader {
     let options =
         bake::Options { lattice: lattice.parse().unwrap(), storage: Storage::F32, face_px: 32, ..Default::default() };
-    bake::header(mesh, Kind::Occlusion, &options)
+    bake::header(mesh, FieldKind::Occlusion, &options)
 }
 
-fn floats(store: &Buffer, header: &Header) -> Vec<f32> {
+fn floats(store: &Buffer, header: &FieldHeader) -> Vec<f32> {
     store.download_range(0..header.payload_bytes()).unwrap()
 }
 

@@ -6,7 +6,7 @@ use shadow_fields::Error;
 use shadow_fields::asset::generate;
 use shadow_fields::bake;
 use shadow_fields::field::file::{self, FIELD_MAGIC, TRANSFER_MAGIC};
-use shadow_fields::field::{Header, Kind, ShadowField, Storage};
+use shadow_fields::field::{FieldHeader, FieldKind, ShadowField, Storage};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -15,13 +15,13 @@ const VERSION_AT: usize = 8;
 const HEADER_LENGTH_AT: usize = 12;
 const PAYLOAD_LENGTH_AT: usize = 16;
 
-fn header(kind: Kind, storage: Storage, lattice: &str) -> Header {
+fn header(kind: FieldKind, storage: Storage, lattice: &str) -> FieldHeader {
     let options =
         bake::Options { field_bands: None, storage, lattice: lattice.parse().unwrap(), bands: 2, face_px: 16 };
     bake::header(&generate::sphere(0.7, 1), kind, &options)
 }
 
-fn field(kind: Kind, storage: Storage, lattice: &str, seed: u64) -> ShadowField {
+fn field(kind: FieldKind, storage: Storage, lattice: &str, seed: u64) -> ShadowField {
     let header = header(kind, storage, lattice);
     let mut rng = Rng::with_seed(seed);
     let payload = (0..header.payload_bytes()).map(|_| rng.u8(..)).collect();
@@ -29,7 +29,7 @@ fn field(kind: Kind, storage: Storage, lattice: &str, seed: u64) -> ShadowField 
 }
 
 fn small() -> ShadowField {
-    field(Kind::Occlusion, Storage::F16, "latlon:2x2x2", 1)
+    field(FieldKind::Occlusion, Storage::F16, "latlon:2x2x2", 1)
 }
 
 /// The refusal of a file: bad input, one line, that names the file.
@@ -50,10 +50,10 @@ fn entries(folder: &Path) -> Vec<String> {
 fn round_trip() {
     let folder = tempfile::tempdir().unwrap();
     for (i, (kind, storage, lattice)) in [
-        (Kind::Occlusion, Storage::F16, "cube:3x2,inner=1.02"),
-        (Kind::Occlusion, Storage::F32, "cube:3x2,log,raw,inner=0.3,outer=5.5"),
-        (Kind::Radiance, Storage::F16, "latlon:3x4x5,linear"),
-        (Kind::Radiance, Storage::F32, "cube:1x1"),
+        (FieldKind::Occlusion, Storage::F16, "cube:3x2,inner=1.02"),
+        (FieldKind::Occlusion, Storage::F32, "cube:3x2,log,raw,inner=0.3,outer=5.5"),
+        (FieldKind::Radiance, Storage::F16, "latlon:3x4x5,linear"),
+        (FieldKind::Radiance, Storage::F32, "cube:1x1"),
     ]
     .into_iter()
     .enumerate()
@@ -71,7 +71,7 @@ fn round_trip() {
 #[test]
 fn stored_numbers_have_their_format() {
     for storage in [Storage::F16, Storage::F32] {
-        let header = header(Kind::Radiance, storage, "latlon:2x2x2");
+        let header = header(FieldKind::Radiance, storage, "latlon:2x2x2");
         let count = header.payload_bytes() as usize / storage.bytes();
         let payload = (0..count)
             .flat_map(|i| match storage {
@@ -256,7 +256,7 @@ fn a_read_only_folder_keeps_the_old_file() {
     small().write(&path).unwrap();
     let permit = |mode| std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(mode)).unwrap();
     permit(0o555);
-    let other = field(Kind::Occlusion, Storage::F32, "latlon:2x2x2", 9);
+    let other = field(FieldKind::Occlusion, Storage::F32, "latlon:2x2x2", 9);
     let outcome = other.write(&path);
     permit(0o755);
     // The superuser may write all the same; either way the file is whole and alone.
@@ -269,7 +269,7 @@ fn a_read_only_folder_keeps_the_old_file() {
 fn two_writers_and_a_reader_never_meet() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("shared.sf");
-    let fields = [1, 2].map(|seed| field(Kind::Radiance, Storage::F32, "cube:4x4,inner=1.02", seed));
+    let fields = [1, 2].map(|seed| field(FieldKind::Radiance, Storage::F32, "cube:4x4,inner=1.02", seed));
     fields[0].write(&path).unwrap();
     let done = AtomicBool::new(false);
     let reads = std::thread::scope(|scope| {

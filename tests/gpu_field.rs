@@ -14,7 +14,7 @@ use shadow_fields::bake::surface::Surface;
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::bake::{TRANSFER_OFFSET, capture};
 use shadow_fields::field::quantity::channel_stride;
-use shadow_fields::field::{Header, Kind, Lookup, ShadowField, Storage};
+use shadow_fields::field::{FieldHeader, FieldKind, Lookup, ShadowField, Storage};
 use shadow_fields::gpu::{Buffer, BufferKind, Device};
 use shadow_fields::sh::lobe;
 use shadow_fields::sh::rotation::Rotation;
@@ -29,11 +29,11 @@ fn small(lattice: &str, storage: Storage, bands: usize) -> bake::Options {
 }
 
 /// A store whose bytes are not those of a new one, so that what a bake leaves out shows.
-fn store(device: &Arc<Device>, header: &Header, fill: u8) -> Buffer {
+fn store(device: &Arc<Device>, header: &FieldHeader, fill: u8) -> Buffer {
     Buffer::with_data(device, "store", &vec![fill; header.payload_bytes() as usize]).unwrap()
 }
 
-fn bake_field(device: &Arc<Device>, mesh: &Mesh, kind: Kind, options: &bake::Options) -> ShadowField {
+fn bake_field(device: &Arc<Device>, mesh: &Mesh, kind: FieldKind, options: &bake::Options) -> ShadowField {
     let mut header = bake::header(mesh, kind, options);
     let store = store(device, &header, 0xff);
     let baker = Baker::new(device, &library());
@@ -82,7 +82,9 @@ fn receivers(count: usize, seed: u64) -> Vec<DVec3> {
 /// The default field of a sphere, baked once.
 fn sphere_field(gpu: &Gpu) -> &'static ShadowField {
     static FIELD: OnceLock<ShadowField> = OnceLock::new();
-    FIELD.get_or_init(|| bake_field(&gpu.device, &generate::sphere(2.5, 4), Kind::Occlusion, &bake::Options::default()))
+    FIELD.get_or_init(|| {
+        bake_field(&gpu.device, &generate::sphere(2.5, 4), FieldKind::Occlusion, &bake::Options::default())
+    })
 }
 
 /// Mean and largest relative error of the blocked part of a sphere's field.
@@ -170,7 +172,7 @@ fn torus() -> Mesh {
 fn samples_in_the_tube_are_filled_from_outside() {
     let Some(gpu) = gpu() else { return };
     let mesh = torus();
-    let field = bake_field(&gpu.device, &mesh, Kind::Occlusion, &small("cube:10x4", Storage::F32, 4));
+    let field = bake_field(&gpu.device, &mesh, FieldKind::Occlusion, &small("cube:10x4", Storage::F32, 4));
     let header = &field.header;
     let lattice = header.lattice;
     let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
@@ -233,8 +235,8 @@ fn one_colour_shines_where_it_blocks() {
         let (name, triangles) = (mesh.name.clone(), mesh.triangles.clone());
         let bright = Mesh::new(name, mesh.positions.clone(), mesh.normals.clone(), colors, triangles).unwrap();
         let options = small("cube:5x3", Storage::F32, 4);
-        let blocked = bake_field(&gpu.device, &mesh, Kind::Occlusion, &options);
-        let radiance = bake_field(&gpu.device, &bright, Kind::Radiance, &options);
+        let blocked = bake_field(&gpu.device, &mesh, FieldKind::Occlusion, &options);
+        let radiance = bake_field(&gpu.device, &bright, FieldKind::Radiance, &options);
         assert_eq!(radiance.header.radiance_scale, 7.0);
         let px = f64::from(radiance.header.face_px);
         let mut odd = 0;
@@ -323,9 +325,11 @@ fn a_second_bake_has_the_same_bytes() {
     let Some(gpu) = gpu() else { return };
     let mesh = torus();
     // Three bands leave padding behind nine coefficients.
-    for (kind, storage, bands) in
-        [(Kind::Occlusion, Storage::F16, 3), (Kind::Radiance, Storage::F32, 5), (Kind::Radiance, Storage::F16, 4)]
-    {
+    for (kind, storage, bands) in [
+        (FieldKind::Occlusion, Storage::F16, 3),
+        (FieldKind::Radiance, Storage::F32, 5),
+        (FieldKind::Radiance, Storage::F16, 4),
+    ] {
         let options = small("cube:4x3", storage, bands);
         let first = bake_field(&gpu.device, &mesh, kind, &options);
         let second = bake_field(&gpu.device, &mesh, kind, &options);
@@ -339,8 +343,8 @@ fn a_second_bake_has_the_same_bytes() {
 fn a_field_lands_at_its_offset() {
     let Some(gpu) = gpu() else { return };
     let (mesh, options) = (generate::sphere(1.0, 2), small("cube:3x2", Storage::F16, 4));
-    let alone = bake_field(&gpu.device, &mesh, Kind::Occlusion, &options);
-    let mut header = bake::header(&mesh, Kind::Occlusion, &options);
+    let alone = bake_field(&gpu.device, &mesh, FieldKind::Occlusion, &options);
+    let mut header = bake::header(&mesh, FieldKind::Occlusion, &options);
     let size = header.payload_bytes() as usize;
     let store = Buffer::with_data(&gpu.device, "store", &vec![0x5a_u8; size + 1024]).unwrap();
     Baker::new(&gpu.device, &gpu.library).field(&mesh, &mut header, (&store, 512), &quiet).unwrap();
@@ -353,7 +357,7 @@ fn a_field_lands_at_its_offset() {
 fn progress_is_told_up_to_the_end() {
     let Some(gpu) = gpu() else { return };
     let (mesh, options) = (generate::sphere(1.0, 1), small("cube:3x4", Storage::F16, 4));
-    let mut header = bake::header(&mesh, Kind::Occlusion, &options);
+    let mut header = bake::header(&mesh, FieldKind::Occlusion, &options);
     let store = store(&gpu.device, &header, 0);
     let told = std::cell::RefCell::new(Vec::new());
     let progress = |done, all| told.borrow_mut().push((done, all));
@@ -373,7 +377,7 @@ fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
 }
 
 /// (whether it was baked, header, payload) of a field that comes through the cache.
-fn cached(device: &Arc<Device>, folder: &Path, mesh: &Mesh, header: &mut Header) -> (bool, Vec<u8>) {
+fn cached(device: &Arc<Device>, folder: &Path, mesh: &Mesh, header: &mut FieldHeader) -> (bool, Vec<u8>) {
     let cache = Cache::new(Some(folder));
     let mut store = store(device, header, 0xff);
     let report = cache.field(&Baker::new(device, &library()), mesh, header, (&mut store, 0), &quiet).unwrap();
@@ -385,7 +389,7 @@ fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
     let Some(gpu) = gpu() else { return };
     let folder = tempfile::tempdir().unwrap();
     let (mesh, options) = (torus(), small("cube:10x4", Storage::F16, 4));
-    let fresh = || bake::header(&mesh, Kind::Occlusion, &options);
+    let fresh = || bake::header(&mesh, FieldKind::Occlusion, &options);
     let mut header = fresh();
     let (baked, bytes) = cached(&gpu.device, folder.path(), &mesh, &mut header);
     assert!(baked && header.filled_samples > 0);
@@ -402,7 +406,7 @@ fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
     // The name of a mesh is for people; equal content is found under any name.
     let mut renamed = mesh.clone();
     renamed.name = "other".into();
-    let mut header_renamed = bake::header(&renamed, Kind::Occlusion, &options);
+    let mut header_renamed = bake::header(&renamed, FieldKind::Occlusion, &options);
     assert!(!cached(&gpu.device, folder.path(), &renamed, &mut header_renamed).0);
 
     let paths = files(folder.path(), "sf");
@@ -432,7 +436,7 @@ fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
         small("cube:4x3,outer=7", Storage::F16, 4),
     ];
     for (i, other) in others.iter().enumerate() {
-        let mut header = bake::header(&mesh, Kind::Occlusion, other);
+        let mut header = bake::header(&mesh, FieldKind::Occlusion, other);
         assert!(cached(&gpu.device, folder.path(), &mesh, &mut header).0, "{other:?}");
         assert_eq!(files(folder.path(), "sf").len(), 2 + i);
     }
@@ -445,7 +449,7 @@ fn a_file_under_another_name_is_not_believed() {
     let options = small("cube:3x2,inner=1.02", Storage::F16, 4);
     let meshes = [torus(), generate::cuboid(Vec3::ONE, 2)];
     let run = |mesh: &Mesh| {
-        let mut header = bake::header(mesh, Kind::Occlusion, &options);
+        let mut header = bake::header(mesh, FieldKind::Occlusion, &options);
         cached(&gpu.device, folder.path(), mesh, &mut header)
     };
     let (_, first) = run(&meshes[0]);
@@ -486,7 +490,7 @@ fn without_a_folder_nothing_is_kept() {
     let Some(gpu) = gpu() else { return };
     let (mesh, options) = (generate::sphere(1.0, 1), small("cube:2x1", Storage::F16, 2));
     for _ in 0..2 {
-        let mut header = bake::header(&mesh, Kind::Occlusion, &options);
+        let mut header = bake::header(&mesh, FieldKind::Occlusion, &options);
         let mut store = Buffer::new(&gpu.device, "store", BufferKind::Device, header.payload_bytes()).unwrap();
         let baker = Baker::new(&gpu.device, &gpu.library);
         assert!(Cache::new(None).field(&baker, &mesh, &mut header, (&mut store, 0), &quiet).unwrap().is_some());
@@ -503,7 +507,7 @@ fn two_devices_bake_into_one_cache() {
         let threads = [0, 1].map(|_| {
             scope.spawn(|| {
                 let device = open().unwrap();
-                let mut header = bake::header(&mesh, Kind::Occlusion, &options);
+                let mut header = bake::header(&mesh, FieldKind::Occlusion, &options);
                 let (_, bytes) = cached(&device, folder.path(), &mesh, &mut header);
                 device.save_pipeline_cache();
                 (header, bytes, device.take_validation_messages())
@@ -525,8 +529,8 @@ fn what_cannot_be_baked_is_bad_input() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::sphere(1.0, 2);
     let baker = Baker::new(&gpu.device, &gpu.library);
-    let refused = |edit: &dyn Fn(&mut Header)| {
-        let mut header = bake::header(&mesh, Kind::Occlusion, &small("cube:2x2", Storage::F16, 4));
+    let refused = |edit: &dyn Fn(&mut FieldHeader)| {
+        let mut header = bake::header(&mesh, FieldKind::Occlusion, &small("cube:2x2", Storage::F16, 4));
         let store = store(&gpu.device, &header, 0);
         edit(&mut header);
         baker.field(&mesh, &mut header, (&store, 0), &quiet).expect_err("refused").exit_code()

@@ -9,10 +9,10 @@ use shadow_fields::asset::generate;
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::{Capture, Model};
 use shadow_fields::bake::{self, Baker};
-use shadow_fields::field::{Kind, Storage};
+use shadow_fields::field::{FieldKind, Storage};
 use shadow_fields::gpu::image::ImageShape;
 use shadow_fields::gpu::validation::Messages;
-use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, Device, Image, Options};
+use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, Device, DeviceOptions, Image};
 use shadow_fields::{Error, Result};
 
 /// Leaves out a barrier of every recording until it is dropped.
@@ -76,7 +76,7 @@ fn the_layer_hears_a_wrong_layout() {
 #[test]
 fn without_the_layer_nothing_is_heard() {
     let Some(_gpu) = gpu() else { return };
-    let device = Device::new(&Options::default()).unwrap();
+    let device = Device::new(&DeviceOptions::default()).unwrap();
     let buffer = Buffer::new(&device, "overlap", BufferKind::Device, 1024).unwrap();
     let mut commands = Commands::new(&device, "canary").unwrap();
     commands.copy_range(&buffer, 0..512, &buffer, 256);
@@ -165,7 +165,7 @@ fn a_wrong_kind_of_barrier_is_no_barrier() {
 fn the_barrier_of_a_bake_batch_is_missed() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::sphere(1.0, 1);
-    for kind in [Kind::Occlusion, Kind::Radiance] {
+    for kind in [FieldKind::Occlusion, FieldKind::Radiance] {
         let options = bake::Options {
             lattice: "cube:2x2".parse().unwrap(),
             face_px: 16,

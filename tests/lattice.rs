@@ -7,7 +7,7 @@ use shadow_fields::bake;
 use shadow_fields::field::lattice::{
     CELL_WARP, Directions, OUTSIDE_INNER, Spacing, cap_cosine, cap_height, unwarp, warp,
 };
-use shadow_fields::field::{Fit, Header, Kind, Lattice, Lookup, ShadowField, Storage};
+use shadow_fields::field::{FieldHeader, FieldKind, Fit, Lattice, Lookup, ShadowField, Storage};
 use std::f64::consts::{PI, TAU};
 
 /// A few f64 roundings, widened by the steepest slope of a shell coordinate (some hundreds a unit of distance).
@@ -491,13 +491,16 @@ fn bad_lattices_are_refused() {
 #[test]
 fn first_shell_follows_the_shape() {
     let first = |mesh: &shadow_fields::asset::Mesh| {
-        bake::header(mesh, Kind::Occlusion, &bake::Options::default()).lattice.inner
+        bake::header(mesh, FieldKind::Occlusion, &bake::Options::default()).lattice.inner
     };
     assert_eq!(first(&generate::sphere(3.0, 3)), OUTSIDE_INNER);
     assert_eq!(first(&generate::torus(1.0, 0.3, 24, 12)), 0.25, "room up to the centre");
     // A box of 4 x 1 x 2: its middle is the shells', its short edges are stretched by half their proportions.
-    let slab =
-        bake::header(&generate::cuboid(glam::Vec3::new(4.0, 1.0, 2.0), 2), Kind::Occlusion, &bake::Options::default());
+    let slab = bake::header(
+        &generate::cuboid(glam::Vec3::new(4.0, 1.0, 2.0), 2),
+        FieldKind::Occlusion,
+        &bake::Options::default(),
+    );
     let lattice = slab.lattice;
     assert_eq!((lattice.fit().stretch, lattice.outer), ([1.0, 2.0, 1.421875], 8.0));
     // Half an edge of 1 in bounding radii of sqrt 21 / 2, stretched by 2.
@@ -513,9 +516,11 @@ fn lookup_of_a_field_is_the_lattice_and_the_factor() {
     let lattice: Lattice = "cube:4x3,inner=1.02".parse().unwrap();
     let captured = noise(&lattice, &mut rng);
     let stored = store(&lattice, &captured);
-    let header =
-        Header { lattice, ..bake::header(&generate::sphere(1.0, 1), Kind::Radiance, &bake::Options::default()) };
-    let header = Header { bands: 2, storage: Storage::F32, radiance_scale: 2.5, ..header };
+    let header = FieldHeader {
+        lattice,
+        ..bake::header(&generate::sphere(1.0, 1), FieldKind::Radiance, &bake::Options::default())
+    };
+    let header = FieldHeader { bands: 2, storage: Storage::F32, radiance_scale: 2.5, ..header };
     // Channel and coefficient as multiples of the value, so that a swapped index shows.
     let payload = stored
         .iter()

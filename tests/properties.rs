@@ -8,7 +8,7 @@ use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
 use shadow_fields::bake::assemble::{Sources, reference};
-use shadow_fields::field::{Header, Kind, Lattice, Lookup, ShadowField, Storage};
+use shadow_fields::field::{FieldHeader, FieldKind, Lattice, Lookup, ShadowField, Storage};
 use shadow_fields::sh::basis::{Y00, coefficient_count};
 use shadow_fields::sh::product::Tensor;
 use shadow_fields::sh::project::project;
@@ -140,8 +140,8 @@ fn projection_is_linear() {
 /// A field of random numbers, stored as a bake stores them.
 fn field(lattice: Lattice, seed: u64) -> ShadowField {
     let mut rng = fastrand::Rng::with_seed(seed);
-    let header = Header {
-        kind: Kind::Occlusion,
+    let header = FieldHeader {
+        kind: FieldKind::Occlusion,
         bands: 2,
         storage: Storage::F32,
         lattice,

@@ -44,7 +44,11 @@ impl Stand {
         let options = Options { size: SIZE, ..small() };
         let setup = Setup {
             device: gpu.device.clone(),
-            options: gpu::Options { device: None, validation: Validation::Core, cache_dir: Some(common::cache_dir()) },
+            options: gpu::DeviceOptions {
+                device: None,
+                validation: Validation::Core,
+                cache_dir: Some(common::cache_dir()),
+            },
             library,
             cache: Cache::new(Some(&cache)),
             frame: options,

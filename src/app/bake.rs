@@ -6,7 +6,7 @@ use crate::asset::Mesh;
 use crate::asset::environment::RADIANCE_LIMIT;
 use crate::bake;
 use crate::error::{Error, Result};
-use crate::field::{Kind, ShadowField};
+use crate::field::{FieldKind, ShadowField};
 use crate::gpu::{Buffer, BufferKind};
 use clap::Args;
 use glam::Vec3;
@@ -74,7 +74,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     output::check_folder(&arguments.output)?;
     output::check_ending(&arguments.output, "sf", "a field file")?;
     let mut mesh = Mesh::load(&arguments.mesh)?;
-    let kind = if arguments.radiance.is_some() { Kind::Radiance } else { Kind::Occlusion };
+    let kind = if arguments.radiance.is_some() { FieldKind::Radiance } else { FieldKind::Occlusion };
     if let Some(radiance) = arguments.radiance {
         mesh = shining(mesh, radiance, &arguments.mesh)?;
     }

@@ -178,7 +178,7 @@ impl Context {
     ///
     /// # Errors
     /// What `open` returns.
-    pub fn with_device(global: &Global, open: impl FnOnce(&gpu::Options) -> Result<Arc<Device>>) -> Result<Self> {
+    pub fn with_device(global: &Global, open: impl FnOnce(&gpu::DeviceOptions) -> Result<Arc<Device>>) -> Result<Self> {
         let cache_dir = match (global.no_cache, &global.cache_dir) {
             (true, _) => None,
             (false, Some(folder)) => Some(folder.clone()),
@@ -196,7 +196,7 @@ impl Context {
         {
             return Err(Error::input(folder, "is no folder of shaders"));
         }
-        let device = open(&gpu::Options {
+        let device = open(&gpu::DeviceOptions {
             device: global.device.clone(),
             validation: global.validation,
             cache_dir: cache_dir.clone(),

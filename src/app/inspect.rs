@@ -8,7 +8,7 @@ use crate::asset::Mesh;
 use crate::bake::{self, snapshot::snapshot};
 use crate::bench::text;
 use crate::error::{Error, Result};
-use crate::field::{Header, Kind, Lookup, ShadowField, growth};
+use crate::field::{FieldHeader, FieldKind, Lookup, ShadowField, growth};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
 use clap::Args;
@@ -97,7 +97,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     for (name, value) in lines {
         output::say(format!("{name:16} {value}"));
     }
-    if header.kind == Kind::Occlusion {
+    if header.kind == FieldKind::Occlusion {
         output::say(format!(
             "{:16} at most {:.4} times a product, transfers of {} bands",
             "growth",
@@ -105,7 +105,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             growth::TRANSFER_BANDS
         ));
     }
-    if header.kind == Kind::Radiance {
+    if header.kind == FieldKind::Radiance {
         output::say(format!("{:16} {}", "radiance scale", header.radiance_scale));
     }
     if result["at"] != serde_json::Value::Null {
@@ -115,9 +115,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
 }
 
 /// The mesh that a field was baked from, with the colours that it was baked with.
-fn baked_mesh(header: &Header, path: &Path, radiance: Option<Vec3>) -> Result<Mesh> {
+fn baked_mesh(header: &FieldHeader, path: &Path, radiance: Option<Vec3>) -> Result<Mesh> {
     let mut mesh = Mesh::load(path)?;
-    if header.kind == Kind::Radiance {
+    if header.kind == FieldKind::Radiance {
         mesh = shining(mesh, radiance.unwrap_or(Vec3::ONE), path)?;
     } else if radiance.is_some() {
         return Err(Error::Usage("--radiance goes with a radiance field, and this one holds occlusion".into()));
@@ -129,7 +129,7 @@ fn baked_mesh(header: &Header, path: &Path, radiance: Option<Vec3>) -> Result<Me
     let of = |centre: [f32; 3], radius_m: f32| format!("centre {centre:?} m, radius {radius_m} m");
     let same_size = centre.to_array() == header.centre_m && radius_m == header.radius_m;
     let why = match (header.kind, same_size) {
-        (Kind::Radiance, true) => {
+        (FieldKind::Radiance, true) => {
             "it is as large: say with --radiance which colour the field was baked with".to_owned()
         }
         (_, true) => "it is as large, but has other triangles".to_owned(),
@@ -148,8 +148,8 @@ fn lookup(field: &ShadowField, position_m: DVec3, lookup: Lookup) -> serde_json:
         out
     };
     match field.header.kind {
-        Kind::Occlusion => json!({ "position_m": position_m.to_array(), "blocked": channel(0) }),
-        Kind::Radiance => {
+        FieldKind::Occlusion => json!({ "position_m": position_m.to_array(), "blocked": channel(0) }),
+        FieldKind::Radiance => {
             let channels = [0, 1, 2].map(channel);
             json!({ "position_m": position_m.to_array(), "radiance": channels })
         }
@@ -192,12 +192,12 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
         rows.iter().flat_map(|(_, cells)| cells.iter().flatten()).fold(least, |m, c| m.max(*c))
     };
     let whites: Vec<f32> = match field.header.kind {
-        Kind::Occlusion => vec![brightest(&rows, 1.0); rows.len()],
-        Kind::Radiance => rows.chunks(1).map(|row| brightest(row, f32::MIN_POSITIVE)).collect(),
+        FieldKind::Occlusion => vec![brightest(&rows, 1.0); rows.len()],
+        FieldKind::Radiance => rows.chunks(1).map(|row| brightest(row, f32::MIN_POSITIVE)).collect(),
     };
     if let Some(mesh) = mesh {
         let context = Context::new(global)?;
-        let radiance = field.header.kind == Kind::Radiance;
+        let radiance = field.header.kind == FieldKind::Radiance;
         let faces = snapshot(&context.device, context.baker.library(), mesh, &eyes, FACE_PX as u32, radiance)?;
         let mut captured = faces.chunks(LONGITUDES);
         for (_, cells) in &mut rows {
@@ -244,7 +244,7 @@ fn reconstruct(field: &ShadowField, position: DVec3) -> Cell {
                 evaluate(bands, w, &mut basis);
                 let value = |channel: usize| -> f64 {
                     let sum: f64 = found[channel].iter().zip(&basis).map(|(c, y)| c * y).sum();
-                    if field.header.kind == Kind::Occlusion { 1.0 - sum } else { sum }
+                    if field.header.kind == FieldKind::Occlusion { 1.0 - sum } else { sum }
                 };
                 cell.extend((0..3).map(|c| value(c.min(channels - 1)).max(0.0) as f32));
             }

@@ -102,7 +102,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         context.learn(global)?;
     }
     let usual = calibrate::best_known(&context.device).name;
-    let fresh = Device::new(&gpu::Options {
+    let fresh = Device::new(&gpu::DeviceOptions {
         device: Some(context.device.info.uuid.clone()),
         validation: Validation::Off,
         cache_dir: None,

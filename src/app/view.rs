@@ -64,7 +64,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let events = event_loop()?;
     let display = events.owned_display_handle();
     let display = display.display_handle().map_err(no_display)?.as_raw();
-    let mut device_options = gpu::Options::default();
+    let mut device_options = gpu::DeviceOptions::default();
     let context = Context::with_device(global, |options| {
         device_options = options.clone();
         Device::for_display(options, display)
@@ -143,7 +143,7 @@ struct App<'a> {
     global: &'a Global,
     arguments: &'a Arguments,
     context: &'a Context,
-    device_options: gpu::Options,
+    device_options: gpu::DeviceOptions,
     scene: Option<Scene>,
     shown: Option<Shown>,
     outcome: Result<()>,

@@ -6,7 +6,7 @@ use crate::asset::mesh::Mesh;
 use crate::error::Result;
 use crate::field::file::{self, TRANSFER_MAGIC, VERSION};
 use crate::field::quantity::channel_stride;
-use crate::field::{Header, ShadowField};
+use crate::field::{FieldHeader, ShadowField};
 use crate::gpu::Buffer;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -45,8 +45,8 @@ fn key(header: &impl Serialize) -> String {
 }
 
 /// What decides a field: the header without the name for people and without what only the bake finds out.
-fn identity(header: &Header) -> Header {
-    Header {
+fn identity(header: &FieldHeader) -> FieldHeader {
+    FieldHeader {
         mesh: String::new(),
         filled_samples: 0,
         captured_samples: 0,
@@ -57,7 +57,7 @@ fn identity(header: &Header) -> Header {
 }
 
 /// Name of a field: the same for all that come out the same.
-pub fn field_name(header: &Header) -> String {
+pub fn field_name(header: &FieldHeader) -> String {
     key(&identity(header))
 }
 
@@ -72,7 +72,7 @@ impl Cache {
     }
 
     /// Whether the field that `header` describes is on disk.
-    pub fn has_field(&self, header: &Header) -> bool {
+    pub fn has_field(&self, header: &FieldHeader) -> bool {
         self.path(&field_name(header), "sf").is_some_and(|path| path.exists())
     }
 
@@ -90,7 +90,7 @@ impl Cache {
         &self,
         baker: &Baker,
         mesh: &Mesh,
-        header: &mut Header,
+        header: &mut FieldHeader,
         (store, offset_bytes): (&mut Buffer, u64),
         progress: Progress<'_>,
     ) -> Result<Option<Report>> {
@@ -98,7 +98,7 @@ impl Cache {
         if let Some(path) = path.as_ref().filter(|path| path.exists()) {
             match ShadowField::read(path) {
                 Ok(found) if identity(&found.header) == identity(header) => {
-                    *header = Header { mesh: header.mesh.clone(), ..found.header };
+                    *header = FieldHeader { mesh: header.mesh.clone(), ..found.header };
                     store.fill(offset_bytes, &found.payload)?;
                     return Ok(None);
                 }

@@ -23,8 +23,8 @@ pub mod symmetry;
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
-use crate::field::quantity::{Kind, Storage, channel_stride};
-use crate::field::{Fit, Header, Lattice, ShadowField, growth};
+use crate::field::quantity::{FieldKind, Storage, channel_stride};
+use crate::field::{FieldHeader, Fit, Lattice, ShadowField, growth};
 use crate::gpu::{Buffer, Commands, Device};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
@@ -115,16 +115,16 @@ pub fn hash_text(mesh: &Mesh) -> String {
 }
 
 /// Header of the field that a bake of `mesh` would make.
-pub fn header(mesh: &Mesh, kind: Kind, options: &Options) -> Header {
+pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
     let (centre, radius_m) = mesh.bounding_sphere();
     let positions = unit_positions(mesh);
     let first = |fit: &Fit| first_shell(fit, &positions, &mesh.triangles);
     let mut lattice = options.lattice.fitted(Fit::new(&positions), first);
     lattice.edges.get_or_insert_with(|| is_served_by_edges(&positions, &mesh.triangles));
     let brightest = mesh.colors.iter().flatten().map(|c| c.max_element()).fold(0.0, f32::max);
-    Header {
+    FieldHeader {
         kind,
-        bands: if kind == Kind::Occlusion { options.occlusion_bands() } else { options.bands },
+        bands: if kind == FieldKind::Occlusion { options.occlusion_bands() } else { options.bands },
         storage: options.storage,
         lattice,
         face_px: options.face_px,
@@ -134,14 +134,14 @@ pub fn header(mesh: &Mesh, kind: Kind, options: &Options) -> Header {
         growth: 0.0,
         centre_m: centre.to_array(),
         radius_m,
-        radiance_scale: if kind == Kind::Radiance && mesh.colors.is_some() { brightest } else { 1.0 },
+        radiance_scale: if kind == FieldKind::Radiance && mesh.colors.is_some() { brightest } else { 1.0 },
         mesh: mesh.name.clone(),
         mesh_hash: hash_text(mesh),
     }
 }
 
 /// Bytes of the samples of a field before they are put into its stored order and number format.
-fn captured_bytes(header: &Header) -> u64 {
+fn captured_bytes(header: &FieldHeader) -> u64 {
     4 * u64::from(header.lattice.sample_count()) * header.sample_stride() as u64
 }
 
@@ -172,7 +172,7 @@ impl Baker {
     ///
     /// # Errors
     /// `Input` with both numbers of bytes.
-    pub fn fits(&self, header: &Header) -> Result<()> {
+    pub fn fits(&self, header: &FieldHeader) -> Result<()> {
         let (needed, most) = (
             header.payload_bytes().max(captured_bytes(header)),
             u64::from(self.device.limits.max_storage_buffer_range),
@@ -193,7 +193,7 @@ impl Baker {
     pub fn field(
         &self,
         mesh: &Mesh,
-        header: &mut Header,
+        header: &mut FieldHeader,
         target: (&Buffer, u64),
         progress: Progress<'_>,
     ) -> Result<Report> {
@@ -208,7 +208,7 @@ impl Baker {
         &self,
         partial: &Partial,
         mesh: &Mesh,
-        header: &mut Header,
+        header: &mut FieldHeader,
         (store, offset_bytes): (&Buffer, u64),
         progress: Progress<'_>,
     ) -> Result<Report> {
@@ -230,7 +230,7 @@ impl Baker {
         header.filled_samples = inside.iter().filter(|i| **i).count() as u32;
         let sources = Sources::new(&lattice, &inside, &unseen)?;
 
-        let radiance = header.kind == Kind::Radiance;
+        let radiance = header.kind == FieldKind::Radiance;
         let mut values = vec![0.0_f32; captured_bytes(header) as usize / 4];
         let mut targets = Vec::new();
         let seen = positions.iter().enumerate().filter(|(index, _)| !unseen[*index] && twins[*index].is_none());
@@ -265,7 +265,7 @@ impl Baker {
             assemble.record(commands, inputs, (store, range), (lattice.stored_count(), quads), factor)
         })?;
         report.add(&commands.submit()?);
-        if header.kind == Kind::Occlusion {
+        if header.kind == FieldKind::Occlusion {
             let payload = store.download_range(offset_bytes..offset_bytes + header.payload_bytes())?;
             header.growth = growth::growth(&ShadowField { header: header.clone(), payload });
         }
@@ -328,12 +328,12 @@ impl Baker {
     }
 
     /// Which samples are turned from which others; says in the header by what symmetries.
-    fn plan(&self, mesh: &Mesh, header: &mut Header, surface: &Surface, inside: &[bool]) -> Plan {
+    fn plan(&self, mesh: &Mesh, header: &mut FieldHeader, surface: &Surface, inside: &[bool]) -> Plan {
         if !self.orbit {
             header.symmetry = "off".to_owned();
             return Plan { twins: orbit::same(&header.lattice), round: Vec::new() };
         }
-        let symmetry = Symmetry::of(mesh, surface, header.kind == Kind::Radiance).kept_by(&header.lattice.fit());
+        let symmetry = Symmetry::of(mesh, surface, header.kind == FieldKind::Radiance).kept_by(&header.lattice.fit());
         header.symmetry = symmetry.describe();
         let distance = |sample: u32| {
             let position = header.lattice.position(sample);

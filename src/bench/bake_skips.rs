@@ -4,7 +4,7 @@ use super::{Bench, text};
 use crate::asset::{Mesh, generate};
 use crate::bake::{self, Baker, Report};
 use crate::error::Result;
-use crate::field::{Kind, Storage};
+use crate::field::{FieldKind, Storage};
 use crate::gpu::{Buffer, BufferKind};
 use serde::Serialize;
 use serde_json::json;
@@ -140,7 +140,7 @@ fn bake_once(
     set(&mut baker);
     let lattice = lattice.parse().expect("a lattice");
     let options = bake::Options { lattice, storage: Storage::F32, face_px, ..Default::default() };
-    let mut header = bake::header(mesh, Kind::Occlusion, &options);
+    let mut header = bake::header(mesh, FieldKind::Occlusion, &options);
     let store = Buffer::new(baker.device(), "field", BufferKind::Device, header.payload_bytes())?;
     let report = baker.field(mesh, &mut header, (&store, 0), &|_, _| ())?;
     Ok((report, store.download_range(0..header.payload_bytes())?))

@@ -6,7 +6,7 @@ use crate::asset::Mesh;
 use crate::bake;
 use crate::draw::{Antialias, Finish};
 use crate::error::{Error, Result};
-use crate::field::Kind;
+use crate::field::FieldKind;
 use crate::gpu::census::{Census, disassemble};
 use crate::gpu::{Buffer, BufferKind, Device};
 use crate::merge::Merge;
@@ -275,19 +275,19 @@ pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(Row, Vec<f
     // Two shells: the inner one alone may lie inside the solid, where nothing is seen.
     let small = bake::Options { lattice: "cube:2x1".parse().expect("a lattice"), ..options };
     let mut times: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
-    let field = |kind: Kind, options: &bake::Options| -> Result<bake::Report> {
+    let field = |kind: FieldKind, options: &bake::Options| -> Result<bake::Report> {
         let mut header = bake::header(mesh, kind, options);
         let store = Buffer::new(bench.baker.device(), "field", BufferKind::Device, header.payload_bytes())?;
         bench.baker.field(mesh, &mut header, (&store, 0), &|_, _| ())
     };
-    for kind in [Kind::Occlusion, Kind::Radiance] {
+    for kind in [FieldKind::Occlusion, FieldKind::Radiance] {
         field(kind, &small)?;
     }
     for _ in 0..runs.min(3) {
         let (bands, face_px) = (options.bands, options.face_px);
         let reports = [
-            ("occlusion", field(Kind::Occlusion, &options)?),
-            ("radiance", field(Kind::Radiance, &options)?),
+            ("occlusion", field(FieldKind::Occlusion, &options)?),
+            ("radiance", field(FieldKind::Radiance, &options)?),
             ("transfer", bench.baker.transfer(mesh, bands, face_px, &|_, _| ())?.1),
         ];
         for (what, report) in reports {

@@ -63,7 +63,7 @@ fn node_at(s: f64, columns: u32) -> f64 {
 }
 
 /// Four cells of a shell and the place between them.
-pub(super) struct Plane {
+pub(super) struct ShellCells {
     pub base: u32,
     pub columns: u32,
     pub x: [u32; 2],
@@ -228,7 +228,7 @@ impl Lattice {
     }
 
     /// The four cells around a direction within one shell.
-    pub(super) fn plane(&self, direction: DVec3, lookup: Lookup) -> Plane {
+    pub(super) fn plane(&self, direction: DVec3, lookup: Lookup) -> ShellCells {
         let settle = |x: f64| if lookup == Lookup::Trilinear { x } else { x.round() };
         match self.directions {
             Directions::Cube { cells } => {
@@ -240,7 +240,7 @@ impl Lattice {
                 // Rounding may land on cells + 1/2 exactly: stay inside the stored rows.
                 let low = |x: f64| (x.floor() as u32).min(cells);
                 let (x0, y0) = (low(x), low(y));
-                Plane {
+                ShellCells {
                     base: face as u32 * (cells + 2) * (cells + 2),
                     columns: cells + 2,
                     x: [x0, x0 + 1],
@@ -254,7 +254,7 @@ impl Lattice {
                 let y = settle(polar.clamp(0.0, f64::from(latitudes - 1)));
                 let x = settle(azimuth);
                 let (x0, y0) = (x.floor() as u32, (y.floor() as u32).min(latitudes.saturating_sub(2)));
-                Plane {
+                ShellCells {
                     base: 0,
                     columns: longitudes,
                     x: [x0 % longitudes, (x0 + 1) % longitudes],

@@ -1,7 +1,7 @@
 //! In which directions around its object a field holds anything at all.
 
 use super::lattice::Directions;
-use super::{ShadowField, quantity::Kind};
+use super::{ShadowField, quantity::FieldKind};
 use crate::sh::basis::coefficient_count;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -27,7 +27,7 @@ pub fn extent(field: &ShadowField) -> Extent {
     let header = &field.header;
     let (lattice, count) = (header.lattice, coefficient_count(header.bands));
     let fit = lattice.fit();
-    let channels = if header.kind == Kind::Radiance { 3 } else { 1 };
+    let channels = if header.kind == FieldKind::Radiance { 3 } else { 1 };
     let stored = lattice.stored_direction_count();
     let holds = |sample: u32| (0..channels).any(|c| (0..count).any(|k| field.stored(sample, c, k) != 0.0));
     // Directions in the object's frame.

@@ -10,7 +10,7 @@
 //! 56  header, then payload, then the end of the file
 //! ```
 
-use super::{Header, ShadowField};
+use super::{FieldHeader, ShadowField};
 use crate::error::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -111,7 +111,7 @@ impl ShadowField {
     /// # Errors
     /// As [`read`]; also when the header's numbers are out of range or do not fit the payload.
     pub fn read(path: &Path) -> Result<Self> {
-        let (header, payload): (Header, _) = read(path, FIELD_MAGIC)?;
+        let (header, payload): (FieldHeader, _) = read(path, FIELD_MAGIC)?;
         header.validate().map_err(|error| Error::input(path, error))?;
         if header.payload_bytes() != payload.len() as u64 {
             let (claimed, found) = (header.payload_bytes(), payload.len());

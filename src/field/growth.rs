@@ -53,7 +53,7 @@ fn neighbouring(lattice: &Lattice, shell: u32) -> impl Iterator<Item = f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{Header, Kind, Lookup, Storage};
+    use crate::field::{FieldHeader, FieldKind, Lookup, Storage};
     use crate::sh::basis::MAX_COEFFICIENTS;
     use crate::sh::lobe;
     use glam::DVec3;
@@ -79,8 +79,8 @@ mod tests {
                 payload.extend(mean.iter().flat_map(|&c| (c as f32).to_le_bytes()));
             }
         }
-        let header = Header {
-            kind: Kind::Occlusion,
+        let header = FieldHeader {
+            kind: FieldKind::Occlusion,
             bands,
             storage: Storage::F32,
             lattice,

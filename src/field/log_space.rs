@@ -1,7 +1,7 @@
 //! A field of logarithms: what is added where chains are kept in log space (see [`crate::sh::log_space`]).
 
 use super::ShadowField;
-use super::quantity::{Kind, Storage};
+use super::quantity::{FieldKind, Storage};
 use crate::sh::basis::coefficient_count;
 use crate::sh::log_space::LogSpace;
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 /// The logarithm of 1 - b for every stored sample of an occlusion field, in floats, to be looked up as the field is: multiplied by
 /// [`super::Lattice::scale`], since it falls off with distance as b does.
 pub fn logarithms(field: &ShadowField) -> ShadowField {
-    assert_eq!(field.header.kind, Kind::Occlusion, "only what blocks is multiplied");
+    assert_eq!(field.header.kind, FieldKind::Occlusion, "only what blocks is multiplied");
     let (lattice, bands) = (field.header.lattice, field.header.bands);
     let space = LogSpace::new(bands);
     let payload = (0..lattice.stored_count())
@@ -24,7 +24,7 @@ pub fn logarithms(field: &ShadowField) -> ShadowField {
             floats.into_iter().flat_map(f32::to_le_bytes)
         })
         .collect();
-    let header = super::Header { storage: Storage::F32, ..field.header.clone() };
+    let header = super::FieldHeader { storage: Storage::F32, ..field.header.clone() };
     ShadowField { header, payload }
 }
 
@@ -37,5 +37,5 @@ pub fn widened(field: &ShadowField) -> ShadowField {
             halves.flat_map(|half| half.to_f32().to_le_bytes()).collect()
         }
     };
-    ShadowField { header: super::Header { storage: Storage::F32, ..field.header.clone() }, payload }
+    ShadowField { header: super::FieldHeader { storage: Storage::F32, ..field.header.clone() }, payload }
 }

@@ -14,7 +14,7 @@ mod text;
 pub use area::Area;
 pub use fit::Fit;
 pub use lattice::{Lattice, Lookup};
-pub use quantity::{Kind, Storage};
+pub use quantity::{FieldKind, Storage};
 
 use crate::error::{Error, Result};
 use crate::sh::basis::coefficient_count;
@@ -24,9 +24,9 @@ use serde::{Deserialize, Serialize};
 
 /// Everything about a field but its coefficients.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Header {
+pub struct FieldHeader {
     /// What the field holds.
-    pub kind: Kind,
+    pub kind: FieldKind,
     /// SH bands; bands^2 coefficients a channel.
     pub bands: usize,
     /// Number format of the coefficients.
@@ -56,7 +56,7 @@ pub struct Header {
     pub mesh_hash: String,
 }
 
-impl Header {
+impl FieldHeader {
     /// Coefficients of one channel as stored: rounded up to a multiple of four, so that shaders read whole quads.
     pub fn channel_stride(&self) -> usize {
         quantity::channel_stride(self.bands)
@@ -98,7 +98,7 @@ impl Header {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShadowField {
     /// Parameters.
-    pub header: Header,
+    pub header: FieldHeader,
     /// Stored coefficients, little-endian: samples in stored order, channels within a sample, coefficients within a channel.
     pub payload: Vec<u8>,
 }

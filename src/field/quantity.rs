@@ -5,19 +5,19 @@ use serde::{Deserialize, Serialize};
 /// What a field's coefficients mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum FieldKind {
     /// Object occlusion field: the blocked part b = P[1 - V], one channel.
     Occlusion,
     /// Source radiance field: `P[L]` in red, green and blue.
     Radiance,
 }
 
-impl Kind {
+impl FieldKind {
     /// Channels of a sample.
     pub fn channels(self) -> usize {
         match self {
-            Kind::Occlusion => 1,
-            Kind::Radiance => 3,
+            FieldKind::Occlusion => 1,
+            FieldKind::Radiance => 3,
         }
     }
 }

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex};
 
 /// What the caller decides about a device.
 #[derive(Clone, Debug, Default)]
-pub struct Options {
+pub struct DeviceOptions {
     /// Index, UUID or part of a name; `None` takes the best.
     pub device: Option<String>,
     /// Which validation checks run.
@@ -187,13 +187,13 @@ impl Device {
     ///
     /// # Errors
     /// `Unsupported` without a loader, a suitable device, or the validation layer that was asked for.
-    pub fn new(options: &Options) -> Result<Arc<Self>> {
+    pub fn new(options: &DeviceOptions) -> Result<Arc<Self>> {
         Self::with_extensions(options, &[], &[])
     }
 
     /// As [`Device::new`] with what a window needs of instance and device.
     pub(super) fn with_extensions(
-        options: &Options,
+        options: &DeviceOptions,
         surface: &[&'static CStr],
         swapchain: &[&'static CStr],
     ) -> Result<Arc<Self>> {

@@ -2,7 +2,7 @@
 
 use super::Checked;
 use super::device::Device;
-use super::memory::{BufferKind, Memory};
+use super::memory::{Allocation, BufferKind};
 use crate::error::{Error, Result};
 use ash::vk;
 use std::any::Any;
@@ -47,7 +47,7 @@ impl Drop for ImageHandle {
 /// A two-dimensional image that passes draw into and read.
 pub struct Image {
     handle: ImageHandle,
-    _memory: Option<Memory>,
+    _memory: Option<Allocation>,
     /// Format and size.
     pub shape: ImageShape,
     /// Name shown in messages and debuggers.
@@ -88,7 +88,7 @@ impl Image {
         device.name(image, name);
         // SAFETY: the handle is alive.
         let needs = unsafe { device.handle.get_image_memory_requirements(image) };
-        let memory = Memory::new(device, name, needs, BufferKind::Device.preferences())?;
+        let memory = Allocation::new(device, name, needs, BufferKind::Device.preferences())?;
         // SAFETY: fresh image and memory of sufficient size.
         unsafe { device.handle.bind_image_memory(image, memory.handle, 0) }.checked("vkBindImageMemory", name)?;
         Self::with_view(handle, Some(memory), name, shape)
@@ -108,7 +108,7 @@ impl Image {
         Self::with_view(handle, None, name, shape)
     }
 
-    fn with_view(mut handle: ImageHandle, memory: Option<Memory>, name: &str, shape: ImageShape) -> Result<Self> {
+    fn with_view(mut handle: ImageHandle, memory: Option<Allocation>, name: &str, shape: ImageShape) -> Result<Self> {
         let device = handle.device.clone();
         let view = vk::ImageViewCreateInfo::default()
             .image(handle.image)

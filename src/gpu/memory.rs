@@ -38,13 +38,13 @@ impl BufferKind {
 }
 
 /// One allocation, bound to one buffer or image.
-pub(super) struct Memory {
+pub(super) struct Allocation {
     device: Arc<Device>,
     pub(super) handle: vk::DeviceMemory,
     host_coherent: bool,
 }
 
-impl Memory {
+impl Allocation {
     pub(super) fn new(
         device: &Arc<Device>,
         name: &str,
@@ -71,11 +71,11 @@ impl Memory {
         let handle = unsafe { device.handle.allocate_memory(&allocate, None) }.checked("vkAllocateMemory", name)?;
         device.name(handle, name);
         let coherent = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-        Ok(Memory { device: device.clone(), handle, host_coherent: types[index].property_flags.contains(coherent) })
+        Ok(Allocation { device: device.clone(), handle, host_coherent: types[index].property_flags.contains(coherent) })
     }
 }
 
-impl Drop for Memory {
+impl Drop for Allocation {
     fn drop(&mut self) {
         // SAFETY: the object bound to this memory is dropped first (field order of its owner).
         unsafe { self.device.handle.free_memory(self.handle, None) };
@@ -107,7 +107,7 @@ impl Drop for BufferHandle {
 /// A buffer with its own memory, usable as storage, uniform, texel, vertex and index buffer and for copies.
 pub struct Buffer {
     handle: BufferHandle,
-    memory: Memory,
+    memory: Allocation,
     mapped: Option<*mut u8>,
     pub(super) kind: BufferKind,
     /// Size in bytes.
@@ -146,7 +146,7 @@ impl Buffer {
         device.name(handle.buffer, name);
         // SAFETY: the handle is alive.
         let needs = unsafe { device.handle.get_buffer_memory_requirements(handle.buffer) };
-        let memory = Memory::new(device, name, needs, kind.preferences())?;
+        let memory = Allocation::new(device, name, needs, kind.preferences())?;
         // SAFETY: fresh buffer and memory of sufficient size; the whole allocation is mapped once and unmapped by freeing.
         let mapped = unsafe {
             device.handle.bind_buffer_memory(handle.buffer, memory.handle, 0).checked("vkBindBufferMemory", name)?;

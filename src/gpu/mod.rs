@@ -30,7 +30,7 @@ pub mod window;
 pub use access::Access;
 pub use commands::{Commands, Timing};
 pub use descriptors::Bind;
-pub use device::{Device, Options};
+pub use device::{Device, DeviceOptions};
 pub use drawing::{Drawing, Target};
 pub use flight::{FLIGHTS, Flight};
 pub use image::{Image, ImageShape};

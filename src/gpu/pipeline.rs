@@ -2,7 +2,7 @@
 
 use super::Checked;
 use super::device::Device;
-use super::reflect::{Binding, BindingKind, Input};
+use super::reflect::{Binding, BindingKind, VertexInput};
 use super::shader::{Shader, Stage};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -209,7 +209,7 @@ pub struct GraphicsState {
 pub struct GraphicsPipeline {
     handle: PipelineHandle,
     pub(super) layout: Layout,
-    pub(super) inputs: Vec<Input>,
+    pub(super) inputs: Vec<VertexInput>,
     /// Fixed-function state.
     pub state: GraphicsState,
     /// Name of the pass.

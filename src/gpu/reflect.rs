@@ -47,7 +47,7 @@ pub struct Constant {
 
 /// One vertex attribute.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Input {
+pub struct VertexInput {
     /// `location`.
     pub location: u32,
     /// Number of floats, 1 to 4.
@@ -69,7 +69,7 @@ pub struct Reflection {
     /// Specialisation constants.
     pub constants: Vec<Constant>,
     /// Vertex inputs by location; empty for other stages.
-    pub inputs: Vec<Input>,
+    pub inputs: Vec<VertexInput>,
     /// Struct name to member offsets.
     pub structs: BTreeMap<String, Layout>,
     /// Struct name to the stride of arrays of it, where the module has such an array.
@@ -218,7 +218,7 @@ impl<'m> Reader<'m> {
                         Op::TypeVector => literal(self.definitions[&target].operands.get(1)),
                         _ => 1,
                     };
-                    out.inputs.push(Input { location: literal(location.first()), components });
+                    out.inputs.push(VertexInput { location: literal(location.first()), components });
                 }
             }
             StorageClass::StorageBuffer | StorageClass::Uniform | StorageClass::UniformConstant => {

@@ -28,7 +28,7 @@ impl Stage {
 }
 
 /// Everything that decides what SPIR-V comes out.
-pub struct Source<'a> {
+pub struct ShaderSource<'a> {
     /// File name, for messages.
     pub name: &'a str,
     /// Stage it is compiled for.
@@ -63,7 +63,7 @@ impl Shader {
     ///
     /// # Errors
     /// `Failed` with the compiler's lines, or when an include is missing.
-    pub fn compile(source: &Source<'_>, cache_dir: Option<&Path>) -> Result<Self> {
+    pub fn compile(source: &ShaderSource<'_>, cache_dir: Option<&Path>) -> Result<Self> {
         let includes = gather(source)?;
         let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{}.spv", key(source, &includes))));
         let cached = path.as_ref().and_then(|path| std::fs::read(path).ok()).and_then(|bytes| words(&bytes));
@@ -91,9 +91,9 @@ pub fn included(text: &str) -> impl Iterator<Item = &str> {
 }
 
 /// Every file that the source includes, directly or not, by name.
-fn gather(source: &Source<'_>) -> Result<BTreeMap<String, String>> {
+fn gather(source: &ShaderSource<'_>) -> Result<BTreeMap<String, String>> {
     fn visit(
-        source: &Source<'_>,
+        source: &ShaderSource<'_>,
         chain: &mut Vec<String>,
         text: &str,
         found: &mut BTreeMap<String, String>,
@@ -120,7 +120,7 @@ fn gather(source: &Source<'_>) -> Result<BTreeMap<String, String>> {
 }
 
 /// Hash of all that changes the outcome: texts, defines, stage, compiler version and the options in [`compile`].
-fn key(source: &Source<'_>, includes: &BTreeMap<String, String>) -> String {
+fn key(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> String {
     static COMPILER: OnceLock<(u32, u32)> = OnceLock::new();
     let mut hasher = blake3::Hasher::new();
     let mut part = |text: &str| {
@@ -145,7 +145,7 @@ fn key(source: &Source<'_>, includes: &BTreeMap<String, String>) -> String {
     hasher.finalize().to_hex()[..32].to_owned()
 }
 
-fn compile(source: &Source<'_>, includes: &BTreeMap<String, String>) -> Result<Vec<u32>> {
+fn compile(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> Result<Vec<u32>> {
     let failed = |what: String| Error::Failed(format!("{}: {what}", source.name));
     let compiler = shaderc::Compiler::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
     let mut options = shaderc::CompileOptions::new().map_err(|error| failed(format!("no shader compiler: {error}")))?;
@@ -191,8 +191,8 @@ mod tests {
     const TEXT: &str = "#version 460\n#include \"a.glsl\"\nlayout(local_size_x = 8) in;\n\
         layout(std430, binding = 0) buffer Out { float values[]; };\nvoid main() { values[0] = A + float(B); }\n";
 
-    fn source<'a>(include: &'a dyn Fn(&str) -> Option<String>, defines: &'a [(String, String)]) -> Source<'a> {
-        Source { name: "test.comp", stage: Stage::Compute, text: TEXT.into(), defines, include }
+    fn source<'a>(include: &'a dyn Fn(&str) -> Option<String>, defines: &'a [(String, String)]) -> ShaderSource<'a> {
+        ShaderSource { name: "test.comp", stage: Stage::Compute, text: TEXT.into(), defines, include }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Images of three dimensions that shaders read through a sampler, filled once.
 
 use super::device::Device;
-use super::memory::{Buffer, BufferKind, Memory};
+use super::memory::{Allocation, Buffer, BufferKind};
 use super::{Access, Checked, Commands};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -41,7 +41,7 @@ impl Drop for Handles {
 /// An image of three dimensions of four halves a texel, with a sampler that interpolates linearly and clamps to the edge.
 pub struct Volume {
     handles: Handles,
-    _memory: Memory,
+    _memory: Allocation,
     /// Texels along x, y and z.
     pub size: [u32; 3],
     /// Name shown in messages and debuggers.
@@ -83,7 +83,7 @@ impl Volume {
         device.name(image, name);
         // SAFETY: the handle is alive.
         let needs = unsafe { device.handle.get_image_memory_requirements(image) };
-        let memory = Memory::new(device, name, needs, BufferKind::Device.preferences())?;
+        let memory = Allocation::new(device, name, needs, BufferKind::Device.preferences())?;
         // SAFETY: fresh image and memory of sufficient size.
         unsafe { device.handle.bind_image_memory(image, memory.handle, 0) }.checked("vkBindImageMemory", name)?;
         let view = vk::ImageViewCreateInfo::default()

@@ -1,6 +1,6 @@
 //! Surface and swapchain: images that a window shows, made anew whenever they no longer fit it.
 
-use super::device::{Device, Options};
+use super::device::{Device, DeviceOptions};
 use super::flight::{FLIGHTS, Flight, Signals};
 use super::image::{Image, ImageShape};
 use super::present::{MODES, PresentMode, best_format, extent, is_srgb};
@@ -16,7 +16,7 @@ impl Device {
     ///
     /// # Errors
     /// As [`Device::new`]; `Unsupported` too when the driver opens no windows on that display.
-    pub fn for_display(options: &Options, display: RawDisplayHandle) -> Result<Arc<Self>> {
+    pub fn for_display(options: &DeviceOptions, display: RawDisplayHandle) -> Result<Arc<Self>> {
         let names = ash_window::enumerate_required_extensions(display)
             .checked("surface extensions", "display")
             .map_err(|error| error.context("Vulkan opens no windows on this display"))?;
@@ -27,7 +27,7 @@ impl Device {
 }
 
 /// What Vulkan draws into a window with. Keeps the window alive.
-struct Surface {
+struct WindowSurface {
     device: Arc<Device>,
     loader: khr::surface::Instance,
     handle: vk::SurfaceKHR,
@@ -35,7 +35,7 @@ struct Surface {
     _window: Box<dyn std::any::Any>,
 }
 
-impl Surface {
+impl WindowSurface {
     fn new<W: HasDisplayHandle + HasWindowHandle + 'static>(device: &Arc<Device>, window: &Arc<W>) -> Result<Self> {
         let gone = |error| Error::Unsupported(format!("the window cannot be drawn into: {error}"));
         let display = window.display_handle().map_err(gone)?.as_raw();
@@ -46,7 +46,7 @@ impl Surface {
         // instance, which the device keeps alive.
         let handle = unsafe { ash_window::create_surface(entry, instance, display, handle, None) }
             .checked("vkCreateSurfaceKHR", "window")?;
-        let surface = Surface { device: device.clone(), loader, handle, _window: Box::new(window.clone()) };
+        let surface = WindowSurface { device: device.clone(), loader, handle, _window: Box::new(window.clone()) };
         // SAFETY: physical device and surface are alive.
         let supported = unsafe {
             surface.loader.get_physical_device_surface_support(device.physical, device.queue_family, surface.handle)
@@ -62,7 +62,7 @@ impl Surface {
     }
 }
 
-impl Drop for Surface {
+impl Drop for WindowSurface {
     fn drop(&mut self) {
         // SAFETY: its swapchain is gone (field order of `Window`).
         unsafe { self.loader.destroy_surface(self.handle, None) };
@@ -85,19 +85,19 @@ impl Semaphore {
 
 impl Drop for Semaphore {
     fn drop(&mut self) {
-        // SAFETY: their owners, `Chain` and `Window`, wait for the device first.
+        // SAFETY: their owners, `Swapchain` and `Window`, wait for the device first.
         unsafe { self.0.handle.destroy_semaphore(self.1, None) };
     }
 }
 
 /// Destroys a swapchain; its images keep it alive.
-struct ChainHandle {
+struct SwapchainHandle {
     device: Arc<Device>,
     loader: khr::swapchain::Device,
     handle: vk::SwapchainKHR,
 }
 
-impl ChainHandle {
+impl SwapchainHandle {
     /// Waits until the queue shows nothing any more.
     fn settle(&self) {
         let queue = self.device.queue();
@@ -106,7 +106,7 @@ impl ChainHandle {
     }
 }
 
-impl Drop for ChainHandle {
+impl Drop for SwapchainHandle {
     fn drop(&mut self) {
         self.settle();
         // SAFETY: views of its images went before, and the queue is idle.
@@ -115,14 +115,14 @@ impl Drop for ChainHandle {
 }
 
 /// A swapchain of one size with its images.
-struct Chain {
+struct Swapchain {
     images: Vec<Arc<Image>>,
     /// Signalled when an image is drawn; one an image, because only acquiring it again says that its showing has begun.
     drawn: Vec<Semaphore>,
-    handle: Arc<ChainHandle>,
+    handle: Arc<SwapchainHandle>,
 }
 
-impl Drop for Chain {
+impl Drop for Swapchain {
     fn drop(&mut self) {
         // Before the semaphores go.
         self.handle.settle();
@@ -141,7 +141,7 @@ pub struct Shot {
 pub struct Window {
     device: Arc<Device>,
     /// Before the surface.
-    chain: Option<Chain>,
+    chain: Option<Swapchain>,
     /// Signalled when an image may be drawn into; one more than flights, since one may be acquired ahead of them.
     acquired: Vec<Semaphore>,
     next: usize,
@@ -150,7 +150,7 @@ pub struct Window {
     size: [u32; 2],
     /// Swapchains made so far.
     pub chain_count: usize,
-    surface: Surface,
+    surface: WindowSurface,
 }
 
 impl Window {
@@ -164,7 +164,7 @@ impl Window {
         size: [u32; 2],
         mode: PresentMode,
     ) -> Result<Self> {
-        let surface = Surface::new(device, window)?;
+        let surface = WindowSurface::new(device, window)?;
         // SAFETY: for both queries, physical device and surface are alive.
         let (modes, formats) = unsafe {
             (
@@ -262,7 +262,7 @@ impl Window {
         let info =
             vk::PresentInfoKHR::default().wait_semaphores(&semaphores).swapchains(&swapchains).image_indices(&indices);
         let queue = self.device.queue();
-        // SAFETY: swapchain and semaphore are alive until the queue is idle (`Chain`); the queue is locked.
+        // SAFETY: swapchain and semaphore are alive until the queue is idle (`Swapchain`); the queue is locked.
         let outcome = unsafe { chain.handle.loader.queue_present(*queue, &info) };
         drop(queue);
         match outcome {
@@ -299,10 +299,10 @@ impl Window {
             .present_mode(self.mode.raw())
             .clipped(true);
         let loader = khr::swapchain::Device::new(&self.device.instance.handle, &self.device.handle);
-        // SAFETY: the surface is alive and has no other swapchain (`chain` is `None`); destroyed by `ChainHandle`.
+        // SAFETY: the surface is alive and has no other swapchain (`chain` is `None`); destroyed by `SwapchainHandle`.
         let handle = unsafe { loader.create_swapchain(&create, None) }.checked("vkCreateSwapchainKHR", "window")?;
         self.device.name(handle, "window");
-        let handle = Arc::new(ChainHandle { device: self.device.clone(), loader, handle });
+        let handle = Arc::new(SwapchainHandle { device: self.device.clone(), loader, handle });
         // SAFETY: the swapchain is alive.
         let images = unsafe { handle.loader.get_swapchain_images(handle.handle) };
         let shape = ImageShape { format: self.format.format, width, height, samples: 1 };
@@ -311,7 +311,7 @@ impl Window {
             images.checked("vkGetSwapchainImagesKHR", "window")?.into_iter().map(image).collect::<Result<_>>()?;
         let drawn = images.iter().map(|_| Semaphore::new(&self.device, "drawn")).collect::<Result<_>>()?;
         log::info!("swapchain of {width}x{height}, {} images, {:?}", images.len(), self.format.format);
-        self.chain = Some(Chain { images, drawn, handle });
+        self.chain = Some(Swapchain { images, drawn, handle });
         self.chain_count += 1;
         Ok(true)
     }

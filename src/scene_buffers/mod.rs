@@ -10,8 +10,8 @@ use crate::bake::{self, Baker, Report};
 use crate::draw::Drawable;
 use crate::error::Result;
 use crate::field::extent::{Extent, extent};
-use crate::field::quantity::{Kind, Storage, channel_stride};
-use crate::field::{Area, Header, ShadowField};
+use crate::field::quantity::{FieldKind, Storage, channel_stride};
+use crate::field::{Area, FieldHeader, ShadowField};
 use crate::gpu::{Buffer, BufferKind, Volume};
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::Bounds;
@@ -33,7 +33,7 @@ pub type Progress<'p> = &'p dyn Fn(&str, u32, u32);
 /// A field in the store.
 pub struct Slot {
     /// Its parameters.
-    pub header: Header,
+    pub header: FieldHeader,
     /// Its bytes in the store.
     pub bytes: Range<u64>,
     /// Number of its first channel among those of all fields, as they stand in an image.
@@ -114,14 +114,14 @@ pub struct Store {
 
 /// Which fields the entities of a mesh need: none for what only receives or what nothing else can see, none for shadows where
 /// there is no light, no radiance field for a light of one colour.
-pub fn needs(scene: &Scene, mesh: usize, skip: Skip) -> [Option<Kind>; 2] {
+pub fn needs(scene: &Scene, mesh: usize, skip: Skip) -> [Option<FieldKind>; 2] {
     let matters = |e: &&Entity| !skip.unseen || is_seen(scene, e);
     let entities = || scene.entities.iter().filter(|e| e.mesh == mesh).filter(matters);
     let coloured = scene.meshes[mesh].colors.is_some();
     let light = !scene.environment.is_none() || scene.entities.iter().any(|e| e.emits);
     let blocked = entities().any(|e| (e.occludes && light) || (e.emits && !coloured));
     let radiance = coloured && entities().any(|e| e.emits);
-    [blocked.then_some(Kind::Occlusion), radiance.then_some(Kind::Radiance)]
+    [blocked.then_some(FieldKind::Occlusion), radiance.then_some(FieldKind::Radiance)]
 }
 
 /// Whether anything but itself is lit, so that its shadow or light can fall on it.
@@ -172,18 +172,19 @@ impl Store {
             total.max(ALIGNMENT) + if options.field_bands.is_some() { overrun } else { 0 },
         )?;
         let mut baked = Vec::new();
-        let mut ready = HashMap::<u64, (Header, Extent, Area)>::new();
+        let mut ready = HashMap::<u64, (FieldHeader, Extent, Area)>::new();
         for (mesh, slot) in slots
             .iter_mut()
             .zip(&scene.meshes)
             .flat_map(|(pair, mesh)| pair.iter_mut().flatten().map(move |slot| (mesh, slot)))
         {
             if let Some((header, extent, area)) = ready.get(&slot.bytes.start) {
-                slot.header = Header { mesh: slot.header.mesh.clone(), ..header.clone() };
+                slot.header = FieldHeader { mesh: slot.header.mesh.clone(), ..header.clone() };
                 (slot.extent, slot.area) = (*extent, *area);
                 continue;
             }
-            let what = format!("{} {}", mesh.name, if slot.header.kind == Kind::Radiance { "light" } else { "shadow" });
+            let what =
+                format!("{} {}", mesh.name, if slot.header.kind == FieldKind::Radiance { "light" } else { "shadow" });
             let done = |now, all| progress(&what, now, all);
             let target = (&mut fields, slot.bytes.start);
             if let Some(report) = cache.field(baker, mesh, &mut slot.header, target, &done)? {
@@ -191,7 +192,7 @@ impl Store {
             }
             let field = download(&fields, slot)?;
             slot.extent = extent(&field);
-            if slot.header.kind == Kind::Occlusion {
+            if slot.header.kind == FieldKind::Occlusion {
                 slot.area = Area::new(&field);
             }
             ready.insert(slot.bytes.start, (slot.header.clone(), slot.extent, slot.area));

@@ -152,7 +152,7 @@ impl Editor {
     }
 
     /// Fields that a mesh needs as its entities are: occlusion, radiance. What the frame's store lacks is to be baked.
-    pub fn needs(&self, mesh: usize) -> [Option<quantity::Kind>; 2] {
+    pub fn needs(&self, mesh: usize) -> [Option<quantity::FieldKind>; 2] {
         scene_buffers::needs(&self.scene, mesh, Skip::ALL)
     }
 

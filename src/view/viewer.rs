@@ -36,7 +36,7 @@ pub struct Setup {
     /// The device that it draws on.
     pub device: Arc<Device>,
     /// How background bakes open one of their own.
-    pub options: gpu::Options,
+    pub options: gpu::DeviceOptions,
     /// Shaders.
     pub library: Library,
     /// Where bakes are kept; it needs a folder.

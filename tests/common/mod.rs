@@ -11,7 +11,7 @@ use shadow_fields::asset::{Mesh, teapot};
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::capture::{Capture, Model, Slots};
 use shadow_fields::check;
-use shadow_fields::gpu::{Device, Options, Validation};
+use shadow_fields::gpu::{Device, DeviceOptions, Validation};
 use shadow_fields::shaders::Library;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
@@ -46,7 +46,7 @@ pub fn library() -> Library {
 
 /// Another device like the one that the tests share.
 pub fn open() -> shadow_fields::Result<Arc<Device>> {
-    Device::new(&Options { device: None, validation: Validation::Sync, cache_dir: Some(cache_dir()) })
+    Device::new(&DeviceOptions { device: None, validation: Validation::Sync, cache_dir: Some(cache_dir()) })
 }
 
 /// The device of this test binary, held by one test. At the end it fails the test if the validation layer said anything.

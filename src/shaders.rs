@@ -47,7 +47,7 @@ embedded!(
 
 /// One compilation of one entry point. Everything that changes the code is in here; the cache key is the whole row.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Row {
+pub struct ShaderPermutation {
     /// File in `glsl/`; its ending decides the stage.
     pub file: &'static str,
     /// SH bands that generated includes are made for; defines BANDS, COEFFICIENTS and STRIDE.
@@ -58,10 +58,10 @@ pub struct Row {
     pub defines: Vec<(&'static str, String)>,
 }
 
-impl Row {
+impl ShaderPermutation {
     /// A row without further macros.
     pub fn new(file: &'static str, bands: usize) -> Self {
-        Row { file, bands, field_bands: bands, defines: Vec::new() }
+        ShaderPermutation { file, bands, field_bands: bands, defines: Vec::new() }
     }
 
     /// Occlusion fields of other bands than everything else.
@@ -97,7 +97,7 @@ impl Library {
     ///
     /// # Errors
     /// `Failed` with the compiler's lines; `Input` when a file of the override folder cannot be read.
-    pub fn shader(&self, row: &Row) -> Result<Shader> {
+    pub fn shader(&self, row: &ShaderPermutation) -> Result<Shader> {
         let stage = match row.file.rsplit('.').next() {
             Some("comp") => Stage::Compute,
             Some("vert") => Stage::Vertex,
@@ -158,7 +158,7 @@ impl Library {
 
 /// Text of a generated include. Includes are looked for before the preprocessor takes any out, so what a row has no use for may
 /// be asked for too.
-fn generate(name: &str, row: &Row) -> Option<String> {
+fn generate(name: &str, row: &ShaderPermutation) -> Option<String> {
     let (bands, field_bands) = (row.bands, row.field_bands);
     match name {
         "basis.glsl" => Some(sh::basis::glsl_basis(bands)),

@@ -4,12 +4,12 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
-use shadow_fields::asset::environment::{Environment, Gradient, Image, Key, Source};
+use shadow_fields::asset::environment::{Environment, EnvironmentData, EnvironmentImage, Gradient, KeyLight};
 use shadow_fields::asset::picture::{write_exr, write_png};
 use shadow_fields::asset::sky::Sky;
 use shadow_fields::sh::{basis, lobe, quadrature};
 
-fn build(source: &Source) -> Environment {
+fn build(source: &EnvironmentData) -> Environment {
     Environment::new(source, &|path: &Path| Ok(std::fs::read(path).unwrap())).unwrap()
 }
 
@@ -34,9 +34,9 @@ fn agree(a: &[Vec<f64>; 3], b: &[Vec<f64>; 3], tolerance: f64) {
 
 #[test]
 fn none_and_uniform() {
-    let none = build(&Source::default());
+    let none = build(&EnvironmentData::default());
     assert!(none.is_none() && none.coefficients(4).iter().flatten().all(|c| *c == 0.0));
-    let uniform = build(&Source { uniform: Some(Vec3::new(0.5, 1.0, 2.0)), ..Default::default() });
+    let uniform = build(&EnvironmentData { uniform: Some(Vec3::new(0.5, 1.0, 2.0)), ..Default::default() });
     assert_eq!(uniform.radiance(DVec3::Y), [0.5, 1.0, 2.0]);
     let c = uniform.coefficients(4);
     for (channel, radiance) in c.iter().zip([0.5, 1.0, 2.0]) {
@@ -47,30 +47,30 @@ fn none_and_uniform() {
 #[test]
 fn gradient_and_key_match_the_rule() {
     let gradient = Gradient { radiance: Vec3::new(0.3, 0.6, 1.2), base: 0.2, rise: 0.8 };
-    let sky = build(&Source { gradient: Some(gradient), ..Default::default() });
+    let sky = build(&EnvironmentData { gradient: Some(gradient), ..Default::default() });
     assert!((sky.radiance(DVec3::Y)[2] - 1.2).abs() < 1e-6 && (sky.radiance(-DVec3::Y)[2] - 0.24).abs() < 1e-6);
     // max(0, y) has a kink: a rule of degree d is off by O(1 / d^2).
     agree(&sky.coefficients(5), &by_rule(&sky, 5, 120), 2e-3);
     for sharpness in [0.0, 0.7, 6.0, 24.0] {
-        let key = Key { radiance: Vec3::new(2.0, 1.0, 0.5), toward: Vec3::new(0.3, 2.0, -0.8), sharpness };
-        let light = build(&Source { key: Some(key), ..Default::default() });
+        let key = KeyLight { radiance: Vec3::new(2.0, 1.0, 0.5), toward: Vec3::new(0.3, 2.0, -0.8), sharpness };
+        let light = build(&EnvironmentData { key: Some(key), ..Default::default() });
         // Entire functions: the rule converges faster than any power.
         agree(&light.coefficients(6), &by_rule(&light, 6, 80), 1e-9);
     }
     // A sharp lobe is a point: z_0 -> 2 pi / s * Y_00.
-    let key = Key { radiance: Vec3::ONE, toward: Vec3::Z, sharpness: 1e5 };
-    let c = build(&Source { key: Some(key), ..Default::default() }).coefficients(2);
+    let key = KeyLight { radiance: Vec3::ONE, toward: Vec3::Z, sharpness: 1e5 };
+    let c = build(&EnvironmentData { key: Some(key), ..Default::default() }).coefficients(2);
     let expected = 2.0 * PI / 1e5 * (0.25 / PI).sqrt();
     assert!((c[0][0] / expected - 1.0).abs() < 1e-9, "{} {expected}", c[0][0]);
 }
 
 #[test]
 fn sources_add() {
-    let uniform = Source { uniform: Some(Vec3::new(0.5, 1.0, 2.0)), ..Default::default() };
-    let key = Key { radiance: Vec3::ONE, toward: Vec3::X, sharpness: 3.0 };
-    let both = build(&Source { key: Some(key.clone()), ..uniform.clone() }).coefficients(3);
+    let uniform = EnvironmentData { uniform: Some(Vec3::new(0.5, 1.0, 2.0)), ..Default::default() };
+    let key = KeyLight { radiance: Vec3::ONE, toward: Vec3::X, sharpness: 3.0 };
+    let both = build(&EnvironmentData { key: Some(key.clone()), ..uniform.clone() }).coefficients(3);
     let a = build(&uniform).coefficients(3);
-    let b = build(&Source { key: Some(key), ..Default::default() }).coefficients(3);
+    let b = build(&EnvironmentData { key: Some(key), ..Default::default() }).coefficients(3);
     for k in 0..3 {
         for i in 0..9 {
             assert!((both[k][i] - a[k][i] - b[k][i]).abs() < 1e-12);
@@ -85,7 +85,7 @@ fn picture_orientation() {
     // 8 x 4: red = column, green = row.
     let pixels: Vec<f32> = (0..32).flat_map(|i| [(i % 8) as f32, (i / 8) as f32, 1.0]).collect();
     write_exr(&file, 8, 4, &pixels).unwrap();
-    let sky = build(&Source { image: Some(Image { file, scale: 2.0 }), ..Default::default() });
+    let sky = build(&EnvironmentData { image: Some(EnvironmentImage { file, scale: 2.0 }), ..Default::default() });
     let at = |x: f64, y: f64, z: f64| sky.radiance(DVec3::new(x, y, z).normalize()).map(|c| c / 2.0);
     assert_eq!(at(0.01, 0.01, -1.0), [4.0, 1.0, 1.0], "ahead, just right of the middle and above it");
     assert_eq!(at(-0.01, -0.01, -1.0), [3.0, 2.0, 1.0]);
@@ -103,14 +103,17 @@ fn picture_projection() {
     let (width, height) = (256usize, 128usize);
     // A white picture has the coefficients of a uniform sky exactly in band 0: solid angles sum to 4 pi.
     write_exr(&file, 256, 128, &vec![1.0; width * height * 3]).unwrap();
-    let white = build(&Source { image: Some(Image { file: file.clone(), scale: 1.0 }), ..Default::default() });
+    let white = build(&EnvironmentData {
+        image: Some(EnvironmentImage { file: file.clone(), scale: 1.0 }),
+        ..Default::default()
+    });
     for channel in white.coefficients(4) {
         assert!((channel[0] - (4.0 * PI).sqrt()).abs() < 1e-9);
         assert!(channel[1..].iter().all(|c| c.abs() < 1e-12), "{channel:?}");
     }
     // A smooth light drawn into a picture projects as the light does.
-    let key = Key { radiance: Vec3::new(1.0, 0.5, 0.25), toward: Vec3::new(0.6, 0.7, -0.4), sharpness: 5.0 };
-    let light = build(&Source { key: Some(key), ..Default::default() });
+    let key = KeyLight { radiance: Vec3::new(1.0, 0.5, 0.25), toward: Vec3::new(0.6, 0.7, -0.4), sharpness: 5.0 };
+    let light = build(&EnvironmentData { key: Some(key), ..Default::default() });
     let mut pixels = Vec::new();
     for y in 0..height {
         for x in 0..width {
@@ -120,7 +123,7 @@ fn picture_projection() {
         }
     }
     write_exr(&file, 256, 128, &pixels).unwrap();
-    let drawn = build(&Source { image: Some(Image { file, scale: 1.0 }), ..Default::default() });
+    let drawn = build(&EnvironmentData { image: Some(EnvironmentImage { file, scale: 1.0 }), ..Default::default() });
     agree(&drawn.coefficients(5), &light.coefficients(5), 3e-4);
 }
 
@@ -129,7 +132,7 @@ fn png_pictures_are_decoded_from_srgb() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("sky.png");
     write_png(&file, 2, 1, &[0.18, 0.5, 1.0, 0.18, 0.5, 1.0], 0.0).unwrap();
-    let sky = build(&Source { image: Some(Image { file, scale: 1.0 }), ..Default::default() });
+    let sky = build(&EnvironmentData { image: Some(EnvironmentImage { file, scale: 1.0 }), ..Default::default() });
     for (value, expected) in sky.radiance(DVec3::X).into_iter().zip([0.18, 0.5, 1.0]) {
         // One 8-bit step at mid grey is about 0.8 %.
         assert!((value - expected).abs() < 5e-3, "{value} {expected}");
@@ -141,7 +144,7 @@ fn picture(width: u32, height: u32, red: &[f32], bands: usize) -> Vec<f64> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("sky.exr");
     write_exr(&file, width, height, &red.iter().flat_map(|r| [*r, 0.0, 0.0]).collect::<Vec<_>>()).unwrap();
-    let sky = build(&Source { image: Some(Image { file, scale: 1.0 }), ..Default::default() });
+    let sky = build(&EnvironmentData { image: Some(EnvironmentImage { file, scale: 1.0 }), ..Default::default() });
     let [red, green, blue] = sky.coefficients(bands);
     assert!(green.iter().chain(&blue).all(|c| *c == 0.0));
     red
@@ -173,13 +176,14 @@ fn texels_are_integrated_exactly() {
 
 #[test]
 fn a_turn_carries_everything_along() {
-    let key = |toward: Vec3| Key { radiance: Vec3::new(2.0, 1.0, 0.5), toward, sharpness: 6.0 };
+    let key = |toward: Vec3| KeyLight { radiance: Vec3::new(2.0, 1.0, 0.5), toward, sharpness: 6.0 };
     // A quarter turn, counter-clockwise seen from above, takes -z to -x and +x to -z.
     for (before, after) in
         [(Vec3::NEG_Z, Vec3::NEG_X), (Vec3::X, Vec3::NEG_Z), (Vec3::new(1.0, 2.0, 0.0), Vec3::new(0.0, 2.0, -1.0))]
     {
-        let turned = build(&Source { key: Some(key(before)), turn_deg: 90.0, strength: 3.0, ..Default::default() });
-        let there = build(&Source { key: Some(key(after)), ..Default::default() });
+        let turned =
+            build(&EnvironmentData { key: Some(key(before)), turn_deg: 90.0, strength: 3.0, ..Default::default() });
+        let there = build(&EnvironmentData { key: Some(key(after)), ..Default::default() });
         let thrice = there.coefficients(5).map(|c| c.iter().map(|c| 3.0 * c).collect());
         agree(&turned.coefficients(5), &thrice, 1e-12);
         for (direction, _) in quadrature::sphere_rule(6) {
@@ -195,8 +199,12 @@ fn a_turn_carries_everything_along() {
     };
     let of = |pixels: &[f32], turn_deg: f32| {
         write_exr(&file, 8, 3, pixels).unwrap();
-        build(&Source { image: Some(Image { file: file.clone(), scale: 0.5 }), turn_deg, ..Default::default() })
-            .coefficients(6)
+        build(&EnvironmentData {
+            image: Some(EnvironmentImage { file: file.clone(), scale: 0.5 }),
+            turn_deg,
+            ..Default::default()
+        })
+        .coefficients(6)
     };
     agree(&of(&columns(0), 90.0), &of(&columns(2), 0.0), 1e-9);
 }
@@ -206,15 +214,16 @@ fn a_picture_is_kept_under_another_description() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("sky.exr");
     write_exr(&file, 2, 1, &[1.0; 6]).unwrap();
-    let source = Source { image: Some(Image { file: file.clone(), scale: 1.0 }), ..Default::default() };
+    let source =
+        EnvironmentData { image: Some(EnvironmentImage { file: file.clone(), scale: 1.0 }), ..Default::default() };
     let sky = build(&source);
     std::fs::remove_file(&file).unwrap();
-    let brighter = sky.with(&Source { strength: 2.0, ..source.clone() }).unwrap();
+    let brighter = sky.with(&EnvironmentData { strength: 2.0, ..source.clone() }).unwrap();
     assert_eq!(brighter.radiance(DVec3::X), [2.0; 3]);
-    let other = Image { file: "other.exr".into(), scale: 1.0 };
-    assert!(sky.with(&Source { image: Some(other), ..Default::default() }).is_err());
-    assert!(sky.with(&Source::default()).unwrap().is_none());
-    let dark = sky.with(&Source { strength: 0.0, ..source }).unwrap();
+    let other = EnvironmentImage { file: "other.exr".into(), scale: 1.0 };
+    assert!(sky.with(&EnvironmentData { image: Some(other), ..Default::default() }).is_err());
+    assert!(sky.with(&EnvironmentData::default()).unwrap().is_none());
+    let dark = sky.with(&EnvironmentData { strength: 0.0, ..source }).unwrap();
     assert!(dark.is_none() && dark.coefficients(3).iter().flatten().all(|c| *c == 0.0));
     assert_eq!(dark.with(brighter.source()).unwrap().radiance(DVec3::Y), [2.0; 3]);
 }
@@ -225,7 +234,7 @@ fn luminance([r, g, b]: [f64; 3]) -> f64 {
 
 #[test]
 fn a_generated_sky_is_the_papers() {
-    let dome = |sky: Sky| build(&Source { sky: Some(sky), ..Default::default() });
+    let dome = |sky: Sky| build(&EnvironmentData { sky: Some(sky), ..Default::default() });
     let clear = Sky {
         sun_elevation_deg: 40.0,
         sun_azimuth_deg: 0.0,
@@ -295,7 +304,10 @@ fn hdr_pictures_are_read_and_oversized_ones_refused_before_memory_is_taken() {
     let pixels: Vec<image::Rgb<f32>> = (0..32).map(|i| image::Rgb([0.75 * 2.0_f32.powi(i / 4), 0.375, 12.0])).collect();
     let bytes = std::fs::File::create(&file).unwrap();
     image::codecs::hdr::HdrEncoder::new(bytes).encode(&pixels, 8, 4).unwrap();
-    let sky = build(&Source { image: Some(Image { file: file.clone(), scale: 1.0 }), ..Default::default() });
+    let sky = build(&EnvironmentData {
+        image: Some(EnvironmentImage { file: file.clone(), scale: 1.0 }),
+        ..Default::default()
+    });
     assert_eq!(sky.radiance(DVec3::new(0.01, 0.1, -1.0).normalize())[0], 6.0, "row 1, column 4: the 12th pixel");
     assert_eq!(sky.radiance(DVec3::NEG_Y)[0], 96.0);
     let chunk = |name: &[u8], data: &[u8]| {
@@ -311,7 +323,8 @@ fn hdr_pictures_are_read_and_oversized_ones_refused_before_memory_is_taken() {
         [b"\x89PNG\r\n\x1a\n".to_vec(), chunk(b"IHDR", &header), chunk(b"IDAT", &[0; 9]), chunk(b"IEND", b"")].concat();
     let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 50000 +X 100000\n".to_vec();
     for bytes in [png, hdr] {
-        let source = Source { image: Some(Image { file: "big".into(), scale: 1.0 }), ..Default::default() };
+        let source =
+            EnvironmentData { image: Some(EnvironmentImage { file: "big".into(), scale: 1.0 }), ..Default::default() };
         let error = Environment::new(&source, &|_: &Path| Ok(bytes.clone())).unwrap_err();
         assert_eq!(error.exit_code(), 4);
         assert!(error.to_string().contains("16384 x 8192 pixels"), "{error}");

@@ -7,11 +7,12 @@ mod common;
 use cli::{command, finish, good, has_device, names};
 use common::library;
 use shadow_fields::gpu::census::Census;
-use shadow_fields::shaders::Row;
+use shadow_fields::shaders::ShaderPermutation;
 use std::path::Path;
 
 fn ceiling(kind: u32) -> Census {
-    let row = Row::new("ceiling.comp", 4).define("KIND", kind).define("READS", 16_u32).define("ROUNDS", 64_u32);
+    let row =
+        ShaderPermutation::new("ceiling.comp", 4).define("KIND", kind).define("READS", 16_u32).define("ROUNDS", 64_u32);
     Census::new(&library().shader(&row.define("MASK", 1023_u32)).unwrap()).unwrap()
 }
 

@@ -6,7 +6,7 @@ use fastrand::Rng;
 use glam::{DQuat, DVec3};
 use shadow_fields::sh::basis::{basis_cost, evaluate, glsl_basis};
 use shadow_fields::sh::product::Tensor;
-use shadow_fields::sh::product_program::{Form, glsl_product, product_cost};
+use shadow_fields::sh::product_program::{ProductOperation, glsl_product, product_cost};
 use shadow_fields::sh::rotation::{Rotation, glsl_rotate, rotate_program, turns};
 
 /// Compiles `functions` in a compute shader with `main` as its body.
@@ -162,8 +162,8 @@ fn text_is_deterministic() {
 fn costs_are_what_is_documented() {
     assert_eq!([2, 3, 4, 7].map(|bands| basis_cost(bands).fma_count), [3, 14, 28, 97]);
     // The plain pairs form takes 428 slots, Snyder's greedy factoring 399 multiplications and 274 additions.
-    let product = product_cost(4, Form::Product);
+    let product = product_cost(4, ProductOperation::Product);
     assert_eq!((product.multiply_count, product.add_count, product.fma_count), (392, 267, 394));
-    assert_eq!(product_cost(4, Form::Subtract).fma_count, 394);
+    assert_eq!(product_cost(4, ProductOperation::Subtract).fma_count, 394);
     assert_eq!(rotate_program(4).cost().fma_count, 128);
 }

@@ -6,7 +6,7 @@ use shadow_fields::sh::basis::{Y00, coefficient_count, evaluate};
 use shadow_fields::sh::lobe::cap;
 use shadow_fields::sh::points;
 use shadow_fields::sh::product::{Tensor, eigenvalues, largest_eigenvalue};
-use shadow_fields::sh::product_program::{Form, STYLES, Style, styled_program};
+use shadow_fields::sh::product_program::{ProductOperation, STYLES, Style, styled_program};
 use shadow_fields::sh::quadrature::sphere_rule;
 
 fn random(rng: &mut Rng, bands: usize) -> Vec<f64> {
@@ -113,8 +113,8 @@ fn the_program_that_is_printed_equals_the_product() {
     let mut tried = 0;
     for (style, a_bands, b_bands) in square.chain(other).filter(|&(style, a, b)| style.fits(a, b)) {
         let tensor = Tensor::new(a_bands, b_bands, a_bands);
-        let [product, subtract] =
-            [Form::Product, Form::Subtract].map(|form| styled_program(style, a_bands, b_bands, form));
+        let [product, subtract] = [ProductOperation::Product, ProductOperation::Subtract]
+            .map(|form| styled_program(style, a_bands, b_bands, form));
         for _ in 0..20 {
             let (a, b) = (random(&mut rng, a_bands), random(&mut rng, b_bands));
             let inputs = [a.clone(), b.clone()].concat();
@@ -159,7 +159,7 @@ fn points_hold_what_they_were_given() {
 
 #[test]
 fn multiply_adds_are_as_many_as_documented() {
-    let cost = |style, b_bands| styled_program(style, 4, b_bands, Form::Subtract).cost().fma_count;
+    let cost = |style, b_bands| styled_program(style, 4, b_bands, ProductOperation::Subtract).cost().fma_count;
     let costs = STYLES.map(|style| cost(style, 4));
     let wide = [5, 6, 7].map(|bands| cost(Style::Matrix, bands));
     assert_eq!((costs, wide), ([394, 414, 426, 467], [533, 596, 644]));

@@ -11,34 +11,37 @@ use shadow_fields::lists::gather::Gather;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::product::{Products, Shape};
 use shadow_fields::merge::variant::{Chain, Form, PRODUCTS, VARIANTS, Variant};
-use shadow_fields::shaders::{FILES, Row};
+use shadow_fields::shaders::{FILES, ShaderPermutation};
 use std::collections::BTreeSet;
 use std::process::Command;
 
 const BANDS: std::ops::RangeInclusive<usize> = 2..=7;
 const PROJECTIONS: [Projection; 3] = [Projection::Blocked, Projection::Radiance, Projection::Transfer];
 
-fn baking() -> Vec<Row> {
+fn baking() -> Vec<ShaderPermutation> {
     let project = BANDS.flat_map(|bands| PROJECTIONS.map(|projection| Project::row(bands, projection)));
     let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
     let capture = [false, true].into_iter().flat_map(Capture::rows);
     project.chain(assemble).chain(capture).collect()
 }
 
-fn drawing() -> Vec<Row> {
-    let finished = |file| [false, true].map(|display| Row::new(file, 4).define("DISPLAY", display));
+fn drawing() -> Vec<ShaderPermutation> {
+    let finished = |file| [false, true].map(|display| ShaderPermutation::new(file, 4).define("DISPLAY", display));
     let fragments = ["draw.frag", "grid.frag", "smooth.frag"].into_iter().flat_map(finished);
     fragments
-        .chain(["draw.vert", "grid.vert", "show.vert", "show.frag", "smooth.vert"].map(|file| Row::new(file, 4)))
+        .chain(
+            ["draw.vert", "grid.vert", "show.vert", "show.frag", "smooth.vert"]
+                .map(|file| ShaderPermutation::new(file, 4)),
+        )
         .collect()
 }
 
-fn gathering() -> Vec<Row> {
+fn gathering() -> Vec<ShaderPermutation> {
     [false, true].into_iter().flat_map(|texel| [false, true].map(|roomy| Gather::row(texel, roomy))).collect()
 }
 
-fn measuring() -> Vec<Row> {
-    let kind = |kind: u32| Row::new("ceiling.comp", 4).define("KIND", kind);
+fn measuring() -> Vec<ShaderPermutation> {
+    let kind = |kind: u32| ShaderPermutation::new("ceiling.comp", 4).define("KIND", kind);
     let rate = |n| kind(n).define("READS", 16_u32).define("ROUNDS", 16_u32).define("MASK", 1023_u32);
     (0..4).map(rate).chain([kind(4), rate(5)]).collect()
 }
@@ -62,7 +65,7 @@ fn usual_form() -> Form {
 }
 
 /// A usual form, everything that differs from it in one choice, and a few far from it.
-fn merging() -> Vec<Row> {
+fn merging() -> Vec<ShaderPermutation> {
     let usual = usual_form();
     let mut forms = vec![usual];
     forms.extend(["none", "horizon", "cones", "caps"].map(|skip| Form { skip: skip.parse().unwrap(), ..usual }));
@@ -96,7 +99,7 @@ fn merging() -> Vec<Row> {
 }
 
 /// Every product, with its loop alone, guarded or not, and by fields of more or fewer bands.
-fn multiplying() -> Vec<Row> {
+fn multiplying() -> Vec<ShaderPermutation> {
     let square = PRODUCTS.iter().flat_map(|&(_, product)| [true, false].map(|guard| (Chain { product, guard }, 4, 4)));
     let other = [(4, 6), (3, 5), (5, 3)].map(|(bands, field_bands)| (Chain::default(), bands, field_bands));
     square
@@ -125,9 +128,9 @@ fn has_validator() -> bool {
 }
 
 /// Compiles every row and validates what comes out, each different row once.
-fn check(rows: Vec<Row>) {
+fn check(rows: Vec<ShaderPermutation>) {
     let has_validator = has_validator();
-    let mut done: Vec<Row> = Vec::new();
+    let mut done: Vec<ShaderPermutation> = Vec::new();
     for row in rows {
         if done.contains(&row) {
             continue;
@@ -202,7 +205,7 @@ fn the_validator_refuses_damage() {
 #[test]
 fn other_endings_and_missing_files_are_refused() {
     for file in ["field.glsl", "absent.comp"] {
-        let error = library().shader(&Row::new(file, 4)).unwrap_err();
+        let error = library().shader(&ShaderPermutation::new(file, 4)).unwrap_err();
         assert!(error.to_string().contains(file), "{error}");
     }
 }

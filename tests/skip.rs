@@ -11,7 +11,7 @@ use shadow_fields::frame::Options;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::truth::raycast::RayCast;
-use shadow_fields::truth::{Shapes, Vertex, World};
+use shadow_fields::truth::{RayMeshes, Vertex, World};
 use stage::{at, scene, small, stage};
 use std::fmt::Write;
 
@@ -214,7 +214,7 @@ fn what_is_dropped_stays_within_its_bound() {
     let placements = town.at(0.0);
     let mut full = stage.frame(&town, small());
     let exact = stage.light(&mut full, &placements);
-    let shapes = Shapes::new(&town);
+    let shapes = RayMeshes::new(&town);
     let world = World::new(&town, &shapes, &placements);
     let vertices: Vec<Vertex> = (0..exact[0].len()).map(|index| Vertex { entity: 0, index }).collect();
     let cast = RayCast { rays: 1 << 13, ..Default::default() };

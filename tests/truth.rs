@@ -7,7 +7,7 @@ use shadow_fields::sh::basis::MAX_COEFFICIENTS;
 use shadow_fields::sh::lobe;
 use shadow_fields::sh::product::Tensor;
 use shadow_fields::truth::raycast::{Distant, RayCast, relative_error};
-use shadow_fields::truth::{Exact, Shapes, Vertex, World, receiver_vertices, sample_vertices};
+use shadow_fields::truth::{ExactChain, RayMeshes, Vertex, World, receiver_vertices, sample_vertices};
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -50,7 +50,7 @@ fn taken(position: DVec3) -> f64 {
 #[test]
 fn a_ball_under_a_uniform_sky_takes_its_closed_form() {
     let scene = scene(&format!("{BALL}{SKY}"));
-    let shapes = Shapes::new(&scene);
+    let shapes = RayMeshes::new(&scene);
     let world = World::new(&scene, &shapes, &scene.at(0.0));
     let (vertices, positions): (Vec<_>, Vec<_>) = floor_positions(&scene).into_iter().unzip();
     let lit = RayCast::default().run(&world, &vertices);
@@ -73,7 +73,7 @@ fn a_sphere_light_shines_as_its_closed_form_and_is_hidden_by_what_is_nearer() {
     let light =
         "[[entity]]\nmesh = \"ball\"\nposition = [0, 2.5, 0]\nscale = 0.4\nemission = [9, 9, 9]\nreceives = false\n";
     let open = scene(light);
-    let shapes = Shapes::new(&open);
+    let shapes = RayMeshes::new(&open);
     let world = World::new(&open, &shapes, &open.at(0.0));
     let (vertices, positions): (Vec<_>, Vec<_>) = floor_positions(&open).into_iter().unzip();
     let lit = RayCast::default().run(&world, &vertices);
@@ -89,7 +89,7 @@ fn a_sphere_light_shines_as_its_closed_form_and_is_hidden_by_what_is_nearer() {
     }
     // Below the ball the light is wholly hidden; from above it, not.
     let hidden = scene(&format!("{BALL}{light}"));
-    let shapes = Shapes::new(&hidden);
+    let shapes = RayMeshes::new(&hidden);
     let centre = Vertex { entity: 0, index: positions.iter().position(|p| p.length() < 1e-6).unwrap() };
     let dark = RayCast::default().run(&World::new(&hidden, &shapes, &hidden.at(0.0)), &[centre]);
     assert_eq!(dark[0].radiosity, [0.0; 3]);
@@ -103,12 +103,12 @@ fn a_sphere_light_shines_as_its_closed_form_and_is_hidden_by_what_is_nearer() {
 fn the_exact_chain_of_balls_is_that_of_their_closed_forms() {
     let second = "[[entity]]\nmesh = \"ball\"\nposition = [0.9, 1.4, 0.3]\nscale = 0.8\nreceives = false\n";
     let scene = scene(&format!("{BALL}{second}{SKY}"));
-    let shapes = Shapes::new(&scene);
+    let shapes = RayMeshes::new(&scene);
     let world = World::new(&scene, &shapes, &scene.at(0.0));
     let (vertices, positions): (Vec<_>, Vec<_>) = floor_positions(&scene).into_iter().unzip();
     for bands in [4, 5] {
-        let exact =
-            Exact { bands, visibility_bands: bands, skip: Skip::NONE, ..Default::default() }.run(&world, &vertices);
+        let exact = ExactChain { bands, visibility_bands: bands, skip: Skip::NONE, ..Default::default() }
+            .run(&world, &vertices);
         let tensor = Tensor::new(bands, bands, bands);
         for (position, found) in positions.iter().zip(&exact) {
             let mut t = [0.0; MAX_COEFFICIENTS];
@@ -144,10 +144,10 @@ fn a_receiver_shadows_itself_only_where_it_bends_inwards() {
         Ok(scene) => scene,
         Err(error) => panic!("{error}"),
     };
-    let shapes = Shapes::new(&scene);
+    let shapes = RayMeshes::new(&scene);
     let world = World::new(&scene, &shapes, &scene.at(0.0));
     let vertices = receiver_vertices(&scene);
-    let (cast, exact) = (RayCast::default().run(&world, &vertices), Exact::default().run(&world, &vertices));
+    let (cast, exact) = (RayCast::default().run(&world, &vertices), ExactChain::default().run(&world, &vertices));
     let mesh = &scene.meshes[0];
     let (mut outer, mut inner) = (0, 0);
     for (vertex, (t0, t1)) in vertices.iter().zip(cast.iter().zip(&exact)) {
@@ -169,7 +169,7 @@ fn a_receiver_shadows_itself_only_where_it_bends_inwards() {
 #[test]
 fn runs_repeat_and_seeds_differ() {
     let scene = scene(&format!("{BALL}{SKY}"));
-    let shapes = Shapes::new(&scene);
+    let shapes = RayMeshes::new(&scene);
     let world = World::new(&scene, &shapes, &scene.at(0.0));
     let vertices = sample_vertices(&scene, 40, 9);
     assert_eq!(vertices.len(), 40);
@@ -184,7 +184,7 @@ fn runs_repeat_and_seeds_differ() {
 #[test]
 fn a_ray_meets_the_nearest_side_first() {
     let side = shadow_fields::asset::generate::torus_two_colour(0.5, 0.2, 64, 32);
-    let shape = shadow_fields::truth::shape::Shape::new(&side);
+    let shape = shadow_fields::truth::ray_mesh::RayMesh::new(&side);
     // Along x both colours lie behind one another; in units of the bounding radius, .7 m.
     for (sign, color) in [(1.0, shadow_fields::asset::generate::WARM), (-1.0, shadow_fields::asset::generate::COOL)] {
         for height in [0.0, 0.05, 0.15] {

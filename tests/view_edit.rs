@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3, Vec3};
 use proptest::prelude::*;
 use shadow_fields::scene::EntityData;
-use shadow_fields::scene::motion::{Interpolation, Keyframe, Motion, Rotation};
+use shadow_fields::scene::motion::{Interpolation, Keyframe, Motion, RotationData};
 use shadow_fields::view::edit;
 
 fn place() -> impl Strategy<Value = Vec3> {
@@ -14,8 +14,8 @@ fn axis() -> impl Strategy<Value = Vec3> {
     place().prop_filter("a direction", |v| v.length() > 0.1)
 }
 
-fn rotation() -> impl Strategy<Value = Rotation> {
-    (axis(), -400.0_f64..400.0).prop_map(|(axis, angle_deg)| Rotation::AxisAngle { axis, angle_deg })
+fn rotation() -> impl Strategy<Value = RotationData> {
+    (axis(), -400.0_f64..400.0).prop_map(|(axis, angle_deg)| RotationData::AxisAngle { axis, angle_deg })
 }
 
 fn motion() -> impl Strategy<Value = Motion> {

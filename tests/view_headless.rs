@@ -17,7 +17,7 @@ use shadow_fields::gpu::{self, Access, Buffer, BufferKind, Commands, FLIGHTS, Im
 use shadow_fields::scene::Scene;
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
-use shadow_fields::view::{Canvas, Editor, Setup, Viewer};
+use shadow_fields::view::{Editor, FrameTarget, Setup, Viewer};
 use stage::small;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -75,7 +75,7 @@ impl Stand {
         let [width, height] = SIZE.map(|s| s as f32);
         let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
         let _ = self.viewer.ui(egui::RawInput { screen_rect: Some(screen), ..Default::default() }).unwrap();
-        assert!(self.viewer.draw(Canvas::Image(&self.image)).unwrap());
+        assert!(self.viewer.draw(FrameTarget::Image(&self.image)).unwrap());
         assert!(self.gpu.device.flight_count() <= FLIGHTS);
     }
 

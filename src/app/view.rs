@@ -9,7 +9,7 @@ use crate::gpu::{self, Device, PresentMode, Window};
 use crate::scene::Scene;
 use crate::view::command::Command;
 use crate::view::input::{Button, Event, Key};
-use crate::view::{Canvas, Editor, Setup, Viewer};
+use crate::view::{Editor, FrameTarget, Setup, Viewer};
 use clap::Args;
 use raw_window_handle::HasDisplayHandle;
 use std::path::PathBuf;
@@ -318,7 +318,7 @@ impl Shown {
         let output = self.viewer.ui(input)?;
         self.egui.handle_platform_output(&self.window, output);
         self.window.pre_present_notify();
-        let drawn = self.viewer.draw(Canvas::Window(&mut self.target))?;
+        let drawn = self.viewer.draw(FrameTarget::Window(&mut self.target))?;
         (self.hidden, self.tried) = (!drawn, Instant::now());
         Ok(())
     }

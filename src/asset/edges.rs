@@ -11,7 +11,7 @@ const COPLANAR_SINE: f64 = 1e-5;
 
 /// How an edge is seen.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum EdgeKind {
     /// Where exactly one of its two faces looks at the eye; `flipped` where they are wound against one another.
     Fold { flipped: bool },
     /// Shaded differently on both sides, and a fold too.
@@ -25,7 +25,7 @@ struct Edge {
     /// Corner of its first face that is on no end of it.
     far: u32,
     faces: [u32; 2],
-    kind: Kind,
+    kind: EdgeKind,
 }
 
 /// An edge as it is seen.
@@ -94,14 +94,14 @@ impl Edges {
             let far = welded[mesh.triangles[first / 3][(first + 2) % 3] as usize];
             let face = |side: &([u32; 2], bool, usize)| (side.2 / 3) as u32;
             let [one, other] = sides else {
-                return Some(Edge { ends, far, faces: [face(&sides[0]); 2], kind: Kind::Border });
+                return Some(Edge { ends, far, faces: [face(&sides[0]); 2], kind: EdgeKind::Border });
             };
             let (u, v) = (vertices(one), vertices(other));
             let crease = differ([u[0], v[0]]) || differ([u[1], v[1]]);
             let flipped = one.1 == other.1;
             let [m, n] = [one, other].map(|side| planes[face(side) as usize].0);
             let straight = m.cross(n).length() < COPLANAR_SINE && (m.dot(n) > 0.0) != flipped;
-            let kind = if crease { Kind::Crease { flipped } } else { Kind::Fold { flipped } };
+            let kind = if crease { EdgeKind::Crease { flipped } } else { EdgeKind::Fold { flipped } };
             (crease || !straight).then_some(Edge { ends, far, faces: [face(one), face(other)], kind })
         };
         let edges = sides.chunk_by(|a, b| a.0 == b.0).filter_map(edge).collect();
@@ -116,9 +116,9 @@ impl Edges {
         let line = |edge: &Edge| {
             let [a, b] = edge.faces.map(|face| seen[face as usize]);
             let shown = match edge.kind {
-                Kind::Fold { flipped } => (a == b) == flipped,
-                Kind::Crease { flipped } => (a == b) == flipped || (creases && (a || b)),
-                Kind::Border => true,
+                EdgeKind::Fold { flipped } => (a == b) == flipped,
+                EdgeKind::Crease { flipped } => (a == b) == flipped || (creases && (a || b)),
+                EdgeKind::Border => true,
             };
             if !shown {
                 return None;

@@ -18,13 +18,13 @@ use crate::sh::rotation::Rotation;
 pub const RADIANCE_LIMIT: f32 = 1e15;
 /// Largest angle that the whole may be turned by: f32 keeps hundredths of a degree there.
 const TURN_LIMIT_DEG: f32 = 1e5;
-/// Intervals of Simpson's rule for the lobe of [`Key`]; its relative error is then below 1e-11.
+/// Intervals of Simpson's rule for the lobe of [`KeyLight`]; its relative error is then below 1e-11.
 const LOBE_INTERVALS: usize = 1 << 14;
 
 /// Distant light as data: what is given adds up, nothing given is darkness. Radiances are linear RGB, W m^-2 sr^-1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Source {
+pub struct EnvironmentData {
     /// Factor on everything, 0 to 1e15.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub strength: f32,
@@ -39,19 +39,27 @@ pub struct Source {
     pub gradient: Option<Gradient>,
     /// A soft directional light.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub key: Option<Key>,
+    pub key: Option<KeyLight>,
     /// A generated sky; `sky = {}` takes its defaults.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sky: Option<Sky>,
     /// An equirectangular picture.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub image: Option<Image>,
+    pub image: Option<EnvironmentImage>,
 }
 
-impl Default for Source {
+impl Default for EnvironmentData {
     /// Darkness.
     fn default() -> Self {
-        Source { strength: 1.0, turn_deg: 0.0, uniform: None, gradient: None, key: None, sky: None, image: None }
+        EnvironmentData {
+            strength: 1.0,
+            turn_deg: 0.0,
+            uniform: None,
+            gradient: None,
+            key: None,
+            sky: None,
+            image: None,
+        }
     }
 }
 
@@ -67,7 +75,7 @@ fn is_zero(value: &f32) -> bool {
     *value == 0.0
 }
 
-impl Source {
+impl EnvironmentData {
     fn check(&self) -> Result<()> {
         let amount = |what: &str, values: &[f32]| match values.iter().find(|v| !(0.0..=RADIANCE_LIMIT).contains(*v)) {
             Some(bad) => Err(Error::Input(format!(
@@ -125,7 +133,7 @@ impl Source {
         )))
     }
 
-    /// [`Source::within`] for the mean of a picture.
+    /// [`EnvironmentData::within`] for the mean of a picture.
     fn check_picture(&self, picture: &Equirect) -> Result<()> {
         let scale = self.image.as_ref().map_or(0.0, |image| f64::from(image.scale));
         let mean = picture.coefficients(1).iter().map(|c| c[0]).fold(0.0, f64::max) / (4.0 * PI).sqrt();
@@ -134,7 +142,7 @@ impl Source {
 
     /// Whether nothing shines, whatever the strength.
     pub fn is_empty(&self) -> bool {
-        *self == Source { strength: self.strength, turn_deg: self.turn_deg, ..Source::default() }
+        *self == EnvironmentData { strength: self.strength, turn_deg: self.turn_deg, ..EnvironmentData::default() }
     }
 }
 
@@ -165,7 +173,7 @@ impl Gradient {
 /// radiance * exp(sharpness * (cos - 1)), cos being that of the angle to `toward`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Key {
+pub struct KeyLight {
     /// Linear RGB at the middle of the lobe.
     pub radiance: Vec3,
     /// Direction towards the light, of any length but 0.
@@ -180,7 +188,7 @@ pub struct Key {
 /// to the right, +x; the picture's left and right edges meet at +z.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Image {
+pub struct EnvironmentImage {
     /// Relative to the scene file.
     pub file: PathBuf,
     /// Factor on the picture's values.
@@ -191,7 +199,7 @@ pub struct Image {
 /// Distant light, ready for use.
 #[derive(Clone, Debug)]
 pub struct Environment {
-    source: Source,
+    source: EnvironmentData,
     picture: Option<Arc<Equirect>>,
     dome: Option<Arc<Dome>>,
 }
@@ -203,7 +211,7 @@ impl Environment {
     /// [`Error::Input`], one line: a negative number, radiance over [`RADIANCE_LIMIT`], a direction without length, a picture
     /// that cannot be read, is not HDR, EXR or PNG, is wider than [`super::equirect::WIDTH_LIMIT_PX`], or holds negative or
     /// non-finite radiance.
-    pub fn new(source: &Source, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Self> {
+    pub fn new(source: &EnvironmentData, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Self> {
         source.check()?;
         let picture = source.image.as_ref().map(|image| {
             Equirect::decode(&read(&image.file)?).map(Arc::new).map_err(|e| e.context(image.file.display()))
@@ -218,9 +226,9 @@ impl Environment {
     ///
     /// # Errors
     /// As [`Environment::new`], and where it names another picture.
-    pub fn with(&self, source: &Source) -> Result<Self> {
+    pub fn with(&self, source: &EnvironmentData) -> Result<Self> {
         source.check()?;
-        let file = |source: &Source| source.image.as_ref().map(|image| image.file.clone());
+        let file = |source: &EnvironmentData| source.image.as_ref().map(|image| image.file.clone());
         if let Some(other) = file(source).filter(|other| file(&self.source).as_ref() != Some(other)) {
             return Err(Error::Input(format!("environment image {} was not read", other.display())));
         }
@@ -234,7 +242,7 @@ impl Environment {
     }
 
     /// Its description.
-    pub fn source(&self) -> &Source {
+    pub fn source(&self) -> &EnvironmentData {
         &self.source
     }
 

@@ -21,7 +21,7 @@ const DECODE_LIMIT_BYTES: u64 = 2 << 30;
 /// worst picture, one row from pole to pole, the rule is off by less than 1e-9, for two rows already by less than f64 resolves.
 const ROW_NODES: usize = 16;
 
-/// Linear radiance of texels, rows from +y, columns from behind by the left: see [`super::environment::Image`].
+/// Linear radiance of texels, rows from +y, columns from behind by the left: see [`super::environment::EnvironmentImage`].
 #[derive(Debug)]
 pub struct Equirect {
     width: usize,

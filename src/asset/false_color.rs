@@ -31,7 +31,7 @@ impl FromStr for Scheme {
 
 /// Which error has which colour.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Scale {
+pub struct ColorScale {
     /// What the colours tell.
     pub scheme: Scheme,
     /// The error with the last colour; larger ones share it.
@@ -43,7 +43,7 @@ pub const NEUTRAL: [f32; 3] = [0.12; 3];
 /// Colour behind everything. Linear.
 pub const BACKGROUND: [f32; 3] = [0.03; 3];
 
-impl Scale {
+impl ColorScale {
     /// A scale whose limit is the 99th percentile of the magnitudes, rounded up to 1, 2 or 5 times a power of ten.
     pub fn fitting(scheme: Scheme, errors: impl Iterator<Item = f64>) -> Self {
         let mut sorted: Vec<f64> = errors.map(f64::abs).filter(|e| e.is_finite()).collect();
@@ -52,7 +52,7 @@ impl Scale {
         let reached = sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0).max(1e-9);
         let power = 10_f64.powi(reached.log10().floor() as i32);
         let step = [1.0, 2.0, 5.0].into_iter().find(|step| reached <= step * power * (1.0 + 1e-9));
-        Scale { scheme, limit: step.unwrap_or(10.0) * power }
+        ColorScale { scheme, limit: step.unwrap_or(10.0) * power }
     }
 
     /// Linear RGB of an error; what is no number is magenta.
@@ -155,8 +155,8 @@ mod tests {
 
     #[test]
     fn larger_errors_are_lighter_or_deeper() {
-        let absolute = Scale { scheme: Scheme::Absolute, limit: 0.2 };
-        let signed = Scale { scheme: Scheme::Signed, limit: 0.2 };
+        let absolute = ColorScale { scheme: Scheme::Absolute, limit: 0.2 };
+        let signed = ColorScale { scheme: Scheme::Signed, limit: 0.2 };
         for i in 0..50 {
             let (less, more) = (0.004 * f64::from(i), 0.004 * f64::from(i + 1));
             assert!(brightness(absolute.color(less)) < brightness(absolute.color(more)), "{more}");
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn limits_are_round() {
-        let limit = |errors: &[f64]| Scale::fitting(Scheme::Signed, errors.iter().copied()).limit;
+        let limit = |errors: &[f64]| ColorScale::fitting(Scheme::Signed, errors.iter().copied()).limit;
         for (reached, round) in [(0.011, 0.02), (-0.05, 0.05), (0.07, 0.1), (0.5, 0.5), (3.0, 5.0)] {
             assert!((limit(&[reached]) / round - 1.0).abs() < 1e-9, "{reached}");
         }
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn the_bar_spans_the_scale() {
-        let scale = Scale { scheme: Scheme::Signed, limit: 0.05 };
+        let scale = ColorScale { scheme: Scheme::Signed, limit: 0.05 };
         assert_eq!(
             scale.ticks().iter().map(|t| scale.label(*t)).collect::<Vec<_>>(),
             ["-0.05", "-0.025", "0", "+0.025", "+0.05"]

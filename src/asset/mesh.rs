@@ -34,7 +34,7 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     centre: Vec3,
     radius_m: f32,
-    shape: topology::Shape,
+    shape: topology::Topology,
     content_hash: [u8; 32],
 }
 

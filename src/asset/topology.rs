@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 /// What a baker needs to know about a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shape {
+pub struct Topology {
     /// 2-manifold without boundary, wound consistently, positive volume.
     pub closed: bool,
     /// Closed, and every piece has positive volume: from outside no back is seen, unless pieces run through themselves inside out.
@@ -26,7 +26,7 @@ const VERTEX_NOISE: f64 = 5e-7;
 
 /// One side of a triangle: `corner` is 3 * triangle + k, the side runs from that corner to the next one.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
+struct HalfEdge {
     low: u32,
     high: u32,
     reversed: bool,
@@ -34,12 +34,12 @@ struct Side {
 }
 
 /// Classifies the surface. `triangles` have three different positions each; `radius_m` is that of the bounding sphere.
-pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m: f32) -> Shape {
+pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m: f32) -> Topology {
     let (welded, vertex_count) = weld(positions);
     let corners: Vec<u32> = triangles.iter().flatten().map(|&i| welded[i as usize]).collect();
-    let mut sides: Vec<Side> = (0..corners.len()).map(|corner| side(&corners, corner)).collect();
+    let mut sides: Vec<HalfEdge> = (0..corners.len()).map(|corner| side(&corners, corner)).collect();
     sides.sort_unstable();
-    let edges: Vec<&[Side]> = sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)).collect();
+    let edges: Vec<&[HalfEdge]> = sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)).collect();
     let euler_characteristic = vertex_count as i64 - edges.len() as i64 + triangles.len() as i64;
 
     // Sorted, so that the side that runs from low to high stands first.
@@ -52,7 +52,7 @@ pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m:
         && euler_characteristic == 2
         && pieces(&edges, triangles.len()).count == 1
         && edges.iter().all(|e| bends_outwards(e, positions, triangles, f64::from(radius_m)));
-    Shape { closed, solid, convex, flat: is_flat(positions, f64::from(radius_m)), euler_characteristic }
+    Topology { closed, solid, convex, flat: is_flat(positions, f64::from(radius_m)), euler_characteristic }
 }
 
 /// Signed volume in cubic metres: the sum of the tetrahedra from `centre` to every triangle.
@@ -82,13 +82,13 @@ fn next_corner(corner: usize) -> usize {
     if corner % 3 == 2 { corner - 2 } else { corner + 1 }
 }
 
-fn side(corners: &[u32], corner: usize) -> Side {
+fn side(corners: &[u32], corner: usize) -> HalfEdge {
     let (from, to) = (corners[corner], corners[next_corner(corner)]);
-    Side { low: from.min(to), high: from.max(to), reversed: from > to, corner: corner as u32 }
+    HalfEdge { low: from.min(to), high: from.max(to), reversed: from > to, corner: corner as u32 }
 }
 
 /// Number of closed fans of triangles around vertices: more than there are vertices where two surfaces touch in a point.
-fn fan_count(edges: &[&[Side]], corner_count: usize) -> usize {
+fn fan_count(edges: &[&[HalfEdge]], corner_count: usize) -> usize {
     let mut sets = Sets::new(corner_count);
     for e in edges {
         let (a, b) = (e[0].corner as usize, e[1].corner as usize);
@@ -99,14 +99,14 @@ fn fan_count(edges: &[&[Side]], corner_count: usize) -> usize {
 }
 
 /// Triangles that hang together.
-fn pieces(edges: &[&[Side]], triangle_count: usize) -> Sets {
+fn pieces(edges: &[&[HalfEdge]], triangle_count: usize) -> Sets {
     let mut sets = Sets::new(triangle_count);
     edges.iter().for_each(|e| sets.join(e[0].corner as usize / 3, e[1].corner as usize / 3));
     sets
 }
 
 /// Whether every piece of a closed surface is wound outwards: it is no hollow's wall, and nothing inside out.
-fn has_solid_pieces(edges: &[&[Side]], positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3) -> bool {
+fn has_solid_pieces(edges: &[&[HalfEdge]], positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3) -> bool {
     let mut pieces = pieces(edges, triangles.len());
     let mut volumes = HashMap::<usize, f64>::new();
     for (number, triangle) in triangles.iter().enumerate() {
@@ -145,7 +145,7 @@ impl Sets {
 
 /// Whether the far corner of one triangle lies below the plane of the other, or above it by no more than rounding explains:
 /// noise of the first triangle's plane is magnified by how much farther from the edge that corner is.
-fn bends_outwards(edge: &[Side], positions: &[Vec3], triangles: &[[u32; 3]], radius_m: f64) -> bool {
+fn bends_outwards(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]], radius_m: f64) -> bool {
     let at = |corner: usize| positions[triangles[corner / 3][corner % 3] as usize].as_dvec3();
     let (one, other) = (edge[0].corner as usize, edge[1].corner as usize);
     let (from, to) = (at(one), at(next_corner(one)));

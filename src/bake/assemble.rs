@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::field::lattice::{Directions, Lattice};
 use crate::field::quantity::Storage;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device};
-use crate::shaders::{Library, Row};
+use crate::shaders::{Library, ShaderPermutation};
 use bytemuck::{Pod, Zeroable};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -174,8 +174,10 @@ pub struct Assemble {
 
 impl Assemble {
     /// The row of the shader table.
-    pub fn row(storage: Storage) -> Row {
-        Row::new("assemble.comp", 4).define("HALF", storage == Storage::F16).define("WORKGROUP", WORKGROUP)
+    pub fn row(storage: Storage) -> ShaderPermutation {
+        ShaderPermutation::new("assemble.comp", 4)
+            .define("HALF", storage == Storage::F16)
+            .define("WORKGROUP", WORKGROUP)
     }
 
     /// A pipeline that stores `storage`.

@@ -14,7 +14,7 @@ use crate::gpu::ImageShape;
 use crate::gpu::Target;
 use crate::gpu::{Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
 use crate::sh::cube::{FACE_COUNT, face_basis, texel_st};
-use crate::shaders::{Library, Row};
+use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
@@ -110,8 +110,8 @@ pub struct Capture {
 
 impl Capture {
     /// The rows of the shader table: vertex and fragment.
-    pub fn rows(radiance: bool) -> [Row; 2] {
-        ["capture.vert", "capture.frag"].map(|file| Row::new(file, 4).define("RADIANCE", radiance))
+    pub fn rows(radiance: bool) -> [ShaderPermutation; 2] {
+        ["capture.vert", "capture.frag"].map(|file| ShaderPermutation::new(file, 4).define("RADIANCE", radiance))
     }
 
     /// Faces in a row of the atlas.

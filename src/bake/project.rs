@@ -11,7 +11,7 @@ use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Im
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube::{FACE_COUNT, direction, solid_angle, texel_st};
 use crate::sh::lobe::clamped_cosine;
-use crate::shaders::{Library, Row};
+use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
@@ -82,8 +82,8 @@ pub struct Project {
 
 impl Project {
     /// The row of the shader table.
-    pub fn row(bands: usize, projection: Projection) -> Row {
-        Row::new("project.comp", bands)
+    pub fn row(bands: usize, projection: Projection) -> ShaderPermutation {
+        ShaderPermutation::new("project.comp", bands)
             .define("CHANNELS", projection.channels() as u32)
             .define("COSINE", projection == Projection::Transfer)
             .define("WORKGROUP", workgroup(bands, projection))

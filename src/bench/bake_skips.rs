@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// One bake.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Side {
+pub struct BakeTime {
     /// Wall time, the least of the rounds, milliseconds.
     pub bake_ms: f64,
     /// Samples that were captured.
@@ -28,7 +28,7 @@ pub struct Side {
 
 /// One skip on one mesh.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct BakeSkipRow {
     /// Mesh.
     pub case: String,
     /// Its triangles.
@@ -38,9 +38,9 @@ pub struct Row {
     /// Name of the skip.
     pub skip: String,
     /// With nothing else left out either; on the large mesh with all others.
-    pub off: Side,
+    pub off: BakeTime,
     /// With this alone.
-    pub on: Side,
+    pub on: BakeTime,
     /// Bake time off over on.
     #[serde(rename = "speed_up_ratio")]
     pub times_faster: f64,
@@ -67,7 +67,7 @@ const FAR: &str = "cube:16x8,log,outer=64";
 ///
 /// # Errors
 /// `Failed` when a file cannot be written; else as [`Baker::field`].
-pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Row>> {
+pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<BakeSkipRow>> {
     let mut meshes = vec![(generate::sphere(0.5, 4), SMALL), (generate::torus(0.5, 0.2, 96, 48), SMALL)];
     if !bench.quick {
         meshes.push((generate::torus(0.5, 0.2, 200, 100), SMALL));
@@ -79,7 +79,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Row
         let far = *lattice == FAR;
         let exact = if far { None } else { Some(bake_once(bench, mesh, lattice, 128, &|_| ())?.1) };
         for (skip, off, on) in SKIPS.into_iter().filter(|(skip, ..)| !far || *skip == "simplify") {
-            let (mut sides, rounds) = ([None::<Side>; 2], if bench.quick || far { 1 } else { 3 });
+            let (mut sides, rounds) = ([None::<BakeTime>; 2], if bench.quick || far { 1 } else { 3 });
             let mut exact = exact.clone();
             for _ in 0..rounds {
                 for (side, set) in sides.iter_mut().zip([off, on]) {
@@ -89,7 +89,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Row
                         set(baker);
                     })?;
                     let exact = exact.get_or_insert_with(|| values.clone());
-                    let now = Side {
+                    let now = BakeTime {
                         bake_ms: report.total.as_secs_f64() * 1e3,
                         captured_count: report.samples + report.filled - report.turned,
                         filled_count: report.filled,
@@ -101,7 +101,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Row
             }
             let [Some(off), Some(on)] = sides else { continue };
             (bench.progress)(&format!("{}: {skip} measured", mesh.name));
-            rows.push(Row {
+            rows.push(BakeSkipRow {
                 case: mesh.name.clone(),
                 triangle_count: mesh.triangles.len(),
                 lattice: (*lattice).to_owned(),

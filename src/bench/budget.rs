@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::field::Storage;
 use crate::frame::{self, Frame};
 use crate::truth::raycast::{RayCast, relative_error};
-use crate::truth::{Exact, Shapes, Vertex, World, sample_vertices};
+use crate::truth::{ExactChain, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
 
 /// Vertices that are judged a scene.
@@ -57,13 +57,13 @@ impl Truth {
     /// Casts all rays.
     pub fn new(case: &Case, effort: Effort, seed: u64) -> Self {
         let placements = case.scene.at(case.time_s);
-        let shapes = Shapes::new(&case.scene);
+        let shapes = RayMeshes::new(&case.scene);
         let world = World::new(&case.scene, &shapes, &placements);
         let vertices = sample_vertices(&case.scene, effort.vertices, seed);
         let cast = RayCast { rays: effort.t0_rays, seed, distant: case.distant, ..Default::default() };
         let lit = cast.run(&world, &vertices);
         let open = RayCast { rays: 256, runs: 1, shadows: false, ..cast }.run(&world, &vertices);
-        let half = |half| Exact { rays: effort.t1_rays / 2, seed: seed ^ half, ..Default::default() };
+        let half = |half| ExactChain { rays: effort.t1_rays / 2, seed: seed ^ half, ..Default::default() };
         let (first, second) = (half(1 << 32).run(&world, &vertices), half(2 << 32).run(&world, &vertices));
         let t0: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
         let unit = rms(&t0).max(f64::MIN_POSITIVE);

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView, Volume};
-use crate::shaders::{Library, Row};
+use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use serde::Serialize;
 use std::sync::Arc;
@@ -54,7 +54,7 @@ pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Res
     let rate = |kind: u32, invocations: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
         let count = (field_bytes / texel_bytes).max(8) as u32;
         let mask = count.next_power_of_two() / if count.is_power_of_two() { 1 } else { 2 } - 1;
-        let row = Row::new("ceiling.comp", 4)
+        let row = ShaderPermutation::new("ceiling.comp", 4)
             .define("KIND", kind)
             .define("READS", READS)
             .define("ROUNDS", rounds)
@@ -89,7 +89,7 @@ fn triad(device: &Arc<Device>, library: &Library, out: &Buffer) -> Result<f64> {
     let bytes = 4 * u64::from(TRIAD_FLOATS);
     let ones = vec![1.0_f32; TRIAD_FLOATS as usize];
     let (b, c) = (Buffer::with_data(device, "ceiling b", &ones)?, Buffer::with_data(device, "ceiling c", &ones)?);
-    let row = Row::new("ceiling.comp", 4).define("KIND", 4_u32);
+    let row = ShaderPermutation::new("ceiling.comp", 4).define("KIND", 4_u32);
     let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?, &[])?;
     let resources = [Bind::Buffer(&b), Bind::Buffer(out), Bind::Buffer(&c)];
     Ok(3.0 * bytes as f64 / best(device, &pipeline, &resources, TRIAD_FLOATS / 4)? * 1e-9)
@@ -97,7 +97,7 @@ fn triad(device: &Arc<Device>, library: &Library, out: &Buffer) -> Result<f64> {
 
 /// Milliseconds of a dispatch of one workgroup that multiplies once.
 fn idle(device: &Arc<Device>, library: &Library, source: &Buffer, out: &Buffer) -> Result<f64> {
-    let row = Row::new("ceiling.comp", 4)
+    let row = ShaderPermutation::new("ceiling.comp", 4)
         .define("KIND", 0_u32)
         .define("READS", 1_u32)
         .define("ROUNDS", 1_u32)

@@ -23,7 +23,7 @@ pub const GOAL: f64 = 0.45;
 
 /// One light.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct FloorRow {
     /// Teapot and light.
     pub case: String,
     /// T0-T1, root mean square over that of the unoccluded value.
@@ -40,10 +40,10 @@ pub struct Row {
     pub budget: Budget,
 }
 
-impl Row {
+impl FloorRow {
     fn new(budget: Budget, independent: Option<f64>) -> Self {
         let unit = budget.t0_per_unoccluded;
-        Row {
+        FloorRow {
             case: budget.case.clone(),
             bands_per_unoccluded: unit * budget.bands.rms,
             independent_bands_per_unoccluded: independent,
@@ -82,7 +82,7 @@ pub fn run(
     lights: &[String],
     rays: Option<u32>,
     bake: bake::Options,
-) -> Result<Vec<Row>> {
+) -> Result<Vec<FloorRow>> {
     let known: Vec<_> = cases::floor(CELLS)?.into_iter().zip(INDEPENDENT).collect();
     let chosen = cases::named(known, lights, |(case, _)| &case.name)?;
     let options = frame::Options { bake, ..default_options() };
@@ -95,7 +95,7 @@ pub fn run(
     for (case, independent) in chosen {
         (bench.progress)(&format!("{}: casting rays", case.name));
         let truth = Truth::new(&case, effort, bench.seed);
-        rows.push(Row::new(budget(bench, &case, &truth, options)?, independent));
+        rows.push(FloorRow::new(budget(bench, &case, &truth, options)?, independent));
     }
     let origin = json!({
         "origin": bench.origin, "quick": bench.quick, "seed": bench.seed, "bake": bake, "lattice": bake.lattice.to_string(),

@@ -10,7 +10,7 @@ use crate::merge::variant::{Chain, PRODUCTS, Product};
 use crate::sh::basis::coefficient_count;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::points;
-use crate::sh::product_program::{Form, styled_program};
+use crate::sh::product_program::{ProductOperation, styled_program};
 use glam::DVec3;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -109,7 +109,7 @@ pub fn measure(bench: &Bench<'_>) -> Result<Vec<Timed>> {
             }
             false => {
                 let style = shape.chain.product.style(BANDS, shape.field_bands);
-                styled_program(style, BANDS, shape.field_bands, Form::Subtract).cost()
+                styled_program(style, BANDS, shape.field_bands, ProductOperation::Subtract).cost()
             }
         };
         let ns_per_product = spread(&times);

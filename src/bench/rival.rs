@@ -11,7 +11,7 @@ use super::default_options;
 use super::figures::{Difference, Radiosity, Spread, along, crossing, spread};
 use super::sweep;
 use crate::error::Result;
-use crate::truth::{RayCast, Shapes, World};
+use crate::truth::{RayCast, RayMeshes, World};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -76,7 +76,7 @@ impl Comparison {
 pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparison> {
     let placements = case.scene.at(case.time_s);
     let mut frame = bench.frame(&case.scene, default_options())?;
-    let shapes = Shapes::new(&case.scene);
+    let shapes = RayMeshes::new(&case.scene);
     let rays: &[u32] = if bench.quick { &[1, 4, 16, 64, 256] } else { &[1, 4, 16, 64, 256, 1024, 4096] };
     let vertices = frame.receiver_vertex_count();
     let share = vertices as f64 / truth.vertices.len() as f64;

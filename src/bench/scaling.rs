@@ -14,7 +14,7 @@ use crate::layout::CLUSTER_VERTICES;
 use crate::lists::gather::{Counts, Place};
 use crate::lists::skip::Skip;
 use crate::scene::{Placement, Scene};
-use crate::truth::{RayCast, Shapes, World, sample_vertices};
+use crate::truth::{RayCast, RayMeshes, World, sample_vertices};
 use serde::Serialize;
 use serde_json::json;
 use std::path::Path;
@@ -22,7 +22,7 @@ use std::time::Instant;
 
 /// One size of one axis.
 #[derive(Clone, Debug, Serialize)]
-pub struct Point {
+pub struct ScalingPoint {
     /// What is varied: vertices, entities (floor alone lit), entities all lit, or lights.
     pub axis: &'static str,
     /// Lit vertices.
@@ -66,7 +66,7 @@ pub struct Point {
 ///
 /// # Errors
 /// `Usage` when there is no such axis, `Failed` when the folder cannot be written; else as [`Frame::new`].
-pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Point>> {
+pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<ScalingPoint>> {
     let mut axes = axes(bench.quick);
     if let Some(name) = chosen.iter().find(|name| !axes.iter().any(|(axis, _)| axis == name)) {
         let names: Vec<&str> = axes.iter().map(|(axis, _)| *axis).collect();
@@ -86,7 +86,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Po
     write(&folder.join("scaling.csv"), &csv(&origin, &rows))?;
     write(&folder.join("scaling.json"), &format!("{:#}\n", json!({ "origin": origin, "points": points })))?;
     for (axis, _) in axes {
-        let of_axis: Vec<&Point> = points.iter().filter(|p| p.axis == axis).collect();
+        let of_axis: Vec<&ScalingPoint> = points.iter().filter(|p| p.axis == axis).collect();
         write(&folder.join(format!("scaling-{}.svg", axis.replace(' ', "-"))), &plot(axis, &of_axis).svg())?;
     }
     Ok(points)
@@ -117,7 +117,7 @@ fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
 /// Relative root mean square error of a few vertices against rays.
 fn error(bench: &Bench<'_>, frame: &mut Frame, placements: &[Placement]) -> Result<f64> {
     let scene = frame.scene().clone();
-    let shapes = Shapes::new(&scene);
+    let shapes = RayMeshes::new(&scene);
     let vertices = sample_vertices(&scene, if bench.quick { 64 } else { 256 }, bench.seed);
     let cast = RayCast { rays: if bench.quick { 256 } else { 1024 }, seed: bench.seed, ..Default::default() };
     let lit = cast.run(&World::new(&scene, &shapes, placements), &vertices);
@@ -152,7 +152,7 @@ fn lists(bench: &Bench<'_>, scene: &Scene, at: &dyn Fn(usize) -> Vec<Placement>)
     Ok([spread(&frames[0].1).median, spread(&frames[1].1).median])
 }
 
-fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<Point> {
+fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoint> {
     let scene = town.scene()?;
     let placements = scene.at(0.0);
     let mut frame = bench.frame(&scene, frame::Options { skip: Skip::ALL, ..default_options() })?;
@@ -194,7 +194,7 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<Point> {
     // Before rays are cast, which takes memory of its own.
     let resident_bytes = resident_bytes();
     (bench.progress)(&format!("{axis}: {vertices} vertices, {} entities measured", scene.entities.len()));
-    Ok(Point {
+    Ok(ScalingPoint {
         axis,
         vertices,
         entities: scene.entities.len(),
@@ -222,8 +222,8 @@ fn resident_bytes() -> Option<u64> {
     Some(line.trim().trim_end_matches(" kB").trim().parse::<u64>().ok()? * 1024)
 }
 
-fn plot(axis: &str, points: &[&Point]) -> Plot {
-    let size = |p: &Point| match axis {
+fn plot(axis: &str, points: &[&ScalingPoint]) -> Plot {
+    let size = |p: &ScalingPoint| match axis {
         "vertices" => p.vertices,
         "lights" => p.lights,
         _ => p.entities,
@@ -231,9 +231,9 @@ fn plot(axis: &str, points: &[&Point]) -> Plot {
     // A town grows with its entities: what a vertex costs tells whether what exists matters, or only what is near.
     let town = axis.starts_with("entities");
     let words = if town { "entities" } else { axis };
-    let time = |p: &Point, ms: f64| if town { ms * 1e3 / p.vertices as f64 } else { ms };
+    let time = |p: &ScalingPoint, ms: f64| if town { ms * 1e3 / p.vertices as f64 } else { ms };
     // A slope in logarithms says how cost follows size: 0 not at all, 1 in proportion.
-    let curve = |label: &str, noted: bool, value: &dyn Fn(&Point) -> Option<f64>| {
+    let curve = |label: &str, noted: bool, value: &dyn Fn(&ScalingPoint) -> Option<f64>| {
         let known: Vec<(f64, f64)> = points.iter().filter_map(|p| Some((size(p), value(p)?))).collect();
         (known.len() > 1).then(|| Curve {
             label: format!("{label}: slope {:.2}", slope(known.iter().copied())),
@@ -249,7 +249,7 @@ fn plot(axis: &str, points: &[&Point]) -> Plot {
         ..Panel::default()
     };
     let mib = |bytes: u64| bytes as f64 / 1_048_576.0;
-    let each = |p: &Point, of: f64| of / (p.vertices as f64 / f64::from(CLUSTER_VERTICES));
+    let each = |p: &ScalingPoint, of: f64| of / (p.vertices as f64 / f64::from(CLUSTER_VERTICES));
     Plot {
         title: if town {
             format!(

@@ -3,7 +3,7 @@
 use super::budget::device_radiosity;
 use super::cases::{self, Case};
 use super::figures::{Difference, Radiosity, Spread, difference, rms, spread};
-use super::plot::{Column, Group, Rows, Scale};
+use super::plot::{AxisScale, PlotColumn, RowGroup, Rows};
 use super::sweep::merge_ms;
 use super::town::{Town, moved};
 use super::{Bench, default_options, house};
@@ -17,7 +17,7 @@ use crate::lists::skip::{EPS, Skip};
 use crate::scene::{Placement, Scene};
 use crate::scene_buffers::is_seen;
 use crate::truth::raycast::{Distant, relative_error};
-use crate::truth::{RayCast, Shapes, Vertex, World, sample_vertices};
+use crate::truth::{RayCast, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
 use serde_json::json;
 use std::path::Path;
@@ -112,13 +112,13 @@ pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Ro
 fn plot(rows: &[Row]) -> Rows {
     let mut cases: Vec<&str> = rows.iter().map(|row| row.case.as_str()).collect();
     cases.dedup();
-    let group = |case: &&str| Group {
+    let group = |case: &&str| RowGroup {
         heading: (*case).to_owned(),
         rows: rows.iter().filter(|row| row.case == *case).map(|row| row.skip.clone()).collect(),
     };
-    let column = |x_label: &str, value: &dyn Fn(&Row) -> [Option<f64>; 2]| Column {
+    let column = |x_label: &str, value: &dyn Fn(&Row) -> [Option<f64>; 2]| PlotColumn {
         x_label: x_label.into(),
-        scale: Scale::Log,
+        scale: AxisScale::Log,
         limit: None,
         values: rows.iter().map(|row| value(row).to_vec()).collect(),
     };
@@ -131,7 +131,7 @@ fn plot(rows: &[Row]) -> Rows {
             column("frame without drawing, milliseconds (median)", &|row| {
                 [row.off, row.on].map(|side| Some(side.frame_ms.median))
             }),
-            Column { limit: Some((1.0, "equal".into())), ..lead },
+            PlotColumn { limit: Some((1.0, "equal".into())), ..lead },
             column("RMS error against ray casting, relative", &|row| {
                 [row.off, row.on].map(|side| Some(side.error.rms))
             }),
@@ -181,7 +181,7 @@ fn alone() -> Result<Case> {
 fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<Row>> {
     (bench.progress)(&format!("{}: casting rays", case.name));
     let placements = case.scene.at(case.time_s);
-    let shapes = Shapes::new(&case.scene);
+    let shapes = RayMeshes::new(&case.scene);
     let world = World::new(&case.scene, &shapes, &placements);
     let vertices = sample_vertices(&case.scene, if bench.quick { 500 } else { 1500 }, bench.seed);
     let rays = if bench.quick { 512 } else { 4096 };

@@ -2,7 +2,7 @@
 
 use super::Bench;
 use super::default_options;
-use super::plot::{Column, Curve, Group, Panel, Plot, Rows, Scale};
+use super::plot::{AxisScale, Curve, Panel, Plot, PlotColumn, RowGroup, Rows};
 use super::refusals::{Refusal, refusals};
 use super::text::{csv, write};
 use super::trials::{self, Trial, Turn};
@@ -28,7 +28,7 @@ const TRUTH_DEGREE: usize = 400;
 
 /// Irradiance of a horizontal plane under a uniform sky of unit irradiance, behind a chain of caps.
 #[derive(Clone, Debug, Serialize)]
-pub struct Chain {
+pub struct CapChain {
     /// Which caps.
     pub caps: &'static str,
     /// How many.
@@ -69,9 +69,9 @@ pub const NEAR_F16: f64 = 2e-3;
 
 /// What was measured.
 #[derive(Serialize)]
-pub struct Outcome {
+pub struct StabilityOutcome {
     /// Chains of caps.
-    pub chains: Vec<Chain>,
+    pub chains: Vec<CapChain>,
     /// Scenes.
     pub trials: Vec<Trial>,
     /// Rotations composed of small steps.
@@ -80,7 +80,7 @@ pub struct Outcome {
     pub refusals: Vec<Refusal>,
 }
 
-impl Outcome {
+impl StabilityOutcome {
     /// How many failed, and of how many.
     pub fn failed(&self) -> [usize; 2] {
         let passed = self.chains.iter().map(|c| c.passed).chain(self.trials.iter().map(|t| t.passed));
@@ -146,7 +146,7 @@ fn truth(caps: &[Cap], rule: &[(DVec3, f64)]) -> f64 {
 }
 
 /// Chains of identical and of distinct caps.
-pub fn chains(seed: u64, longest: usize) -> Vec<Chain> {
+pub fn chains(seed: u64, longest: usize) -> Vec<CapChain> {
     let points = sphere_rule(TRUTH_DEGREE);
     let mut rng = fastrand::Rng::with_seed(seed);
     let distinct: Vec<Cap> = (0..longest)
@@ -168,7 +168,7 @@ pub fn chains(seed: u64, longest: usize) -> Vec<Chain> {
             let guard = Rule { guard: true, ..base };
             let guarded = chain(caps, guard);
             let (f32, f16) = (chain(caps, Rule { single: true, ..guard }), chain(caps, Rule { half: true, ..guard }));
-            out.push(Chain {
+            out.push(CapChain {
                 caps: name,
                 count,
                 truth: truth(caps, &points),
@@ -192,7 +192,7 @@ pub fn chains(seed: u64, longest: usize) -> Vec<Chain> {
 ///
 /// # Errors
 /// `Failed` when the folder cannot be written; else as [`crate::frame::Frame::new`].
-pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Outcome> {
+pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<StabilityOutcome> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
     (bench.progress)("chains of caps");
@@ -211,7 +211,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Outcome> {
     let turns = trials::turns(1_000_000);
     let rows = |value: Value| value.as_array().cloned().unwrap_or_default();
     let origin = json!({ "origin": bench.origin, "quick": bench.quick, "seed": bench.seed });
-    let outcome = Outcome { chains, trials, turns, refusals: refusals() };
+    let outcome = StabilityOutcome { chains, trials, turns, refusals: refusals() };
     write(&folder.join("chains.csv"), &csv(&origin, &rows(json!(outcome.chains))))?;
     write(&folder.join("trials.csv"), &csv(&origin, &rows(json!(outcome.trials))))?;
     write(&folder.join("turns.csv"), &csv(&origin, &rows(json!(outcome.turns))))?;
@@ -223,10 +223,10 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Outcome> {
 }
 
 /// Chains against the truth by kind of cap, and what f32 and f16 change.
-fn chain_plot(chains: &[Chain]) -> Plot {
+fn chain_plot(chains: &[CapChain]) -> Plot {
     let mut kinds: Vec<&str> = chains.iter().map(|c| c.caps).collect();
     kinds.dedup();
-    let curve = |kind: &str, label: &str, value: &dyn Fn(&Chain) -> f64| Curve {
+    let curve = |kind: &str, label: &str, value: &dyn Fn(&CapChain) -> f64| Curve {
         label: label.into(),
         points: chains.iter().filter(|c| c.caps == kind).map(|c| (c.count as f64, value(c))).collect(),
         notes: Vec::new(),
@@ -237,7 +237,7 @@ fn chain_plot(chains: &[Chain]) -> Plot {
             title: format!("Caps: {kind} (1.5 and more at the edge)"),
             x_label: "caps in the chain".into(),
             y_label: "irradiance, relative to where nothing blocks".into(),
-            scales: [Scale::Log, Scale::Linear(-0.1, 1.5)],
+            scales: [AxisScale::Log, AxisScale::Linear(-0.1, 1.5)],
             curves: vec![
                 curve(kind, "truth", &|c| c.truth),
                 curve(kind, "plain products of 4 bands", &|c| c.plain),
@@ -249,7 +249,7 @@ fn chain_plot(chains: &[Chain]) -> Plot {
             ..Panel::default()
         })
         .collect();
-    let largest = |label: &str, value: &dyn Fn(&Chain) -> f64| {
+    let largest = |label: &str, value: &dyn Fn(&CapChain) -> f64| {
         let mut worst: std::collections::BTreeMap<usize, f64> = Default::default();
         for chain in chains {
             let apart = worst.entry(chain.count).or_default();
@@ -277,21 +277,21 @@ fn trial_plot(trials: &[Trial]) -> Rows {
         names.iter().map(|name| vec![of(name, Storage::F16), of(name, Storage::F32)]).collect()
     };
     let columns = vec![
-        Column {
+        PlotColumn {
             x_label: "largest radiosity / its bound".into(),
-            scale: Scale::Linear(0.0, 1.1),
+            scale: AxisScale::Linear(0.0, 1.1),
             limit: Some((1.0, "bound".into())),
             values: values(&|t| if t.largest == 0.0 { 0.0 } else { t.largest / t.bound }),
         },
-        Column {
+        PlotColumn {
             x_label: "difference to the f64 twin, relative".into(),
-            scale: Scale::Log,
+            scale: AxisScale::Log,
             limit: Some((trials::NEAR_TWIN, "tolerance".into())),
             values: values(&|t| t.twin_error),
         },
     ];
     let series = vec!["fields in f16".into(), "in f32".into()];
-    let groups = vec![Group { heading: String::new(), rows: names }];
+    let groups = vec![RowGroup { heading: String::new(), rows: names }];
     Rows { title: "Odd scenes on the device".into(), series, groups, columns }
 }
 

@@ -2,7 +2,7 @@
 
 use super::budget::{Budget, Effort, Truth, budget};
 use super::cases::{self, Case};
-use super::plot::{Column, Curve, Dot, Gap, Group, Panel, Plot, Rows, Scale};
+use super::plot::{AxisScale, Curve, Dot, Gap, Panel, Plot, PlotColumn, RowGroup, Rows};
 use super::rival::{Comparison, compare};
 use super::sweep::{Point, Variation, pareto, sweep, variations};
 use super::text::{csv, three, write};
@@ -11,7 +11,7 @@ use crate::asset::false_color::Scheme;
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::Options;
-use crate::truth::error_map::Shown;
+use crate::truth::error_map::ErrorPicture;
 use crate::truth::{self, ErrorMap, RayCast, error_map};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -30,11 +30,11 @@ pub struct Selection {
 
 /// What was measured.
 #[derive(Serialize)]
-pub struct Outcome {
+pub struct TimeErrorOutcome {
     /// A row a scene and light.
     pub budgets: Vec<Budget>,
     /// A picture a scene and light.
-    pub pictures: Vec<Shown>,
+    pub pictures: Vec<ErrorPicture>,
     /// A row a case and variation.
     pub points: Vec<Point>,
     /// A row a case.
@@ -43,7 +43,7 @@ pub struct Outcome {
     pub seconds: BTreeMap<&'static str, f64>,
 }
 
-impl Outcome {
+impl TimeErrorOutcome {
     /// How long the run took and what with.
     pub fn took(&self) -> String {
         let parts: Vec<String> = self.seconds.iter().map(|(part, s)| format!("{part} {s:.0}")).collect();
@@ -57,12 +57,12 @@ impl Outcome {
 /// # Errors
 /// `Usage` when a case or axis does not exist, `Failed` when the folder cannot be written; else as
 /// [`crate::frame::Frame::new`].
-pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection) -> Result<Outcome> {
+pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection) -> Result<TimeErrorOutcome> {
     let cases = chosen(bench.quick, &selection.cases)?;
     let all = variations_of(bench.quick, &selection.axes)?;
     std::fs::create_dir_all(folder)
         .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
-    let mut outcome = Outcome {
+    let mut outcome = TimeErrorOutcome {
         budgets: Vec::new(),
         pictures: Vec::new(),
         points: Vec::new(),
@@ -73,7 +73,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection) -> Result<Ou
     for (index, case) in cases.iter().enumerate() {
         (bench.progress)(&format!("case {} of {}, {}: casting rays", index + 1, cases.len(), case.name));
         let mut started = Instant::now();
-        let mut took = |outcome: &mut Outcome, part| {
+        let mut took = |outcome: &mut TimeErrorOutcome, part| {
             *outcome.seconds.entry(part).or_default() += started.elapsed().as_secs_f64();
             started = Instant::now();
         };
@@ -101,7 +101,7 @@ const PICTURE_RAYS: [usize; 2] = [8_000_000, 32_000_000];
 const PICTURE_SIZE: [u32; 2] = [720, 480];
 
 /// Writes the error of every lit vertex in false colour, as `error-` and the case's name.
-fn error_picture(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<Shown> {
+fn error_picture(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<ErrorPicture> {
     let placements = case.scene.at(case.time_s);
     let options = Options { size: PICTURE_SIZE, antialias: Antialias::Samples, ..default_options() };
     let mut frame = bench.frame(&case.scene, options)?;
@@ -146,7 +146,7 @@ fn is_swept(case: &Case) -> bool {
     case.name == "torus_over_plane" || case.name.contains("(b)")
 }
 
-fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &Outcome) -> Result<()> {
+fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &TimeErrorOutcome) -> Result<()> {
     fn rows(of: &[impl Serialize]) -> Vec<Value> {
         of.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect()
     }
@@ -189,7 +189,7 @@ fn rival_rows(comparison: &Comparison) -> Vec<Value> {
 }
 
 /// The settings of a case with their front, and that front beside ray casting.
-fn plot(case: &str, outcome: &Outcome) -> Plot {
+fn plot(case: &str, outcome: &TimeErrorOutcome) -> Plot {
     let points: Vec<&Point> = outcome.points.iter().filter(|p| p.case == case).collect();
     let places: Vec<(f64, f64)> = points.iter().map(|p| (p.merge_ms.median, p.total.rms)).collect();
     let dot = |p: &&Point| Dot {
@@ -237,9 +237,9 @@ fn rival_curve(c: &Comparison) -> Curve {
 /// Every case's lead at equal error.
 fn rival_plot(comparisons: &[Comparison]) -> Rows {
     let column =
-        |x_label: &str, values: &dyn Fn(&Comparison) -> [Option<f64>; 2], limit: Option<(f64, String)>| Column {
+        |x_label: &str, values: &dyn Fn(&Comparison) -> [Option<f64>; 2], limit: Option<(f64, String)>| PlotColumn {
             x_label: x_label.into(),
-            scale: Scale::Log,
+            scale: AxisScale::Log,
             limit,
             values: comparisons.iter().map(|c| values(c).to_vec()).collect(),
         };
@@ -248,7 +248,7 @@ fn rival_plot(comparisons: &[Comparison]) -> Rows {
     Rows {
         title: "Merge and ray casting at equal error".into(),
         series: vec!["merge (a frame without drawing)".into(), "ray casting on as many threads".into()],
-        groups: vec![Group { heading: String::new(), rows: comparisons.iter().map(Comparison::title).collect() }],
+        groups: vec![RowGroup { heading: String::new(), rows: comparisons.iter().map(Comparison::title).collect() }],
         columns: vec![
             column("wall time, milliseconds (median)", times, None),
             column("how many times faster the merge is", lead, Some((1.0, "equal".into()))),

@@ -7,7 +7,7 @@ use crate::asset::grid::{Grid, UPWARDS};
 use crate::draw::Item;
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
-use crate::shaders::{Library, Row};
+use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -87,8 +87,8 @@ impl DrawGrid {
     /// # Errors
     /// `Failed` when a shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, state: GraphicsState, display: bool) -> Result<Self> {
-        let vertex = library.shader(&Row::new("grid.vert", 4))?;
-        let fragment = library.shader(&Row::new("grid.frag", 4).define("DISPLAY", display))?;
+        let vertex = library.shader(&ShaderPermutation::new("grid.vert", 4))?;
+        let fragment = library.shader(&ShaderPermutation::new("grid.frag", 4).define("DISPLAY", display))?;
         Ok(DrawGrid { pipeline: GraphicsPipeline::new(device, "draw grid", &vertex, &fragment, state)? })
     }
 

@@ -19,7 +19,7 @@ use crate::gpu::ImageShape;
 use crate::gpu::Target;
 use crate::gpu::{Access, Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
 use crate::lists::sight::{Faces, Sight};
-use crate::shaders::{Library, Row};
+use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
@@ -245,8 +245,9 @@ impl Draw {
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
         let shape = ImageShape { format: color, width, height, samples: 1 };
         let state = GraphicsState { color, depth: Some(DEPTH), samples, cull: vk::CullModeFlags::NONE };
-        let vertex = library.shader(&Row::new("draw.vert", 4))?;
-        let fragment = library.shader(&Row::new("draw.frag", 4).define("DISPLAY", finish == Finish::Display))?;
+        let vertex = library.shader(&ShaderPermutation::new("draw.vert", 4))?;
+        let fragment =
+            library.shader(&ShaderPermutation::new("draw.frag", 4).define("DISPLAY", finish == Finish::Display))?;
         Ok(Draw {
             open: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
             solid: GraphicsPipeline::new(

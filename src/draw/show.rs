@@ -5,7 +5,7 @@
 use crate::asset::picture::srgb_from_linear;
 use crate::error::Result;
 use crate::gpu::{Bind, Device, Drawing, GraphicsPipeline, GraphicsState, Image};
-use crate::shaders::{Library, Row};
+use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -30,8 +30,8 @@ impl Show {
     /// `Failed` when a shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, format: vk::Format, encodes_srgb: bool) -> Result<Self> {
         let state = GraphicsState { color: format, depth: None, samples: 1, cull: vk::CullModeFlags::NONE };
-        let vertex = library.shader(&Row::new("show.vert", 4))?;
-        let fragment = library.shader(&Row::new("show.frag", 4))?;
+        let vertex = library.shader(&ShaderPermutation::new("show.vert", 4))?;
+        let fragment = library.shader(&ShaderPermutation::new("show.frag", 4))?;
         let pipeline = GraphicsPipeline::new(device, "show", &vertex, &fragment, state)?;
         Ok(Show { pipeline, encode: !encodes_srgb })
     }

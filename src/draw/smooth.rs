@@ -11,7 +11,7 @@
 use crate::asset::edges::Line;
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Target, Upload};
-use crate::shaders::{Library, Row};
+use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, IVec2};
@@ -147,8 +147,8 @@ impl Smooth {
     /// `Failed` when a shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, shape: ImageShape, display: bool) -> Result<Self> {
         let state = GraphicsState { color: shape.format, depth: None, samples: 1, cull: vk::CullModeFlags::NONE };
-        let vertex = library.shader(&Row::new("smooth.vert", 4))?;
-        let fragment = library.shader(&Row::new("smooth.frag", 4).define("DISPLAY", display))?;
+        let vertex = library.shader(&ShaderPermutation::new("smooth.vert", 4))?;
+        let fragment = library.shader(&ShaderPermutation::new("smooth.frag", 4).define("DISPLAY", display))?;
         Ok(Smooth {
             pipeline: GraphicsPipeline::new(device, "smooth", &vertex, &fragment, state)?,
             picture: Image::new(device, "smooth picture", shape)?,

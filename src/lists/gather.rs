@@ -16,7 +16,7 @@ pub use crate::lists::moment::{Body, Bounds, Counts, Lamp, Moment, distance_key}
 pub use crate::lists::scope::Scope;
 use crate::lists::scope::{BELOW, Fate, GROUP_SLACK, SLACK, SLACK_RAD, View, cap_sines, fade, fade_sine};
 use crate::lists::tree::Crowd;
-use crate::shaders::{Library, Row};
+use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -323,8 +323,8 @@ impl Gather {
     }
 
     /// The row of the shader table; `roomy` for the second round.
-    pub fn row(texel: bool, roomy: bool) -> Row {
-        Row::new("gather.comp", 4)
+    pub fn row(texel: bool, roomy: bool) -> ShaderPermutation {
+        ShaderPermutation::new("gather.comp", 4)
             .define("TEXEL", texel)
             .define("ROOMY", roomy)
             .define("LANES", LANES)

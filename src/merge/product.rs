@@ -9,7 +9,7 @@ use crate::merge::chain::Multiplier;
 use crate::merge::variant::Chain;
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count};
 use crate::sh::product_program::STYLES;
-use crate::shaders::{Library, Row};
+use crate::shaders::{Library, ShaderPermutation};
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
@@ -45,9 +45,9 @@ pub struct Products {
 
 impl Products {
     /// The row of the shader table; without `multiply`, the loop alone.
-    pub fn row(shape: Shape, multiply: bool) -> Row {
+    pub fn row(shape: Shape, multiply: bool) -> ShaderPermutation {
         let style = shape.chain.product.style(shape.bands, shape.field_bands);
-        Row::new("product.comp", shape.bands)
+        ShaderPermutation::new("product.comp", shape.bands)
             .field_bands(shape.field_bands)
             .define("WORKGROUP", WORKGROUP)
             .define("PRODUCT", STYLES.iter().position(|s| *s == style).expect("every style is listed") as u32)

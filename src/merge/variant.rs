@@ -8,7 +8,7 @@ use crate::layout::{CLUSTER_VERTICES, Entity};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::sh::points;
 use crate::sh::product_program::{STYLES, Style};
-use crate::shaders::Row;
+use crate::shaders::ShaderPermutation;
 use ash::vk;
 
 /// How the merge is done, where that changes its speed and not its outcome.
@@ -217,7 +217,7 @@ impl Form {
     }
 
     /// The row of the shader table.
-    pub fn row(&self) -> Row {
+    pub fn row(&self) -> ShaderPermutation {
         let lattice = self.lattice;
         let (cells, latitudes, longitudes) = match lattice.directions {
             Directions::Cube { cells } => (cells, 0, 0),
@@ -225,7 +225,7 @@ impl Form {
         };
         let cube = matches!(lattice.directions, Directions::Cube { .. });
         let product = self.chain.product.style(self.bands, self.field_bands);
-        let row = Row::new("merge.comp", self.bands)
+        let row = ShaderPermutation::new("merge.comp", self.bands)
             .field_bands(self.field_bands)
             .define("PRODUCT", STYLES.iter().position(|style| *style == product).expect("every style is listed") as u32)
             .define("POINT_CHAIN", self.chain.product.stays_at_points())

@@ -39,10 +39,10 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::motion::{Exact, Motion, Placement, Rotation};
+use super::motion::{Motion, Placement, PlacementF64, RotationData};
 use super::{ENTITY_LIMIT, MESH_LIMIT, values};
 use crate::asset::Mesh;
-use crate::asset::environment::Source;
+use crate::asset::environment::EnvironmentData;
 use crate::asset::generate::Generator;
 use crate::error::{Error, Result};
 
@@ -60,7 +60,7 @@ pub struct Data {
     pub output: Output,
     /// Distant light; darkness if left out.
     #[serde(default)]
-    pub environment: Source,
+    pub environment: EnvironmentData,
     /// Shapes, by name.
     #[serde(default, rename = "mesh")]
     pub meshes: Vec<MeshData>,
@@ -227,7 +227,7 @@ pub struct EntityData {
     pub position: Vec3,
     /// None if left out.
     #[serde(default)]
-    pub rotation: Rotation,
+    pub rotation: RotationData,
     /// Uniform and positive; 1 if left out.
     #[serde(default = "one", deserialize_with = "values::scale")]
     pub scale: f32,
@@ -262,7 +262,7 @@ fn grey() -> Vec3 {
 impl EntityData {
     /// Where it is at `time_s` seconds.
     pub fn at(&self, time_s: f64) -> Placement {
-        let rest = Exact::new(self.position, self.rotation, self.scale);
+        let rest = PlacementF64::new(self.position, self.rotation, self.scale);
         self.motion.iter().fold(rest, |place, motion| place.moved(motion, rest, time_s)).rounded()
     }
 }

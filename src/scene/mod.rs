@@ -13,7 +13,7 @@ use glam::Vec3;
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::asset::environment::{Environment, Source};
+use crate::asset::environment::{Environment, EnvironmentData};
 use crate::asset::{Mesh, embedded, obj, read_file};
 use crate::error::{Error, Result};
 pub use data::{Camera, Data, EntityData, MeshData, Output};
@@ -82,7 +82,7 @@ impl Scene {
     /// As [`Scene::load`].
     pub fn parse(text: &str, path: &Path, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Self> {
         let data = Data::parse(text, path)?;
-        let lines = Lines::read(text);
+        let lines = TableLines::read(text);
         let folder = path.parent().unwrap_or(Path::new(""));
         // What is not on disk may be in the binary, under its own name from wherever the scene stands.
         let read = |file: &Path| {
@@ -128,7 +128,7 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Environment::new`].
-    pub fn set_environment(&mut self, source: &Source) -> Result<()> {
+    pub fn set_environment(&mut self, source: &EnvironmentData) -> Result<()> {
         self.environment = self.environment.with(source)?;
         self.data.environment = source.clone();
         Ok(())
@@ -170,7 +170,7 @@ fn utf8<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a str> {
 }
 
 /// Where the tables of a scene file begin, for messages about what is only known after reading it.
-struct Lines<'a> {
+struct TableLines<'a> {
     text: &'a str,
     tables: Tables,
 }
@@ -184,7 +184,7 @@ struct Tables {
     environment: Option<Spanned<toml::Table>>,
 }
 
-impl<'a> Lines<'a> {
+impl<'a> TableLines<'a> {
     fn read(text: &'a str) -> Self {
         Self { text, tables: toml::from_str(text).unwrap_or_default() }
     }

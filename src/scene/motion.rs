@@ -22,7 +22,7 @@ pub struct Placement {
 /// but zero.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Written", into = "Written")]
-pub enum Rotation {
+pub enum RotationData {
     /// Turn about an axis of any length but zero.
     AxisAngle {
         /// Direction of the axis.
@@ -34,20 +34,20 @@ pub enum Rotation {
     Quaternion([f32; 4]),
 }
 
-impl Default for Rotation {
+impl Default for RotationData {
     fn default() -> Self {
-        Rotation::Quaternion([0.0, 0.0, 0.0, 1.0])
+        RotationData::Quaternion([0.0, 0.0, 0.0, 1.0])
     }
 }
 
-impl Rotation {
+impl RotationData {
     /// The unit quaternion.
     pub fn unit(self) -> DQuat {
         match self {
-            Rotation::AxisAngle { axis, angle_deg } => {
+            RotationData::AxisAngle { axis, angle_deg } => {
                 DQuat::from_axis_angle(axis.as_dvec3().normalize(), angle_deg.to_radians())
             }
-            Rotation::Quaternion(q) => DQuat::from_array(q.map(f64::from)).normalize(),
+            RotationData::Quaternion(q) => DQuat::from_array(q.map(f64::from)).normalize(),
         }
     }
 }
@@ -63,7 +63,7 @@ struct Written {
     quaternion: Option<Vec<f32>>,
 }
 
-impl TryFrom<Written> for Rotation {
+impl TryFrom<Written> for RotationData {
     type Error = String;
 
     fn try_from(written: Written) -> Result<Self, String> {
@@ -71,21 +71,21 @@ impl TryFrom<Written> for Rotation {
             |v: &[f32]| v.iter().all(|x| x.abs() <= values::POSITION_LIMIT_M) && v.iter().any(|x| x.abs() > 1e-12);
         match (written.axis.as_deref(), written.angle_deg, written.quaternion.as_deref()) {
             (Some(&[x, y, z]), Some(angle_deg), None) if usable(&[x, y, z]) && angle_deg.abs() <= values::NUMBER_LIMIT => {
-                Ok(Rotation::AxisAngle { axis: Vec3::new(x, y, z), angle_deg })
+                Ok(RotationData::AxisAngle { axis: Vec3::new(x, y, z), angle_deg })
             }
-            (None, None, Some(&[x, y, z, w])) if usable(&[x, y, z, w]) => Ok(Rotation::Quaternion([x, y, z, w])),
+            (None, None, Some(&[x, y, z, w])) if usable(&[x, y, z, w]) => Ok(RotationData::Quaternion([x, y, z, w])),
             _ => Err("a rotation is { axis = [x, y, z], angle_deg = a } or { quaternion = [x, y, z, w] }, finite and not zero".into()),
         }
     }
 }
 
-impl From<Rotation> for Written {
-    fn from(rotation: Rotation) -> Self {
+impl From<RotationData> for Written {
+    fn from(rotation: RotationData) -> Self {
         match rotation {
-            Rotation::AxisAngle { axis, angle_deg } => {
+            RotationData::AxisAngle { axis, angle_deg } => {
                 Written { axis: Some(axis.to_array().to_vec()), angle_deg: Some(angle_deg), quaternion: None }
             }
-            Rotation::Quaternion(q) => Written { axis: None, angle_deg: None, quaternion: Some(q.to_vec()) },
+            RotationData::Quaternion(q) => Written { axis: None, angle_deg: None, quaternion: Some(q.to_vec()) },
         }
     }
 }
@@ -180,7 +180,7 @@ pub struct Keyframe {
     pub position: Option<Vec3>,
     /// Turned the short way at a steady rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rotation: Option<Rotation>,
+    pub rotation: Option<RotationData>,
     /// Between keys as [`Interpolation`] says.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "values::maybe_scale")]
     pub scale: Option<f32>,
@@ -205,14 +205,14 @@ fn keyframes<'de, D: serde::Deserializer<'de>>(source: D) -> Result<Vec<Keyframe
 
 /// [`Placement`] in f64, between movements.
 #[derive(Clone, Copy)]
-pub(super) struct Exact {
+pub(super) struct PlacementF64 {
     position: DVec3,
     rotation: DQuat,
     scale: f64,
 }
 
-impl Exact {
-    pub(super) fn new(position: Vec3, rotation: Rotation, scale: f32) -> Self {
+impl PlacementF64 {
+    pub(super) fn new(position: Vec3, rotation: RotationData, scale: f32) -> Self {
         Self { position: position.as_dvec3(), rotation: rotation.unit(), scale: f64::from(scale) }
     }
 
@@ -229,7 +229,7 @@ impl Exact {
     }
 
     /// This placement after `motion`, with `rest` for what keyframes leave out.
-    pub(super) fn moved(mut self, motion: &Motion, rest: Exact, time_s: f64) -> Self {
+    pub(super) fn moved(mut self, motion: &Motion, rest: PlacementF64, time_s: f64) -> Self {
         // The fraction of a turn first: the angle stays small, so late times lose nothing.
         let turn = |axis: Vec3, period_s: f64| {
             DQuat::from_axis_angle(axis.as_dvec3().normalize(), TAU * (time_s / period_s).fract())
@@ -252,12 +252,18 @@ impl Exact {
     }
 }
 
-fn interpolate(keys: &[Keyframe], repeat: bool, interpolation: Interpolation, rest: Exact, time_s: f64) -> Exact {
+fn interpolate(
+    keys: &[Keyframe],
+    repeat: bool,
+    interpolation: Interpolation,
+    rest: PlacementF64,
+    time_s: f64,
+) -> PlacementF64 {
     let (first, last) = (keys[0].time_s, keys[keys.len() - 1].time_s);
     let time = if repeat && last > first { first + (time_s - first).rem_euclid(last - first) } else { time_s };
-    let place = |key: &Keyframe| Exact {
+    let place = |key: &Keyframe| PlacementF64 {
         position: key.position.map_or(rest.position, |p| p.as_dvec3()),
-        rotation: key.rotation.map_or(rest.rotation, Rotation::unit),
+        rotation: key.rotation.map_or(rest.rotation, RotationData::unit),
         scale: key.scale.map_or(rest.scale, f64::from),
     };
     let next = keys.partition_point(|k| k.time_s <= time);
@@ -268,7 +274,7 @@ fn interpolate(keys: &[Keyframe], repeat: bool, interpolation: Interpolation, re
     let span_s = keys[next].time_s - keys[next - 1].time_s;
     let part = (time - keys[next - 1].time_s) / span_s;
     let rotation = from.rotation.slerp(to.rotation, part);
-    let [a, b] = [from, to].map(Exact::position_and_scale);
+    let [a, b] = [from, to].map(PlacementF64::position_and_scale);
     let between = match interpolation {
         Interpolation::Linear => a.lerp(b, part),
         Interpolation::Smooth => {
@@ -293,7 +299,7 @@ fn interpolate(keys: &[Keyframe], repeat: bool, interpolation: Interpolation, re
             spline.with_w(spline.w.max(0.1 * a.w.min(b.w)))
         }
     };
-    Exact { position: between.truncate(), rotation, scale: between.w }
+    PlacementF64 { position: between.truncate(), rotation, scale: between.w }
 }
 
 /// The cubic through `values` at 0 and 1 with `slopes` there.

@@ -76,8 +76,8 @@ const SCALE: &str = "one scale, uniform and positive (1e-7 to 1e7)";
 
 /// One factor for all axes.
 pub fn scale<'de, D: Deserializer<'de>>(source: D) -> Result<f32, D::Error> {
-    struct Scale;
-    impl<'de> Visitor<'de> for Scale {
+    struct ScaleVisitor;
+    impl<'de> Visitor<'de> for ScaleVisitor {
         type Value = f32;
         fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
             f.write_str(SCALE)
@@ -97,7 +97,7 @@ pub fn scale<'de, D: Deserializer<'de>>(source: D) -> Result<f32, D::Error> {
             Err(A::Error::custom(format!("a list of scales: expected {SCALE}")))
         }
     }
-    source.deserialize_any(Scale)
+    source.deserialize_any(ScaleVisitor)
 }
 
 /// A scale that may be left out.

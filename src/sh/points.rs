@@ -2,16 +2,16 @@
 //! projected back, which is exact for one product (degree 9). A chain may also stay at the points and be projected once; the
 //! rule is then no longer exact, but a factor costs one evaluation.
 //!
-//! The points come in orbits under the reflections of the axes, eight of (1, 1, 1) and six times four of points in a coordinate
-//! plane. Coefficients that are odd in the same axes have the same magnitude all over an orbit: they are summed at the one
-//! point with no negative coordinate, and butterflies give the others.
+//! The points come in sets that the reflections of the axes map to themselves: one set of eight, (1, 1, 1) and its mirror images,
+//! and six sets of four in coordinate planes. Coefficients that are odd in the same axes have the same magnitude at all points of
+//! a set: they are summed at the one point without negative coordinates, and sums and differences give the others.
 
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 
 use super::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
-use super::product_program::Form;
+use super::product_program::ProductOperation;
 use super::program::{Program, Term, Value, elements};
 use super::quadrature::icosahedral_rule;
 
@@ -21,13 +21,13 @@ pub const BANDS: usize = 4;
 /// Points of the rule.
 pub const COUNT: usize = 32;
 
-/// The points with their weights, orbit after orbit.
+/// The unit directions of the rule with their weights (sum 4 pi), one set of mirror images after another.
 pub fn points() -> Vec<(DVec3, f64)> {
-    orbits().iter().flat_map(|orbit| (0..orbit.size()).map(|s| (orbit.point(s), orbit.weight))).collect()
+    reflected_points().iter().flat_map(|set| (0..set.size()).map(|s| (set.point(s), set.weight))).collect()
 }
 
 /// Points that are reflections of one another.
-struct Orbit {
+struct ReflectedPoints {
     /// The one without negative coordinates.
     corner: DVec3,
     /// Axes along which it has reflections.
@@ -35,7 +35,7 @@ struct Orbit {
     weight: f64,
 }
 
-impl Orbit {
+impl ReflectedPoints {
     fn size(&self) -> usize {
         1 << self.axes.len()
     }
@@ -51,7 +51,7 @@ impl Orbit {
         point
     }
 
-    /// The axes in which coefficients are odd, as bits of this orbit's axes, with their values at the corner: empty classes and
+    /// The axes in which coefficients are odd, as bits of this set's axes, with their values at the corner: empty classes and
     /// those that are odd in an axis without extent are left out.
     fn classes(&self, bands: usize) -> BTreeMap<usize, Vec<(usize, f64)>> {
         // A place without symmetry tells the parities of all coefficients.
@@ -80,16 +80,16 @@ impl Orbit {
     }
 }
 
-fn orbits() -> Vec<Orbit> {
-    let mut orbits: Vec<Orbit> = Vec::new();
+fn reflected_points() -> Vec<ReflectedPoints> {
+    let mut reflected_points: Vec<ReflectedPoints> = Vec::new();
     for (point, weight) in icosahedral_rule() {
         let corner = point.abs();
-        if orbits.iter().all(|orbit| orbit.corner.distance(corner) > 1e-9) {
+        if reflected_points.iter().all(|set| set.corner.distance(corner) > 1e-9) {
             let axes = (0..3).filter(|&axis| corner[axis] > 1e-9).collect();
-            orbits.push(Orbit { corner, axes, weight });
+            reflected_points.push(ReflectedPoints { corner, axes, weight });
         }
     }
-    orbits
+    reflected_points
 }
 
 /// Sums and differences along every axis: classes to points, or back.
@@ -114,10 +114,10 @@ fn butterflies(program: &mut Program, values: &mut [Option<Value>]) {
     }
 }
 
-/// Values at the points of one orbit.
-fn at_orbit(program: &mut Program, orbit: &Orbit, bands: usize, input: impl Fn(usize) -> Value) -> Vec<Value> {
-    let mut values = vec![None; orbit.size()];
-    for (class, members) in orbit.classes(bands) {
+/// Values at the points of one set.
+fn at_points(program: &mut Program, set: &ReflectedPoints, bands: usize, input: impl Fn(usize) -> Value) -> Vec<Value> {
+    let mut values = vec![None; set.size()];
+    for (class, members) in set.classes(bands) {
         let terms = members.into_iter().map(|(k, y)| Term::new(y, &[input(k)])).collect();
         values[class] = Some(program.define(terms));
     }
@@ -125,10 +125,10 @@ fn at_orbit(program: &mut Program, orbit: &Orbit, bands: usize, input: impl Fn(u
     values.into_iter().map(|v| v.expect("coefficient 0 is even everywhere")).collect()
 }
 
-/// Adds the projection of values at an orbit's points to coefficients; `factor` multiplies the weight.
+/// Adds the projection of values at a set's points to coefficients; `factor` multiplies the weight.
 fn project(
     program: &mut Program,
-    orbit: &Orbit,
+    set: &ReflectedPoints,
     bands: usize,
     values: Vec<Value>,
     factor: f64,
@@ -136,7 +136,7 @@ fn project(
 ) {
     let mut values: Vec<Option<Value>> = values.into_iter().map(Some).collect();
     butterflies(program, &mut values);
-    for (class, members) in orbit.classes(bands) {
+    for (class, members) in set.classes(bands) {
         let value = values[class].expect("every point has a value");
         for (k, y) in members {
             program.accumulate(&mut sums[k], vec![Term::new(factor * y, &[value])]);
@@ -145,25 +145,25 @@ fn project(
 }
 
 /// The product as evaluation, multiplication and projection.
-pub(super) fn product_program(bands: usize, form: Form) -> Program {
+pub(super) fn product_program(bands: usize, operation: ProductOperation) -> Program {
     let count = coefficient_count(bands);
-    let [left, target] = if form == Form::Product { ["a", "c"] } else { ["t", "t"] };
+    let [left, target] = if operation == ProductOperation::Product { ["a", "c"] } else { ["t", "t"] };
     let mut program = Program::new([elements(left, count), elements("b", count)].concat());
     let mut sums = vec![None; count];
-    let sign = match form {
-        Form::Product => 1.0,
-        Form::Subtract => {
+    let sign = match operation {
+        ProductOperation::Product => 1.0,
+        ProductOperation::Subtract => {
             for (k, sum) in sums.iter_mut().enumerate() {
                 *sum = Some(program.define(vec![Term::new(1.0, &[Value::Input(k)])]));
             }
             -1.0
         }
     };
-    for orbit in orbits() {
-        let a = at_orbit(&mut program, &orbit, bands, Value::Input);
-        let b = at_orbit(&mut program, &orbit, bands, |k| Value::Input(count + k));
+    for set in reflected_points() {
+        let a = at_points(&mut program, &set, bands, Value::Input);
+        let b = at_points(&mut program, &set, bands, |k| Value::Input(count + k));
         let products = a.into_iter().zip(b).map(|(a, b)| program.define(vec![Term::new(1.0, &[a, b])])).collect();
-        project(&mut program, &orbit, bands, products, sign * orbit.weight, &mut sums);
+        project(&mut program, &set, bands, products, sign * set.weight, &mut sums);
     }
     for (text, sum) in elements(target, count).into_iter().zip(sums) {
         program.output(text, sum.expect("every coefficient has a term"));
@@ -175,8 +175,8 @@ pub(super) fn product_program(bands: usize, form: Form) -> Program {
 pub fn evaluate_program(bands: usize) -> Program {
     let mut program = Program::new(elements("c", coefficient_count(bands)));
     let mut values = Vec::new();
-    for orbit in orbits() {
-        values.extend(at_orbit(&mut program, &orbit, bands, Value::Input));
+    for set in reflected_points() {
+        values.extend(at_points(&mut program, &set, bands, Value::Input));
     }
     for (text, value) in elements("v", COUNT).into_iter().zip(values) {
         program.output(text, value);
@@ -189,10 +189,10 @@ pub fn project_program(bands: usize) -> Program {
     let count = coefficient_count(bands);
     let mut program = Program::new(elements("v", COUNT));
     let (mut sums, mut first) = (vec![None; count], 0);
-    for orbit in orbits() {
-        let values = (first..first + orbit.size()).map(Value::Input).collect();
-        project(&mut program, &orbit, bands, values, 1.0, &mut sums);
-        first += orbit.size();
+    for set in reflected_points() {
+        let values = (first..first + set.size()).map(Value::Input).collect();
+        project(&mut program, &set, bands, values, 1.0, &mut sums);
+        first += set.size();
     }
     for (text, sum) in elements("c", count).into_iter().zip(sums) {
         program.output(text, sum.expect("every coefficient has a term"));

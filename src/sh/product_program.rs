@@ -135,36 +135,36 @@ impl Emitter<'_> {
 
 /// What a product program computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
+pub enum ProductOperation {
     /// `c = product(a, b)`: inputs a then b, outputs c.
     Product,
     /// `t -= product(t, b)`, multiplication by 1 - b: inputs t then b, outputs t.
     Subtract,
 }
 
-impl Form {
+impl ProductOperation {
     fn sign(self) -> f64 {
-        if self == Form::Product { 1.0 } else { -1.0 }
+        if self == ProductOperation::Product { 1.0 } else { -1.0 }
     }
 }
 
 /// The product of expansions of `bands` bands as a program.
-pub fn product_program(bands: usize, form: Form) -> Program {
-    styled_program(Style::Factored, bands, bands, form)
+pub fn product_program(bands: usize, operation: ProductOperation) -> Program {
+    styled_program(Style::Factored, bands, bands, operation)
 }
 
 /// The product of an expansion of `a_bands` by one of `b_bands`, cut to `a_bands`, in a style that [`Style::fits`] them.
-pub fn styled_program(style: Style, a_bands: usize, b_bands: usize, form: Form) -> Program {
+pub fn styled_program(style: Style, a_bands: usize, b_bands: usize, operation: ProductOperation) -> Program {
     assert!(style.fits(a_bands, b_bands), "{style:?} cannot multiply {a_bands} bands by {b_bands}");
     if style == Style::Points {
-        return points::product_program(a_bands, form);
+        return points::product_program(a_bands, operation);
     }
     let counts = [a_bands, b_bands].map(coefficient_count);
-    let [left, target] = if form == Form::Product { ["a", "c"] } else { ["t", "t"] };
+    let [left, target] = if operation == ProductOperation::Product { ["a", "c"] } else { ["t", "t"] };
     let mut program = Program::new([elements(left, counts[0]), elements("b", counts[1])].concat());
     let sums = match style {
-        Style::Matrix => matrix_sums(&mut program, a_bands, b_bands, form),
-        _ => pair_sums(&mut program, a_bands, form, style == Style::Factored),
+        Style::Matrix => matrix_sums(&mut program, a_bands, b_bands, operation),
+        _ => pair_sums(&mut program, a_bands, operation, style == Style::Factored),
     };
     for (text, sum) in elements(target, counts[0]).into_iter().zip(sums) {
         program.output(text, sum.expect("every coefficient has a term"));
@@ -172,7 +172,7 @@ pub fn styled_program(style: Style, a_bands: usize, b_bands: usize, form: Form) 
     program
 }
 
-fn pair_sums(program: &mut Program, bands: usize, form: Form, factored: bool) -> Vec<Option<Value>> {
+fn pair_sums(program: &mut Program, bands: usize, operation: ProductOperation, factored: bool) -> Vec<Option<Value>> {
     let count = coefficient_count(bands);
     let (a, b) = (Value::Input, |j: usize| Value::Input(count + j));
     let mut linear = Linear::new(bands);
@@ -180,13 +180,13 @@ fn pair_sums(program: &mut Program, bands: usize, form: Form, factored: bool) ->
         linear.factor();
     }
     // The terms of coefficient 0: c_0 = Y00 a_0 b_0, c_k = Y00 (a_0 b_k + a_k b_0).
-    let sign = form.sign();
+    let sign = operation.sign();
     let a_0 = program.define(vec![Term::new(Y00, &[a(0)])]);
-    let b_0 = scaled_first(program, b(0), form);
+    let b_0 = scaled_first(program, b(0), operation);
     let mut sums = vec![None; count];
-    let first = match form {
-        Form::Product => Term::new(1.0, &[a_0, b(0)]),
-        Form::Subtract => Term::new(1.0, &[a(0), b_0]),
+    let first = match operation {
+        ProductOperation::Product => Term::new(1.0, &[a_0, b(0)]),
+        ProductOperation::Subtract => Term::new(1.0, &[a(0), b_0]),
     };
     program.accumulate(&mut sums[0], vec![first]);
     for (k, sum) in sums.iter_mut().enumerate().skip(1) {
@@ -207,14 +207,19 @@ fn pair_sums(program: &mut Program, bands: usize, form: Form, factored: bool) ->
 }
 
 /// Y00 b_0, or 1 - Y00 b_0 where the product is subtracted: what coefficient 0 of b multiplies all of a by.
-fn scaled_first(program: &mut Program, b_0: Value, form: Form) -> Value {
-    match form {
-        Form::Product => program.define(vec![Term::new(Y00, &[b_0])]),
-        Form::Subtract => program.define(vec![Term::new(1.0, &[]), Term::new(-Y00, &[b_0])]),
+fn scaled_first(program: &mut Program, b_0: Value, operation: ProductOperation) -> Value {
+    match operation {
+        ProductOperation::Product => program.define(vec![Term::new(Y00, &[b_0])]),
+        ProductOperation::Subtract => program.define(vec![Term::new(1.0, &[]), Term::new(-Y00, &[b_0])]),
     }
 }
 
-fn matrix_sums(program: &mut Program, a_bands: usize, b_bands: usize, form: Form) -> Vec<Option<Value>> {
+fn matrix_sums(
+    program: &mut Program,
+    a_bands: usize,
+    b_bands: usize,
+    operation: ProductOperation,
+) -> Vec<Option<Value>> {
     let count = coefficient_count(a_bands);
     let (a, b) = (Value::Input, |j: usize| Value::Input(count + j));
     let mut elements: BTreeMap<(usize, usize), Vec<(usize, f64)>> = BTreeMap::new();
@@ -223,7 +228,7 @@ fn matrix_sums(program: &mut Program, a_bands: usize, b_bands: usize, form: Form
             elements.entry((entry.i, entry.k)).or_default().push((entry.j, entry.value));
         }
     }
-    let b_0 = scaled_first(program, b(0), form);
+    let b_0 = scaled_first(program, b(0), operation);
     let mut sums = vec![None; count];
     for (k, sum) in sums.iter_mut().enumerate() {
         program.accumulate(sum, vec![Term::new(1.0, &[a(k), b_0])]);
@@ -231,17 +236,17 @@ fn matrix_sums(program: &mut Program, a_bands: usize, b_bands: usize, form: Form
     for ((i, k), row) in elements {
         let terms = row.into_iter().map(|(j, value)| Term::new(value, &[b(j)])).collect();
         let element = program.define(terms);
-        program.accumulate(&mut sums[k], vec![Term::new(form.sign(), &[element, a(i)])]);
+        program.accumulate(&mut sums[k], vec![Term::new(operation.sign(), &[element, a(i)])]);
         if i != k {
-            program.accumulate(&mut sums[i], vec![Term::new(form.sign(), &[element, a(k)])]);
+            program.accumulate(&mut sums[i], vec![Term::new(operation.sign(), &[element, a(k)])]);
         }
     }
     sums
 }
 
 /// Arithmetic of one product of [`product_program`].
-pub fn product_cost(bands: usize, form: Form) -> Cost {
-    product_program(bands, form).cost()
+pub fn product_cost(bands: usize, operation: ProductOperation) -> Cost {
+    product_program(bands, operation).cost()
 }
 
 /// GLSL 460 text of two functions, N = bands^2:
@@ -250,7 +255,7 @@ pub fn product_cost(bands: usize, form: Form) -> Cost {
 /// - [`glsl_subtract`]'s for two factors of as many bands.
 pub fn glsl_product(bands: usize) -> String {
     let count = coefficient_count(bands);
-    let body = product_program(bands, Form::Product).glsl_body();
+    let body = product_program(bands, ProductOperation::Product).glsl_body();
     format!("void sh_product(float a[{count}], float b[{count}], out float c[{count}]) {{\n{body}}}\n")
         + &glsl_subtract(Style::Factored, bands, bands)
 }
@@ -259,6 +264,6 @@ pub fn glsl_product(bands: usize) -> String {
 /// t -= product(t, b), multiplication by the visibility 1 - b of a factor that is stored as its blocked part b.
 pub fn glsl_subtract(style: Style, a_bands: usize, b_bands: usize) -> String {
     let [a_count, b_count] = [a_bands, b_bands].map(coefficient_count);
-    let body = styled_program(style, a_bands, b_bands, Form::Subtract).glsl_body();
+    let body = styled_program(style, a_bands, b_bands, ProductOperation::Subtract).glsl_body();
     format!("void sh_subtract_product(inout float t[{a_count}], float b[{b_count}]) {{\n{body}}}\n")
 }

@@ -1,7 +1,7 @@
 //! The error of every lit vertex, and a frame that shows it in false colour.
 
 use super::EntityRadiosity;
-use crate::asset::false_color::{BACKGROUND, NEUTRAL, Scale, Scheme};
+use crate::asset::false_color::{BACKGROUND, ColorScale, NEUTRAL, Scheme};
 use crate::asset::picture;
 use crate::error::Result;
 use crate::frame::Frame;
@@ -11,11 +11,11 @@ use std::path::Path;
 
 /// What an error picture shows.
 #[derive(Clone, Debug, Serialize)]
-pub struct Shown {
+pub struct ErrorPicture {
     /// File.
     pub picture: String,
     /// Which error has which colour.
-    pub scale: Scale,
+    pub scale: ColorScale,
     /// Root mean square over all lit vertices, relative to that of the reference.
     pub rms: f64,
     /// The reference's own relative standard error.
@@ -71,13 +71,13 @@ impl ErrorMap {
         )
     }
 
-    /// A scale that fits: see [`Scale::fitting`].
-    pub fn scale(&self) -> Scale {
-        Scale::fitting(self.scheme, self.errors.iter().flat_map(|(_, errors)| errors.iter().copied()))
+    /// A scale that fits: see [`ColorScale::fitting`].
+    pub fn scale(&self) -> ColorScale {
+        ColorScale::fitting(self.scheme, self.errors.iter().flat_map(|(_, errors)| errors.iter().copied()))
     }
 
     /// Colours a vertex, by entity, as [`Frame::set_radiosity`] takes them.
-    pub fn colors(&self, scale: &Scale) -> Vec<EntityRadiosity> {
+    pub fn colors(&self, scale: &ColorScale) -> Vec<EntityRadiosity> {
         self.errors.iter().map(|(entity, errors)| (*entity, errors.iter().map(|e| scale.color(*e)).collect())).collect()
     }
 
@@ -86,7 +86,7 @@ impl ErrorMap {
     ///
     /// # Errors
     /// As [`Frame::redraw`].
-    pub fn draw(&self, frame: &mut Frame, placements: &[Placement], scale: &Scale) -> Result<()> {
+    pub fn draw(&self, frame: &mut Frame, placements: &[Placement], scale: &ColorScale) -> Result<()> {
         for entity in 0..frame.scene().entities.len() {
             let count = frame.scene().meshes[frame.scene().entities[entity].mesh].positions.len();
             frame.set_radiosity(entity, &vec![NEUTRAL; count])?;
@@ -110,14 +110,14 @@ impl ErrorMap {
         placements: &[Placement],
         limit: Option<f64>,
         reference_error: f64,
-    ) -> Result<Shown> {
+    ) -> Result<ErrorPicture> {
         let fitting = self.scale();
-        let scale = Scale { limit: limit.unwrap_or(fitting.limit), ..fitting };
+        let scale = ColorScale { limit: limit.unwrap_or(fitting.limit), ..fitting };
         self.draw(frame, placements, &scale)?;
         let [width, _] = frame.size();
         let (picture, rows) = scale.with_bar(&frame.picture(), width as usize, &self.title(reference_error));
         picture::write_png(path, width, rows as u32, &picture, 0.0)?;
-        Ok(Shown { picture: path.display().to_string(), scale, rms: self.rms(), reference_error })
+        Ok(ErrorPicture { picture: path.display().to_string(), scale, rms: self.rms(), reference_error })
     }
 }
 

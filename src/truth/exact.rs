@@ -3,7 +3,7 @@
 
 use super::Vertex;
 use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
-use super::world::{Sight, View, World};
+use super::world::{EntityView, VertexView, World};
 use crate::lists::gather::distance_key;
 use crate::lists::skip::Skip;
 use crate::merge::chain::Multiplier;
@@ -19,7 +19,7 @@ type Coefficients = [f64; MAX_COEFFICIENTS];
 
 /// How factors are projected.
 #[derive(Clone, Copy, Debug)]
-pub struct Exact {
+pub struct ExactChain {
     /// SH bands of transfer, light and every product.
     pub bands: usize,
     /// SH bands of an occluder's visibility.
@@ -34,14 +34,14 @@ pub struct Exact {
     pub skip: Skip,
 }
 
-impl Default for Exact {
+impl Default for ExactChain {
     /// 4 bands throughout, 4096 rays a factor, the merge's chain, every skip.
     fn default() -> Self {
-        Exact { bands: 4, visibility_bands: 4, rays: 4096, seed: 2, chain: Chain::default(), skip: Skip::ALL }
+        ExactChain { bands: 4, visibility_bands: 4, rays: 4096, seed: 2, chain: Chain::default(), skip: Skip::ALL }
     }
 }
 
-impl Exact {
+impl ExactChain {
     /// Radiosity of the given vertices: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self, world: &World<'_>, vertices: &[Vertex]) -> Vec<[f64; 3]> {
         let multiplier = Multiplier::new(self.chain, self.bands, self.visibility_bands);
@@ -56,15 +56,15 @@ impl Exact {
             Sequence::new(self.seed, [u64::MAX, vertex.entity as u64, (vertex.index as u64) << 16 | stream as u64])
         };
         let transfer = self.transfer(world, &view, points(0));
-        let centre = |entity: usize| world.bodies[entity].centre.as_vec3().to_array();
-        let cone = |sight: &Sight| {
-            let body = &world.bodies[sight.entity];
-            Cone::new(body.centre, body.radius_m, view.position)
+        let centre = |entity: usize| world.entities[entity].centre.as_vec3().to_array();
+        let cone = |sight: &EntityView| {
+            let entity = &world.entities[sight.entity];
+            Cone::new(entity.centre, entity.radius_m, view.position)
         };
         let mut occluders = world.occluders(&view);
         // The merge's order: ties of its f32 key go by index here too.
         occluders.sort_by_key(|sight| (distance_key(centre(sight.entity), centre(vertex.entity)), sight.entity));
-        let factors: Vec<(Sight, f64, Coefficients, Option<Cap>)> = occluders
+        let factors: Vec<(EntityView, f64, Coefficients, Option<Cap>)> = occluders
             .into_iter()
             .map(|occluder| {
                 let cone = cone(&occluder);
@@ -76,7 +76,7 @@ impl Exact {
             })
             .collect();
         // The chain of the occluders, each as much as `share` says.
-        let chain = |share: &dyn Fn(&Sight) -> f64| {
+        let chain = |share: &dyn Fn(&EntityView) -> f64| {
             let mut state = multiplier.begin(&transfer[..count]);
             for (occluder, reach, blocked, cap) in &factors {
                 let share = reach * share(occluder);
@@ -106,7 +106,7 @@ impl Exact {
     }
 
     /// Self-visibility times cosine.
-    fn transfer(&self, world: &World<'_>, view: &View, points: Sequence) -> Coefficients {
+    fn transfer(&self, world: &World<'_>, view: &VertexView, points: Sequence) -> Coefficients {
         let mut out = [0.0; MAX_COEFFICIENTS];
         if !view.shadows_itself() {
             let count = coefficient_count(self.bands);
@@ -124,7 +124,7 @@ impl Exact {
         out.map(|sum| sum * COSINE_INTEGRAL / f64::from(self.rays))
     }
 
-    fn blocked(&self, world: &World<'_>, occluder: &Sight, points: Sequence) -> Coefficients {
+    fn blocked(&self, world: &World<'_>, occluder: &EntityView, points: Sequence) -> Coefficients {
         let cone = occluder.cone();
         let (mut out, mut basis) = ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
         for ray in 0..self.rays {
@@ -137,7 +137,7 @@ impl Exact {
         out.map(|sum| sum * cone_solid_angle(cone.height) / f64::from(self.rays))
     }
 
-    fn radiance(&self, world: &World<'_>, light: &Sight, points: Sequence) -> [Coefficients; 3] {
+    fn radiance(&self, world: &World<'_>, light: &EntityView, points: Sequence) -> [Coefficients; 3] {
         let cone = light.cone();
         let (mut out, mut basis) = ([[0.0; MAX_COEFFICIENTS]; 3], [0.0; MAX_COEFFICIENTS]);
         for ray in 0..self.rays {

@@ -16,15 +16,15 @@
 
 pub mod error_map;
 pub mod exact;
+pub mod ray_mesh;
 pub mod raycast;
 pub mod sequence;
-pub mod shape;
 pub mod world;
 
 pub use error_map::ErrorMap;
-pub use exact::Exact;
+pub use exact::ExactChain;
+pub use ray_mesh::RayMeshes;
 pub use raycast::{Estimate, RayCast};
-pub use shape::Shapes;
 pub use world::World;
 
 use crate::scene::{Placement, Scene};
@@ -62,7 +62,7 @@ pub type EntityRadiosity = (usize, Vec<[f32; 3]>);
 /// T0 of a whole scene, for pictures: radiosity of every receiver's vertices by entity, as `Frame::set_radiosity` takes
 /// it, and the root mean square of its standard error relative to that of the radiosity.
 pub fn picture(scene: &Scene, placements: &[Placement], cast: &RayCast) -> (Vec<EntityRadiosity>, f64) {
-    let shapes = Shapes::new(scene);
+    let shapes = RayMeshes::new(scene);
     let world = World::new(scene, &shapes, placements);
     let vertices = receiver_vertices(scene);
     let lit = cast.run(&world, &vertices);

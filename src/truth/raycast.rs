@@ -6,7 +6,7 @@
 
 use super::Vertex;
 use super::sequence::{COSINE_INTEGRAL, Sequence, cone_solid_angle};
-use super::world::{Sight, View, World};
+use super::world::{EntityView, VertexView, World};
 use crate::asset::environment::Environment;
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use glam::DVec3;
@@ -103,7 +103,7 @@ impl RayCast {
         if !self.shadows {
             occluders.clear();
         }
-        let lights: Vec<(Sight, Vec<Sight>)> = world
+        let lights: Vec<(EntityView, Vec<EntityView>)> = world
             .lights(&view)
             .into_iter()
             .filter(|light| light.rises_above(view.normal))
@@ -144,8 +144,8 @@ impl RayCast {
     fn sky(
         &self,
         world: &World<'_>,
-        view: &View,
-        occluders: &[Sight],
+        view: &VertexView,
+        occluders: &[EntityView],
         radiance: &Radiance<'_>,
         points: Sequence,
     ) -> DVec3 {
@@ -164,7 +164,14 @@ impl RayCast {
     }
 
     /// Irradiance of a local light behind the occluders that precede it.
-    fn light(&self, world: &World<'_>, view: &View, light: &Sight, between: &[Sight], points: Sequence) -> DVec3 {
+    fn light(
+        &self,
+        world: &World<'_>,
+        view: &VertexView,
+        light: &EntityView,
+        between: &[EntityView],
+        points: Sequence,
+    ) -> DVec3 {
         let cone = light.cone();
         let mut sum = DVec3::ZERO;
         for ray in 0..self.rays_a_run() {
@@ -181,7 +188,7 @@ impl RayCast {
         sum * emission * (cone_solid_angle(cone.height) / f64::from(self.rays_a_run()))
     }
 
-    fn blocked(&self, world: &World<'_>, view: &View, occluders: &[Sight], direction: DVec3) -> bool {
+    fn blocked(&self, world: &World<'_>, view: &VertexView, occluders: &[EntityView], direction: DVec3) -> bool {
         self.shadows
             && (occluders.iter().any(|occluder| world.blocks(occluder, direction))
                 || world.blocks_itself(view, direction))

@@ -1,17 +1,17 @@
 //! A scene at one moment, as rays and exact visibility see it.
 
 use super::Vertex;
+use super::ray_mesh::{RayMesh, RayMeshes};
 use super::sequence::Axes;
-use super::shape::{Shape, Shapes};
 use crate::bake::TRANSFER_OFFSET;
 use crate::field::lattice::cap_height;
 use crate::scene::{Placement, Scene};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
 /// An entity at its place.
-pub struct Body<'s> {
+pub struct PlacedEntity<'s> {
     /// Its mesh.
-    pub shape: &'s Shape,
+    pub mesh: &'s RayMesh,
     /// Centre of the bounding sphere, metres.
     pub centre: DVec3,
     /// Bounding radius, metres.
@@ -26,7 +26,7 @@ pub struct World<'s> {
     /// What does not move.
     pub scene: &'s Scene,
     /// Its entities, in order.
-    pub bodies: Vec<Body<'s>>,
+    pub entities: Vec<PlacedEntity<'s>>,
     /// Entities that occlude.
     pub occluders: Vec<usize>,
     /// Entities that emit.
@@ -34,19 +34,19 @@ pub struct World<'s> {
 }
 
 /// What a vertex sees of the world.
-pub struct View {
+pub struct VertexView {
     /// Metres.
     pub position: DVec3,
     /// Unit.
     pub normal: DVec3,
     /// Where its own mesh's visibility is judged from, and that mesh; `None` where it cannot shadow itself.
-    own: Option<Sight>,
+    own: Option<EntityView>,
     entity: usize,
 }
 
-/// A body as seen from a point: everything that all rays from there share.
+/// An entity as seen from a point: everything that all rays from there share.
 #[derive(Clone, Copy)]
-pub struct Sight {
+pub struct EntityView {
     /// Entity.
     pub entity: usize,
     /// Distance of the sphere's centre, metres.
@@ -58,9 +58,9 @@ pub struct Sight {
     to_object: Mat3A,
 }
 
-/// The cone around a body's bounding sphere.
+/// The cone around an entity's bounding sphere.
 #[derive(Clone, Copy)]
-pub struct Cone {
+pub struct BoundingCone {
     /// Around its axis.
     pub axes: Axes,
     /// 1 - cosine of its half angle; 2, all directions, from inside the sphere.
@@ -69,13 +69,13 @@ pub struct Cone {
 
 impl<'s> World<'s> {
     /// The scene with its entities at `placements`.
-    pub fn new(scene: &'s Scene, shapes: &'s Shapes, placements: &[Placement]) -> Self {
-        let body = |(entity, placement): (&crate::scene::Entity, &Placement)| {
+    pub fn new(scene: &'s Scene, meshes: &'s RayMeshes, placements: &[Placement]) -> Self {
+        let placed = |(entity, placement): (&crate::scene::Entity, &Placement)| {
             let (centre, radius_m) = scene.meshes[entity.mesh].bounding_sphere();
             let rotation = placement.rotation.as_dquat().normalize();
             let scale = f64::from(placement.scale);
-            Body {
-                shape: &shapes.0[entity.mesh],
+            PlacedEntity {
+                mesh: &meshes.0[entity.mesh],
                 centre: placement.position.as_dvec3() + rotation * (centre.as_dvec3() * scale),
                 radius_m: f64::from(radius_m) * scale,
                 rotation,
@@ -87,95 +87,100 @@ impl<'s> World<'s> {
         };
         World {
             scene,
-            bodies: scene.entities.iter().zip(placements).map(body).collect(),
+            entities: scene.entities.iter().zip(placements).map(placed).collect(),
             occluders: having(&|e| e.occludes),
             lights: having(&|e| e.emits),
         }
     }
 
     /// The world from a vertex.
-    pub fn view(&self, vertex: Vertex) -> View {
-        let body = &self.bodies[vertex.entity];
+    pub fn view(&self, vertex: Vertex) -> VertexView {
+        let placed = &self.entities[vertex.entity];
         let mesh = &self.scene.meshes[self.scene.entities[vertex.entity].mesh];
         let (centre, radius_m) = mesh.bounding_sphere();
         let local = (mesh.positions[vertex.index].as_dvec3() - centre.as_dvec3()) / f64::from(radius_m);
         let normal = mesh.normals[vertex.index].as_dvec3();
-        let place = |local: DVec3| body.centre + body.rotation * (local * body.radius_m);
-        let own = body.shape.self_shadowing.then(|| {
+        let place = |local: DVec3| placed.centre + placed.rotation * (local * placed.radius_m);
+        let own = placed.mesh.self_shadowing.then(|| {
             let eye = local + f64::from(TRANSFER_OFFSET) * normal;
-            Sight { origin: eye.as_vec3a(), ..self.sight(vertex.entity, place(eye)) }
+            EntityView { origin: eye.as_vec3a(), ..self.sight(vertex.entity, place(eye)) }
         });
-        View { position: place(local), normal: (body.rotation * normal).normalize(), own, entity: vertex.entity }
+        VertexView {
+            position: place(local),
+            normal: (placed.rotation * normal).normalize(),
+            own,
+            entity: vertex.entity,
+        }
     }
 
-    /// A body from a point.
-    pub fn sight(&self, entity: usize, from: DVec3) -> Sight {
-        let body = &self.bodies[entity];
-        let toward = (body.centre - from) / body.radius_m;
-        Sight {
+    /// An entity from a point.
+    pub fn sight(&self, entity: usize, from: DVec3) -> EntityView {
+        let placed = &self.entities[entity];
+        let toward = (placed.centre - from) / placed.radius_m;
+        EntityView {
             entity,
-            distance_m: body.centre.distance(from),
+            distance_m: placed.centre.distance(from),
             toward: toward.as_vec3a(),
             beyond: (toward.length_squared() - 1.0) as f32,
-            origin: body.to_object * (-toward).as_vec3a(),
-            to_object: body.to_object,
+            origin: placed.to_object * (-toward).as_vec3a(),
+            to_object: placed.to_object,
         }
     }
 
     /// Every occluder of a vertex but its own entity, in the order of indices.
-    pub fn occluders(&self, view: &View) -> Vec<Sight> {
+    pub fn occluders(&self, view: &VertexView) -> Vec<EntityView> {
         let others = self.occluders.iter().filter(|&&j| j != view.entity);
         others.map(|&j| self.sight(j, view.position)).collect()
     }
 
     /// Every light of a vertex but its own entity.
-    pub fn lights(&self, view: &View) -> Vec<Sight> {
+    pub fn lights(&self, view: &VertexView) -> Vec<EntityView> {
         let others = self.lights.iter().filter(|&&j| j != view.entity);
         others.map(|&j| self.sight(j, view.position)).collect()
     }
 
-    /// Whether the body blocks a ray (unit direction).
-    pub fn blocks(&self, sight: &Sight, direction: DVec3) -> bool {
+    /// Whether the entity blocks a ray (unit direction).
+    pub fn blocks(&self, sight: &EntityView, direction: DVec3) -> bool {
         let direction = direction.as_vec3a();
         if !sight.meets_sphere(direction) {
             return false;
         }
-        let shape = self.bodies[sight.entity].shape;
-        sight.meets_inner(direction, shape.inner_radius) || shape.blocks(sight.origin, sight.to_object * direction)
+        let mesh = self.entities[sight.entity].mesh;
+        sight.meets_inner(direction, mesh.inner_radius) || mesh.blocks(sight.origin, sight.to_object * direction)
     }
 
     /// Whether the receiver's own mesh blocks a ray.
-    pub fn blocks_itself(&self, view: &View, direction: DVec3) -> bool {
+    pub fn blocks_itself(&self, view: &VertexView, direction: DVec3) -> bool {
         view.own.as_ref().is_some_and(|own| {
             let local = own.to_object * direction.as_vec3a();
-            self.bodies[own.entity].shape.blocks(own.origin, local)
+            self.entities[own.entity].mesh.blocks(own.origin, local)
         })
     }
 
-    /// Radiance of a body's emission along a ray, without its factor; `None` where the ray misses.
-    pub fn emission(&self, sight: &Sight, direction: DVec3) -> Option<DVec3> {
+    /// Radiance of an entity's emission along a ray, without its factor; `None` where the ray misses.
+    pub fn emission(&self, sight: &EntityView, direction: DVec3) -> Option<DVec3> {
         let direction = direction.as_vec3a();
         if !sight.meets_sphere(direction) {
             return None;
         }
-        let shape = self.bodies[sight.entity].shape;
-        if shape.is_plain() && sight.meets_inner(direction, shape.inner_radius) {
+        let mesh = self.entities[sight.entity].mesh;
+        if mesh.is_plain() && sight.meets_inner(direction, mesh.inner_radius) {
             return Some(DVec3::ONE);
         }
-        shape.emission(sight.origin, sight.to_object * direction).map(|color| color.as_dvec3())
+        mesh.emission(sight.origin, sight.to_object * direction).map(|color| color.as_dvec3())
     }
 }
 
-impl View {
+impl VertexView {
     /// Whether the receiver can shadow itself.
     pub fn shadows_itself(&self) -> bool {
         self.own.is_some()
     }
 }
 
-impl Sight {
+impl EntityView {
     /// Whether this occluder precedes a light: the merge's order.
-    pub fn precedes(&self, light: &Sight) -> bool {
+    pub fn precedes(&self, light: &EntityView) -> bool {
         (self.distance_m, self.entity) < (light.distance_m, light.entity)
     }
 
@@ -185,20 +190,22 @@ impl Sight {
     }
 
     /// The cone around the bounding sphere.
-    pub fn cone(&self) -> Cone {
+    pub fn cone(&self) -> BoundingCone {
         let toward = self.toward.as_dvec3();
         match toward.try_normalize() {
-            Some(axis) if self.beyond > 0.0 => Cone { axes: Axes::new(axis), height: cap_height(toward.length()) },
-            _ => Cone { axes: Axes::new(DVec3::Z), height: 2.0 },
+            Some(axis) if self.beyond > 0.0 => {
+                BoundingCone { axes: Axes::new(axis), height: cap_height(toward.length()) }
+            }
+            _ => BoundingCone { axes: Axes::new(DVec3::Z), height: 2.0 },
         }
     }
 
     /// Whether the cones around two bounding spheres have a direction in common.
-    pub fn overlaps(&self, other: &Sight) -> bool {
+    pub fn overlaps(&self, other: &EntityView) -> bool {
         if self.beyond <= 0.0 || other.beyond <= 0.0 {
             return true;
         }
-        let half_angle = |sight: &Sight| (1.0 / sight.toward.as_dvec3().length()).asin();
+        let half_angle = |sight: &EntityView| (1.0 / sight.toward.as_dvec3().length()).asin();
         self.toward.as_dvec3().angle_between(other.toward.as_dvec3()) < half_angle(self) + half_angle(other)
     }
 

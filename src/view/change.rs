@@ -3,8 +3,8 @@
 use super::command::{Changed, Command, Effect, Step};
 use super::edit;
 use super::editor::Editor;
-use super::history::{Kind, Slider, Snapshot};
-use crate::asset::environment::Source;
+use super::history::{EditKind, Slider, Snapshot};
+use crate::asset::environment::EnvironmentData;
 use crate::scene::EntityData;
 use glam::{DQuat, DVec3, Vec3};
 
@@ -26,13 +26,13 @@ impl Editor {
             Command::Redo => self.travel(true),
             Command::TurnSky { by_deg, repeat } => {
                 let turn_deg = wrapped(self.sky_turn_deg() + by_deg);
-                self.set_environment(Kind::SkyTurn, repeat, |e| e.turn_deg = turn_deg)
+                self.set_environment(EditKind::SkyTurn, repeat, |e| e.turn_deg = turn_deg)
             }
             Command::SetSkyTurn(turn_deg) => {
-                self.set_environment(Kind::Slide(Slider::SkyTurn), true, |e| e.turn_deg = wrapped(turn_deg))
+                self.set_environment(EditKind::Slide(Slider::SkyTurn), true, |e| e.turn_deg = wrapped(turn_deg))
             }
             Command::SetSky(strength) => {
-                self.set_environment(Kind::Slide(Slider::Sky), true, |e| e.strength = strength)
+                self.set_environment(EditKind::Slide(Slider::Sky), true, |e| e.strength = strength)
             }
             Command::SetLight(ev) => self.set_light(ev),
             Command::SetExposure(ev) => self.set_exposure(ev),
@@ -61,7 +61,7 @@ impl Editor {
         let Some(after) = after else {
             return Effect { message: Some("no further: that is the limit of a scene".into()), ..Effect::default() };
         };
-        self.note_entities(Kind::Step(step), repeat, &entities);
+        self.note_entities(EditKind::Step(step), repeat, &entities);
         for (index, data) in entities.into_iter().zip(after) {
             self.scene.set_entity(index, data);
         }
@@ -72,7 +72,7 @@ impl Editor {
         let Some(index) = self.selection else {
             return Effect { message: Some("select an entity first: click it, or Q / A".into()), ..Effect::default() };
         };
-        self.note_entities(Kind::Role, false, &[index]);
+        self.note_entities(EditKind::Role, false, &[index]);
         let mut data = self.scene.data.entities[index].clone();
         if self.scene.entities[index].emits {
             self.former_emission[index] = Some(data.emission).filter(|e| *e != Vec3::ZERO);
@@ -114,7 +114,7 @@ impl Editor {
     fn set_light(&mut self, ev: f32) -> Effect {
         let Some(now) = self.light_ev().filter(|_| (-16.0..=32.0).contains(&ev)) else { return Effect::default() };
         let (lights, factor) = (self.lights(), (ev - now).exp2());
-        self.note_entities(Kind::Slide(Slider::Light), true, &lights);
+        self.note_entities(EditKind::Slide(Slider::Light), true, &lights);
         for index in lights {
             let mut data = self.scene.data.entities[index].clone();
             data.emission *= factor;
@@ -128,12 +128,12 @@ impl Editor {
             return Effect::default();
         }
         let before = Snapshot { exposure_ev: Some(self.exposure_ev()), ..Snapshot::default() };
-        self.history.note(Kind::Slide(Slider::Exposure), None, true, || before);
+        self.history.note(EditKind::Slide(Slider::Exposure), None, true, || before);
         self.scene.data.output.exposure_ev = ev;
         Changed { exposure: true, ..Changed::default() }.into()
     }
 
-    fn set_environment(&mut self, kind: Kind, joins: bool, change: impl FnOnce(&mut Source)) -> Effect {
+    fn set_environment(&mut self, kind: EditKind, joins: bool, change: impl FnOnce(&mut EnvironmentData)) -> Effect {
         let before = self.scene.data.environment.clone();
         let mut after = before.clone();
         change(&mut after);
@@ -147,7 +147,7 @@ impl Editor {
         Changed { sky: true, ..Changed::default() }.into()
     }
 
-    fn note_entities(&mut self, kind: Kind, joins: bool, entities: &[usize]) {
+    fn note_entities(&mut self, kind: EditKind, joins: bool, entities: &[usize]) {
         let data = &self.scene.data.entities;
         self.history.note(kind, self.selection, joins, || Snapshot {
             entities: entities.iter().map(|&i| (i, data[i].clone())).collect(),

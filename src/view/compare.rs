@@ -3,7 +3,7 @@
 use super::command::Changed;
 use super::panel;
 use super::reference;
-use super::task::Task;
+use super::task::BackgroundTask;
 use super::viewer::{ERROR, REFERENCE, Viewer};
 use crate::asset::false_color::{NEUTRAL, Scheme};
 use crate::error::Result;
@@ -23,14 +23,16 @@ impl Viewer {
             self.reference = Some(found);
             self.pending |= Changed { display: true, ..Changed::default() };
         }
-        if let Some(Err(error)) = self.rays.as_mut().and_then(Task::ended) {
+        if let Some(Err(error)) = self.rays.as_mut().and_then(BackgroundTask::ended) {
             self.tolerate(Err::<(), _>(error)).map(|_| ())?;
         }
         let current = self.reference.as_ref().is_some_and(|r| r.version == self.version);
         // Rays for a state that is gone end after their first round, so that something is seen while things move.
         let known = self.reference.as_ref().map(|r| r.version);
         let stale = self.rays_version != self.version && known == Some(self.rays_version);
-        if (self.rays.is_none() && !current) || stale || (!current && !self.rays.as_ref().is_some_and(Task::is_running))
+        if (self.rays.is_none() && !current)
+            || stale
+            || (!current && !self.rays.as_ref().is_some_and(BackgroundTask::is_running))
         {
             let (scene, placements) = (self.editor.scene().clone(), self.editor.placements());
             self.rays = Some(reference::cast(scene, placements, self.version, self.setup.seed));

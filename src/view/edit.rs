@@ -1,7 +1,7 @@
 //! Changes of one entity that hold at all times: the whole of its motion is moved, turned or scaled along.
 
 use crate::scene::data::EntityData;
-use crate::scene::motion::{Motion, Rotation};
+use crate::scene::motion::{Motion, RotationData};
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
 use glam::{DQuat, DVec3, Vec3};
 
@@ -45,7 +45,7 @@ pub fn scaled(entity: &EntityData, by: f64) -> Option<EntityData> {
 /// does not.
 pub fn turned(entity: &EntityData, by: DQuat) -> EntityData {
     let mut out = entity.clone();
-    let turn = |r: &mut Rotation| *r = Rotation::Quaternion((by * r.unit()).normalize().as_quat().to_array());
+    let turn = |r: &mut RotationData| *r = RotationData::Quaternion((by * r.unit()).normalize().as_quat().to_array());
     turn(&mut out.rotation);
     for motion in &mut out.motion {
         match motion {

@@ -2,10 +2,10 @@
 
 use super::command::{Changed, Command, Effect, Request};
 use super::history::History;
-use super::orbit::Orbit;
-use super::pick::{Drag, Picker};
+use super::orbit_camera::OrbitCamera;
+use super::pick::{EntityDrag, Picker};
 use crate::asset::embedded;
-use crate::asset::environment::Source;
+use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
 use crate::error::Result;
 use crate::field::quantity;
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 pub struct Editor {
     pub(super) scene: Scene,
     path: PathBuf,
-    pub(super) orbit: Orbit,
+    pub(super) orbit: OrbitCamera,
     size: [u32; 2],
     pub(super) selection: Option<usize>,
     time_s: f64,
@@ -33,7 +33,7 @@ pub struct Editor {
     /// Emission that an entity had before it stopped being a light.
     pub(super) former_emission: Vec<Option<Vec3>>,
     pub(super) picker: Picker,
-    pub(super) drag: Option<Drag>,
+    pub(super) drag: Option<EntityDrag>,
     /// Files that were written since the start, of any scene.
     pub(super) saved: HashSet<PathBuf>,
     /// The scene before this one, if it was changed.
@@ -45,13 +45,13 @@ impl Editor {
     /// whose file says nothing of distant light gets a generated sky, which is saved with it.
     pub fn new(mut scene: Scene, path: &Path) -> Self {
         if scene.data.environment.is_empty() {
-            let source = Source { sky: Some(Sky::default()), ..scene.data.environment.clone() };
+            let source = EnvironmentData { sky: Some(Sky::default()), ..scene.data.environment.clone() };
             if let Err(error) = scene.set_environment(&source) {
                 log::warn!("no generated sky: {error}");
             }
         }
         Editor {
-            orbit: Orbit::new(&scene.data.camera),
+            orbit: OrbitCamera::new(&scene.data.camera),
             size: [scene.data.output.width, scene.data.output.height],
             selection: None,
             time_s: scene.data.output.time_s,
@@ -251,7 +251,7 @@ impl Editor {
         chosen.into_iter()
     }
 
-    fn see(&mut self, change: impl FnOnce(&mut Orbit, [u32; 2], (DVec3, f64))) -> Effect {
+    fn see(&mut self, change: impl FnOnce(&mut OrbitCamera, [u32; 2], (DVec3, f64))) -> Effect {
         let (size, bounds) = (self.size, self.bounds());
         let before = self.orbit;
         change(&mut self.orbit, size, bounds);

@@ -1,7 +1,7 @@
 //! The viewer after a change: what is taken over at once, what is baked in the background first, what is rebuilt.
 
 use super::command::Changed;
-use super::task::{Task, Worker};
+use super::task::{BackgroundTask, TaskWorker};
 use super::viewer::Viewer;
 use crate::bake::Baker;
 use crate::draw::show::Show;
@@ -61,7 +61,7 @@ impl Viewer {
             return self.build();
         }
         let (options, library) = (self.setup.options.clone(), self.setup.library.clone());
-        self.bake = Some(Task::new(move |worker: &Worker<()>| {
+        self.bake = Some(BackgroundTask::new(move |worker: &TaskWorker<()>| {
             worker.report("opening the device for it", 0, 1);
             let device = Device::new(&options)?;
             let baker = Baker::new(&device, &library);

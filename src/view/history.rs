@@ -1,6 +1,6 @@
 //! What can be undone: the parts of a scene as they were, bounded in number and size.
 
-use crate::asset::environment::Source;
+use crate::asset::environment::EnvironmentData;
 use crate::scene::data::EntityData;
 
 /// Most changes that are kept.
@@ -14,14 +14,14 @@ pub struct Snapshot {
     /// Entities by index.
     pub entities: Vec<(usize, EntityData)>,
     /// Distant light.
-    pub environment: Option<Source>,
+    pub environment: Option<EnvironmentData>,
     /// Exposure in stops.
     pub exposure_ev: Option<f32>,
 }
 
 /// What kind of change a step is: the same kind in a row may be one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum EditKind {
     /// A key that moves, scales or turns.
     Step(super::Step),
     /// A drag.
@@ -53,13 +53,13 @@ pub struct History {
     done: Vec<Snapshot>,
     undone: Vec<Snapshot>,
     /// Kind and selection of the last change, while more of the same joins it.
-    open: Option<(Kind, Option<usize>)>,
+    open: Option<(EditKind, Option<usize>)>,
 }
 
 impl History {
     /// Notes that a change of `kind` follows; `before` makes what it touches as it is now. Where `joins` and the last change
     /// was of the same kind to the same selection, it becomes part of that.
-    pub fn note(&mut self, kind: Kind, selection: Option<usize>, joins: bool, before: impl FnOnce() -> Snapshot) {
+    pub fn note(&mut self, kind: EditKind, selection: Option<usize>, joins: bool, before: impl FnOnce() -> Snapshot) {
         if joins && self.open == Some((kind, selection)) {
             return;
         }

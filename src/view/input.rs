@@ -60,7 +60,7 @@ pub enum Event {
 }
 
 /// One line of the help, and what stands behind it.
-pub struct Row {
+pub struct KeyHelp {
     /// Keys as they are shown.
     pub keys: &'static str,
     /// What they do.
@@ -69,7 +69,7 @@ pub struct Row {
     bindings: &'static [(Key, bool, Command)],
 }
 
-impl Row {
+impl KeyHelp {
     /// What its keys ask for.
     pub fn commands(&self) -> Vec<Command> {
         self.bindings.iter().map(|(.., command)| *command).collect()
@@ -84,12 +84,12 @@ const fn letter(key: char, command: Command) -> (Key, bool, Command) {
     (Key::Letter(key), false, command)
 }
 
-const fn row(keys: &'static str, what: &'static str, bindings: &'static [(Key, bool, Command)]) -> Row {
-    Row { keys, what, bindings }
+const fn row(keys: &'static str, what: &'static str, bindings: &'static [(Key, bool, Command)]) -> KeyHelp {
+    KeyHelp { keys, what, bindings }
 }
 
 /// All controls, in the order of the help.
-pub const CONTROLS: &[Row] = &[
+pub const CONTROLS: &[KeyHelp] = &[
     row("drag", "turn the camera", &[]),
     row("right drag", "move the camera", &[]),
     row("wheel", "nearer, farther", &[]),
@@ -154,7 +154,7 @@ enum Held {
 
 /// The pointer between press and release.
 #[derive(Clone, Copy, Debug)]
-struct Drag {
+struct PointerDrag {
     button: Button,
     held: Held,
     start: [f32; 2],
@@ -168,7 +168,7 @@ struct Drag {
 /// Turns events into commands.
 #[derive(Debug)]
 pub struct Input {
-    drag: Option<Drag>,
+    drag: Option<PointerDrag>,
     scale: f32,
 }
 
@@ -198,7 +198,7 @@ impl Input {
                     Button::Left => Held::Turn,
                     Button::Right | Button::Middle => Held::Pan,
                 };
-                self.drag = Some(Drag { button, held, start: at, last: at, left, moved: false });
+                self.drag = Some(PointerDrag { button, held, start: at, last: at, left, moved: false });
                 out
             }
             Event::Move(to) => self.moved(to),

@@ -18,7 +18,7 @@ pub mod history;
 pub mod input;
 #[cfg(feature = "view")]
 mod notes;
-pub mod orbit;
+pub mod orbit_camera;
 pub mod outline;
 #[cfg(feature = "view")]
 pub mod panel;
@@ -36,6 +36,6 @@ pub use command::{Changed, Command, Effect, Request, Step};
 pub use editor::Editor;
 pub use input::{Event, Input};
 #[cfg(feature = "view")]
-pub use picture::Canvas;
+pub use picture::FrameTarget;
 #[cfg(feature = "view")]
 pub use viewer::{Setup, Viewer};

@@ -2,7 +2,7 @@
 
 use super::Editor;
 use super::panel::{ERROR, MARGIN, Status, WARNING, grouped};
-use crate::asset::false_color::{Scale, Scheme};
+use crate::asset::false_color::{ColorScale, Scheme};
 use crate::asset::picture::srgb_from_linear;
 use egui::{Align2, Color32, Context, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
 
@@ -81,7 +81,7 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
 
 /// Which colour is which error, from -`limit` to `limit`.
 fn bar(ui: &mut Ui, limit: f64) {
-    let scale = Scale { scheme: Scheme::Signed, limit };
+    let scale = ColorScale { scheme: Scheme::Signed, limit };
     let width = ui.available_width().min(420.0);
     let (response, painter) = ui.allocate_painter(vec2(width, 28.0), Sense::hover());
     let area = response.rect;

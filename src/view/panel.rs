@@ -5,7 +5,7 @@ use super::command::Command;
 use super::graph;
 use super::input::CONTROLS;
 use super::notes;
-use super::task::Progress;
+use super::task::TaskProgress;
 use crate::gpu::Timing;
 use crate::lists::gather::Counts;
 use crate::merge::variant::VARIANTS;
@@ -53,9 +53,9 @@ pub struct Status<'s> {
     /// Merge variant in use; `None` before the first frame of a scene.
     pub variant: Option<&'s str>,
     /// The bake in the background.
-    pub bake: Option<Progress>,
+    pub bake: Option<TaskProgress>,
     /// The rays that are being cast.
-    pub rays: Option<Progress>,
+    pub rays: Option<TaskProgress>,
     /// Rays a vertex, relative standard error, whether it belongs to the state shown.
     pub reference: Option<(u32, f64, bool)>,
     /// The error's colours and whether they belong to the state shown.
@@ -134,7 +134,7 @@ fn help(ui: &mut Ui) {
     });
 }
 
-fn baking(context: &Context, bake: &Progress) {
+fn baking(context: &Context, bake: &TaskProgress) {
     let share = bake.done as f32 / bake.all.max(1) as f32;
     egui::Window::new("baking").title_bar(false).resizable(false).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).show(
         context,

@@ -3,10 +3,10 @@
 use super::command::{Changed, Command, Effect};
 use super::edit;
 use super::editor::Editor;
-use super::history::{Kind, Snapshot};
+use super::history::{EditKind, Snapshot};
 use crate::draw::camera::clip_from_world;
 use crate::scene::{EntityData, Placement};
-use crate::truth::shape::Shape;
+use crate::truth::ray_mesh::RayMesh;
 use glam::{DVec3, DVec4};
 use std::sync::OnceLock;
 
@@ -16,7 +16,7 @@ const REACH: f64 = 30.0;
 /// Hierarchies of the scene's meshes, each built when a ray first comes near its mesh.
 #[derive(Default)]
 pub struct Picker {
-    shapes: Vec<OnceLock<Shape>>,
+    shapes: Vec<OnceLock<RayMesh>>,
 }
 
 impl Picker {
@@ -27,7 +27,7 @@ impl Picker {
 }
 
 /// What is being dragged.
-pub struct Drag {
+pub struct EntityDrag {
     entity: usize,
     /// The entity as it was.
     before: EntityData,
@@ -90,7 +90,7 @@ impl Editor {
     /// Distance at which a ray that enters the bounding sphere at `enters_m` meets the mesh.
     fn meets(&self, entity: usize, placement: &Placement, ray: Ray, enters_m: f64) -> Option<f64> {
         let mesh = self.scene.entities[entity].mesh;
-        let shape = self.picker.shapes[mesh].get_or_init(|| Shape::new(&self.scene.meshes[mesh]));
+        let shape = self.picker.shapes[mesh].get_or_init(|| RayMesh::new(&self.scene.meshes[mesh]));
         let (centre, radius_m) = self.sphere(entity, placement);
         let to_object = placement.rotation.as_dquat().normalize().inverse();
         // From the sphere on, in its radii: f32 keeps its precision however far the camera is.
@@ -120,7 +120,7 @@ impl Editor {
                     && let Some((entity, anchor)) = self.hit(at)
                 {
                     let before = self.scene.data.entities[entity].clone();
-                    self.drag = Some(Drag { entity, before, anchor, moved: false });
+                    self.drag = Some(EntityDrag { entity, before, anchor, moved: false });
                 }
                 Effect::default()
             }
@@ -146,7 +146,7 @@ impl Editor {
         let (entity, joins) = (drag.entity, drag.moved);
         drag.moved = true;
         let before = || Snapshot { entities: vec![(entity, drag.before.clone())], ..Snapshot::default() };
-        self.history.note(Kind::Drag, Some(entity), joins, before);
+        self.history.note(EditKind::Drag, Some(entity), joins, before);
         self.scene.set_entity(entity, after);
         Changed { placements: true, ..Changed::default() }.into()
     }

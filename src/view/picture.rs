@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 const REST: Duration = Duration::from_millis(100);
 
 /// What a frame is drawn into.
-pub enum Canvas<'c> {
+pub enum FrameTarget<'c> {
     /// A window; the frame is shown.
     Window(&'c mut Window),
     /// An image of the setup's format, left to be copied from.
@@ -30,7 +30,7 @@ impl Viewer {
     ///
     /// # Errors
     /// `Device` when the device or the surface was lost.
-    pub fn draw(&mut self, canvas: Canvas<'_>) -> Result<bool> {
+    pub fn draw(&mut self, canvas: FrameTarget<'_>) -> Result<bool> {
         let pending = self.pending;
         let drawn = self.draw_pending(canvas);
         if drawn.is_err() {
@@ -43,21 +43,21 @@ impl Viewer {
         drawn
     }
 
-    fn draw_pending(&mut self, mut canvas: Canvas<'_>) -> Result<bool> {
+    fn draw_pending(&mut self, mut canvas: FrameTarget<'_>) -> Result<bool> {
         while self.flights.len() >= FLIGHTS {
             self.land()?;
         }
         let shot = match &mut canvas {
-            Canvas::Window(window) => match window.acquire()? {
+            FrameTarget::Window(window) => match window.acquire()? {
                 Some(shot) => Some(shot),
                 None => return Ok(false),
             },
-            Canvas::Image(_) => None,
+            FrameTarget::Image(_) => None,
         };
         let target = match (&canvas, &shot) {
-            (Canvas::Image(image), _) => *image,
+            (FrameTarget::Image(image), _) => *image,
             (_, Some(shot)) => &*shot.image,
-            (Canvas::Window(_), None) => unreachable!("a window gave a shot"),
+            (FrameTarget::Window(_), None) => unreachable!("a window gave a shot"),
         };
         let size = [target.shape.width, target.shape.height];
         let resized = self.frame.as_ref().is_some_and(|frame| frame.size() != size);
@@ -102,7 +102,7 @@ impl Viewer {
         let after = if shot.is_some() { Access::Present } else { Access::TransferRead };
         commands.image_barrier(target, Some(Access::ColorWrite), after);
         let flight = match (canvas, &shot) {
-            (Canvas::Window(window), Some(shot)) => window.present(commands, shot)?,
+            (FrameTarget::Window(window), Some(shot)) => window.present(commands, shot)?,
             _ => commands.launch()?,
         };
         self.flights.push_back(flight);

@@ -1,9 +1,9 @@
 //! The ray-cast reference beside the picture: cast in the background, coarse first, then finer while nothing changes.
 
-use super::task::{Task, Worker};
+use super::task::{BackgroundTask, TaskWorker};
 use crate::error::Result;
 use crate::scene::{Placement, Scene};
-use crate::truth::{EntityRadiosity, RayCast, Shapes, World, raycast, receiver_vertices};
+use crate::truth::{EntityRadiosity, RayCast, RayMeshes, World, raycast, receiver_vertices};
 
 /// Rays a vertex and light of each round; each round starts anew.
 const ROUNDS: [u32; 3] = [32, 256, 2048];
@@ -25,9 +25,9 @@ pub struct Reference {
 }
 
 /// Starts the rounds for a scene as it stands.
-pub fn cast(scene: Scene, placements: Vec<Placement>, version: u64, seed: u64) -> Task<Reference> {
-    Task::new(move |worker: &Worker<Reference>| {
-        let shapes = Shapes::new(&scene);
+pub fn cast(scene: Scene, placements: Vec<Placement>, version: u64, seed: u64) -> BackgroundTask<Reference> {
+    BackgroundTask::new(move |worker: &TaskWorker<Reference>| {
+        let shapes = RayMeshes::new(&scene);
         let world = World::new(&scene, &shapes, &placements);
         for rays in ROUNDS {
             worker.send(round(
@@ -47,7 +47,7 @@ fn round(
     world: &World<'_>,
     cast: RayCast,
     version: u64,
-    worker: &Worker<Reference>,
+    worker: &TaskWorker<Reference>,
 ) -> Result<Reference> {
     let vertices = receiver_vertices(scene);
     let mut lit = Vec::with_capacity(vertices.len());

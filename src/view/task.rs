@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 
 /// How far a task is.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Progress {
+pub struct TaskProgress {
     /// What is being done.
     pub what: String,
     /// Parts done.
@@ -20,23 +20,23 @@ pub struct Progress {
 }
 
 /// The thread's end of a task: where it says how far it is and hands over what it has.
-pub struct Worker<T> {
+pub struct TaskWorker<T> {
     stop: Arc<AtomicBool>,
-    progress: Arc<Mutex<Progress>>,
+    progress: Arc<Mutex<TaskProgress>>,
     results: Sender<T>,
 }
 
 /// Thrown through a task's stack when it is to stop: nobody waits for its result.
 struct Stopped;
 
-impl<T> Worker<T> {
+impl<T> TaskWorker<T> {
     /// Says how far the task is. Where the task is to stop, this unwinds its thread, which frees what it holds.
     pub fn report(&self, what: &str, done: u32, all: u32) {
         if self.stop.load(Ordering::Relaxed) {
-            // Not a panic: nothing is printed, and `Task` expects it.
+            // Not a panic: nothing is printed, and `BackgroundTask` expects it.
             resume_unwind(Box::new(Stopped));
         }
-        let progress = Progress { what: what.to_owned(), done, all };
+        let progress = TaskProgress { what: what.to_owned(), done, all };
         *self.progress.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = progress;
     }
 
@@ -47,21 +47,21 @@ impl<T> Worker<T> {
 }
 
 /// A task under way. Dropping it stops it and waits for its thread.
-pub struct Task<T> {
+pub struct BackgroundTask<T> {
     thread: Option<JoinHandle<Result<()>>>,
     stop: Arc<AtomicBool>,
-    progress: Arc<Mutex<Progress>>,
+    progress: Arc<Mutex<TaskProgress>>,
     results: Receiver<T>,
 }
 
-impl<T: Send + 'static> Task<T> {
+impl<T: Send + 'static> BackgroundTask<T> {
     /// Starts a thread.
-    pub fn new(work: impl FnOnce(&Worker<T>) -> Result<()> + Send + 'static) -> Self {
-        let (stop, progress) = (Arc::<AtomicBool>::default(), Arc::<Mutex<Progress>>::default());
+    pub fn new(work: impl FnOnce(&TaskWorker<T>) -> Result<()> + Send + 'static) -> Self {
+        let (stop, progress) = (Arc::<AtomicBool>::default(), Arc::<Mutex<TaskProgress>>::default());
         let (sender, results) = channel();
-        let worker = Worker { stop: stop.clone(), progress: progress.clone(), results: sender };
+        let worker = TaskWorker { stop: stop.clone(), progress: progress.clone(), results: sender };
         let thread = std::thread::spawn(move || work(&worker));
-        Task { thread: Some(thread), stop, progress, results }
+        BackgroundTask { thread: Some(thread), stop, progress, results }
     }
 
     /// What the task has handed over since, oldest first.
@@ -70,7 +70,7 @@ impl<T: Send + 'static> Task<T> {
     }
 
     /// How far it is.
-    pub fn progress(&self) -> Progress {
+    pub fn progress(&self) -> TaskProgress {
         self.progress.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).clone()
     }
 
@@ -93,7 +93,7 @@ fn outcome(joined: std::result::Result<Result<()>, Box<dyn Any + Send>>) -> Resu
     }
 }
 
-impl<T> Drop for Task<T> {
+impl<T> Drop for BackgroundTask<T> {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
@@ -109,14 +109,14 @@ mod tests {
     #[test]
     fn a_dropped_task_stops_at_its_next_report() {
         let freed = Arc::new(AtomicBool::new(false));
-        struct Held(Arc<AtomicBool>);
-        impl Drop for Held {
+        struct SetWhenDropped(Arc<AtomicBool>);
+        impl Drop for SetWhenDropped {
             fn drop(&mut self) {
                 self.0.store(true, Ordering::Relaxed);
             }
         }
-        let held = Held(freed.clone());
-        let task = Task::new(move |worker: &Worker<u32>| {
+        let held = SetWhenDropped(freed.clone());
+        let task = BackgroundTask::new(move |worker: &TaskWorker<u32>| {
             let _held = held;
             for i in 0.. {
                 worker.report("counting", i, u32::MAX);
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn a_task_that_ends_says_how_once() {
-        let mut task = Task::new(|worker: &Worker<&str>| {
+        let mut task = BackgroundTask::new(|worker: &TaskWorker<&str>| {
             worker.send("half");
             Err(Error::Device("gone".into()))
         });

@@ -8,7 +8,7 @@ use super::input::{Event, Input};
 use super::panel::{self, Status};
 use super::reference::Reference;
 use super::reload::Watch;
-use super::task::{Progress, Task};
+use super::task::{BackgroundTask, TaskProgress};
 use crate::asset::edges::Edges;
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
@@ -65,8 +65,8 @@ pub struct Viewer {
     pub(super) flights: VecDeque<Flight>,
     /// What is not yet seen in a frame.
     pub(super) pending: Changed,
-    pub(super) bake: Option<Task<()>>,
-    pub(super) rays: Option<Task<Reference>>,
+    pub(super) bake: Option<BackgroundTask<()>>,
+    pub(super) rays: Option<BackgroundTask<Reference>>,
     /// Version of the light that the rays are cast for.
     pub(super) rays_version: u64,
     pub(super) reference: Option<Reference>,
@@ -84,7 +84,7 @@ pub struct Viewer {
     /// When egui wants to be drawn again by itself.
     pub(super) repaint_at: Option<Instant>,
     /// Progress that was shown last.
-    pub(super) told: [Option<Progress>; 2],
+    pub(super) told: [Option<TaskProgress>; 2],
     /// Lookups that lists leave off, of the version counted.
     pub(super) counts: Option<(u64, Counts)>,
     /// When they may be counted again: it takes a look at every cluster and entity.
@@ -204,7 +204,8 @@ impl Viewer {
 
     /// How soon [`Viewer::update`] may find something new by itself; `None`: not before an event.
     pub fn idle(&self) -> Option<Duration> {
-        let busy = self.bake.is_some() || self.rays.as_ref().is_some_and(Task::is_running) || self.watch.is_some();
+        let busy =
+            self.bake.is_some() || self.rays.as_ref().is_some_and(BackgroundTask::is_running) || self.watch.is_some();
         let poll = (busy || !self.messages.is_empty()).then_some(Duration::from_millis(100));
         let repaint = self.repaint_at.map(|at| at.saturating_duration_since(Instant::now()));
         poll.into_iter().chain(repaint).min()
@@ -272,7 +273,8 @@ impl Viewer {
     pub fn update(&mut self, dt_s: f64) -> Result<()> {
         let count = self.messages.len();
         self.messages.retain(|(since, _)| since.elapsed().as_secs_f64() < MESSAGE_S);
-        let progress = [self.bake.as_ref().map(Task::progress), self.rays.as_ref().map(Task::progress)];
+        let progress =
+            [self.bake.as_ref().map(BackgroundTask::progress), self.rays.as_ref().map(BackgroundTask::progress)];
         if count != self.messages.len() || progress != self.told {
             self.told = progress;
             self.pending.display = true;
@@ -281,7 +283,7 @@ impl Viewer {
             let changed = self.editor.advance(dt_s).changed;
             self.follow(changed)?;
         }
-        if let Some(ended) = self.bake.as_mut().and_then(Task::ended) {
+        if let Some(ended) = self.bake.as_mut().and_then(BackgroundTask::ended) {
             self.bake = None;
             match ended {
                 Ok(()) => self.build()?,
@@ -375,8 +377,8 @@ impl Viewer {
             merged: self.frame.as_ref().map(|f| (f.merged.merged_clusters, f.merged.clusters)),
             vertices: self.frame.as_ref().map_or(0, Frame::receiver_vertex_count),
             variant: self.frame.as_ref().map(|frame| frame.variant.name),
-            bake: self.bake.as_ref().map(Task::progress),
-            rays: self.rays.as_ref().filter(|rays| rays.is_running()).map(Task::progress),
+            bake: self.bake.as_ref().map(BackgroundTask::progress),
+            rays: self.rays.as_ref().filter(|rays| rays.is_running()).map(BackgroundTask::progress),
             reference: self.reference.as_ref().map(|r| (r.rays, r.error, r.version == self.version)),
             error: self.error_shown.as_ref().map(|(version, _, scale)| (*scale, *version == self.version)),
             shader_error: self.shader_error.as_deref(),

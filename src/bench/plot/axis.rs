@@ -2,7 +2,7 @@
 
 /// How values are spread over an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Scale {
+pub enum AxisScale {
     /// By their logarithm; what is not above 0 stands at the low end.
     Log,
     /// In proportion, from one value to another; what is beyond stands at the edge.
@@ -11,7 +11,7 @@ pub enum Scale {
 
 /// An axis between two places of a drawing.
 pub(super) struct Axis {
-    scale: Scale,
+    scale: AxisScale,
     low: f64,
     high: f64,
     from: f64,
@@ -19,10 +19,10 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    pub fn new(scale: Scale, values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+    pub fn new(scale: AxisScale, values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (low, high) = match scale {
-            Scale::Linear(low, high) => (low, high),
-            Scale::Log => {
+            AxisScale::Linear(low, high) => (low, high),
+            AxisScale::Log => {
                 let within = values.filter(|v| *v > 0.0 && v.is_finite());
                 let (low, high) = within.fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
                 let (low, high) = if low <= high { (low, high) } else { (0.1, 10.0) };
@@ -36,9 +36,9 @@ impl Axis {
 
     pub fn at(&self, value: f64) -> f64 {
         let value = match self.scale {
-            Scale::Log if value > 0.0 => value.ln(),
-            Scale::Log => self.low,
-            Scale::Linear(..) => value,
+            AxisScale::Log if value > 0.0 => value.ln(),
+            AxisScale::Log => self.low,
+            AxisScale::Linear(..) => value,
         };
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         self.from + share * (self.to - self.from)
@@ -48,9 +48,9 @@ impl Axis {
     pub fn ticks(&self, apart: f64) -> Vec<(f64, String)> {
         let most = ((self.to - self.from).abs() / apart).floor().max(2.0) as usize;
         match self.scale {
-            Scale::Log if self.high - self.low > 3.0_f64.ln() => self.decades(most),
-            Scale::Log => linear(self.low.exp(), self.high.exp(), most),
-            Scale::Linear(..) => linear(self.low, self.high, most),
+            AxisScale::Log if self.high - self.low > 3.0_f64.ln() => self.decades(most),
+            AxisScale::Log => linear(self.low.exp(), self.high.exp(), most),
+            AxisScale::Linear(..) => linear(self.low, self.high, most),
         }
     }
 
@@ -101,7 +101,7 @@ mod tests {
     fn ticks_are_round_apart_and_within() {
         let spans = [(1e-9, 1e9), (0.001, 0.9), (1.0, 1.1), (0.0917, 0.0921), (3.0, 40.0), (5.0, 5.0)];
         for (low, high) in spans {
-            let axis = Axis::new(Scale::Log, [low, high, 0.0, f64::INFINITY].into_iter(), 0.0, 400.0);
+            let axis = Axis::new(AxisScale::Log, [low, high, 0.0, f64::INFINITY].into_iter(), 0.0, 400.0);
             let ticks = axis.ticks(40.0);
             assert!((1..=11).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
             for (value, name) in &ticks {

@@ -6,9 +6,9 @@ mod axis;
 mod points;
 mod rows;
 
-pub use axis::Scale;
+pub use axis::AxisScale;
 pub use points::{Curve, Dot, Gap, Panel, Plot};
-pub use rows::{Column, Group, Rows};
+pub use rows::{PlotColumn, RowGroup, Rows};
 
 use std::fmt::Write;
 

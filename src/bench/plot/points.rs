@@ -1,6 +1,6 @@
 //! Points that are numbered and listed, the front of those that nothing beats, and curves.
 
-use super::axis::{Axis, Scale};
+use super::axis::{Axis, AxisScale};
 use super::{LETTER, Svg, color, place};
 
 const WIDTH: f64 = 440.0;
@@ -59,7 +59,7 @@ pub struct Panel {
     /// Beside the y axis, unit included.
     pub y_label: String,
     /// Of x and of y.
-    pub scales: [Scale; 2],
+    pub scales: [AxisScale; 2],
     /// Points.
     pub dots: Vec<Dot>,
     /// Whether numbers lead from the points to the list.
@@ -79,7 +79,7 @@ impl Default for Panel {
             title: String::new(),
             x_label: String::new(),
             y_label: String::new(),
-            scales: [Scale::Log; 2],
+            scales: [AxisScale::Log; 2],
             dots: Vec::new(),
             numbered: true,
             front: Vec::new(),
@@ -121,7 +121,7 @@ impl Plot {
         svg.text(20.0, 30.0, "font-size=\"16\"", &self.title);
         for (i, panel) in self.panels.iter().enumerate() {
             let left = MARGIN + (MARGIN + WIDTH) * i as f64;
-            Drawing::new(panel, &names, left).draw(&mut svg);
+            PanelDrawing::new(panel, &names, left).draw(&mut svg);
         }
         let mut y = TOP + 8.0;
         for (i, dot) in listed.iter().enumerate() {
@@ -155,7 +155,7 @@ fn stroke(series: usize) -> String {
 }
 
 /// A panel at its place.
-struct Drawing<'p> {
+struct PanelDrawing<'p> {
     panel: &'p Panel,
     names: &'p Names,
     left: f64,
@@ -170,7 +170,7 @@ fn meet(a: &Rectangle, b: &Rectangle) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
-impl<'p> Drawing<'p> {
+impl<'p> PanelDrawing<'p> {
     fn new(panel: &'p Panel, names: &'p Names, left: f64) -> Self {
         let curves = || panel.curves.iter().flat_map(|c| &c.points);
         let ranges = panel.dots.iter().filter_map(|d| d.x_range).flat_map(|(low, high)| [low, high]);
@@ -178,7 +178,7 @@ impl<'p> Drawing<'p> {
         let xs = panel.dots.iter().map(|d| d.x).chain(ranges).chain(curves().map(|p| p.0)).chain(gap);
         let ys = panel.dots.iter().map(|d| d.y).chain(curves().map(|p| p.1));
         let x = Axis::new(panel.scales[0], xs, left, left + WIDTH);
-        Drawing { panel, names, left, x, y: Axis::new(panel.scales[1], ys, BOTTOM, TOP) }
+        PanelDrawing { panel, names, left, x, y: Axis::new(panel.scales[1], ys, BOTTOM, TOP) }
     }
 
     fn draw(&self, svg: &mut Svg) {

@@ -1,6 +1,6 @@
 //! Named rows with a mark a series, in one column or several.
 
-use super::axis::{Axis, Scale};
+use super::axis::{Axis, AxisScale};
 use super::{LETTER, Svg, color};
 
 const ROW: f64 = 17.0;
@@ -9,7 +9,7 @@ const GAP: f64 = 40.0;
 const TOP: f64 = 84.0;
 
 /// Rows under one heading.
-pub struct Group {
+pub struct RowGroup {
     /// Above them; may be empty.
     pub heading: String,
     /// Their names.
@@ -17,11 +17,11 @@ pub struct Group {
 }
 
 /// What is shown of every row.
-pub struct Column {
+pub struct PlotColumn {
     /// Below it, unit included.
     pub x_label: String,
     /// How values are spread.
-    pub scale: Scale,
+    pub scale: AxisScale,
     /// What values are to stay below, with a word for it.
     pub limit: Option<(f64, String)>,
     /// By row over all groups, by series.
@@ -35,9 +35,9 @@ pub struct Rows {
     /// Names of the series.
     pub series: Vec<String>,
     /// The rows.
-    pub groups: Vec<Group>,
+    pub groups: Vec<RowGroup>,
     /// Side by side.
-    pub columns: Vec<Column>,
+    pub columns: Vec<PlotColumn>,
 }
 
 impl Rows {
@@ -76,7 +76,7 @@ impl Rows {
         svg.finish()
     }
 
-    fn column(&self, svg: &mut Svg, column: &Column, left: f64, bottom: f64, heights: &[f64]) {
+    fn column(&self, svg: &mut Svg, column: &PlotColumn, left: f64, bottom: f64, heights: &[f64]) {
         assert_eq!(column.values.len(), heights.len(), "values of every row");
         let limit = column.limit.iter().map(|(value, _)| *value);
         let values = column.values.iter().flatten().flatten().copied().chain(limit);
@@ -107,7 +107,7 @@ impl Rows {
             for (series, x) in places.iter().enumerate() {
                 let Some(x) = x else { continue };
                 svg.mark(*x, *y, series, 5.5 - 1.5 * series.min(2) as f64);
-                if column.scale == Scale::Log && values[series].is_some_and(|v| v <= 0.0) {
+                if column.scale == AxisScale::Log && values[series].is_some_and(|v| v <= 0.0) {
                     let extra = format!("font-size=\"10\" fill=\"{}\"", color(series));
                     svg.text(x + 8.0 + 10.0 * series as f64, y + 4.0, &extra, "0");
                 }
@@ -127,12 +127,12 @@ mod tests {
             title: "skips".into(),
             series: vec!["off".into(), "on".into()],
             groups: vec![
-                Group { heading: "one".into(), rows: vec!["a".into()] },
-                Group { heading: "two".into(), rows: vec!["b".into(), "c".into()] },
+                RowGroup { heading: "one".into(), rows: vec!["a".into()] },
+                RowGroup { heading: "two".into(), rows: vec!["b".into(), "c".into()] },
             ],
-            columns: vec![Column {
+            columns: vec![PlotColumn {
                 x_label: "frame, ms".into(),
-                scale: Scale::Log,
+                scale: AxisScale::Log,
                 limit: Some((10.0, "limit".into())),
                 values,
             }],

@@ -15,7 +15,7 @@ const TARGET_LIMIT_M: f64 = 9e6;
 
 /// Where the eye is seen from the target. All methods leave it finite, whatever they are given.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Orbit {
+pub struct OrbitCamera {
     /// What is looked at, metres.
     pub target: DVec3,
     /// Angle about +y of the eye from +z, radians, -pi to pi.
@@ -28,7 +28,7 @@ pub struct Orbit {
     pub fov_deg: f32,
 }
 
-impl Orbit {
+impl OrbitCamera {
     /// The camera of a scene.
     pub fn new(camera: &Camera) -> Self {
         let (eye, target) = (camera.eye.as_dvec3(), camera.target.as_dvec3());
@@ -38,7 +38,7 @@ impl Orbit {
         // Seen from straight above or below, what is up in the picture tells where the eye would lean to.
         let lean = if camera.up() == glam::Vec3::Y { offset } else { -camera.up().as_dvec3() * offset.y.signum() };
         let yaw_rad = lean.x.atan2(lean.z);
-        Orbit { target, yaw_rad, pitch_rad, distance_m, fov_deg: camera.fov_deg }
+        OrbitCamera { target, yaw_rad, pitch_rad, distance_m, fov_deg: camera.fov_deg }
     }
 
     /// From the target to the eye, unit.

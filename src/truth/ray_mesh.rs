@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use std::time::Duration;
 
 /// One mesh with its hierarchy.
-pub struct Shape {
+pub struct RayMesh {
     hierarchy: CwBvh,
     /// Triangles in the order of the hierarchy's leaves.
     triangles: Vec<Triangle>,
@@ -29,16 +29,16 @@ pub struct Shape {
 }
 
 /// The meshes of a scene, in its order.
-pub struct Shapes(pub Vec<Shape>);
+pub struct RayMeshes(pub Vec<RayMesh>);
 
-impl Shapes {
+impl RayMeshes {
     /// Builds every hierarchy; milliseconds a mesh.
     pub fn new(scene: &Scene) -> Self {
-        Shapes(scene.meshes.par_iter().map(|mesh| Shape::new(mesh)).collect())
+        RayMeshes(scene.meshes.par_iter().map(|mesh| RayMesh::new(mesh)).collect())
     }
 }
 
-impl Shape {
+impl RayMesh {
     /// Builds the hierarchy of one mesh.
     pub fn new(mesh: &Mesh) -> Self {
         let positions = unit_positions(mesh);
@@ -52,7 +52,7 @@ impl Shape {
             .as_ref()
             .map(|colors| order.clone().map(|i| mesh.triangles[i].map(|corner| colors[corner as usize])).collect());
         let inner = if mesh.is_convex() { first_shell(&Fit::ROUND, &positions, &mesh.triangles) } else { ROOMY_INNER };
-        Shape {
+        RayMesh {
             triangles: order.map(|i| unsorted[i]).collect(),
             hierarchy,
             colors,

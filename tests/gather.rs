@@ -11,7 +11,7 @@ use shadow_fields::frame::Options;
 use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, FLIGHTS};
 use shadow_fields::layout::{Cluster, Entity, STEP_ENTITIES, Step};
 use shadow_fields::lists::gather::{
-    self, Body, Bounds, Chains, FOUND, GROUP_CLUSTERS, Gather, Group, Inputs, Moment, Packed, Place, Report, Scope,
+    self, Body, Bounds, Chains, FOUND, GROUP_CLUSTERS, Gather, Group, Inputs, Packed, Place, Report, SceneBounds, Scope,
 };
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::sh::rotation::turns;
@@ -29,7 +29,7 @@ fn random_direction(rng: &mut fastrand::Rng) -> DVec3 {
 
 /// A receiver among many things, with clusters of its own.
 struct Crowded {
-    moment: Moment,
+    scene_bounds: SceneBounds,
     receiver: u32,
     entity: Entity,
     clusters: Vec<Bounds>,
@@ -67,7 +67,7 @@ fn crowded(rng: &mut fastrand::Rng, round: usize, count: usize) -> Crowded {
         .chain(["cones", "behind", "horizon", "caps"].map(Skip::without))
         .collect::<Vec<_>>();
     let eps = if round % 6 == 5 { 0.0 } else { 10_f64.powf(-1.5 - 2.5 * rng.f64()) };
-    let moment = Moment::new(bodies, (round % 4 != 3).then_some(1.2), skips[round % skips.len()], eps);
+    let scene_bounds = SceneBounds::new(bodies, (round % 4 != 3).then_some(1.2), skips[round % skips.len()], eps);
     let facing = random_direction(rng);
     let clusters = (0..GROUP_CLUSTERS)
         .map(|_| {
@@ -76,16 +76,16 @@ fn crowded(rng: &mut fastrand::Rng, round: usize, count: usize) -> Crowded {
             Bounds::from_parts(centre, 0.3 * rng.f64(), axis, 0.4 * rng.f64())
         })
         .collect();
-    Crowded { moment, receiver, entity, clusters }
+    Crowded { scene_bounds, receiver, entity, clusters }
 }
 
 impl Crowded {
     /// Lists by a look at everything.
     fn expected(&self) -> Vec<Vec<u32>> {
-        let everything = Chains::all(&self.moment, self.receiver);
+        let everything = Chains::all(&self.scene_bounds, self.receiver);
         let of = |bounds| {
             let mut steps = Vec::new();
-            gather::reference(&self.moment, &self.entity, bounds, &everything, &mut steps);
+            gather::reference(&self.scene_bounds, &self.entity, bounds, &everything, &mut steps);
             steps
         };
         self.clusters.iter().map(of).collect()
@@ -98,9 +98,9 @@ impl Crowded {
         let mut bounds = self.clusters.clone();
         bounds.push(Bounds::union(&self.clusters));
         let cluster = |i: u32| Cluster { receiver: self.receiver, vertex_count: 64, bounds: i, ..Default::default() };
-        let mut entities = vec![Entity::default(); self.moment.spheres.len()];
+        let mut entities = vec![Entity::default(); self.scene_bounds.spheres.len()];
         entities[self.receiver as usize] = self.entity;
-        let packed = Packed::new(&self.moment);
+        let packed = Packed::new(&self.scene_bounds);
         let bodies = Buffer::with_data(device, "bodies", &packed.quads).unwrap();
         let entities = Buffer::with_data(device, "entities", &entities).unwrap();
         let bounds = Buffer::with_data(device, "bounds", &bounds).unwrap();
@@ -114,7 +114,7 @@ impl Crowded {
         let clusters = Buffer::with_data(device, "clusters", &clusters).unwrap();
         let steps = Buffer::new(device, "steps", BufferKind::Device, 4 * u64::from(count * capacity)).unwrap();
         let told = Buffer::with_data(device, "report", &[Report::default()]).unwrap();
-        let pass = Gather::new(device, &stage.gpu.library, texel, self.moment.spheres.len()).unwrap();
+        let pass = Gather::new(device, &stage.gpu.library, texel, self.scene_bounds.spheres.len()).unwrap();
         let inputs = Inputs {
             bodies: &bodies,
             entities: &entities,
@@ -147,19 +147,19 @@ fn the_tree_leaves_every_list_as_it_is() {
     let (mut listed, mut offered, mut all) = (0, 0, 0);
     for round in 0..60 {
         let crowded = crowded(&mut rng, round, 200);
-        let Crowded { moment, receiver, entity, clusters } = &crowded;
-        let group = Chains::of_group(moment, *receiver, entity, &Bounds::union(clusters));
+        let Crowded { scene_bounds, receiver, entity, clusters } = &crowded;
+        let group = Chains::of_group(scene_bounds, *receiver, entity, &Bounds::union(clusters));
         offered += group.occluder_count();
-        all += Chains::all(moment, *receiver).occluder_count();
+        all += Chains::all(scene_bounds, *receiver).occluder_count();
         for (bounds, expected) in clusters.iter().zip(crowded.expected()) {
             let mut found = Vec::new();
-            gather::reference(moment, entity, bounds, &group, &mut found);
+            gather::reference(scene_bounds, entity, bounds, &group, &mut found);
             assert_eq!(found, expected, "round {round}");
             listed += expected.len();
             // An occluder may stand there by its field and as a cap.
             let whole = expected.iter().filter(|&&step| !is_cap(step));
             let count = whole.count() as u64;
-            let counts = gather::counts(moment, *receiver, entity, bounds);
+            let counts = gather::counts(scene_bounds, *receiver, entity, bounds);
             let left = counts.below_horizon
                 + counts.behind_light
                 + counts.apart
@@ -167,11 +167,11 @@ fn the_tree_leaves_every_list_as_it_is() {
                 + counts.below_eps
                 + counts.caps;
             assert_eq!(left + count, counts.considered, "every lookup is listed or has a reason");
-            let scope = Scope::new(moment, entity, bounds);
-            for (j, body) in moment.bodies.iter().enumerate().filter(|(j, _)| *j != *receiver as usize) {
+            let scope = Scope::new(scene_bounds, entity, bounds);
+            for (j, body) in scene_bounds.bodies.iter().enumerate().filter(|(j, _)| *j != *receiver as usize) {
                 let on = expected.iter().any(|&step| Step::entities(step)[0] as usize == j);
                 assert_eq!(scope.lists(j as u32, body, *receiver), on, "round {round}, entity {j}");
-                assert!(!on || scope.may_list(body, moment.spheres[j]), "round {round}, entity {j}");
+                assert!(!on || scope.may_list(body, scene_bounds.spheres[j]), "round {round}, entity {j}");
             }
         }
     }
@@ -188,7 +188,7 @@ fn the_device_makes_the_lists_of_its_twin() {
         let crowded = crowded(&mut rng, round, [30, 200, 700][round % 3]);
         let expected = crowded.expected();
         let (lists, said) =
-            crowded.on_device(&stage, round.is_multiple_of(2), Packed::new(&crowded.moment).longest() as u32);
+            crowded.on_device(&stage, round.is_multiple_of(2), Packed::new(&crowded.scene_bounds).longest() as u32);
         for (i, ((cluster, found), expected)) in lists.iter().zip(&expected).enumerate() {
             assert!(found == expected, "round {round}, cluster {i}: {} steps for {}", found.len(), expected.len());
             assert_eq!(cluster.vertex_count, 64);
@@ -228,13 +228,13 @@ fn what_a_group_has_no_room_for_is_gathered_again() {
         // With no threshold all that occlude are found. One that takes fewer of them makes groups differ.
         let eps = if round == 0 { 0.0 } else { 1e-4 * 2.0_f64.powi(round) };
         let mut lamps = 0;
-        for body in &mut many.moment.bodies {
+        for body in &mut many.scene_bounds.bodies {
             lamps += usize::from(body.emits);
             body.emits &= lamps <= 9;
         }
-        many.moment = Moment::new(many.moment.bodies, Some(1.2), Skip::ALL, eps);
+        many.scene_bounds = SceneBounds::new(many.scene_bounds.bodies, Some(1.2), Skip::ALL, eps);
         let expected = many.expected();
-        let (lists, said) = many.on_device(&stage, round % 2 == 0, Packed::new(&many.moment).longest() as u32);
+        let (lists, said) = many.on_device(&stage, round % 2 == 0, Packed::new(&many.scene_bounds).longest() as u32);
         for (i, ((cluster, found), expected)) in lists.iter().zip(&expected).enumerate() {
             assert!(found == expected, "round {round}, cluster {i}: {} steps for {}", found.len(), expected.len());
             assert_eq!(cluster.vertex_count, 64);

@@ -11,7 +11,7 @@ use glam::DVec3;
 use shadow_fields::check::merge::ARITHMETIC;
 use shadow_fields::field::ShadowField;
 use shadow_fields::frame::Frame;
-use shadow_fields::lists::gather::{Body, Moment};
+use shadow_fields::lists::gather::{Body, SceneBounds};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::chain::Method;
 use shadow_fields::merge::reference::{Object, Task};
@@ -175,8 +175,9 @@ fn equal_keys_go_by_index() {
         radiance: 0.0,
         facing: None,
     };
-    let moment = Moment::new(vec![body(0.0), body(1.0 + 1e-12), body(1.0), body(1.0 - 1e-5)], None, Skip::ALL, 0.0);
+    let scene_bounds =
+        SceneBounds::new(vec![body(0.0), body(1.0 + 1e-12), body(1.0), body(1.0 - 1e-5)], None, Skip::ALL, 0.0);
     let mut order = [1, 2, 3];
-    order.sort_by_key(|&j| moment.order(0, j));
+    order.sort_by_key(|&j| scene_bounds.order(0, j));
     assert_eq!(order, [3, 1, 2]);
 }

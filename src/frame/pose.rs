@@ -7,7 +7,7 @@ use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::lists::gather::{Body, Bounds, Moment, Report};
+use crate::lists::gather::{Body, Bounds, Report, SceneBounds};
 use crate::lists::gathering::Gathering;
 use crate::lists::incremental::{Dirty, Member, Merged, State};
 use crate::lists::sight::{Faces, Sight};
@@ -96,7 +96,7 @@ impl Frame {
         let eps = f64::from(self.options.eps) * white;
         State {
             entities: placements.iter().enumerate().map(|(index, p)| self.entity(index, p)).collect(),
-            moment: Moment::new(bodies, sky, self.options.skip, eps),
+            scene_bounds: SceneBounds::new(bodies, sky, self.options.skip, eps),
             placements: placements.to_vec(),
         }
     }
@@ -179,10 +179,11 @@ impl Frame {
         entity.occludes && self.store.geometries[entity.mesh].blocked.is_some()
     }
 
-    /// Occluders of a receiver in their order, [`Moment::order`]; itself left out.
-    pub(super) fn occluders(&self, moment: &Moment, receiver: usize) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..moment.spheres.len()).filter(|&j| self.occludes(j) && j != receiver).collect();
-        order.sort_by_cached_key(|&j| moment.order(receiver as u32, j as u32));
+    /// Occluders of a receiver in their order, [`SceneBounds::order`]; itself left out.
+    pub(super) fn occluders(&self, scene_bounds: &SceneBounds, receiver: usize) -> Vec<usize> {
+        let mut order: Vec<usize> =
+            (0..scene_bounds.spheres.len()).filter(|&j| self.occludes(j) && j != receiver).collect();
+        order.sort_by_cached_key(|&j| scene_bounds.order(receiver as u32, j as u32));
         order
     }
 }

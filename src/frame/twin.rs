@@ -67,7 +67,7 @@ impl Frame {
             let geometry = &self.store.geometries[mesh_index];
             receivers.push(Receiver {
                 index,
-                occluders: self.occluders(&state.moment, index),
+                occluders: self.occluders(&state.scene_bounds, index),
                 positions: mesh.positions.iter().map(|p| p.as_dvec3() - geometry.centre_m).collect(),
                 normals: mesh.normals.iter().map(|n| n.as_dvec3()).collect(),
                 transfer: self.store.transfer(geometry)?,
@@ -182,15 +182,15 @@ impl Twin<'_> {
 type Listed = (Vec<usize>, Vec<HashSet<(u32, u32)>>);
 
 fn listed(state: &State, receiver: usize, geometry: &Geometry) -> Listed {
-    let (moment, entity) = (&state.moment, &state.entities[receiver]);
+    let (scene_bounds, entity) = (&state.scene_bounds, &state.entities[receiver]);
     let mut cluster_of = vec![0; geometry.order.len()];
     for (place, &v) in geometry.order.iter().enumerate() {
         cluster_of[v as usize] = place / CLUSTER_VERTICES as usize;
     }
-    let chains = Chains::all(moment, receiver as u32);
+    let chains = Chains::all(scene_bounds, receiver as u32);
     let of_cluster = |bounds| {
         let mut steps = Vec::new();
-        gather::reference(moment, entity, bounds, &chains, &mut steps);
+        gather::reference(scene_bounds, entity, bounds, &chains, &mut steps);
         steps.into_iter().map(|step| Step::entities(step).into()).collect()
     };
     (cluster_of, geometry.clusters.iter().map(of_cluster).collect())

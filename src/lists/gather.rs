@@ -12,7 +12,7 @@
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{self, Step};
-pub use crate::lists::moment::{Body, Bounds, Counts, Lamp, Moment, distance_key};
+pub use crate::lists::scene_bounds::{Body, Bounds, Counts, Lamp, SceneBounds, distance_key};
 pub use crate::lists::scope::Scope;
 use crate::lists::scope::{BELOW, Fate, GROUP_SLACK, SLACK, SLACK_RAD, View, cap_sines, fade, fade_sine};
 use crate::lists::tree::Crowd;
@@ -71,19 +71,19 @@ impl std::str::FromStr for Place {
 }
 
 /// The chains that a group of clusters may need: each light (`None`: the sky) with its occluders in the order in which they are
-/// multiplied ([`Moment::order`]), itself left out.
+/// multiplied ([`SceneBounds::order`]), itself left out.
 pub struct Chains(Vec<(Option<Lamp>, Vec<u32>)>);
 
 impl Chains {
     /// What may matter to any cluster of a group with these bounds.
-    pub fn of_group(moment: &Moment, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Self {
-        let scope = Scope::new(moment, entity, bounds);
-        Self::new(moment, receiver, |lamp| scope.candidates(lamp))
+    pub fn of_group(scene_bounds: &SceneBounds, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Self {
+        let scope = Scope::new(scene_bounds, entity, bounds);
+        Self::new(scene_bounds, receiver, |lamp| scope.candidates(lamp))
     }
 
     /// Everything.
-    pub fn all(moment: &Moment, receiver: u32) -> Self {
-        Self::new(moment, receiver, |_| Some(moment.occluders.clone()))
+    pub fn all(scene_bounds: &SceneBounds, receiver: u32) -> Self {
+        Self::new(scene_bounds, receiver, |_| Some(scene_bounds.occluders.clone()))
     }
 
     /// Occluders of all chains together.
@@ -91,12 +91,12 @@ impl Chains {
         self.0.iter().map(|(_, occluders)| occluders.len()).sum()
     }
 
-    fn new(moment: &Moment, receiver: u32, candidates: impl Fn(Option<&Lamp>) -> Option<Vec<u32>>) -> Self {
-        let lamps = moment.lamps.iter().filter(|lamp| lamp.entity != receiver).map(Some);
-        let chains = lamps.chain(moment.sky.map(|_| None)).filter_map(|lamp| {
+    fn new(scene_bounds: &SceneBounds, receiver: u32, candidates: impl Fn(Option<&Lamp>) -> Option<Vec<u32>>) -> Self {
+        let lamps = scene_bounds.lamps.iter().filter(|lamp| lamp.entity != receiver).map(Some);
+        let chains = lamps.chain(scene_bounds.sky.map(|_| None)).filter_map(|lamp| {
             let mut occluders = candidates(lamp)?;
             occluders.retain(|&j| j != receiver && lamp.is_none_or(|lamp| lamp.entity != j));
-            occluders.sort_by_cached_key(|&j| moment.order(receiver, j));
+            occluders.sort_by_cached_key(|&j| scene_bounds.order(receiver, j));
             Some((lamp.copied(), occluders))
         });
         Chains(chains.collect())
@@ -104,15 +104,21 @@ impl Chains {
 }
 
 /// The CPU twin of the pass for one cluster: appends its steps. `chains` are those of a group that the cluster belongs to, or all.
-pub fn reference(moment: &Moment, entity: &layout::Entity, bounds: &Bounds, chains: &Chains, out: &mut Vec<u32>) {
-    walk(moment, &Scope::new(moment, entity, bounds), chains, out, &mut |_, _| ());
+pub fn reference(
+    scene_bounds: &SceneBounds,
+    entity: &layout::Entity,
+    bounds: &Bounds,
+    chains: &Chains,
+    out: &mut Vec<u32>,
+) {
+    walk(scene_bounds, &Scope::new(scene_bounds, entity, bounds), chains, out, &mut |_, _| ());
 }
 
 /// What of all that exists is left off the list of one cluster, and why.
-pub fn counts(moment: &Moment, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Counts {
+pub fn counts(scene_bounds: &SceneBounds, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Counts {
     let (mut counts, mut dropped) = (Counts::default(), 0.0);
-    let scope = Scope::new(moment, entity, bounds);
-    walk(moment, &scope, &Chains::all(moment, receiver), &mut Vec::new(), &mut |fate, lookups| {
+    let scope = Scope::new(scene_bounds, entity, bounds);
+    walk(scene_bounds, &scope, &Chains::all(scene_bounds, receiver), &mut Vec::new(), &mut |fate, lookups| {
         counts.considered += lookups;
         match fate {
             Fate::Listed => {}
@@ -131,9 +137,15 @@ pub fn counts(moment: &Moment, receiver: u32, entity: &layout::Entity, bounds: &
 }
 
 /// Goes through all chains; tells of every entity and channel what becomes of it.
-fn walk(moment: &Moment, scope: &Scope<'_>, chains: &Chains, out: &mut Vec<u32>, tell: &mut dyn FnMut(Fate, u64)) {
+fn walk(
+    scene_bounds: &SceneBounds,
+    scope: &Scope<'_>,
+    chains: &Chains,
+    out: &mut Vec<u32>,
+    tell: &mut dyn FnMut(Fate, u64),
+) {
     for (lamp, occluders) in &chains.0 {
-        let light: Option<View> = lamp.as_ref().map(|lamp| scope.view(moment.spheres[lamp.entity as usize]));
+        let light: Option<View> = lamp.as_ref().map(|lamp| scope.view(scene_bounds.spheres[lamp.entity as usize]));
         if let (Some(lamp), Some(light)) = (lamp, &light) {
             let fate = scope.light_fate(lamp, light);
             tell(fate, if lamp.coloured == 0 { 1 } else { 3 });
@@ -143,9 +155,9 @@ fn walk(moment: &Moment, scope: &Scope<'_>, chains: &Chains, out: &mut Vec<u32>,
                 continue;
             }
         }
-        let radiance = lamp.map_or(moment.sky.unwrap_or(0.0), |lamp| lamp.radiance);
+        let radiance = lamp.map_or(scene_bounds.sky.unwrap_or(0.0), |lamp| lamp.radiance);
         for &j in occluders {
-            let view = scope.view(moment.spheres[j as usize]);
+            let view = scope.view(scene_bounds.spheres[j as usize]);
             let fate = scope.occluder_fate(&view, light.as_ref(), radiance);
             tell(if fate == Fate::Listed && !view.whole { Fate::Cap } else { fate }, 1);
             let (entity, light) = (j, lamp.map(|lamp| lamp.entity));
@@ -225,12 +237,12 @@ pub struct Packed {
 
 impl Packed {
     /// Packs a moment.
-    pub fn new(moment: &Moment) -> Self {
-        let mut quads = moment.spheres.clone();
-        let members = moment.tree.members();
+    pub fn new(scene_bounds: &SceneBounds) -> Self {
+        let mut quads = scene_bounds.spheres.clone();
+        let members = scene_bounds.tree.members();
         let block_first = quads.len();
         for block in members.chunks(BLOCK) {
-            let crowd = Crowd::around(block.iter().map(|&j| moment.spheres[j as usize]));
+            let crowd = Crowd::around(block.iter().map(|&j| scene_bounds.spheres[j as usize]));
             let [x, y, z] = crowd.centre;
             quads.extend([[x, y, z, crowd.reach_m], [crowd.radius_m, 0.0, 0.0, 0.0]]);
         }
@@ -238,11 +250,11 @@ impl Packed {
         let member = |quad: &[u32]| [0, 1, 2, 3].map(|i| f32::from_bits(quad.get(i).copied().unwrap_or(0)));
         quads.extend(members.chunks(4).map(member));
         let lamp_first = quads.len();
-        for lamp in &moment.lamps {
+        for lamp in &scene_bounds.lamps {
             let numbers = [lamp.radiance, f32::from_bits(lamp.entity), f32::from_bits(lamp.coloured), 0.0];
             quads.extend([lamp.facing, numbers]);
         }
-        let skip = moment.skip;
+        let skip = scene_bounds.skip;
         let switches = [skip.horizon, skip.cones, skip.behind, skip.facing, skip.caps];
         Packed {
             push: Push {
@@ -250,12 +262,12 @@ impl Packed {
                 block_first: block_first as u32,
                 member_first: member_first as u32,
                 lamp_first: lamp_first as u32,
-                lamp_count: moment.lamps.len() as u32,
+                lamp_count: scene_bounds.lamps.len() as u32,
                 capacity: 0,
                 switches: switches.iter().enumerate().map(|(bit, &on)| u32::from(on) << bit).sum(),
-                sky: moment.sky.unwrap_or(-1.0),
-                brightest: moment.brightest,
-                eps: moment.eps,
+                sky: scene_bounds.sky.unwrap_or(-1.0),
+                brightest: scene_bounds.brightest,
+                eps: scene_bounds.eps,
             },
             quads,
         }

@@ -66,7 +66,7 @@ impl Gathering {
         if self.refused {
             return Ok(None);
         }
-        let packed = Packed::new(&lists.now().moment);
+        let packed = Packed::new(&lists.now().scene_bounds);
         let (clusters, groups) = lists.groups(dirty);
         let capacity = self.capacity.min(packed.longest()).max(1);
         let bytes = 4 * capacity * clusters.len() as u64;

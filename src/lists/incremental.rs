@@ -9,7 +9,7 @@
 //! once nothing moves any more.
 
 use crate::layout::{self, Step};
-use crate::lists::gather::{self, Bounds, Chains, Counts, GROUP_CLUSTERS, Moment, Scope};
+use crate::lists::gather::{self, Bounds, Chains, Counts, GROUP_CLUSTERS, SceneBounds, Scope};
 use crate::lists::sight::{Faces, Sight};
 use crate::scene::Placement;
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ use std::ops::Range;
 /// All that lists and merge depend on at one moment.
 pub(crate) struct State {
     /// For the lists.
-    pub moment: Moment,
+    pub scene_bounds: SceneBounds,
     /// As the device sees them.
     pub entities: Vec<layout::Entity>,
     /// From which all of the above follows.
@@ -130,12 +130,12 @@ impl Lists {
         let before = self.now.take();
         let first = before.is_none();
         let renewed = std::mem::take(&mut self.renewed);
-        let before = before.filter(|before| !renewed && now.moment.is_like(&before.moment));
+        let before = before.filter(|before| !renewed && now.scene_bounds.is_like(&before.scene_bounds));
         let moved = before.as_ref().map(|before| Moved::new(before, &now));
         let at_rest = moved.as_ref().is_some_and(|moved| moved.list.is_empty());
-        let sights = sights.filter(|_| now.moment.skip.hidden && !first && !at_rest);
+        let sights = sights.filter(|_| now.scene_bounds.skip.hidden && !first && !at_rest);
         // Without the skip all clusters count as changed.
-        let moved = moved.filter(|_| now.moment.skip.unmoved);
+        let moved = moved.filter(|_| now.scene_bounds.skip.unmoved);
         let found: Vec<[Dirty; 2]> = if moved.is_some() && at_rest && self.stale_count == 0 {
             Vec::new()
         } else {
@@ -211,10 +211,10 @@ impl Lists {
         let of_group = |dirty: &Dirty| {
             let group = &self.groups[dirty.group];
             let entity = &now.entities[group.receiver];
-            let chains = Chains::of_group(&now.moment, group.receiver as u32, entity, &group.bounds);
+            let chains = Chains::of_group(&now.scene_bounds, group.receiver as u32, entity, &group.bounds);
             let (mut ends, mut steps) = (Vec::with_capacity(dirty.clusters.len()), Vec::new());
             for &cluster in &dirty.clusters {
-                gather::reference(&now.moment, entity, &self.bounds[cluster], &chains, &mut steps);
+                gather::reference(&now.scene_bounds, entity, &self.bounds[cluster], &chains, &mut steps);
                 ends.push(steps.len());
             }
             (ends, steps)
@@ -253,7 +253,7 @@ impl Lists {
             let entity = &state.entities[group.receiver];
             let clusters = self.bounds[group.clusters.clone()].iter();
             clusters.fold(Counts::default(), |mut counts, bounds| {
-                counts += gather::counts(&state.moment, group.receiver as u32, entity, bounds);
+                counts += gather::counts(&state.scene_bounds, group.receiver as u32, entity, bounds);
                 counts
             })
         };
@@ -267,9 +267,11 @@ impl Lists {
     pub fn entities_on(&self, state: &State, receiver: usize) -> BTreeSet<usize> {
         let (mut steps, entity) = (Vec::new(), &state.entities[receiver]);
         for group in self.groups.iter().filter(|group| group.receiver == receiver) {
-            let chains = Chains::of_group(&state.moment, receiver as u32, entity, &group.bounds);
+            let chains = Chains::of_group(&state.scene_bounds, receiver as u32, entity, &group.bounds);
             let clusters = &self.bounds[group.clusters.clone()];
-            clusters.iter().for_each(|bounds| gather::reference(&state.moment, entity, bounds, &chains, &mut steps));
+            clusters
+                .iter()
+                .for_each(|bounds| gather::reference(&state.scene_bounds, entity, bounds, &chains, &mut steps));
         }
         steps.into_iter().map(|step| Step::entities(step)[0] as usize).collect()
     }
@@ -294,7 +296,7 @@ impl<'b> Moved<'b> {
         let same = |i: usize| {
             now.placements[i] == before.placements[i]
                 && bytemuck::bytes_of(&now.entities[i]) == bytemuck::bytes_of(&before.entities[i])
-                && now.moment.bodies[i] == before.moment.bodies[i]
+                && now.scene_bounds.bodies[i] == before.scene_bounds.bodies[i]
         };
         let flags: Vec<bool> = (0..now.placements.len()).map(|i| !same(i)).collect();
         let list: Vec<usize> = (0..flags.len()).filter(|&i| flags[i]).collect();
@@ -303,20 +305,20 @@ impl<'b> Moved<'b> {
 
     /// Those that may stand on the list of a cluster within these bounds, before or now; its receiver has not moved.
     fn near(&self, now: &State, receiver: usize, bounds: &Bounds) -> Vec<usize> {
-        let moments = [&self.before.moment, &now.moment];
-        let scopes = moments.map(|moment| Scope::new(moment, &now.entities[receiver], bounds));
+        let both = [&self.before.scene_bounds, &now.scene_bounds];
+        let scopes = both.map(|scene_bounds| Scope::new(scene_bounds, &now.entities[receiver], bounds));
         let near = |j: usize| {
-            j != receiver && moments.iter().zip(&scopes).any(|(m, scope)| scope.may_list(&m.bodies[j], m.spheres[j]))
+            j != receiver && both.iter().zip(&scopes).any(|(m, scope)| scope.may_list(&m.bodies[j], m.spheres[j]))
         };
         self.list.iter().copied().filter(|&j| near(j)).collect()
     }
 
     /// Whether any of `list` stands on the list of a cluster, before or now.
     fn any_on_list(&self, now: &State, receiver: usize, bounds: &Bounds, list: &[usize]) -> bool {
-        let on = |moment: &Moment| {
-            let scope = Scope::new(moment, &now.entities[receiver], bounds);
-            list.iter().any(|&j| scope.lists(j as u32, &moment.bodies[j], receiver as u32))
+        let on = |scene_bounds: &SceneBounds| {
+            let scope = Scope::new(scene_bounds, &now.entities[receiver], bounds);
+            list.iter().any(|&j| scope.lists(j as u32, &scene_bounds.bodies[j], receiver as u32))
         };
-        on(&self.before.moment) || on(&now.moment)
+        on(&self.before.scene_bounds) || on(&now.scene_bounds)
     }
 }

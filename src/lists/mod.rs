@@ -3,8 +3,8 @@
 pub mod gather;
 pub mod gathering;
 pub mod incremental;
-pub mod moment;
 pub mod repeatable;
+pub mod scene_bounds;
 pub mod scope;
 pub mod sight;
 pub mod skip;

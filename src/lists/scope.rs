@@ -3,8 +3,8 @@
 //! In f32 and by [`crate::lists::repeatable`] alone, as `glsl/gather_scope.glsl` has it: host and device decide alike to the bit.
 
 use crate::layout;
-use crate::lists::moment::{Body, Bounds, Lamp, Moment};
 use crate::lists::repeatable::{Angle, dot, inverse, inverse_root};
+use crate::lists::scene_bounds::{Body, Bounds, Lamp, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 
@@ -92,7 +92,7 @@ fn less(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 
 /// A cluster of a receiver, or a group of them, at one moment. Places are world axes from the receiver's centre.
 pub struct Scope<'m> {
-    moment: &'m Moment,
+    scene_bounds: &'m SceneBounds,
     receiver: &'m layout::Entity,
     centre: [f32; 3],
     radius: f32,
@@ -102,11 +102,11 @@ pub struct Scope<'m> {
 
 impl<'m> Scope<'m> {
     /// Places bounds of a receiver's mesh in the world.
-    pub fn new(moment: &'m Moment, receiver: &'m layout::Entity, bounds: &Bounds) -> Self {
+    pub fn new(scene_bounds: &'m SceneBounds, receiver: &'m layout::Entity, bounds: &Bounds) -> Self {
         let scale = receiver.albedo[3];
         let [x, y, z] = bounds.centre;
         Scope {
-            moment,
+            scene_bounds,
             receiver,
             centre: to_world(receiver, [x * scale, y * scale, z * scale]),
             radius: bounds.radius_m * scale,
@@ -117,7 +117,7 @@ impl<'m> Scope<'m> {
 
     /// Whether so much radiance, reflected, stays below eps.
     pub fn negligible(&self, radiance: f32) -> bool {
-        self.reflected(radiance) < self.moment.eps
+        self.reflected(radiance) < self.scene_bounds.eps
     }
 
     fn reflected(&self, radiance: f32) -> f32 {
@@ -136,10 +136,10 @@ impl<'m> Scope<'m> {
         // The highest that any vertex sees the centre above its horizon, against the threshold of the shader.
         let highest = distance * toward.cosine_less(self.spread) + self.radius;
         let threshold = radius + fade_sine() * (distance + self.radius);
-        let below = self.moment.skip.horizon && highest < threshold * BELOW;
+        let below = self.scene_bounds.skip.horizon && highest < threshold * BELOW;
         let nearest = distance - self.radius;
         let [least, most] = cap_sines();
-        let caps = self.moment.skip.caps;
+        let caps = self.scene_bounds.skip.caps;
         let (whole, cap) = (!caps || radius > least * nearest, caps && radius < most * (distance + self.radius));
         let inside =
             View { to, inverse: inverse_distance, distance, spread: None, turn, below, weight: EVERYTHING, whole, cap };
@@ -157,7 +157,7 @@ impl<'m> Scope<'m> {
         if light.below {
             return Fate::BelowHorizon;
         }
-        if self.moment.skip.facing && lamp.facing[3] >= -1.0 && light.distance > self.radius {
+        if self.scene_bounds.skip.facing && lamp.facing[3] >= -1.0 && light.distance > self.radius {
             let [x, y, z, cosine] = lamp.facing;
             let away = -dot(light.to, [x, y, z]) * light.inverse;
             if away < Angle::of_cosine(cosine).plus(light.turn).cosine {
@@ -177,10 +177,10 @@ impl<'m> Scope<'m> {
             return Fate::BelowHorizon;
         }
         let Some(light) = light else { return self.of_weight(radiance * view.weight) };
-        if self.moment.skip.behind && view.distance > (light.distance + 2.0 * self.radius) * SLACK {
+        if self.scene_bounds.skip.behind && view.distance > (light.distance + 2.0 * self.radius) * SLACK {
             return Fate::BehindLight;
         }
-        if self.moment.skip.cones && apart(view, light) {
+        if self.scene_bounds.skip.cones && apart(view, light) {
             return Fate::Apart;
         }
         self.of_weight(radiance * view.weight.min(light.weight))
@@ -215,10 +215,10 @@ impl<'m> Scope<'m> {
 
     /// Occluders that a chain may need in any cluster within the bounds; `None` where none needs the chain.
     pub fn candidates(&self, lamp: Option<&Lamp>) -> Option<Vec<u32>> {
-        let moment = self.moment;
-        let radiance = lamp.map_or(moment.sky.unwrap_or(0.0), |lamp| lamp.radiance);
+        let scene_bounds = self.scene_bounds;
+        let radiance = lamp.map_or(scene_bounds.sky.unwrap_or(0.0), |lamp| lamp.radiance);
         let light = lamp.map(|lamp| {
-            let [x, y, z, radius_m] = moment.spheres[lamp.entity as usize];
+            let [x, y, z, radius_m] = scene_bounds.spheres[lamp.entity as usize];
             let (to, inverse, weight) = self.crowd(&Crowd { centre: [x, y, z], reach_m: 0.0, radius_m });
             (to, dot(to, to).max(1e-30) * inverse, weight)
         });
@@ -233,30 +233,30 @@ impl<'m> Scope<'m> {
             let distance = dot(to, to).max(1e-30) * inverse;
             light.is_some_and(|(_, to_light, _)| {
                 let blur = self.radius + crowd.reach_m;
-                moment.skip.behind && distance - blur > (to_light + self.radius) * GROUP_SLACK
+                scene_bounds.skip.behind && distance - blur > (to_light + self.radius) * GROUP_SLACK
             })
         };
         let mut found = Vec::new();
-        moment.tree.find(leave, |j| found.push(j));
+        scene_bounds.tree.find(leave, |j| found.push(j));
         Some(found)
     }
 
     /// Whether an entity may stand on the list of any cluster within the bounds.
     pub fn may_list(&self, body: &Body, [x, y, z, radius_m]: [f32; 4]) -> bool {
         let weight = self.crowd_weight(&Crowd { centre: [x, y, z], reach_m: 0.0, radius_m });
-        (body.occludes || body.emits) && !self.negligible(weight * self.moment.brightest)
+        (body.occludes || body.emits) && !self.negligible(weight * self.scene_bounds.brightest)
     }
 
     /// Whether an entity stands on the list of the cluster.
     pub fn lists(&self, index: u32, body: &Body, receiver: u32) -> bool {
-        let moment = self.moment;
-        let view = body.occludes.then(|| self.view(moment.spheres[index as usize]));
-        let mut chains = moment.lamps.iter().filter(|lamp| lamp.entity != receiver);
+        let scene_bounds = self.scene_bounds;
+        let view = body.occludes.then(|| self.view(scene_bounds.spheres[index as usize]));
+        let mut chains = scene_bounds.lamps.iter().filter(|lamp| lamp.entity != receiver);
         chains.any(|lamp| {
-            let light = self.view(moment.spheres[lamp.entity as usize]);
+            let light = self.view(scene_bounds.spheres[lamp.entity as usize]);
             let needs = |view: &View| self.occluder_fate(view, Some(&light), lamp.radiance) == Fate::Listed;
             self.light_fate(lamp, &light) == Fate::Listed && (lamp.entity == index || view.as_ref().is_some_and(needs))
-        }) || moment
+        }) || scene_bounds
             .sky
             .is_some_and(|sky| view.as_ref().is_some_and(|view| self.occluder_fate(view, None, sky) == Fate::Listed))
     }

@@ -7,7 +7,7 @@
 
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
-use crate::lists::moment::Bounds;
+use crate::lists::scene_bounds::Bounds;
 use glam::{DMat4, DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 

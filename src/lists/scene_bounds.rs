@@ -103,7 +103,7 @@ pub struct Lamp {
 }
 
 /// What the lists are made from at one moment.
-pub struct Moment {
+pub struct SceneBounds {
     /// All entities.
     pub bodies: Vec<Body>,
     /// Their bounding spheres: centre in the world and radius, metres.
@@ -124,7 +124,7 @@ pub struct Moment {
     pub eps: f32,
 }
 
-impl Moment {
+impl SceneBounds {
     /// Sorts `bodies` for the lists.
     pub fn new(bodies: Vec<Body>, sky: Option<f64>, skip: Skip, eps: f64) -> Self {
         let sphere = |body: &Body| body.centre.as_vec3().extend(body.radius_m as f32).to_array();
@@ -143,11 +143,11 @@ impl Moment {
         let sky = sky.map(|sky| sky as f32);
         let brightest = lamps.iter().map(|lamp| lamp.radiance).fold(sky.unwrap_or(0.0), f32::max);
         let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));
-        Moment { tree, occluders, lamps, sky, brightest, skip, eps: eps as f32, spheres, bodies }
+        SceneBounds { tree, occluders, lamps, sky, brightest, skip, eps: eps as f32, spheres, bodies }
     }
 
     /// Whether lists of the other moment hold here too where no body has changed.
-    pub fn is_like(&self, other: &Moment) -> bool {
+    pub fn is_like(&self, other: &SceneBounds) -> bool {
         self.bodies.len() == other.bodies.len() && (self.sky, self.skip, self.eps) == (other.sky, other.skip, other.eps)
     }
 
@@ -160,7 +160,7 @@ impl Moment {
     }
 }
 
-/// Bits of the squared distance of two centres, in f32, by which [`Moment::order`] goes: of what is not negative, more is more in bits
+/// Bits of the squared distance of two centres, in f32, by which [`SceneBounds::order`] goes: of what is not negative, more is more in bits
 /// too. Centres that differ by less than a part in 10^7 may come as equal; the f64 twins go by the same key.
 pub fn distance_key(a: [f32; 3], b: [f32; 3]) -> u32 {
     let to = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];

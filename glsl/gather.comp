@@ -1,5 +1,5 @@
 #version 460
-// The steps of every cluster, a group of neighbouring clusters of one receiver a workgroup. First all invocations look for the
+// The entries of every cluster, a group of neighbouring clusters of one receiver a workgroup. First all invocations look for the
 // occluders that may matter to any of the clusters, by the block and then one by one, and put them into the receiver's order;
 // then each walks its own cluster through what was found, light by light and at last the sky, and writes what it keeps.
 // A group that finds more than there is room for is left to a second round (ROOMY), which keeps what it finds in a buffer.
@@ -36,11 +36,11 @@ layout(std430, binding = 1) readonly buffer Entities { Entity entities[]; };
 layout(std430, binding = 2) readonly buffer AllBounds { Bounds bounds[]; };
 layout(std430, binding = 3) buffer Groups { Group groups[]; };
 layout(std430, binding = 4) buffer Clusters { Cluster clusters[]; };
-layout(std430, binding = 5) writeonly buffer Steps { uint steps[]; };
+layout(std430, binding = 5) writeonly buffer Entries { uint entries[]; };
 layout(std430, binding = 6) buffer Report {
     uint longest;
     uint most_found;
-    uint step_total;
+    uint entry_total;
     uint left_count; // groups left to the second round
 };
 layout(push_constant) uniform Push {
@@ -49,7 +49,7 @@ layout(push_constant) uniform Push {
     uint member_first; // four to a quad
     uint lamp_first;   // quads: axis and cosine; radiance, entity, whether coloured
     uint lamp_count;
-    uint capacity;     // steps of a cluster
+    uint capacity;     // entries of a cluster
     uint switches;
     float sky;         // radiance; negative without one
     float brightest;
@@ -181,16 +181,16 @@ void order(uint count, uint lane) {
             uint other = ORDERED(j);
             rank += uint(KEY(other) < key || (KEY(other) == key && (OCCLUDER(other) & SKY_CHAIN) < e));
         }
-        atomicOr(OCCLUDER(i), rank << STEP_BITS);
+        atomicOr(OCCLUDER(i), rank << ENTRY_BITS);
     }
     meet();
     for (uint i = lane; i < count; i += LANES) {
-        ORDERED(OCCLUDER(i) >> STEP_BITS) = OCCLUDER(i) & SKY_CHAIN;
+        ORDERED(OCCLUDER(i) >> ENTRY_BITS) = OCCLUDER(i) & SKY_CHAIN;
     }
 }
 #endif
 
-// One cluster: its steps.
+// One cluster: its entries.
 void walk(uint at, Entity receiver, uint receiver_index, uint count) {
     Scope scope = scope_of(receiver, bounds[clusters[at].bounds]);
     uint first = at * capacity, made = 0;
@@ -205,7 +205,7 @@ void walk(uint at, Entity receiver, uint receiver_index, uint count) {
         if (!of_sky && (lamp_index == receiver_index || !light_listed(scope, facing, lamp.x, light))) {
             continue;
         }
-        uint chain = (of_sky ? SKY_CHAIN : lamp_index) << STEP_BITS;
+        uint chain = (of_sky ? SKY_CHAIN : lamp_index) << ENTRY_BITS;
         for (uint k = 0; k < count; k++) {
             uint e = ORDERED(k);
             View view = view_of(scope, body(e));
@@ -213,13 +213,13 @@ void walk(uint at, Entity receiver, uint receiver_index, uint count) {
                                  : e != lamp_index && occluder_listed(scope, view, light, lamp.x);
             if (needed && view.whole) {
                 if (made < capacity) {
-                    steps[first + made] = e | chain;
+                    entries[first + made] = e | chain;
                 }
                 made++;
             }
             if (needed && view.cap) {
                 if (made < capacity) {
-                    steps[first + made] = e | chain | STEP_CAP;
+                    entries[first + made] = e | chain | ENTRY_CAP;
                 }
                 made++;
             }
@@ -227,21 +227,21 @@ void walk(uint at, Entity receiver, uint receiver_index, uint count) {
         if (!of_sky) {
             bool coloured = floatBitsToUint(lamp.z) != 0;
             for (uint channel = coloured ? 0 : 2; channel < 3; channel++) {
-                uint flags = STEP_LIGHT | (coloured ? channel : 3) << STEP_CHANNEL | (channel == 2 ? STEP_LAST : 0);
+                uint flags = ENTRY_LIGHT | (coloured ? channel : 3) << ENTRY_CHANNEL | (channel == 2 ? ENTRY_LAST : 0);
                 if (made < capacity) {
-                    steps[first + made] = lamp_index | chain | flags;
+                    entries[first + made] = lamp_index | chain | flags;
                 }
                 made++;
             }
         }
     }
-    clusters[at].step_first = first;
-    clusters[at].step_count = min(made, capacity);
+    clusters[at].entry_first = first;
+    clusters[at].entry_count = min(made, capacity);
     if (made > capacity) {
         clusters[at].vertex_count = 0;
     }
     atomicMax(longest, made);
-    atomicAdd(step_total, made);
+    atomicAdd(entry_total, made);
 }
 
 // One group.

@@ -2,8 +2,8 @@
 #extension GL_EXT_control_flow_attributes : require
 // Light on receivers, a cluster of neighbouring vertices a workgroup. Every chain begins with the vertex's transfer, is
 // multiplied by the visibility past the occluders that lie before its light, and meets the light; the sky's chain comes last.
-// Step "gather" lists these steps for each cluster, so that all its vertices walk one list and only what concerns one of them is on
-// it; what a step does to a single vertex (order, overlap, horizon) is decided here.
+// Pass "gather" lists these entries for each cluster, so that all its vertices walk one list and only what concerns one of them is on
+// it; what an entry does to a single vertex (order, overlap, horizon) is decided here.
 #include "merge_layout.glsl"
 #include "generated/basis.glsl"
 #include "generated/cosine.glsl"
@@ -11,7 +11,7 @@
 
 layout(local_size_x = WORKGROUP) in;
 
-layout(std430, binding = 1) readonly buffer Steps { uint steps[]; };
+layout(std430, binding = 1) readonly buffer Entries { uint entries[]; };
 layout(std430, binding = 2) readonly buffer Clusters { Cluster clusters[]; };
 const uint NONE = 0xffffffffu;
 
@@ -78,7 +78,7 @@ void transfer(uint at, Entity receiver, out float t[COEFFICIENTS]) {
     sh_rotate(t, receiver.alpha_beta, receiver.gamma);
 }
 
-// What a vertex brings to every step, and what becomes of it.
+// What a vertex brings to every entry, and what becomes of it.
 struct Vertex {
     vec3 receiver; // centre, world
     vec3 position; // world axes, from there
@@ -94,12 +94,12 @@ float share(Vertex vertex, uint e, Cone cone, uint l) {
     return l == SKY_CHAIN ? 1.0 : before(e, cone, l, light);
 }
 
-// A step that reads a field.
+// An entry that reads a field.
 void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN], inout vec3 sum) {
     uint e = packed & SKY_CHAIN;
-    uint l = (packed >> STEP_BITS) & SKY_CHAIN;
-    bool shines = (packed & STEP_LIGHT) != 0;
-    uint channel = (packed >> STEP_CHANNEL) & 3;
+    uint l = (packed >> ENTRY_BITS) & SKY_CHAIN;
+    bool shines = (packed & ENTRY_LIGHT) != 0;
+    uint channel = (packed >> ENTRY_CHANNEL) & 3;
     bool of_radiance = shines && channel != 3;
 
     Entity entity = ENTITY(e);
@@ -133,7 +133,7 @@ void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN]
     vec3 color = of_radiance ? vec3(channel == 0, channel == 1, channel == 2) : vec3(1.0);
     sum += (shines ? met : 0.0) * color * entity.emission.rgb;
     chain_multiply(t, b);
-    bool anew = (packed & STEP_LAST) != 0;
+    bool anew = (packed & ENTRY_LAST) != 0;
     [[unroll]] for (uint k = 0; k < CHAIN; k++) {
         t[k] = anew ? t_start[k] : t[k];
     }
@@ -141,16 +141,16 @@ void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN]
 
 #if CAPS
 bool is_cap(uint packed) {
-    return (packed & (STEP_LIGHT | STEP_CAP)) == STEP_CAP;
+    return (packed & (ENTRY_LIGHT | ENTRY_CAP)) == ENTRY_CAP;
 }
 
-// A step that takes an occluder for a cap.
+// An entry that takes an occluder for a cap.
 void cover(Vertex vertex, uint packed, inout float t[CHAIN]) {
     uint e = packed & SKY_CHAIN;
     Entity entity = ENTITY(e);
     entity.centre.xyz -= vertex.receiver;
     Cone cone = cone_of(entity.centre, vertex.position);
-    float weight = above_horizon(cone, vertex.normal) * share(vertex, e, cone, (packed >> STEP_BITS) & SKY_CHAIN);
+    float weight = above_horizon(cone, vertex.normal) * share(vertex, e, cone, (packed >> ENTRY_BITS) & SKY_CHAIN);
     float y[COEFFICIENTS];
     float solid_angle = cap_of(entity, cone, y);
     chain_cover(t, y, weight * (1.0 - field_share(cone)) * solid_angle);
@@ -181,34 +181,34 @@ void main() {
     chain_begin(through, t_start);
     float t[CHAIN] = t_start;
     vec3 sum = vec3(0.0);
-    // Nothing may be read without a step: the scene may have no field at all.
-    if (cluster.step_count > 0) {
+    // Nothing may be read without an entry: the scene may have no field at all.
+    if (cluster.entry_count > 0) {
         Vertex vertex = Vertex(receiver.centre.xyz, position, normal);
         uint i = 0;
-        uint packed = steps[cluster.step_first];
+        uint packed = entries[cluster.entry_first];
         // Loops are tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the loop. It jumps
-        // nowhere else, so steps of either kind run as loops of their own, each in turn as long as there are such steps.
+        // nowhere else, so entries of either kind run as loops of their own, each in turn as long as there are such entries.
         do {
 #if CAPS
             do {
                 if (!is_cap(packed)) {
                     look(vertex, packed, t_start, t, sum);
                     i++;
-                    packed = steps[cluster.step_first + min(i, cluster.step_count - 1)];
+                    packed = entries[cluster.entry_first + min(i, cluster.entry_count - 1)];
                 }
-            } while (i < cluster.step_count && !is_cap(packed));
+            } while (i < cluster.entry_count && !is_cap(packed));
             do {
-                if (i < cluster.step_count && is_cap(packed)) {
+                if (i < cluster.entry_count && is_cap(packed)) {
                     cover(vertex, packed, t);
                     i++;
-                    packed = steps[cluster.step_first + min(i, cluster.step_count - 1)];
+                    packed = entries[cluster.entry_first + min(i, cluster.entry_count - 1)];
                 }
-            } while (i < cluster.step_count && is_cap(packed));
+            } while (i < cluster.entry_count && is_cap(packed));
 #else
-            look(vertex, steps[cluster.step_first + i], t_start, t, sum);
+            look(vertex, entries[cluster.entry_first + i], t_start, t, sum);
             i++;
 #endif
-        } while (i < cluster.step_count);
+        } while (i < cluster.entry_count);
     }
 
 #if POINT_CHAIN

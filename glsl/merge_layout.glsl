@@ -55,15 +55,15 @@ struct Cluster {
     uint vertex_count;    // at most a workgroup
     uint transfer_first;  // quad of its first transfer vector; NONE: the cosine of the normal
     uint radiosity_first; // in the radiosity buffer
-    uint step_first;
-    uint step_count;      // at least 1
+    uint entry_first;
+    uint entry_count;      // at least 1
     uint bounds;          // for the gather
 };
 
-// A step: what one lookup is for. Bits 0-13: entity. Bits 14-27: the light whose chain this is, SKY_CHAIN for the sky's.
-const uint STEP_BITS = 14;
-const uint SKY_CHAIN = (1u << STEP_BITS) - 1u;
-const uint STEP_LIGHT = 1u << 28;    // meets the light rather than multiplying an occluder
-const uint STEP_CHANNEL = 29;        // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour
-const uint STEP_LAST = 1u << 31;     // ends the chain: the next step begins anew from the transfer
-const uint STEP_CAP = 1u << 29;      // without STEP_LIGHT: an occluder as a cap
+// An entry: what one lookup is for. Bits 0-13: entity. Bits 14-27: the light whose chain this is, SKY_CHAIN for the sky's.
+const uint ENTRY_BITS = 14;
+const uint SKY_CHAIN = (1u << ENTRY_BITS) - 1u;
+const uint ENTRY_LIGHT = 1u << 28;    // meets the light rather than multiplying an occluder
+const uint ENTRY_CHANNEL = 29;        // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour
+const uint ENTRY_LAST = 1u << 31;     // ends the chain: the next entry begins anew from the transfer
+const uint ENTRY_CAP = 1u << 29;      // without ENTRY_LIGHT: an occluder as a cap

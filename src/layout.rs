@@ -46,10 +46,10 @@ pub struct Cluster {
     pub transfer_first: u32,
     /// First vertex in the radiosity buffer.
     pub radiosity_first: u32,
-    /// First step in the list.
-    pub step_first: u32,
-    /// Steps, at least 1.
-    pub step_count: u32,
+    /// First entry in the list.
+    pub entry_first: u32,
+    /// Entries, at least 1.
+    pub entry_count: u32,
     /// Where the gather on the device finds its bounds.
     pub bounds: u32,
 }
@@ -61,14 +61,14 @@ pub const NONE: u32 = u32::MAX;
 /// limits.
 pub const CLUSTER_VERTICES: u32 = 64;
 
-/// Bits of an entity's number in a step.
-pub const STEP_BITS: u32 = 14;
-/// Entities that a step can name: numbers below this, which stands for the sky.
-pub const STEP_ENTITIES: u32 = (1 << STEP_BITS) - 1;
+/// Bits of an entity's number in an entry.
+pub const ENTRY_BITS: u32 = 14;
+/// Entities that an entry can name: numbers below this, which stands for the sky.
+pub const ENTRY_ENTITIES: u32 = (1 << ENTRY_BITS) - 1;
 
 /// What one lookup of the merge is for, packed into 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum ListEntry {
     /// Multiply the chain of a light (`None`: of the sky) by the visibility past an entity.
     Occlude {
         /// The occluder.
@@ -76,7 +76,7 @@ pub enum Step {
         /// Whose chain it is.
         light: Option<u32>,
     },
-    /// As [`Step::Occlude`], for vertices that see the entity small.
+    /// As [`ListEntry::Occlude`], for vertices that see the entity small.
     Cap {
         /// The occluder.
         entity: u32,
@@ -94,20 +94,20 @@ pub enum Step {
     },
 }
 
-impl Step {
-    /// The two entities that packed bits name; the second is [`STEP_ENTITIES`] in the sky's chain.
+impl ListEntry {
+    /// The two entities that packed bits name; the second is [`ENTRY_ENTITIES`] in the sky's chain.
     pub fn entities(packed: u32) -> [u32; 2] {
-        [packed & STEP_ENTITIES, packed >> STEP_BITS & STEP_ENTITIES]
+        [packed & ENTRY_ENTITIES, packed >> ENTRY_BITS & ENTRY_ENTITIES]
     }
 
     /// The 32 bits that `merge_layout.glsl` takes apart.
     pub fn pack(self) -> u32 {
         match self {
-            Step::Occlude { entity, light } => entity | light.unwrap_or(STEP_ENTITIES) << STEP_BITS,
-            Step::Cap { entity, light } => Step::Occlude { entity, light }.pack() | 1 << (2 * STEP_BITS + 1),
-            Step::Shine { entity, channel, last } => {
+            ListEntry::Occlude { entity, light } => entity | light.unwrap_or(ENTRY_ENTITIES) << ENTRY_BITS,
+            ListEntry::Cap { entity, light } => ListEntry::Occlude { entity, light }.pack() | 1 << (2 * ENTRY_BITS + 1),
+            ListEntry::Shine { entity, channel, last } => {
                 let flags = 1 | channel.unwrap_or(3) << 1 | u32::from(last) << 3;
-                entity | entity << STEP_BITS | flags << (2 * STEP_BITS)
+                entity | entity << ENTRY_BITS | flags << (2 * ENTRY_BITS)
             }
         }
     }

@@ -9,7 +9,7 @@ use common::report;
 use glam::{DQuat, DVec3};
 use shadow_fields::frame::Options;
 use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, FLIGHTS};
-use shadow_fields::layout::{Cluster, Entity, STEP_ENTITIES, Step};
+use shadow_fields::layout::{Cluster, ENTRY_ENTITIES, Entity, ListEntry};
 use shadow_fields::lists::gather::{
     self, Body, Bounds, Chains, FOUND, GROUP_CLUSTERS, Gather, Group, Inputs, Packed, Place, Report, SceneBounds, Scope,
 };
@@ -84,9 +84,9 @@ impl Crowded {
     fn expected(&self) -> Vec<Vec<u32>> {
         let everything = Chains::all(&self.scene_bounds, self.receiver);
         let of = |bounds| {
-            let mut steps = Vec::new();
-            gather::reference(&self.scene_bounds, &self.entity, bounds, &everything, &mut steps);
-            steps
+            let mut entries = Vec::new();
+            gather::reference(&self.scene_bounds, &self.entity, bounds, &everything, &mut entries);
+            entries
         };
         self.clusters.iter().map(of).collect()
     }
@@ -112,7 +112,7 @@ impl Crowded {
         let groups = Buffer::with_data(device, "groups", &groups).unwrap();
         let clusters: Vec<Cluster> = (0..count).map(cluster).collect();
         let clusters = Buffer::with_data(device, "clusters", &clusters).unwrap();
-        let steps = Buffer::new(device, "steps", BufferKind::Device, 4 * u64::from(count * capacity)).unwrap();
+        let entries = Buffer::new(device, "entries", BufferKind::Device, 4 * u64::from(count * capacity)).unwrap();
         let told = Buffer::with_data(device, "report", &[Report::default()]).unwrap();
         let pass = Gather::new(device, &stage.gpu.library, texel, self.scene_bounds.spheres.len()).unwrap();
         let inputs = Inputs {
@@ -121,7 +121,7 @@ impl Crowded {
             bounds: &bounds,
             groups: &groups,
             clusters: &clusters,
-            steps: &steps,
+            entries: &entries,
             report: &told,
         };
         let mut commands = Commands::new(device, "gather").unwrap();
@@ -129,16 +129,16 @@ impl Crowded {
         commands.barrier(Access::ComputeWrite, Access::TransferRead);
         commands.submit().unwrap();
         let clusters: Vec<Cluster> = clusters.download(count as usize).unwrap();
-        let steps: Vec<u32> = steps.download((count * capacity) as usize).unwrap();
-        let list = |cluster: &Cluster| steps[cluster.step_first as usize..][..cluster.step_count as usize].to_vec();
+        let entries: Vec<u32> = entries.download((count * capacity) as usize).unwrap();
+        let list = |cluster: &Cluster| entries[cluster.entry_first as usize..][..cluster.entry_count as usize].to_vec();
         (clusters.iter().map(|cluster| (*cluster, list(cluster))).collect(), told.download(1).unwrap()[0])
     }
 }
 
-fn is_cap(step: u32) -> bool {
-    let [entity, light] = Step::entities(step);
-    let light = (light != STEP_ENTITIES).then_some(light);
-    step == Step::Cap { entity, light }.pack()
+fn is_cap(entry: u32) -> bool {
+    let [entity, light] = ListEntry::entities(entry);
+    let light = (light != ENTRY_ENTITIES).then_some(light);
+    entry == ListEntry::Cap { entity, light }.pack()
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn the_tree_leaves_every_list_as_it_is() {
             assert_eq!(found, expected, "round {round}");
             listed += expected.len();
             // An occluder may stand there by its field and as a cap.
-            let whole = expected.iter().filter(|&&step| !is_cap(step));
+            let whole = expected.iter().filter(|&&entry| !is_cap(entry));
             let count = whole.count() as u64;
             let counts = gather::counts(scene_bounds, *receiver, entity, bounds);
             let left = counts.below_horizon
@@ -169,13 +169,13 @@ fn the_tree_leaves_every_list_as_it_is() {
             assert_eq!(left + count, counts.considered, "every lookup is listed or has a reason");
             let scope = Scope::new(scene_bounds, entity, bounds);
             for (j, body) in scene_bounds.bodies.iter().enumerate().filter(|(j, _)| *j != *receiver as usize) {
-                let on = expected.iter().any(|&step| Step::entities(step)[0] as usize == j);
+                let on = expected.iter().any(|&entry| ListEntry::entities(entry)[0] as usize == j);
                 assert_eq!(scope.lists(j as u32, body, *receiver), on, "round {round}, entity {j}");
                 assert!(!on || scope.may_list(body, scene_bounds.spheres[j]), "round {round}, entity {j}");
             }
         }
     }
-    report(&format!("{listed} steps; the tree offers {offered} of {all} occluders to groups"));
+    report(&format!("{listed} entries; the tree offers {offered} of {all} occluders to groups"));
     assert!(listed > 10_000 && 2 * offered < all, "the tree is of use: {offered} of {all}");
 }
 
@@ -190,12 +190,12 @@ fn the_device_makes_the_lists_of_its_twin() {
         let (lists, said) =
             crowded.on_device(&stage, round.is_multiple_of(2), Packed::new(&crowded.scene_bounds).longest() as u32);
         for (i, ((cluster, found), expected)) in lists.iter().zip(&expected).enumerate() {
-            assert!(found == expected, "round {round}, cluster {i}: {} steps for {}", found.len(), expected.len());
+            assert!(found == expected, "round {round}, cluster {i}: {} entries for {}", found.len(), expected.len());
             assert_eq!(cluster.vertex_count, 64);
         }
         let longest = expected.iter().map(Vec::len).max().unwrap();
-        let steps: usize = expected.iter().map(Vec::len).sum();
-        assert_eq!((said.longest as usize, said.step_total as usize), (longest, steps), "round {round}");
+        let entries: usize = expected.iter().map(Vec::len).sum();
+        assert_eq!((said.longest as usize, said.entry_total as usize), (longest, entries), "round {round}");
     }
 }
 
@@ -236,11 +236,11 @@ fn what_a_group_has_no_room_for_is_gathered_again() {
         let expected = many.expected();
         let (lists, said) = many.on_device(&stage, round % 2 == 0, Packed::new(&many.scene_bounds).longest() as u32);
         for (i, ((cluster, found), expected)) in lists.iter().zip(&expected).enumerate() {
-            assert!(found == expected, "round {round}, cluster {i}: {} steps for {}", found.len(), expected.len());
+            assert!(found == expected, "round {round}, cluster {i}: {} entries for {}", found.len(), expected.len());
             assert_eq!(cluster.vertex_count, 64);
         }
         assert_eq!(said.left_count > 0, said.most_found as usize > FOUND, "{said:?}");
-        assert_eq!(said.step_total as usize, expected.iter().map(Vec::len).sum::<usize>());
+        assert_eq!(said.entry_total as usize, expected.iter().map(Vec::len).sum::<usize>());
         left.push(said.left_count);
     }
     report(&format!("groups left to the second round: {left:?}"));
@@ -277,8 +277,8 @@ fn town(edge: usize) -> shadow_fields::scene::Scene {
     scene(&text)
 }
 
-/// Whole frames by both, moving and at rest: the same light to the bit, the same clusters merged, the same steps. Lists of more
-/// than 64 steps need a second try, which nobody sees.
+/// Whole frames by both, moving and at rest: the same light to the bit, the same clusters merged, the same entries. Lists of more
+/// than 64 entries need a second try, which nobody sees.
 #[test]
 fn frames_are_the_same_by_either() {
     let Some(stage) = stage() else { return };
@@ -297,7 +297,7 @@ fn frames_are_the_same_by_either() {
             let expected = stage.light(&mut by_host, &placements);
             let found: Vec<_> = (0..placements.len()).map(|entity| by_device.radiosity(entity).unwrap()).collect();
             assert!(found == expected, "eps {eps}, round {round}");
-            assert!(by_device.merged.merged_steps > 0);
+            assert!(by_device.merged.merged_entries > 0);
             assert_eq!(by_device.merged, by_host.merged, "eps {eps}, round {round}");
             assert!(by_device.render(&placements, None).unwrap().is_empty(), "at rest nothing is gathered");
         }
@@ -316,7 +316,7 @@ fn crowd(stage: &Stage, lights: usize) -> (shadow_fields::scene::Scene, Options,
     let options = Options { eps: 0.0, ..small() };
     let mut by_host = stage.frame(&scene, Options { lists: Some(Place::Host), ..options });
     by_host.render(&scene.at(0.0), None).unwrap();
-    assert!(by_host.merged.merged_steps > FOUND * by_host.merged.clusters);
+    assert!(by_host.merged.merged_entries > FOUND * by_host.merged.clusters);
     let light = by_host.radiosity(100).unwrap();
     (scene, Options { lists: Some(Place::Device), ..options }, light)
 }
@@ -371,7 +371,7 @@ fn a_crowd_is_gathered_in_a_window() {
             "dark"
         });
     }
-    // Lists of 64 steps at first: that they were too short is seen before the third frame.
+    // Lists of 64 entries at first: that they were too short is seen before the third frame.
     assert_eq!(lit, ["dark", "dark", "lit", "lit", "lit"]);
     assert_eq!(frame.merged.merged_clusters, 0, "at rest nothing is merged");
 }

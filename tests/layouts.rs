@@ -52,8 +52,8 @@ fn entities_and_clusters_of_the_merge() {
                 vertex_count,
                 transfer_first,
                 radiosity_first,
-                step_first,
-                step_count,
+                entry_first,
+                entry_count,
                 bounds,
             }
         );
@@ -90,7 +90,7 @@ fn structs_of_the_gather() {
         let reflection = library().shader(&Gather::row(texel, roomy)).unwrap().reflection;
         same_layout!(reflection, Group { first, count, bounds, left });
         assert_eq!(reflection.strides.get("Group"), Some(&(size_of::<Group>() as u32)));
-        same_layout!(reflection, Report { longest, most_found, step_total, left_count });
+        same_layout!(reflection, Report { longest, most_found, entry_total, left_count });
         // Two quads: centre and radius, axis and cosine.
         assert_eq!(reflection.strides.get("Bounds"), Some(&(size_of::<Bounds>() as u32)));
         assert_eq!([offset_of!(Bounds, radius_m), offset_of!(Bounds, axis), offset_of!(Bounds, cosine)], [12, 16, 28]);

@@ -47,7 +47,7 @@ pub struct ScalingPoint {
     /// The same with lists made by the device, in turns with the other.
     pub device_lists_ms: Option<f64>,
     /// Lookups a vertex.
-    pub steps_a_vertex: f64,
+    pub entries_a_vertex: f64,
     /// What the lists leave off.
     pub counts: Counts,
     /// Relative root mean square error of some vertices against ray casting.
@@ -180,7 +180,7 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
     };
     let (walls, merges) = timed(&mut frame, &|round| everything(round as f64))?;
     let vertices = frame.receiver_vertex_count();
-    let steps_a_vertex = frame.merged.merged_steps as f64 / frame.merged.clusters.max(1) as f64;
+    let entries_a_vertex = frame.merged.merged_entries as f64 / frame.merged.clusters.max(1) as f64;
     let last = scene.entities.len() - 1;
     let (one, _) = timed(&mut frame, &|round| {
         let mut now = placements.clone();
@@ -206,7 +206,7 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
         rest_ms: spread(&rest),
         host_lists_ms: lists_ms.map(|[host, _]| host),
         device_lists_ms: lists_ms.map(|[_, device]| device),
-        steps_a_vertex,
+        entries_a_vertex,
         counts: frame.counts(&placements),
         error: error(bench, &mut frame, &placements)?,
         memory_bytes: frame.memory(),
@@ -275,7 +275,7 @@ fn plot(axis: &str, points: &[&ScalingPoint]) -> Plot {
                 "lookups a vertex",
                 vec![
                     curve("lookups, nothing skipped", true, &|p| Some(each(p, p.counts.considered as f64))),
-                    curve("lookups done", true, &|p| Some(p.steps_a_vertex)),
+                    curve("lookups done", true, &|p| Some(p.entries_a_vertex)),
                 ],
             ),
             panel(

@@ -31,8 +31,8 @@ pub struct Side {
     /// Device time of the merge, milliseconds.
     pub merge_ms: Spread,
     /// Lookups in the lists that were merged, one for 64 vertices.
-    #[serde(rename = "step_count")]
-    pub steps: usize,
+    #[serde(rename = "entry_count")]
+    pub entries: usize,
     /// Against ray casting.
     pub error: Difference,
     /// Fields on the device, bytes.
@@ -289,7 +289,7 @@ impl Judge {
                 }
             }
         }
-        let steps = [frames[0].merged.merged_steps, frames[1].merged.merged_steps];
+        let entries = [frames[0].merged.merged_entries, frames[1].merged.merged_entries];
         let mut found = Vec::new();
         for frame in &mut frames {
             frame.render(placements, None)?;
@@ -298,7 +298,7 @@ impl Judge {
         let side = |i: usize| Side {
             frame_ms: spread(&walls[i]),
             merge_ms: spread(&merges[i]),
-            steps: steps[i],
+            entries: entries[i],
             error: difference(&found[i], &self.truth, self.unit),
             field_bytes: frames[i].memory().fields,
             ready_ms: ready_ms[i],

@@ -18,7 +18,7 @@ pub struct Memory {
     pub radiosity: u64,
     /// What is drawn: positions, emission and indices of meshes.
     pub drawables: u64,
-    /// Entities, clusters, steps, sky and outlines.
+    /// Entities, clusters, entries, sky and outlines.
     pub lists: u64,
     /// Images and the buffer that a picture is read back through.
     pub pictures: u64,
@@ -36,7 +36,7 @@ impl Memory {
 impl Frame {
     /// Memory that the scene takes now, meshes as read from their files apart.
     pub fn memory(&self) -> Memory {
-        let uploads = [&self.entities, &self.clusters, &self.steps, &self.sky];
+        let uploads = [&self.entities, &self.clusters, &self.entries, &self.sky];
         Memory {
             fields: self.store.fields.size_bytes + self.image.as_ref().map_or(0, Volume::size_bytes),
             transfers: self.store.transfers.size_bytes,

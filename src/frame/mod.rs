@@ -1,7 +1,7 @@
 //! A frame on one screen: upload, passes in order, the barriers between them.
 //!
 //! ```text
-//! placements -> entities, rotations, clusters to merge (host) -> gather (device or host) -> steps of every cluster -> merge -> radiosity -> draw -> picture -> read back
+//! placements -> entities, rotations, clusters to merge (host) -> gather (device or host) -> entries of every cluster -> merge -> radiosity -> draw -> picture -> read back
 //! ```
 
 mod draw_twin;
@@ -84,7 +84,7 @@ pub struct Frame {
     library: Library,
     entities: Upload,
     clusters: Upload,
-    steps: Upload,
+    entries: Upload,
     sky: Upload,
     radiosity: Buffer,
     radiosity_offsets: Vec<u64>,
@@ -158,7 +158,7 @@ impl Frame {
             edges: Vec::new(),
             entities: upload("entities", count * size_of::<layout::Entity>() as u64)?,
             clusters: upload("clusters", (lists.clusters.len() * size_of::<layout::Cluster>()) as u64)?,
-            steps: upload("steps", 4 * lists.clusters.len() as u64)?,
+            entries: upload("entries", 4 * lists.clusters.len() as u64)?,
             sky: upload("sky", 12 * channel_stride(bands) as u64)?,
             radiosity,
             radiosity_offsets,
@@ -313,7 +313,7 @@ impl Frame {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         Ok(Inputs {
             entities: Readable::shared(&self.entities, self.variant)?,
-            steps: self.gathering.as_ref().and_then(Gathering::steps).unwrap_or(&self.steps),
+            entries: self.gathering.as_ref().and_then(Gathering::entries).unwrap_or(&self.entries),
             clusters: &self.clusters,
             fields: Readable::fields(&self.store.fields, self.image.as_ref(), &self.form)?,
             transfers: Readable::new(&self.store.transfers, self.variant, floats)?,

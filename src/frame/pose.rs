@@ -1,4 +1,4 @@
-//! What an entity is to the merge at a moment: its place, rotation and light, and the steps of every cluster.
+//! What an entity is to the merge at a moment: its place, rotation and light, and the entries of every cluster.
 
 use super::Frame;
 use super::live::{Lit, Part};
@@ -21,7 +21,7 @@ use glam::DVec3;
 use std::f64::consts::PI;
 
 impl Frame {
-    /// Writes what has changed for the merge at this moment: clusters to light, their steps, and all entities. Where merged light
+    /// Writes what has changed for the merge at this moment: clusters to light, their entries, and all entities. Where merged light
     /// is shown in `parts` of the picture, only what they may show has to be lit.
     pub(super) fn upload(&mut self, placements: &[Placement], parts: &[Part]) -> Result<()> {
         let sights = self.sights(placements, parts);
@@ -30,7 +30,7 @@ impl Frame {
         let stale_clusters = self.lists.stale_count();
         self.merged = Merged { clusters: self.lists.clusters.len(), merged_clusters, stale_clusters, ..self.merged };
         if dirty.is_empty() {
-            self.merged.merged_steps = 0;
+            self.merged.merged_entries = 0;
             return Ok(());
         }
         self.entities.write(&self.lists.now().entities)?;
@@ -39,12 +39,12 @@ impl Frame {
         {
             return self.clusters.write(&clusters);
         }
-        let (clusters, steps) = self.lists.gather(&dirty);
+        let (clusters, entries) = self.lists.gather(&dirty);
         if self.device.info.is_software() {
-            limits::check_steps(clusters.iter().map(|cluster| cluster.step_count).max().unwrap_or(0))?;
+            limits::check_entries(clusters.iter().map(|cluster| cluster.entry_count).max().unwrap_or(0))?;
         }
-        self.merged.merged_steps = steps.len();
-        self.steps.write(&steps)?;
+        self.merged.merged_entries = entries.len();
+        self.entries.write(&entries)?;
         self.clusters.write(&clusters)
     }
 
@@ -66,7 +66,7 @@ impl Frame {
     }
 
     fn heed(&mut self, report: &Report) -> bool {
-        self.merged.merged_steps = report.step_total as usize;
+        self.merged.merged_entries = report.entry_total as usize;
         let lost = self.gathering.as_mut().is_some_and(|gathering| gathering.lost(report));
         if lost {
             self.lists.forget();
@@ -188,7 +188,7 @@ impl Frame {
     }
 }
 
-/// Clusters of one receiver, without steps; `radiosity_first` is its first vertex in the radiosity buffer.
+/// Clusters of one receiver, without entries; `radiosity_first` is its first vertex in the radiosity buffer.
 pub(super) fn clusters(
     receiver: usize,
     geometry: &scene_buffers::Geometry,

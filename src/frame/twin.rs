@@ -4,7 +4,7 @@ use super::Frame;
 use crate::error::Result;
 use crate::field::log_space::{logarithms, widened};
 use crate::field::{Area, ShadowField};
-use crate::layout::{CLUSTER_VERTICES, STEP_ENTITIES, Step};
+use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
 use crate::lists::gather::{self, Chains, Counts};
 use crate::lists::incremental::State;
 use crate::merge::chain::Method;
@@ -155,7 +155,7 @@ impl Twin<'_> {
         let lit = |receiver: &Receiver| {
             let leaves = |v: usize, j: usize, light: Option<usize>| {
                 let Some((cluster_of, listed)) = &receiver.listed else { return false };
-                !listed[cluster_of[v]].contains(&(j as u32, light.map_or(STEP_ENTITIES, |l| l as u32)))
+                !listed[cluster_of[v]].contains(&(j as u32, light.map_or(ENTRY_ENTITIES, |l| l as u32)))
             };
             let task = Task {
                 objects: &objects,
@@ -189,9 +189,9 @@ fn listed(state: &State, receiver: usize, geometry: &Geometry) -> Listed {
     }
     let chains = Chains::all(scene_bounds, receiver as u32);
     let of_cluster = |bounds| {
-        let mut steps = Vec::new();
-        gather::reference(scene_bounds, entity, bounds, &chains, &mut steps);
-        steps.into_iter().map(|step| Step::entities(step).into()).collect()
+        let mut entries = Vec::new();
+        gather::reference(scene_bounds, entity, bounds, &chains, &mut entries);
+        entries.into_iter().map(|entry| ListEntry::entities(entry).into()).collect()
     };
     (cluster_of, geometry.clusters.iter().map(of_cluster).collect())
 }

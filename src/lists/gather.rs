@@ -1,8 +1,8 @@
-//! Step "gather": which lookups each cluster of vertices needs, in which order. On the device as a pass of the frame, or on the
+//! Pass "gather": which lookups each cluster of vertices needs, in which order. On the device as a pass of the frame, or on the
 //! host, with the same outcome to the bit.
 //!
-//! Inputs: bounding spheres of the entities, their switches, bounds of the clusters. Output: a list of [`Step`]s a cluster.
-//! A step is left off when it changes no vertex of the cluster (an occluder farther than the light from all of them, or one
+//! Inputs: bounding spheres of the entities, their switches, bounds of the clusters. Output: a list of [`ListEntry`]s a cluster.
+//! An entry is left off when it changes no vertex of the cluster (an occluder farther than the light from all of them, or one
 //! that the skips in `merge_cone.glsl` weigh with zero everywhere), and, with a threshold `eps`, when the light that it could
 //! take or bring is bounded below it ([`crate::lists::scope`]). Neighbouring clusters are gathered together, so that the work grows with
 //! what may matter to any of them and not with what exists: the host finds that through a tree of the occluders, the device by
@@ -11,7 +11,7 @@
 
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
-use crate::layout::{self, Step};
+use crate::layout::{self, ListEntry};
 pub use crate::lists::scene_bounds::{Body, Bounds, Counts, Lamp, SceneBounds, distance_key};
 pub use crate::lists::scope::Scope;
 use crate::lists::scope::{BELOW, Fate, GROUP_SLACK, SLACK, SLACK_RAD, View, cap_sines, fade, fade_sine};
@@ -36,9 +36,9 @@ pub const FOUND: usize = 1024;
 /// Workgroups of the second round, each with memory of its own for as many occluders as there are: 8 bytes for each, 512 KiB in all
 /// for 4 096. Each takes one such group after the other.
 const ROOMS: u32 = 16;
-/// Occluders times chains that the pass looks at for a cluster on a software device, and steps that a merge takes there: llvmpipe
+/// Occluders times chains that the pass looks at for a cluster on a software device, and entries that a merge takes there: llvmpipe
 /// (Mesa 22.3) ends all loops of an invocation after 65 535 turns together, without a word. To sort 1 024 occluders takes up to
-/// half of them, and a step of the merge up to two.
+/// half of them, and an entry of the merge up to two.
 pub const TURNS: u32 = 30_000;
 
 /// Where lists are made.
@@ -103,7 +103,7 @@ impl Chains {
     }
 }
 
-/// The CPU twin of the pass for one cluster: appends its steps. `chains` are those of a group that the cluster belongs to, or all.
+/// The CPU twin of the pass for one cluster: appends its entries. `chains` are those of a group that the cluster belongs to, or all.
 pub fn reference(
     scene_bounds: &SceneBounds,
     entity: &layout::Entity,
@@ -162,17 +162,17 @@ fn walk(
             tell(if fate == Fate::Listed && !view.whole { Fate::Cap } else { fate }, 1);
             let (entity, light) = (j, lamp.map(|lamp| lamp.entity));
             if fate == Fate::Listed && view.whole {
-                out.push(Step::Occlude { entity, light }.pack());
+                out.push(ListEntry::Occlude { entity, light }.pack());
             }
             if fate == Fate::Listed && view.cap {
-                out.push(Step::Cap { entity, light }.pack());
+                out.push(ListEntry::Cap { entity, light }.pack());
             }
         }
         if let Some(lamp) = lamp {
             let channels = if lamp.coloured == 0 { 1 } else { 3 };
             out.extend((0..channels).map(|channel| {
                 let last = channel + 1 == channels;
-                Step::Shine { entity: lamp.entity, channel: (lamp.coloured != 0).then_some(channel), last }.pack()
+                ListEntry::Shine { entity: lamp.entity, channel: (lamp.coloured != 0).then_some(channel), last }.pack()
             }));
         }
     }
@@ -203,12 +203,12 @@ pub struct Group {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Report {
-    /// Steps of the longest list, as long as it should have been; `u32::MAX` where a group has more to look at than the device can.
+    /// Entries of the longest list, as long as it should have been; `u32::MAX` where a group has more to look at than the device can.
     pub longest: u32,
     /// Most occluders that a group found.
     pub most_found: u32,
-    /// Steps of all lists.
-    pub step_total: u32,
+    /// Entries of all lists.
+    pub entry_total: u32,
     /// Groups that found more than [`FOUND`] and were gathered in the second round.
     pub left_count: u32,
 }
@@ -273,7 +273,7 @@ impl Packed {
         }
     }
 
-    /// Steps of the longest list that there can be.
+    /// Entries of the longest list that there can be.
     pub fn longest(&self) -> u64 {
         let Push { occluder_count, lamp_count, sky, .. } = self.push;
         // Each by its field and as a cap.
@@ -292,11 +292,11 @@ pub struct Inputs<'b> {
     pub bounds: &'b Buffer,
     /// [`Group`]s.
     pub groups: &'b Buffer,
-    /// [`layout::Cluster`]s: where their steps go and how many they are is written. One whose list does not fit loses its vertices,
+    /// [`layout::Cluster`]s: where their entries go and how many they are is written. One whose list does not fit loses its vertices,
     /// so that the merge leaves it as it is.
     pub clusters: &'b Buffer,
     /// `capacity` of them a cluster.
-    pub steps: &'b Buffer,
+    pub entries: &'b Buffer,
     /// A [`Report`], zero before.
     pub report: &'b Buffer,
 }
@@ -342,7 +342,7 @@ impl Gather {
             .define("LANES", LANES)
             .define("BUCKETS", BUCKETS)
             .define("BLOCK", BLOCK as u32)
-            .define("BLOCKS", layout::STEP_ENTITIES.div_ceil(BLOCK as u32))
+            .define("BLOCKS", layout::ENTRY_ENTITIES.div_ceil(BLOCK as u32))
             .define("ROOM", FOUND as u32)
             .define("TURNS", if texel { TURNS } else { u32::MAX })
             .number("FADE_SINE", fade_sine().into())
@@ -356,7 +356,7 @@ impl Gather {
             .number("GROUP_SLACK", GROUP_SLACK.into())
     }
 
-    /// Makes the lists of `group_count` groups, `capacity` steps a cluster at most.
+    /// Makes the lists of `group_count` groups, `capacity` entries a cluster at most.
     ///
     /// # Errors
     /// `Input` when a buffer is larger than the device can bind.
@@ -373,7 +373,7 @@ impl Gather {
         } else {
             Bind::Buffer(inputs.bodies)
         };
-        let others = [inputs.entities, inputs.bounds, inputs.groups, inputs.clusters, inputs.steps, inputs.report]
+        let others = [inputs.entities, inputs.bounds, inputs.groups, inputs.clusters, inputs.entries, inputs.report]
             .map(Bind::Buffer);
         let mut resources: Vec<Bind<'r>> = std::iter::once(bodies).chain(others).collect();
         let push = Push { capacity, ..packed.push };

@@ -8,7 +8,7 @@ use crate::lists::incremental::{Dirty, Lists};
 use crate::shaders::Library;
 use std::sync::Arc;
 
-/// Steps that a list has room for at first, unless it cannot become as long.
+/// Entries that a list has room for at first, unless it cannot become as long.
 const FIRST_CAPACITY: u64 = 64;
 /// Bytes of all lists: beyond this the host makes them, one behind the other.
 const MOST_BYTES: u64 = 1 << 28;
@@ -21,9 +21,9 @@ pub(crate) struct Gathering {
     bodies: Upload,
     groups: Upload,
     report: Upload,
-    /// Steps of all clusters.
-    steps: Buffer,
-    /// Steps that every list has room for.
+    /// Entries of all clusters.
+    entries: Buffer,
+    /// Entries that every list has room for.
     capacity: u64,
     /// The lists would take more than [`MOST_BYTES`], or than the pass can go through: the host makes them from now on.
     refused: bool,
@@ -48,7 +48,7 @@ impl Gathering {
             bodies: upload("bodies", 16)?,
             groups: upload("groups", 16)?,
             report: upload("report", size_of::<Report>() as u64)?,
-            steps: Buffer::new(device, "lists", BufferKind::Device, 4)?,
+            entries: Buffer::new(device, "lists", BufferKind::Device, 4)?,
             capacity: FIRST_CAPACITY,
             refused: false,
             packed: None,
@@ -75,8 +75,8 @@ impl Gathering {
             self.refused = true;
             return Ok(None);
         }
-        if bytes > self.steps.size_bytes {
-            self.steps = Buffer::new(&self.device, "lists", BufferKind::Device, bytes)?;
+        if bytes > self.entries.size_bytes {
+            self.entries = Buffer::new(&self.device, "lists", BufferKind::Device, bytes)?;
         }
         self.bodies.write(&packed.quads)?;
         self.groups.write(&groups)?;
@@ -86,9 +86,9 @@ impl Gathering {
         Ok(Some(clusters))
     }
 
-    /// The steps, where the frame in preparation gathers.
-    pub fn steps(&self) -> Option<&Buffer> {
-        self.packed.as_ref().map(|_| &self.steps)
+    /// The entries, where the frame in preparation gathers.
+    pub fn entries(&self) -> Option<&Buffer> {
+        self.packed.as_ref().map(|_| &self.entries)
     }
 
     /// Records the pass, if the frame gathers, and makes its lists known to the merge.
@@ -103,7 +103,7 @@ impl Gathering {
             bounds: &self.bounds,
             groups: &self.groups,
             clusters,
-            steps: &self.steps,
+            entries: &self.entries,
             report: &self.report,
         };
         commands.pass("gather", |c| self.pass.record(c, &inputs, packed, *capacity, *group_count))?;
@@ -149,6 +149,6 @@ impl Gathering {
     /// Bytes on the device.
     pub fn size_bytes(&self) -> u64 {
         let uploads = self.bodies.all_bytes() + self.groups.all_bytes() + self.report.all_bytes();
-        self.bounds.size_bytes + self.steps.size_bytes + self.pass.size_bytes() + uploads
+        self.bounds.size_bytes + self.entries.size_bytes + self.pass.size_bytes() + uploads
     }
 }

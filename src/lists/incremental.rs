@@ -1,4 +1,4 @@
-//! Which clusters a frame merges, and their steps where the host makes them: a cluster is merged again only when its receiver
+//! Which clusters a frame merges, and their entries where the host makes them: a cluster is merged again only when its receiver
 //! or an entity that stands on its list has changed, before or now.
 //!
 //! What a cluster's merge reads is its receiver, its list and the entities on it, and nothing else that ever changes; and what
@@ -8,7 +8,7 @@
 //! What the camera cannot see is left as it is while things move, and remembered as stale: it is merged once it may be seen, or
 //! once nothing moves any more.
 
-use crate::layout::{self, Step};
+use crate::layout::{self, ListEntry};
 use crate::lists::gather::{self, Bounds, Chains, Counts, GROUP_CLUSTERS, SceneBounds, Scope};
 use crate::lists::sight::{Faces, Sight};
 use crate::scene::Placement;
@@ -48,7 +48,7 @@ impl Dirty {
 
 /// A cluster of one receiver.
 pub(crate) struct Member {
-    /// Without its steps.
+    /// Without its entries.
     pub cluster: layout::Cluster,
     /// Of its vertices.
     pub bounds: Bounds,
@@ -59,7 +59,7 @@ pub(crate) struct Member {
 /// All clusters.
 #[derive(Default)]
 pub(crate) struct Lists {
-    /// Without their steps.
+    /// Without their entries.
     pub clusters: Vec<layout::Cluster>,
     bounds: Vec<Bounds>,
     faces: Vec<Faces>,
@@ -80,7 +80,7 @@ pub struct Merged {
     /// Those that were merged; the others kept their light.
     pub merged_clusters: usize,
     /// Lookups in the lists of those, one for 64 vertices. In a window with lists made on the device, of an earlier frame.
-    pub merged_steps: usize,
+    pub merged_entries: usize,
     /// Clusters that have changed since they were merged and are not seen.
     pub stale_clusters: usize,
 }
@@ -204,31 +204,31 @@ impl Lists {
         Some([seen, hidden].map(|clusters| Dirty { group: index, clusters }))
     }
 
-    /// The steps of clusters at the last update's moment, by the host: clusters that know their place among the steps, and the
-    /// steps.
+    /// The entries of clusters at the last update's moment, by the host: clusters that know their place among the entries, and the
+    /// entries.
     pub fn gather(&self, dirty: &[Dirty]) -> (Vec<layout::Cluster>, Vec<u32>) {
         let now = self.now();
         let of_group = |dirty: &Dirty| {
             let group = &self.groups[dirty.group];
             let entity = &now.entities[group.receiver];
             let chains = Chains::of_group(&now.scene_bounds, group.receiver as u32, entity, &group.bounds);
-            let (mut ends, mut steps) = (Vec::with_capacity(dirty.clusters.len()), Vec::new());
+            let (mut ends, mut entries) = (Vec::with_capacity(dirty.clusters.len()), Vec::new());
             for &cluster in &dirty.clusters {
-                gather::reference(&now.scene_bounds, entity, &self.bounds[cluster], &chains, &mut steps);
-                ends.push(steps.len());
+                gather::reference(&now.scene_bounds, entity, &self.bounds[cluster], &chains, &mut entries);
+                ends.push(entries.len());
             }
-            (ends, steps)
+            (ends, entries)
         };
         let found: Vec<(Vec<usize>, Vec<u32>)> = dirty.par_iter().map(of_group).collect();
         let (mut clusters, mut all) = (Vec::new(), Vec::with_capacity(found.iter().map(|(_, s)| s.len()).sum()));
-        for (dirty, (ends, steps)) in dirty.iter().zip(found) {
+        for (dirty, (ends, entries)) in dirty.iter().zip(found) {
             let mut start = 0;
             for (&cluster, end) in dirty.clusters.iter().zip(ends) {
-                let (step_first, step_count) = ((all.len() + start) as u32, (end - start) as u32);
-                clusters.push(layout::Cluster { step_first, step_count, ..self.clusters[cluster] });
+                let (entry_first, entry_count) = ((all.len() + start) as u32, (end - start) as u32);
+                clusters.push(layout::Cluster { entry_first, entry_count, ..self.clusters[cluster] });
                 start = end;
             }
-            all.extend(steps);
+            all.extend(entries);
         }
         (clusters, all)
     }
@@ -265,15 +265,15 @@ impl Lists {
 
     /// Entities on the lists of a receiver's clusters at a moment.
     pub fn entities_on(&self, state: &State, receiver: usize) -> BTreeSet<usize> {
-        let (mut steps, entity) = (Vec::new(), &state.entities[receiver]);
+        let (mut entries, entity) = (Vec::new(), &state.entities[receiver]);
         for group in self.groups.iter().filter(|group| group.receiver == receiver) {
             let chains = Chains::of_group(&state.scene_bounds, receiver as u32, entity, &group.bounds);
             let clusters = &self.bounds[group.clusters.clone()];
             clusters
                 .iter()
-                .for_each(|bounds| gather::reference(&state.scene_bounds, entity, bounds, &chains, &mut steps));
+                .for_each(|bounds| gather::reference(&state.scene_bounds, entity, bounds, &chains, &mut entries));
         }
-        steps.into_iter().map(|step| Step::entities(step)[0] as usize).collect()
+        entries.into_iter().map(|entry| ListEntry::entities(entry)[0] as usize).collect()
     }
 
     /// Host memory of the clusters, bytes.

@@ -1,4 +1,4 @@
-//! What the lists of step "gather" are made from at one moment: bounds of clusters, bodies of entities, poses of receivers; and
+//! What the lists of pass "gather" are made from at one moment: bounds of clusters, bodies of entities, poses of receivers; and
 //! counts of what they leave off.
 
 use crate::lists::repeatable::dot;

@@ -1,6 +1,6 @@
 //! Pass "merge": light on every vertex of every receiver.
 //!
-//! Inputs: entities, clusters and their steps (see [`crate::lists::gather`]), the field store, transfer vectors,
+//! Inputs: entities, clusters and their entries (see [`crate::lists::gather`]), the field store, transfer vectors,
 //! vertices (position and normal, object frame, two quads each), the sky's coefficients. Output: `radiosity`, four floats a
 //! vertex: radiance that leaves the surface, albedo / pi times the integral of incoming light, without emission.
 
@@ -69,8 +69,8 @@ impl<'b> Readable<'b> {
 pub struct Inputs<'b> {
     /// [`crate::layout::Entity`] of every entity.
     pub entities: Readable<'b>,
-    /// Steps of all clusters.
-    pub steps: &'b Buffer,
+    /// Entries of all clusters.
+    pub entries: &'b Buffer,
     /// [`crate::layout::Cluster`] of every cluster.
     pub clusters: &'b Buffer,
     /// Field store.
@@ -110,7 +110,7 @@ impl Merge {
     ) -> Result<()> {
         let resources = [
             inputs.entities.bind(),
-            Bind::Buffer(inputs.steps),
+            Bind::Buffer(inputs.entries),
             Bind::Buffer(inputs.clusters),
             inputs.fields.bind(),
             inputs.transfers.bind(),

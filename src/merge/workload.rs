@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::{Lattice, Lookup};
 use crate::gpu::{Buffer, BufferKind, Commands, Device, Volume};
-use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, NONE, Step};
+use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, ListEntry, NONE};
 use crate::lists::skip::Skip;
 use crate::merge::shelf::Shelf;
 use crate::merge::variant::{Chain, Form, Variant, uniform_entities};
@@ -25,7 +25,7 @@ pub struct Workload {
     lattice: Lattice,
     entity_limit: u32,
     entities: Buffer,
-    steps: Buffer,
+    entries: Buffer,
     clusters: Buffer,
     fields: Buffer,
     image: Volume,
@@ -77,13 +77,14 @@ impl Workload {
                 [[x, 0.0, z, 0.0], [0.0, 1.0, 0.0, 0.0]]
             })
             .collect();
-        let list: Vec<u32> = (1..=occluder_count).map(|entity| Step::Occlude { entity, light: None }.pack()).collect();
+        let list: Vec<u32> =
+            (1..=occluder_count).map(|entity| ListEntry::Occlude { entity, light: None }.pack()).collect();
         let cluster = |i: u32| Cluster {
             vertex_first: i * CLUSTER_VERTICES,
             vertex_count: CLUSTER_VERTICES,
             transfer_first: NONE,
             radiosity_first: i * CLUSTER_VERTICES,
-            step_count: occluder_count,
+            entry_count: occluder_count,
             ..Default::default()
         };
         let clusters: Vec<Cluster> = (0..vertex_count / CLUSTER_VERTICES).map(cluster).collect();
@@ -99,7 +100,7 @@ impl Workload {
             lattice,
             entity_limit,
             entities: Buffer::with_data(device, "workload entities", &entities)?,
-            steps: Buffer::with_data(device, "workload steps", &list)?,
+            entries: Buffer::with_data(device, "workload entries", &list)?,
             clusters: Buffer::with_data(device, "workload clusters", &clusters)?,
             fields: Buffer::with_data(device, "workload fields", &fields)?,
             image: shelf
@@ -154,7 +155,7 @@ impl Workload {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         Ok(Inputs {
             entities: Readable::shared(&self.entities, variant)?,
-            steps: &self.steps,
+            entries: &self.entries,
             clusters: &self.clusters,
             fields: Readable::fields(&self.fields, variant.image.then_some(&self.image), &self.form(variant))?,
             transfers: Readable::new(&self.transfers, variant, floats)?,

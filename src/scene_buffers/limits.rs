@@ -65,11 +65,11 @@ impl Needs {
     }
 }
 
-/// Refuses a list of steps that a software device would leave off midway.
+/// Refuses a list of entries that a software device would leave off midway.
 ///
 /// # Errors
 /// `Input` with how long it is, the limit, and what would help.
-pub fn check_steps(longest: u32) -> Result<()> {
+pub fn check_entries(longest: u32) -> Result<()> {
     if longest > TURNS {
         return Err(Error::Input(format!(
             "{longest} lookups of occluders and lights matter to one cluster of vertices, a software device makes at most {TURNS}: \
@@ -118,8 +118,8 @@ mod tests {
 
     #[test]
     fn a_list_beyond_the_loop_limit_is_refused_with_numbers() {
-        check_steps(TURNS).unwrap();
-        let error = check_steps(TURNS + 1).unwrap_err();
+        check_entries(TURNS).unwrap();
+        let error = check_entries(TURNS + 1).unwrap_err();
         assert_eq!(error.exit_code(), 4);
         assert!(error.to_string().contains("30001") && error.to_string().contains("--eps"), "{error}");
     }

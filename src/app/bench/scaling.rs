@@ -35,7 +35,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         cells.extend([p.vertices, p.entities, p.lights].map(|n| n.to_string()));
         cells.extend([p.all_move_ms, p.merge_ms, p.one_moves_ms, p.rest_ms].map(|ms| three(ms.median)));
         cells.extend([p.host_lists_ms, p.device_lists_ms].map(|ms| ms.map_or("-".into(), three)));
-        cells.extend([p.merge_ns_a_vertex, p.steps_a_vertex, p.counts.dropped_bound, p.error].map(three));
+        cells.extend([p.merge_ns_a_vertex, p.entries_a_vertex, p.counts.dropped_bound, p.error].map(three));
         cells.push(three(p.device_bytes as f64 / 1048576.0));
         cells.push(p.resident_bytes.map_or("-".into(), |bytes| three(bytes as f64 / 1048576.0)));
         cells
@@ -52,7 +52,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "host lists ms",
         "device lists ms",
         "ns/vertex",
-        "steps",
+        "entries",
         "dropped",
         "error",
         "device MiB",

@@ -43,7 +43,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         let mut cells = vec![row.case.clone(), row.skip.clone()];
         cells.extend([row.off.frame_ms.median, row.on.frame_ms.median, row.times_faster].map(three));
         cells.push(row.left_off_count.map_or("-".into(), |count| count.to_string()));
-        cells.extend([row.off.steps, row.on.steps].map(|steps| steps.to_string()));
+        cells.extend([row.off.entries, row.on.entries].map(|entries| entries.to_string()));
         cells.extend([row.off.error.rms, row.on.error.rms, row.change.max].map(three));
         cells.extend([row.off.field_bytes, row.on.field_bytes].map(|bytes| (bytes / 1024).to_string()));
         cells

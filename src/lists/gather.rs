@@ -14,7 +14,7 @@ use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, De
 use crate::layout::{self, ListEntry};
 pub use crate::lists::scene_bounds::{Body, Bounds, Counts, Lamp, SceneBounds, distance_key};
 pub use crate::lists::scope::Scope;
-use crate::lists::scope::{BELOW, Fate, GROUP_SLACK, SLACK, SLACK_RAD, View, cap_sines, fade, fade_sine};
+use crate::lists::scope::{BELOW, CullResult, GROUP_SLACK, SLACK, SLACK_RAD, View, cap_sines, fade, fade_sine};
 use crate::lists::tree::Crowd;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -118,16 +118,16 @@ pub fn reference(
 pub fn counts(scene_bounds: &SceneBounds, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Counts {
     let (mut counts, mut dropped) = (Counts::default(), 0.0);
     let scope = Scope::new(scene_bounds, entity, bounds);
-    walk(scene_bounds, &scope, &Chains::all(scene_bounds, receiver), &mut Vec::new(), &mut |fate, lookups| {
+    walk(scene_bounds, &scope, &Chains::all(scene_bounds, receiver), &mut Vec::new(), &mut |result, lookups| {
         counts.considered += lookups;
-        match fate {
-            Fate::Listed => {}
-            Fate::Cap => counts.caps += lookups,
-            Fate::BelowHorizon => counts.below_horizon += lookups,
-            Fate::BehindLight => counts.behind_light += lookups,
-            Fate::Apart => counts.apart += lookups,
-            Fate::FacingAway => counts.facing_away += lookups,
-            Fate::BelowEps(bound) => {
+        match result {
+            CullResult::Listed => {}
+            CullResult::Cap => counts.caps += lookups,
+            CullResult::BelowHorizon => counts.below_horizon += lookups,
+            CullResult::BehindLight => counts.behind_light += lookups,
+            CullResult::Apart => counts.apart += lookups,
+            CullResult::FacingAway => counts.facing_away += lookups,
+            CullResult::BelowEps(bound) => {
                 counts.below_eps += lookups;
                 dropped += f64::from(bound);
             }
@@ -142,29 +142,29 @@ fn walk(
     scope: &Scope<'_>,
     chains: &Chains,
     out: &mut Vec<u32>,
-    tell: &mut dyn FnMut(Fate, u64),
+    tell: &mut dyn FnMut(CullResult, u64),
 ) {
     for (lamp, occluders) in &chains.0 {
         let light: Option<View> = lamp.as_ref().map(|lamp| scope.view(scene_bounds.spheres[lamp.entity as usize]));
         if let (Some(lamp), Some(light)) = (lamp, &light) {
-            let fate = scope.light_fate(lamp, light);
-            tell(fate, if lamp.coloured == 0 { 1 } else { 3 });
-            if fate != Fate::Listed {
-                let fate = if let Fate::BelowEps(_) = fate { Fate::BelowEps(0.0) } else { fate };
-                tell(fate, occluders.len() as u64);
+            let result = scope.light_result(lamp, light);
+            tell(result, if lamp.coloured == 0 { 1 } else { 3 });
+            if result != CullResult::Listed {
+                let result = if let CullResult::BelowEps(_) = result { CullResult::BelowEps(0.0) } else { result };
+                tell(result, occluders.len() as u64);
                 continue;
             }
         }
         let radiance = lamp.map_or(scene_bounds.sky.unwrap_or(0.0), |lamp| lamp.radiance);
         for &j in occluders {
             let view = scope.view(scene_bounds.spheres[j as usize]);
-            let fate = scope.occluder_fate(&view, light.as_ref(), radiance);
-            tell(if fate == Fate::Listed && !view.whole { Fate::Cap } else { fate }, 1);
+            let result = scope.occluder_result(&view, light.as_ref(), radiance);
+            tell(if result == CullResult::Listed && !view.whole { CullResult::Cap } else { result }, 1);
             let (entity, light) = (j, lamp.map(|lamp| lamp.entity));
-            if fate == Fate::Listed && view.whole {
+            if result == CullResult::Listed && view.whole {
                 out.push(ListEntry::Occlude { entity, light }.pack());
             }
-            if fate == Fate::Listed && view.cap {
+            if result == CullResult::Listed && view.cap {
                 out.push(ListEntry::Cap { entity, light }.pack());
             }
         }

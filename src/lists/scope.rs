@@ -35,7 +35,7 @@ pub fn fade() -> Angle {
 
 /// What becomes of an entity in a chain.
 #[derive(Clone, Copy, PartialEq)]
-pub enum Fate {
+pub enum CullResult {
     /// It stands on the list.
     Listed,
     /// It stands there as a cap alone.
@@ -153,35 +153,35 @@ impl<'m> Scope<'m> {
     }
 
     /// What becomes of a light.
-    pub fn light_fate(&self, lamp: &Lamp, light: &View) -> Fate {
+    pub fn light_result(&self, lamp: &Lamp, light: &View) -> CullResult {
         if light.below {
-            return Fate::BelowHorizon;
+            return CullResult::BelowHorizon;
         }
         if self.scene_bounds.skip.facing && lamp.facing[3] >= -1.0 && light.distance > self.radius {
             let [x, y, z, cosine] = lamp.facing;
             let away = -dot(light.to, [x, y, z]) * light.inverse;
             if away < Angle::of_cosine(cosine).plus(light.turn).cosine {
-                return Fate::FacingAway;
+                return CullResult::FacingAway;
             }
         }
         self.of_weight(lamp.radiance * light.weight)
     }
 
-    fn of_weight(&self, radiance: f32) -> Fate {
-        if self.negligible(radiance) { Fate::BelowEps(self.reflected(radiance)) } else { Fate::Listed }
+    fn of_weight(&self, radiance: f32) -> CullResult {
+        if self.negligible(radiance) { CullResult::BelowEps(self.reflected(radiance)) } else { CullResult::Listed }
     }
 
     /// An occluder takes at most what comes from its part of the view, and at most what the light brings.
-    pub fn occluder_fate(&self, view: &View, light: Option<&View>, radiance: f32) -> Fate {
+    pub fn occluder_result(&self, view: &View, light: Option<&View>, radiance: f32) -> CullResult {
         if view.below {
-            return Fate::BelowHorizon;
+            return CullResult::BelowHorizon;
         }
         let Some(light) = light else { return self.of_weight(radiance * view.weight) };
         if self.scene_bounds.skip.behind && view.distance > (light.distance + 2.0 * self.radius) * SLACK {
-            return Fate::BehindLight;
+            return CullResult::BehindLight;
         }
         if self.scene_bounds.skip.cones && apart(view, light) {
-            return Fate::Apart;
+            return CullResult::Apart;
         }
         self.of_weight(radiance * view.weight.min(light.weight))
     }
@@ -254,11 +254,12 @@ impl<'m> Scope<'m> {
         let mut chains = scene_bounds.lamps.iter().filter(|lamp| lamp.entity != receiver);
         chains.any(|lamp| {
             let light = self.view(scene_bounds.spheres[lamp.entity as usize]);
-            let needs = |view: &View| self.occluder_fate(view, Some(&light), lamp.radiance) == Fate::Listed;
-            self.light_fate(lamp, &light) == Fate::Listed && (lamp.entity == index || view.as_ref().is_some_and(needs))
-        }) || scene_bounds
-            .sky
-            .is_some_and(|sky| view.as_ref().is_some_and(|view| self.occluder_fate(view, None, sky) == Fate::Listed))
+            let needs = |view: &View| self.occluder_result(view, Some(&light), lamp.radiance) == CullResult::Listed;
+            self.light_result(lamp, &light) == CullResult::Listed
+                && (lamp.entity == index || view.as_ref().is_some_and(needs))
+        }) || scene_bounds.sky.is_some_and(|sky| {
+            view.as_ref().is_some_and(|view| self.occluder_result(view, None, sky) == CullResult::Listed)
+        })
     }
 }
 

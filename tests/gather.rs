@@ -11,7 +11,8 @@ use shadow_fields::frame::Options;
 use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, FLIGHTS};
 use shadow_fields::layout::{Cluster, ENTRY_ENTITIES, Entity, ListEntry};
 use shadow_fields::lists::gather::{
-    self, Body, Bounds, Chains, FOUND, GROUP_CLUSTERS, Gather, Group, Inputs, Packed, Place, Report, SceneBounds, Scope,
+    self, Bounds, Chains, EntityBounds, FOUND, GROUP_CLUSTERS, Gather, Group, Inputs, Packed, Place, Report,
+    SceneBounds, Scope,
 };
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::sh::rotation::turns;
@@ -39,8 +40,8 @@ struct Crowded {
 fn crowded(rng: &mut fastrand::Rng, round: usize, count: usize) -> Crowded {
     let spread_m = if round.is_multiple_of(2) { 60.0 } else { 8.0 };
     let corner = if round % 3 == 2 { DVec3::new(4e3, -7e3, 1e4) } else { DVec3::ZERO };
-    let bodies: Vec<Body> = (0..count)
-        .map(|i| Body {
+    let bounds: Vec<EntityBounds> = (0..count)
+        .map(|i| EntityBounds {
             centre: corner + DVec3::new(rng.f64() - 0.5, 0.1 * rng.f64(), rng.f64() - 0.5) * spread_m,
             radius_m: 0.1 + 0.4 * rng.f64(),
             occludes: i % 5 != 0,
@@ -53,9 +54,9 @@ fn crowded(rng: &mut fastrand::Rng, round: usize, count: usize) -> Crowded {
     let receiver = rng.u32(0..count as u32);
     let rotation = DQuat::from_axis_angle(random_direction(rng), 6.0 * rng.f64());
     let turns = turns(rotation).map(|x| x as f32);
-    let body = bodies[receiver as usize];
+    let own = bounds[receiver as usize];
     let entity = Entity {
-        centre: body.centre.as_vec3().extend(1.0 / body.radius_m as f32).to_array(),
+        centre: own.centre.as_vec3().extend(1.0 / own.radius_m as f32).to_array(),
         alpha_beta: [turns[0], turns[1], turns[2], turns[3]],
         gamma: [turns[4], turns[5]],
         emission: [0.0, 0.0, 0.0, 0.3 + 0.7 * rng.f32()],
@@ -67,7 +68,7 @@ fn crowded(rng: &mut fastrand::Rng, round: usize, count: usize) -> Crowded {
         .chain(["cones", "behind", "horizon", "caps"].map(Skip::without))
         .collect::<Vec<_>>();
     let eps = if round % 6 == 5 { 0.0 } else { 10_f64.powf(-1.5 - 2.5 * rng.f64()) };
-    let scene_bounds = SceneBounds::new(bodies, (round % 4 != 3).then_some(1.2), skips[round % skips.len()], eps);
+    let scene_bounds = SceneBounds::new(bounds, (round % 4 != 3).then_some(1.2), skips[round % skips.len()], eps);
     let facing = random_direction(rng);
     let clusters = (0..GROUP_CLUSTERS)
         .map(|_| {
@@ -168,7 +169,7 @@ fn the_tree_leaves_every_list_as_it_is() {
                 + counts.caps;
             assert_eq!(left + count, counts.considered, "every lookup is listed or has a reason");
             let scope = Scope::new(scene_bounds, entity, bounds);
-            for (j, body) in scene_bounds.bodies.iter().enumerate().filter(|(j, _)| *j != *receiver as usize) {
+            for (j, body) in scene_bounds.entities.iter().enumerate().filter(|(j, _)| *j != *receiver as usize) {
                 let on = expected.iter().any(|&entry| ListEntry::entities(entry)[0] as usize == j);
                 assert_eq!(scope.lists(j as u32, body, *receiver), on, "round {round}, entity {j}");
                 assert!(!on || scope.may_list(body, scene_bounds.spheres[j]), "round {round}, entity {j}");
@@ -228,11 +229,11 @@ fn what_a_group_has_no_room_for_is_gathered_again() {
         // With no threshold all that occlude are found. One that takes fewer of them makes groups differ.
         let eps = if round == 0 { 0.0 } else { 1e-4 * 2.0_f64.powi(round) };
         let mut lamps = 0;
-        for body in &mut many.scene_bounds.bodies {
+        for body in &mut many.scene_bounds.entities {
             lamps += usize::from(body.emits);
             body.emits &= lamps <= 9;
         }
-        many.scene_bounds = SceneBounds::new(many.scene_bounds.bodies, Some(1.2), Skip::ALL, eps);
+        many.scene_bounds = SceneBounds::new(many.scene_bounds.entities, Some(1.2), Skip::ALL, eps);
         let expected = many.expected();
         let (lists, said) = many.on_device(&stage, round % 2 == 0, Packed::new(&many.scene_bounds).longest() as u32);
         for (i, ((cluster, found), expected)) in lists.iter().zip(&expected).enumerate() {

@@ -11,7 +11,7 @@ use glam::DVec3;
 use shadow_fields::check::merge::ARITHMETIC;
 use shadow_fields::field::ShadowField;
 use shadow_fields::frame::Frame;
-use shadow_fields::lists::gather::{Body, SceneBounds};
+use shadow_fields::lists::gather::{EntityBounds, SceneBounds};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::chain::Method;
 use shadow_fields::merge::reference::{Object, Task};
@@ -166,7 +166,7 @@ fn two_occluders_about_as_far_as_a_light() {
 /// The key is in f32: what differs by less comes as equal, and by index, for the merge, for its twin and for the exact chain alike.
 #[test]
 fn equal_keys_go_by_index() {
-    let body = |x: f64| Body {
+    let entity = |x: f64| EntityBounds {
         centre: DVec3::new(x, 2.0, 3.0),
         radius_m: 0.5,
         occludes: true,
@@ -176,7 +176,7 @@ fn equal_keys_go_by_index() {
         facing: None,
     };
     let scene_bounds =
-        SceneBounds::new(vec![body(0.0), body(1.0 + 1e-12), body(1.0), body(1.0 - 1e-5)], None, Skip::ALL, 0.0);
+        SceneBounds::new(vec![entity(0.0), entity(1.0 + 1e-12), entity(1.0), entity(1.0 - 1e-5)], None, Skip::ALL, 0.0);
     let mut order = [1, 2, 3];
     order.sort_by_key(|&j| scene_bounds.order(0, j));
     assert_eq!(order, [3, 1, 2]);

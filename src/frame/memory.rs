@@ -22,7 +22,7 @@ pub struct Memory {
     pub lists: u64,
     /// Images and the buffer that a picture is read back through.
     pub pictures: u64,
-    /// Lists as the host keeps them.
+    /// Cluster lists as the host keeps them.
     pub host_lists: u64,
 }
 

@@ -25,7 +25,7 @@ use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing, Upload, V
 use crate::layout;
 use crate::lists::gather::Place;
 use crate::lists::gathering::Gathering;
-use crate::lists::incremental::{Lists, Merged};
+use crate::lists::incremental::{ClusterLists, Merged};
 use crate::lists::skip::Skip;
 use crate::merge::calibrate;
 use crate::merge::variant::{Chain, Form, Variant, uniform_entities};
@@ -89,7 +89,7 @@ pub struct Frame {
     radiosity: Buffer,
     radiosity_offsets: Vec<u64>,
     readback: Buffer,
-    lists: Lists,
+    lists: ClusterLists,
     /// Where the device makes the lists.
     gathering: Option<Gathering>,
     /// What the last frame did about its clusters.
@@ -123,7 +123,7 @@ impl Frame {
         let (variant, entity_limit) = (form.variant, form.entity_limit);
 
         let mut radiosity_offsets = Vec::new();
-        let (mut radiosity_size, mut lists) = (0, Lists::default());
+        let (mut radiosity_size, mut lists) = (0, ClusterLists::default());
         for (index, entity) in scene.entities.iter().enumerate() {
             let geometry = &store.geometries[entity.mesh];
             radiosity_offsets.push(radiosity_size);

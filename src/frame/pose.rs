@@ -7,7 +7,7 @@ use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::lists::gather::{Body, Bounds, Report, SceneBounds};
+use crate::lists::gather::{Bounds, EntityBounds, Report, SceneBounds};
 use crate::lists::gathering::Gathering;
 use crate::lists::incremental::{Dirty, Member, Merged, State};
 use crate::lists::sight::{Faces, Sight};
@@ -90,18 +90,19 @@ impl Frame {
 
     /// All that lists and merge depend on at this moment.
     pub(super) fn state(&self, placements: &[Placement]) -> State {
-        let bodies: Vec<Body> = placements.iter().enumerate().map(|(index, p)| self.body(index, p)).collect();
+        let bounds: Vec<EntityBounds> =
+            placements.iter().enumerate().map(|(index, p)| self.entity_bounds(index, p)).collect();
         let white = f64::from(-self.scene.data.output.exposure_ev).exp2();
         let sky = (!self.scene.environment.is_none()).then_some(self.sky_radiance);
         let eps = f64::from(self.options.eps) * white;
         State {
             entities: placements.iter().enumerate().map(|(index, p)| self.entity(index, p)).collect(),
-            scene_bounds: SceneBounds::new(bodies, sky, self.options.skip, eps),
+            scene_bounds: SceneBounds::new(bounds, sky, self.options.skip, eps),
             placements: placements.to_vec(),
         }
     }
 
-    fn body(&self, index: usize, placement: &Placement) -> Body {
+    fn entity_bounds(&self, index: usize, placement: &Placement) -> EntityBounds {
         let entity = &self.scene.entities[index];
         let geometry = &self.store.geometries[entity.mesh];
         // A field that nobody needs was not baked, and one of zeros changes nothing.
@@ -116,7 +117,7 @@ impl Frame {
             Extent::Nothing | Extent::All => None,
         });
         let brightest = geometry.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale);
-        Body {
+        EntityBounds {
             centre: self.centre(index, placement),
             radius_m: geometry.radius_m * f64::from(placement.scale),
             occludes: entity.occludes && holds(&geometry.blocked),

@@ -12,7 +12,7 @@
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{self, ListEntry};
-pub use crate::lists::scene_bounds::{Body, Bounds, Counts, Lamp, SceneBounds, distance_key};
+pub use crate::lists::scene_bounds::{Bounds, Counts, EntityBounds, Lamp, SceneBounds, distance_key};
 pub use crate::lists::scope::Scope;
 use crate::lists::scope::{BELOW, CullResult, GROUP_SLACK, SLACK, SLACK_RAD, View, cap_sines, fade, fade_sine};
 use crate::lists::tree::Crowd;

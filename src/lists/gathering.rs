@@ -4,7 +4,7 @@
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, FLIGHTS, Upload};
 use crate::lists::gather::{Gather, Inputs, Packed, Report};
-use crate::lists::incremental::{Dirty, Lists};
+use crate::lists::incremental::{ClusterLists, Dirty};
 use crate::shaders::Library;
 use std::sync::Arc;
 
@@ -39,7 +39,7 @@ impl Gathering {
     ///
     /// # Errors
     /// As [`Gather::new`] and [`Buffer::new`].
-    pub fn new(device: &Arc<Device>, library: &Library, lists: &Lists, entity_count: usize) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, library: &Library, lists: &ClusterLists, entity_count: usize) -> Result<Self> {
         let upload = |name: &str, bytes: u64| Upload::new(device, name, bytes);
         Ok(Gathering {
             device: device.clone(),
@@ -61,7 +61,7 @@ impl Gathering {
     ///
     /// # Errors
     /// As [`Buffer::new`].
-    pub fn prepare(&mut self, lists: &Lists, dirty: &[Dirty]) -> Result<Option<Vec<crate::layout::Cluster>>> {
+    pub fn prepare(&mut self, lists: &ClusterLists, dirty: &[Dirty]) -> Result<Option<Vec<crate::layout::Cluster>>> {
         self.packed = None;
         if self.refused {
             return Ok(None);

@@ -58,7 +58,7 @@ pub(crate) struct Member {
 
 /// All clusters.
 #[derive(Default)]
-pub(crate) struct Lists {
+pub(crate) struct ClusterLists {
     /// Without their entries.
     pub clusters: Vec<layout::Cluster>,
     bounds: Vec<Bounds>,
@@ -85,7 +85,7 @@ pub struct Merged {
     pub stale_clusters: usize,
 }
 
-impl Lists {
+impl ClusterLists {
     /// Adds the clusters of one receiver, neighbours beside each other.
     pub fn add(&mut self, receiver: usize, clusters: Vec<Member>) {
         let first = self.clusters.len();
@@ -296,7 +296,7 @@ impl<'b> Moved<'b> {
         let same = |i: usize| {
             now.placements[i] == before.placements[i]
                 && bytemuck::bytes_of(&now.entities[i]) == bytemuck::bytes_of(&before.entities[i])
-                && now.scene_bounds.bodies[i] == before.scene_bounds.bodies[i]
+                && now.scene_bounds.entities[i] == before.scene_bounds.entities[i]
         };
         let flags: Vec<bool> = (0..now.placements.len()).map(|i| !same(i)).collect();
         let list: Vec<usize> = (0..flags.len()).filter(|&i| flags[i]).collect();
@@ -308,7 +308,7 @@ impl<'b> Moved<'b> {
         let both = [&self.before.scene_bounds, &now.scene_bounds];
         let scopes = both.map(|scene_bounds| Scope::new(scene_bounds, &now.entities[receiver], bounds));
         let near = |j: usize| {
-            j != receiver && both.iter().zip(&scopes).any(|(m, scope)| scope.may_list(&m.bodies[j], m.spheres[j]))
+            j != receiver && both.iter().zip(&scopes).any(|(m, scope)| scope.may_list(&m.entities[j], m.spheres[j]))
         };
         self.list.iter().copied().filter(|&j| near(j)).collect()
     }
@@ -317,7 +317,7 @@ impl<'b> Moved<'b> {
     fn any_on_list(&self, now: &State, receiver: usize, bounds: &Bounds, list: &[usize]) -> bool {
         let on = |scene_bounds: &SceneBounds| {
             let scope = Scope::new(scene_bounds, &now.entities[receiver], bounds);
-            list.iter().any(|&j| scope.lists(j as u32, &scene_bounds.bodies[j], receiver as u32))
+            list.iter().any(|&j| scope.lists(j as u32, &scene_bounds.entities[j], receiver as u32))
         };
         on(&self.before.scene_bounds) || on(&now.scene_bounds)
     }

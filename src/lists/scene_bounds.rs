@@ -1,4 +1,4 @@
-//! What the lists of pass "gather" are made from at one moment: bounds of clusters, bodies of entities, poses of receivers; and
+//! What the lists of pass "gather" are made from at one moment: bounds of clusters and of entities, lights; and
 //! counts of what they leave off.
 
 use crate::lists::repeatable::dot;
@@ -68,7 +68,7 @@ impl Bounds {
 
 /// One entity as the gather sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Body {
+pub struct EntityBounds {
     /// Centre of the bounding sphere in the world, metres.
     pub centre: DVec3,
     /// Its radius in the world, metres.
@@ -105,7 +105,7 @@ pub struct Lamp {
 /// What the lists are made from at one moment.
 pub struct SceneBounds {
     /// All entities.
-    pub bodies: Vec<Body>,
+    pub entities: Vec<EntityBounds>,
     /// Their bounding spheres: centre in the world and radius, metres.
     pub spheres: Vec<[f32; 4]>,
     /// Those that occlude.
@@ -125,30 +125,31 @@ pub struct SceneBounds {
 }
 
 impl SceneBounds {
-    /// Sorts `bodies` for the lists.
-    pub fn new(bodies: Vec<Body>, sky: Option<f64>, skip: Skip, eps: f64) -> Self {
-        let sphere = |body: &Body| body.centre.as_vec3().extend(body.radius_m as f32).to_array();
-        let spheres: Vec<[f32; 4]> = bodies.iter().map(sphere).collect();
-        let occluders: Vec<u32> = (0..bodies.len()).filter(|&j| bodies[j].occludes).map(|j| j as u32).collect();
-        let lamps = bodies.iter().enumerate().filter(|(_, body)| body.emits).map(|(j, body)| Lamp {
-            facing: body.facing.map_or([0.0, 0.0, 0.0, -2.0], |(axis, half_angle)| {
+    /// Sorts `entities` for the lists.
+    pub fn new(entities: Vec<EntityBounds>, sky: Option<f64>, skip: Skip, eps: f64) -> Self {
+        let sphere = |entity: &EntityBounds| entity.centre.as_vec3().extend(entity.radius_m as f32).to_array();
+        let spheres: Vec<[f32; 4]> = entities.iter().map(sphere).collect();
+        let occluders: Vec<u32> = (0..entities.len()).filter(|&j| entities[j].occludes).map(|j| j as u32).collect();
+        let lamps = entities.iter().enumerate().filter(|(_, entity)| entity.emits).map(|(j, entity)| Lamp {
+            facing: entity.facing.map_or([0.0, 0.0, 0.0, -2.0], |(axis, half_angle)| {
                 axis.as_vec3().extend((half_angle + SLACK_RAD).min(PI).cos() as f32).to_array()
             }),
-            radiance: body.radiance as f32,
+            radiance: entity.radiance as f32,
             entity: j as u32,
-            coloured: u32::from(body.coloured),
+            coloured: u32::from(entity.coloured),
             spare: 0,
         });
         let lamps: Vec<Lamp> = lamps.collect();
         let sky = sky.map(|sky| sky as f32);
         let brightest = lamps.iter().map(|lamp| lamp.radiance).fold(sky.unwrap_or(0.0), f32::max);
         let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));
-        SceneBounds { tree, occluders, lamps, sky, brightest, skip, eps: eps as f32, spheres, bodies }
+        SceneBounds { tree, occluders, lamps, sky, brightest, skip, eps: eps as f32, spheres, entities }
     }
 
-    /// Whether lists of the other moment hold here too where no body has changed.
+    /// Whether lists of the other moment hold here too where no entity has changed.
     pub fn is_like(&self, other: &SceneBounds) -> bool {
-        self.bodies.len() == other.bodies.len() && (self.sky, self.skip, self.eps) == (other.sky, other.skip, other.eps)
+        self.entities.len() == other.entities.len()
+            && (self.sky, self.skip, self.eps) == (other.sky, other.skip, other.eps)
     }
 
     /// The key by which the occluders of a receiver are ordered, near to far from the centre of its bounding sphere: products

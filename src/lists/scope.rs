@@ -4,7 +4,7 @@
 
 use crate::layout;
 use crate::lists::repeatable::{Angle, dot, inverse, inverse_root};
-use crate::lists::scene_bounds::{Body, Bounds, Lamp, SceneBounds};
+use crate::lists::scene_bounds::{Bounds, EntityBounds, Lamp, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 
@@ -242,13 +242,13 @@ impl<'m> Scope<'m> {
     }
 
     /// Whether an entity may stand on the list of any cluster within the bounds.
-    pub fn may_list(&self, body: &Body, [x, y, z, radius_m]: [f32; 4]) -> bool {
+    pub fn may_list(&self, body: &EntityBounds, [x, y, z, radius_m]: [f32; 4]) -> bool {
         let weight = self.crowd_weight(&Crowd { centre: [x, y, z], reach_m: 0.0, radius_m });
         (body.occludes || body.emits) && !self.negligible(weight * self.scene_bounds.brightest)
     }
 
     /// Whether an entity stands on the list of the cluster.
-    pub fn lists(&self, index: u32, body: &Body, receiver: u32) -> bool {
+    pub fn lists(&self, index: u32, body: &EntityBounds, receiver: u32) -> bool {
         let scene_bounds = self.scene_bounds;
         let view = body.occludes.then(|| self.view(scene_bounds.spheres[index as usize]));
         let mut chains = scene_bounds.lamps.iter().filter(|lamp| lamp.entity != receiver);

@@ -8,6 +8,9 @@ pub enum Error {
     /// A comparison, check or run did not come out as it should (exit code 1).
     #[error("{0}")]
     Failed(String),
+    /// A shader does not compile (exit code 1). The only message that has several lines.
+    #[error("{0}")]
+    Shader(String),
     /// The command line makes no sense (exit code 2).
     #[error("{0}")]
     Usage(String),
@@ -26,11 +29,19 @@ impl Error {
     /// Process exit code: 1 failed, 2 usage, 3 unsupported, 4 bad input, 5 device lost or out of memory.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Failed(_) => 1,
+            Error::Failed(_) | Error::Shader(_) => 1,
             Error::Usage(_) => 2,
             Error::Unsupported(_) => 3,
             Error::Input(_) => 4,
             Error::Device(_) => 5,
+        }
+    }
+
+    /// The message for a terminal: on one line, unless it is a compiler's, and without control characters.
+    pub fn line(&self) -> String {
+        match self {
+            Error::Shader(message) => message.lines().map(one_line).collect::<Vec<_>>().join("\n"),
+            other => one_line(&other.to_string()),
         }
     }
 
@@ -49,12 +60,20 @@ impl Error {
         let join = |message: String| format!("{place}: {message}");
         match self {
             Error::Failed(m) => Error::Failed(join(m)),
+            Error::Shader(m) => Error::Shader(join(m)),
             Error::Usage(m) => Error::Usage(join(m)),
             Error::Unsupported(m) => Error::Unsupported(join(m)),
             Error::Input(m) => Error::Input(join(m)),
             Error::Device(m) => Error::Device(join(m)),
         }
     }
+}
+
+/// Text with its control characters written as escapes: a line break or an escape sequence in a file's name neither breaks a line
+/// nor reaches the terminal.
+pub fn one_line(text: &str) -> String {
+    let escaped = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
+    text.chars().map(escaped).collect()
 }
 
 /// Shorthand for results of this crate.

@@ -1,39 +1,40 @@
 //! Files that are never seen half-written.
 
-use std::fs;
-use std::io::{BufWriter, Result, Write};
-use std::path::Path;
+use std::collections::HashSet;
+use std::fs::{self, File};
+use std::io::{BufWriter, Error, ErrorKind, Result, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use tempfile::NamedTempFile;
+
+/// Start of the name that a file has until it is whole.
+const UNFINISHED: &str = ".unfinished-";
 
 /// Writes a file in its folder under another name and renames it, so that another process sees the old one or the new one,
 /// never a part. What is not a regular file (a pipe, `/dev/stdout`) is written to as it stands; a link keeps pointing where it
-/// did.
+/// did. What killed processes left unfinished in the folder is removed.
 ///
 /// # Errors
 /// What `write` or the file system returns; nothing is left behind then.
-pub fn replace_with<E: From<std::io::Error>>(
+pub fn replace_with<E: From<Error>>(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::result::Result<(), E>,
 ) -> std::result::Result<(), E> {
     if fs::metadata(path).is_ok_and(|m| !m.is_file()) {
-        let mut file = BufWriter::new(fs::File::create(path)?);
+        let mut file = BufWriter::new(File::create(path)?);
         write(&mut file)?;
         return Ok(file.flush()?);
     }
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let target = destination(path)?;
     let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // Like any created file, not private to its owner as temporary files are.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    // The error names the other name, which is nobody's business.
-    let made = builder.prefix(".unfinished-").tempfile_in(folder).map_err(|e| {
-        let text = e.to_string();
-        std::io::Error::new(e.kind(), text.split(" at path ").next().unwrap_or(&text).to_owned())
-    });
-    let mut file = BufWriter::new(made?);
+    sweep_once(folder);
+    let made = unfinished(folder)?;
+    // Through the plain file: errors of the temporary one would show its name, which means nothing to the user.
+    let mut file = BufWriter::new(made.as_file());
     write(&mut file)?;
     file.flush()?;
-    file.into_inner().map_err(|e| e.into_error())?.persist(&target).map_err(|e| e.error)?;
+    drop(file);
+    made.persist(&target).map_err(|e| e.error)?;
     Ok(())
 }
 
@@ -46,4 +47,112 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
         fs::create_dir_all(folder)?;
     }
     replace_with(path, |file| file.write_all(bytes))
+}
+
+/// Where a path leads: through links, also to a file that does not exist yet.
+///
+/// # Errors
+/// That of the file system where links go in circles or may not be followed.
+fn destination(path: &Path) -> Result<PathBuf> {
+    match fs::canonicalize(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => match fs::read_link(path) {
+            Ok(link) => destination(&path.parent().unwrap_or(Path::new("")).join(link)),
+            Err(_) => Ok(path.to_owned()),
+        },
+        found => found,
+    }
+}
+
+/// A new file that its process holds locked for as long as it writes: [`sweep`] knows by the lock which files nobody will finish.
+fn unfinished(folder: &Path) -> Result<NamedTempFile> {
+    loop {
+        let mut builder = tempfile::Builder::new();
+        // Like any created file, not private to its owner as temporary files are.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let made = builder.prefix(UNFINISHED).tempfile_in(folder).map_err(|e| {
+            let text = e.to_string();
+            Error::new(e.kind(), text.split(" at path ").next().unwrap_or(&text).to_owned())
+        })?;
+        // Where locks are not supported nobody sweeps either.
+        if made.as_file().lock().is_err() || made.path().exists() {
+            return Ok(made);
+        }
+        // Another process swept it before it was locked.
+    }
+}
+
+/// Removes what killed processes left unfinished in a folder. A file that a process still writes is locked and stays.
+pub fn sweep(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if !entry.file_name().to_string_lossy().starts_with(UNFINISHED) {
+            continue;
+        }
+        if let Ok(file) = File::open(entry.path())
+            && file.try_lock().is_ok()
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Sweeps a folder the first time that this process writes to it.
+fn sweep_once(folder: &Path) {
+    static SWEPT: Mutex<Option<HashSet<PathBuf>>> = Mutex::new(None);
+    let mut swept = SWEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    if swept.get_or_insert_default().insert(folder.to_owned()) {
+        sweep(folder);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn leftovers_of_killed_processes_are_swept_and_files_in_work_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(".unfinished-killed"), "half").unwrap();
+        let working = unfinished(folder.path()).unwrap();
+        replace(&folder.path().join("a.txt"), b"whole").unwrap();
+        let name = working.path().file_name().unwrap().to_str().unwrap().to_owned();
+        assert_eq!(names(folder.path()), [name, "a.txt".into()]);
+        working.persist(folder.path().join("b.txt")).unwrap();
+        assert_eq!(names(folder.path()), ["a.txt", "b.txt"]);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn links_are_followed_and_circles_refused() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        symlink("two", at("one")).unwrap();
+        symlink("one", at("two")).unwrap();
+        assert!(replace(&at("one"), b"text").is_err());
+        assert!(at("one").is_symlink() && at("two").is_symlink());
+        symlink("later", at("link")).unwrap();
+        replace(&at("link"), b"text").unwrap();
+        assert!(at("link").is_symlink());
+        assert_eq!(fs::read(at("later")).unwrap(), b"text");
+        assert_eq!(names(folder.path()), ["later", "link", "one", "two"]);
+    }
+
+    /// What a full disk or a limit on file sizes says names no file but the one that was asked for.
+    #[test]
+    fn messages_do_not_show_the_unfinished_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = replace(Path::new("/proc/none.txt"), b"text").unwrap_err();
+        assert!(!error.to_string().contains(UNFINISHED), "{error}");
+        let made = replace_with(&folder.path().join("a"), |_| Err(Error::other("full")));
+        assert_eq!(made.unwrap_err().to_string(), "full");
+        assert_eq!(names(folder.path()), [""; 0]);
+    }
 }

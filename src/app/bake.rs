@@ -109,7 +109,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     } else {
         output::say(format!(
             "{}: {} samples ({} filled, {} captured), {} triangles, {} bytes, {:.2} s",
-            arguments.output.display(),
+            output::shown(&arguments.output),
             report.samples + report.filled,
             report.filled,
             field.header.captured_samples,

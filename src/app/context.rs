@@ -5,6 +5,7 @@ use crate::bake::{self, Baker, cache::Cache};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::field::{Lattice, Lookup, Storage};
+use crate::files;
 use crate::frame;
 use crate::gpu::{self, Device, Validation};
 use crate::lists::gather::Place;
@@ -191,6 +192,9 @@ impl Context {
                 false
             }
         });
+        for folder in cache_dir.iter().flat_map(|cache| [cache.clone(), cache.join("fields"), cache.join("spirv")]) {
+            files::sweep(&folder);
+        }
         if let Some(folder) = &global.shader_dir
             && !folder.is_dir()
         {
@@ -260,7 +264,7 @@ impl Context {
             "driver": self.device.info.driver,
             "vulkan": self.device.info.api,
             "seed": global.seed,
-            "command_line": std::env::args().skip(1).collect::<Vec<_>>(),
+            "command_line": std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()).collect::<Vec<_>>(),
         })
     }
 }

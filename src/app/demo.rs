@@ -63,7 +63,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     for (name, animated) in SCENES {
         let scene = load(name)?;
         let row = still(&context, arguments, name, &scene, &mut written, started)?;
-        output::note(global, format!("{}: {:.0} ms a frame", written[written.len() - 1].display(), row.frame_ms));
+        output::note(global, format!("{}: {:.0} ms a frame", output::shown(&written[written.len() - 1]), row.frame_ms));
         rows.push(row);
         if animated && !arguments.no_animations {
             written.push(animation(&context, arguments, name, &scene)?);
@@ -97,7 +97,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let first = rows.first().map_or(0.0, |row| row.first_picture_s);
     output::say(format!("first picture after {first:.2} s, all after {:.1} s", started.elapsed().as_secs_f64()));
     for path in written {
-        output::say(path.display().to_string());
+        output::say(output::shown(&path));
     }
     Ok(())
 }

@@ -7,7 +7,7 @@ use super::{Global, output};
 use crate::asset::Mesh;
 use crate::bake::{self, snapshot::snapshot};
 use crate::bench::text;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 use crate::field::{FieldHeader, FieldKind, Lookup, ShadowField, growth};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
@@ -82,7 +82,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let storage = format!("{:?}", header.storage).to_lowercase();
     let lines = [
         ("kind", format!("{:?}", header.kind).to_lowercase()),
-        ("mesh", format!("{} ({})", header.mesh, &header.mesh_hash[..16.min(header.mesh_hash.len())])),
+        ("mesh", format!("{} ({})", one_line(&header.mesh), &header.mesh_hash[..16.min(header.mesh_hash.len())])),
         ("bounding sphere", format!("centre {:?} m, radius {} m", header.centre_m, header.radius_m)),
         ("bands", format!("{} ({} coefficients a channel)", header.bands, header.bands * header.bands)),
         ("lattice", lattice.to_string()),
@@ -217,7 +217,7 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
         global,
         format!(
             "{}: cubes unfolded: -X +Z +X -Z in a row, +Y above, -Y below; \"white\": the value shown as white{pairs}",
-            path.display()
+            output::shown(path)
         ),
     );
     Ok(())

@@ -14,7 +14,8 @@ mod sheet;
 #[cfg(feature = "view")]
 mod view;
 
-use crate::error::Result;
+use crate::error::{Result, one_line};
+use crate::gpu::signals;
 use clap::{Parser, Subcommand};
 pub use context::Global;
 use std::process::ExitCode;
@@ -56,7 +57,8 @@ enum Command {
 
 /// Runs the program on the process's arguments and returns its exit code.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    signals::fail_writes_beyond_limit();
+    let cli = Cli::try_parse().unwrap_or_else(|error| refuse(error));
     output::start_log(&cli.global);
     match run(&cli).and_then(|()| output::written()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -65,6 +67,12 @@ pub fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Ends the program with what the parser says. It quotes arguments, so it reads them again with their control characters escaped.
+fn refuse(error: clap::Error) -> ! {
+    let arguments = std::env::args_os().map(|argument| one_line(&argument.to_string_lossy()));
+    Cli::try_parse_from(arguments).err().unwrap_or(error).exit()
 }
 
 fn run(cli: &Cli) -> Result<()> {

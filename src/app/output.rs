@@ -1,7 +1,7 @@
 //! What the program says: results, logs, errors, progress bars, tables.
 
 use super::Global;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::cell::RefCell;
 use std::io::Write;
@@ -11,10 +11,11 @@ use std::sync::{Mutex, PoisonError};
 /// What kept results from being written first.
 static UNWRITTEN: Mutex<Option<std::io::Error>> = Mutex::new(None);
 
-/// Writes one line of results to stdout. A reader that went away is no error; any other is kept for [`written`].
-pub fn say(line: impl AsRef<str>) {
+/// Writes lines of results to stdout. A reader that went away is no error; any other is kept for [`written`].
+pub fn say(text: impl AsRef<str>) {
+    let text = text.as_ref().split('\n').map(one_line).collect::<Vec<_>>().join("\n");
     let mut stdout = std::io::stdout().lock();
-    let Err(error) = writeln!(stdout, "{}", line.as_ref()).and_then(|()| stdout.flush()) else { return };
+    let Err(error) = writeln!(stdout, "{text}").and_then(|()| stdout.flush()) else { return };
     if error.kind() != std::io::ErrorKind::BrokenPipe {
         UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
     }
@@ -33,13 +34,18 @@ pub fn written() -> Result<()> {
 
 /// Writes one line of an error to stderr.
 pub fn complain(error: &Error) {
-    let _ = writeln!(std::io::stderr().lock(), "shadow-fields: {error}");
+    let _ = writeln!(std::io::stderr().lock(), "shadow-fields: {}", error.line());
+}
+
+/// A path as it is shown in a line.
+pub fn shown(path: &Path) -> String {
+    one_line(&path.to_string_lossy())
 }
 
 /// Writes one line for people to stderr.
 pub fn note(global: &Global, line: impl AsRef<str>) {
     if !global.quiet {
-        let _ = writeln!(std::io::stderr().lock(), "{}", line.as_ref());
+        let _ = writeln!(std::io::stderr().lock(), "{}", one_line(line.as_ref()));
     }
 }
 
@@ -81,7 +87,12 @@ pub fn start_log(global: &Global) {
         (false, _) => "debug",
     };
     let environment = env_logger::Env::default().default_filter_or(level);
-    let _ = env_logger::Builder::from_env(environment).format_timestamp(None).try_init();
+    let line = |buffer: &mut env_logger::fmt::Formatter, record: &log::Record<'_>| {
+        let (level, style) = (record.level(), buffer.default_level_style(record.level()));
+        let message = one_line(&record.args().to_string());
+        writeln!(buffer, "[{style}{level:<5}{style:#} {}] {message}", record.target())
+    };
+    let _ = env_logger::Builder::from_env(environment).format(line).try_init();
 }
 
 /// A progress bar for one piece of work after another; nothing where stderr is no terminal or bars are not wanted.
@@ -117,7 +128,7 @@ impl Progress {
             let bar = ProgressBar::with_draw_target(Some(all.into()), ProgressDrawTarget::stderr());
             let style = ProgressStyle::with_template(template);
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
-            bar.set_message(what.to_owned());
+            bar.set_message(one_line(what));
             *current = Some((what.to_owned(), bar));
         }
         if let Some((_, bar)) = current.as_ref() {

@@ -8,7 +8,7 @@ use crate::bench::text;
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::scene::Scene;
+use crate::scene::{Scene, values::NUMBER_LIMIT};
 use crate::truth::{self, ErrorMap, error_map, raycast::RayCast};
 use clap::Args;
 use serde_json::json;
@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
     fps: u16,
     /// Scene time of the first picture, seconds; default: the scene's, which is 0 unless it says otherwise
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = time_s, allow_negative_numbers = true)]
     time: Option<f64>,
     /// Size of the picture; default: the scene's
     #[arg(long, value_parser = size, value_name = "WxH")]
@@ -72,9 +72,6 @@ pub struct Arguments {
 
 /// Renders a scene.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    if arguments.time.is_some_and(|time| !time.is_finite()) {
-        return Err(Error::Usage("--time wants a finite number of seconds".into()));
-    }
     let numbered = Numbered::new(&arguments.output, "png")?;
     let others = [&arguments.exr, &arguments.vertices, &arguments.stats, &arguments.error];
     for path in others.into_iter().flatten().chain([&arguments.output]) {
@@ -183,7 +180,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         let walls: Vec<f64> = timings.iter().map(|(_, wall, _)| wall.as_secs_f64() * 1e3).collect();
         output::say(format!(
             "{}: {} entities, {} lit vertices, prepared in {:.0} ms, {} in {:.1} ms (median), variant {}",
-            arguments.output.display(),
+            output::shown(&arguments.output),
             scene.entities.len(),
             frame.receiver_vertex_count(),
             prepared.as_secs_f64() * 1e3,
@@ -213,6 +210,12 @@ fn light_by_rays(frame: &mut Frame, placements: &[crate::scene::Placement], rays
     Ok(error)
 }
 
+/// A scene time in seconds, within the limit of numbers in scene files.
+fn time_s(text: &str) -> std::result::Result<f64, String> {
+    let number = text.parse().ok().filter(|time: &f64| time.abs() <= NUMBER_LIMIT);
+    number.ok_or_else(|| format!("expected seconds from -{NUMBER_LIMIT:e} to {NUMBER_LIMIT:e}, got \"{text}\""))
+}
+
 /// A number above 0.
 fn positive(text: &str) -> std::result::Result<f64, String> {
     let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
@@ -234,12 +237,15 @@ struct Numbered {
 impl Numbered {
     /// A name that ends as the pictures do; `None` where it has no run of `#`.
     fn new(path: &Path, ending: &str) -> Result<Option<Self>> {
-        let text = path.to_str().ok_or_else(|| Error::Usage(format!("{}: the name is not UTF-8", path.display())))?;
-        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case(ending)) {
-            return Err(Error::Usage(format!(
-                "{text}: the name is to end in .{ending} (-o writes PNG, --exr OpenEXR)"
-            )));
-        }
+        output::check_ending(path, ending, "this picture")?;
+        let Some(text) = path.to_str() else {
+            let what = format!("{}: a name with # has to be UTF-8", path.display());
+            return if path.as_os_str().as_encoded_bytes().contains(&b'#') {
+                Err(Error::Usage(what))
+            } else {
+                Ok(None)
+            };
+        };
         Ok(text.find('#').map(|at| {
             let digits = text[at..].bytes().take_while(|b| *b == b'#').count();
             Numbered { before: text[..at].into(), digits, after: text[at + digits..].into() }

@@ -113,5 +113,5 @@ type WriteResult = std::result::Result<(), Box<dyn std::error::Error>>;
 /// # Errors
 /// [`Error::Failed`] with the path; nothing is left behind.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> WriteResult) -> Result<()> {
-    files::replace_with(path, write).map_err(|e| Error::Failed(format!("{}: cannot write: {e}", path.display())))
+    files::replace_with(path, write).map_err(|e| Error::Failed(format!("{}: cannot be written: {e}", path.display())))
 }

@@ -297,9 +297,11 @@ impl Lattice {
         if samples > MAX_SAMPLES || self.shells > 4096 || directions > MAX_SAMPLES {
             return bad(format!("{samples} samples, at most {MAX_SAMPLES} are allowed"));
         }
-        let radii = self.inner.is_finite() && self.outer.is_finite() && self.inner >= 0.0 && self.outer > self.inner;
+        // The bake chooses none nearer.
+        let inner = if self.inner == AUTOMATIC { ROOMY_INNER } else { self.inner };
+        let radii = inner.is_finite() && self.outer.is_finite() && inner >= 0.0 && self.outer > inner;
         if !radii || self.outer > 1e4 {
-            return bad(format!("shells from {} to {} r", self.inner, self.outer));
+            return bad(format!("shells from {inner} to {} r", self.outer));
         }
         if !self.fit().is_usable() {
             return bad("its centre or stretch is out of range".into());

@@ -1,6 +1,7 @@
 //! Instance, logical device and queue: the root that every other Vulkan object keeps alive.
 
 use super::Checked;
+use super::manifest;
 use super::select::{Candidate, choose, physical_devices, queue_family, version_text};
 use super::validation::{LAYER, Messages, Validation, on_message};
 use crate::error::{Error, Result};
@@ -58,8 +59,10 @@ impl Instance {
             ));
         }
         // SAFETY: as above.
-        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
-            .checked("vkEnumerateInstanceExtensionProperties", "instance")?;
+        let extensions = match unsafe { entry.enumerate_instance_extension_properties(None) } {
+            Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = manifest::broken() => return Err(broken),
+            other => other.checked("vkEnumerateInstanceExtensionProperties", "instance")?,
+        };
         let has_debug_utils = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
 
         let application = vk::ApplicationInfo::default()
@@ -94,7 +97,8 @@ impl Instance {
         // SAFETY: every pointer in `create` outlives the call; the handle is destroyed in `Drop` after its children.
         let handle = match unsafe { entry.create_instance(&create, None) } {
             // The loader's way to say that it has no driver to ask.
-            Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => return Err(no_driver()),
+            Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => return Err(manifest::no_driver()),
+            Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = manifest::broken() => return Err(broken),
             other => other.checked("vkCreateInstance", "instance")?,
         };
         let mut instance = Instance { entry, handle, debug: None, has_debug_utils, messages: Box::default() };
@@ -123,17 +127,6 @@ impl Instance {
         self.debug = Some((loader, messenger));
         Ok(())
     }
-}
-
-fn no_driver() -> Error {
-    let variable = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].into_iter().find_map(|name| {
-        let value = std::env::var_os(name)?;
-        Some(format!("; {name} is {}", value.to_string_lossy()))
-    });
-    Error::Unsupported(format!(
-        "no Vulkan driver found (a software driver is in Debian's package mesa-vulkan-drivers{})",
-        variable.unwrap_or_default()
-    ))
 }
 
 impl Drop for Instance {

@@ -12,6 +12,7 @@ pub mod drawing;
 pub mod flight;
 mod heap;
 pub mod image;
+mod manifest;
 pub mod memory;
 #[cfg(feature = "view")]
 pub mod overlay;
@@ -21,6 +22,7 @@ pub mod present;
 pub mod reflect;
 pub mod select;
 pub mod shader;
+pub mod signals;
 pub mod upload;
 pub mod validation;
 pub mod volume;

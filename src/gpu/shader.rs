@@ -166,7 +166,7 @@ fn compile(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> Re
     });
     let artifact = compiler
         .compile_into_spirv(&source.text, source.stage.kind(), source.name, "main", Some(&options))
-        .map_err(|error| failed(error.to_string()))?;
+        .map_err(|error| Error::Shader(format!("{}: {error}", source.name)))?;
     Ok(artifact.as_binary().to_vec())
 }
 

@@ -84,7 +84,7 @@ pub fn measure(device: &Arc<Device>, library: &Library) -> Result<Calibration> {
     let mut contenders = Vec::new();
     for variant in candidates() {
         let merge = match Merge::new(device, library, workload.form(variant)) {
-            Err(error @ Error::Failed(_)) => {
+            Err(error @ (Error::Failed(_) | Error::Shader(_))) => {
                 log::warn!("calibration: {} takes no part: {error}", variant.name);
                 None
             }

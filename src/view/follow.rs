@@ -108,7 +108,7 @@ impl Viewer {
                 watch.compiled();
             }
         } else {
-            log::warn!("{}", errors.join("\n"));
+            errors.iter().flat_map(|error| error.lines()).for_each(|line| log::warn!("{line}"));
             self.shader_error = Some(errors.join("\n"));
         }
         self.pending |= Changed { placements: true, display: true, ..Changed::default() };

@@ -61,7 +61,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         })
         .collect();
     output::table(&["scene", "light", "frame ms", "error", "rays", "rays ms", "times faster", "merge alone"], &rows);
-    let folder = arguments.out.display();
+    let folder = output::shown(&arguments.out);
     output::say(format!("\n{folder}: {} settings measured, {}", outcome.points.len(), outcome.took()));
     output::say(format!("{folder}/time-error.txt says which setting is the default and why"));
     context.finish()

@@ -1,5 +1,5 @@
-//! Bad input through the program: one clear line on stderr that names the file (and the line), the exit code of DESIGN,
-//! section 7, and nothing left behind.
+//! Bad input through the program: one clear line on stderr that names the file (and the line), the exit code that README lists,
+//! and nothing left behind.
 
 #[path = "common/cli.rs"]
 mod cli;

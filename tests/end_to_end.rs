@@ -142,7 +142,8 @@ fn animations_are_one_file_or_numbered() {
     }
 }
 
-/// Three bands of the cap that a sphere of radius 1 blocks: DESIGN's closed form, written out.
+/// Three bands of the cap that a sphere of radius 1 blocks, in closed form: coefficient (l, m) is sqrt(4 pi / (2 l + 1)) z_l times
+/// the basis function in the direction of the cap's middle, where z_l is the zonal integral over a cap about +z.
 fn cap(distance: f64, [x, y, z]: [f64; 3]) -> [f64; 9] {
     let pi = std::f64::consts::PI;
     let c = (1.0 - distance.powi(-2)).sqrt();

@@ -339,7 +339,7 @@ fn instances_and_equal_meshes_share_one_field() {
     assert_eq!(lit(&pair("ball"), small(), &stage), lit(&pair("equal"), small(), &stage));
 }
 
-/// The cosine of DESIGN's convention: light from the side that a normal faces, and none from behind.
+/// The convention of the cosine: a vertex receives light from the side that its normal faces, and none from behind.
 #[test]
 fn light_comes_from_where_it_stands() {
     let Some(stage) = stage() else { return };

@@ -34,7 +34,7 @@ const ORDER: &[&str] = &[
 /// The only modules that `gpu` may use: it knows nothing of what it is for.
 const GPU_USES: &[&str] = &["error", "files"];
 
-/// Lines that a file may have; STYLE asks why above it.
+/// Lines that a file may have. A longer file stands in [`LONG_FILES`] with the reason.
 const LINE_LIMIT: usize = 400;
 
 /// Files over the limit, with the reason.

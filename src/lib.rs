@@ -9,19 +9,19 @@
 //!
 //! | thing | choice |
 //! |---|---|
-//! | SH basis | real, orthonormal, Condon-Shortley phase as in Sloan, *Stupid SH Tricks*: Y1,-1 = -.488603 y, Y1,0 = .488603 z, Y1,1 = -.488603 x; index l(l+1)+m; evaluated as polynomials of a unit vector |
-//! | bands | n bands = n^2 coefficients; "order 4" in the literature is 4 bands, 16 coefficients |
-//! | space | right-handed, +y up, metres; SH are taken on world x, y, z as they stand |
-//! | cube faces | +X -X +Y -Y +Z -Z with Vulkan's s/t on each; texel centres; exact texel solid angle, weights sum to 4 pi |
-//! | field distances | in units of the object's bounding-sphere radius r, from the sphere's centre; shells lie about the middle of the mesh's box, short axes stretched ([`field::fit`]) |
-//! | occlusion field | stores the *blocked* part b = P[1 - V]: 0 where nothing blocks; samples inside the solid are captured off the nearest surface |
-//! | between shells | b / (1 - cos a) is interpolated over sin(a/2), a the half-angle of the bounding sphere, samples lowered by a twelfth of their second differences; beyond 8 r it falls as (8r/d)^2 |
-//! | order | an occluder precedes a light whose bounding sphere's centre is farther from the vertex; ties by entity index |
-//! | small occluders | bounding spheres of a half-angle below 12 degrees (16 with shares between) block a point: the chain's value there times the solid angle of a projected area fitted to the outermost shell ([`field::Area`]) |
-//! | switches | an emitter does not occlude, flat ground only receives, all else does both; each can be set per entity |
-//! | scale | uniform and positive |
-//! | light | linear Rec.709 radiance; radiosity B = albedo/pi * integral L V max(0, n.w) dw |
-//! | numbers | tables in f64, shaders in f32, field storage f16 or f32 |
+//! | SH basis | The basis is real and orthonormal, with the Condon-Shortley phase as in Sloan, *Stupid SH Tricks*: Y1,-1 = -0.488603 y, Y1,0 = 0.488603 z, Y1,1 = -0.488603 x. Coefficient (l, m) has index l(l+1)+m. The basis is evaluated as polynomials of a unit vector. |
+//! | bands | n bands are n^2 coefficients. What the literature calls "order 4" is 4 bands, 16 coefficients. |
+//! | space | Space is right-handed, +y is up, and lengths are in metres. SH are taken on world x, y, z as they stand. |
+//! | cube faces | The faces are +X -X +Y -Y +Z -Z, with Vulkan's s and t on each. A texel stands for the direction of its centre and weighs its exact solid angle; the weights sum to 4 pi. |
+//! | field distances | Distances are in units of the object's bounding-sphere radius r, from the sphere's centre. Shells lie about the middle of the mesh's box, and its short axes are stretched ([`field::fit`]). |
+//! | occlusion field | It stores the *blocked* part b = P[1 - V], which is 0 where nothing blocks. A sample inside the solid is captured off the nearest surface. |
+//! | between shells | b / (1 - cos a) is interpolated over sin(a/2), where a is the half-angle of the bounding sphere. Samples are lowered by a twelfth of their second differences. Beyond 8 r the value falls as (8r/d)^2. |
+//! | order | An occluder precedes a light if its bounding sphere's centre is nearer to the vertex than the light's. Entity indices decide ties. |
+//! | small occluders | An occluder whose bounding sphere has a half-angle below 12 degrees blocks a point: it takes away the chain's value in its direction times the solid angle of a projected area, which is fitted to its outermost shell ([`field::Area`]). Up to 16 degrees the point and the field share. |
+//! | switches | An emitter does not occlude, flat ground only receives, and everything else does both. Each can be set per entity. |
+//! | scale | Scales are uniform and positive. |
+//! | light | Light is linear Rec.709 radiance. The radiosity is B = albedo/pi * integral of L V max(0, n.w) dw. |
+//! | numbers | Tables are made in f64, shaders compute in f32, and fields are stored as f16 or f32. |
 //!
 //! # Layers
 //!
@@ -50,14 +50,19 @@
 //!
 //! # Beyond one device
 //!
-//! On paper, not built. *Merges over many devices*: a cluster reads its list, the entities on it and their fields, and writes its
-//! own vertices only, so clusters can be dealt out by receiver and place with no exchange but the entities' 5 600 bytes a frame
-//! for every 30 of them; each device needs the fields and vertices of its own clusters, and sends 16 bytes a vertex to the one
-//! that draws. What a device merges again is what moved near its clusters. *Farms of bakes*: a field depends on mesh, lattice,
-//! bands, face size and format, whose hash names its cache file, and every file is replaced whole: workers that share a cache
-//! folder need no other meeting place. Within one field, targets are independent and the kept part of a bake is a prefix of
-//! them; a range for each worker and a sum of the parts would do. *Larger scenes*: fields beyond what a device binds want several
-//! buffers, or those of a neighbourhood at a time, which the lists already name.
+//! Nothing in this section is built.
+//!
+//! *Merges on many devices.* A cluster reads its list, the entities on the list and their fields, and it writes only its own
+//! vertices. Clusters can therefore be dealt out by receiver and by place. Each device holds the fields and vertices of its own
+//! clusters. In every frame it receives 5 600 bytes for every 30 entities, and it sends 16 bytes for every vertex to the device that
+//! draws. A device merges again only what something moved near.
+//!
+//! *Bakes on many machines.* A field depends on mesh, lattice, bands, face size and number format. Their hash names its cache file, and
+//! every file is replaced whole. Workers that share a cache folder need no other meeting place. To share out one field, give each worker
+//! a range of its samples, and add up the parts.
+//!
+//! *Larger scenes.* Fields that together exceed what a device can bind need several buffers, or only the fields of one neighbourhood
+//! at a time. The cluster lists already name those.
 
 pub mod app;
 pub mod asset;

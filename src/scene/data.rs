@@ -1,33 +1,34 @@
-//! The tables of a scene file.
+//! The tables of a scene file. README has a table of all keys with units, ranges and defaults; a test compares it with this file.
 //!
 //! ```toml
-//! [camera]                                   # fov_deg is vertical
+//! [camera]
 //! eye = [0, 2, 5]
 //! target = [0, 0.5, 0]
-//! [output]                                   # all may be left out; time_s is that of the first picture
+//! fov_deg = 40                               # vertical
+//! [output]                                   # every key may be left out
 //! width = 960
 //! exposure_ev = -0.5
-//! time_s = 0
-//! [environment]                              # what is given adds up, times strength, turned about +y
+//! time_s = 0                                 # time of the first picture
+//! [environment]                              # the parts add up, are multiplied by strength and turned about +y
 //! strength = 1
 //! turn_deg = 30
 //! uniform = [0.02, 0.02, 0.03]
 //! gradient = { radiance = [0.1, 0.12, 0.16] }                              # brighter towards the zenith
 //! key = { radiance = [3, 3, 2], toward = [1, 2, 1], sharpness = 8 }        # a soft directional light
-//! sky = { sun_elevation_deg = 40, turbidity = 3, radiance = 0.35 }         # generated daylight; sky = {} will do
+//! sky = { sun_elevation_deg = 40, turbidity = 3, radiance = 0.35 }         # generated daylight; sky = {} takes the defaults
 //! image = { file = "studio.hdr", scale = 0.5 }                             # equirectangular HDR, EXR or PNG
 //! [[mesh]]
 //! name = "ball"
-//! sphere = { radius_m = 0.5, subdivisions = 4 }                            # or plane, cuboid, torus, teapot
+//! sphere = { radius_m = 0.5, subdivisions = 4 }                            # or plane, cuboid, torus, torus_two_colour, teapot
 //! [[entity]]
 //! mesh = "ball"
 //! position = [0, 0.6, 0]
 //! rotation = { axis = [0, 1, 0], angle_deg = 30 }
 //! scale = 1
 //! albedo = [0.7, 0.4, 0.2]
-//! emission = [40, 36, 30]                    # makes it a light; emits, occludes, receives = true | false say otherwise
-//! motion = [                                 # one after the other, functions of time alone
-//!     { keyframes = { repeat = true, interpolation = "smooth", keys = [    # Catmull-Rom; or "linear"; rotations by slerp
+//! emission = [40, 36, 30]                    # makes it a light; emits, occludes and receives override the defaults
+//! motion = [                                 # applied from first to last; each is a function of time alone
+//!     { keyframes = { repeat = true, interpolation = "smooth", keys = [    # Catmull-Rom, or "linear"; rotations use slerp
 //!         { time_s = 0, position = [0, 0.6, 0] }, { time_s = 2, position = [1, 0.9, 0] }, { time_s = 4, position = [0, 0.6, 0] } ] } },
 //!     { orbit = { centre = [0, 0, 0], period_s = 8 } }, { spin = { axis = [0, 1, 0], period_s = 4 } },
 //!     { bob = { amplitude_m = 0.1, period_s = 3 } },
@@ -46,43 +47,43 @@ use crate::asset::environment::EnvironmentData;
 use crate::asset::generate::Generator;
 use crate::error::{Error, Result};
 
-/// Largest width or height of a picture.
+/// Largest width or height of a picture, in pixels.
 pub const PICTURE_LIMIT_PX: u32 = 16_384;
 
 /// A scene file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Data {
-    /// From where it is seen.
+    /// The viewpoint.
     pub camera: Camera,
     /// Size and exposure of pictures.
     #[serde(default)]
     pub output: Output,
-    /// Distant light; darkness if left out.
+    /// Distant light. Without it the sky is black.
     #[serde(default)]
     pub environment: EnvironmentData,
-    /// Shapes, by name.
+    /// Meshes, each with a name that entities refer to.
     #[serde(default, rename = "mesh")]
     pub meshes: Vec<MeshData>,
-    /// Things with a shape, a place and a surface.
+    /// Entities: each has a mesh, a placement and a surface.
     #[serde(default, rename = "entity")]
     pub entities: Vec<EntityData>,
 }
 
-/// Perspective from `eye` towards `target`.
+/// A perspective camera at `eye` that looks towards `target`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "CameraWritten")]
 pub struct Camera {
-    /// Metres.
+    /// Position in metres.
     pub eye: Vec3,
-    /// Metres; not the eye.
+    /// Position in metres; it must differ from the eye.
     pub target: Vec3,
-    /// Vertical field of view in degrees, 1 to 170; 40 if left out.
+    /// Vertical field of view in degrees, 1 to 170. The default is 40.
     pub fov_deg: f32,
 }
 
 impl Camera {
-    /// A direction that is up in the picture: +y, or -z for a camera that looks straight up or down.
+    /// The direction that points up in the picture: +y, or -z for a camera that looks straight up or down.
     pub fn up(&self) -> Vec3 {
         let ahead = (self.target.as_dvec3() - self.eye.as_dvec3()).normalize();
         if ahead.x.hypot(ahead.z) < 1e-3 { Vec3::NEG_Z } else { Vec3::Y }
@@ -115,17 +116,17 @@ impl TryFrom<CameraWritten> for Camera {
     }
 }
 
-/// Pictures of a scene, where the command line does not say otherwise.
+/// Size, exposure and time of pictures. The command line overrides them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default, try_from = "OutputWritten")]
 pub struct Output {
-    /// Pixels.
+    /// Width in pixels, 1 to 16 384. The default is 960.
     pub width: u32,
-    /// Pixels.
+    /// Height in pixels, 1 to 16 384. The default is 640.
     pub height: u32,
-    /// Stops by which radiance is brightened before it is encoded.
+    /// Stops by which radiance is brightened before it is encoded, -32 to 32. The default is 0.
     pub exposure_ev: f32,
-    /// Scene time of the first picture, seconds.
+    /// Scene time of the first picture in seconds. The default is 0.
     #[serde(skip_serializing_if = "is_zero")]
     pub time_s: f64,
 }
@@ -167,20 +168,21 @@ impl TryFrom<OutputWritten> for Output {
     }
 }
 
-/// A shape: a file or a generator.
+/// A mesh, read from a file or made by a generator.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeshData {
-    /// What entities call it; unique.
+    /// The name that entities use; it is unique.
     pub name: String,
-    /// Wavefront OBJ file, relative to the scene file; where there is none, a built-in mesh as `assets/meshes/torus.obj`.
+    /// A Wavefront OBJ file, relative to the scene file. If there is no such file, a built-in mesh of that name is taken, such as
+    /// `assets/meshes/torus.obj`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// Its generator, written as `plane = {...}`, `sphere = {...}` and so on.
+    /// A generator, written as `plane = {...}`, `sphere = {...}` and so on.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub generator: Option<Generator>,
 }
 
-// By hand, because serde's flattening would accept unknown keys.
+// Written by hand, because serde's flattening would accept unknown keys.
 impl<'de> Deserialize<'de> for MeshData {
     fn deserialize<D: serde::Deserializer<'de>>(source: D) -> std::result::Result<Self, D::Error> {
         use serde::de::Error as _;
@@ -201,7 +203,7 @@ impl<'de> Deserialize<'de> for MeshData {
 }
 
 impl MeshData {
-    /// Reads or makes the mesh.
+    /// Reads the file or runs the generator.
     pub(super) fn build(&self, folder: &Path, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Mesh> {
         let mut mesh = match (&self.file, &self.generator) {
             (Some(file), None) => Mesh::parse(&read(file)?, &folder.join(file))?,
@@ -213,40 +215,40 @@ impl MeshData {
     }
 }
 
-/// A thing in the scene.
+/// An entity of the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EntityData {
-    /// For messages and tables.
+    /// A name for messages and tables. The default is `entity N`, counted from 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Name of its mesh.
+    /// The name of its mesh.
     pub mesh: String,
-    /// Metres; the origin if left out.
+    /// Position in metres. The default is the origin.
     #[serde(default, deserialize_with = "values::position")]
     pub position: Vec3,
-    /// None if left out.
+    /// The default is no rotation.
     #[serde(default)]
     pub rotation: RotationData,
-    /// Uniform and positive; 1 if left out.
+    /// A uniform factor, 1e-7 to 1e7. The default is 1.
     #[serde(default = "one", deserialize_with = "values::scale")]
     pub scale: f32,
-    /// Linear reflectance, 0 to 1; .7 grey if left out.
+    /// Linear reflectance, 0 to 1. The default is a grey of 0.7.
     #[serde(default = "grey", deserialize_with = "values::albedo")]
     pub albedo: Vec3,
-    /// Linear radiance in W m^-2 sr^-1; it multiplies the colours of a mesh that has them.
+    /// Linear radiance in W m^-2 sr^-1, at most 1e15. It multiplies the colours of a mesh that has them. The default is 0.
     #[serde(default, deserialize_with = "values::radiance")]
     pub emission: Vec3,
-    /// Whether it lights others; if left out, whether it has emission.
+    /// Whether it lights others. By default it does if it has emission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub emits: Option<bool>,
-    /// Whether it casts shadows; if left out, unless it emits or is flat.
+    /// Whether it casts shadows. By default it does unless it emits or is flat.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub occludes: Option<bool>,
-    /// Whether it is lit; if left out, it is.
+    /// Whether it is lit. By default it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub receives: Option<bool>,
-    /// Movements, applied from first to last.
+    /// Movements, which are applied from first to last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub motion: Vec<Motion>,
 }
@@ -260,7 +262,7 @@ fn grey() -> Vec3 {
 }
 
 impl EntityData {
-    /// Where it is at `time_s` seconds.
+    /// The placement at `time_s` seconds.
     pub fn at(&self, time_s: f64) -> Placement {
         let rest = PlacementF64::new(self.position, self.rotation, self.scale);
         self.motion.iter().fold(rest, |place, motion| place.moved(motion, rest, time_s)).rounded()
@@ -268,10 +270,10 @@ impl EntityData {
 }
 
 impl Data {
-    /// Reads and checks the text of a scene file; meshes are not looked at. `path` is for messages.
+    /// Reads and checks the text of a scene file, without reading the meshes that it names. Messages name `path`.
     ///
     /// # Errors
-    /// [`Error::Input`], one line with file and line.
+    /// [`Error::Input`] in one line, which names the file and the line.
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let data: Data = toml::from_str(text).map_err(|e| {
             let line = e.span().map_or(1, |span| line_of(text, span.start));
@@ -287,21 +289,21 @@ impl Data {
         Ok(data)
     }
 
-    /// TOML that reads back as equal data.
+    /// The scene as TOML, which reads back as equal data.
     pub fn to_toml(&self) -> String {
-        // All fields are plain values, tables and lists of them, which TOML can hold.
+        // Every field is a plain value, a table or a list, and TOML can hold these.
         toml::to_string(self).unwrap_or_else(|e| panic!("scene data does not fit TOML: {e}"))
     }
 }
 
-/// A message without the names of this program's types: where it expected one of them, a table is wanted.
+/// Replaces the name of one of this program's types in a message by "a table", which is what the file has to hold there.
 fn plain(message: &str) -> String {
     let Some((before, rest)) = message.split_once("expected struct ") else { return message.to_owned() };
     let after = rest.find(|c: char| !c.is_alphanumeric() && c != '_').map_or("", |end| &rest[end..]);
     format!("{before}expected a table {{ ... }}{after}")
 }
 
-/// Line, counted from 1, of a byte of `text`.
+/// The line that holds a byte of `text`, counted from 1.
 pub(super) fn line_of(text: &str, byte: usize) -> usize {
     1 + text.as_bytes()[..byte.min(text.len())].iter().filter(|&&b| b == b'\n').count()
 }

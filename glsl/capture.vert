@@ -17,13 +17,13 @@ layout(push_constant) uniform Push {
 void main() {
     vec3 q = position - push.eye.xyz;
     float w = dot(push.forward.xyz, q);
-    // A corner just beside the eye, in r: SwiftShader divides by w before it clips to tell front from back, takes 1 for 1 / 0,
-    // and errs where the quotient is huge.
+    // Moves a vertex off the plane of the eye, where w is in r. To find a triangle's facing, SwiftShader divides by w before it clips; it
+    // returns 1 for 1 / 0, and a huge quotient gives a wrong facing.
     if (abs(w) < 1e-6) {
         w = w < 0.0 ? -1e-6 : 1e-6;
     }
 #if RADIANCE
-    // Reversed depth w_near / w without a far plane; nothing closer than eye.w (in r) is seen.
+    // Reversed depth w_near / w without a far plane; geometry closer than eye.w (in r) is clipped.
     float z = push.eye.w;
     radiance = color;
 #else

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
-// What a device does at best, one kind of work a compilation: KIND 0 multiply-adds, 1 texels of four halves, 2 texels of 16
+// Measures a device's peak rates, one kind of work per compilation. KIND 0: multiply-adds, 1 texels of four halves, 2 texels of 16
 // bytes, 3 reads of 8 bytes from a storage block, 4 triad, 5 samples that a sampler interpolates between eight texels.
 layout(local_size_x = 64) in;
 layout(std430, binding = 1) buffer Out { vec4 results[]; };
@@ -27,7 +27,7 @@ void main() {
 #if KIND == 4
     results[index] = source[index] + 0.5 * other[index];
 #else
-    // Sixteen results at a time, none waiting for another.
+    // Sixteen independent results, so that latency is hidden.
     vec4 sums[4] = vec4[](vec4(index), vec4(0.25), vec4(0.5), vec4(0.75));
     uint at = index * 747796405u;
     uint round = 0;
@@ -37,7 +37,7 @@ void main() {
             sums[k % 4] = sums[k % 4] * 0.999 + 0.001;
         }
 #else
-        // Runs of four from anywhere, as a lookup's corners.
+        // Runs of four texels at scattered addresses, as in a lookup's corners.
         [[unroll]] for (uint k = 0; k < READS / 4; k++) {
             at = at * 1664525u + 1013904223u;
             uint first = (at >> 8) & (MASK ^ 3u);

@@ -1,5 +1,5 @@
 #version 460
-// A lit vertex: emission plus radiosity, both radiance in linear Rec.709.
+// Draws a lit vertex: emission plus radiosity, both as radiance in linear Rec.709.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 emission;
 layout(location = 2) in vec4 radiosity;
@@ -8,7 +8,7 @@ layout(location = 0) out vec3 radiance;
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
     vec4 emission_white; // radiance factor; w = radiance that is shown as white
-    float tag;           // tells entities apart
+    float tag;           // number of the entity, for outlines
 } push;
 
 void main() {

@@ -1,7 +1,7 @@
 #version 460
 #include "finish.glsl"
-// A point of a grid: the radiance that its cell's triangle has there. One fetch finds the triangle, three its corners, which on a
-// software rasteriser is a fraction of what small triangles cost.
+// Shades a point of a grid with the interpolated radiance of its cell's triangle. One fetch finds the triangle and three read its
+// corners, which on a software rasteriser is much cheaper than drawing small triangles.
 layout(binding = 0) uniform utextureBuffer corners;  // vertices of each cell; see asset::grid
 layout(binding = 1) uniform textureBuffer radiosity; // of every vertex of the scene
 layout(location = 0) in vec2 place;
@@ -21,7 +21,7 @@ void main() {
     uvec4 corner = texelFetch(corners, int(cell.y * push.cells.x + cell.x));
     bool upwards = corner.x >= 0x80000000u;
     corner.x &= 0x7fffffffu;
-    // Two corners lie on the line that the cell's triangles share, the third on this point's side of it.
+    // Two corners lie on the cell's diagonal; the third is the one on this point's side of it.
     bool far = upwards ? at.y > at.x : at.x + at.y > 1.0;
     uvec3 triangle = upwards ? uvec3(corner.x, corner.w, far ? corner.z : corner.y)
                              : uvec3(corner.y, corner.z, far ? corner.w : corner.x);

@@ -1,5 +1,5 @@
 #version 460
-// A corner of a grid that is drawn as one parallelogram.
+// Transforms a corner of a grid, which is drawn as one parallelogram.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec2 cell; // in cells from the first
 layout(location = 0) out vec2 place;

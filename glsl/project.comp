@@ -1,7 +1,7 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
-// Cube faces to SH coefficients: one workgroup a sample. Every invocation sums its share of the texels, then one invocation a
-// coefficient sums the shares in order: the result does not depend on scheduling.
+// Projects cube faces to SH coefficients, one workgroup per sample. Every invocation sums its share of the texels; then one
+// invocation per coefficient adds the shares in order, so the result does not depend on scheduling.
 #include "generated/basis.glsl"
 #if COSINE
 #include "generated/cosine.glsl"
@@ -18,7 +18,7 @@ struct Job {
 
 layout(binding = 0) uniform texture2D atlas;
 layout(std430, binding = 1) readonly buffer Jobs { Job jobs[]; };
-// Per texel of a face: unit direction as (along right, along down, along forward), and solid angle.
+// For each texel of a face: unit direction as components along (right, down, forward), and solid angle in steradians.
 layout(binding = 2) uniform textureBuffer texels;
 layout(std430, binding = 3) writeonly buffer Samples { float samples[]; };
 
@@ -95,14 +95,14 @@ void main() {
     for (uint i = lane; i < STRIDE * CHANNELS; i += WORKGROUP) {
         uint channel = i / STRIDE;
         uint k = i % STRIDE;
-        float total = 0.0; // stays in what fills a channel up to whole quads
+        float total = 0.0; // value of the padding coefficients of a channel
         if (k < COEFFICIENTS) {
             for (uint other = 0; other < WORKGROUP; other++) {
                 total += shares[channel * COEFFICIENTS + k][other];
             }
             total *= jobs[job].scale;
 #if COSINE
-            // What the object's own geometry leaves of the whole cosine lobe.
+            // The unoccluded part is the whole cosine lobe minus the part that the object's own geometry blocks.
             float lobe[COEFFICIENTS];
             sh_cosine(jobs[job].normal.xyz, lobe);
             total = lobe[k] - total;

@@ -1,12 +1,12 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
 #include "srgb.glsl"
-// A linear picture as a display shows it.
+// Converts a linear picture to display colours.
 layout(binding = 0) uniform texture2D picture;
 layout(location = 0) out vec4 color;
 
 layout(push_constant) uniform Push {
-    float gain;  // what radiance is multiplied by: 1 / white
+    float gain;  // factor on radiance: 1 / white
     uint encode; // 1: the target does not encode sRGB by itself
 } push;
 

@@ -1,8 +1,8 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
 #include "srgb.glsl"
-// A pixel whose centre lies within half a pixel of a line, along x or y: as much of the pixel on the line's other side is mixed
-// in as the line cuts off.
+// Smooths a pixel whose centre lies within half a pixel of a line, along x or y: the colour of the pixel on the line's other side
+// is blended in by the share of the pixel that the line cuts off.
 layout(binding = 0) uniform texture2D picture; // alpha: tag of the entity seen
 layout(binding = 1) uniform texture2D depth;   // reversed: greater is nearer, 0 infinitely far
 layout(location = 0) in float line_depth;
@@ -14,10 +14,10 @@ layout(push_constant) uniform Push {
     ivec4 area; // pixels that may be read: from x, y, to x, y
 } push;
 
-// What lies behind the line may seem nearer by this share of its distance.
+// Relative depth tolerance: a surface behind the line may appear nearer by this share of its distance.
 const float TOLERANCE = 1e-3;
 
-// Pixels that a corner may be moved by: two steps of 1/256, which is what devices have to offer at least, and rounding.
+// Largest displacement of a corner in pixels: two steps of the usual subpixel grid of 1/256, and rounding.
 const float SNAPPED = 0.01;
 
 vec4 picture_at(ivec2 pixel) {
@@ -39,7 +39,7 @@ void main() {
     bool inside = offset * line_mark.x > 0.0;
     vec4 own = texelFetch(picture, pixel, 0);
     vec4 beyond = picture_at(pixel + across);
-    // The rasteriser moves corners a little, and may see a centre that is almost on the line on its other side.
+    // The rasteriser snaps corners, so a pixel centre close to the line may be rasterised on its other side.
     vec4 opposite = picture_at(pixel - across);
     if (abs(offset) < SNAPPED && shows(own) == shows(beyond) && shows(own) != shows(opposite)) {
         across = -across;
@@ -53,7 +53,7 @@ void main() {
     if (!shows(inside ? own : beyond)) {
         discard; // something hides the surface
     }
-    // What lies on the outer side, where the line is: as at the pixel's centre, or as its slope continues to the line.
+    // Depth of the outer side at the line: that of the pixel's centre, or its slope extrapolated to the line.
     float behind = depth_at(outer);
     float slope = behind - depth_at(outer + outwards);
     float reach = inside ? 1.0 - abs(offset) : abs(offset);

@@ -5,19 +5,19 @@ use std::path::Path;
 /// Everything that can go wrong, grouped by what the user can do about it (see [`Error::exit_code`]).
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A comparison, check or run did not come out as it should (exit code 1).
+    /// A comparison, check or run failed (exit code 1).
     #[error("{0}")]
     Failed(String),
-    /// A shader does not compile (exit code 1). The only message that has several lines.
+    /// A shader does not compile (exit code 1). Only this message has several lines.
     #[error("{0}")]
     Shader(String),
-    /// The command line makes no sense (exit code 2).
+    /// The command line is invalid (exit code 2).
     #[error("{0}")]
     Usage(String),
-    /// No suitable device, driver, feature or display (exit code 3).
+    /// There is no suitable device, driver, feature or display (exit code 3).
     #[error("{0}")]
     Unsupported(String),
-    /// A missing, malformed or oversized input (exit code 4).
+    /// An input is missing, malformed or too large (exit code 4).
     #[error("{0}")]
     Input(String),
     /// The device was lost, or it or the host ran out of memory (exit code 5).
@@ -45,17 +45,17 @@ impl Error {
         }
     }
 
-    /// Bad input found in `path`: one line that starts with the file.
+    /// An error in the file `path`: one line that starts with the file.
     pub fn input(path: &Path, what: impl std::fmt::Display) -> Self {
         Error::Input(format!("{}: {what}", path.display()))
     }
 
-    /// Bad input found in `path` at a line counted from 1.
+    /// An error in the file `path` at a line counted from 1.
     pub fn input_at(path: &Path, line: usize, what: impl std::fmt::Display) -> Self {
         Error::Input(format!("{}:{line}: {what}", path.display()))
     }
 
-    /// Adds where it happened in front of the message and keeps the kind.
+    /// Puts the place of the error in front of its message and keeps its kind.
     pub fn context(self, place: impl std::fmt::Display) -> Self {
         let join = |message: String| format!("{place}: {message}");
         match self {

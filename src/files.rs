@@ -1,4 +1,4 @@
-//! Files that are never seen half-written.
+//! Writes files so that no reader sees a partial file.
 
 use std::collections::HashSet;
 use std::fs::{self, File};
@@ -10,12 +10,12 @@ use tempfile::NamedTempFile;
 /// Start of the name that a file has until it is whole.
 const UNFINISHED: &str = ".unfinished-";
 
-/// Writes a file in its folder under another name and renames it, so that another process sees the old one or the new one,
-/// never a part. What is not a regular file (a pipe, `/dev/stdout`) is written to as it stands; a link keeps pointing where it
-/// did. What killed processes left unfinished in the folder is removed.
+/// Writes a file in its folder under another name and renames it, so that another process sees either the old or the new
+/// content. If the path is not a regular file (a pipe, `/dev/stdout`), it is written to directly; a symbolic link is followed
+/// and kept. Unfinished files of killed processes in the folder are removed.
 ///
 /// # Errors
-/// What `write` or the file system returns; nothing is left behind then.
+/// What `write` or the file system returns; then no partial file remains.
 pub fn replace_with<E: From<Error>>(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::result::Result<(), E>,
@@ -38,7 +38,7 @@ pub fn replace_with<E: From<Error>>(
     Ok(())
 }
 
-/// As [`replace_with`] for bytes; the folder is made if it is not there.
+/// As [`replace_with`] for bytes; creates the folder if it does not exist.
 ///
 /// # Errors
 /// What the file system returns.

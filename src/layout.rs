@@ -1,8 +1,8 @@
-//! Structs that cross to `glsl/merge_layout.glsl`; `tests/layouts.rs` compares names and offsets with what the compiler made.
+//! Structs shared with `glsl/merge_layout.glsl`; `tests/layouts.rs` compares names and offsets with the compiled shaders.
 
 use bytemuck::{Pod, Zeroable};
 
-/// One object of the scene as the merge sees it.
+/// One entity of the scene in the form that the merge reads.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Entity {
@@ -18,17 +18,17 @@ pub struct Entity {
     pub radiance_base: u32,
     /// Slope and offset of the shell coordinate, inner and outer shell radius in r.
     pub radial: [f32; 4],
-    /// Radiance factor of the entity's light; w = its albedo, of its brightest colour.
+    /// Linear RGB radiance factor of the entity's light; w = the largest channel of its albedo.
     pub emission: [f32; 4],
-    /// What is added to a place after it was stretched, in r; w = what its axes are stretched by ([`crate::field::Fit::packed`]).
+    /// Added to a stretched position, in r; w = the packed stretch factors of the axes ([`crate::field::Fit::packed`]).
     pub shift: [f32; 4],
-    /// Albedo / pi; w = uniform scale of the object.
+    /// Albedo / pi; w = uniform scale of the entity.
     pub albedo: [f32; 4],
     /// First axis of its projected area ([`crate::field::Area`]), world; w = the area's constant term.
     pub area_x: [f32; 4],
     /// Second axis, world; w = factor of u, the square of a direction's cosine to the first.
     pub area_y: [f32; 4],
-    /// Factors of v, likewise of the second, of u u, v v and u v.
+    /// Factors of v (the square of the cosine to the second axis), u u, v v and u v.
     pub area_terms: [f32; 4],
 }
 
@@ -50,15 +50,15 @@ pub struct Cluster {
     pub entry_first: u32,
     /// Entries, at least 1.
     pub entry_count: u32,
-    /// Where the gather on the device finds its bounds.
+    /// Index of its bounds for the gather on the device.
     pub bounds: u32,
 }
 
-/// "No such thing" among indices.
+/// The index that means "none".
 pub const NONE: u32 = u32::MAX;
 
-/// Vertices of a cluster, which is a workgroup: eight waves of llvmpipe, two of the commonest GPUs, and within every device's
-/// limits.
+/// Vertices of a cluster, which is one workgroup: eight subgroups on llvmpipe, two on most GPUs, and within the limits of
+/// every device.
 pub const CLUSTER_VERTICES: u32 = 64;
 
 /// Bits of an entity's number in an entry.

@@ -45,7 +45,7 @@ embedded!(
     "srgb.glsl",
 );
 
-/// One compilation of one entry point. Everything that changes the code is in here; the cache key is the whole row.
+/// One compilation of one entry point. It contains everything that changes the compiled code, and all of it is the cache key.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct ShaderPermutation {
     /// File in `glsl/`; its ending decides the stage.
@@ -59,12 +59,12 @@ pub struct ShaderPermutation {
 }
 
 impl ShaderPermutation {
-    /// A row without further macros.
+    /// A permutation without further macros.
     pub fn new(file: &'static str, bands: usize) -> Self {
         ShaderPermutation { file, bands, field_bands: bands, defines: Vec::new() }
     }
 
-    /// Occlusion fields of other bands than everything else.
+    /// Sets another number of bands for occlusion fields.
     pub fn field_bands(mut self, field_bands: usize) -> Self {
         self.field_bands = field_bands;
         self
@@ -76,7 +76,7 @@ impl ShaderPermutation {
         self
     }
 
-    /// Adds a macro that stands for an f32.
+    /// Adds a macro whose value is an f32.
     pub fn number(mut self, name: &'static str, value: f64) -> Self {
         self.defines.push((name, format!("({:?})", value as f32)));
         self
@@ -93,10 +93,10 @@ pub struct Library {
 }
 
 impl Library {
-    /// Compiles a row, or takes it from the cache.
+    /// Compiles a permutation, or reads it from the cache.
     ///
     /// # Errors
-    /// `Failed` with the compiler's lines; `Input` when a file of the override folder cannot be read.
+    /// `Failed` with the compiler's messages; `Input` when a file of the override folder cannot be read.
     pub fn shader(&self, row: &ShaderPermutation) -> Result<Shader> {
         let stage = match row.file.rsplit('.').next() {
             Some("comp") => Stage::Compute,
@@ -125,7 +125,7 @@ impl Library {
         Shader::compile(&source, self.cache_dir.as_deref())
     }
 
-    /// An entry point's file and every file that it includes, directly or not; generated ones are not files.
+    /// An entry point's file and every file that it includes, directly or indirectly, without generated includes.
     pub fn files(&self, entry: &str) -> Vec<String> {
         let mut files = vec![entry.to_owned()];
         let mut at = 0;
@@ -156,8 +156,8 @@ impl Library {
     }
 }
 
-/// Text of a generated include. Includes are looked for before the preprocessor takes any out, so what a row has no use for may
-/// be asked for too.
+/// Text of a generated include. Includes are resolved before the preprocessor removes any, so a permutation may also request
+/// includes that it does not use.
 fn generate(name: &str, row: &ShaderPermutation) -> Option<String> {
     let (bands, field_bands) = (row.bands, row.field_bands);
     match name {
@@ -169,7 +169,7 @@ fn generate(name: &str, row: &ShaderPermutation) -> Option<String> {
             let place = row.defines.iter().find(|(name, _)| *name == "PRODUCT").and_then(|(_, n)| n.parse().ok());
             Some(glsl_subtract(STYLES[place.unwrap_or(0)], bands, field_bands))
         }
-        // One function for each length of array; GLSL tells them apart by it.
+        // One overload for each array length.
         "rotate.glsl" => {
             let more = if field_bands > bands { glsl_rotate(field_bands) } else { String::new() };
             Some(glsl_rotate(bands) + &more)

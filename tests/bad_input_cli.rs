@@ -154,7 +154,7 @@ fn drivers_layers_and_devices() {
         &case,
         &[&render[..], &["--device", "Voodoo"]].concat(),
         3,
-        &["no device matches \"Voodoo\"", "there is: 0 "],
+        &["no device matches \"Voodoo\"", "available: 0 "],
     );
     refused(&case, &[&render[..], &["--device", "4000"]].concat(), 3, &["no device matches \"4000\""]);
 }

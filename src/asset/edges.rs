@@ -1,54 +1,55 @@
-//! Edges of a mesh, and those of them that a picture shows as lines: outlines and creases.
+//! Edges of a mesh, and which of them a picture shows as lines: outlines and creases.
 
 use super::Mesh;
 use glam::{DMat3, DMat4, DVec3, DVec4, Vec3};
 use std::collections::HashMap;
 
-/// Cosine between normals of one place below which a surface has a crease there: 5 degrees.
+/// Two normals at one position whose cosine is below this (5 degrees) form a crease.
 const CREASE_COSINE: f32 = 0.996;
-/// Sine between two faces up to which they lie in one plane and their edge is never seen: rounding of f32 positions.
+/// Faces with a sine up to this between them lie in one plane, and their edge is never seen. It allows for the rounding of f32
+/// positions.
 const COPLANAR_SINE: f64 = 1e-5;
 
-/// How an edge is seen.
+/// When an edge is seen.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum EdgeKind {
-    /// Where exactly one of its two faces looks at the eye; `flipped` where they are wound against one another.
+    /// When exactly one of its two faces looks at the eye; `flipped` if their windings are opposite.
     Fold { flipped: bool },
-    /// Shaded differently on both sides, and a fold too.
+    /// As a fold, and also when both faces are in view, because their shading differs.
     Crease { flipped: bool },
-    /// From everywhere: it has one face, or more than two.
+    /// Always, because it has one face or more than two.
     Border,
 }
 
 struct Edge {
     ends: [u32; 2],
-    /// Corner of its first face that is on no end of it.
+    /// The corner of its first face that is no end of the edge.
     far: u32,
     faces: [u32; 2],
     kind: EdgeKind,
 }
 
-/// An edge as it is seen.
+/// The visible part of an edge.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
-    /// In clip space, before the eye and within the picture.
+    /// End points in clip space, in front of the eye and within the picture.
     pub ends: [DVec4; 2],
-    /// On which side its face lies, going from the first end to the second with x to the right and y down: positive is right.
-    /// A crease has a face on the other side too.
+    /// Side of its face, seen along the line from its first end to its second with x to the right and y down: positive is
+    /// right. A crease also has a face on the other side.
     pub side: f64,
 }
 
 /// Edges of a mesh with the faces beside them.
 pub struct Edges {
-    /// Places, metres from the centre of the bounding sphere. Vertices at one place are one corner, whatever their normals.
+    /// Positions, metres from the centre of the bounding sphere. Vertices at one position are one corner, whatever their normals.
     corners: Vec<DVec3>,
     edges: Vec<Edge>,
-    /// Normal of each face, and its product with a point of it.
+    /// Plane of each face: normal, and the dot product of the normal with a point of the face.
     planes: Vec<(DVec3, f64)>,
 }
 
 impl Edges {
-    /// Finds the edges of a mesh, those within a plane left out.
+    /// Finds the edges of a mesh, without those between faces in one plane.
     pub fn new(mesh: &Mesh) -> Self {
         let (centre, _) = mesh.bounding_sphere();
         let mut numbers: HashMap<[u32; 3], u32> = HashMap::with_capacity(mesh.positions.len());
@@ -57,7 +58,7 @@ impl Edges {
             .positions
             .iter()
             .map(|position| {
-                // -0 and 0 are one place.
+                // -0 and 0 are one position.
                 *numbers.entry((*position + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert_with(|| {
                     corners.push((*position - centre).as_dvec3());
                     corners.len() as u32 - 1
@@ -70,7 +71,7 @@ impl Edges {
             (normal, normal.dot(a))
         });
         let planes: Vec<(DVec3, f64)> = planes.collect();
-        // A side of a triangle: its ends in order of number, whether it runs against that, its place among the corners.
+        // A side of a triangle: its ends in ascending order, whether it runs in descending order, and its index among the corners.
         let side = |corner: usize| {
             let triangle = mesh.triangles[corner / 3];
             let [from, to] = [corner % 3, (corner + 1) % 3].map(|k| welded[triangle[k] as usize]);
@@ -78,7 +79,7 @@ impl Edges {
         };
         let mut sides: Vec<_> = (0..3 * mesh.triangles.len()).map(side).collect();
         sides.sort_unstable();
-        // Vertices of the mesh at the ends of a side, in order of the corners' numbers.
+        // Vertices of the mesh at the ends of a side, in ascending order of the corners.
         let vertices = |&(_, reversed, corner): &([u32; 2], bool, usize)| {
             let triangle = mesh.triangles[corner / 3];
             let pair = [triangle[corner % 3], triangle[(corner + 1) % 3]].map(|v| v as usize);
@@ -108,8 +109,8 @@ impl Edges {
         Edges { corners, edges, planes }
     }
 
-    /// Edges that the surface ends or folds away at, as seen from `eye` (metres from the centre of the bounding sphere, in the
-    /// mesh's frame), and with `creases` those that it is bent at in sight. Whether something hides them is not asked.
+    /// Silhouette and border edges as seen from `eye` (metres from the centre of the bounding sphere, in the mesh's frame), and
+    /// with `creases` also the creases in view. Hidden edges are included.
     pub fn lines(&self, clip_from_object: DMat4, eye: DVec3, creases: bool) -> Vec<Line> {
         let seen: Vec<bool> = self.planes.iter().map(|(normal, offset)| normal.dot(eye) > *offset).collect();
         let place = |corner: u32| clip_from_object * self.corners[corner as usize].extend(1.0);
@@ -132,7 +133,7 @@ impl Edges {
     }
 }
 
-/// The part of a segment in clip coordinates that is before the eye and between the picture's edges.
+/// The part of a segment in clip coordinates that lies in front of the eye and within the picture.
 fn clipped([from, to]: [DVec4; 2]) -> Option<[DVec4; 2]> {
     let sides = |c: DVec4| [c.w - 1e-6, c.w - c.x, c.w + c.x, c.w - c.y, c.w + c.y];
     let (mut first, mut last) = (0.0, 1.0);

@@ -28,8 +28,8 @@ const FILES: &[(&str, &[u8])] = files![
 /// The folder that embedded paths stand in: `assets/scenes/NAME.toml`.
 pub const ROOT: &str = "assets";
 
-/// The contents of an embedded file, by its path from the repository's top (`assets/meshes/torus.obj`, also with `..` in it, as
-/// a scene's relative paths give).
+/// The contents of an embedded file, by its path from the repository's root, such as `assets/meshes/torus.obj`. The path may
+/// contain `..`, as a scene's relative paths do.
 pub fn find(path: &Path) -> Option<&'static [u8]> {
     entry(path).map(|(_, bytes)| *bytes)
 }
@@ -62,7 +62,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     find(path).map(<[u8]>::to_vec).ok_or_else(|| Error::input(path, "no such embedded file"))
 }
 
-/// Where the built-in scene of this bare name stands: `assets/scenes/NAME.toml`. `None` for any other word.
+/// Path of the built-in scene with this bare name: `assets/scenes/NAME.toml`. `None` if there is no such scene.
 pub fn scene_path(name: &Path) -> Option<PathBuf> {
     let path = Path::new(ROOT).join("scenes").join(name).with_extension("toml");
     (name.components().count() == 1 && name.extension().is_none() && find(&path).is_some()).then_some(path)

@@ -1,22 +1,22 @@
 //! The smallest sphere around a set of points.
 //!
 //! Smallest enclosing balls are an LP-type problem (Welzl 1991): the ball is fixed by at most four of the points. The loop
-//! here keeps such a support, takes the point farthest outside, and solves the five points by trying every subset. The
-//! radius grows with every turn, so it ends; meshes take 5 to 30 turns, each one pass over the points.
+//! here keeps such a support, adds the point farthest outside, and solves the five points by trying every subset. The radius
+//! grows in every iteration, so the loop ends; meshes take 5 to 30 iterations, each one pass over the points.
 
 use glam::{DMat3, DVec3, Vec3};
 
 /// A point counts as inside when its distance is within this factor of the radius: far above f64 rounding, far below f32.
 const INSIDE: f64 = 1.0 + 1e-11;
-/// The centre of the bounding box is taken instead when its sphere is larger by no more than this: one f32 rounding. It
-/// makes the centre of a symmetric mesh exact.
+/// The centre of the bounding box is used instead if its sphere is larger by at most this factor, one f32 rounding, because it
+/// is exact for a symmetric mesh.
 const CENTRE_SLACK: f64 = 1.0 + 2e-7;
-/// More turns than any mesh needs; a bound all the same, against rounding that cycles.
+/// Bound on the iterations, more than any mesh needs, in case rounding makes the support cycle.
 const TURN_LIMIT: usize = 1000;
 
 /// Centre and radius of the smallest sphere around `positions` (at least one), solved in f64.
 ///
-/// The radius is then rounded up so that every position lies inside, measured in f64 as well as in f32.
+/// The radius is rounded up so that every position lies inside, measured in f64 and in f32.
 pub fn bounding_sphere(positions: &[Vec3]) -> (Vec3, f32) {
     assert!(!positions.is_empty(), "no points to enclose");
     let (low, high) = positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
@@ -54,7 +54,7 @@ fn smallest_ball(positions: &[Vec3], start: DVec3) -> Ball {
         support.push(point);
         match smallest_of(&support) {
             Some((next, kept)) if next.radius > ball.radius => (ball, support) = (next, kept),
-            // Rounding has the last word: what is left is far below what f32 can tell apart.
+            // Rounding prevents progress; the remaining error is far below f32 precision.
             _ => break,
         }
     }
@@ -84,7 +84,7 @@ fn smallest_of(points: &[DVec3]) -> Option<(Ball, Vec<DVec3>)> {
         .min_by(|a, b| a.0.radius.total_cmp(&b.0.radius))
 }
 
-/// The smallest ball with all of one to four points on its surface; none when they are too close to dependent.
+/// The smallest ball with all of one to four points on its surface; `None` if they are nearly affinely dependent.
 ///
 /// With q_i = p_i - p_0 the centre is p_0 + sum x_i q_i where 2 (q_i . q_j) x_j = q_i . q_i.
 fn circumscribed(points: &[DVec3]) -> Option<Ball> {
@@ -97,7 +97,7 @@ fn circumscribed(points: &[DVec3]) -> Option<Ball> {
     let column = |j: usize| DVec3::new(entry(0, j), entry(1, j), entry(2, j));
     let gram = DMat3::from_cols(column(0), column(1), column(2));
     let scale: f64 = (0..3).map(|i| entry(i, i)).product();
-    // The determinant over the product of the diagonal is a squared volume: 1e-14 is a sliver 1e-7 thick.
+    // The determinant over the product of the diagonal is a squared relative volume: 1e-14 means a sliver 1e-7 thick.
     if gram.determinant() <= 1e-14 * scale {
         return None;
     }

@@ -1,4 +1,4 @@
-//! Distant light: radiance that depends on direction only, as such and projected to spherical harmonics.
+//! Distant light: radiance that depends on direction only, evaluated and projected to spherical harmonics.
 
 use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
@@ -14,24 +14,24 @@ use crate::error::{Error, Result};
 use crate::sh::lobe;
 use crate::sh::rotation::Rotation;
 
-/// Largest radiance, and largest of its factors: the square still fits f32.
+/// Largest radiance, and largest of its factors. Its square still fits f32.
 pub const RADIANCE_LIMIT: f32 = 1e15;
-/// Largest angle that the whole may be turned by: f32 keeps hundredths of a degree there.
+/// Largest angle by which the light may be turned: f32 still resolves hundredths of a degree there.
 const TURN_LIMIT_DEG: f32 = 1e5;
 /// Intervals of Simpson's rule for the lobe of [`KeyLight`]; its relative error is then below 1e-11.
 const LOBE_INTERVALS: usize = 1 << 14;
 
-/// Distant light as data: what is given adds up, nothing given is darkness. Radiances are linear RGB, W m^-2 sr^-1.
+/// Distant light as data: the sum of the parts that are given, or darkness if none is. Radiances are linear RGB, W m^-2 sr^-1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EnvironmentData {
-    /// Factor on everything, 0 to 1e15.
+    /// Factor on all parts, 0 to 1e15.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub strength: f32,
-    /// All of it turned about +y, degrees, counter-clockwise seen from above.
+    /// Rotation of all parts about +y, degrees, counter-clockwise seen from above.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub turn_deg: f32,
-    /// The same radiance from everywhere.
+    /// The same radiance from all directions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uniform: Option<Vec3>,
     /// A sky that brightens towards the zenith.
@@ -120,7 +120,7 @@ impl EnvironmentData {
         self.image.as_ref().map_or(Ok(()), |image| amount("image scale", &[image.scale]))
     }
 
-    /// Refuses radiance that `strength` takes over the limit.
+    /// Refuses a radiance that exceeds the limit after multiplication by `strength`.
     fn within(&self, what: &str, radiance: f64) -> Result<()> {
         let whole = radiance * f64::from(self.strength);
         if whole <= f64::from(RADIANCE_LIMIT) * (1.0 + 1e-6) {
@@ -140,7 +140,7 @@ impl EnvironmentData {
         self.within("image", mean * scale)
     }
 
-    /// Whether nothing shines, whatever the strength.
+    /// Whether no part is given.
     pub fn is_empty(&self) -> bool {
         *self == EnvironmentData { strength: self.strength, turn_deg: self.turn_deg, ..EnvironmentData::default() }
     }
@@ -152,10 +152,10 @@ impl EnvironmentData {
 pub struct Gradient {
     /// Linear RGB at the zenith if base + rise = 1.
     pub radiance: Vec3,
-    /// Share at and below the horizon, not negative.
+    /// Factor on `radiance` at and below the horizon, not negative.
     #[serde(default = "Gradient::base")]
     pub base: f32,
-    /// What the zenith has in addition, not negative.
+    /// Increase of that factor from the horizon to the zenith, not negative.
     #[serde(default = "Gradient::rise")]
     pub rise: f32,
 }
@@ -178,7 +178,7 @@ pub struct KeyLight {
     pub radiance: Vec3,
     /// Direction towards the light, of any length but 0.
     pub toward: Vec3,
-    /// 0 is uniform; half the radiance is left at an angle of about sqrt(1.4 / sharpness) radians. At most 1e5.
+    /// 0 is uniform; radiance falls to half at an angle of about sqrt(1.4 / sharpness) radians. At most 1e5.
     pub sharpness: f32,
 }
 
@@ -196,7 +196,7 @@ pub struct EnvironmentImage {
     pub scale: f32,
 }
 
-/// Distant light, ready for use.
+/// Checked distant light with its decoded picture.
 #[derive(Clone, Debug)]
 pub struct Environment {
     source: EnvironmentData,
@@ -222,10 +222,10 @@ impl Environment {
         Ok(Self { source: source.clone(), picture, dome })
     }
 
-    /// The same picture under another description, which must name it too if it names one.
+    /// The same picture with other data. If the data name a picture, it must be the same one.
     ///
     /// # Errors
-    /// As [`Environment::new`], and where it names another picture.
+    /// As [`Environment::new`], and if the data name another picture.
     pub fn with(&self, source: &EnvironmentData) -> Result<Self> {
         source.check()?;
         let file = |source: &EnvironmentData| source.image.as_ref().map(|image| image.file.clone());
@@ -241,12 +241,12 @@ impl Environment {
         Ok(Self { source: source.clone(), picture, dome })
     }
 
-    /// Its description.
+    /// Its data.
     pub fn source(&self) -> &EnvironmentData {
         &self.source
     }
 
-    /// Whether nothing shines.
+    /// Whether the radiance is 0 in all directions.
     pub fn is_none(&self) -> bool {
         self.source.is_empty() || self.source.strength == 0.0
     }
@@ -278,8 +278,8 @@ impl Environment {
         (sum * f64::from(self.source.strength)).to_array()
     }
 
-    /// Projection of each channel to `bands` bands, bands^2 coefficients. All but the sky is exact: closed forms, a one-dimensional
-    /// integral, and for pictures the integral over every texel.
+    /// Projection of each channel to `bands` bands, bands^2 coefficients. All parts but the sky are exact: closed forms, a
+    /// one-dimensional integral, and for pictures the integral over every texel.
     pub fn coefficients(&self, bands: usize) -> [Vec<f64>; 3] {
         let turn = Rotation::new(bands, self.turn());
         self.unturned(bands).map(|channel| {

@@ -15,13 +15,14 @@ use crate::sh::rotation::Rotation;
 
 /// Largest width of an environment image; its height may be half of it: 1.6 GB as f32 RGB.
 pub const WIDTH_LIMIT_PX: u32 = 16_384;
-/// Most memory in bytes that decoding an image may take.
+/// Largest amount of memory in bytes that decoding an image may take.
 const DECODE_LIMIT_BYTES: u64 = 2 << 30;
-/// Nodes of the rule along a row's polar angle. SH times the sine are trigonometric polynomials of degree [`MAX_BANDS`]: for the
-/// worst picture, one row from pole to pole, the rule is off by less than 1e-9, for two rows already by less than f64 resolves.
+/// Nodes of the rule along a row's polar angle. SH times the sine are trigonometric polynomials of degree [`MAX_BANDS`]: for
+/// the worst picture, one row from pole to pole, the rule's error is below 1e-9, and for two rows it is below f64 precision.
 const ROW_NODES: usize = 16;
 
-/// Linear radiance of texels, rows from +y, columns from behind by the left: see [`super::environment::EnvironmentImage`].
+/// Linear radiance of texels. Rows start at +y; columns start behind the viewer and run from left to right: see
+/// [`super::environment::EnvironmentImage`].
 #[derive(Debug)]
 pub struct Equirect {
     width: usize,
@@ -78,14 +79,14 @@ impl Equirect {
         DVec3::from_array(self.texels[y * self.width + x].map(f64::from))
     }
 
-    /// Its projection to at most [`MAX_BANDS`] bands, a list a channel. Exact for what the picture is, the same radiance all over
-    /// each texel: not the texels' centres stand for them.
+    /// Its projection to at most [`MAX_BANDS`] bands, one list per channel. It is exact for a radiance that is constant over
+    /// each texel: texels are integrated, not sampled at their centres.
     pub fn coefficients(&self, bands: usize) -> [&[f64]; 3] {
         self.coefficients.each_ref().map(|channel| &channel[..bands * bands])
     }
 
-    /// With the polar axis along z, SH are A_lm(theta) times cos(m phi) or sin(|m| phi), so that the integral over a texel is that
-    /// along its row's polar angle times that along its column's azimuth. The picture is then stood up, +z to +y.
+    /// With the polar axis along z, SH are A_lm(theta) times cos(m phi) or sin(|m| phi), so the integral over a texel is the
+    /// integral along its row's polar angle times the integral along its column's azimuth. A rotation from +z to +y follows.
     fn project(&self) -> [Vec<f64>; 3] {
         // Column x spans the azimuth -TAU x / width to -TAU (x + 1) / width from +z, which stands for frame +x.
         let across: Vec<[[f64; 2]; MAX_BANDS]> = (0..self.width)
@@ -131,7 +132,7 @@ impl Equirect {
                 out
             })
         };
-        // Rows are added in order: the same bits on any number of threads.
+        // Rows are added in order, so the result does not depend on the number of threads.
         let rows: Vec<[[f64; MAX_COEFFICIENTS]; 3]> = (0..self.height).into_par_iter().map(row).collect();
         let stood_up = DQuat::from_mat3(&DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y));
         let turn = Rotation::new(MAX_BANDS, stood_up);

@@ -1,13 +1,13 @@
 //! Errors as colours, with a scale bar.
 //!
-//! Magnitudes run from dark to light (viridis: as bright as they are large, also in grey and to colour-blind eyes). Signed errors
+//! Magnitudes run from dark to light (viridis, whose brightness grows evenly, also in grey and for colour-blind readers). Signed errors
 //! run from blue (too dark) over white to red (too bright), equally dark at both ends.
 
 use super::lettering;
 use super::picture::linear_from_srgb;
 use std::str::FromStr;
 
-/// What the colours tell.
+/// What the colours show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scheme {
@@ -29,18 +29,18 @@ impl FromStr for Scheme {
     }
 }
 
-/// Which error has which colour.
+/// The mapping from errors to colours.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ColorScale {
-    /// What the colours tell.
+    /// What the colours show.
     pub scheme: Scheme,
-    /// The error with the last colour; larger ones share it.
+    /// The error of the last colour; larger errors have the same colour.
     pub limit: f64,
 }
 
-/// Colour of what has no error: neither lit nor judged. Linear.
+/// Colour of surfaces without an error, because they are not lit. Linear RGB.
 pub const NEUTRAL: [f32; 3] = [0.12; 3];
-/// Colour behind everything. Linear.
+/// Colour of the background. Linear RGB.
 pub const BACKGROUND: [f32; 3] = [0.03; 3];
 
 impl ColorScale {
@@ -55,7 +55,7 @@ impl ColorScale {
         ColorScale { scheme, limit: step.unwrap_or(10.0) * power }
     }
 
-    /// Linear RGB of an error; what is no number is magenta.
+    /// Linear RGB of an error; NaN is magenta.
     pub fn color(&self, error: f64) -> [f32; 3] {
         if error.is_nan() {
             return [1.0, 0.0, 1.0];
@@ -63,24 +63,24 @@ impl ColorScale {
         let part = error / self.limit;
         let color = match self.scheme {
             Scheme::Absolute => colorous::VIRIDIS.eval_continuous(part.abs().min(1.0)),
-            // The scheme as published runs from red to blue.
+            // The published scheme runs from red to blue.
             Scheme::Signed => colorous::RED_BLUE.eval_continuous((0.5 - 0.5 * part).clamp(0.0, 1.0)),
         };
         [color.r, color.g, color.b].map(|c| linear_from_srgb(f32::from(c) / 255.0))
     }
 
-    /// Errors that the bar names.
+    /// Errors that the bar labels.
     pub fn ticks(&self) -> Vec<f64> {
         let low = if self.scheme == Scheme::Signed { -4 } else { 0 };
         (low..=4).step_by(2).map(|i| f64::from(i) / 4.0 * self.limit).collect()
     }
 
-    /// A picture of linear RGB triples with a bar below it that says which colour means what, and its new height.
+    /// Adds a labelled colour bar below a picture of linear RGB triples. Returns the new picture and its height in pixels.
     pub fn with_bar(&self, rgb: &[f32], width: usize, title: &str) -> (Vec<f32>, usize) {
         let size = (width / 480).clamp(1, 4);
         let (line, edge) = (lettering::GLYPH * size + 4 * size, 8 * size);
         let bar_height = 14 * size;
-        // Titles that do not fit go on in further lines.
+        // A title that does not fit is wrapped.
         let columns = ((width.saturating_sub(2 * edge)) / lettering::width("0", size)).max(8);
         let title = wrap(title, columns);
         let top = rgb.len() / 3 / width;
@@ -116,7 +116,7 @@ impl ColorScale {
         (out, height)
     }
 
-    /// A tick in words: signed, and with a mark where larger errors share its colour.
+    /// Label of a tick: its sign, its value, and a mark if larger errors share its colour.
     fn label(&self, tick: f64) -> String {
         let digits = (2 - self.limit.log10().floor() as i32).clamp(0, 9) as usize;
         let number = format!("{:.digits$}", tick.abs());

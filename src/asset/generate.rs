@@ -1,6 +1,6 @@
-//! Meshes made from numbers: the shapes of the built-in scenes and of the tests, with analytic normals.
+//! Generated meshes with analytic normals, for the built-in scenes and the tests.
 //!
-//! The functions assert their ranges. [`Generator`] is the same as data for scene files, checked with a message.
+//! The functions assert their ranges. [`Generator`] is their form in scene files; it reports bad numbers as errors.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -12,13 +12,13 @@ use super::mesh::{COORDINATE_LIMIT_M, Mesh, TRIANGLE_LIMIT};
 use super::teapot;
 use crate::error::{Error, Result};
 
-/// Most halvings of the edges of an icosahedron: 1.3 million triangles.
+/// Largest number of times that an icosahedron's triangles are divided: 1.3 million triangles.
 pub const SPHERE_SUBDIVISION_LIMIT: u32 = 8;
 /// Emission pattern of the x < 0 half of [`torus_two_colour`], linear RGB.
 pub const COOL: Vec3 = Vec3::new(0.02, 0.12, 1.0);
 /// Emission pattern of the x > 0 half of [`torus_two_colour`], linear RGB.
 pub const WARM: Vec3 = Vec3::new(1.0, 0.12, 0.02);
-/// Half the width of the blend between the two, as a share of the major radius: narrow, yet several segments wide.
+/// Half the width of the blend between the two colours, as a share of the major radius. It spans several segments.
 const BLEND: f64 = 0.15;
 
 /// A generated mesh as a scene file names it: a table with one key, for example `sphere = { radius_m = 0.5, subdivisions = 3 }`.
@@ -36,7 +36,7 @@ pub enum Generator {
     Sphere {
         /// Radius in metres.
         radius_m: f32,
-        /// Times every triangle of an icosahedron is cut in four.
+        /// Number of times that every triangle of an icosahedron is divided into four.
         subdivisions: u32,
     },
     /// See [`torus`].
@@ -123,7 +123,7 @@ impl Generator {
     }
 }
 
-/// A generated mesh holds what [`Mesh::new`] asks for once its numbers are in range.
+/// Makes the mesh. It meets the conditions of [`Mesh::new`] if the numbers are in range.
 fn finish(
     name: &str,
     positions: Vec<Vec3>,
@@ -135,8 +135,8 @@ fn finish(
         .unwrap_or_else(|e| panic!("generator {name} made a bad mesh: {e}"))
 }
 
-/// Place `index` of 0 to `cells` on an edge of `size` centred on zero. One function, so that shared edges match bit for bit,
-/// and odd about the middle, so that opposite ends do.
+/// Coordinate `index` of 0 to `cells` on an edge of length `size` centred on zero. All edges use this function, so shared edges
+/// match to the bit; it is odd about the middle, so opposite ends do too.
 fn along(size: f32, index: u32, cells: u32) -> f32 {
     (f64::from(size) * 0.5 * (2.0 * f64::from(index) - f64::from(cells)) / f64::from(cells)) as f32
 }

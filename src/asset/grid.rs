@@ -1,29 +1,29 @@
-//! Flat meshes that are grids: equal cells in rows, two triangles each, as floors are made.
+//! Finds flat meshes that are grids, as floors are: equal cells in rows, two triangles each.
 
 use super::Mesh;
 use glam::{DVec3, Vec3};
 
-/// How far a vertex may be from its place in the grid, in cells: f32 rounding of places and of files.
+/// Largest distance of a vertex from its grid position, in cells. It allows for rounding to f32 and in files.
 const TOLERANCE: f64 = 1e-3;
 
-/// A cell's triangles meet along the line between the corners (0, 0) and (1, 1), not between (1, 0) and (0, 1).
+/// Flag of a cell whose diagonal runs from corner (0, 0) to (1, 1), not from (1, 0) to (0, 1).
 pub const UPWARDS: u32 = 1 << 31;
 
 /// A mesh that covers a parallelogram by cells.
 #[derive(Clone, Debug)]
 pub struct Grid {
-    /// Corner of the first cell, and from there to the ends of the first row and of the first column, metres.
+    /// Corner of the first cell, metres.
     pub corner: Vec3,
-    /// See [`Grid::corner`].
+    /// From there to the ends of the first row and of the first column, metres.
     pub sides: [Vec3; 2],
-    /// Cells in a row and rows.
+    /// Number of cells in a row, and number of rows.
     pub cells: [u32; 2],
-    /// Vertices of every cell, row by row: at (0, 0), (1, 0), (0, 1) and (1, 1) of it; the first may have [`UPWARDS`] added.
+    /// Vertices of every cell, row by row: at its corners (0, 0), (1, 0), (0, 1) and (1, 1). The first may have [`UPWARDS`] added.
     pub vertices: Vec<[u32; 4]>,
 }
 
 impl Grid {
-    /// The grid that a mesh is, if it is one: flat, of one colour, every cell there once.
+    /// The mesh as a grid, if it is flat, of one colour, and has every cell exactly once.
     pub fn find(mesh: &Mesh) -> Option<Grid> {
         let triangles = &mesh.triangles;
         if !mesh.is_flat()
@@ -61,7 +61,7 @@ impl Grid {
         }
         const NONE: u32 = u32::MAX;
         let mut cells = vec![[NONE; 4]; triangles.len() / 2];
-        // Halves of each cell that are there: the corner that each lacks.
+        // The halves found of each cell, as a bit for the corner that the half lacks.
         let mut halves = vec![0_u8; cells.len()];
         for triangle in triangles {
             let corners = triangle.map(|v| places[v as usize]);
@@ -99,7 +99,7 @@ impl Grid {
         Some(Grid { corner: corner.as_vec3(), sides, cells: [columns as u32, rows as u32], vertices: cells })
     }
 
-    /// Vertices of the cells at its four sides; some come more than once.
+    /// Vertices of the cells at its four sides; some occur more than once.
     pub fn rim(&self) -> impl Iterator<Item = u32> {
         let [columns, rows] = self.cells.map(|n| n as usize);
         let at_side = move |cell: usize| {

@@ -2,7 +2,7 @@
 
 use font8x8::UnicodeFonts;
 
-/// Edge of a glyph in pixels, its space included, at size 1.
+/// Edge of a glyph in pixels at size 1, with its spacing.
 pub const GLYPH: usize = 8;
 
 /// Width of a text in pixels.
@@ -10,8 +10,8 @@ pub fn width(text: &str, size: usize) -> usize {
     GLYPH * size * text.chars().count()
 }
 
-/// Writes one line into a picture of RGB triples, `picture_width` pixels wide, its upper left corner at (x, y). What lies outside
-/// is left out, and so is a character without a glyph.
+/// Writes one line into a picture of RGB triples, `picture_width` pixels wide, its upper left corner at (x, y). Pixels
+/// outside the picture and characters without a glyph are left out.
 pub fn write(rgb: &mut [f32], picture_width: usize, (x, y): (usize, usize), size: usize, color: [f32; 3], text: &str) {
     for (index, letter) in text.chars().enumerate() {
         let rows = font8x8::BASIC_FONTS.get(letter).or_else(|| font8x8::GREEK_FONTS.get(letter)).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! A checked triangle mesh and what is derived from it once: bounding sphere, closedness, convexity, flatness, identity.
+//! A checked triangle mesh with derived data: bounding sphere, closedness, convexity, flatness and content hash.
 
 use std::path::Path;
 
@@ -7,19 +7,19 @@ use glam::{DVec3, Vec3};
 use super::{enclose, obj, topology};
 use crate::error::{Error, Result};
 
-/// Most triangles a mesh may have: 48 MB of indices, and edge tables of about 200 MB while it is checked.
+/// Largest number of triangles of a mesh: 48 MB of indices, and edge tables of about 200 MB while it is checked.
 pub const TRIANGLE_LIMIT: usize = 4_000_000;
-/// Largest magnitude of a coordinate in metres; with f32 positions anything beyond has no sub-metre detail left.
+/// Largest magnitude of a coordinate in metres; beyond it f32 positions resolve no detail below a metre.
 pub const COORDINATE_LIMIT_M: f32 = 1e7;
-/// Smallest bounding radius in metres; below, squared lengths leave the range of f32 in the shaders.
+/// Smallest bounding radius in metres; below it, squared lengths in shaders leave the range of f32.
 const RADIUS_MINIMUM_M: f32 = 1e-9;
 /// A mesh whose area is below this share of its squared radius is a point or a line up to f32 rounding.
 const RELATIVE_AREA_MINIMUM: f64 = 1e-10;
 
 /// Triangles with one unit normal per vertex; vertices are split where normals differ. Positions in metres.
 ///
-/// The four arrays are public to read. What the accessors return was computed from them by [`Mesh::new`], so build a new
-/// mesh instead of altering one. Vertices stand in the order of their first use by a triangle; every vertex is used.
+/// The four arrays are public to read. [`Mesh::new`] computes from them what the accessors return, so build a new mesh
+/// instead of changing one. Vertices stand in the order of their first use by a triangle; every vertex is used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     /// Name for messages: the generator's, or the file's stem.
@@ -43,7 +43,7 @@ impl Mesh {
     ///
     /// Empty `normals` are computed from the triangles, weighted by angle; given ones are brought to unit length, and those
     /// of zero length replaced by computed ones. Triangles with two equal corners are dropped, which leaves a closed surface
-    /// closed; needles and other triangles without area are kept, since dropping them could open it. Unused vertices go.
+    /// closed; needles and other triangles without area are kept, since dropping them could open it. Unused vertices are dropped.
     ///
     /// # Errors
     /// [`Error::Input`] with one line: no triangles, more than [`TRIANGLE_LIMIT`], an index out of range, a number that is
@@ -106,8 +106,8 @@ impl Mesh {
         self.shape.closed
     }
 
-    /// Whether the mesh is closed and each of its pieces has positive volume: none is the wall of a hollow or inside out. From
-    /// outside only its fronts are seen.
+    /// Whether the mesh is closed and each of its pieces has positive volume, so that no piece is the wall of a cavity or inside
+    /// out. From outside, only front faces are seen.
     pub fn is_solid(&self) -> bool {
         self.shape.solid
     }
@@ -143,7 +143,7 @@ impl Mesh {
     }
 }
 
-/// Refuses what the rest of the crate must never meet.
+/// Refuses arrays of wrong length, indices out of range and numbers that are not finite or too large.
 fn check_numbers(positions: &[Vec3], normals: &[Vec3], colors: Option<&[Vec3]>, triangles: &[[u32; 3]]) -> Result<()> {
     let fail = |message: String| Err(Error::Input(message));
     if triangles.is_empty() {
@@ -219,7 +219,7 @@ fn complete_normals(positions: &[Vec3], triangles: &[[u32; 3]], given: &[Vec3]) 
     (0..positions.len()).map(unit).collect()
 }
 
-/// Whether a normal has unit length up to f32 rounding; such a one is kept bit for bit, so that files read back unchanged.
+/// Whether a normal has unit length up to f32 rounding; such a normal is kept to the bit, so that files read back unchanged.
 fn is_unit(normal: Vec3) -> bool {
     (normal.as_dvec3().length_squared() - 1.0).abs() < 5e-7
 }

@@ -1,7 +1,7 @@
-//! What comes from outside: triangle meshes, distant light and pictures.
+//! Triangle meshes, distant light and pictures.
 //!
-//! Everything read from a file is checked here, once: the modules below may trust a [`mesh::Mesh`] to be finite, indexed
-//! within range and of positive size.
+//! Everything read from a file is checked here, once: all other modules rely on a [`mesh::Mesh`] to have finite numbers,
+//! indices within range and a positive size.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -27,7 +27,7 @@ pub mod topology;
 
 pub use mesh::Mesh;
 
-/// A number as people write it: very large and very small ones with an exponent (`1e15`).
+/// A number as text; very large and very small ones have an exponent (`1e15`).
 pub fn short<T: Copy + Into<f64> + std::fmt::Display + std::fmt::LowerExp>(number: T) -> String {
     let size = number.into().abs();
     if size.is_finite() && size != 0.0 && !(1e-4..1e7).contains(&size) {
@@ -37,14 +37,14 @@ pub fn short<T: Copy + Into<f64> + std::fmt::Display + std::fmt::LowerExp>(numbe
     }
 }
 
-/// Reads a file of at most `limit_bytes`, whatever length it claims.
+/// Reads a file of at most `limit_bytes`, whatever length the file system reports.
 ///
 /// # Errors
 /// [`Error::Input`] where it cannot be read or is larger.
 pub fn read_file(path: &Path, limit_bytes: u64) -> Result<Vec<u8>> {
     let file = File::open(path).map_err(|e| Error::input(path, e))?;
     let mut bytes = Vec::new();
-    // One byte past the limit tells an oversized file; pipes and devices state no length.
+    // Reading one byte past the limit detects an oversized file; pipes and devices report no length.
     file.take(limit_bytes + 1).read_to_end(&mut bytes).map_err(|e| Error::input(path, e))?;
     if bytes.len() as u64 > limit_bytes {
         return Err(Error::input(path, format!("over the limit of {} MiB", limit_bytes >> 20)));

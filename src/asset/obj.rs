@@ -1,13 +1,13 @@
-//! Wavefront OBJ: a checking reader around `tobj`, and a writer that reads back bit for bit.
+//! Wavefront OBJ: a checking reader around `tobj`, and a writer whose text reads back as the same bits.
 //!
-//! Understood: `v x y z [w | r g b]` (colours are linear emission), `vn`, and `f` with any number of corners, as `v`, `v/vt`,
+//! The reader accepts `v x y z [w | r g b]` (colours are linear emission), `vn`, and `f` with any number of corners, as `v`, `v/vt`,
 //! `v//vn` or `v/vt/vn`, counted from 1 or from the end (-1). Groups, objects, materials, texture coordinates, points and lines
 //! are skipped: the file is one mesh. If any corner lacks a normal, all normals are computed; vertices are then smooth where
 //! faces share an index. Faces of more than three corners become fans, so they should be convex.
 //!
-//! `tobj` accepts NaN, indices past the end (some of which it wraps around), faces without corners (a panic) and corners
-//! whose normal it invents. So every line is checked here first, which also gives the line numbers, and `tobj` is handed only
-//! the checked lines, with plain indices.
+//! `tobj` accepts NaN and indices past the end (some of which it wraps around), panics on faces without corners, and invents
+//! missing normals. So every line is checked here first, which also provides the line numbers for messages, and `tobj` receives
+//! only checked lines with plain indices.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -50,7 +50,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh> {
     scan.into_mesh(&name).map_err(|e| e.context(path.display()))
 }
 
-/// What has been read so far: counts to check indices against, and the lines that go on to `tobj`.
+/// State of the reader: counts against which indices are checked, and the checked lines for `tobj`.
 #[derive(Default)]
 struct Scan {
     checked: String,
@@ -203,11 +203,11 @@ fn index(word: &str, count: usize, total: usize, of: &str) -> std::result::Resul
     Ok(plain as usize)
 }
 
-/// The mesh as OBJ text, which reads back as the same mesh, bit for bit. Equal normals are written once.
+/// The mesh as OBJ text, which reads back as the same bits. Equal normals are written once.
 pub fn write_obj(mesh: &Mesh) -> String {
     let mut text =
         format!("# {}: {} vertices, {} triangles, metres\n", mesh.name, mesh.positions.len(), mesh.triangles.len());
-    // Writing into a string cannot fail. The shortest digits that give the same f32 back are what Rust prints.
+    // Writing into a string cannot fail. Rust prints the shortest digits that read back as the same f32.
     for (i, p) in mesh.positions.iter().enumerate() {
         let _ = write!(text, "v {} {} {}", p.x, p.y, p.z);
         if let Some(colors) = &mesh.colors {

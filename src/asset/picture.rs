@@ -1,4 +1,4 @@
-//! Pictures out: PNG with the exact sRGB curve, animated PNG, and linear OpenEXR.
+//! Writes pictures: PNG with the exact sRGB curve, animated PNG, and linear OpenEXR.
 //!
 //! Rows run from the top, pixels from the left, three channels each. A file appears under its name only once it is complete:
 //! it is written beside it and renamed.
@@ -11,7 +11,7 @@ use image::ImageEncoder as _;
 use crate::error::{Error, Result};
 use crate::files;
 
-/// Linear Rec.709 channel to sRGB (IEC 61966-2-1), both 0 to 1; outside it is clamped, NaN gives 0.
+/// Linear Rec.709 channel to sRGB (IEC 61966-2-1), both 0 to 1. Values outside are clamped; NaN gives 0.
 pub fn srgb_from_linear(linear: f32) -> f32 {
     let x = if linear.is_nan() { 0.0 } else { linear.clamp(0.0, 1.0) };
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
@@ -44,8 +44,8 @@ pub fn write_png(path: &Path, width: u32, height: u32, linear_rgb: &[f32], expos
     })
 }
 
-/// Writes 8-bit sRGB frames (see [`encode_srgb`]) as an animated PNG that repeats for ever, `fps` frames a second. Frames are asked
-/// for one by one, and only their compressed form is kept until the file is written.
+/// Writes 8-bit sRGB frames (see [`encode_srgb`]) as an endlessly repeating animated PNG with `fps` frames per second. Frames
+/// are requested one by one, and only their compressed form is kept until the file is written.
 ///
 /// # Errors
 /// [`Error::Failed`] where the path cannot be written; [`Error::Usage`] without frames or with zero `fps`; that of a frame.
@@ -74,7 +74,7 @@ pub fn write_apng(
     write_whole(path, |file| Ok(file.write_all(&bytes)?))
 }
 
-/// Writes linear RGB as OpenEXR with 32-bit floats, bit for bit.
+/// Writes linear RGB as OpenEXR with 32-bit floats, without any rounding.
 ///
 /// # Errors
 /// [`Error::Failed`] where the path cannot be written.
@@ -107,11 +107,11 @@ fn check_size(width: u32, height: u32, channel_count: usize) {
 /// What can go wrong while a file is written.
 type WriteResult = std::result::Result<(), Box<dyn std::error::Error>>;
 
-/// Writes a file in its folder under another name and renames it, so that it is never seen half-written. What is not a
-/// regular file (a pipe, `/dev/stdout`) is written to as it stands.
+/// Writes a file in its folder under another name and renames it, so that it is never seen half-written. If the path is not
+/// a regular file (a pipe, `/dev/stdout`), it is written to directly.
 ///
 /// # Errors
-/// [`Error::Failed`] with the path; nothing is left behind.
+/// [`Error::Failed`] with the path; then no partial file remains.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> WriteResult) -> Result<()> {
     files::replace_with(path, write).map_err(|e| Error::Failed(format!("{}: cannot be written: {e}", path.display())))
 }

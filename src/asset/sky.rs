@@ -2,7 +2,7 @@
 //! ground of one colour, with a soft sun.
 //!
 //! Luminance and chromaticity of the dome are the paper's equation 3 with the coefficients of its appendix A.2. The brightness is
-//! not the physical one: [`Sky::radiance`] and [`Sky::sun`] say what a white surface shows, so that no exposure has to be found.
+//! not physical: [`Sky::radiance`] and [`Sky::sun`] set the radiance of a white surface, so that no exposure has to be found.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -16,13 +16,14 @@ use crate::sh::basis::{self, MAX_BANDS, MAX_COEFFICIENTS};
 use crate::sh::lobe;
 use crate::sh::quadrature::gauss_legendre;
 
-/// The sun's lobe is exp(SHARPNESS * (cos - 1)): half is left at 14 degrees. Four bands show no smaller sun.
+/// The sun's lobe is exp(SHARPNESS * (cos - 1)), which falls to half at 14 degrees. Four bands cannot represent a smaller sun.
 const SUN_SHARPNESS: f64 = 24.0;
-/// Nodes in the cosine and in azimuth of the rule that projects the dome: doubling them moves no coefficient by 2e-4 of the first.
+/// Nodes in the cosine and in azimuth of the rule that projects the dome. Doubling them changes every coefficient by less than
+/// 2e-4 of the first one.
 const RULE: (usize, usize) = (64, 128);
-/// Optical depth of clear air overhead at the middle of red, green and blue (Rayleigh, 1 / wavelength^4).
+/// Optical depth of clear air at the zenith for red, green and blue (Rayleigh scattering, 1 / wavelength^4).
 const AIR_DEPTH: DVec3 = DVec3::new(0.05, 0.10, 0.22);
-/// The same of haze, a unit of turbidity above 1.
+/// Optical depth of haze at the zenith, per unit of turbidity above 1.
 const HAZE_DEPTH: DVec3 = DVec3::new(0.035, 0.045, 0.06);
 
 /// A clear or hazy sky as data.
@@ -31,13 +32,13 @@ const HAZE_DEPTH: DVec3 = DVec3::new(0.035, 0.045, 0.06);
 pub struct Sky {
     /// Height of the sun, 0 to 90 degrees.
     pub sun_elevation_deg: f32,
-    /// Where the sun stands, from -z (ahead) towards +x (right), degrees.
+    /// Azimuth of the sun from -z (ahead) towards +x (right), degrees.
     pub sun_azimuth_deg: f32,
-    /// Haze: 2 clear to 10 hazy.
+    /// Haze, from 2 (clear) to 10 (hazy).
     pub turbidity: f32,
-    /// What white level ground shows under the dome alone, W m^-2 sr^-1 (its luminance).
+    /// Radiance of white level ground under the dome alone, W m^-2 sr^-1 (as luminance).
     pub radiance: f32,
-    /// What a white surface that faces the sun shows under the sun alone, as a factor on `radiance`.
+    /// Radiance of a white surface that faces the sun, under the sun alone, as a factor on `radiance`.
     pub sun: f32,
     /// Linear reflectance of the ground below the horizon, 0 to 1.
     pub ground: Vec3,
@@ -78,27 +79,27 @@ impl Sky {
     }
 }
 
-/// A sky ready for use.
+/// An evaluated sky.
 #[derive(Clone, Debug)]
 pub struct Dome {
     /// Direction to the sun, unit.
     sun: DVec3,
-    /// Linear RGB in the middle of the sun's lobe.
+    /// Linear RGB radiance in the middle of the sun's lobe.
     sun_radiance: DVec3,
     /// Perez coefficients A to E of Y, x and y.
     perez: [[f64; 5]; 3],
-    /// Y, x and y overhead over the Perez function there.
+    /// Y, x and y at the zenith, each divided by the Perez function there.
     zenith: [f64; 3],
     /// Factor on the model's luminance.
     scale: f64,
-    /// Linear RGB below the horizon.
+    /// Linear RGB radiance below the horizon.
     ground: DVec3,
     /// Projection to [`MAX_BANDS`] bands.
     coefficients: [Vec<f64>; 3],
 }
 
 impl Dome {
-    /// Evaluates a sky that was checked: a few milliseconds.
+    /// Evaluates a checked sky; this takes a few milliseconds.
     pub fn new(sky: &Sky) -> Self {
         let turbidity = f64::from(sky.turbidity);
         let elevation = f64::from(sky.sun_elevation_deg).to_radians();
@@ -119,7 +120,7 @@ impl Dome {
             coefficients: Default::default(),
         };
         let directions = rule();
-        // What white level ground shows: the mean over the dome, weighted with the cosine.
+        // Radiance of white level ground: the mean over the dome, weighted with the cosine.
         let white = |dome: &Dome| {
             let sum: DVec3 = directions.iter().map(|(w, weight)| dome.above(*w) * (weight * w.y)).sum();
             sum / PI
@@ -173,7 +174,7 @@ impl Dome {
         };
         for &(direction, weight) in directions {
             add(direction, self.above(direction) * weight);
-            // The ground's is the same rule upside down, exact for its one colour.
+            // The ground uses the mirrored rule, which is exact because the ground has one colour.
             add(direction * DVec3::new(1.0, -1.0, 1.0), self.ground * weight);
         }
         let disc = lobe::zonal(MAX_BANDS, &key_zonal(MAX_BANDS, SUN_SHARPNESS), self.sun);

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 pub const CONTROL_TEXT: &str = include_str!("../../assets/newell_teapot.txt");
 /// Squares along a patch edge that give about 6 000 triangles.
 pub const DEFAULT_SUBDIVISIONS: u32 = 10;
-/// The vertical is divided by this for the squat look that the drawings of the teapot have had since Blinn.
+/// Heights are divided by this, as in renderings of the teapot since Blinn.
 const VERTICAL_SQUEEZE: f64 = 1.3;
 /// Vertices of neighbouring patches closer than this, in units of the table, are one position.
 const WELD_DISTANCE: f64 = 1e-6;
@@ -25,8 +25,8 @@ type Patch = [[DVec3; 4]; 4];
 ///
 /// The result has y up, spout towards +x, handle towards -x, its base on y = 0, and is in units of the original table taken
 /// as metres (6.5 m from handle to spout, 2.4 m high). Normals are analytic, and point out of the body. Where a patch edge
-/// collapses to a point the limit is taken and triangles without extent are dropped. The mesh is not closed: the lid stands
-/// on an open pot, and spout and handle reach into it.
+/// collapses to a point, the limit of the normal is taken and triangles without area are dropped. The mesh is not closed: the lid
+/// rests on an open pot, and spout and handle reach into it.
 ///
 /// # Errors
 /// [`Error::Input`] for malformed control text.
@@ -124,7 +124,7 @@ struct Weld {
 
 impl Weld {
     fn add(&mut self, position: DVec3, normal: DVec3) -> u32 {
-        // Cells much larger than the distance, and the neighbours whose border is close.
+        // Cells are much larger than the distance; neighbouring cells are searched where their border is close.
         let cell = |p: DVec3| (p / (64.0 * WELD_DISTANCE)).floor().as_ivec3();
         let (low, high) = (cell(position - WELD_DISTANCE), cell(position + WELD_DISTANCE));
         let mut found = None;

@@ -1,15 +1,15 @@
-//! How the triangles of a mesh hang together once equal positions are welded.
+//! Topology of a mesh after equal positions are welded.
 
 use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
-/// What a baker needs to know about a surface.
+/// Properties of a surface on which the bake depends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Topology {
     /// 2-manifold without boundary, wound consistently, positive volume.
     pub closed: bool,
-    /// Closed, and every piece has positive volume: from outside no back is seen, unless pieces run through themselves inside out.
+    /// Closed, and every piece has positive volume: from outside no back face is seen, unless a piece intersects itself.
     pub solid: bool,
     /// Closed, in one piece, Euler characteristic 2, no edge bends inwards.
     pub convex: bool,
@@ -19,9 +19,9 @@ pub struct Topology {
     pub euler_characteristic: i64,
 }
 
-/// Distance from the plane that still counts as in it, relative to the bounding radius: some f32 roundings of a vertex.
+/// Largest distance of a vertex from the plane of a flat mesh, relative to the bounding radius: a few f32 roundings.
 const FLAT_TOLERANCE: f64 = 1e-5;
-/// How far f32 rounding moves a vertex, relative to the bounding radius, with a factor 4 to spare for rotated files.
+/// Largest displacement of a vertex by f32 rounding, relative to the bounding radius, with a factor of 4 for rotated files.
 const VERTEX_NOISE: f64 = 5e-7;
 
 /// One side of a triangle: `corner` is 3 * triangle + k, the side runs from that corner to the next one.
@@ -87,7 +87,7 @@ fn side(corners: &[u32], corner: usize) -> HalfEdge {
     HalfEdge { low: from.min(to), high: from.max(to), reversed: from > to, corner: corner as u32 }
 }
 
-/// Number of closed fans of triangles around vertices: more than there are vertices where two surfaces touch in a point.
+/// Number of closed fans of triangles around vertices. It exceeds the number of vertices if two surfaces touch in a point.
 fn fan_count(edges: &[&[HalfEdge]], corner_count: usize) -> usize {
     let mut sets = Sets::new(corner_count);
     for e in edges {
@@ -98,14 +98,14 @@ fn fan_count(edges: &[&[HalfEdge]], corner_count: usize) -> usize {
     sets.count
 }
 
-/// Triangles that hang together.
+/// Connected components of the triangles.
 fn pieces(edges: &[&[HalfEdge]], triangle_count: usize) -> Sets {
     let mut sets = Sets::new(triangle_count);
     edges.iter().for_each(|e| sets.join(e[0].corner as usize / 3, e[1].corner as usize / 3));
     sets
 }
 
-/// Whether every piece of a closed surface is wound outwards: it is no hollow's wall, and nothing inside out.
+/// Whether every piece of a closed surface is wound outwards, so that none is the wall of a cavity or inside out.
 fn has_solid_pieces(edges: &[&[HalfEdge]], positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3) -> bool {
     let mut pieces = pieces(edges, triangles.len());
     let mut volumes = HashMap::<usize, f64>::new();
@@ -143,8 +143,8 @@ impl Sets {
     }
 }
 
-/// Whether the far corner of one triangle lies below the plane of the other, or above it by no more than rounding explains:
-/// noise of the first triangle's plane is magnified by how much farther from the edge that corner is.
+/// Whether the far corner of the edge's second triangle lies below the plane of the first, or above it by no more than rounding
+/// explains. Rounding tilts the first plane, so its effect grows with the ratio of the two corners' distances from the edge.
 fn bends_outwards(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]], radius_m: f64) -> bool {
     let at = |corner: usize| positions[triangles[corner / 3][corner % 3] as usize].as_dvec3();
     let (one, other) = (edge[0].corner as usize, edge[1].corner as usize);
@@ -159,7 +159,7 @@ fn bends_outwards(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]],
     unit.dot(other_far - from) <= VERTEX_NOISE * radius_m * (1.0 + other_height / own_height)
 }
 
-/// Takes three vertices that span the set as widely as possible, so that the plane is well determined, and tests the rest.
+/// Chooses three vertices that span the set widely, so that the plane is well determined, and tests all others against it.
 fn is_flat(positions: &[Vec3], radius_m: f64) -> bool {
     let most = |measure: &dyn Fn(DVec3) -> f64| {
         let larger = |a: DVec3, b: DVec3| if measure(b) > measure(a) { b } else { a };

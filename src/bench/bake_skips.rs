@@ -1,4 +1,4 @@
-//! What a bake leaves out, part of `bench skip`: time, what is captured, and the field's error, with each skip off and on in turns.
+//! Skips of the bake, part of `bench skip`: time, number of captures and the field's error, with each skip off and on in turns.
 
 use super::{Bench, text};
 use crate::asset::{Mesh, generate};
@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde_json::json;
 use std::path::Path;
 
-/// One bake.
+/// Time, captures and error of one bake.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct BakeTime {
     /// Wall time, the least of the rounds, milliseconds.
@@ -21,8 +21,8 @@ pub struct BakeTime {
     pub filled_count: u32,
     /// Cube faces that were drawn.
     pub face_count: u32,
-    /// Of the coefficients against a bake that leaves nothing out, on faces of twice the edge: relative root mean square. Of the
-    /// large mesh against the bake without the skip.
+    /// Relative root mean square error of the coefficients against a bake without skips and with faces of twice the edge; for
+    /// the large mesh, against the bake without this skip.
     pub error: f64,
 }
 
@@ -37,18 +37,18 @@ pub struct BakeSkipRow {
     pub lattice: String,
     /// Name of the skip.
     pub skip: String,
-    /// With nothing else left out either; on the large mesh with all others.
+    /// The bake without any skip; for the large mesh, with all other skips.
     pub off: BakeTime,
-    /// With this alone.
+    /// The bake with this skip alone; for the large mesh, with all skips.
     pub on: BakeTime,
-    /// Bake time off over on.
+    /// Bake time without the skip over bake time with it.
     #[serde(rename = "speed_up_ratio")]
     pub times_faster: f64,
 }
 
 type Set = fn(&mut Baker);
 
-/// The skips by name, and what sets them off and on.
+/// The skips by name, with the functions that switch them off and on.
 const SKIPS: [(&str, Set, Set); 5] = [
     ("faces", |_| (), |baker| baker.faces = true),
     ("orbit", |_| (), |baker| baker.orbit = true),
@@ -59,7 +59,7 @@ const SKIPS: [(&str, Set, Set); 5] = [
 
 /// Half of the default shells and directions.
 const SMALL: &str = "cube:8x5";
-/// As many samples as by default, most of them far off: where simplified meshes gain.
+/// About as many samples as by default, most of them far away, where simplified meshes help.
 const FAR: &str = "cube:16x8,log,outer=64";
 
 /// Measures every skip on a few meshes, and writes `skip_bake.csv` and `skip_bake.json` into `folder`. `cases`: of all meshes only

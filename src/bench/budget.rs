@@ -1,4 +1,4 @@
-//! The error of a picture split into its causes, rung by rung of the ladder of [`crate::truth`].
+//! The error of a picture, split into its causes by the rungs of [`crate::truth`].
 
 use super::Bench;
 use super::cases::Case;
@@ -10,22 +10,22 @@ use crate::truth::raycast::{RayCast, relative_error};
 use crate::truth::{ExactChain, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
 
-/// Vertices that are judged a scene.
+/// Number of vertices that are compared per scene.
 pub const VERTICES: usize = 1500;
 
-/// How a case is judged.
+/// Effort of the truth of a case.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
-    /// Vertices, chosen at random; all where there are fewer.
+    /// Number of vertices, chosen at random; all if there are fewer.
     pub vertices: usize,
-    /// Rays of T0 a vertex and light.
+    /// Rays of T0 per vertex and light.
     pub t0_rays: u32,
-    /// Rays of T1 a factor.
+    /// Rays of T1 per factor.
     pub t1_rays: u32,
 }
 
 impl Effort {
-    /// For a quick or a thorough run.
+    /// Effort of a quick or a thorough run.
     pub fn new(quick: bool) -> Self {
         if quick {
             Effort { vertices: 1000, t0_rays: 1024, t1_rays: 1024 }
@@ -35,26 +35,26 @@ impl Effort {
     }
 }
 
-/// The upper rungs of a case, which no option of bake or merge moves.
+/// T0 and T1 of a case, which do not depend on options of bake or merge.
 pub struct Truth {
-    /// The vertices that are judged.
+    /// The compared vertices.
     pub vertices: Vec<Vertex>,
-    /// Rays.
+    /// Radiosity of T0, by ray casting.
     pub t0: Vec<Radiosity>,
     /// Relative standard error of `t0`.
     pub t0_error: f64,
-    /// Exact factors, band-limited chain.
+    /// Radiosity of T1: exact factors, band-limited chain.
     pub t1: Vec<Radiosity>,
     /// Relative standard error of `t1`, from two halves of its rays.
     pub t1_error: f64,
     /// Root mean square of `t0`: the unit of relative errors.
     pub unit: f64,
-    /// Root mean square of what would be there if nothing blocked.
+    /// Root mean square of the radiosity without occlusion.
     pub unoccluded: f64,
 }
 
 impl Truth {
-    /// Casts all rays.
+    /// Computes T0 and T1.
     pub fn new(case: &Case, effort: Effort, seed: u64) -> Self {
         let placements = case.scene.at(case.time_s);
         let shapes = RayMeshes::new(&case.scene);
@@ -84,13 +84,13 @@ impl Truth {
     }
 }
 
-/// Values of the judged vertices from values of all, by entity.
+/// Values of the compared vertices, from values of all vertices by entity.
 pub fn select(all: &[(usize, Vec<Radiosity>)], vertices: &[Vertex]) -> Vec<Radiosity> {
     let of = |v: &Vertex| all.iter().find(|(entity, _)| *entity == v.entity).expect("it receives").1[v.index];
     vertices.iter().map(of).collect()
 }
 
-/// The device's radiosity of the judged vertices after a merge.
+/// The device's radiosity of the compared vertices after a merge.
 ///
 /// # Errors
 /// `Device` when memory ran out.
@@ -103,12 +103,12 @@ pub fn device_radiosity(frame: &Frame, vertices: &[Vertex]) -> Result<Vec<Radios
     Ok(select(&all, vertices))
 }
 
-/// One row of the table.
+/// The errors of one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Budget {
     /// Scene and light.
     pub case: String,
-    /// Vertices judged.
+    /// Number of compared vertices.
     #[serde(rename = "vertex_count")]
     pub vertices: usize,
     /// T0's own relative standard error.
@@ -123,16 +123,16 @@ pub struct Budget {
     pub sampling: Difference,
     /// T2 to T3.
     pub arithmetic_and_storage: Difference,
-    /// T1 to T3: all that better code or more memory could take away.
+    /// T1 to T3: the error that does not come from the number of bands.
     pub below_bands: Difference,
     /// T0 to T3.
     pub total: Difference,
-    /// T0's root mean square over that of the unoccluded value: what turns errors relative to T0 into errors relative to it.
+    /// T0's root mean square over that of the unoccluded value, which converts errors to the unit of the unoccluded value.
     #[serde(rename = "t0_per_unoccluded_ratio")]
     pub t0_per_unoccluded: f64,
 }
 
-/// Climbs down the ladder, with fields and a merge of the given options.
+/// Computes T2 and T3 with fields and a merge of the given options, and compares all rungs.
 ///
 /// # Errors
 /// As [`Frame::new`].

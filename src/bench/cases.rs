@@ -1,4 +1,4 @@
-//! What is measured: the embedded scenes, and a teapot over a plane under one kind of light at a time.
+//! The measured cases: the embedded scenes, and a teapot over a plane under one kind of light at a time.
 
 use crate::asset::{Mesh, embedded};
 use crate::error::{Error, Result};
@@ -6,17 +6,17 @@ use crate::scene::Scene;
 use crate::truth::raycast::Distant;
 use std::path::Path;
 
-/// A scene at a moment under the light that its reference integrates.
+/// A scene at one moment, and the distant light that its truth integrates.
 pub struct Case {
-    /// For tables.
+    /// Name in tables.
     pub name: String,
-    /// What lights it, in words.
+    /// Description of its light.
     pub light: String,
     /// The scene.
     pub scene: Scene,
     /// Scene time in seconds.
     pub time_s: f64,
-    /// Distant light of the reference.
+    /// Form of the distant light that ray casting integrates.
     pub distant: Distant,
 }
 
@@ -26,13 +26,13 @@ const TOWARD: [f64; 3] = [0.5, 0.707, 0.5];
 const GAP: f64 = 0.02;
 /// Distance of the sphere lights from the teapot's centre, in bounding radii.
 const LIGHT_DISTANCE: f64 = 5.0;
-/// Distance of a disc in the sky: over the floor its direction changes by a quarter of a degree.
+/// Distance of a disc in the sky, in bounding radii: its direction changes by 0.25 degrees over the floor.
 const FAR: f64 = 1000.0;
 
-/// What has any of the texts in its name, in its order; all where there is no text.
+/// The items whose name contains any of the texts, in their order; all if there is no text.
 ///
 /// # Errors
-/// `Usage` that lists the names when a text is in none.
+/// `Usage` with a list of the names when no name contains one of the texts.
 pub fn named<T>(mut all: Vec<T>, texts: &[String], name: impl Fn(&T) -> &str) -> Result<Vec<T>> {
     for text in texts {
         if !all.iter().any(|case| name(case).contains(text)) {
@@ -44,10 +44,10 @@ pub fn named<T>(mut all: Vec<T>, texts: &[String], name: impl Fn(&T) -> &str) ->
     Ok(all)
 }
 
-/// The embedded scenes at their start.
+/// The embedded scenes at time 0.
 ///
 /// # Errors
-/// None that a test does not show.
+/// `Input` when an embedded scene is malformed; tests read all of them.
 pub fn scenes() -> Result<Vec<Case>> {
     let names = embedded::scenes().into_iter().map(|(name, _)| name);
     names.map(scene).collect()
@@ -56,14 +56,14 @@ pub fn scenes() -> Result<Vec<Case>> {
 /// An embedded scene by name.
 ///
 /// # Errors
-/// `Input` when there is none.
+/// `Input` when there is no such scene.
 pub fn scene(name: &str) -> Result<Case> {
     let path = Path::new(embedded::ROOT).join("scenes").join(format!("{name}.toml"));
     let scene = Scene::load(&path)?;
     Ok(Case { name: name.to_owned(), light: light(&scene), scene, time_s: 0.0, distant: Distant::Exact })
 }
 
-/// What lights a scene: its distant light and the number of those in it.
+/// Description of a scene's light: its distant light and the number of local lights.
 pub fn light(scene: &Scene) -> String {
     let source = scene.environment.source();
     let named = [
@@ -90,16 +90,16 @@ const FINE_CELLS: usize = 112;
 /// light seen from the teapot's centre under a half angle of 15 and of 7.5 degrees.
 ///
 /// # Errors
-/// None that a test does not show.
+/// As [`floor`].
 pub fn teapot_lights() -> Result<Vec<Case>> {
     Ok(floor(FINE_CELLS)?.into_iter().filter(|case| !case.name.contains("disc")).collect())
 }
 
-/// As [`teapot_lights`] over a floor of so many cells along a side, and with discs of half-angles of 30 and 15 degrees in the sky
-/// last: sphere lights so far away that they look the same from everywhere.
+/// As [`teapot_lights`] over a floor with `cells` cells along a side, followed by discs of half-angles of 30 and 15 degrees in the
+/// sky: sphere lights so far away that they look the same from all vertices.
 ///
 /// # Errors
-/// None that a test does not show.
+/// `Input` when the embedded mesh or a scene of this function is malformed; tests run it.
 pub fn floor(cells: usize) -> Result<Vec<Case>> {
     let mesh = Mesh::parse(&embedded::read(Path::new("assets/meshes/teapot.obj"))?, Path::new("teapot.obj"))?;
     let (centre, radius_m) = mesh.bounding_sphere();
@@ -134,7 +134,7 @@ pub fn floor(cells: usize) -> Result<Vec<Case>> {
         let length = TOWARD.iter().map(|c| c * c).sum::<f64>().sqrt();
         let at = TOWARD.map(|c| c * distance / length);
         let scale = distance * half_angle_deg.to_radians().sin();
-        // As bright at the centre as a unit of cosine-weighted irradiance over pi.
+        // Radiance that gives a facing surface at the centre the irradiance pi.
         let radiance = half_angle_deg.to_radians().sin().powi(-2);
         format!(
             "[[entity]]\nmesh = \"bulb\"\nreceives = false\nscale = {scale}\nposition = [{}, {}, {}]\nemission = [{radiance}, {radiance}, {radiance}]",

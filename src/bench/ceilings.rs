@@ -1,4 +1,4 @@
-//! What a device does at best, measured with shaders that do one thing each: what the merge is held against.
+//! Peak rates of a device, measured with shaders that do one kind of work each, to compare the merge with.
 
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView, Volume};
@@ -7,14 +7,14 @@ use ash::vk;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Rates of a device.
+/// Measured peak rates of a device.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Ceilings {
     /// Multiplications and additions, in 10^9 a second; a fused one counts as two.
     pub gflops: f64,
     /// Texels of four halves from a buffer of the field's size, in 10^9 a second.
     pub texel_halves_giga: f64,
-    /// Texels of 16 bytes likewise.
+    /// Texels of 16 bytes from a buffer of the field's size, in 10^9 a second.
     pub texel_packed_giga: f64,
     /// Samples interpolated between eight texels of four halves of an image of the field's size, in 10^9 a second.
     pub filtered_giga: f64,
@@ -22,20 +22,20 @@ pub struct Ceilings {
     pub storage_giga: f64,
     /// Bytes that `a = b + s c` reads and writes in buffers larger than caches, in 10^9 a second.
     pub triad_gb_s: f64,
-    /// What a dispatch of one workgroup takes that does next to nothing, milliseconds: the grain of all times.
+    /// Time of a dispatch of one workgroup with almost no work, milliseconds: the resolution of all times.
     pub dispatch_ms: f64,
 }
 
 impl Ceilings {
-    /// Whether a time says more of what was done than of starting it: at least five times an idle dispatch.
+    /// Whether a time is at least five times that of an idle dispatch, so that it measures work and not overhead.
     pub fn resolve(&self, milliseconds: f64) -> bool {
         milliseconds >= 5.0 * self.dispatch_ms
     }
 }
 
-/// Timed runs of each shader after one to warm up.
+/// Number of timed runs of each shader, after one run to warm up.
 const RUNS: usize = 5;
-/// Multiply-adds of vectors, or reads, in a round.
+/// Vector multiply-adds, or reads, per iteration.
 const READS: u32 = 16;
 /// Floats of each of the triad's three buffers: 16 MiB.
 const TRIAD_FLOATS: u32 = 4 << 20;
@@ -47,10 +47,10 @@ const TRIAD_FLOATS: u32 = 4 << 20;
 pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Result<Ceilings> {
     let source = Buffer::with_data(device, "ceiling source", &vec![0x2000_2000_u32; field_bytes as usize / 4])?;
     let out = Buffer::new(device, "ceiling results", BufferKind::Device, 4 * u64::from(TRIAD_FLOATS))?;
-    // As wide and high as a field of default shape.
+    // The width and height of a field of the default lattice.
     let size = [40, 60, (field_bytes / (8 * 40 * 60)).max(1) as u32];
     let image = Volume::with_data(device, "ceiling image", size, &vec![[0x2000; 4]; (size[2] * 40 * 60) as usize])?;
-    // Invocations of a run of each kind; what is slow on a processor does less.
+    // Invocations per run differ by kind, because some kinds are slow on a CPU.
     let rate = |kind: u32, invocations: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
         let count = (field_bytes / texel_bytes).max(8) as u32;
         let mask = count.next_power_of_two() / if count.is_power_of_two() { 1 } else { 2 } - 1;
@@ -74,7 +74,7 @@ pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Res
         Ok(f64::from(invocations) * f64::from(rounds) * f64::from(READS) / seconds * 1e-9)
     };
     Ok(Ceilings {
-        // A round multiplies and adds vectors of four.
+        // An iteration multiplies and adds vectors of four.
         gflops: 8.0 * rate(0, 65_536, 256, 8)?,
         texel_halves_giga: rate(1, 16_384, 64, 8)?,
         texel_packed_giga: rate(2, 16_384, 64, 16)?,
@@ -95,7 +95,7 @@ fn triad(device: &Arc<Device>, library: &Library, out: &Buffer) -> Result<f64> {
     Ok(3.0 * bytes as f64 / best(device, &pipeline, &resources, TRIAD_FLOATS / 4)? * 1e-9)
 }
 
-/// Milliseconds of a dispatch of one workgroup that multiplies once.
+/// Milliseconds of a dispatch of one workgroup with one iteration of multiply-adds.
 fn idle(device: &Arc<Device>, library: &Library, source: &Buffer, out: &Buffer) -> Result<f64> {
     let row = ShaderPermutation::new("ceiling.comp", 4)
         .define("KIND", 0_u32)
@@ -106,7 +106,7 @@ fn idle(device: &Arc<Device>, library: &Library, source: &Buffer, out: &Buffer) 
     Ok(1e3 * best(device, &pipeline, &[Bind::Buffer(source), Bind::Buffer(out)], 1)?)
 }
 
-/// Seconds of the fastest run: noise only adds.
+/// Seconds of the fastest run, because noise only adds time.
 fn best(device: &Arc<Device>, pipeline: &ComputePipeline, resources: &[Bind<'_>], invocations: u32) -> Result<f64> {
     let mut least = f64::INFINITY;
     for run in 0..=RUNS {

@@ -1,21 +1,21 @@
-//! Errors over vertices and times over rounds.
+//! Statistics: errors over vertices, and times over rounds.
 
 use serde::Serialize;
 
-/// Radiosity a vertex: linear RGB.
+/// Radiosity of a vertex: linear RGB radiance.
 pub type Radiosity = [f64; 3];
 
-/// How far two sets of vertices are apart, in units of a given value. A vertex's error is the root mean square over its
+/// Difference between two sets of vertex values, relative to a given unit. A vertex's error is the root mean square over its
 /// three channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Difference {
     /// Root mean square over vertices.
     #[serde(rename = "rms_relative")]
     pub rms: f64,
-    /// What 99 of 100 vertices stay below.
+    /// 99th percentile over vertices.
     #[serde(rename = "p99_relative")]
     pub p99: f64,
-    /// The worst vertex.
+    /// Maximum over vertices.
     #[serde(rename = "max_relative")]
     pub max: f64,
 }
@@ -39,11 +39,11 @@ pub fn difference(a: &[Radiosity], b: &[Radiosity], unit: f64) -> Difference {
 /// Median and quartiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {
-    /// A quarter of the values lies below.
+    /// First quartile.
     pub lower: f64,
-    /// The middle value.
+    /// Median.
     pub median: f64,
-    /// A quarter of the values lies above.
+    /// Third quartile.
     pub upper: f64,
 }
 
@@ -63,9 +63,9 @@ pub fn spread(values: &[f64]) -> Spread {
     Spread { lower: at(0.25), median: at(0.5), upper: at(0.75) }
 }
 
-/// Where a falling curve of (x, y) comes down to `y`, straight in logarithms between its points and on beyond the last two. A
-/// curve that starts below `y` answers with its first x: there it is at least as good. `None` with fewer than two points
-/// or where it does not fall.
+/// The x at which a falling curve of (x, y) reaches `y`, interpolated linearly in logarithms and extrapolated beyond its last two
+/// points. If the curve starts below `y`, its first x is returned. `None` if there are fewer than two points or the curve does
+/// not fall.
 pub fn crossing(curve: &[(f64, f64)], y: f64) -> Option<f64> {
     let logs: Vec<(f64, f64)> = curve.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
     let target = y.ln();
@@ -74,7 +74,7 @@ pub fn crossing(curve: &[(f64, f64)], y: f64) -> Option<f64> {
     (slope < 0.0).then(|| (pair[0].0 + (target - pair[0].1) / slope).exp().max(curve[0].0))
 }
 
-/// What a rising curve of (x, y) has at `x`, straight in logarithms between its points and on beyond its ends; of one point, that.
+/// The value of a rising curve of (x, y) at `x`, interpolated and extrapolated linearly in logarithms. A single point gives its y.
 ///
 /// # Panics
 /// When there is no point.

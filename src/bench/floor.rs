@@ -1,4 +1,4 @@
-//! `bench floor`: the teapot alone over a floor, against an independent ray caster's figures for four bands.
+//! `bench floor`: a teapot over a floor, compared with an independent ray caster's errors of four bands.
 
 use super::budget::{Budget, Effort, Truth, budget};
 use super::cases;
@@ -11,17 +11,17 @@ use serde::Serialize;
 use serde_json::json;
 use std::path::Path;
 
-/// The independent check's bands rung, root mean square of T0-T1 over that of the unoccluded value, where there is one, in the
-/// order of [`cases::floor`].
+/// Root mean square of T0-T1 over that of the unoccluded value by the independent check, if it has the case, in the order of
+/// [`cases::floor`].
 const INDEPENDENT: [Option<f64>; 7] = [Some(0.0023), Some(0.0054), Some(0.0064), None, None, Some(0.036), Some(0.061)];
 
-/// Cells along a side of the floor: 40 x 40 receivers, as the independent check has.
+/// Cells along a side of the floor: 40 x 40 receiving vertices, as in the independent check.
 const CELLS: usize = 39;
 
-/// Most that T1-T3 should be of T0-T1.
+/// Goal: largest T1-T3 as a share of T0-T1.
 pub const GOAL: f64 = 0.45;
 
-/// One light.
+/// Errors under one light.
 #[derive(Clone, Debug, Serialize)]
 pub struct FloorRow {
     /// Teapot and light.
@@ -36,7 +36,7 @@ pub struct FloorRow {
     pub total_per_unoccluded: f64,
     /// T1-T3 over T0-T1.
     pub below_bands_per_bands_ratio: f64,
-    /// Everything, relative to T0.
+    /// All rungs, relative to T0.
     pub budget: Budget,
 }
 
@@ -54,25 +54,26 @@ impl FloorRow {
         }
     }
 
-    /// The bands rung without what T0 and T1 themselves err by, which adds up in squares.
+    /// T0-T1 without the standard errors of T0 and T1, whose squares are subtracted.
     pub fn bands_without_noise(&self) -> f64 {
         let Budget { bands, t0_error, t1_error, t0_per_unoccluded, .. } = &self.budget;
         t0_per_unoccluded * (bands.rms.powi(2) - t0_error.powi(2) - t1_error.powi(2)).max(0.0).sqrt()
     }
 
-    /// Whether the bands rung is within a fifth of the independent check's.
+    /// Whether T0-T1 is within 20 % of the independent check's.
     pub fn agrees(&self) -> bool {
         let off = |known: f64| (self.bands_without_noise() / known - 1.0).abs();
         self.independent_bands_per_unoccluded.is_none_or(|known| off(known) <= 0.2)
     }
 
-    /// Whether the rungs below keep to the goal.
+    /// Whether T1-T3 meets the goal.
     pub fn keeps_goal(&self) -> bool {
         self.below_bands_per_bands_ratio <= GOAL
     }
 }
 
-/// Measures the lights that are named, or all, by `rays` a vertex, light and factor, with fields of the given kind, and writes `floor.csv` and `floor.json` into `folder`.
+/// Measures the named lights, or all, with `rays` rays per vertex, light and factor and with fields of the given bake options, and
+/// writes `floor.csv` and `floor.json` into `folder`.
 ///
 /// # Errors
 /// `Usage` when no light has a given text in its name, `Failed` when the folder cannot be written; else as [`crate::frame::Frame::new`].

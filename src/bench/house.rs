@@ -1,4 +1,4 @@
-//! A storey of a house, made for what lists leave off: lamps that face away from the ceiling, lamps that are out, things in the attic.
+//! A storey of a house, made for skips: lamps that face away from the ceiling, lamps that are out, entities in the attic.
 
 use crate::asset::{Mesh, embedded};
 use crate::error::Result;
@@ -9,14 +9,14 @@ use std::path::Path;
 
 /// Lamps along a side of the storey.
 const LAMPS: usize = 3;
-/// Things along a side of the storey, and of the attic.
+/// Entities along a side of the storey, and of the attic.
 const THINGS: usize = 5;
 
-/// A floor and a ceiling of 8 by 8 m, lamps of which three shine down and the others are out, things on the floor and in the attic.
-/// Fields of the lamps tell: what shines has one that is zero above it, what is out one that is zero everywhere.
+/// A floor and a ceiling of 8 by 8 m, lamps of which three shine down and the others are out, entities on the floor and in the
+/// attic. The field of a shining lamp is zero above it, and the field of a lamp that is out is zero everywhere.
 ///
 /// # Errors
-/// None that a test does not show.
+/// `Input` when the scene of this function is malformed; tests run it.
 pub fn scene() -> Result<Scene> {
     let panel = "cuboid = { size_m = [0.9, 0.1, 0.9], cells = 3 }";
     let mut text = format!(

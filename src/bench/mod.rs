@@ -35,15 +35,15 @@ use serde_json::Value;
 /// What every measurement needs.
 #[derive(Clone)]
 pub struct Bench<'b> {
-    /// Bakes on the device that is measured.
+    /// Baker on the measured device.
     pub baker: &'b Baker,
-    /// Baked things on disk.
+    /// Cache of baked fields and transfers.
     pub cache: &'b Cache,
-    /// Told what is being done now.
+    /// Receives descriptions of the current work.
     pub progress: &'b dyn Fn(&str),
-    /// Whether to end within a minute on two cores rather than to be thorough.
+    /// Whether to run a reduced measurement that ends within a minute on two cores.
     pub quick: bool,
-    /// Decides vertices and rays.
+    /// Seed of vertices and rays.
     pub seed: u64,
     /// Device, driver, version, options and revision, for the head of every result file.
     pub origin: Value,
@@ -63,13 +63,13 @@ impl Bench<'_> {
     }
 }
 
-/// The options that sweeps vary: the program's defaults, and a picture too small to matter.
+/// The options that sweeps vary: the program's defaults, with a picture so small that drawing costs nothing.
 pub fn default_options() -> frame::Options {
     frame::Options {
         bake: crate::bake::Options::default(),
         lookup: crate::field::Lookup::default(),
         chain: crate::merge::variant::Chain::default(),
-        // Frames are timed at rest: each must merge everything.
+        // Frames are timed without motion, and each must merge everything.
         skip: crate::lists::skip::Skip::without("unmoved"),
         eps: crate::lists::skip::EPS,
         lists: None,

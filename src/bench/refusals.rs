@@ -1,4 +1,4 @@
-//! Numbers and meshes that no picture can be made of: each is refused with one line.
+//! Invalid numbers and meshes; each must be refused with one line.
 
 use super::trials::{GRADIENT, entity, scene};
 use crate::asset::Mesh;
@@ -6,18 +6,18 @@ use crate::error::{Error, Result};
 use glam::Vec3;
 use serde::Serialize;
 
-/// What came of an input that is to be refused.
+/// The result for an input that must be refused.
 #[derive(Clone, Debug, Serialize)]
 pub struct Refusal {
-    /// What is wrong with it.
+    /// Description of the input.
     pub name: String,
-    /// What the user is told.
+    /// The error message.
     pub message: String,
-    /// Whether it was refused as bad input (exit code 4) in one line that is no longer than a terminal shows in two.
+    /// Whether it was refused as bad input (exit code 4) with one line that fits two lines of a terminal.
     pub passed: bool,
 }
 
-/// What an entity may not have.
+/// Invalid properties of an entity.
 const ENTITIES: &[(&str, &str)] = &[
     ("scale 0", "scale = 0"),
     ("negative scale", "scale = -1"),
@@ -47,7 +47,7 @@ fn triangle(corners: [Vec3; 3], indices: [u32; 3]) -> Result<()> {
     Mesh::new("odd", corners.to_vec(), vec![Vec3::Y; 3], None, vec![indices]).map(|_| ())
 }
 
-/// Tries them all; needs no device.
+/// Tries all invalid inputs; this needs no device.
 pub fn refusals() -> Vec<Refusal> {
     let placed = ENTITIES.iter().map(|(name, with)| (*name, scene(2, GRADIENT, &entity("ball", with)).map(|_| ())));
     let meshes = [

@@ -1,8 +1,8 @@
-//! What a user would pick instead of shadow fields: soft shadows a vertex by ray casting on the processor's threads.
+//! Comparison with the alternative to shadow fields: soft shadows per vertex by ray casting on all CPU threads.
 //!
-//! The rival is [`RayCast`] in one run: an 8-wide hierarchy a mesh, bounding spheres before it, scrambled Sobol points, the
-//! sky sampled by cosine, local lights in their cone, occluders that cannot lie between left out, all threads busy. Its
-//! hierarchies are built beforehand, as fields are baked beforehand.
+//! The rival is [`RayCast`] in one run. It uses an 8-wide hierarchy per mesh behind a bounding sphere test, scrambled Sobol points,
+//! cosine sampling of the sky and cone sampling of local lights, and leaves out occluders that cannot lie between vertex and light.
+//! Its hierarchies are built beforehand, as fields are baked beforehand.
 
 use super::Bench;
 use super::budget::{Truth, device_radiosity};
@@ -15,19 +15,19 @@ use crate::truth::{RayCast, RayMeshes, World};
 use serde::Serialize;
 use std::time::Instant;
 
-/// The rival at one number of rays.
+/// Ray casting with one number of rays.
 #[derive(Clone, Debug, Serialize)]
 pub struct RivalPoint {
-    /// Rays a vertex for the sky and for each light.
+    /// Rays per vertex for the sky and for each light.
     #[serde(rename = "ray_count")]
     pub rays: u32,
-    /// Wall time for all lit vertices, in proportion from the judged ones, milliseconds.
+    /// Wall time for all lit vertices, scaled from the compared ones, milliseconds.
     pub wall_ms: Spread,
     /// Difference to T0.
     pub error: Difference,
 }
 
-/// Merge and rival on one case.
+/// Merge and ray casting on one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Scene and light.
@@ -37,39 +37,39 @@ pub struct Comparison {
     /// Lit vertices.
     #[serde(rename = "vertex_count")]
     pub vertices: usize,
-    /// Threads of the rival.
+    /// Threads of the ray caster.
     #[serde(rename = "thread_count")]
     pub threads: usize,
-    /// Wall time of a frame without drawing, milliseconds.
+    /// Wall time of a frame of the merge without drawing, milliseconds.
     pub frame_wall_ms: Spread,
     /// Device time of the merge in it, milliseconds.
     pub merge_ms: Spread,
-    /// Merge against T0.
+    /// Error of the merge against T0.
     pub merge_error: Difference,
-    /// The rival at rising numbers of rays.
+    /// Ray casting with increasing numbers of rays.
     pub rival: Vec<RivalPoint>,
-    /// Wall time in which the rival has the merge's root mean square error, milliseconds: between its points, beyond its last,
-    /// or at one ray where that is already better.
+    /// Wall time in which ray casting reaches the merge's root mean square error, milliseconds: interpolated, extrapolated, or the
+    /// time of one ray if that already has a smaller error.
     pub rival_ms_at_equal_rms: Option<f64>,
-    /// Rays at which it has it.
+    /// Number of rays at which it reaches that error.
     #[serde(rename = "rays_at_equal_rms_count")]
     pub rays_at_equal_rms: Option<f64>,
-    /// How many times faster a frame of the merge is at equal root mean square error.
+    /// Ratio of that wall time to a frame of the merge.
     #[serde(rename = "speed_up_at_equal_rms_ratio")]
     pub speed_up_at_equal_rms: Option<f64>,
-    /// The same of the merge's device time alone, without lists, uploads and waiting.
+    /// Ratio of that wall time to the merge's device time, without lists, uploads and waiting.
     #[serde(rename = "merge_speed_up_at_equal_rms_ratio")]
     pub merge_speed_up_at_equal_rms: Option<f64>,
 }
 
 impl Comparison {
-    /// The case with its light, once.
+    /// Name of the case with its light, unless the name contains it.
     pub fn title(&self) -> String {
         if self.case.contains(", (") { self.case.clone() } else { format!("{} ({})", self.case, self.light) }
     }
 }
 
-/// Runs both in turns.
+/// Measures merge and ray casting in turns.
 ///
 /// # Errors
 /// As [`crate::frame::Frame::new`] and [`crate::frame::Frame::render`].
@@ -85,9 +85,9 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparis
     let mut found: Vec<Vec<Radiosity>> = vec![Vec::new(); rays.len()];
     frame.render(&placements, None)?;
     for round in 0..if bench.quick { 3 } else { 7 } {
-        // The first frame after the rays finds threads asleep and caches full of triangles: it warms up.
+        // The first frame after ray casting warms up threads and caches.
         for warm in [false, true, true, true] {
-            // All is merged, as if everything had moved.
+            // Everything is merged, as if all entities had moved.
             frame.forget();
             let started = Instant::now();
             let timings = frame.render(&placements, None)?;

@@ -1,4 +1,4 @@
-//! `bench scaling`: what a frame costs as vertices, entities and lights become many.
+//! `bench scaling`: time and memory of a frame as vertices, entities and lights increase.
 
 use super::budget::device_radiosity;
 use super::figures::{Radiosity, Spread, difference, rms, spread};
@@ -20,49 +20,47 @@ use serde_json::json;
 use std::path::Path;
 use std::time::Instant;
 
-/// One size of one axis.
+/// Measurements at one size along one axis.
 #[derive(Clone, Debug, Serialize)]
 pub struct ScalingPoint {
-    /// What is varied: vertices, entities (floor alone lit), entities all lit, or lights.
+    /// The varied quantity: vertices, entities (only the floor is lit), entities all lit, or lights.
     pub axis: &'static str,
-    /// Lit vertices.
+    /// Number of lit vertices.
     pub vertices: usize,
-    /// Entities, the floor included.
+    /// Number of entities, including the floor.
     pub entities: usize,
-    /// Of them, lights.
+    /// Number of lights among them.
     pub lights: usize,
     /// Wall time of a frame without drawing in which everything but the floor moves, milliseconds.
     pub all_move_ms: Spread,
     /// Device time of the merge in it, milliseconds.
     pub merge_ms: Spread,
-    /// The same in nanoseconds a vertex.
+    /// The same in nanoseconds per vertex.
     pub merge_ns_a_vertex: f64,
     /// Wall time of a frame in which one entity moves, milliseconds.
     pub one_moves_ms: Spread,
     /// Wall time of a frame at rest, milliseconds.
     pub rest_ms: Spread,
-    /// What a frame in which everything but the floor moves takes besides the merge, uploads included, with lists made by the host:
-    /// milliseconds, median. Along the entities alone.
+    /// Median milliseconds that a frame in which everything but the floor moves takes besides the merge, including uploads, with
+    /// lists made by the host. Measured along the entities axis only.
     pub host_lists_ms: Option<f64>,
-    /// The same with lists made by the device, in turns with the other.
+    /// The same with lists made by the device, measured in turns with the host's.
     pub device_lists_ms: Option<f64>,
-    /// Lookups a vertex.
+    /// Lookups per vertex.
     pub entries_a_vertex: f64,
-    /// What the lists leave off.
+    /// Lookups that the lists skip.
     pub counts: Counts,
-    /// Relative root mean square error of some vertices against ray casting.
+    /// Relative root mean square error of a sample of vertices against ray casting.
     pub error: f64,
     /// Device memory and lists, bytes.
     pub memory_bytes: Memory,
     /// Device memory, bytes.
     pub device_bytes: u64,
-    /// Memory of the whole process that is resident, bytes, where the system tells; on a software device this holds the
-    /// device's too.
+    /// Resident memory of the process in bytes, if the system reports it. On a software device it includes device memory.
     pub resident_bytes: Option<u64>,
 }
 
-/// Measures, and writes `scaling.csv`, `scaling.json` and a plot an axis into `folder`. `chosen`: these axes alone, all where there
-/// is none.
+/// Measures the `chosen` axes (all if empty), and writes `scaling.csv`, `scaling.json` and a plot per axis into `folder`.
 ///
 /// # Errors
 /// `Usage` when there is no such axis, `Failed` when the folder cannot be written; else as [`Frame::new`].
@@ -92,8 +90,8 @@ pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Sc
     Ok(points)
 }
 
-/// Every axis with its towns, small to large. As entities grow in number the town grows, at equal density of entities and of
-/// vertices: what is near a vertex stays the same.
+/// Every axis with its towns from small to large. With more entities the town becomes larger at equal density of entities and
+/// vertices, so the neighbourhood of a vertex stays the same.
 fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
     let cells: &[usize] = if quick { &[31, 63, 127, 255] } else { &[31, 63, 127, 255, 511, 1023] };
     let things: &[usize] = if quick { &[16, 64, 1024, 4095] } else { &[1, 4, 16, 64, 256, 1024, 4095] };
@@ -104,7 +102,7 @@ fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
     let mut axes = vec![
         ("vertices", with(cells, &|cells| Town { cells, things: 16, ..base })),
         ("entities", with(things, &|things| Town { things, cells: 4 * edge(things), ..base })),
-        // Among so many things that lights are few.
+        // With so many entities that lights remain few among them.
         ("lights", with(lights, &|lights| Town { lights, things: 256, ..base })),
     ];
     if !quick {
@@ -114,7 +112,7 @@ fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
     axes
 }
 
-/// Relative root mean square error of a few vertices against rays.
+/// Relative root mean square error of a sample of vertices against ray casting.
 fn error(bench: &Bench<'_>, frame: &mut Frame, placements: &[Placement]) -> Result<f64> {
     let scene = frame.scene().clone();
     let shapes = RayMeshes::new(&scene);
@@ -126,7 +124,7 @@ fn error(bench: &Bench<'_>, frame: &mut Frame, placements: &[Placement]) -> Resu
     Ok(difference(&device_radiosity(frame, &vertices)?, &truth, rms(&truth).max(f64::MIN_POSITIVE)).rms)
 }
 
-/// Makes lists by host and device, in turns: medians in milliseconds.
+/// Median milliseconds besides the merge with lists made by the host and by the device, measured in turns.
 fn lists(bench: &Bench<'_>, scene: &Scene, at: &dyn Fn(usize) -> Vec<Placement>) -> Result<[f64; 2]> {
     let mut frames = Vec::new();
     for place in [Place::Host, Place::Device] {
@@ -143,7 +141,7 @@ fn lists(bench: &Bench<'_>, scene: &Scene, at: &dyn Fn(usize) -> Vec<Placement>)
             let now = at(round);
             let started = Instant::now();
             let merge = merge_ms(&frame.render(&now, None)?);
-            // The first frames compile and make room.
+            // The first frames compile shaders and allocate memory.
             if round >= 2 {
                 times.push(started.elapsed().as_secs_f64() * 1e3 - merge);
             }
@@ -191,7 +189,7 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
     let lists_ms = axis.starts_with("entities").then(|| lists(bench, &scene, &|round| everything(round as f64)));
     let lists_ms = lists_ms.transpose()?;
     let merge_ms = spread(&merges);
-    // Before rays are cast, which takes memory of its own.
+    // This is read before ray casting, which needs memory of its own.
     let resident_bytes = resident_bytes();
     (bench.progress)(&format!("{axis}: {vertices} vertices, {} entities measured", scene.entities.len()));
     Ok(ScalingPoint {

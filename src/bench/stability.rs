@@ -1,4 +1,4 @@
-//! `bench stability`: what long chains, odd places and odd numbers do to the merge.
+//! `bench stability`: behaviour of the merge with long chains and with extreme placements and numbers.
 
 use super::Bench;
 use super::default_options;
@@ -23,24 +23,24 @@ use std::path::Path;
 
 /// Bands of the transfer in all chains.
 const BANDS: usize = 4;
-/// Degree of the rule by which the true irradiance is found; a cap's edge leaves about 1e-3.
+/// Degree of the quadrature rule of the true irradiance; its error at a cap's edge is about 1e-3.
 const TRUTH_DEGREE: usize = 400;
 
 /// Irradiance of a horizontal plane under a uniform sky of unit irradiance, behind a chain of caps.
 #[derive(Clone, Debug, Serialize)]
 pub struct CapChain {
-    /// Which caps.
+    /// Description of the caps.
     pub caps: &'static str,
-    /// How many.
+    /// Number of caps.
     #[serde(rename = "cap_count")]
     pub count: usize,
-    /// By quadrature of the true visibility.
+    /// True irradiance, by quadrature of the true visibility.
     #[serde(rename = "truth_relative")]
     pub truth: f64,
     /// Products of 4 bands in f64.
     #[serde(rename = "plain_relative")]
     pub plain: f64,
-    /// The same, guarded as the merge does it by default: from 0 to 1 by construction.
+    /// Guarded products of 4 bands in f64, as in the merge by default: 0 to 1 by construction.
     #[serde(rename = "guarded_relative")]
     pub guarded: f64,
     /// Guarded products in f32.
@@ -49,22 +49,22 @@ pub struct CapChain {
     /// Factors rounded to f16, guarded products in f64.
     #[serde(rename = "guarded_f16_relative")]
     pub f16: f64,
-    /// Visibility of 5 bands, not guarded, like the next two.
+    /// Unguarded products with visibility of 5 bands.
     #[serde(rename = "plain_5_bands_relative")]
     pub bands_5: f64,
-    /// Visibility of 6 bands.
+    /// Unguarded products with visibility of 6 bands.
     #[serde(rename = "plain_6_bands_relative")]
     pub bands_6: f64,
-    /// Visibility of 7 bands: with 4 of transfer the chain cannot grow.
+    /// Unguarded products with visibility of 7 bands: with 4 bands of transfer the chain cannot grow.
     #[serde(rename = "plain_7_bands_relative")]
     pub bands_7: f64,
-    /// Whether the guarded chain is within its bound, f32 within [`NEAR_F32`] of it and f16 within [`NEAR_F16`].
+    /// Whether the guarded chain is within its bound, and f32 and f16 are within [`NEAR_F32`] and [`NEAR_F16`] of it.
     pub passed: bool,
 }
 
-/// How far single precision may take a guarded chain of up to 1 000 factors from f64: each factor rounds by 6e-8.
+/// Largest allowed difference between f32 and f64 for a guarded chain of up to 1 000 factors; each factor rounds by 6e-8.
 pub const NEAR_F32: f64 = 1e-5;
-/// The same for factors stored in f16, each rounded by 5e-4 of its largest coefficients at most.
+/// The same for factors stored in f16, each rounded by at most 5e-4 of its largest coefficients.
 pub const NEAR_F16: f64 = 2e-3;
 
 /// What was measured.
@@ -74,14 +74,14 @@ pub struct StabilityOutcome {
     pub chains: Vec<CapChain>,
     /// Scenes.
     pub trials: Vec<Trial>,
-    /// Rotations composed of small steps.
+    /// Rotations that are composed of small steps.
     pub turns: Vec<Turn>,
-    /// What is not accepted.
+    /// Inputs that must be refused.
     pub refusals: Vec<Refusal>,
 }
 
 impl StabilityOutcome {
-    /// How many failed, and of how many.
+    /// Number of failures, and number of tests.
     pub fn failed(&self) -> [usize; 2] {
         let passed = self.chains.iter().map(|c| c.passed).chain(self.trials.iter().map(|t| t.passed));
         let passed = passed.chain(self.turns.iter().map(|t| t.passed)).chain(self.refusals.iter().map(|r| r.passed));
@@ -90,7 +90,7 @@ impl StabilityOutcome {
     }
 }
 
-/// How a chain multiplies.
+/// Rule by which a chain multiplies.
 #[derive(Clone, Copy, Default)]
 struct Rule {
     visibility_bands: usize,
@@ -188,7 +188,7 @@ pub fn chains(seed: u64, longest: usize) -> Vec<CapChain> {
     out
 }
 
-/// Measures, and writes `chains.csv`, `trials.csv`, `turns.csv`, `refusals.csv`, `stability.json` and plots into `folder`.
+/// Runs all tests, and writes `chains.csv`, `trials.csv`, `turns.csv`, `refusals.csv`, `stability.json` and plots into `folder`.
 ///
 /// # Errors
 /// `Failed` when the folder cannot be written; else as [`crate::frame::Frame::new`].
@@ -222,7 +222,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<StabilityOutcome> {
     Ok(outcome)
 }
 
-/// Chains against the truth by kind of cap, and what f32 and f16 change.
+/// Plot of the chains against the truth by kind of cap, and of the effect of f32 and f16.
 fn chain_plot(chains: &[CapChain]) -> Plot {
     let mut kinds: Vec<&str> = chains.iter().map(|c| c.caps).collect();
     kinds.dedup();
@@ -268,7 +268,7 @@ fn chain_plot(chains: &[CapChain]) -> Plot {
     Plot { title: "Irradiance behind chains of caps".into(), panels }
 }
 
-/// How near each scene comes to its bound and to its twin.
+/// Plot of each scene's radiosity relative to its bound, and of its difference to the f64 twin.
 fn trial_plot(trials: &[Trial]) -> Rows {
     let mut names: Vec<String> = trials.iter().map(|t| t.name.clone()).collect();
     names.dedup();

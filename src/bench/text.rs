@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use serde_json::Value;
 use std::path::Path;
 
-/// Writes a text file, whole or not at all.
+/// Writes a text file without leaving a partial one.
 ///
 /// # Errors
 /// `Failed` that names the file.
@@ -17,7 +17,7 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
 /// `#`, is `origin` as JSON.
 pub fn csv(origin: &Value, rows: &[Value]) -> String {
     let mut flat: Vec<Vec<(String, String)>> = rows.iter().map(|row| flatten("", row)).collect();
-    // Words before numbers, judged by the first row: what a row is about stands at its left.
+    // Columns of words come before columns of numbers, as judged by the first row.
     let words = |row: &Value| {
         flatten("", row).iter().map(|(_, value)| !value.is_empty() && value.parse::<f64>().is_err()).collect::<Vec<_>>()
     };
@@ -64,11 +64,10 @@ pub fn three(x: f64) -> String {
     if x.abs() >= 1e6 {
         return format!("{x:.2e}");
     }
-    // Of the rounded number: 0.9996 is 1.00.
+    // The rounded number determines the digits: 0.9996 is written as 1.00.
     let rounded: f64 = format!("{x:.2e}").parse().unwrap_or(x);
     let digits = (2 - rounded.abs().log10().floor() as i32).clamp(0, 8) as usize;
-    let text = format!("{x:.digits$}");
-    text.strip_prefix("0.").map_or(text.clone(), |rest| format!(".{rest}"))
+    format!("{x:.digits$}")
 }
 
 #[cfg(test)]
@@ -94,6 +93,6 @@ mod tests {
     #[test]
     fn three_digits() {
         let shown: Vec<String> = [0.012_345, 123.4, -0.0, 9876.5, 0.9996, -0.5, -1.5e22].map(three).to_vec();
-        assert_eq!(shown, [".0123", "123", "0", "9876", "1.00", "-0.500", "-1.50e22"]);
+        assert_eq!(shown, ["0.0123", "123", "0", "9876", "1.00", "-0.500", "-1.50e22"]);
     }
 }

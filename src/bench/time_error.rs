@@ -19,10 +19,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
-/// What is measured: all where nothing is named.
+/// The selected cases and axes; an empty list selects all.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Selection {
-    /// Parts of the names of cases; all that are named are swept.
+    /// Parts of the names of cases; named cases are also swept.
     pub cases: Vec<String>,
     /// Axes of the sweep.
     pub axes: Vec<String>,
@@ -31,28 +31,28 @@ pub struct Selection {
 /// What was measured.
 #[derive(Serialize)]
 pub struct TimeErrorOutcome {
-    /// A row a scene and light.
+    /// One row per scene and light.
     pub budgets: Vec<Budget>,
-    /// A picture a scene and light.
+    /// One picture per scene and light.
     pub pictures: Vec<ErrorPicture>,
-    /// A row a case and variation.
+    /// One row per case and variation.
     pub points: Vec<Point>,
-    /// A row a case.
+    /// One row per case.
     pub comparisons: Vec<Comparison>,
-    /// Wall time of the parts of the run in seconds, all cases together.
+    /// Wall time of the parts of the run, in seconds over all cases.
     pub seconds: BTreeMap<&'static str, f64>,
 }
 
 impl TimeErrorOutcome {
-    /// How long the run took and what with.
+    /// Description of the run's wall time by parts.
     pub fn took(&self) -> String {
         let parts: Vec<String> = self.seconds.iter().map(|(part, s)| format!("{part} {s:.0}")).collect();
         format!("{:.0} s in all: {}", self.seconds.values().sum::<f64>(), parts.join(", "))
     }
 }
 
-/// Measures, and writes `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, an error picture a case, a plot a swept case,
-/// one of the rivals, and `time-error.txt` into `folder`.
+/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, `time-error.txt`, an error picture
+/// per case, a plot per swept case, and a plot of the comparison with ray casting.
 ///
 /// # Errors
 /// `Usage` when a case or axis does not exist, `Failed` when the folder cannot be written; else as
@@ -94,13 +94,13 @@ pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection) -> Result<Ti
     Ok(outcome)
 }
 
-/// Rays of an error picture in a quick and a thorough run, a few seconds on two cores: shared by its vertices and lights, so that
-/// what has few vertices, and errs little, is judged by more of them.
+/// Rays of an error picture in a quick and in a thorough run, a few seconds on two cores. Vertices and lights share them, so a
+/// scene with fewer vertices gets more rays per vertex.
 const PICTURE_RAYS: [usize; 2] = [8_000_000, 32_000_000];
-/// Size of the error pictures, less their scale bars.
+/// Size of the error pictures in pixels, without their scale bars.
 const PICTURE_SIZE: [u32; 2] = [720, 480];
 
-/// Writes the error of every lit vertex in false colour, as `error-` and the case's name.
+/// Writes the error of every lit vertex in false colour, as `error-CASE.png`.
 fn error_picture(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<ErrorPicture> {
     let placements = case.scene.at(case.time_s);
     let options = Options { size: PICTURE_SIZE, antialias: Antialias::Samples, ..default_options() };
@@ -116,8 +116,8 @@ fn error_picture(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<ErrorP
     map.write(&folder.join(format!("error-{}.png", words.join("-"))), &mut frame, &placements, None, noise)
 }
 
-/// The cases that are named, or all. The quick run leaves out what takes ten seconds and more to bake on two cores, and takes the
-/// teapot under one light, as an occluder alone.
+/// The named cases, or all. A quick run leaves out cases that take ten seconds or more to bake on two cores, and uses the teapot
+/// under one light only.
 fn chosen(quick: bool, named: &[String]) -> Result<Vec<Case>> {
     let mut all: Vec<Case> = cases::teapot_lights()?.into_iter().chain(cases::scenes()?).collect();
     if named.is_empty() {
@@ -127,7 +127,7 @@ fn chosen(quick: bool, named: &[String]) -> Result<Vec<Case>> {
     cases::named(all, named, |case| &case.name)
 }
 
-/// The default and the settings of the axes that are named, or of all.
+/// The default, and the settings of the named axes, or of all axes.
 fn variations_of(quick: bool, axes: &[String]) -> Result<Vec<Variation>> {
     let mut all = variations(quick && axes.is_empty());
     for axis in axes {
@@ -141,7 +141,7 @@ fn variations_of(quick: bool, axes: &[String]) -> Result<Vec<Variation>> {
     Ok(all)
 }
 
-/// Variations are baked anew, so few cases are swept: one object under a sky, and one with a local light.
+/// Variations need new bakes, so only two cases are swept by default: one occluder under a sky, and one with a local light.
 fn is_swept(case: &Case) -> bool {
     case.name == "torus_over_plane" || case.name.contains("(b)")
 }
@@ -173,7 +173,7 @@ fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &
     write(&folder.join("time-error.txt"), &page.join("\n"))
 }
 
-/// A row for the merge and one for each number of rays.
+/// One row for the merge, and one for each number of rays.
 fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     let row = |what: String, wall_ms: f64, error| {
         json!({
@@ -188,7 +188,7 @@ fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     std::iter::once(merge).chain(cast).collect()
 }
 
-/// The settings of a case with their front, and that front beside ray casting.
+/// Plot of the settings of a case with their Pareto front, and of that front beside ray casting.
 fn plot(case: &str, outcome: &TimeErrorOutcome) -> Plot {
     let points: Vec<&Point> = outcome.points.iter().filter(|p| p.case == case).collect();
     let places: Vec<(f64, f64)> = points.iter().map(|p| (p.merge_ms.median, p.total.rms)).collect();
@@ -234,7 +234,7 @@ fn rival_curve(c: &Comparison) -> Curve {
     }
 }
 
-/// Every case's lead at equal error.
+/// Plot of every case's times at equal error.
 fn rival_plot(comparisons: &[Comparison]) -> Rows {
     let column =
         |x_label: &str, values: &dyn Fn(&Comparison) -> [Option<f64>; 2], limit: Option<(f64, String)>| PlotColumn {

@@ -1,4 +1,4 @@
-//! A town of any size: a floor and instances of three shapes on a grid with one density, some of them lights.
+//! A town of any size: a floor with instances of three meshes on a grid of constant density, some of which are lights.
 
 use crate::asset::embedded;
 use crate::error::Result;
@@ -7,27 +7,27 @@ use glam::Quat;
 use std::fmt::Write;
 use std::path::Path;
 
-/// What a town is made of.
+/// Parameters of a town.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Town {
-    /// Things on the floor, lights included.
+    /// Number of entities on the floor, including lights.
     pub things: usize,
-    /// How many of them shine.
+    /// Number of lights among them.
     pub lights: usize,
     /// Squares along an edge of the floor.
     pub cells: usize,
-    /// Whether things are lit, and not the floor alone.
+    /// Whether all entities are lit, or only the floor.
     pub receive: bool,
 }
 
-/// Distance between neighbours, metres; things are about 1 m wide.
+/// Distance between neighbours, metres; entities are about 1 m wide.
 const STEP_M: f64 = 2.0;
 
 impl Town {
-    /// The scene.
+    /// Makes the scene.
     ///
     /// # Errors
-    /// None that a test does not show.
+    /// `Input` when the scene of this function is malformed; tests run it.
     pub fn scene(&self) -> Result<Scene> {
         let edge = (self.things.max(1) as f64).sqrt().ceil() as usize;
         let size_m = edge as f64 * STEP_M;
@@ -43,7 +43,7 @@ impl Town {
         let every = self.things / self.lights.max(1);
         for i in 0..self.things {
             let at = |k: usize| (k as f64 + 0.5) * STEP_M - edge as f64 * STEP_M / 2.0;
-            // Off the grid, the same each time.
+            // Displacements from the grid are the same in each run.
             let (dx, dz) = (0.3 * (i as f64 * 2.399).sin(), 0.3 * (i as f64 * 1.237).cos());
             let (x, z) = (at(i % edge) + dx, at(i / edge) + dz);
             let light = self.lights > 0 && i % every == every / 2 && i / every < self.lights;
@@ -67,7 +67,7 @@ impl Town {
     }
 }
 
-/// A thing a little further on its way: circles about its place and turns.
+/// The placement of an entity at `time_s`: it circles about its place and turns.
 pub fn moved(place: &Placement, time_s: f64) -> Placement {
     let (sin, cos) = time_s.sin_cos();
     let position = place.position + glam::DVec3::new(0.1 * cos, 0.0, 0.1 * sin).as_vec3();

@@ -1,4 +1,5 @@
-//! Which setting is the default and why, and where the merge leads and loses, in words made from a run's own figures.
+//! Conclusions from a run's figures as text: which setting is the default and why, and where the merge is faster or slower than
+//! ray casting.
 
 use super::budget::Budget;
 use super::rival::Comparison;
@@ -7,12 +8,12 @@ use super::text::three;
 use crate::merge::variant::PRODUCTS;
 use std::fmt::Write;
 
-/// Changes of time, error or bytes by less than this factor count as none: medians of quiet runs differ by as much.
+/// Changes of time, error or bytes by less than this factor count as none, because medians of repeated runs differ by as much.
 const NOISE: f64 = 1.02;
-/// How many times the default's bytes a setting may need and still take its place.
+/// A setting that needs more than this many times the default's bytes cannot replace it.
 const MORE_BYTES: f64 = 1.25;
 
-/// A setting in units of the default, case by case.
+/// Time, error and bytes of a setting relative to the default, case by case.
 struct Ratios {
     guarded: bool,
     time: Vec<f64>,
@@ -33,7 +34,7 @@ impl Ratios {
         }
     }
 
-    /// Time multiplied by error, in the case where that is largest.
+    /// The largest product of relative time and relative error over the cases.
     fn worst_product(&self) -> f64 {
         self.time.iter().zip(&self.error).map(|(t, e)| t * e).fold(0.0, f64::max)
     }
@@ -42,7 +43,7 @@ impl Ratios {
         self.guarded && self.worst_product() < 1.0 / NOISE && self.bytes.iter().all(|b| *b <= MORE_BYTES)
     }
 
-    /// What it is, compared with the default.
+    /// The setting compared with the default, in words.
     fn word(&self) -> &'static str {
         let any = |of: &[f64], test: &dyn Fn(f64) -> bool| of.iter().any(|v| test(*v));
         let (more, less) = (|v: f64| v > NOISE, |v: f64| v < 1.0 / NOISE);
@@ -70,7 +71,7 @@ impl Ratios {
     }
 }
 
-/// The program's defaults.
+/// Description of the program's defaults.
 fn default_in_words() -> String {
     let options = super::default_options();
     let (bake, chain) = (options.bake, options.chain);
@@ -98,7 +99,7 @@ pub fn swept(points: &[Point]) -> Vec<&str> {
     cases
 }
 
-/// Where the default stands among all settings, and a line for each.
+/// Compares the default with all settings, one line per setting.
 pub fn defaults(points: &[Point]) -> String {
     let cases = swept(points);
     let of_case = |case: &str| points.iter().filter(|p| p.case == case).collect::<Vec<_>>();
@@ -184,7 +185,7 @@ pub fn defaults(points: &[Point]) -> String {
     text + &lines
 }
 
-/// A line a case with its lead, then where it is thin or none.
+/// One line per case with the speed-up at equal error, then the cases where it is below ten or below one.
 pub fn rivals(comparisons: &[Comparison]) -> String {
     let mut text = String::from(
         "How many times faster the merge is than ray casting on all threads at equal error\n\
@@ -228,7 +229,7 @@ pub fn rivals(comparisons: &[Comparison]) -> String {
     text
 }
 
-/// The table of rungs: root mean square, 99th percentile and maximum of each.
+/// Table of the rungs: root mean square, 99th percentile and maximum of each.
 pub fn budgets(budgets: &[Budget]) -> String {
     let wide = budgets.iter().map(|b| b.case.len()).max().unwrap_or(0);
     let mut text = format!(
@@ -251,7 +252,7 @@ pub fn budgets(budgets: &[Budget]) -> String {
     text
 }
 
-/// Three digits, or a power of ten below 1e-4.
+/// A number with three significant digits; below 1e-4 as a power of ten.
 fn short(value: f64) -> String {
     if value != 0.0 && value < 1e-4 { format!("{value:.0e}") } else { three(value) }
 }

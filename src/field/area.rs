@@ -1,5 +1,5 @@
-//! How much of the view an object covers from afar, by direction: its projected area as a polynomial, fitted to the outermost
-//! shell of its field, so that what is computed from the one agrees there with what is looked up in the other.
+//! Projected area of an object by direction, as a polynomial. It is fitted to the outermost shell of the object's field, so that
+//! values computed from the area agree there with values looked up in the field.
 
 use super::lattice::cap_height;
 use super::{Lookup, ShadowField};
@@ -11,10 +11,11 @@ use std::f64::consts::PI;
 const TERMS: usize = 6;
 
 /// Projected area as a share of the bounding sphere's, for a direction d to or from the object: a polynomial in the squares of
-/// d's cosines with two of three axes. It is the same from opposite sides, as an area is, and with mirror images at the three axes.
+/// d's cosines with two of three axes. It is equal for opposite directions, as a projected area is, and symmetric about the planes of the three
+/// axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Area {
-    /// Unit, object's frame.
+    /// The first two axes, unit vectors in the object's frame.
     pub axes: [DVec3; 2],
     /// Factors of 1, u, v, u u, v v, u v.
     pub terms: [f64; TERMS],
@@ -23,7 +24,7 @@ pub struct Area {
 }
 
 impl Area {
-    /// The area that an occlusion field tells of.
+    /// Fits the area to the outermost shell of an occlusion field.
     pub fn new(field: &ShadowField) -> Self {
         let outer = field.header.lattice.outer;
         let mut found = [0.0; MAX_COEFFICIENTS];
@@ -37,13 +38,13 @@ impl Area {
         Self::fit(&samples)
     }
 
-    /// The best fit to samples: direction, weight, area.
+    /// Least-squares fit to samples of (direction, weight, area).
     fn fit(samples: &[(DVec3, f64, f64)]) -> Self {
         let outer = |d: DVec3| DMat3::from_cols(d * d.x, d * d.y, d * d.z);
         let moment = samples.iter().fold(DMat3::ZERO, |sum, &(d, weight, area)| sum + outer(d) * (weight * area));
         let axes = principal_axes(moment);
         let mut area = Area { axes: [axes.x_axis, axes.y_axis], ..Area::default() };
-        // Normal equations, the right side as a seventh column.
+        // Normal equations with the right side as a seventh column.
         let mut rows = [[0.0; TERMS + 1]; TERMS];
         for &(d, weight, value) in samples {
             let basis = area.basis(d);
@@ -57,7 +58,7 @@ impl Area {
         area
     }
 
-    /// The area for a direction (unit, object's frame).
+    /// The area for a direction (unit vector in the object's frame), as a share of the bounding sphere's.
     pub fn at(&self, direction: DVec3) -> f64 {
         let basis = self.basis(direction);
         self.terms.iter().zip(basis).map(|(term, b)| term * b).sum::<f64>().max(0.0)
@@ -69,8 +70,8 @@ impl Area {
     }
 }
 
-/// Eigenvectors of a symmetric matrix by Jacobi's rotations. Where values are nearly the same any will do, and the frame's own axes
-/// are taken: what is made in it tends to be mirrored there.
+/// Eigenvectors of a symmetric matrix by Jacobi rotations. If eigenvalues are nearly equal, the frame's own axes are kept, because
+/// meshes tend to be symmetric about them.
 fn principal_axes(mut matrix: DMat3) -> DMat3 {
     let mut axes = DMat3::IDENTITY;
     let least = 1e-3 * (matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z);
@@ -92,7 +93,7 @@ fn principal_axes(mut matrix: DMat3) -> DMat3 {
     axes
 }
 
-/// Gauss's elimination of a positive definite system.
+/// Solves a positive definite system by Gaussian elimination.
 fn solve(mut rows: [[f64; TERMS + 1]; TERMS]) -> [f64; TERMS] {
     for pivot in 0..TERMS {
         let scale = rows[pivot][pivot].recip();

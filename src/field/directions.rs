@@ -1,12 +1,13 @@
-//! How the directions of a shell are arranged, and between which of them a direction lies.
+//! Arrangement of the directions of a shell, and interpolation between them.
 
 use super::lattice::{Lattice, Lookup};
 use crate::sh::cube;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
-/// Cells of a cube face have (almost) equal angles: cell coordinate u = s (c0 + c1 s^2 + c2 s^4) for s in [-1, 1]. This is
-/// (4/pi) atan(s) to 4.3e-3, matched in value at 1 and in slope at 0 and 1; a shader evaluates it with three multiply-adds.
+/// Cells of a cube face have (almost) equal angles: cell coordinate u = s (c0 + c1 s^2 + c2 s^4) for s in [-1, 1]. This
+/// approximates (4/pi) atan(s) within 4.3e-3, with equal value at 1 and equal slope at 0 and 1; a shader evaluates it with three
+/// multiply-adds.
 pub const CELL_WARP: [f64; 3] = {
     let (slope_0, slope_1) = (4.0 / PI, 2.0 / PI);
     let c2 = (slope_1 - slope_0 - 3.0 * (1.0 - slope_0)) / 2.0;
@@ -22,7 +23,7 @@ pub enum Directions {
         /// Cells along a face edge.
         cells: u32,
     },
-    /// Rings of equal latitude, equal steps of longitude: what student implementations of the method used.
+    /// Rings of equal latitude with equal steps of longitude, as in early implementations of the method.
     LatLon {
         /// Rings; ring i lies at polar angle (i + 1/2) pi / latitudes from +y.
         latitudes: u32,
@@ -37,7 +38,7 @@ pub fn warp(s: f64) -> f64 {
     s * (CELL_WARP[0] + q * (CELL_WARP[1] + q * CELL_WARP[2]))
 }
 
-/// Inverse of [`warp`], by Newton's method from the arctangent it stands for.
+/// Inverse of [`warp`] by Newton's method, which starts at the arctangent's inverse.
 pub fn unwarp(u: f64) -> f64 {
     let mut s = (u * PI / 4.0).tan();
     for _ in 0..8 {
@@ -57,12 +58,12 @@ fn node_st(i: u32, columns: u32) -> f64 {
     }
 }
 
-/// Inverse of [`node_st`], between nodes too.
+/// Inverse of [`node_st`], also between nodes.
 fn node_at(s: f64, columns: u32) -> f64 {
     (warp(s) + 1.0) / 2.0 * f64::from(columns - 1)
 }
 
-/// Four cells of a shell and the place between them.
+/// Four cells of a shell, and a position between them.
 pub(super) struct ShellCells {
     pub base: u32,
     pub columns: u32,
@@ -83,7 +84,7 @@ impl Lattice {
         if self.has_edges() { cells + 2 } else { cells }
     }
 
-    /// Directions of one shell; one that faces share counts on each of them.
+    /// Number of directions of one shell; a direction that several faces share counts once per face.
     pub fn direction_count(&self) -> u32 {
         match self.directions {
             Directions::Cube { .. } => 6 * self.columns() * self.columns(),
@@ -91,7 +92,7 @@ impl Lattice {
         }
     }
 
-    /// The first index of the direction that the `index`-th is: of one that faces share the same for all of them.
+    /// The first index of the direction with this index: a direction that several faces share has several indices.
     pub fn first_of(&self, index: u32) -> u32 {
         if !self.has_edges() {
             return index;
@@ -109,7 +110,7 @@ impl Lattice {
         (first * columns + at(down)) * columns + at(right)
     }
 
-    /// The direction of that place on a face, or one step beyond its edge.
+    /// The direction of a node of a face, or of a node one step beyond the face's edge.
     fn node(&self, face: u32, x: i64, y: i64) -> u32 {
         let columns = self.columns();
         let last = i64::from(columns) - 1;
@@ -117,7 +118,8 @@ impl Lattice {
         if within(x) && within(y) {
             return self.first_of((face * columns + y as u32) * columns + x as u32);
         }
-        // A hair beyond the edge, and along it off its ends, another face is found by plain projection; there a step from its edge.
+        // Projection of a point just beyond the edge, and not at its ends, finds the neighbouring face. The node lies one step from
+        // that face's edge.
         let (hair, off_end) = (1e-6, 1e-3);
         let st = |i: i64| match i {
             -1 => -1.0 - hair,
@@ -133,7 +135,7 @@ impl Lattice {
         self.first_of((other as u32 * columns + y) * columns + x)
     }
 
-    /// Directions of one shell as stored, borders included.
+    /// Number of stored directions of one shell, including borders.
     pub fn stored_direction_count(&self) -> u32 {
         match self.directions {
             Directions::Cube { cells } => 6 * (cells + 2) * (cells + 2),
@@ -163,8 +165,8 @@ impl Lattice {
         }
     }
 
-    /// For every stored direction, the captured directions whose mean it is: one for a cell, one for a border, three for
-    /// the corner of a border.
+    /// For every stored direction, the captured directions of which it is the mean: one for a cell, one for a border, three for
+    /// a corner of a border.
     pub fn sources(&self) -> Vec<Vec<u32>> {
         let (Directions::Cube { cells }, false) = (self.directions, self.has_edges()) else {
             return (0..self.direction_count()).map(|i| vec![self.first_of(i)]).collect();
@@ -190,8 +192,8 @@ impl Lattice {
         out
     }
 
-    /// The four captured directions around one of a cube lattice, in two opposite pairs. Where three edges meet there are only three:
-    /// the one on the third stands opposite to both others.
+    /// The four captured directions around one direction of a cube lattice, as two opposite pairs. Where three edges meet there are
+    /// only three, and the one on the third edge is opposite to both others.
     pub fn cell_neighbours(&self, direction: u32) -> Vec<u32> {
         let (columns, n) = (self.columns(), i64::from(self.columns()));
         let (face, x, y) = (direction / (columns * columns), direction % columns, direction / columns % columns);
@@ -216,7 +218,7 @@ impl Lattice {
     fn neighbour(&self, face: u32, x: i64, y: i64) -> u32 {
         let Directions::Cube { cells } = self.directions else { unreachable!("only cubes have cells") };
         let n = i64::from(cells);
-        // A hair beyond the edge the other face's cell is found by plain projection.
+        // Projection of a point just beyond the edge finds the other face's cell.
         let st = |i: i64| match i {
             -1 => -1.0 - 1e-6,
             i if i == n => 1.0 + 1e-6,
@@ -233,11 +235,11 @@ impl Lattice {
         match self.directions {
             Directions::Cube { cells } => {
                 let (face, s, t) = cube::face_st(direction);
-                // From the middle of a row to its ends, of a row without its borders where those are other faces' cells.
+                // Half a row in cells; without borders if those belong to other faces.
                 let half = f64::from(if self.has_edges() { cells + 1 } else { cells }) / 2.0;
                 let place = |s: f64| settle(warp(s) * half + f64::from(cells + 1) / 2.0);
                 let (x, y) = (place(s), place(t));
-                // Rounding may land on cells + 1/2 exactly: stay inside the stored rows.
+                // Rounding may give cells + 1/2 exactly; the index must stay inside the stored rows.
                 let low = |x: f64| (x.floor() as u32).min(cells);
                 let (x0, y0) = (low(x), low(y));
                 ShellCells {

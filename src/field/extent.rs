@@ -1,4 +1,4 @@
-//! In which directions around its object a field holds anything at all.
+//! The directions around its object in which a field is not zero.
 
 use super::lattice::Directions;
 use super::{ShadowField, quantity::FieldKind};
@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 /// Where a field is not zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Extent {
-    /// Nowhere: its object blocks or sends nothing.
+    /// In no direction: its object blocks or emits nothing.
     Nothing,
     /// At most within a cone of directions from the centre, object's frame.
     Cone {
@@ -18,11 +18,11 @@ pub enum Extent {
         /// Less than pi.
         half_angle_rad: f64,
     },
-    /// Perhaps everywhere.
+    /// Possibly in all directions.
     All,
 }
 
-/// The extent of a field, from its stored numbers; a lookup outside it gives exactly zero.
+/// The extent of a field, computed from its stored numbers; a lookup outside it returns exactly zero.
 pub fn extent(field: &ShadowField) -> Extent {
     let header = &field.header;
     let (lattice, count) = (header.lattice, coefficient_count(header.bands));
@@ -36,7 +36,7 @@ pub fn extent(field: &ShadowField) -> Extent {
         .sources()
         .iter()
         .enumerate()
-        // The corner of a border is the mean of three cells that are looked at by themselves.
+        // A corner of a border is the mean of three cells, which are tested themselves.
         .filter(|(_, cells)| cells.len() == 1)
         .filter(|(at, _)| (0..lattice.shells).any(|shell| holds(shell * stored + *at as u32)))
         .map(|(_, cells)| cells[0])
@@ -45,17 +45,17 @@ pub fn extent(field: &ShadowField) -> Extent {
         return Extent::Nothing;
     }
     let axis = lit.iter().map(|&d| at(d)).sum::<DVec3>().normalize_or_zero();
-    // Directions from a centre elsewhere make no cone from the sphere's.
+    // A cone of directions from a shifted centre is no cone from the sphere's centre.
     if axis == DVec3::ZERO || fit.centre != [0.0; 3] {
         return Extent::All;
     }
-    // A sample reaches one step along either axis of its plane; twice the longer one is more than the diagonal.
+    // A sample affects lookups within one step along either axis; twice the longer step exceeds the diagonal.
     let reach_rad = |direction: u32| match lattice.directions {
         Directions::Cube { .. } => {
             let steps = lattice.cell_neighbours(direction).into_iter().map(|n| at(n).angle_between(at(direction)));
             2.0 * steps.fold(0.0, f64::max)
         }
-        // No angle grows by more than the largest factor on its way to the object's frame.
+        // The transform to the object's frame enlarges an angle by at most the largest stretch factor.
         Directions::LatLon { latitudes, longitudes } => {
             2.0 * fit.largest() * (PI / f64::from(latitudes)).max(2.0 * PI / f64::from(longitudes))
         }

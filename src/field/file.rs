@@ -1,5 +1,5 @@
-//! Files that cannot be mistaken: a prologue with magic, version and lengths, a header in JSON, a payload, and one hash over
-//! all of it. Little-endian; written to a temporary file and renamed.
+//! Format of field files: a prologue with magic bytes, version and lengths, a JSON header, a payload, and one hash over all of
+//! it. Numbers are little-endian. A file is written under a temporary name and then renamed.
 //!
 //! ```text
 //! 0   8 bytes  magic: what kind of file
@@ -22,7 +22,7 @@ use std::path::Path;
 pub const FIELD_MAGIC: [u8; 8] = *b"SHFIELD\n";
 /// First bytes of a cached transfer file.
 pub const TRANSFER_MAGIC: [u8; 8] = *b"SHTRANS\n";
-/// Version that this program writes and reads. Goes up whenever the meaning of header or payload changes.
+/// Version that this program writes and reads. It increases whenever the meaning of header or payload changes.
 pub const VERSION: u32 = 6;
 /// Longest header that is read.
 const HEADER_LIMIT: u64 = 64 << 10;
@@ -39,7 +39,7 @@ fn seal(prologue: &[u8], header: &[u8], payload: &[u8]) -> [u8; 32] {
 /// Writes header and payload to `path`.
 ///
 /// # Errors
-/// `Input` when the file cannot be written; nothing is left half-written.
+/// `Input` when the file cannot be written; then no partial file remains.
 pub fn write<H: Serialize>(path: &Path, magic: [u8; 8], header: &H, payload: &[u8]) -> Result<()> {
     let header = serde_json::to_vec(header).expect("headers are plain data");
     let mut bytes = magic.to_vec();
@@ -53,10 +53,10 @@ pub fn write<H: Serialize>(path: &Path, magic: [u8; 8], header: &H, payload: &[u
     crate::files::replace(path, &bytes).map_err(|error| Error::input(path, format!("cannot be written: {error}")))
 }
 
-/// Reads what [`write()`] wrote. Lengths are checked against the file's size before anything is allocated for them.
+/// Reads what [`write()`] wrote. Lengths are checked against the file's size before memory is allocated for them.
 ///
 /// # Errors
-/// `Input` when the file is missing, of another kind or version, cut, damaged, or its header is malformed.
+/// `Input` when the file is missing, truncated, damaged, of another kind or version, or its header is malformed.
 pub fn read<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
     let bad = |what: String| Error::input(path, what);
     let mut file = File::open(path).map_err(|error| bad(format!("cannot be read: {error}")))?;

@@ -1,28 +1,29 @@
-//! How a lattice lies around an object that is no ball: about the middle of its box, the short axes stretched.
+//! Fits a lattice to an object that is not round: shells lie about the middle of its box, and its short axes are stretched.
 //!
-//! Shells around the bounding sphere's centre miss most objects' surfaces, near which the blocked part changes fastest: the
-//! first shell must start where the nearest part of the surface is, and shells are spent on places inside the solid elsewhere.
-//! Stretching by the square root of the box's proportions, which takes half of them away, costs a lookup three multiply-adds.
+//! The blocked part changes fastest near the surface. Spherical shells about the bounding sphere's centre do not follow most
+//! surfaces: the first shell must start where the surface is nearest, so elsewhere shells lie inside the solid. Stretching each
+//! axis by the square root of longest edge over edge halves the box's proportions (in logarithms) and costs a lookup three
+//! multiply-adds.
 
 use glam::{DMat3, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// A point p (object's frame, in r from the bounding sphere's centre) lies at (p - centre) * stretch in the lattice's own space,
-/// where directions and distances are taken.
+/// Maps a point p (object's frame, in r from the bounding sphere's centre) to (p - centre) * stretch in the lattice's space, in
+/// which directions and distances are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// Centre of the shells in r from the bounding sphere's centre, a multiple of 1/1024.
     pub centre: [f64; 3],
-    /// Factor of each axis, 1 to 2, a multiple of 1/64, of which a shader is given the number.
+    /// Factor of each axis, 1 to 2, a multiple of 1/64, so that three factors fit one f32 ([`Fit::packed`]).
     pub stretch: [f64; 3],
 }
 
-/// A box thinner than this share of its longest edge is a sheet: what is captured on its two sides differs at once, and no
-/// stretching helps.
+/// A box thinner than this share of its longest edge is a sheet and is not stretched: captures on its two sides differ however
+/// near they are.
 const SHEET: f64 = 0.02;
 
 impl Fit {
-    /// Spheres around the bounding sphere's centre.
+    /// No fit: spherical shells about the bounding sphere's centre.
     pub const ROUND: Fit = Fit { centre: [0.0; 3], stretch: [1.0; 3] };
 
     /// Bits of the factors in [`Fit::packed`].
@@ -31,8 +32,8 @@ impl Fit {
     /// Largest factor of an axis.
     pub const MOST: f64 = 2.0;
 
-    /// The fit of a mesh, its positions in r from the bounding sphere's centre: the middle of its box, and the square root of
-    /// longest edge over edge. A ball and a cube stay round.
+    /// The fit of a mesh, whose positions are in r from the bounding sphere's centre: the middle of its box, and the square
+    /// root of longest edge over edge. A ball and a cube keep spherical shells.
     pub fn new(positions: &[Vec3]) -> Self {
         let (low, high) = positions.iter().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
         let (low, high) = (low.as_dvec3(), high.as_dvec3());
@@ -63,7 +64,7 @@ impl Fit {
         self.stretch.into_iter().fold(1.0, f64::max)
     }
 
-    /// Whether the numbers are such as [`Fit::new`] makes.
+    /// Whether the numbers have the range and steps that [`Fit::new`] produces.
     pub fn is_usable(&self) -> bool {
         self.centre.iter().all(|c| c.abs() <= 1.0) && self.stretch.iter().all(|s| (1.0..=Fit::MOST).contains(s))
     }
@@ -75,7 +76,7 @@ impl Fit {
         (matrix * centre - centre).length() < 1e-9 && same(matrix * stretch, stretch * matrix)
     }
 
-    /// For a shader: what is added after stretching, and 64ths of each factor beyond 1 as one whole number.
+    /// For a shader: x, y, z are added after stretching; w holds the three factors, in 64ths above 1, as one whole number.
     pub fn packed(&self) -> [f32; 4] {
         let shift = -DVec3::from(self.centre) * DVec3::from(self.stretch);
         let [x, y, z] = self.stretch.map(|s| ((s - 1.0) * 64.0).round() as u32);

@@ -3,11 +3,11 @@
 //!
 //! With M(b) the symmetric matrix of multiplication by b, a product with visibility is T' = (I - M(b)) T. What is looked up
 //! at distance d is b = u sum_k w_k s_k: stored samples s_k with convex weights w_k, and u = [`Lattice::unscale`] at d.
-//! The norm of I - u sum w_k M(s_k) is at most the largest of |I - u M(s_k)|, because sum w_k = 1. That is convex in u, and u
-//! lies between its values on the two shells that are interpolated (it falls with d), or beyond the last shell between that
-//! shell's and 0. So it is enough to look at every sample with u of its own shell and of its neighbours. Rotations keep norms.
+//! The norm of I - u sum w_k M(s_k) is at most the largest of |I - u M(s_k)|, because sum w_k = 1. This is convex in u. Since u falls
+//! with d, it lies between its values on the two interpolated shells, or beyond the last shell between that shell's value and 0.
+//! So it suffices to test every sample with u of its own shell and of the neighbouring shells. Rotations do not change norms.
 //!
-//! A factor between 0 and 1 could not lengthen anything; projected to few bands it can, up to 1.058 at a cap of 30 degrees and
+//! A factor between 0 and 1 lengthens no function, but its projection to few bands can: by up to 1.058 for a cap of 30 degrees at
 //! 4 bands.
 
 use super::{Lattice, ShadowField};
@@ -15,17 +15,17 @@ use crate::sh::basis::coefficient_count;
 use crate::sh::product::{Tensor, eigenvalues};
 use rayon::prelude::*;
 
-/// SH bands of the transfers that the certificate is for, whatever the field's. It holds for fewer too: their matrix is a part of
-/// this one, and its eigenvalues lie between this one's (Cauchy). For more it does not.
+/// SH bands of the transfers that the certificate covers, independent of the field's bands. It also holds for fewer bands, whose
+/// matrix is a principal submatrix with eigenvalues between this one's (Cauchy interlacing), but not for more.
 pub const TRANSFER_BANDS: usize = 4;
 
-/// Largest factor, at least 1 (where nothing blocks, a product changes nothing), from the stored, quantised numbers.
+/// Largest factor, computed from the stored, quantised numbers. It is at least 1, because a visibility of 1 changes nothing.
 pub fn growth(field: &ShadowField) -> f64 {
     let header = &field.header;
     let (lattice, bands) = (header.lattice, header.bands);
     let tensor = Tensor::new(TRANSFER_BANDS, bands, TRANSFER_BANDS);
     let directions = lattice.stored_direction_count();
-    // What stands on the border of a cube's face is a copy of another face's, but for corners, which are means.
+    // Border samples of a cube's face are copies of other faces' samples, except corners, which are means.
     let sources = lattice.sources();
     let mut seen = vec![false; lattice.direction_count() as usize];
     let own = |of: &Vec<u32>| of.len() > 1 || !std::mem::replace(&mut seen[of[0] as usize], true);
@@ -43,7 +43,7 @@ pub fn growth(field: &ShadowField) -> f64 {
         .reduce(|| 1.0, f64::max)
 }
 
-/// Factors between which that of a lookup lies that uses samples of `shell`.
+/// Bounds of u for lookups that use samples of `shell`.
 fn neighbouring(lattice: &Lattice, shell: u32) -> impl Iterator<Item = f64> {
     let lattice = *lattice;
     let shells = shell.saturating_sub(1)..=(shell + 1).min(lattice.shells - 1);

@@ -1,4 +1,4 @@
-//! A baked field: where it is sampled ([`lattice`]), what is stored, and its file ([`mod@file`]).
+//! A baked field: its sample points ([`lattice`]), its stored numbers, and its file ([`mod@file`]).
 
 pub mod area;
 mod directions;
@@ -22,7 +22,7 @@ use glam::DVec3;
 use half::f16;
 use serde::{Deserialize, Serialize};
 
-/// Everything about a field but its coefficients.
+/// All parameters of a field.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FieldHeader {
     /// What the field holds.
@@ -35,22 +35,22 @@ pub struct FieldHeader {
     pub lattice: Lattice,
     /// Edge of the captured cube faces in texels.
     pub face_px: u32,
-    /// Samples that lay inside the solid: they hold what is seen just off the surface nearest to them.
+    /// Number of sample points inside the solid. They hold captures from just outside the nearest surface.
     pub filled_samples: u32,
-    /// Samples that were captured; the others are made of these, by the mesh's symmetries or from neighbours.
+    /// Number of captured samples; the others follow from these by the mesh's symmetries or from neighbours.
     pub captured_samples: u32,
     /// The symmetries that the bake found, in words.
     pub symmetry: String,
-    /// Occlusion fields: what one product may lengthen a transfer vector by at most (see [`growth`]), from the stored numbers;
-    /// 0 before the bake, and in radiance fields, which are not multiplied.
+    /// Occlusion fields: largest factor by which one product lengthens a transfer vector (see [`growth`]), from the stored
+    /// numbers. It is 0 before the bake, and in radiance fields, which are not multiplied.
     pub growth: f64,
     /// Centre of the bounding sphere in the mesh's own frame, metres.
     pub centre_m: [f32; 3],
     /// Radius of the bounding sphere, metres.
     pub radius_m: f32,
-    /// Radiance fields: what stored coefficients are multiplied by, so that f16 holds any brightness. Occlusion fields: 1.
+    /// Radiance fields: factor on the stored coefficients, so that f16 can represent any brightness. Occlusion fields: 1.
     pub radiance_scale: f32,
-    /// Name of the mesh, for people.
+    /// Name of the mesh, for messages.
     pub mesh: String,
     /// Content hash of the mesh, hexadecimal.
     pub mesh_hash: String,
@@ -104,8 +104,8 @@ pub struct ShadowField {
 }
 
 impl ShadowField {
-    /// Stored coefficient by stored sample, channel and coefficient, as a number of the field's unit (blocked part or
-    /// radiance, still multiplied by [`Lattice::scale`]).
+    /// Stored coefficient by stored sample, channel and coefficient, in the field's unit (blocked part or radiance), still
+    /// multiplied by [`Lattice::scale`].
     pub fn stored(&self, sample: u32, channel: usize, coefficient: usize) -> f64 {
         let header = &self.header;
         let at = sample as usize * header.sample_stride() + channel * header.channel_stride() + coefficient;

@@ -1,4 +1,4 @@
-//! What a field holds and in which number format.
+//! The quantity that a field holds, and its number format.
 
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +28,7 @@ impl FieldKind {
 pub enum Storage {
     /// 32-bit floats.
     F32,
-    /// 16-bit floats: half the bytes; error under 1e-3 of the blocked part. What is below 2^-14 is stored as 0.
+    /// 16-bit floats. The error is below 1e-3 of the blocked part; magnitudes below 2^-14 are stored as 0.
     #[default]
     F16,
 }
@@ -54,7 +54,7 @@ impl std::str::FromStr for Storage {
     }
 }
 
-/// Coefficients of one channel as stored: bands^2 rounded up to a multiple of four.
+/// Stored coefficients of one channel: bands^2 rounded up to a multiple of four.
 pub fn channel_stride(bands: usize) -> usize {
     (bands * bands).next_multiple_of(4)
 }

@@ -1,10 +1,10 @@
-//! Lattices in words, as the command line takes and prints them.
+//! Text form of lattices, which the command line parses and prints.
 
 use super::Fit;
 use super::lattice::{AUTOMATIC, Directions, Lattice, Spacing};
 
 impl std::fmt::Display for Lattice {
-    /// In the words that the parser takes.
+    /// Writes the text that [`Lattice::from_str`] parses.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.directions {
             Directions::Cube { cells } => write!(f, "cube:{}x{cells}", self.shells)?,
@@ -87,7 +87,7 @@ impl std::str::FromStr for Lattice {
     }
 }
 
-/// Three numbers with colons between.
+/// Three numbers separated by colons.
 fn triple(words: &str) -> Option<[f64; 3]> {
     let numbers: Vec<f64> = words.split(':').map(|w| w.parse().ok()).collect::<Option<_>>()?;
     numbers.try_into().ok()

@@ -1,15 +1,15 @@
-//! Kinds of access, the barriers between them, and the tracker that objects when one is missing.
+//! Kinds of access, the barriers between them, and the tracker that reports a missing barrier.
 //!
-//! The validation layer of Debian 12 misses a hazard between two dispatches on one storage buffer; the tracker does not. It
+//! The validation layer of Debian 12 misses a hazard between two dispatches on one storage buffer; the tracker finds it. It
 //! knows every use that a recording declares (reflected from the shaders) and every barrier, and checks each pair of
-//! overlapping uses of which one writes.
+//! overlapping uses of which at least one writes.
 
 use crate::error::{Error, Result};
 use ash::vk;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// What a pass does with a resource. Barriers are written as a pair of these.
+/// What a pass does with a resource. A barrier names two of them: what happened before it and what follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Access {
     /// The host reads mapped memory after the submission.
@@ -32,7 +32,7 @@ pub enum Access {
     ColorWrite,
     /// Depth attachment of a render pass.
     DepthWrite,
-    /// The window system shows the image, once a semaphore says so.
+    /// The window system shows the image after it has waited for a semaphore.
     Present,
 }
 
@@ -47,7 +47,7 @@ impl Access {
             Access::VertexRead => Stage::VERTEX_INPUT,
             Access::ColorWrite => Stage::COLOR_ATTACHMENT_OUTPUT,
             Access::DepthWrite => Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS,
-            // The semaphore that follows orders and makes visible; the barrier only changes the layout.
+            // The semaphore orders the accesses and makes the writes visible; the barrier only changes the layout.
             Access::Present => Stage::NONE,
         }
     }
@@ -73,7 +73,7 @@ impl Access {
         matches!(self, Access::TransferWrite | Access::ComputeWrite | Access::ColorWrite | Access::DepthWrite)
     }
 
-    /// Layout that an image is in while it is accessed so: GENERAL, except for attachments and copies.
+    /// Layout of an image during the access: GENERAL, except for attachments and copies.
     pub(super) fn layout(self) -> vk::ImageLayout {
         match self {
             Access::ColorWrite => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
@@ -100,7 +100,7 @@ struct Barrier {
     order: usize,
     from: Access,
     to: Access,
-    /// `None`: a memory barrier, good for every resource.
+    /// The image of an image barrier; `None` for a memory barrier, which holds for every resource.
     resource: Option<u64>,
 }
 
@@ -111,14 +111,14 @@ impl Barrier {
             return false;
         }
         let stages = self.from.stage().contains(earlier.access.stage()) && self.to.stage().contains(later.stage());
-        // A write after a read needs execution order only; after a write its memory has to move as well.
+        // A write after a read only needs execution order; after a write, the written memory must also become visible.
         let memory = !earlier.access.writes()
             || (self.from.mask().contains(earlier.access.mask()) && self.to.mask().contains(later.mask()));
         stages && memory
     }
 }
 
-/// Follows one recording on the host.
+/// Follows the uses and barriers of one recording on the host.
 #[derive(Default)]
 pub struct Tracker {
     order: usize,
@@ -129,7 +129,7 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// Notes a barrier; `resource` for an image barrier, which also moves the image to the layout of `to`.
+    /// Notes a barrier. An image barrier has a `resource` and also moves that image to the layout of `to`.
     pub fn barrier(&mut self, from: Access, to: Access, resource: Option<u64>) {
         self.order += 1;
         self.barriers.push(Barrier { order: self.order, from, to, resource });
@@ -138,7 +138,7 @@ impl Tracker {
         }
     }
 
-    /// Notes that an image's content is thrown away and its layout becomes that of `to`.
+    /// Notes that an image's content is discarded and its layout becomes that of `to`.
     pub fn discard(&mut self, image: u64, to: Access) {
         self.layouts.insert(image, to.layout());
     }
@@ -153,7 +153,7 @@ impl Tracker {
         self.use_range(image, name, 0..u64::MAX, access, pass);
     }
 
-    /// Notes a use of a byte range and objects when an earlier use that conflicts is not separated by a barrier.
+    /// Notes a use of a byte range, and an objection for each earlier conflicting use that no barrier separates from it.
     pub fn use_range(&mut self, resource: u64, name: &str, range: Range<u64>, access: Access, pass: &str) {
         self.order += 1;
         let uses = self.uses.entry(resource).or_default();
@@ -170,13 +170,13 @@ impl Tracker {
         if access.writes() {
             uses.retain(|earlier| earlier.range.start < range.start || range.end < earlier.range.end);
         } else if uses.iter().any(|u| u.access == access && u.range == range && u.pass == pass) {
-            // The same read by the same pass again: the later one is the one that a writer has to wait for.
+            // The same pass repeats the same use: a later writer has to wait for the last one only.
             uses.retain(|u| !(u.access == access && u.range == range && u.pass == pass));
         }
         uses.push(Use { order: self.order, range, access, pass: pass.to_owned() });
     }
 
-    /// Fails with every objection.
+    /// Reports all objections together.
     ///
     /// # Errors
     /// `Failed` when a barrier was missing or an image was in another layout than its use needs.

@@ -1,4 +1,4 @@
-//! What the code of a shader's loop does in one round, counted in its SPIR-V.
+//! Counts the operations of one iteration of a shader's main loop in its SPIR-V.
 
 use super::reflect::Reader;
 use super::shader::Shader;
@@ -11,13 +11,13 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 /// `Fma` of the extended instruction set GLSL.std.450.
 const FMA: u32 = 50;
 
-/// Counts of one round of the longest loop, or of the whole of a shader without one. Nothing is executed: both sides of a
-/// branch count, as they cost on devices that mask lanes.
+/// Counts for one iteration of the longest loop, or for the whole shader if it has no loop. The code is not executed: both
+/// sides of a branch count, which is what they cost on devices that mask lanes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Census {
     /// Additions, subtractions and multiplications of floats, component by component.
     pub flops: u32,
-    /// Further float operations: divisions, roots, minima, conversions.
+    /// All other float operations: divisions, roots, minima, conversions.
     pub other_float: u32,
     /// Texels fetched, and samples taken by a sampler, by the binding's name.
     pub fetches: BTreeMap<String, u32>,
@@ -41,13 +41,13 @@ impl Census {
         Ok(census)
     }
 
-    /// Texels fetched in all.
+    /// Number of texels fetched from all bindings.
     pub fn fetch_count(&self) -> u32 {
         self.fetches.values().sum()
     }
 }
 
-/// SPIR-V as text, an instruction a line.
+/// SPIR-V as text, one instruction per line.
 ///
 /// # Errors
 /// `Failed` when the words are no SPIR-V.
@@ -69,7 +69,7 @@ fn ids(instruction: &Instruction) -> impl Iterator<Item = u32> {
     })
 }
 
-/// The blocks of every loop: reached from its header without passing the block where it ends.
+/// The blocks of every loop: those that are reached from its header without passing its merge block.
 fn loops<'m>(blocks: &[&'m Block]) -> Vec<Vec<&'m Block>> {
     let by_label: HashMap<u32, &Block> = blocks.iter().map(|&block| (label(block), block)).collect();
     let body = |header: &&'m Block| {
@@ -117,10 +117,10 @@ impl<'m> Counter<'m> {
         match instruction.class.opcode {
             Op::FAdd | Op::FSub | Op::FMul | Op::VectorTimesScalar => census.flops += components(),
             Op::Dot => {
-                // All that is dotted are positions and directions.
+                // Only vectors of three are dotted: three multiplications and two additions.
                 census.flops += 5;
             }
-            // The optimiser writes `x * y + z` so, whether the device fuses it or not.
+            // The optimiser emits Fma for `x * y + z`, whether or not the device fuses it.
             Op::ExtInst if instruction.operands.get(1) == Some(&Operand::LiteralExtInstInteger(FMA)) => {
                 census.flops += 2 * components();
             }

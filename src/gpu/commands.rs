@@ -1,7 +1,7 @@
 //! Recording and submitting: dispatches, draws, copies, barriers, timers and labels.
 //!
-//! A [`Commands`] borrows every resource that is recorded into it. `submit` waits for the device; `launch` does not, and then
-//! dropping a resource waits for whatever is under way ([`Device::settle`]): nothing that the device still uses goes.
+//! A [`Commands`] borrows every resource that is recorded into it. `submit` waits for the device; `launch` does not. Dropping
+//! a resource waits for every launched recording ([`Device::settle`]), so nothing is destroyed while the device uses it.
 
 use super::access::{Access, Tracker};
 use super::descriptors::Bind;
@@ -27,7 +27,7 @@ pub struct Timing {
     pub milliseconds: f64,
 }
 
-/// A recording in progress. Borrows what it uses until it is submitted.
+/// A recording in progress. It borrows every resource that it uses until it is submitted.
 pub struct Commands<'r> {
     pub(super) recording: Recording,
     in_pass: bool,
@@ -39,7 +39,7 @@ pub struct Commands<'r> {
 }
 
 impl<'r> Commands<'r> {
-    /// Starts a recording; `name` stands in messages and captures.
+    /// Starts a recording; messages and captures show `name`.
     ///
     /// # Errors
     /// `Device` when memory ran out.
@@ -88,7 +88,7 @@ impl<'r> Commands<'r> {
         outcome
     }
 
-    /// Writes a timestamp once everything before is done.
+    /// Writes a timestamp when all commands before it have finished.
     fn stamp(&mut self, query: u32) {
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         // SAFETY: the command buffer is recording and the query was reset at its start.
@@ -101,20 +101,25 @@ impl<'r> Commands<'r> {
             )
         };
         if self.recording.device.info.is_software() {
-            // llvmpipe takes the time when it next rasterises or meets a barrier, not where the stamp stands among dispatches:
-            // an empty barrier settles it. It orders nothing that the passes' own barriers do not, and is not tracked.
-            let barriers = [vk::MemoryBarrier2::default().src_stage_mask(stage).dst_stage_mask(stage)];
-            let info = vk::DependencyInfo::default().memory_barriers(&barriers);
-            // SAFETY: the command buffer is recording and outside a render pass.
-            unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
+            self.timestamp_barrier(stage);
         }
+    }
+
+    /// An execution barrier without memory access after a timestamp, on software devices only. llvmpipe takes a timestamp when
+    /// it next rasterises or meets a barrier, not at its place among dispatches. The tracker does not count this barrier, so it
+    /// cannot replace one between passes; but passes that could overlap do not overlap on a software device.
+    fn timestamp_barrier(&self, stage: vk::PipelineStageFlags2) {
+        let barriers = [vk::MemoryBarrier2::default().src_stage_mask(stage).dst_stage_mask(stage)];
+        let info = vk::DependencyInfo::default().memory_barriers(&barriers);
+        // SAFETY: the command buffer is recording and outside a render pass.
+        unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
     }
 
     pub(super) fn pass_name(&self) -> String {
         self.recording.passes.last().unwrap_or(&self.recording.name).clone()
     }
 
-    /// Makes what `from` did before complete and visible to `to` after, for every buffer.
+    /// Memory barrier: all `from` accesses before it are complete and visible to all `to` accesses after it, for every buffer.
     pub fn barrier(&mut self, from: Access, to: Access) {
         if self.skip_barrier() {
             return;
@@ -130,8 +135,8 @@ impl<'r> Commands<'r> {
         unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
     }
 
-    /// As [`Commands::barrier`] for one image, moving it to the layout that `to` needs. `from` of `None` throws its
-    /// content away.
+    /// As [`Commands::barrier`] for one image, which moves to the layout that `to` needs. With `from` of `None` its content
+    /// is discarded.
     pub fn image_barrier(&mut self, image: &'r Image, from: Option<Access>, to: Access) {
         if from.is_some() && self.skip_barrier() {
             return;
@@ -160,7 +165,7 @@ impl<'r> Commands<'r> {
         unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
     }
 
-    /// Counts a barrier and says whether a test wants it left out.
+    /// Counts a barrier and returns whether a test asked to omit it ([`Device::omit_barrier`]).
     fn skip_barrier(&mut self) -> bool {
         self.barrier_count += 1;
         self.barrier_count - 1 == self.recording.device.omitted_barrier()
@@ -169,10 +174,10 @@ impl<'r> Commands<'r> {
     /// Runs a compute pipeline over `elements` invocations in x, y and z; `resources` stand at their binding numbers.
     ///
     /// # Errors
-    /// `Input` when a buffer is larger than the device can bind or the elements are more than it can dispatch.
+    /// `Input` when a buffer is larger than the device can bind or there are more elements than it can dispatch.
     ///
     /// # Panics
-    /// When resources or push constants are not what the shader declares.
+    /// When the resources or push constants do not match the shader's declarations.
     pub fn dispatch<P: Pod>(
         &mut self,
         pipeline: &'r ComputePipeline,
@@ -224,7 +229,7 @@ impl<'r> Commands<'r> {
         unsafe { self.recording.device.handle.cmd_copy_buffer(self.recording.buffer, from.raw(), to.raw(), &regions) };
     }
 
-    /// Notes a copy into `to`; what lies in a readback buffer is read by the host once the commands have run.
+    /// Notes a copy into `to`. The host reads a readback buffer after the commands have run.
     fn copied_into(&mut self, to: &'r Buffer, range: Range<u64>, pass: &str) {
         self.tracker.use_range(to.id, &to.name, range.clone(), Access::TransferWrite, pass);
         if to.kind == BufferKind::Readback {
@@ -232,7 +237,7 @@ impl<'r> Commands<'r> {
         }
     }
 
-    /// Copies a whole single-sampled image into a buffer, rows tightly packed.
+    /// Copies a whole single-sampled image into a buffer; rows are tightly packed.
     pub fn copy_image(&mut self, from: &'r Image, to: &'r Buffer) {
         let pass = self.pass_name();
         self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
@@ -259,7 +264,7 @@ impl<'r> Commands<'r> {
         }
     }
 
-    /// Copies a whole single-sampled image into another of its shape.
+    /// Copies a whole single-sampled image into another image of the same size and format.
     ///
     /// # Panics
     /// When their sizes or formats differ.
@@ -294,27 +299,27 @@ impl<'r> Commands<'r> {
         }
     }
 
-    /// Ends the recording, runs it and waits. Returns the duration of each pass, in order.
+    /// Ends the recording, submits it and waits. Returns the duration of each pass, in order.
     ///
     /// # Errors
-    /// `Failed` when the tracker found a barrier missing (nothing is submitted then); `Device` when the device was lost.
+    /// `Failed` when the tracker found a missing barrier (then nothing is submitted); `Device` when the device was lost.
     pub fn submit(self) -> Result<Vec<Timing>> {
         self.end()?.run(Signals::default())?.wait()
     }
 
-    /// Ends the recording and starts it without waiting. The recording has to begin with [`Commands::after_flights`], because
-    /// what it uses may be in use by the ones before.
+    /// Ends the recording and submits it without waiting. The recording must begin with [`Commands::after_flights`], because
+    /// earlier recordings may still use its resources.
     ///
     /// # Errors
     /// As [`Commands::submit`].
     ///
     /// # Panics
-    /// When [`FLIGHTS`](super::FLIGHTS) recordings are under way already.
+    /// When [`FLIGHTS`](super::FLIGHTS) recordings are already in flight.
     pub fn launch(self) -> Result<Flight> {
         self.end()?.launch(Signals::default())
     }
 
-    /// Orders everything that follows behind everything that was launched before.
+    /// Barrier between all recordings launched before and all commands that follow in this one.
     pub fn after_flights(&mut self) {
         let barriers = [vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)

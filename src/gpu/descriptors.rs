@@ -1,4 +1,5 @@
-//! Resources of a dispatch: descriptor sets written in binding order, checked against the shader, told to the tracker.
+//! Resources of a dispatch: writes descriptor sets in binding order, checks them against the shader and reports them to the
+//! tracker.
 
 use super::Checked;
 use super::access::Access;
@@ -26,11 +27,11 @@ pub enum Bind<'r> {
     Image(&'r Image),
     /// An image of three dimensions with its sampler.
     Volume(&'r Volume),
-    /// Nothing: the variant in use does not have this binding.
+    /// No resource: the shader permutation does not have this binding.
     None,
 }
 
-/// Descriptor sets in one pool; another pool is made when it is full.
+/// Descriptor sets in one pool; a full pool is followed by another.
 const SETS_PER_POOL: u32 = 256;
 
 impl<'r> Commands<'r> {
@@ -57,7 +58,7 @@ impl<'r> Commands<'r> {
         }
     }
 
-    /// Writes a descriptor set for `resources` and binds it; tells the tracker what the shader does with each.
+    /// Writes a descriptor set for `resources`, binds it, and reports to the tracker how the shader uses each resource.
     pub(super) fn bind(
         &mut self,
         layout: &Layout,
@@ -162,7 +163,7 @@ impl<'r> Commands<'r> {
     fn descriptor_set(&mut self, layout: &Layout) -> Result<vk::DescriptorSet> {
         let handle = &self.recording.device.handle;
         if self.recording.descriptors.last().is_none_or(|(_, used)| *used == SETS_PER_POOL) {
-            // Twelve bindings of a kind in a set is more than any pass has.
+            // No pass has more than twelve bindings of one kind.
             let sizes = [
                 vk::DescriptorType::STORAGE_BUFFER,
                 vk::DescriptorType::UNIFORM_BUFFER,

@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex};
 /// What the caller decides about a device.
 #[derive(Clone, Debug, Default)]
 pub struct DeviceOptions {
-    /// Index, UUID or part of a name; `None` takes the best.
+    /// Index, UUID or part of a name; `None` takes the best device.
     pub device: Option<String>,
     /// Which validation checks run.
     pub validation: Validation,
@@ -45,7 +45,7 @@ impl Instance {
             .unwrap_or(vk::API_VERSION_1_0);
         if version < vk::API_VERSION_1_3 {
             return Err(Error::Unsupported(format!(
-                "the Vulkan loader speaks {}, 1.3 is needed",
+                "the Vulkan loader supports version {}, but 1.3 is needed",
                 version_text(version)
             )));
         }
@@ -96,7 +96,7 @@ impl Instance {
         }
         // SAFETY: every pointer in `create` outlives the call; the handle is destroyed in `Drop` after its children.
         let handle = match unsafe { entry.create_instance(&create, None) } {
-            // The loader's way to say that it has no driver to ask.
+            // The loader returns this code when it finds no driver.
             Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => return Err(manifest::no_driver()),
             Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = manifest::broken() => return Err(broken),
             other => other.checked("vkCreateInstance", "instance")?,
@@ -143,7 +143,7 @@ impl Drop for Instance {
 
 /// The logical device, its one queue (graphics and compute) and what is known of the hardware.
 ///
-/// Cheap to share: everything that owns a Vulkan object holds an `Arc<Device>`.
+/// Everything that owns a Vulkan object holds an `Arc<Device>`.
 pub struct Device {
     pub(super) handle: ash::Device,
     pub(super) physical: vk::PhysicalDevice,
@@ -156,7 +156,7 @@ pub struct Device {
     pub(super) pipeline_cache: vk::PipelineCache,
     /// Limits of the physical device.
     pub limits: vk::PhysicalDeviceLimits,
-    /// Name, driver, kind.
+    /// Name, driver and kind of the physical device.
     pub info: Candidate,
     /// Folder for compiled shaders and the pipeline cache.
     pub cache_dir: Option<PathBuf>,
@@ -184,7 +184,7 @@ impl Device {
         Self::with_extensions(options, &[], &[])
     }
 
-    /// As [`Device::new`] with what a window needs of instance and device.
+    /// As [`Device::new`], with the instance and device extensions that a window needs.
     pub(super) fn with_extensions(
         options: &DeviceOptions,
         surface: &[&'static CStr],
@@ -255,19 +255,19 @@ impl Device {
         Ok(Arc::new(device))
     }
 
-    /// Size of the largest heap that is the device's own, bytes.
+    /// Size of the largest device-local heap in bytes.
     pub fn heap_bytes(&self) -> u64 {
         let own = |heap: &&vk::MemoryHeap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
         self.memory.memory_heaps_as_slice().iter().filter(own).map(|heap| heap.size).max().unwrap_or(u64::MAX)
     }
 
-    /// What the validation layer said since the last call.
+    /// Messages of the validation layer since the last call.
     pub fn take_validation_messages(&self) -> Vec<String> {
         self.instance.messages.take()
     }
 
-    /// Makes every recording leave out its `index`-th barrier, counted from 0, so that a test can show that the tracker
-    /// notices; `None` restores normal recording.
+    /// Makes every recording omit its `index`-th barrier, counted from 0, so that a test can show that the tracker reports it;
+    /// `None` restores normal recording.
     pub fn omit_barrier(&self, index: Option<usize>) {
         self.omitted_barrier.store(index.unwrap_or(usize::MAX), Ordering::Relaxed);
     }
@@ -281,7 +281,7 @@ impl Device {
         let Some(names) = &self.names else { return };
         let name = CString::new(name).unwrap_or_default();
         let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
-        // SAFETY: the object belongs to this device and is alive. A name is a courtesy: failing to set it is ignored.
+        // SAFETY: the object belongs to this device and is alive. Names only serve debugging, so a failure is ignored.
         let _ = unsafe { names.set_debug_utils_object_name(&info) };
     }
 
@@ -293,14 +293,14 @@ impl Device {
         let data = self.pipeline_cache_path().and_then(|path| std::fs::read(path).ok()).unwrap_or_default();
         let trusted = cache_header_fits(&data, properties);
         if !trusted && !data.is_empty() {
-            log::info!("the pipeline cache on disk belongs to another driver; starting afresh");
+            log::info!("the pipeline cache on disk belongs to another driver and is replaced");
         }
         let create = vk::PipelineCacheCreateInfo::default().initial_data(if trusted { &data } else { &[] });
         // SAFETY: the data's header was checked against this device; destroyed in `Drop`.
         unsafe { self.handle.create_pipeline_cache(&create, None) }.checked("vkCreatePipelineCache", "pipeline cache")
     }
 
-    /// Writes the pipeline cache to disk through a temporary file. Failing to is logged, not an error.
+    /// Writes the pipeline cache to disk through a temporary file. A failure is logged and is no error.
     pub fn save_pipeline_cache(&self) {
         let Some(path) = self.pipeline_cache_path() else { return };
         // SAFETY: the cache is alive.
@@ -313,7 +313,7 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: every owner of a child object held an `Arc` of this device, so none is left.
+        // SAFETY: every owner of a child object holds an `Arc` of this device, so no child object is left.
         unsafe {
             let _ = self.handle.device_wait_idle();
             self.handle.destroy_pipeline_cache(self.pipeline_cache, None);

@@ -11,20 +11,20 @@ use ash::vk;
 use bytemuck::Pod;
 use std::ops::Range;
 
-/// What a render pass draws into. The colour image is resolved into `resolve` where one is given.
+/// Attachments of a render pass. A multisampled colour image is resolved into `resolve` if that is given.
 pub struct Target<'r> {
     /// Colour attachment.
     pub color: &'r Image,
-    /// Colour that it starts with; `None` keeps what it holds.
+    /// Colour that it is cleared to; `None` keeps its content.
     pub clear: Option<[f32; 4]>,
-    /// Depth attachment, cleared to 0 (the far end of reversed depth); kept where it has one sample a pixel.
+    /// Depth attachment, cleared to 0 (infinitely far in reversed depth). It is stored if it has one sample per pixel.
     pub depth: Option<&'r Image>,
-    /// Single-sampled image that the multisampled colour is averaged into.
+    /// Single-sampled image that receives the average of the colour samples.
     pub resolve: Option<&'r Image>,
 }
 
 impl<'r> Commands<'r> {
-    /// Renders into `target`: everything that `record` draws, in order.
+    /// Renders into `target` what `record` draws, in order.
     ///
     /// # Errors
     /// What `record` returns.
@@ -36,8 +36,8 @@ impl<'r> Commands<'r> {
         self.render_part(target, [true, true], record)
     }
 
-    /// As [`Commands::render`] for a picture that several render passes make, with barriers between them: `ends` says whether this
-    /// is the first, which clears, and the last, which resolves.
+    /// As [`Commands::render`] for a picture that several render passes draw, with barriers between them. `ends` says whether
+    /// this pass is the first, which clears, and whether it is the last, which resolves.
     ///
     /// # Errors
     /// What `record` returns.
@@ -97,7 +97,7 @@ impl<'r> Commands<'r> {
     }
 }
 
-/// Inside a render pass.
+/// Records draws inside a render pass.
 pub struct Drawing<'c, 'r> {
     commands: &'c mut Commands<'r>,
     pipeline: Option<&'r GraphicsPipeline>,
@@ -107,7 +107,7 @@ impl<'r> Drawing<'_, 'r> {
     /// Selects the pipeline and its vertex buffers, in order of location, and the index buffer (32-bit).
     ///
     /// # Panics
-    /// When the number of vertex buffers is not the shader's number of inputs.
+    /// When the number of vertex buffers differs from the number of shader inputs.
     pub fn bind(&mut self, pipeline: &'r GraphicsPipeline, vertices: &[(&'r Buffer, u64)], indices: &'r Buffer) {
         assert_eq!(vertices.len(), pipeline.inputs.len(), "{}: vertex buffers against shader inputs", pipeline.name);
         let pass = self.commands.pass_name();
@@ -167,7 +167,7 @@ impl<'r> Drawing<'_, 'r> {
         self.commands.recording.buffer
     }
 
-    /// Restricts drawing to a rectangle in pixels: viewport and scissor.
+    /// Sets viewport and scissor to a rectangle in pixels.
     pub fn area(&mut self, x: u32, y: u32, width: u32, height: u32) {
         let viewport = vk::Viewport {
             x: x as f32,
@@ -198,7 +198,7 @@ impl<'r> Drawing<'_, 'r> {
         self.commands.push(&pipeline.layout, &pipeline.name, push);
     }
 
-    /// Draws the indices of a range, three a triangle.
+    /// Draws the triangles of a range of indices, three indices per triangle.
     ///
     /// # Panics
     /// Before [`Drawing::bind`].

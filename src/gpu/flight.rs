@@ -1,6 +1,6 @@
-//! What a recording owns, and its way through the device: submitted and waited for, or launched and left to itself.
+//! What a recording owns, and its execution: either submitted and waited for, or launched without waiting.
 //!
-//! A one-shot recording waits. A frame of the window is launched: at most [`FLIGHTS`] of them are under way, and the owner of
+//! A one-shot recording waits. A frame of the window is launched: at most [`FLIGHTS`] frames are in flight, and the owner of
 //! anything that they may use waits for all of them before it destroys it ([`Device::settle`]).
 
 use super::Checked;
@@ -10,18 +10,18 @@ use crate::error::Result;
 use ash::vk;
 use std::sync::{Arc, MutexGuard};
 
-/// Launched recordings that may be under way at once: one that the device works on, one that waits for it.
+/// Largest number of recordings in flight: the device executes one while another waits.
 pub const FLIGHTS: usize = 2;
 
-/// Timed passes in one recording; a pass takes two timestamps.
+/// Largest number of timed passes in one recording; each pass takes two timestamps.
 pub(super) const MAX_PASSES: u32 = 64;
 
 /// Semaphores around a submission.
 #[derive(Default)]
 pub(super) struct Signals {
-    /// Colour attachments are written once this is signalled.
+    /// Colour attachments are written only after this is signalled.
     pub wait: Option<vk::Semaphore>,
-    /// Signalled at the end.
+    /// Signalled when the submission has finished.
     pub signal: Option<vk::Semaphore>,
 }
 
@@ -83,17 +83,17 @@ impl Recording {
         format!("{}, last pass {}", self.name, self.passes.last().unwrap_or(&self.name))
     }
 
-    /// Submits; the caller waits before it lets anything go that the recording uses.
+    /// Submits; the caller must wait before it releases anything that the recording uses.
     pub fn run(mut self, signals: Signals) -> Result<Flight> {
         self.start(&signals)?;
         Ok(Flight { recording: self, launched: false })
     }
 
-    /// Submits as one of [`FLIGHTS`].
+    /// Submits as one of at most [`FLIGHTS`] recordings in flight.
     pub fn launch(mut self, signals: Signals) -> Result<Flight> {
         let device = self.device.clone();
         let mut flights = device.flights();
-        assert!(flights.len() < FLIGHTS, "{}: {} recordings are under way already", self.name, flights.len());
+        assert!(flights.len() < FLIGHTS, "{}: {} recordings are already in flight", self.name, flights.len());
         self.start(&signals)?;
         flights.push(self.fence);
         Ok(Flight { recording: self, launched: true })
@@ -134,7 +134,7 @@ impl Recording {
 
 impl Drop for Recording {
     fn drop(&mut self) {
-        // A lost device has nothing under way; what failed was reported where it was waited for.
+        // A lost device executes nothing; the error was reported where the recording was waited for.
         let _ = self.wait();
         let handle = &self.device.handle;
         // SAFETY: the device has finished, or nothing was ever submitted; a handle that was never made is null.
@@ -149,14 +149,14 @@ impl Drop for Recording {
     }
 }
 
-/// A recording that was handed to the device. Dropping it waits for it.
+/// A submitted recording. Dropping it waits for its end.
 pub struct Flight {
     recording: Recording,
     launched: bool,
 }
 
 impl Flight {
-    /// Waits for the end. Returns the duration of each pass, in order.
+    /// Waits for its end. Returns the duration of each pass, in order.
     ///
     /// # Errors
     /// `Device` when the device was lost.
@@ -185,7 +185,7 @@ impl Drop for Flight {
     fn drop(&mut self) {
         let _ = self.recording.wait();
         if self.launched {
-            // Before the fence goes.
+            // The fence leaves the list before it is destroyed.
             let fence = self.recording.fence;
             self.recording.device.flights().retain(|f| *f != fence);
         }
@@ -193,28 +193,28 @@ impl Drop for Flight {
 }
 
 impl Device {
-    /// Fences of what was launched and may be under way.
+    /// Fences of the recordings that may be in flight.
     pub(super) fn flights(&self) -> MutexGuard<'_, Vec<vk::Fence>> {
         self.flights.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 
-    /// Recordings that were launched and whose flights have not ended, at most [`FLIGHTS`].
+    /// Number of recordings in flight, at most [`FLIGHTS`].
     pub fn flight_count(&self) -> usize {
         self.flights().len()
     }
 
-    /// Waits until the device has finished everything that was launched; at once where nothing was. Owners of Vulkan objects
+    /// Waits until the device has finished all launched recordings; returns at once if there are none. Owners of Vulkan objects
     /// call it before they destroy them.
     pub fn settle(&self) {
         let flights = self.flights();
         if !flights.is_empty() {
-            // SAFETY: a fence is taken off the list, whose lock is held, before it is destroyed. A lost device has nothing under
-            // way; whoever waits for the flight itself is told.
+            // SAFETY: a fence is taken off the list, whose lock is held, before it is destroyed. A lost device executes
+            // nothing; the caller that waits for the flight receives the error.
             let _ = unsafe { self.handle.wait_for_fences(&flights, true, u64::MAX) };
         }
     }
 
-    /// The queue, for one user at a time.
+    /// The queue, locked for one user at a time.
     pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
         self.queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }

@@ -9,7 +9,7 @@ use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// What an image is made for.
+/// Format, size and sample count of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageShape {
     /// Texel format.
@@ -18,16 +18,16 @@ pub struct ImageShape {
     pub width: u32,
     /// Height in texels.
     pub height: u32,
-    /// Samples a texel: 1 or 4.
+    /// Samples per texel: 1 or 4.
     pub samples: u32,
 }
 
-/// Destroys an image's handles before its memory goes.
+/// Destroys an image's handles before its memory is freed.
 struct ImageHandle {
     device: Arc<Device>,
     image: vk::Image,
     view: vk::ImageView,
-    /// Owner of the image where that is not this handle but a swapchain.
+    /// The swapchain that owns the image, if this handle does not.
     owner: Option<Arc<dyn Any + Send + Sync>>,
 }
 
@@ -59,7 +59,7 @@ impl Image {
     /// An image without content. Depth formats become depth attachments, all else colour attachments.
     ///
     /// # Errors
-    /// `Input` when it is larger than the device's images can be, `Device` when memory ran out.
+    /// `Input` when it exceeds the device's largest image, `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, name: &str, shape: ImageShape) -> Result<Self> {
         use vk::ImageUsageFlags as Use;
         let most = device.limits.max_image_dimension2_d.min(device.limits.max_framebuffer_width);
@@ -94,7 +94,7 @@ impl Image {
         Self::with_view(handle, Some(memory), name, shape)
     }
 
-    /// An image of a swapchain, which is kept alive.
+    /// Wraps an image of a swapchain and keeps the swapchain alive.
     #[cfg(feature = "view")]
     pub(super) fn of_swapchain(
         device: &Arc<Device>,

@@ -9,19 +9,19 @@ use std::ops::Range;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-/// Where a buffer lives and who touches it.
+/// Where a buffer lies and who accesses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BufferKind {
     /// Device memory; the host fills it once through [`Buffer::with_data`].
     Device,
-    /// Host memory that the host rewrites often and the device reads.
+    /// Host memory that the host writes often and the device reads.
     Upload,
     /// Host memory that the device copies results into.
     Readback,
 }
 
 impl BufferKind {
-    /// Wanted memory properties, best first.
+    /// Memory properties to try, best first.
     pub(super) fn preferences(self) -> &'static [vk::MemoryPropertyFlags] {
         use vk::MemoryPropertyFlags as Flags;
         const COHERENT: Flags = Flags::from_raw(Flags::HOST_VISIBLE.as_raw() | Flags::HOST_COHERENT.as_raw());
@@ -82,11 +82,11 @@ impl Drop for Allocation {
     }
 }
 
-/// Destroys a buffer handle and the views of it before its memory goes.
+/// Destroys a buffer's views and handle before its memory is freed.
 struct BufferHandle {
     device: Arc<Device>,
     buffer: vk::Buffer,
-    /// Every texel view that was asked for.
+    /// The texel views made so far.
     views: Mutex<Vec<(vk::Format, vk::BufferView)>>,
 }
 
@@ -127,7 +127,7 @@ impl Buffer {
     /// An uninitialised buffer of `size_bytes` (at least 4 are allocated).
     ///
     /// # Errors
-    /// `Input` when the device cannot ever hold it, `Device` when memory ran out.
+    /// `Input` when the device can never hold it, `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, name: &str, kind: BufferKind, size_bytes: u64) -> Result<Self> {
         use vk::BufferUsageFlags as Use;
         let size_bytes = size_bytes.max(4);
@@ -164,8 +164,8 @@ impl Buffer {
         Ok(Buffer { handle, memory, mapped, kind, size_bytes, name: name.to_owned(), id })
     }
 
-    /// A device buffer that holds `data`, copied directly where the host can see device memory, else through a staging
-    /// buffer and a submission of its own.
+    /// A device buffer that holds `data`, copied directly if the host can map device memory, else through a staging buffer
+    /// and a submission of its own.
     ///
     /// # Errors
     /// As [`Buffer::new`].
@@ -175,8 +175,8 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// Writes `data` at a byte offset (a multiple of 4), directly or through a staging buffer as the memory allows, once the
-    /// device has finished what is under way.
+    /// Writes `data` at a byte offset (a multiple of 4), directly or through a staging buffer as the memory allows. It first
+    /// waits for all recordings in flight.
     ///
     /// # Errors
     /// As [`Buffer::new`].
@@ -195,11 +195,11 @@ impl Buffer {
         Ok(())
     }
 
-    /// Writes `data` at a byte offset into mapped memory. What a launched recording reads ([`Commands::launch`]) is left alone
-    /// until its flight has ended: an owner keeps one buffer a flight.
+    /// Writes `data` at a byte offset into mapped memory. The caller must not write what a recording in flight reads
+    /// ([`Commands::launch`]); [`Upload`](super::Upload) keeps one buffer per flight for that.
     ///
     /// # Panics
-    /// When the buffer is not visible to the host or the data does not fit: a programmer's mistake.
+    /// When the buffer is not visible to the host or the data does not fit.
     pub fn write<T: Pod>(&mut self, offset_bytes: u64, data: &[T]) {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let pointer = self.mapped.unwrap_or_else(|| panic!("{} is not visible to the host", self.name));
@@ -209,7 +209,7 @@ impl Buffer {
         unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), pointer.add(offset_bytes as usize), bytes.len()) };
     }
 
-    /// Copies `count` elements from a byte offset of mapped memory, once the device has finished what is under way.
+    /// Waits for all recordings in flight, then copies `count` elements from a byte offset of mapped memory.
     ///
     /// # Panics
     /// When the buffer is not visible to the host or the range is outside it.
@@ -218,7 +218,7 @@ impl Buffer {
         self.peek(offset_bytes, count)
     }
 
-    /// As [`Buffer::read`] without waiting: for what the device writes in a flight that has ended.
+    /// As [`Buffer::read`] without waiting; the recording that writes the range must have ended.
     ///
     /// # Panics
     /// As [`Buffer::read`].
@@ -233,7 +233,7 @@ impl Buffer {
         out
     }
 
-    /// Brings `count` elements from the start of a device buffer to the host, through a staging copy and a submission of its
+    /// Copies `count` elements from the start of a device buffer to the host, through a staging buffer and a submission of its
     /// own.
     ///
     /// # Errors
@@ -257,7 +257,7 @@ impl Buffer {
         Ok(staging.read(0, size as usize / size_of::<T>()))
     }
 
-    /// The device that the buffer lives on.
+    /// The device that the buffer belongs to.
     pub fn device(&self) -> &Arc<Device> {
         &self.memory.device
     }
@@ -271,7 +271,7 @@ impl Buffer {
     }
 }
 
-/// A typed window on a whole buffer, read by shaders as `textureBuffer`. The buffer keeps it, so that it is made once.
+/// A typed view of a whole buffer, which shaders read as `textureBuffer`. The buffer owns the view, so it is created once.
 #[derive(Clone, Copy)]
 pub struct TexelView<'b> {
     pub(super) handle: vk::BufferView,

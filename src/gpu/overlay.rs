@@ -1,4 +1,4 @@
-//! What egui drew, on top of a picture: textures, and a pass's commands.
+//! Draws egui's triangles and textures on top of a picture.
 
 use super::device::Device;
 use super::drawing::Drawing;
@@ -12,11 +12,11 @@ use egui_ash_renderer::{DynamicRendering, RenderMode, Renderer, RendererError};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// One frame of egui, ready to be drawn.
+/// One tessellated frame of egui.
 pub struct Paint {
     /// Triangles with clip rectangles, in points.
     pub primitives: Vec<ClippedPrimitive>,
-    /// Pixels a point.
+    /// Pixels per point.
     pub pixels_per_point: f32,
 }
 
@@ -24,10 +24,10 @@ pub struct Paint {
 pub struct Overlay {
     renderer: Renderer<DefaultAllocator>,
     pool: CommandPool,
-    /// Every texture as it stands. Changes of a part are sent as the whole: the renderer's way to change a part throws the rest
-    /// of the image away by its layout.
+    /// The current content of every texture. A partial change is uploaded as the whole texture, because the renderer's partial
+    /// update starts from an undefined layout and so discards the rest of the image.
     textures: HashMap<TextureId, ColorImage>,
-    /// To free once what draws with them has ended.
+    /// Textures to free when the recordings that use them have ended.
     retired: Vec<TextureId>,
 }
 
@@ -48,7 +48,7 @@ fn failed(error: RendererError) -> Error {
 }
 
 impl Overlay {
-    /// For images of `format`, the only attachment of their pass; `encodes_srgb` as the format is.
+    /// For images of `format`, which are the only attachment of their pass; `encodes_srgb` says whether that format is sRGB.
     ///
     /// # Errors
     /// `Device` when memory ran out.
@@ -78,7 +78,7 @@ impl Overlay {
         Ok(Overlay { renderer, pool, textures: HashMap::new(), retired: Vec::new() })
     }
 
-    /// Takes over changes of textures, before the frame that needs them is drawn.
+    /// Applies changes of textures; call it before the frame that needs them is drawn.
     ///
     /// # Errors
     /// `Device` when memory ran out.
@@ -111,7 +111,7 @@ impl Overlay {
                 self.renderer.set_texture(*queue, self.pool.1, id, &whole).map_err(failed)?;
             }
         }
-        // Freed after the frame that is about to be drawn, as egui wants it.
+        // egui still draws with these textures in the coming frame, so they are freed after it.
         self.retired.extend(delta.free.drain());
         Ok(())
     }
@@ -124,7 +124,7 @@ impl Drop for Overlay {
 }
 
 impl<'r> Drawing<'_, 'r> {
-    /// Draws egui's triangles over what is there.
+    /// Draws egui's triangles over the picture.
     ///
     /// # Errors
     /// `Device` when memory ran out.

@@ -1,4 +1,4 @@
-//! Pipelines with their layouts, built from what reflection found.
+//! Pipelines and their layouts, built from the reflection of their shaders.
 
 use super::Checked;
 use super::device::Device;
@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::Arc;
 
-/// Descriptor set layout and pipeline layout; shared shape of both kinds of pipeline.
+/// Descriptor set layout and pipeline layout, used by both kinds of pipeline.
 pub(super) struct Layout {
     device: Arc<Device>,
     pub(super) set: vk::DescriptorSetLayout,
@@ -102,7 +102,7 @@ pub(super) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
     }
 }
 
-/// A shader module that lives while a pipeline is made from it.
+/// A shader module that exists while a pipeline is created from it.
 struct Module<'d>(&'d Device, vk::ShaderModule);
 
 impl<'d> Module<'d> {
@@ -123,7 +123,7 @@ impl Drop for Module<'_> {
     }
 }
 
-/// Destroys a pipeline before its layout goes.
+/// Destroys a pipeline before its layout.
 struct PipelineHandle(Arc<Device>, vk::Pipeline);
 
 impl Drop for PipelineHandle {
@@ -148,7 +148,7 @@ impl ComputePipeline {
     /// Builds the pipeline; `constants` sets specialisation constants by the name they have in the source.
     ///
     /// # Errors
-    /// `Unsupported` when the shader goes over a device limit; `Failed` for a constant that the shader does not have.
+    /// `Unsupported` when the shader exceeds a device limit; `Failed` for a constant that the shader does not have.
     pub fn new(device: &Arc<Device>, name: &str, shader: &Shader, constants: &[(&str, u32)]) -> Result<Self> {
         let layout = Layout::new(device, name, &[shader])?;
         let local_size = shader.reflection.local_size;
@@ -190,15 +190,15 @@ impl ComputePipeline {
     }
 }
 
-/// Fixed-function state of a graphics pipeline; the rest is the same for all of ours (filled triangles, no blending,
-/// counter-clockwise front faces, dynamic viewport and scissor).
+/// Fixed-function state that differs between graphics pipelines. All have filled triangles, no blending, counter-clockwise
+/// front faces, and dynamic viewport and scissor.
 #[derive(Clone, Copy, Debug)]
 pub struct GraphicsState {
     /// Colour attachment format.
     pub color: vk::Format,
-    /// Depth attachment format; with one, depth is tested and written, nearer being *greater* (reversed).
+    /// Depth attachment format. If present, depth is tested and written, and greater is nearer (reversed depth).
     pub depth: Option<vk::Format>,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
     /// Faces that are not drawn.
     pub cull: vk::CullModeFlags,

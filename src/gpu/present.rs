@@ -1,4 +1,4 @@
-//! What a swapchain is made with: when frames are shown, their size and their format.
+//! Parameters of a swapchain: present mode, size and format.
 
 use crate::error::{Error, Result};
 use ash::vk;
@@ -6,12 +6,12 @@ use ash::vk;
 /// When a finished frame is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PresentMode {
-    /// At the display's next refresh, in order; every device has it.
+    /// At the display's next refresh, in order; every device supports it.
     #[default]
     Fifo,
     /// As FIFO, but a late frame is shown at once.
     FifoRelaxed,
-    /// At the next refresh, a newer frame replacing one that waits.
+    /// At the next refresh; a newer frame replaces one that waits.
     Mailbox,
     /// At once, with tearing.
     Immediate,
@@ -47,7 +47,8 @@ impl PresentMode {
     }
 }
 
-/// The swapchain's size: what the surface says, else the window's within the surface's bounds; `None` without pixels.
+/// The swapchain's size in pixels: the surface's, or if it has none, the window's clamped to the surface's bounds. `None` if
+/// a side is 0.
 pub(super) fn extent(can: &vk::SurfaceCapabilitiesKHR, size: [u32; 2]) -> Option<[u32; 2]> {
     let (least, most) = (can.min_image_extent, can.max_image_extent);
     let own = can.current_extent;
@@ -62,7 +63,8 @@ pub(super) fn is_srgb(format: vk::Format) -> bool {
     matches!(format, vk::Format::B8G8R8A8_SRGB | vk::Format::R8G8B8A8_SRGB)
 }
 
-/// sRGB if there is any: the device encodes exactly and blends linearly. Else 8 bits that the shader encodes for.
+/// An sRGB format if there is one, because the device then encodes and blends linearly; else an 8-bit format that the shader
+/// encodes for.
 pub(super) fn best_format(formats: &[vk::SurfaceFormatKHR]) -> Result<vk::SurfaceFormatKHR> {
     let plain = |f: &vk::SurfaceFormatKHR| matches!(f.format, vk::Format::B8G8R8A8_UNORM | vk::Format::R8G8B8A8_UNORM);
     let shown = || formats.iter().filter(|f| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR);
@@ -90,11 +92,11 @@ mod tests {
             max_image_extent: most,
             ..Default::default()
         };
-        assert_eq!(extent(&own(640, 480), [1, 1]), Some([640, 480]), "the surface knows best");
+        assert_eq!(extent(&own(640, 480), [1, 1]), Some([640, 480]), "the surface's own size wins");
         assert_eq!(
             extent(&own(u32::MAX, u32::MAX), [800, 9000]),
             Some([800, 4096]),
-            "the window decides, within bounds"
+            "the window's size is clamped to the surface's bounds"
         );
         assert_eq!(extent(&own(0, 0), [640, 480]), None);
         assert_eq!(extent(&own(640, 480), [0, 0]), None, "minimised");

@@ -6,7 +6,7 @@ use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass};
 use std::collections::{BTreeMap, HashMap};
 
-/// What kind of descriptor a binding wants.
+/// The kind of descriptor that a binding needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BindingKind {
     /// `buffer` block.
@@ -57,7 +57,7 @@ pub struct VertexInput {
 /// Byte offsets of a struct's members, by name, in order of declaration.
 pub type Layout = Vec<(String, u32)>;
 
-/// The outcome of reflection.
+/// The declarations of one module.
 #[derive(Clone, Debug, Default)]
 pub struct Reflection {
     /// Bindings that the optimised code still uses, by index.
@@ -77,7 +77,7 @@ pub struct Reflection {
 }
 
 impl Reflection {
-    /// Reads a module.
+    /// Reads a module's declarations.
     ///
     /// # Errors
     /// `Failed` when the words are no SPIR-V, or declare something that this layer does not use (other sets than 0,
@@ -89,7 +89,7 @@ impl Reflection {
     }
 }
 
-/// Indexes over a module that make the questions below one-liners.
+/// A module with indexes by id, for the queries below.
 pub(super) struct Reader<'m> {
     module: &'m Module,
     definitions: HashMap<u32, &'m Instruction>,

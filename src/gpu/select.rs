@@ -1,11 +1,11 @@
-//! Which physical device to use: a list of what the machine offers and a rule to pick one.
+//! Lists the physical devices and selects one of them.
 
 use super::Checked;
 use crate::error::{Error, Result};
 use ash::vk;
 use std::ffi::CStr;
 
-/// What a user needs to know of one physical device.
+/// One physical device, as `devices` prints it.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     /// Position in the loader's list; `--device INDEX` names it.
@@ -14,9 +14,9 @@ pub struct Candidate {
     pub name: String,
     /// Kind of device.
     pub kind: vk::PhysicalDeviceType,
-    /// Highest Vulkan version, as `major.minor.patch`.
+    /// Highest supported Vulkan version, as `major.minor.patch`.
     pub api: String,
-    /// Driver name and version in the driver's own words.
+    /// Driver name and version as the driver reports them.
     pub driver: String,
     /// Device UUID as 32 hexadecimal digits.
     pub uuid: String,
@@ -25,7 +25,7 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Whether shaders run on the host's processor.
+    /// Whether shaders run on the CPU.
     pub fn is_software(&self) -> bool {
         self.kind == vk::PhysicalDeviceType::CPU
     }
@@ -52,12 +52,11 @@ impl Candidate {
     }
 }
 
-/// Picks a device by index, UUID (hyphens ignored) or part of its name; without a word the first of the best kind, GPUs
-/// before processors.
+/// Selects a device by index, UUID (hyphens are ignored) or part of its name; without `word`, the first of the best kind, GPUs
+/// before CPUs.
 ///
 /// # Errors
-/// `Unsupported` when there is no device, none matches, several names match different devices equally well, or the match
-/// lacks something that is required.
+/// `Unsupported` when there is no device, when none or several match, or when the match lacks a required feature.
 pub fn choose<'c>(candidates: &'c [Candidate], word: Option<&str>) -> Result<&'c Candidate> {
     if candidates.is_empty() {
         return Err(Error::Unsupported(
@@ -84,7 +83,7 @@ pub fn choose<'c>(candidates: &'c [Candidate], word: Option<&str>) -> Result<&'c
     };
     let found = found.ok_or_else(|| {
         let names: Vec<_> = candidates.iter().map(|c| format!("{} {}", c.index, c.name)).collect();
-        Error::Unsupported(format!("no device matches \"{word}\" (there is: {})", names.join(", ")))
+        Error::Unsupported(format!("no device matches \"{word}\"; available: {}", names.join(", ")))
     })?;
     match &found.unsuitable {
         Some(reason) => Err(Error::Unsupported(format!("{}: {reason}", found.name))),
@@ -107,7 +106,7 @@ pub(super) fn version_text(version: u32) -> String {
 }
 
 pub(super) fn physical_devices(instance: &ash::Instance) -> Result<Vec<(vk::PhysicalDevice, Candidate)>> {
-    // SAFETY: a query on a live instance. No driver at all is an empty list to the caller.
+    // SAFETY: a query on a live instance. Without a driver the list is empty.
     let handles = match unsafe { instance.enumerate_physical_devices() } {
         Err(vk::Result::ERROR_INITIALIZATION_FAILED | vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Vec::new(),
         other => other.checked("vkEnumeratePhysicalDevices", "instance")?,
@@ -117,7 +116,7 @@ pub(super) fn physical_devices(instance: &ash::Instance) -> Result<Vec<(vk::Phys
 
 fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
     // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are only
-    // chained where the device itself speaks 1.3.
+    // chained if the device supports 1.3.
     let (properties, unsuitable, identity, driver) = unsafe {
         let properties = instance.get_physical_device_properties(physical);
         let mut identity = vk::PhysicalDeviceIDProperties::default();
@@ -128,7 +127,7 @@ fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice
         }
         let mut unsuitable = None;
         if properties.api_version < vk::API_VERSION_1_3 {
-            unsuitable = Some(format!("speaks Vulkan {}, 1.3 is needed", version_text(properties.api_version)));
+            unsuitable = Some(format!("supports Vulkan {}, but 1.3 is needed", version_text(properties.api_version)));
         } else {
             let mut core_1_3 = vk::PhysicalDeviceVulkan13Features::default();
             let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut core_1_3);

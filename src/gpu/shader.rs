@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// Part of the pipeline that a shader is for; the file ending of its entry point.
+/// Pipeline stage of a shader, given by the file ending of its entry point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
     /// `.comp`
@@ -27,7 +27,7 @@ impl Stage {
     }
 }
 
-/// Everything that decides what SPIR-V comes out.
+/// Everything that determines the compiled SPIR-V.
 pub struct ShaderSource<'a> {
     /// File name, for messages.
     pub name: &'a str,
@@ -41,7 +41,7 @@ pub struct ShaderSource<'a> {
     pub include: &'a dyn Fn(&str) -> Option<String>,
 }
 
-/// Compiled code and what reflection found in it.
+/// Compiled code and its reflection.
 #[derive(Clone, Debug)]
 pub struct Shader {
     /// File name of the entry point.
@@ -58,11 +58,11 @@ pub struct Shader {
 const INCLUDE_DEPTH: usize = 16;
 
 impl Shader {
-    /// Compiles `source`, or takes the words from `cache_dir` when the same source, includes, defines and compiler have been
-    /// compiled before.
+    /// Compiles `source`, or reads the words from `cache_dir` if the same source, includes and defines were compiled by the same
+    /// compiler before.
     ///
     /// # Errors
-    /// `Failed` with the compiler's lines, or when an include is missing.
+    /// `Failed` with the compiler's messages, or when an include is missing.
     pub fn compile(source: &ShaderSource<'_>, cache_dir: Option<&Path>) -> Result<Self> {
         let includes = gather(source)?;
         let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{}.spv", key(source, &includes))));
@@ -71,7 +71,7 @@ impl Shader {
             let reflection = Reflection::new(&spirv).map_err(|error| error.context(source.name))?;
             Ok(Shader { name: source.name.to_owned(), stage: source.stage, spirv, reflection })
         };
-        // A damaged cache entry that reflection cannot read is compiled anew.
+        // A cache entry that reflection cannot read is damaged: the shader is compiled again.
         if let Some(found) = cached.and_then(|spirv| shader(spirv).ok()) {
             return Ok(found);
         }
@@ -90,7 +90,7 @@ pub fn included(text: &str) -> impl Iterator<Item = &str> {
     text.lines().filter_map(|line| Some(line.trim_start().strip_prefix("#include")?.trim().trim_matches('"')))
 }
 
-/// Every file that the source includes, directly or not, by name.
+/// Every file that the source includes, directly or indirectly, by name.
 fn gather(source: &ShaderSource<'_>) -> Result<BTreeMap<String, String>> {
     fn visit(
         source: &ShaderSource<'_>,
@@ -153,7 +153,7 @@ fn compile(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> Re
     // 1.5: in 1.6 the local size becomes an id (ExecutionModeId), which the reader in rspirv 0.13 refuses.
     options.set_target_spirv(shaderc::SpirvVersion::V1_5);
     options.set_optimization_level(shaderc::OptimizationLevel::Performance);
-    // Names survive optimisation only with debug information; reflection needs them.
+    // Reflection needs the names, and optimisation keeps them only with debug information.
     options.set_generate_debug_info();
     options.set_warnings_as_errors();
     for (name, value) in source.defines {
@@ -170,7 +170,7 @@ fn compile(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> Re
     Ok(artifact.as_binary().to_vec())
 }
 
-/// Cache file: the words with a hash in front, so that a damaged file is never handed to a driver.
+/// Content of a cache file: a hash, then the words, so that a damaged file never reaches a driver.
 fn seal(spirv: &[u32]) -> Vec<u8> {
     let bytes: &[u8] = bytemuck::cast_slice(spirv);
     let mut out = blake3::hash(bytes).as_bytes().to_vec();

@@ -1,4 +1,4 @@
-//! Buffers that the host rewrites while the device still reads what it wrote before.
+//! Buffers that the host rewrites while the device still reads their earlier content.
 
 use super::device::Device;
 use super::flight::FLIGHTS;
@@ -8,9 +8,9 @@ use bytemuck::Pod;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// A buffer for each flight, written in turn; it stands for the one that was written last.
+/// One buffer per flight, written in turn; readers use the one that was written last.
 ///
-/// A frame writes it at most once, and waits for the flight before the last one first: what that one read is free again.
+/// A frame writes it at most once, after it has waited for the flight that read the same buffer [`FLIGHTS`] frames before.
 pub struct Upload {
     buffers: [Buffer; FLIGHTS],
     last: usize,
@@ -26,8 +26,8 @@ impl Upload {
         Ok(Upload { buffers: [one()?, one()?], last: 0 })
     }
 
-    /// Writes the whole content. A buffer that is too small gives way to one with room for half as much again, so that a moving
-    /// scene does not come back each frame.
+    /// Writes the whole content. A buffer that is too small is replaced by one that is half as large again as needed, so that
+    /// a slowly growing scene does not reallocate in each frame.
     ///
     /// # Errors
     /// As [`Buffer::new`].
@@ -42,17 +42,17 @@ impl Upload {
         Ok(())
     }
 
-    /// Place of the buffer that was written last.
+    /// Index of the buffer that was written last.
     pub fn place(&self) -> usize {
         self.last
     }
 
-    /// What the device has written into the buffer at that place, once the flight that it belongs to has ended.
+    /// The buffer at that index, to read what the device wrote into it after its flight has ended.
     pub fn at(&self, place: usize) -> &Buffer {
         &self.buffers[place]
     }
 
-    /// Bytes of all flights together.
+    /// Bytes of all buffers together.
     pub fn all_bytes(&self) -> u64 {
         self.buffers.iter().map(|buffer| buffer.size_bytes).sum()
     }

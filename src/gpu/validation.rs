@@ -1,4 +1,4 @@
-//! The validation layer: which checks are on, and what it said.
+//! The validation layer: the checks that it makes and the messages that it reports.
 
 use crate::error::{Error, Result};
 use ash::vk;
@@ -8,9 +8,7 @@ use std::sync::Mutex;
 /// Name of the Khronos layer, as the loader lists it.
 pub const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// Messages that are known and harmless; each with the reason it stands here. Matched against the message id name.
-///
-/// Empty: at present nothing on the drivers tried needs an exception.
+/// Message id names that are known to be harmless, each with the reason. Empty, because no tested driver needs an exception.
 const ACCEPTED: &[(&str, &str)] = &[];
 
 /// How much of the validation layer is switched on.
@@ -54,12 +52,12 @@ impl Validation {
     }
 }
 
-/// What the layer reported so far, filled by the debug messenger; lives as long as the instance.
+/// Messages reported so far. The debug messenger fills it; it lives as long as the instance.
 #[derive(Default)]
 pub struct Messages(Mutex<Vec<String>>);
 
 impl Messages {
-    /// Everything reported since the last call, oldest first, without the accepted messages.
+    /// Messages reported since the last call, oldest first, without the accepted ones.
     pub fn take(&self) -> Vec<String> {
         std::mem::take(&mut *self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
     }

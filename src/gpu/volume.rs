@@ -1,4 +1,4 @@
-//! Images of three dimensions that shaders read through a sampler, filled once.
+//! Three-dimensional images that are filled once and that shaders read through a sampler.
 
 use super::device::Device;
 use super::memory::{Allocation, Buffer, BufferKind};
@@ -8,7 +8,7 @@ use ash::vk;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// Texels are four halves.
+/// A texel has four f16 channels.
 const FORMAT: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
 const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
     aspect_mask: vk::ImageAspectFlags::COLOR,
@@ -18,7 +18,7 @@ const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
     layer_count: 1,
 };
 
-/// Destroys handles before the memory goes.
+/// Destroys the handles before the memory is freed.
 struct Handles {
     device: Arc<Device>,
     image: vk::Image,
@@ -38,7 +38,7 @@ impl Drop for Handles {
     }
 }
 
-/// An image of three dimensions of four halves a texel, with a sampler that interpolates linearly and clamps to the edge.
+/// A three-dimensional image with four f16 channels per texel, and a sampler that interpolates linearly and clamps to the edge.
 pub struct Volume {
     handles: Handles,
     _memory: Allocation,
@@ -50,18 +50,18 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// Most texels along an edge.
+    /// Largest number of texels along an edge.
     pub fn most(device: &Device) -> u32 {
         device.limits.max_image_dimension3_d
     }
 
-    /// An image that holds `texels`, x first, then y, then z.
+    /// An image that holds `texels`, ordered by x, then y, then z.
     ///
     /// # Errors
-    /// `Input` when it is larger than the device's images can be, `Device` when memory ran out.
+    /// `Input` when it exceeds the device's largest image, `Device` when memory ran out.
     ///
     /// # Panics
-    /// When there are not as many texels as the size says.
+    /// When the number of texels does not match the size.
     pub fn with_data(device: &Arc<Device>, name: &str, size: [u32; 3], texels: &[[u16; 4]]) -> Result<Self> {
         let [width, height, depth] = size;
         assert_eq!(texels.len() as u64, size.iter().map(|&n| u64::from(n)).product::<u64>(), "{name}: {size:?} texels");

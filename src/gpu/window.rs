@@ -1,4 +1,4 @@
-//! Surface and swapchain: images that a window shows, made anew whenever they no longer fit it.
+//! Surface and swapchain of a window; the swapchain is rebuilt when it no longer fits the window.
 
 use super::device::{Device, DeviceOptions};
 use super::flight::{FLIGHTS, Flight, Signals};
@@ -12,10 +12,10 @@ use std::ffi::CStr;
 use std::sync::Arc;
 
 impl Device {
-    /// As [`Device::new`], with what windows of a display need.
+    /// As [`Device::new`], with the extensions that windows of a display need.
     ///
     /// # Errors
-    /// As [`Device::new`]; `Unsupported` too when the driver opens no windows on that display.
+    /// As [`Device::new`], and `Unsupported` when the driver cannot open windows on that display.
     pub fn for_display(options: &DeviceOptions, display: RawDisplayHandle) -> Result<Arc<Self>> {
         let names = ash_window::enumerate_required_extensions(display)
             .checked("surface extensions", "display")
@@ -26,7 +26,7 @@ impl Device {
     }
 }
 
-/// What Vulkan draws into a window with. Keeps the window alive.
+/// A window's Vulkan surface. It keeps the window alive.
 struct WindowSurface {
     device: Arc<Device>,
     loader: khr::surface::Instance,
@@ -90,7 +90,7 @@ impl Drop for Semaphore {
     }
 }
 
-/// Destroys a swapchain; its images keep it alive.
+/// Owns a swapchain; its images keep it alive.
 struct SwapchainHandle {
     device: Arc<Device>,
     loader: khr::swapchain::Device,
@@ -98,10 +98,10 @@ struct SwapchainHandle {
 }
 
 impl SwapchainHandle {
-    /// Waits until the queue shows nothing any more.
+    /// Waits until the queue has presented everything.
     fn settle(&self) {
         let queue = self.device.queue();
-        // SAFETY: device and queue are alive; a lost device shows nothing.
+        // SAFETY: device and queue are alive; a lost device presents nothing.
         let _ = unsafe { self.device.handle.queue_wait_idle(*queue) };
     }
 }
@@ -117,19 +117,20 @@ impl Drop for SwapchainHandle {
 /// A swapchain of one size with its images.
 struct Swapchain {
     images: Vec<Arc<Image>>,
-    /// Signalled when an image is drawn; one an image, because only acquiring it again says that its showing has begun.
+    /// Signalled when an image is drawn. There is one per image, because only acquiring the image again shows that its
+    /// presentation has taken the semaphore.
     drawn: Vec<Semaphore>,
     handle: Arc<SwapchainHandle>,
 }
 
 impl Drop for Swapchain {
     fn drop(&mut self) {
-        // Before the semaphores go.
+        // The semaphores are destroyed after this.
         self.handle.settle();
     }
 }
 
-/// An image to draw into, which has to be presented.
+/// An acquired image, which must be drawn into and presented.
 pub struct Shot {
     /// The image; its content is undefined.
     pub image: Arc<Image>,
@@ -137,12 +138,12 @@ pub struct Shot {
     acquired: vk::Semaphore,
 }
 
-/// A window's surface and its swapchain of the moment.
+/// A window's surface and its current swapchain.
 pub struct Window {
     device: Arc<Device>,
-    /// Before the surface.
+    /// Dropped before the surface.
     chain: Option<Swapchain>,
-    /// Signalled when an image may be drawn into; one more than flights, since one may be acquired ahead of them.
+    /// Signalled when an image may be drawn into. There is one more than flights, since one image may be acquired ahead.
     acquired: Vec<Semaphore>,
     next: usize,
     format: vk::SurfaceFormatKHR,
@@ -178,7 +179,7 @@ impl Window {
             let known = MODES.iter().filter(|(_, m)| modes.contains(&m.raw())).map(|(name, _)| *name);
             let known: Vec<_> = known.collect();
             return Err(Error::Unsupported(format!(
-                "this display has no such present mode; it has {}",
+                "this display does not support the present mode; it supports {}",
                 known.join(", ")
             )));
         }
@@ -196,17 +197,17 @@ impl Window {
         })
     }
 
-    /// Format of the images. One that is not sRGB wants encoded colours.
+    /// Format of the images. If it is not an sRGB format, shaders must encode colours.
     pub fn format(&self) -> vk::Format {
         self.format.format
     }
 
-    /// Whether the device encodes linear colours that are drawn.
+    /// Whether the device encodes drawn linear colours as sRGB.
     pub fn encodes_srgb(&self) -> bool {
         is_srgb(self.format.format)
     }
 
-    /// Notes the window's size in pixels; the swapchain follows at the next frame. Without pixels nothing is shown.
+    /// Notes the window's size in pixels; the next frame rebuilds the swapchain. Nothing is shown while a side is 0.
     pub fn resize(&mut self, size: [u32; 2]) {
         if size != self.size {
             self.size = size;
@@ -214,13 +215,13 @@ impl Window {
         }
     }
 
-    /// Takes the next image, making the swapchain anew where it no longer fits the window. `None`: nothing can be shown now, as
-    /// in a minimised window.
+    /// Acquires the next image, after rebuilding the swapchain if it no longer fits the window. `None` if nothing can be shown,
+    /// as in a minimised window.
     ///
     /// # Errors
     /// `Device` when the device or the surface was lost.
     pub fn acquire(&mut self) -> Result<Option<Shot>> {
-        // A window that is dragged changes again while its swapchain is made.
+        // A window that is being resized may change again while its swapchain is built.
         for _ in 0..8 {
             if self.chain.is_none() && !self.rebuild()? {
                 return Ok(None);
@@ -232,7 +233,7 @@ impl Window {
             match unsafe {
                 swapchain.loader.acquire_next_image(swapchain.handle, u64::MAX, semaphore, vk::Fence::null())
             } {
-                // A suboptimal image is drawn and shown all the same; presenting it says so again.
+                // A suboptimal image is still drawn and shown; presenting it reports the same again.
                 Ok((index, _suboptimal)) => {
                     self.next = (self.next + 1) % self.acquired.len();
                     let image = chain.images[index as usize].clone();
@@ -246,13 +247,13 @@ impl Window {
     }
 
     /// Launches a recording that draws into the shot's image and leaves it as [`Access::Present`](super::Access::Present), and
-    /// shows it. A swapchain that no longer fits is made anew at the next [`Window::acquire`].
+    /// shows it. A swapchain that no longer fits is rebuilt by the next [`Window::acquire`].
     ///
     /// # Errors
     /// As [`Commands::launch`]; `Device` when the surface was lost.
     ///
     /// # Panics
-    /// When the shot is of another swapchain: [`Window::resize`] came between.
+    /// When the shot belongs to another swapchain, because [`Window::resize`] was called in between.
     pub fn present(&mut self, commands: Commands<'_>, shot: &Shot) -> Result<Flight> {
         let chain = self.chain.as_ref().expect("a shot is presented before the window changes");
         assert!(Arc::ptr_eq(&chain.images[shot.index as usize], &shot.image), "a shot of another swapchain");
@@ -273,7 +274,7 @@ impl Window {
         Ok(flight)
     }
 
-    /// Makes the swapchain anew; false where the window has no pixels.
+    /// Rebuilds the swapchain; false if a side of the window is 0.
     fn rebuild(&mut self) -> Result<bool> {
         let surface = self.surface.handle;
         // SAFETY: physical device and surface are alive.
@@ -287,7 +288,7 @@ impl Window {
             if can.supported_composite_alpha.contains(opaque) { opaque } else { vk::CompositeAlphaFlagsKHR::INHERIT };
         let create = vk::SwapchainCreateInfoKHR::default()
             .surface(surface)
-            // One is shown, one waits to be, one is drawn.
+            // One image is shown, one waits and one is drawn.
             .min_image_count((can.min_image_count + 1).max(3).min(most))
             .image_format(self.format.format)
             .image_color_space(self.format.color_space)
@@ -319,7 +320,7 @@ impl Window {
 
 impl Drop for Window {
     fn drop(&mut self) {
-        self.device.settle(); // before the semaphores go
+        self.device.settle(); // the semaphores are destroyed after this
         self.chain = None;
     }
 }

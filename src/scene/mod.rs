@@ -1,6 +1,6 @@
-//! Scenes: plain data read from TOML, checked, with the meshes and the distant light that it names.
+//! Scenes: checked data from TOML, with the meshes and the distant light that they name.
 //!
-//! [`Data`] is the file as it stands and goes back to TOML; [`Scene`] adds what follows from it.
+//! [`Data`] has the content of the file and can be written as TOML; [`Scene`] adds derived data.
 
 pub mod data;
 pub mod motion;
@@ -19,27 +19,27 @@ use crate::error::{Error, Result};
 pub use data::{Camera, Data, EntityData, MeshData, Output};
 pub use motion::{Motion, Placement};
 
-/// Most entities in a scene.
+/// Largest number of entities in a scene.
 pub const ENTITY_LIMIT: usize = 4096;
-/// Most meshes in a scene.
+/// Largest number of meshes in a scene.
 pub const MESH_LIMIT: usize = 1024;
 /// Largest scene file in bytes.
 pub const FILE_LIMIT_BYTES: usize = 16 << 20;
 
-/// A checked scene, ready to be baked and drawn.
+/// A checked scene with its meshes.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// The file as it stands.
+    /// The content of the scene file.
     pub data: Data,
     /// Meshes in the file's order.
     pub meshes: Vec<Arc<Mesh>>,
-    /// Entities in the file's order, switches resolved. Where they are is [`Scene::at`].
+    /// Entities in the file's order, with their switches resolved. [`Scene::at`] gives their placements.
     pub entities: Vec<Entity>,
     /// Distant light.
     pub environment: Environment,
 }
 
-/// What an entity is at all times.
+/// The properties of an entity that do not depend on time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entity {
     /// Its name, or `entity N` counted from 0.
@@ -48,9 +48,9 @@ pub struct Entity {
     pub mesh: usize,
     /// Linear reflectance, 0 to 1.
     pub albedo: Vec3,
-    /// Linear radiance in W m^-2 sr^-1; multiplies the colours of a mesh that has them.
+    /// Linear radiance in W m^-2 sr^-1. It is multiplied by the mesh's colours, if there are any.
     pub emission: Vec3,
-    /// Whether it lights others.
+    /// Whether it lights other entities.
     pub emits: bool,
     /// Whether it casts shadows.
     pub occludes: bool,
@@ -59,8 +59,8 @@ pub struct Entity {
 }
 
 impl Scene {
-    /// Reads a scene and the files it names, relative to it. A path that does not exist but is embedded in the binary
-    /// (`assets/scenes/NAME.toml`, or NAME alone) is taken from there.
+    /// Reads a scene and the files that it names, relative to it. If the path does not exist, an embedded scene is read
+    /// (`assets/scenes/NAME.toml`, or NAME alone).
     ///
     /// # Errors
     /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line.
@@ -76,7 +76,7 @@ impl Scene {
     }
 
     /// Reads a scene from text. `path` names it in messages; `read` is given the paths of files, which already start with
-    /// the folder of `path`. A file that it does not have is looked for among the embedded ones, as `assets/meshes/torus.obj`.
+    /// the folder of `path`. If `read` fails, the file is searched among the embedded ones, such as `assets/meshes/torus.obj`.
     ///
     /// # Errors
     /// As [`Scene::load`].
@@ -84,7 +84,7 @@ impl Scene {
         let data = Data::parse(text, path)?;
         let lines = TableLines::read(text);
         let folder = path.parent().unwrap_or(Path::new(""));
-        // What is not on disk may be in the binary, under its own name from wherever the scene stands.
+        // A file that is not on disk may be embedded under its own name, wherever the scene file lies.
         let read = |file: &Path| {
             let full = folder.join(file);
             read(&full)
@@ -112,19 +112,19 @@ impl Scene {
         Ok(Self { data, meshes, entities, environment })
     }
 
-    /// Where every entity is at `time_s` seconds, in order. It depends on the time alone, not on the frames before.
+    /// Placements of all entities at `time_s` seconds, in order. They depend on the time alone, not on earlier frames.
     pub fn at(&self, time_s: f64) -> Vec<Placement> {
         self.data.entities.iter().map(|e| e.at(time_s)).collect()
     }
 
-    /// Replaces what the file says of an entity, whose mesh stays.
+    /// Replaces the data of an entity; its mesh stays the same.
     pub fn set_entity(&mut self, index: usize, data: EntityData) {
         let mesh = self.entities[index].mesh;
         self.entities[index] = resolve(index, &data, mesh, &self.meshes[mesh]);
         self.data.entities[index] = data;
     }
 
-    /// Replaces what the file says of the distant light; its picture stays.
+    /// Replaces the data of the distant light; its picture stays the same.
     ///
     /// # Errors
     /// As [`Environment::new`].
@@ -134,14 +134,13 @@ impl Scene {
         Ok(())
     }
 
-    /// The scene file as text, which reads back as equal [`Data`]; comments are not kept.
+    /// The scene file as text, which parses to equal [`Data`]; comments are lost.
     pub fn to_toml(&self) -> String {
         self.data.to_toml()
     }
 }
 
-/// Defaults of the switches: it emits if it has emission; a light does not occlude, all else does, except that flat ground
-/// only receives.
+/// Resolves the switches. By default, an entity emits if it has emission, occludes unless it emits or is flat, and receives.
 fn resolve(index: usize, data: &EntityData, mesh: usize, shape: &Mesh) -> Entity {
     let emits = data.emits.unwrap_or(data.emission != Vec3::ZERO);
     Entity {
@@ -155,7 +154,7 @@ fn resolve(index: usize, data: &EntityData, mesh: usize, shape: &Mesh) -> Entity
     }
 }
 
-/// Files that a scene names: meshes and pictures.
+/// Reads a file that a scene names: a mesh or a picture.
 fn read_named(path: &Path) -> Result<Vec<u8>> {
     read_file(path, obj::FILE_LIMIT_BYTES)
 }
@@ -169,7 +168,7 @@ fn utf8<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a str> {
     })
 }
 
-/// Where the tables of a scene file begin, for messages about what is only known after reading it.
+/// Lines at which the tables of a scene file begin, for messages about errors that are found after parsing.
 struct TableLines<'a> {
     text: &'a str,
     tables: Tables,

@@ -1,4 +1,4 @@
-//! Where things are and how they move: functions of time alone.
+//! Placements of entities and their motion, as functions of time alone.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ use super::values;
 /// Object to world: scale, then rotation, then position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Metres.
+    /// Position in metres.
     pub position: Vec3,
     /// Unit quaternion.
     pub rotation: Quat,
@@ -18,8 +18,8 @@ pub struct Placement {
     pub scale: f32,
 }
 
-/// A rotation as written: `{ axis = [0, 1, 0], angle_deg = 30 }` (right-handed) or `{ quaternion = [x, y, z, w] }` of any length
-/// but zero.
+/// A rotation in a scene file: `{ axis = [0, 1, 0], angle_deg = 30 }` (right-handed) or `{ quaternion = [x, y, z, w] }` of any
+/// length but zero.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Written", into = "Written")]
 pub enum RotationData {
@@ -90,31 +90,31 @@ impl From<RotationData> for Written {
     }
 }
 
-/// One movement. An entity's list is applied from first to last, each to what the ones before gave.
+/// One movement. The movements of an entity are applied in order, each to the placement that the previous ones give.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Motion {
-    /// Replaces the placement by an interpolated one; before the first and after the last keyframe it holds still.
+    /// Replaces the placement by an interpolated one, which is constant before the first and after the last keyframe.
     Keyframes {
         /// At least one, times increasing.
         #[serde(deserialize_with = "keyframes")]
         keys: Vec<Keyframe>,
-        /// Whether it starts over after the last keyframe's time, counted from the first one's.
+        /// Whether the motion repeats; its period is the time from the first to the last keyframe.
         #[serde(default)]
         repeat: bool,
-        /// What happens between keys.
+        /// Interpolation between keys.
         #[serde(default, skip_serializing_if = "Interpolation::is_linear")]
         interpolation: Interpolation,
     },
-    /// Carries the position around a line; the rotation stays as it is.
+    /// Moves the position around a line; the rotation does not change.
     Orbit {
         /// A point on the line, metres.
         #[serde(deserialize_with = "values::position")]
         centre: Vec3,
-        /// The line's direction; turns are right-handed about it.
+        /// The line's direction; the turn is right-handed about it.
         #[serde(default = "up", deserialize_with = "values::direction")]
         axis: Vec3,
-        /// Seconds a turn; negative turns the other way.
+        /// Seconds per turn; negative reverses the direction.
         #[serde(deserialize_with = "values::period")]
         period_s: f64,
     },
@@ -123,7 +123,7 @@ pub enum Motion {
         /// Direction of the axis.
         #[serde(default = "up", deserialize_with = "values::direction")]
         axis: Vec3,
-        /// Seconds a turn; negative turns the other way.
+        /// Seconds per turn; negative reverses the direction.
         #[serde(deserialize_with = "values::period")]
         period_s: f64,
     },
@@ -144,17 +144,17 @@ pub enum Motion {
     },
 }
 
-/// How positions and scales go from key to key. Rotations always turn the short way at a steady rate (spherical linear
-/// interpolation).
+/// Interpolation of positions and scales between keys. Rotations always take the short way at a constant rate (spherical
+/// linear interpolation).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Interpolation {
-    /// In straight lines at a steady rate.
+    /// Straight lines at a constant rate.
     #[default]
     Linear,
-    /// On a Catmull-Rom spline through the keys, without a kink: Hermite cubics whose slope at a key is that from the key before to
-    /// the key after, over their times. It starts and ends along its first and last stretch; a repeated path whose last key is
-    /// where the first is has no kink there either. It may swing beyond the keys: a scale is kept above a tenth of its keys'.
+    /// A Catmull-Rom spline through the keys: Hermite cubics whose slope at a key is the difference of the neighbouring keys over
+    /// the difference of their times. The first and last slopes are those of the first and last stretch, unless the motion repeats
+    /// and its last key equals its first. The spline may overshoot the keys; scales stay above a tenth of their keys' scales.
     Smooth,
 }
 
@@ -168,20 +168,20 @@ fn up() -> Vec3 {
     Vec3::Y
 }
 
-/// A placement at a time; what is left out is as the entity has it at rest.
+/// A placement at a time; parts that are left out keep the entity's placement at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Keyframe {
     /// Seconds.
     #[serde(deserialize_with = "values::number")]
     pub time_s: f64,
-    /// Metres; between keys as [`Interpolation`] says.
+    /// Position in metres, interpolated as [`Interpolation`] says.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "values::maybe_position")]
     pub position: Option<Vec3>,
-    /// Turned the short way at a steady rate.
+    /// Rotation, interpolated the short way at a constant rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<RotationData>,
-    /// Between keys as [`Interpolation`] says.
+    /// Scale, interpolated as [`Interpolation`] says.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "values::maybe_scale")]
     pub scale: Option<f32>,
 }
@@ -203,7 +203,7 @@ fn keyframes<'de, D: serde::Deserializer<'de>>(source: D) -> Result<Vec<Keyframe
     Ok(keys)
 }
 
-/// [`Placement`] in f64, between movements.
+/// [`Placement`] in f64, for intermediate results between movements.
 #[derive(Clone, Copy)]
 pub(super) struct PlacementF64 {
     position: DVec3,
@@ -228,9 +228,9 @@ impl PlacementF64 {
         self.position.extend(self.scale)
     }
 
-    /// This placement after `motion`, with `rest` for what keyframes leave out.
+    /// This placement after `motion`; `rest` supplies the parts that keyframes leave out.
     pub(super) fn moved(mut self, motion: &Motion, rest: PlacementF64, time_s: f64) -> Self {
-        // The fraction of a turn first: the angle stays small, so late times lose nothing.
+        // Taking the fraction of a turn first keeps the angle small, so late times lose no precision.
         let turn = |axis: Vec3, period_s: f64| {
             DQuat::from_axis_angle(axis.as_dvec3().normalize(), TAU * (time_s / period_s).fract())
         };
@@ -280,10 +280,10 @@ fn interpolate(
         Interpolation::Smooth => {
             let closed =
                 repeat && place(&keys[0]).position_and_scale() == place(&keys[keys.len() - 1]).position_and_scale();
-            // Over this stretch: the slope at a key by its neighbours.
+            // Slope at a key from its neighbours, in units of this stretch.
             let slope = |key: usize| {
                 let end = keys.len() - 1;
-                // The first and the last key of a closed path are one, whose neighbours lie on both sides of the seam.
+                // The first and the last key of a closed path are the same; its neighbours lie on both sides of the seam.
                 let at = |key: usize| place(&keys[key]).position_and_scale();
                 let (before, after, took_s) = match key {
                     _ if closed && (key == 0 || key == end) => {
@@ -302,7 +302,7 @@ fn interpolate(
     PlacementF64 { position: between.truncate(), rotation, scale: between.w }
 }
 
-/// The cubic through `values` at 0 and 1 with `slopes` there.
+/// The cubic with the given values and slopes at 0 and 1.
 fn hermite([a, b]: [DVec4; 2], [from, to]: [DVec4; 2], t: f64) -> DVec4 {
     let rest = 1.0 - t;
     (a * (1.0 + 2.0 * t) + from * t) * rest * rest + (b * (1.0 + 2.0 * rest) - to * rest) * t * t

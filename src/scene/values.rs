@@ -12,7 +12,7 @@ pub const SCALE_LIMIT: f32 = 1e7;
 /// Largest angle in degrees and time in seconds; f64 keeps fractions of 1e-7 there.
 pub const NUMBER_LIMIT: f64 = 1e9;
 
-/// A list of exactly three numbers.
+/// Reads a list of exactly three numbers.
 fn three<'de, D: Deserializer<'de>>(source: D, what: &str, in_range: impl Fn(f32) -> bool) -> Result<Vec3, D::Error> {
     let list = Vec::<f32>::deserialize(source)?;
     let three: [f32; 3] =
@@ -23,12 +23,12 @@ fn three<'de, D: Deserializer<'de>>(source: D, what: &str, in_range: impl Fn(f32
     }
 }
 
-/// A place in metres.
+/// A position in metres.
 pub fn position<'de, D: Deserializer<'de>>(source: D) -> Result<Vec3, D::Error> {
     three(source, "a position (finite, within 1e7 m)", |v| v.abs() <= POSITION_LIMIT_M)
 }
 
-/// A place that may be left out.
+/// A position that may be left out.
 pub fn maybe_position<'de, D: Deserializer<'de>>(source: D) -> Result<Option<Vec3>, D::Error> {
     position(source).map(Some)
 }
@@ -62,7 +62,7 @@ pub fn number<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     }
 }
 
-/// Seconds of one turn; negative turns the other way.
+/// Seconds per turn; negative reverses the direction.
 pub fn period<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     let value = number(source)?;
     if value.abs() >= 1e-6 {

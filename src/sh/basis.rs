@@ -21,7 +21,7 @@ use glam::DVec3;
 
 use super::program::{Cost, Program, Term, Value, elements};
 
-/// The largest number of bands that this module tree is made and tested for.
+/// The largest number of bands that these modules support and their tests cover.
 pub const MAX_BANDS: usize = 8;
 
 /// Coefficients of the largest expansion.
@@ -41,7 +41,7 @@ struct Recurrence {
     fall: [[f64; MAX_BANDS]; MAX_BANDS],
 }
 
-/// Indexed by `[m]` and `[m][l]`, so that evaluation runs through them in order.
+/// Indexed by `[m]` and `[m][l]`, which is the order in which evaluation reads them.
 static RECURRENCE: LazyLock<Recurrence> = LazyLock::new(|| {
     let mut table =
         Recurrence { start: [0.0; 8], rise: [[0.0; MAX_BANDS]; MAX_BANDS], fall: [[0.0; MAX_BANDS]; MAX_BANDS] };
@@ -82,7 +82,7 @@ pub fn evaluate(bands: usize, direction: DVec3, out: &mut [f64]) {
     }
 }
 
-/// The number of bands is known to the compiler, so that the loops unroll.
+/// [`evaluate`] for a number of bands that the compiler knows, so that it unrolls the loops.
 fn evaluate_bands<const BANDS: usize>(direction: DVec3, out: &mut [f64]) {
     let out = &mut out[..coefficient_count(BANDS)];
     let table = &*RECURRENCE;
@@ -170,12 +170,12 @@ fn horner(program: &mut Program, coefficients: &[f64], z: Value, z_squared: Opti
     sum
 }
 
-/// Arithmetic of one [`glsl_basis`] call.
+/// Operation counts of one call of [`glsl_basis`]'s function.
 pub fn basis_cost(bands: usize) -> Cost {
     basis_program(bands).cost()
 }
 
-/// Runs the program that [`glsl_basis`] prints, for tests: the same contract as [`evaluate`], slowly.
+/// As [`evaluate`], by the program that [`glsl_basis`] prints; slow, for tests.
 pub fn evaluate_program(bands: usize, direction: DVec3, out: &mut [f64]) {
     basis_program(bands).evaluate(&direction.to_array(), out);
 }

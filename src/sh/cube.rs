@@ -1,4 +1,4 @@
-//! The cube around a capture point: the one owner of faces, texels, directions and solid angles.
+//! The cube around a capture point: faces, texels, directions and solid angles are defined only here.
 //!
 //! Faces are +X -X +Y -Y +Z -Z, numbered 0 to 5. On a face, s runs to the right and t *down*, both in [-1, 1], as in the
 //! table "Cube Map Face Selection" of the Vulkan specification, so that texel (x, y) of layer `face` of a cube image lies

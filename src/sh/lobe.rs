@@ -1,4 +1,4 @@
-//! Closed forms: the SH of functions that are symmetric about an axis.
+//! Closed forms for the SH of functions that are symmetric about an axis.
 
 use std::f64::consts::PI;
 
@@ -40,7 +40,7 @@ pub fn cap(bands: usize, axis: DVec3, half_angle_rad: f64) -> Vec<f64> {
 
 /// The blocked part of a sphere whose centre lies at `to_centre` from the receiver, in the unit of `radius`.
 ///
-/// From inside or on the sphere every direction is blocked.
+/// If the receiver lies inside or on the sphere, every direction is blocked.
 pub fn sphere(bands: usize, to_centre: DVec3, radius: f64) -> Vec<f64> {
     let distance = to_centre.length();
     if distance <= radius {

@@ -6,7 +6,7 @@ use super::product::{Tensor, eigenvectors};
 use std::f64::consts::PI;
 
 /// Smallest eigenvalue whose logarithm is taken: four bands of a deep shadow ring below 0, where there is none. A floor anywhere
-/// from .005 to .2 makes no difference to caps of up to 40 degrees.
+/// from 0.005 to 0.2 makes no difference to caps of up to 40 degrees.
 const FLOOR: f64 = 0.02;
 /// Longest expansion, without its constant, of which the exponential is a series.
 const SHORT: f64 = 0.5;

@@ -1,11 +1,11 @@
-//! Spherical harmonics in f64: the maths that bakes, shaders and references rest on. No Vulkan, no files.
+//! Spherical harmonics in f64: the maths that bakes, shaders and their tests use. It needs no Vulkan and no files.
 //!
 //! Conventions, tested in `tests/sh_*.rs` and `tests/cube.rs`:
 //!
-//! - real orthonormal basis with the Condon-Shortley phase (reference 1): Y1,-1 = -.488603 y, Y1,0 = .488603 z,
-//!   Y1,1 = -.488603 x; coefficient l (l + 1) + m; n bands are n^2 coefficients, 1 to [`MAX_BANDS`];
+//! - real orthonormal basis with the Condon-Shortley phase (reference 1): Y1,-1 = -0.488603 y, Y1,0 = 0.488603 z,
+//!   Y1,1 = -0.488603 x; coefficient l (l + 1) + m; n bands are n^2 coefficients, 1 to [`MAX_BANDS`];
 //! - directions are unit vectors of a right-handed space, taken as they stand: no axes are swapped;
-//! - a function is blocked part, radiance or transfer; its unit is its coefficients' unit;
+//! - a function is a blocked part, a radiance or a transfer; its coefficients have its unit;
 //! - cube faces +X -X +Y -Y +Z -Z with Vulkan's s and t ([`cube`]).
 //!
 //! | file | holds |

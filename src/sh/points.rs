@@ -18,7 +18,7 @@ use super::quadrature::icosahedral_rule;
 /// Largest number of bands of a factor whose products the rule projects exactly.
 pub const BANDS: usize = 4;
 
-/// Points of the rule.
+/// Number of points of the rule.
 pub const COUNT: usize = 32;
 
 /// The unit directions of the rule with their weights (sum 4 pi), one set of mirror images after another.
@@ -26,11 +26,11 @@ pub fn points() -> Vec<(DVec3, f64)> {
     reflected_points().iter().flat_map(|set| (0..set.size()).map(|s| (set.point(s), set.weight))).collect()
 }
 
-/// Points that are reflections of one another.
+/// A set of points that are reflections of one another in coordinate planes.
 struct ReflectedPoints {
-    /// The one without negative coordinates.
+    /// The point without negative coordinates.
     corner: DVec3,
-    /// Axes along which it has reflections.
+    /// Axes in which the point has a non-zero coordinate, and so a mirror image.
     axes: Vec<usize>,
     weight: f64,
 }
@@ -51,10 +51,10 @@ impl ReflectedPoints {
         point
     }
 
-    /// The axes in which coefficients are odd, as bits of this set's axes, with their values at the corner: empty classes and
-    /// those that are odd in an axis without extent are left out.
+    /// Coefficients with their values at the corner, grouped by the axes in which they are odd (as bits of this set's axes).
+    /// Coefficients that vanish at all points of the set are left out.
     fn classes(&self, bands: usize) -> BTreeMap<usize, Vec<(usize, f64)>> {
-        // A place without symmetry tells the parities of all coefficients.
+        // At a direction in general position, the sign change under a reflection gives each coefficient's parity.
         let place = DVec3::new(0.36, 0.48, 0.8);
         let basis = |at: DVec3| {
             let mut y = [0.0; MAX_COEFFICIENTS];
@@ -92,7 +92,7 @@ fn reflected_points() -> Vec<ReflectedPoints> {
     reflected_points
 }
 
-/// Sums and differences along every axis: classes to points, or back.
+/// Sums and differences along every axis (a Walsh-Hadamard transform): from parity classes to points, or back.
 fn butterflies(program: &mut Program, values: &mut [Option<Value>]) {
     let size = values.len();
     let mut step = 1;
@@ -144,7 +144,7 @@ fn project(
     }
 }
 
-/// The product as evaluation, multiplication and projection.
+/// The product program by evaluation at the points, multiplication and projection.
 pub(super) fn product_program(bands: usize, operation: ProductOperation) -> Program {
     let count = coefficient_count(bands);
     let [left, target] = if operation == ProductOperation::Product { ["a", "c"] } else { ["t", "t"] };
@@ -171,7 +171,7 @@ pub(super) fn product_program(bands: usize, operation: ProductOperation) -> Prog
     program
 }
 
-/// Coefficients to values at the points: inputs c, outputs v in the order of [`points`].
+/// Evaluation of an expansion at the points: inputs c, outputs v in the order of [`points`].
 pub fn evaluate_program(bands: usize) -> Program {
     let mut program = Program::new(elements("c", coefficient_count(bands)));
     let mut values = Vec::new();
@@ -184,7 +184,7 @@ pub fn evaluate_program(bands: usize) -> Program {
     program
 }
 
-/// Values at the points that already hold their weights to coefficients: inputs v, outputs c.
+/// Projection of values at the points, already multiplied by their weights: inputs v, outputs c.
 pub fn project_program(bands: usize) -> Program {
     let count = coefficient_count(bands);
     let mut program = Program::new(elements("v", COUNT));
@@ -201,7 +201,7 @@ pub fn project_program(bands: usize) -> Program {
 }
 
 /// GLSL 460 text of `POINT_WEIGHTS` and their reciprocals `POINT_INVERSES`, `void sh_points(float c[N], out float v[32])` and
-/// `void sh_from_points(float v[32], out float c[N])`, the latter for values that already hold their weights.
+/// `void sh_from_points(float v[32], out float c[N])`, the latter for values that are already multiplied by their weights.
 pub fn glsl_points(bands: usize) -> String {
     let count = coefficient_count(bands);
     let list = |of: &dyn Fn(f64) -> f64| {

@@ -6,8 +6,8 @@
 use super::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use super::quadrature::sphere_rule;
 
-/// Below this, an entry is a zero with rounding errors: the smallest true magnitudes are .0584 at 4 bands and above 1e-4
-/// at 8, the errors of the sum under 1e-14.
+/// Entries below this are zeros with rounding errors. The smallest true magnitudes are 0.0584 at 4 bands and above 1e-4 at 8
+/// bands, and the errors of the sums are below 1e-14.
 const ZERO: f64 = 1e-9;
 
 /// One non-zero entry of a tensor.
@@ -28,11 +28,12 @@ pub struct Entry {
 pub struct Tensor {
     bands: [usize; 3],
     entries: Vec<Entry>,
-    /// The same entries for [`Tensor::multiply`]. Factors that both expansions have: `a_i b_j + a_j b_i` once, then its
-    /// run of targets.
+    /// The same entries as [`Tensor::multiply`] uses them. For coefficients that both expansions have, `a_i b_j + a_j b_i` is
+    /// computed once and added to a run of targets.
     pairs: Vec<Pair>,
     targets: Vec<(u8, f64)>,
-    /// The others, `a_i b_j`, as a flat list: most have one target, and a loop of one mispredicts its end.
+    /// The other entries, `a_i b_j`, as a flat list: most have one target, and the branch at the end of a loop of one iteration is
+    /// mispredicted.
     single: Vec<Single>,
 }
 
@@ -54,7 +55,7 @@ struct Single {
 }
 
 impl Tensor {
-    /// Tabulates the integrals on a rule that is exact for them. Each count of bands is 1 to [`MAX_BANDS`].
+    /// Computes the integrals with a rule that is exact for them. Each number of bands is 1 to [`MAX_BANDS`].
     pub fn new(a_bands: usize, b_bands: usize, c_bands: usize) -> Self {
         let bands = [a_bands, b_bands, c_bands];
         assert!(bands.iter().all(|b| (1..=MAX_BANDS).contains(b)), "bands must be 1 to {MAX_BANDS}, not {bands:?}");
@@ -140,7 +141,7 @@ impl Tensor {
     }
 }
 
-/// Entries with `i <= j` by pair of factors; each stands for its mirror image as well.
+/// Groups the entries with `i <= j` by pair of factors; each also stands for its mirror image.
 fn pair_up(entries: &[Entry]) -> (Vec<Pair>, Vec<(u8, f64)>) {
     let (mut pairs, mut targets) = (Vec::new(), Vec::new());
     for run in entries.chunk_by(|x, y| (x.i, x.j) == (y.i, y.j)).filter(|run| run[0].i <= run[0].j) {

@@ -1,7 +1,7 @@
 //! The SH product as straight-line code, in several [`Style`]s that compute the same numbers.
 //!
 //! "pairs" forms `p_ij = a_i b_j + a_j b_i` once for every unordered pair, then `c_k += G_ijk p_ij`; products with coefficient
-//! 0 are a scaling by Y00, which is done once on `a_0` and `b_0`. "factored" also forms `p + ratio q` once where several `c_k`
+//! 0 scale by Y00, which is applied once to `a_0` and `b_0`. "factored" also forms `p + ratio q` once where several `c_k`
 //! contain two pairs in the same proportion (the linear half of the greedy factoring of reference 3 of [`crate::sh`]).
 //! "matrix" forms the elements `q_ik = sum_j G_ijk b_j` of the symmetric matrix of multiplication by b, and `c_k += q_ik a_i`,
 //! `c_i += q_ik a_k`: the only one here for a second factor of more or fewer bands. "points" is in [`super::points`].
@@ -29,7 +29,7 @@ pub enum Style {
     Points,
 }
 
-/// Every style; shaders know them by their places here.
+/// Every style; shaders identify a style by its index here.
 pub const STYLES: [Style; 4] = [Style::Factored, Style::Pairs, Style::Matrix, Style::Points];
 
 impl Style {
@@ -73,7 +73,7 @@ impl Linear {
         Self { columns, rows }
     }
 
-    /// Introduces the sum that the most rows share, until none is shared by two: each saves one operation a further row.
+    /// Introduces the sum that the most rows share, until no sum is shared by two rows. Each saves one operation per further row.
     fn factor(&mut self) {
         while let Some((first, second, ratio, users)) = self.most_shared() {
             let sum = self.columns.len();
@@ -86,13 +86,13 @@ impl Linear {
         }
     }
 
-    /// (first, second, ratio, rows): ties go to the smallest columns, so that the text is the same in every run.
+    /// Returns (first, second, ratio, rows). Ties go to the smallest columns, so that every run generates the same text.
     fn most_shared(&self) -> Option<(usize, usize, f64, Vec<usize>)> {
         let mut shared: BTreeMap<(usize, usize, i64), (f64, Vec<usize>)> = BTreeMap::new();
         for (k, row) in self.rows.iter().enumerate() {
             for (&first, x) in row {
                 for (&second, y) in row.range(first + 1..) {
-                    // Ratios that are equal in exact arithmetic differ by rounding only, far under this step.
+                    // Ratios that are equal in exact arithmetic differ by rounding only, which is far below this step of 1e-9.
                     let key = (first, second, (y / x * 1e9).round() as i64);
                     shared.entry(key).or_insert_with(|| (y / x, Vec::new())).1.push(k);
                 }
@@ -104,13 +104,13 @@ impl Linear {
     }
 }
 
-/// Emits columns as soon as they can be formed, each followed by the rows that it goes to.
+/// Emits each column as soon as it can be computed, followed by the additions to its rows.
 struct Emitter<'a> {
     program: &'a mut Program,
     linear: &'a Linear,
     values: Vec<Option<Value>>,
     sums: &'a mut [Option<Value>],
-    /// 1 or -1: what the tensor's part is multiplied by.
+    /// Sign of the tensor's part of the result: 1 or -1.
     sign: f64,
 }
 
@@ -206,7 +206,7 @@ fn pair_sums(program: &mut Program, bands: usize, operation: ProductOperation, f
     sums
 }
 
-/// Y00 b_0, or 1 - Y00 b_0 where the product is subtracted: what coefficient 0 of b multiplies all of a by.
+/// The factor with which coefficient 0 of b scales all of a: Y00 b_0, or 1 - Y00 b_0 where the product is subtracted.
 fn scaled_first(program: &mut Program, b_0: Value, operation: ProductOperation) -> Value {
     match operation {
         ProductOperation::Product => program.define(vec![Term::new(Y00, &[b_0])]),
@@ -244,7 +244,7 @@ fn matrix_sums(
     sums
 }
 
-/// Arithmetic of one product of [`product_program`].
+/// Operation counts of one product of [`product_program`].
 pub fn product_cost(bands: usize, operation: ProductOperation) -> Cost {
     product_program(bands, operation).cost()
 }
@@ -252,7 +252,7 @@ pub fn product_cost(bands: usize, operation: ProductOperation) -> Cost {
 /// GLSL 460 text of two functions, N = bands^2:
 ///
 /// - `void sh_product(float a[N], float b[N], out float c[N])`: c = product(a, b);
-/// - [`glsl_subtract`]'s for two factors of as many bands.
+/// - the function of [`glsl_subtract`] for two factors with that number of bands.
 pub fn glsl_product(bands: usize) -> String {
     let count = coefficient_count(bands);
     let body = product_program(bands, ProductOperation::Product).glsl_body();

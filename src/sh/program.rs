@@ -1,7 +1,7 @@
 //! Straight-line programs: one list of instructions, run in f64 by the tests and printed as GLSL for the shaders.
 //!
-//! The generators of this module tree build a [`Program`]; that the text computes what the tests check is then a matter of
-//! two short functions here, not of every generator.
+//! All generators of these modules build a [`Program`]. Because the tests run the same list that the shaders' text is printed
+//! from, only two short functions here have to agree.
 
 use std::fmt::Write;
 
@@ -17,7 +17,7 @@ pub enum Value {
 /// `coefficient * factors[0] * factors[1] ...`; without factors, a constant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Term {
-    /// Made in f64, printed as the nearest f32.
+    /// Computed in f64 and printed as the nearest f32.
     pub coefficient: f64,
     /// At most three in practice.
     pub factors: Vec<Value>,
@@ -42,7 +42,7 @@ struct Instruction {
     terms: Vec<Term>,
 }
 
-/// How much arithmetic a program is.
+/// Operation counts of a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
     /// Multiplications.
@@ -63,7 +63,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// A program that reads the named GLSL expressions, each assumed cheap to repeat.
+    /// A program that reads the given GLSL expressions, which may be repeated in the text and so should be cheap.
     pub fn new(input_texts: Vec<String>) -> Self {
         Self { input_texts, ..Self::default() }
     }
@@ -85,7 +85,7 @@ impl Program {
         }
     }
 
-    /// Declares that `text` receives `value` once every instruction has run, so that it may alias an input.
+    /// Declares that the expression `text` receives `value` after the last instruction, so that it may alias an input.
     pub fn output(&mut self, text: String, value: Value) {
         self.outputs.push((text, value));
     }
@@ -110,7 +110,7 @@ impl Program {
         }
     }
 
-    /// The arithmetic, where a compiler contracts every `x * y + z` that the text spells.
+    /// Operation counts; `fma_count` assumes that the compiler contracts every `x * y + z` of the text.
     pub fn cost(&self) -> Cost {
         let mut cost = Cost::default();
         for Instruction { accumulate, terms, .. } in &self.instructions {
@@ -124,13 +124,13 @@ impl Program {
         cost
     }
 
-    /// The body of a GLSL function, a statement a line, indented by four spaces.
+    /// The body of a GLSL function, one statement per line, indented by four spaces.
     pub fn glsl_body(&self) -> String {
         let mut text = String::new();
         let mut defined = vec![false; self.variable_count];
         for Instruction { target, accumulate, terms } in &self.instructions {
             let kind = if std::mem::replace(&mut defined[*target], true) { "" } else { "float " };
-            // `v -= x` where all else would be `v += -x`.
+            // Print `v -= x` instead of `v += -x`.
             let subtract = *accumulate && terms.iter().all(|term| term.coefficient < 0.0);
             let assign = if subtract {
                 "-="

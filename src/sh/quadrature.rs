@@ -1,7 +1,7 @@
 //! Exact quadrature over the sphere: sums that equal integrals of polynomials up to a stated degree.
 //!
-//! A product of SH of bands l and l' is a polynomial of degree l + l' restricted to the sphere, so every table of this
-//! module tree (product tensor, rotation blocks) is a finite sum without a discretisation error.
+//! A product of SH of bands l and l' is a polynomial of degree l + l' on the sphere, so a finite sum gives every table of these
+//! modules (product tensor, rotation blocks) without discretisation error.
 
 use std::f64::consts::PI;
 
@@ -39,7 +39,7 @@ pub fn sphere_rule(degree: usize) -> Vec<(DVec3, f64)> {
     for (z, weight) in gauss_legendre(degree / 2 + 1) {
         let radius = (1.0 - z * z).sqrt();
         for k in 0..azimuth_count {
-            // Half a step of offset keeps the points off the coordinate planes, where SH vanish together.
+            // An offset of half a step keeps the points off the coordinate planes, where many SH vanish at once.
             let (sin, cos) = (2.0 * PI * (k as f64 + 0.5) / azimuth_count as f64).sin_cos();
             rule.push((DVec3::new(radius * cos, radius * sin, z), weight * 2.0 * PI / azimuth_count as f64));
         }
@@ -50,8 +50,8 @@ pub fn sphere_rule(degree: usize) -> Vec<(DVec3, f64)> {
 /// The 32-point rule, exact to degree 9: twelve icosahedron vertices of weight 4 pi * 25/840 and the twenty vertices of the
 /// dual dodecahedron, the directions of its face centres, of weight 4 pi * 27/840 (McLaren 1963, reference 5 of [`crate::sh`]).
 ///
-/// Points come in antipodal pairs: `rule[2 * k + 1].0 == -rule[2 * k].0`, so that a sum of an even function needs every
-/// second point only.
+/// Points come in antipodal pairs: `rule[2 * k + 1].0 == -rule[2 * k].0`, so a sum of an even function needs only
+/// every second point.
 pub fn icosahedral_rule() -> Vec<(DVec3, f64)> {
     let golden = (1.0 + 5.0_f64.sqrt()) / 2.0;
     let mut rule = Vec::with_capacity(32);

@@ -11,7 +11,7 @@ use super::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use super::program::{Program, Term, Value, elements};
 use super::quadrature::{icosahedral_rule, sphere_rule};
 
-/// Points of a rule with the basis there, multiplied by the weight: what no rotation changes.
+/// The basis at the points of a rule, multiplied by the weights. It is the same for all rotations.
 struct WeightedBasis {
     points: Vec<(DVec3, [f64; MAX_COEFFICIENTS])>,
 }
@@ -40,7 +40,7 @@ impl WeightedBasis {
     }
 }
 
-/// Matrix elements of a rotation of `bands` bands: 9 + 25 + ... ; 83 at 4 bands. The constant band needs none.
+/// Number of matrix elements of a rotation of `bands` bands: 9 + 25 + ..., 83 at 4 bands. The constant band needs none.
 pub const fn block_count(bands: usize) -> usize {
     bands * (4 * bands * bands - 1) / 3 - 1
 }
@@ -53,7 +53,7 @@ pub struct Rotation {
 }
 
 impl Rotation {
-    /// The rotation by `rotation`, a unit quaternion. `bands` is 1 to [`MAX_BANDS`]. Microseconds at 4 bands.
+    /// The rotation by `rotation`, a unit quaternion. `bands` is 1 to [`MAX_BANDS`].
     pub fn new(bands: usize, rotation: DQuat) -> Self {
         let mut blocks = vec![0.0; block_count(bands)];
         let matrix = DMat3::from_quat(rotation);
@@ -80,14 +80,14 @@ impl Rotation {
         self.bands
     }
 
-    /// The row-major blocks of bands 1, 2, ... one after the other: [`block_count`] numbers.
+    /// The row-major blocks of bands 1, 2, ... in this order: [`block_count`] numbers.
     pub fn blocks(&self) -> &[f64] {
         &self.blocks
     }
 
     /// Writes the coefficients of the rotated function f'(w) = f(Q^-1 w): what f shows at w, f' shows at Q w.
     ///
-    /// Slices must hold at least the bands' coefficients.
+    /// The slices must hold at least bands^2 coefficients.
     pub fn apply(&self, coefficients: &[f64], out: &mut [f64]) {
         out[0] = coefficients[0];
         let mut rest = self.blocks.as_slice();
@@ -115,9 +115,9 @@ pub fn turns(rotation: DQuat) -> [f64; 6] {
 
 /// The rotation as a program: inputs are the coefficients, then [`turns`].
 ///
-/// A turn about z mixes only the pair m, -m. A turn about y is one about z between two quarter turns about x, which are
-/// constant and sparse. Against the blocks of [`Rotation`] this is 128 multiply-adds instead of 83, for 6 numbers instead of 83: reads
-/// decide.
+/// A turn about z mixes only the pair m, -m. A turn about y is a turn about z between two quarter turns about x, which are
+/// constant and sparse. At 4 bands this takes 128 multiply-adds instead of the 83 of [`Rotation`]'s blocks, but a shader reads 6
+/// numbers per rotation instead of 83.
 pub fn rotate_program(bands: usize) -> Program {
     let count = coefficient_count(bands);
     let angles = ["alpha_beta.x", "alpha_beta.y", "alpha_beta.z", "alpha_beta.w", "gamma.x", "gamma.y"];
@@ -154,7 +154,7 @@ fn turn_about_z(program: &mut Program, bands: usize, [cosine, sine]: [Value; 2],
     }
 }
 
-/// Appends a rotation that is known beforehand; elements that are 0 in exact arithmetic are left out.
+/// Appends a constant rotation; elements that are 0 in exact arithmetic are left out.
 fn turn_fixed(program: &mut Program, rotation: &Rotation, values: &mut [Value]) {
     let mut rest = rotation.blocks();
     for l in 1..rotation.bands() {
@@ -165,7 +165,7 @@ fn turn_fixed(program: &mut Program, rotation: &Rotation, values: &mut [Value]) 
             let kept = row.iter().zip(&before).filter(|(element, _)| element.abs() > 1e-9);
             let exact = |element: f64| if (element.abs() - 1.0).abs() < 1e-9 { element.round() } else { element };
             let terms: Vec<Term> = kept.map(|(&element, &from)| Term::new(exact(element), &[from])).collect();
-            // A lone element of 1 only changes the place.
+            // A row with a single element of 1 only moves a coefficient.
             *value = match &terms[..] {
                 [Term { coefficient: 1.0, factors }] => factors[0],
                 _ => program.define(terms),

@@ -9,12 +9,12 @@ use crate::scene::Placement;
 use serde::Serialize;
 use std::path::Path;
 
-/// What an error picture shows.
+/// Metadata of an error picture.
 #[derive(Clone, Debug, Serialize)]
 pub struct ErrorPicture {
-    /// File.
+    /// Path of the picture.
     pub picture: String,
-    /// Which error has which colour.
+    /// Mapping from errors to colours.
     pub scale: ColorScale,
     /// Root mean square over all lit vertices, relative to that of the reference.
     pub rms: f64,
@@ -22,20 +22,20 @@ pub struct ErrorPicture {
     pub reference_error: f64,
 }
 
-/// How far the vertices of a frame are from a reference.
+/// Errors of the lit vertices of a frame against a reference.
 #[derive(Clone, Debug)]
 pub struct ErrorMap {
-    /// By entity, a number a vertex in units of `unit`: the mean over channels of what is too much, or, for
+    /// By entity, one error per vertex in units of `unit`: the mean over channels of the signed difference, or, for
     /// [`Scheme::Absolute`], the root mean square over channels.
     pub errors: Vec<(usize, Vec<f64>)>,
-    /// What the numbers tell.
+    /// Signed or absolute errors.
     pub scheme: Scheme,
     /// Root mean square of the reference over vertices and channels, linear radiance.
     pub unit: f64,
 }
 
 impl ErrorMap {
-    /// Compares radiosity by entity (linear RGB a vertex) with a reference for the same entities, as [`super::picture`] gives it.
+    /// Compares radiosity by entity (linear RGB per vertex) with a reference for the same entities, such as [`super::picture`]'s.
     pub fn new(found: &[EntityRadiosity], reference: &[EntityRadiosity], scheme: Scheme) -> Self {
         let squares = || reference.iter().flat_map(|(_, v)| v.iter().flatten()).map(|c| f64::from(*c).powi(2));
         let unit = (squares().sum::<f64>() / squares().count().max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
@@ -59,7 +59,7 @@ impl ErrorMap {
         (all().map(|e| e * e).sum::<f64>() / all().count().max(1) as f64).sqrt()
     }
 
-    /// What a picture of it shows, in words.
+    /// Title of a picture of these errors.
     pub fn title(&self, reference_error: f64) -> String {
         let what = match self.scheme {
             Scheme::Signed => "blue: too dark, red: too bright",
@@ -71,18 +71,18 @@ impl ErrorMap {
         )
     }
 
-    /// A scale that fits: see [`ColorScale::fitting`].
+    /// The colour scale that fits these errors: see [`ColorScale::fitting`].
     pub fn scale(&self) -> ColorScale {
         ColorScale::fitting(self.scheme, self.errors.iter().flat_map(|(_, errors)| errors.iter().copied()))
     }
 
-    /// Colours a vertex, by entity, as [`Frame::set_radiosity`] takes them.
+    /// A colour per vertex by entity, for [`Frame::set_radiosity`].
     pub fn colors(&self, scale: &ColorScale) -> Vec<EntityRadiosity> {
         self.errors.iter().map(|(entity, errors)| (*entity, errors.iter().map(|e| scale.color(*e)).collect())).collect()
     }
 
-    /// Draws a frame in the errors' colours; what is not lit is grey, and nothing shines. The frame's radiosity is replaced until
-    /// the next merge.
+    /// Draws a frame in the errors' colours. Entities that are not lit are grey, and emission is not drawn. The frame's
+    /// radiosity is replaced until the next merge.
     ///
     /// # Errors
     /// As [`Frame::redraw`].
@@ -98,8 +98,8 @@ impl ErrorMap {
         Ok(())
     }
 
-    /// Draws it and writes the picture with its scale bar; `limit` instead of the fitting one, and the reference's own standard
-    /// error for the title. Returns what it shows.
+    /// Draws the errors and writes the picture with its scale bar. `limit` replaces the fitting limit of the scale; the title
+    /// states the reference's own standard error.
     ///
     /// # Errors
     /// As [`Frame::redraw`], and `Failed` when the file cannot be written.
@@ -121,7 +121,7 @@ impl ErrorMap {
     }
 }
 
-/// The radiosity that a frame holds, by receiving entity: what [`super::picture`] is compared with.
+/// Radiosity of a frame's vertices by receiving entity, to compare with [`super::picture`].
 ///
 /// # Errors
 /// `Device` when memory ran out.

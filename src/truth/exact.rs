@@ -1,5 +1,5 @@
-//! T1: the chain of the merge on exact factors: every occluder's visibility and every light's radiance as seen from the
-//! vertex itself, by ray casting, projected to SH and multiplied in f64.
+//! T1: the merge's chain of products on exact factors. Each occluder's visibility and each light's radiance is ray cast from
+//! the vertex itself, projected to SH, and multiplied in f64.
 
 use super::Vertex;
 use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
@@ -17,20 +17,21 @@ use std::f64::consts::PI;
 
 type Coefficients = [f64; MAX_COEFFICIENTS];
 
-/// How factors are projected.
+/// Parameters of the exact chain.
 #[derive(Clone, Copy, Debug)]
 pub struct ExactChain {
     /// SH bands of transfer, light and every product.
     pub bands: usize,
     /// SH bands of an occluder's visibility.
     pub visibility_bands: usize,
-    /// Rays a factor. Powers of two serve best.
+    /// Rays per factor. Powers of two are stratified best.
     pub rays: u32,
-    /// Decides the points.
+    /// Seed of the ray directions.
     pub seed: u64,
     /// How factors are multiplied.
     pub chain: Chain,
-    /// What the chain leaves out, by the merge's rules: where true visibility is zero the band-limited product is not.
+    /// Lookups that the chain skips, by the merge's rules. Skips matter because the band-limited product is not zero where the
+    /// true visibility is zero.
     pub skip: Skip,
 }
 
@@ -62,7 +63,7 @@ impl ExactChain {
             Cone::new(entity.centre, entity.radius_m, view.position)
         };
         let mut occluders = world.occluders(&view);
-        // The merge's order: ties of its f32 key go by index here too.
+        // As in the merge, ties of the f32 distance key are ordered by index.
         occluders.sort_by_key(|sight| (distance_key(centre(sight.entity), centre(vertex.entity)), sight.entity));
         let factors: Vec<(EntityView, f64, Coefficients, Option<Cap>)> = occluders
             .into_iter()
@@ -70,12 +71,12 @@ impl ExactChain {
                 let cone = cone(&occluder);
                 let share = cone.field_share(self.skip);
                 let blocked = self.blocked(world, &occluder, points(1 + occluder.entity));
-                // Of as much area as the blocked part says, and not a fit of it.
+                // Its area is that of the blocked part, not the fitted area that the merge uses.
                 let cap = (share < 1.0).then(|| cone.cap_of(blocked[0] / Y00).by(1.0 - share));
                 (occluder, cone.above_horizon(view.normal, self.skip), blocked.map(|b| b * share), cap)
             })
             .collect();
-        // The chain of the occluders, each as much as `share` says.
+        // The chain of the occluders, each weighted by `share`.
         let chain = |share: &dyn Fn(&EntityView) -> f64| {
             let mut state = multiplier.begin(&transfer[..count]);
             for (occluder, reach, blocked, cap) in &factors {

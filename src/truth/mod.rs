@@ -1,18 +1,18 @@
-//! What pictures are held against: the same scene lit by ray casting and by an exact band-limited chain.
+//! The truth that pictures are compared with: the same scene lit by ray casting and by an exact band-limited chain.
 //!
-//! The ladder, each rung with one approximation more than the one before:
+//! The rungs of the comparison, each with one more approximation than the previous one:
 //!
 //! | rung | what | where |
 //! |---|---|---|
-//! | T0 | rays against the moved meshes, full visibility | [`raycast`] |
+//! | T0 | rays against the placed meshes, full visibility | [`raycast`] |
 //! | T1 | exact visibility of every occluder projected to SH, exact chain of products | [`exact`] |
 //! | T2 | fields looked up, f64 | [`crate::merge::reference`] |
-//! | T3 | the device | [`crate::merge`] |
+//! | T3 | the merge on the device, f32 | [`crate::merge`] |
 //!
-//! T0 and T1 agree with the merge on who lights, blocks and receives: a light is preceded by the occluders whose bounding
-//! sphere's centre is nearer to the vertex than its own (ties by index); a receiver is no occluder of its own, but shadows
-//! itself if it is neither flat nor convex, seen from [`crate::bake::TRANSFER_OFFSET`] off its surface; a light that does
-//! not occlude is transparent, and none lights itself.
+//! T0 and T1 use the same rules as the merge for what emits, occludes and receives. An occluder precedes a light if its bounding
+//! sphere's centre is nearer to the vertex (ties by index). A receiver does not occlude itself through its field; if it is neither
+//! flat nor convex, its self-shadowing is judged from [`crate::bake::TRANSFER_OFFSET`] off its surface. A light that does not
+//! occlude is transparent, and no light lights itself.
 
 pub mod error_map;
 pub mod exact;
@@ -29,12 +29,12 @@ pub use world::World;
 
 use crate::scene::{Placement, Scene};
 
-/// A vertex that is lit: entity and index into its mesh.
+/// A lit vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Vertex {
-    /// Entity.
+    /// Index of the entity.
     pub entity: usize,
-    /// Vertex of its mesh.
+    /// Index of the vertex in the entity's mesh.
     pub index: usize,
 }
 
@@ -47,7 +47,7 @@ pub fn receiver_vertices(scene: &Scene) -> Vec<Vertex> {
     scene.entities.iter().enumerate().flat_map(of).collect()
 }
 
-/// `count` of them (or all, where there are fewer), chosen by `seed`, sorted.
+/// `count` lit vertices (or all, if there are fewer), chosen at random by `seed` and sorted.
 pub fn sample_vertices(scene: &Scene, count: usize, seed: u64) -> Vec<Vertex> {
     let mut all = receiver_vertices(scene);
     fastrand::Rng::with_seed(seed).shuffle(&mut all);

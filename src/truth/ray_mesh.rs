@@ -1,4 +1,4 @@
-//! Meshes as rays meet them, in units of the bounding radius from the sphere's centre.
+//! Meshes for ray casting, in units of the bounding radius from the bounding sphere's centre.
 
 use crate::asset::mesh::Mesh;
 use crate::bake::capture::unit_positions;
@@ -15,14 +15,14 @@ use obvhs::triangle::Triangle;
 use rayon::prelude::*;
 use std::time::Duration;
 
-/// One mesh with its hierarchy.
+/// One mesh with its bounding volume hierarchy.
 pub struct RayMesh {
     hierarchy: CwBvh,
     /// Triangles in the order of the hierarchy's leaves.
     triangles: Vec<Triangle>,
     /// Colours of their corners, where the mesh has any.
     colors: Option<Vec<[Vec3; 3]>>,
-    /// Cosine-free measure of the largest sphere around the centre that lies within a convex mesh; 0 for all others.
+    /// Radius (in bounding radii) of a sphere around the centre that lies within a convex mesh; 0 for all other meshes.
     pub inner_radius: f32,
     /// Whether it can shadow itself.
     pub self_shadowing: bool,
@@ -32,7 +32,7 @@ pub struct RayMesh {
 pub struct RayMeshes(pub Vec<RayMesh>);
 
 impl RayMeshes {
-    /// Builds every hierarchy; milliseconds a mesh.
+    /// Builds every hierarchy, which takes milliseconds per mesh.
     pub fn new(scene: &Scene) -> Self {
         RayMeshes(scene.meshes.par_iter().map(|mesh| RayMesh::new(mesh)).collect())
     }
@@ -68,23 +68,23 @@ impl RayMesh {
         !self.hierarchy.ray_traverse_miss(ray, |ray, id| self.triangles[id].intersect_embree(ray))
     }
 
-    /// How far along a ray it first meets the mesh.
+    /// Distance along a ray to its first intersection with the mesh.
     pub fn first_hit(&self, origin: Vec3A, direction: Vec3A) -> Option<f32> {
         self.nearest(origin, direction).map(|hit| hit.t)
     }
 
     fn nearest(&self, origin: Vec3A, direction: Vec3A) -> Option<RayHit> {
         let (ray, mut hit) = (Ray::new_inf(origin, direction), RayHit::none());
-        // Not `intersect_embree`, whose distance is in a unit of the triangle's own: good for yes or no only.
+        // `intersect_embree` is no alternative: its distance has a scale that depends on the triangle.
         self.hierarchy.ray_traverse(ray, &mut hit, |ray, id| self.triangles[id].intersect(ray)).then_some(hit)
     }
 
-    /// Whether its emission is the same all over.
+    /// Whether its emission is constant over the surface.
     pub fn is_plain(&self) -> bool {
         self.colors.is_none()
     }
 
-    /// Emission pattern where a ray first meets the mesh: white without colours; `None` where it misses.
+    /// Emission pattern at a ray's first intersection: 1 for a mesh without colours, `None` if the ray misses.
     pub fn emission(&self, origin: Vec3A, direction: Vec3A) -> Option<Vec3> {
         let Some(colors) = &self.colors else {
             return self.blocks(origin, direction).then_some(Vec3::ONE);

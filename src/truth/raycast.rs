@@ -1,8 +1,8 @@
-//! T0: radiosity by ray casting, and what a user would pick instead of shadow fields.
+//! T0: radiosity by ray casting, which is also the alternative to shadow fields in benchmarks.
 //!
 //! The distant light is sampled in proportion to the cosine, local lights uniformly in the cone around their bounding
-//! sphere. Sums are in f64, rays in f32 (in units of each occluder's radius, so that scales do not matter). A vertex's
-//! points are scrambled by itself; several runs tell the standard error.
+//! sphere. Sums are in f64, rays in f32 (in units of each occluder's radius, so that scales do not matter). Each
+//! vertex has its own scrambling; several runs give the standard error.
 
 use super::Vertex;
 use super::sequence::{COSINE_INTEGRAL, Sequence, cone_solid_angle};
@@ -13,27 +13,28 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// Which distant light is integrated.
+/// The form in which the distant light is integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Distant {
-    /// As it was described.
+    /// The radiance that the scene describes.
     Exact,
-    /// Its projection to that many bands: for a light that is defined by it.
+    /// Its projection to that number of bands, for a light that is defined by its projection.
     Bands(usize),
 }
 
-/// How many rays are cast.
+/// Parameters of ray casting.
 #[derive(Clone, Copy, Debug)]
 pub struct RayCast {
-    /// Rays a vertex for the distant light, and again for every local light; at least `runs`. Powers of two serve best.
+    /// Rays per vertex for the distant light, and the same number for every local light; at least `runs`. Powers of two are
+    /// stratified best.
     pub rays: u32,
-    /// Independent runs that the rays are split into, at least 1; the standard error needs 2.
+    /// Number of independent runs that share the rays, at least 1; the standard error needs 2.
     pub runs: u32,
-    /// Decides the points.
+    /// Seed of the ray directions.
     pub seed: u64,
     /// Distant light.
     pub distant: Distant,
-    /// Whether anything blocks; if not, what is found is the unoccluded value.
+    /// Whether occluders block rays; if not, the result is the unoccluded value.
     pub shadows: bool,
 }
 
@@ -53,13 +54,13 @@ pub struct Estimate {
     pub error: [f64; 3],
 }
 
-/// Root mean square of the standard errors over that of the values.
+/// Root mean square of the standard errors, relative to that of the values.
 pub fn relative_error(estimates: &[Estimate]) -> f64 {
     let square = |of: &dyn Fn(&Estimate) -> [f64; 3]| estimates.iter().flat_map(of).map(|c| c * c).sum::<f64>();
     (square(&|e| e.error) / square(&|e| e.radiosity).max(f64::MIN_POSITIVE)).sqrt()
 }
 
-/// The distant light, ready for many directions.
+/// The distant light, prepared for evaluation in many directions.
 enum Radiance<'e> {
     None,
     Exact(&'e Environment),
@@ -98,7 +99,7 @@ impl RayCast {
         let view = world.view(vertex);
         let mut occluders = world.occluders(&view);
         occluders.retain(|occluder| occluder.rises_above(view.normal));
-        // Near ones first: they are the likeliest to end a ray.
+        // Near occluders come first, because they are the most likely to block a ray.
         occluders.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
         if !self.shadows {
             occluders.clear();

@@ -15,7 +15,7 @@ pub struct Sequence {
 }
 
 impl Sequence {
-    /// The sequence of a seed and of numbers that tell its uses apart.
+    /// The sequence for a seed and for keys that identify its use.
     pub fn new(seed: u64, keys: [u64; 3]) -> Self {
         let mixed = keys.into_iter().fold(mix(seed), |hash, key| mix(hash ^ mix(key)));
         Sequence { seeds: [mixed as u32, (mixed >> 32) as u32] }
@@ -49,8 +49,8 @@ fn second(mut index: u32) -> u32 {
     bits
 }
 
-/// Nested uniform scrambling of a binary fraction: a bit is flipped by a hash of the bits above it. On reversed bits the
-/// multiplications carry from each bit only to those it decides.
+/// Nested uniform scrambling of a binary fraction: a bit is flipped by a hash of the bits above it. On reversed bits,
+/// carries of a multiplication affect only the bits whose flips may depend on that bit.
 fn scramble(bits: u32, seed: u32) -> u32 {
     let mut x = bits.reverse_bits().wrapping_add(seed);
     x ^= x.wrapping_mul(0x6c50_b47c);

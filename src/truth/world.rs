@@ -1,4 +1,4 @@
-//! A scene at one moment, as rays and exact visibility see it.
+//! A scene at one moment, prepared for ray casting.
 
 use super::Vertex;
 use super::ray_mesh::{RayMesh, RayMeshes};
@@ -8,7 +8,7 @@ use crate::field::lattice::cap_height;
 use crate::scene::{Placement, Scene};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
-/// An entity at its place.
+/// An entity with its placement.
 pub struct PlacedEntity<'s> {
     /// Its mesh.
     pub mesh: &'s RayMesh,
@@ -23,7 +23,7 @@ pub struct PlacedEntity<'s> {
 
 /// A scene at one moment.
 pub struct World<'s> {
-    /// What does not move.
+    /// The scene without placements.
     pub scene: &'s Scene,
     /// Its entities, in order.
     pub entities: Vec<PlacedEntity<'s>>,
@@ -33,13 +33,13 @@ pub struct World<'s> {
     pub lights: Vec<usize>,
 }
 
-/// What a vertex sees of the world.
+/// A vertex from which the world is seen.
 pub struct VertexView {
-    /// Metres.
+    /// Position in metres.
     pub position: DVec3,
-    /// Unit.
+    /// Unit normal.
     pub normal: DVec3,
-    /// Where its own mesh's visibility is judged from, and that mesh; `None` where it cannot shadow itself.
+    /// Its own entity as seen from just off its surface; `None` if it cannot shadow itself.
     own: Option<EntityView>,
     entity: usize,
 }
@@ -47,11 +47,11 @@ pub struct VertexView {
 /// An entity as seen from a point: everything that all rays from there share.
 #[derive(Clone, Copy)]
 pub struct EntityView {
-    /// Entity.
+    /// Index of the entity.
     pub entity: usize,
     /// Distance of the sphere's centre, metres.
     pub distance_m: f64,
-    /// To the sphere's centre, in r.
+    /// Vector to the sphere's centre, in bounding radii.
     toward: Vec3A,
     beyond: f32,
     origin: Vec3A,
@@ -61,9 +61,9 @@ pub struct EntityView {
 /// The cone around an entity's bounding sphere.
 #[derive(Clone, Copy)]
 pub struct BoundingCone {
-    /// Around its axis.
+    /// Frame whose third axis is the cone's axis.
     pub axes: Axes,
-    /// 1 - cosine of its half angle; 2, all directions, from inside the sphere.
+    /// 1 - cosine of its half angle; 2 (all directions) from inside the sphere.
     pub height: f64,
 }
 
@@ -93,7 +93,7 @@ impl<'s> World<'s> {
         }
     }
 
-    /// The world from a vertex.
+    /// A vertex's view of the world.
     pub fn view(&self, vertex: Vertex) -> VertexView {
         let placed = &self.entities[vertex.entity];
         let mesh = &self.scene.meshes[self.scene.entities[vertex.entity].mesh];
@@ -113,7 +113,7 @@ impl<'s> World<'s> {
         }
     }
 
-    /// An entity from a point.
+    /// The entity as seen from a point.
     pub fn sight(&self, entity: usize, from: DVec3) -> EntityView {
         let placed = &self.entities[entity];
         let toward = (placed.centre - from) / placed.radius_m;
@@ -157,7 +157,7 @@ impl<'s> World<'s> {
         })
     }
 
-    /// Radiance of an entity's emission along a ray, without its factor; `None` where the ray misses.
+    /// Emission pattern of an entity along a ray, without the entity's emission factor; `None` if the ray misses.
     pub fn emission(&self, sight: &EntityView, direction: DVec3) -> Option<DVec3> {
         let direction = direction.as_vec3a();
         if !sight.meets_sphere(direction) {
@@ -179,12 +179,12 @@ impl VertexView {
 }
 
 impl EntityView {
-    /// Whether this occluder precedes a light: the merge's order.
+    /// Whether this occluder precedes a light in the merge's order.
     pub fn precedes(&self, light: &EntityView) -> bool {
         (self.distance_m, self.entity) < (light.distance_m, light.entity)
     }
 
-    /// Whether any of the bounding sphere lies above the plane through the point.
+    /// Whether a part of the bounding sphere lies above the plane through the point with this normal.
     pub fn rises_above(&self, normal: DVec3) -> bool {
         self.toward.as_dvec3().dot(normal) > -1.0
     }
@@ -214,7 +214,7 @@ impl EntityView {
         self.beyond <= 0.0 || (along > 0.0 && along * along >= self.beyond)
     }
 
-    /// Whether a ray meets a sphere of that radius (in r) around the centre, and so a convex mesh around it.
+    /// Whether a ray meets a sphere of that radius (in bounding radii) around the centre, and so the convex mesh around it.
     fn meets_inner(&self, direction: Vec3A, radius: f32) -> bool {
         let along = self.toward.dot(direction);
         let beyond = self.beyond + 1.0 - radius * radius;

@@ -1,4 +1,4 @@
-//! The editor's changes of the scene: every one can be undone.
+//! The editor's changes of the scene, all of which can be undone.
 
 use super::command::{Changed, Command, Effect, Step};
 use super::edit;
@@ -8,15 +8,15 @@ use crate::asset::environment::EnvironmentData;
 use crate::scene::EntityData;
 use glam::{DQuat, DVec3, Vec3};
 
-/// Angle of a step that turns an entity or the sky.
+/// Angle in degrees of a step that turns an entity or the sky.
 pub const TURN_STEP_DEG: f64 = 5.0;
-/// Factor of a step that makes larger.
+/// Scale factor of a step that enlarges.
 pub const SCALE_STEP: f64 = 1.05;
-/// Length of a step, as a share of the distance from eye to target: the same way in the picture at any scale.
+/// Length of a step, as a share of the distance from eye to target, so that steps look the same in scenes of any size.
 pub const MOVE_STEP: f64 = 0.02;
 
 impl Editor {
-    /// Does a command that changes the scene.
+    /// Executes a command that changes the scene.
     pub(super) fn change(&mut self, command: Command) -> Effect {
         self.drag = None;
         match command {
@@ -59,7 +59,10 @@ impl Editor {
         let entities: Vec<usize> = self.affected_of(self.selection).collect();
         let after: Option<Vec<EntityData>> = entities.iter().map(|i| change(&self.scene.data.entities[*i])).collect();
         let Some(after) = after else {
-            return Effect { message: Some("no further: that is the limit of a scene".into()), ..Effect::default() };
+            return Effect {
+                message: Some("this step would leave the range of a scene file".into()),
+                ..Effect::default()
+            };
         };
         self.note_entities(EditKind::Step(step), repeat, &entities);
         for (index, data) in entities.into_iter().zip(after) {
@@ -87,8 +90,8 @@ impl Editor {
         Changed { emission: true, roles: true, ..Changed::default() }.into()
     }
 
-    /// Emission that lights a surface as far away as the scene is large about as brightly as white shows, in the entity's
-    /// colour: a Lambert sphere of radius r gives pi L (r / d)^2.
+    /// Emission in the entity's colour that lights a white surface at the distance of the scene's size to a radiance of about 1:
+    /// a Lambertian sphere of radius r gives the irradiance pi L (r / d)^2 at distance d.
     fn fitting_emission(&self, index: usize) -> Vec3 {
         let (_, radius_m) = self.sphere(index, &self.placements()[index]);
         let (_, distance_m) = self.bounds();
@@ -98,14 +101,14 @@ impl Editor {
         hue / hue.max_element() * (needed.clamp(1.0, 1e4) as f32)
     }
 
-    /// Emission that [`Command::SetLight`] changes: the largest channel's stops over the lights concerned; `None` without any.
+    /// Emission that [`Command::SetLight`] changes, in stops: the largest channel of the lights concerned; `None` if there are none.
     pub fn light_ev(&self) -> Option<f32> {
         let lights = self.lights();
         let largest = lights.iter().map(|i| self.scene.entities[*i].emission.max_element()).fold(0.0, f32::max);
         (largest > 0.0).then(|| largest.log2())
     }
 
-    /// The selected entity if it emits; all that do when nothing is selected.
+    /// The selected entity if it emits; all emitting entities if nothing is selected.
     fn lights(&self) -> Vec<usize> {
         let concerned = |i: &usize| self.scene.entities[*i].emits && self.selection.is_none_or(|s| s == *i);
         (0..self.scene.entities.len()).filter(concerned).collect()
@@ -172,7 +175,7 @@ impl Editor {
             }
             if let Some(source) = snapshot.environment {
                 back.environment = Some(scene.data.environment.clone());
-                // It was in place before, with the same picture.
+                // The scene had this environment before, with the same picture.
                 changed.sky = scene.set_environment(&source).is_ok();
             }
             if let Some(ev) = snapshot.exposure_ev {

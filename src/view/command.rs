@@ -1,7 +1,7 @@
-//! What a user can ask for, and what follows from it.
+//! Commands of the user and their effects.
 
-/// A step of an entity, or of all that cast shadows or shine when nothing is selected. Left, right, back and forth are the
-/// camera's, in the ground plane; up and down are the world's.
+/// A step of the selected entity, or of all entities that occlude or emit if none is selected. Left, right, back and forth are
+/// relative to the camera, in the ground plane; up and down are the world's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Step {
     /// To the left of the picture.
@@ -26,46 +26,45 @@ pub enum Step {
     TurnRight,
 }
 
-/// Something to do. Places in the picture and ways across it are in its pixels, x to the right, y down, as
-/// [`Command::Resize`] last said how large it is.
+/// A command. Positions and distances in the picture are in pixels, x to the right, y down; [`Command::Resize`] sets its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// The picture has another size; sides of 0 (a minimised window) are ignored.
+    /// Sets the picture's width and height; sides of 0 (a minimised window) are ignored.
     Resize([u32; 2]),
-    /// The camera turns around its target by a drag of that many pixels.
+    /// Turns the camera around its target by a drag in pixels.
     Orbit([f32; 2]),
-    /// The target moves by a drag of that many pixels.
+    /// Moves the camera's target by a drag in pixels.
     Pan([f32; 2]),
-    /// The camera comes nearer by that many notches of a wheel; negative goes farther.
+    /// Moves the camera nearer by notches of the wheel; negative moves it away.
     Zoom(f32),
-    /// The whole scene into the picture.
+    /// Shows the whole scene.
     Home,
-    /// The next entity is selected.
+    /// Selects the next entity.
     SelectNext,
-    /// The previous entity is selected.
+    /// Selects the previous entity.
     SelectPrevious,
-    /// No entity is selected, which means all of them.
+    /// Selects no entity; steps then move all that occlude or emit.
     SelectNone,
-    /// What is seen at that place is selected; nothing where nothing is.
+    /// Selects the entity that is seen at a position, or none.
     Pick([f32; 2]),
-    /// One step; `repeat` where a held key says it again, so that one undo takes all of them back.
+    /// Makes one step. `repeat` says that a held key repeats it, so that one undo reverts all of these steps.
     Step {
-        /// Which way.
+        /// Kind of step.
         step: Step,
-        /// Whether it continues the step before.
+        /// Whether it continues the previous step.
         repeat: bool,
     },
-    /// The selected entity is grabbed at that place, if it is seen there (see [`Editor::grabs`](super::Editor::grabs)).
+    /// Grabs the selected entity at a position, if it is seen there (see [`Editor::grabs`](super::Editor::grabs)).
     DragStart([f32; 2]),
-    /// What was grabbed follows to that place in the ground plane.
+    /// Moves the grabbed entity in the ground plane to a position.
     DragTo([f32; 2]),
-    /// It is let go: one undo takes the whole drag back.
+    /// Releases it; one undo reverts the whole drag.
     DragEnd,
-    /// An occluder becomes a light, a light an occluder.
+    /// Turns an occluder into a light or a light into an occluder.
     ToggleLight,
-    /// Takes the last change of the scene back; where there is none, the loading of this scene over a changed one.
+    /// Reverts the last change of the scene; if there is none, returns to the changed scene that this one replaced.
     Undo,
-    /// Does again what was taken back.
+    /// Repeats the change that was undone last.
     Redo,
     /// Loads the next built-in scene.
     NextScene,
@@ -77,23 +76,23 @@ pub enum Command {
     ToggleError,
     /// Shows the overlay.
     ToggleOverlay,
-    /// Turns the distant light about +y by an angle, degrees; `repeat` as for steps.
+    /// Turns the distant light about +y.
     TurnSky {
-        /// Counter-clockwise seen from above.
+        /// Angle in degrees, counter-clockwise seen from above.
         by_deg: f32,
-        /// Whether it continues the turn before.
+        /// Whether it continues the previous turn.
         repeat: bool,
     },
     /// Slider: angle of the distant light, degrees.
     SetSkyTurn(f32),
-    /// Slider: strength of the distant light; 1 is as the scene has it.
+    /// Slider: strength of the distant light.
     SetSky(f32),
-    /// Slider: emission of the selected light, or of the brightest when none is selected and of all others in proportion, in
-    /// stops: 2^value is its largest channel, W m^-2 sr^-1.
+    /// Slider: emission in stops; 2^value is the largest channel in W m^-2 sr^-1. It concerns the selected light; if none is
+    /// selected, the brightest light, and all others change in proportion.
     SetLight(f32),
     /// Slider: exposure in stops.
     SetExposure(f32),
-    /// A slider is let go: one undo takes all of its movement back.
+    /// Ends the movement of a slider, so that one undo reverts all of it.
     EndSlide,
     /// Merge variant by name (see [`crate::merge::variant::VARIANTS`]); `None` is the device's fastest.
     SetVariant(Option<&'static str>),
@@ -105,38 +104,38 @@ pub enum Command {
     Quit,
 }
 
-/// What a command changed, for whoever shows it. All may be true at once, as after an undo.
+/// What a command changed, so that the viewer knows what to update. Several may be true, as after an undo.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Changed {
-    /// Another scene: everything is to be built again.
+    /// Another scene: rebuild everything.
     pub scene: bool,
     /// Eye, target or size of the picture: draw again.
     pub camera: bool,
-    /// Places of entities: merge again.
+    /// Placements of entities: merge again.
     pub placements: bool,
     /// Emission of entities: merge again.
     pub emission: bool,
-    /// Who emits and who occludes: fields may be missing ([`Editor::needs`](super::Editor::needs)), merge again.
+    /// Switches of entities: merge again, after a bake if fields are missing ([`Editor::needs`](super::Editor::needs)).
     pub roles: bool,
-    /// The distant light: its coefficients, the background, merge again.
+    /// The distant light: update its coefficients and the background, merge again.
     pub sky: bool,
     /// Exposure: draw again.
     pub exposure: bool,
     /// Selection: draw again.
     pub selection: bool,
-    /// Overlay, reference, error, running: draw again.
+    /// Overlay, reference, error or running: draw again.
     pub display: bool,
-    /// Merge variant.
+    /// Merge variant: merge again.
     pub variant: bool,
 }
 
 impl Changed {
-    /// Whether the light on vertices is no longer what was merged.
+    /// Whether the merged radiosity is out of date.
     pub fn light(&self) -> bool {
         self.scene || self.placements || self.emission || self.roles || self.sky
     }
 
-    /// Whether anything is.
+    /// Whether anything changed.
     pub fn any(&self) -> bool {
         *self != Changed::default()
     }
@@ -157,25 +156,25 @@ impl std::ops::BitOrAssign for Changed {
     }
 }
 
-/// What only the window can do.
+/// A request that only the window can fulfil.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Write the picture as PNG and EXR.
     Screenshot,
     /// Call [`Editor::save`](super::Editor::save).
     Save,
-    /// Close.
+    /// Close the window.
     Quit,
 }
 
-/// What follows from a command.
+/// The effect of a command.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Effect {
     /// What changed.
     pub changed: Changed,
-    /// What is to be done besides.
+    /// What else the window must do.
     pub request: Option<Request>,
-    /// One line for the user: why nothing happened, or what did that cannot be seen.
+    /// One line for the user, if nothing happened or the effect is not visible.
     pub message: Option<String>,
 }
 

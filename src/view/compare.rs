@@ -1,4 +1,4 @@
-//! The viewer's reference and error: rays in the background, and what they say about the merge.
+//! The viewer's ray-cast reference, which a background task computes, and the error of the merge against it.
 
 use super::command::Changed;
 use super::panel;
@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::truth::error_map::{self, ErrorMap};
 
 impl Viewer {
-    /// Starts rays where they are wanted, takes in what they found, and compares.
+    /// Starts casting rays if they are wanted, receives results, and compares.
     pub(super) fn look_at_rays(&mut self) -> Result<()> {
         let wanted = self.editor.shows_reference() || self.editor.shows_error();
         if !wanted || self.frame.is_none() {
@@ -27,7 +27,7 @@ impl Viewer {
             self.tolerate(Err::<(), _>(error)).map(|_| ())?;
         }
         let current = self.reference.as_ref().is_some_and(|r| r.version == self.version);
-        // Rays for a state that is gone end after their first round, so that something is seen while things move.
+        // Rays for an outdated state end after their first round, so that a coarse reference is visible while entities move.
         let known = self.reference.as_ref().map(|r| r.version);
         let stale = self.rays_version != self.version && known == Some(self.rays_version);
         if (self.rays.is_none() && !current)
@@ -44,11 +44,11 @@ impl Viewer {
         Ok(())
     }
 
-    /// Colours of the error of what was merged last, where they are not known yet.
+    /// Computes the error's colours for the last merge, unless they are known.
     pub(super) fn compare(&mut self) -> Result<()> {
         let (Some(frame), Some(reference)) = (&mut self.frame, &self.reference) else { return Ok(()) };
         if frame.stale_count() > 0 {
-            // The next frame lights what none has shown.
+            // Some clusters are out of date; the next frame merges them.
             return Ok(());
         }
         if self

@@ -1,11 +1,11 @@
-//! Changes of one entity that hold at all times: the whole of its motion is moved, turned or scaled along.
+//! Changes of one entity at all times: its whole motion is moved, turned or scaled with it.
 
 use crate::scene::data::EntityData;
 use crate::scene::motion::{Motion, RotationData};
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
 use glam::{DQuat, DVec3, Vec3};
 
-/// The entity `by` metres further at all times; `None` where that leaves the range of a scene file.
+/// The entity moved by `by` metres at all times; `None` if that leaves the range of a scene file.
 pub fn moved(entity: &EntityData, by: DVec3) -> Option<EntityData> {
     let mut out = entity.clone();
     let shift = |p: &mut Vec3| {
@@ -25,7 +25,7 @@ pub fn moved(entity: &EntityData, by: DVec3) -> Option<EntityData> {
     fits.then_some(out)
 }
 
-/// The entity larger by a factor at all times; `None` where that leaves the range of a scene file.
+/// The entity scaled by a factor at all times; `None` if that leaves the range of a scene file.
 pub fn scaled(entity: &EntityData, by: f64) -> Option<EntityData> {
     let mut out = entity.clone();
     let grow = |s: &mut f32| {
@@ -41,8 +41,8 @@ pub fn scaled(entity: &EntityData, by: f64) -> Option<EntityData> {
     fits.then_some(out)
 }
 
-/// The entity turned by a world rotation about its own origin at all times: axes that it spins about turn along, its path
-/// does not.
+/// The entity turned by a world rotation about its own origin at all times. The axes of its spins turn with it; its path does
+/// not.
 pub fn turned(entity: &EntityData, by: DQuat) -> EntityData {
     let mut out = entity.clone();
     let turn = |r: &mut RotationData| *r = RotationData::Quaternion((by * r.unit()).normalize().as_quat().to_array());

@@ -1,4 +1,4 @@
-//! The state behind the window.
+//! The state of the editor behind the window.
 
 use super::command::{Changed, Command, Effect, Request};
 use super::history::History;
@@ -16,7 +16,7 @@ use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// Everything that `view` shows, and how it changes.
+/// The state that `view` shows and that commands change.
 pub struct Editor {
     pub(super) scene: Scene,
     path: PathBuf,
@@ -30,19 +30,19 @@ pub struct Editor {
     overlay: bool,
     variant: Option<&'static str>,
     pub(super) history: History,
-    /// Emission that an entity had before it stopped being a light.
+    /// Emission of each entity before it stopped being a light.
     pub(super) former_emission: Vec<Option<Vec3>>,
     pub(super) picker: Picker,
     pub(super) drag: Option<EntityDrag>,
-    /// Files that were written since the start, of any scene.
+    /// Files that were written since the start, for any scene.
     pub(super) saved: HashSet<PathBuf>,
-    /// The scene before this one, if it was changed.
+    /// The previous scene, if it was changed.
     former: Option<Box<Editor>>,
 }
 
 impl Editor {
-    /// The state in which a scene is first shown: as its file says, running, nothing selected. `path` is the scene's file. A scene
-    /// whose file says nothing of distant light gets a generated sky, which is saved with it.
+    /// The state in which a scene is first shown: running, with nothing selected. `path` is the scene's file. A scene without
+    /// distant light gets a generated sky, which is saved with it.
     pub fn new(mut scene: Scene, path: &Path) -> Self {
         if scene.data.environment.is_empty() {
             let source = EnvironmentData { sky: Some(Sky::default()), ..scene.data.environment.clone() };
@@ -71,22 +71,22 @@ impl Editor {
         }
     }
 
-    /// The scene as it is edited: entities' switches and emission, the distant light, the camera.
+    /// The edited scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// File that the scene came from.
+    /// File from which the scene was read.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// From where it is seen.
+    /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.scene.data.camera
     }
 
-    /// Where entities are now, in order.
+    /// Current placements of the entities, in order.
     pub fn placements(&self) -> Vec<Placement> {
         self.scene.at(self.time_s)
     }
@@ -96,7 +96,7 @@ impl Editor {
         self.size
     }
 
-    /// The selected entity; `None` means all.
+    /// The selected entity; `None` if none is selected.
     pub fn selection(&self) -> Option<usize> {
         self.selection
     }
@@ -106,7 +106,7 @@ impl Editor {
         self.time_s
     }
 
-    /// Whether time goes on.
+    /// Whether the motion runs.
     pub fn is_running(&self) -> bool {
         self.running
     }
@@ -126,7 +126,7 @@ impl Editor {
         self.overlay
     }
 
-    /// Merge variant that was chosen; `None` is the device's fastest.
+    /// The chosen merge variant; `None` is the device's fastest.
     pub fn variant(&self) -> Option<&'static str> {
         self.variant
     }
@@ -146,17 +146,17 @@ impl Editor {
         self.scene.data.environment.turn_deg
     }
 
-    /// How many changes Ctrl-Z can take back.
+    /// Number of changes that can be undone.
     pub fn undo_count(&self) -> usize {
         self.history.len()
     }
 
-    /// Fields that a mesh needs as its entities are: occlusion, radiance. What the frame's store lacks is to be baked.
+    /// Fields that a mesh needs for its entities' switches: occlusion, radiance.
     pub fn needs(&self, mesh: usize) -> [Option<quantity::FieldKind>; 2] {
         scene_buffers::needs(&self.scene, mesh, Skip::ALL)
     }
 
-    /// Lets time pass, if it runs. Where things are depends on the sum of all `dt_s` alone.
+    /// Advances the time by `dt_s` seconds if the motion runs. Placements depend only on the sum of all `dt_s`.
     pub fn advance(&mut self, dt_s: f64) -> Effect {
         if !(self.running && dt_s.is_finite() && dt_s > 0.0) {
             return Effect::default();
@@ -166,7 +166,7 @@ impl Editor {
         Changed { placements: moves, ..Changed::default() }.into()
     }
 
-    /// Does what a command says.
+    /// Executes a command.
     pub fn apply(&mut self, command: Command) -> Effect {
         let unchanged = Changed::default();
         match command {
@@ -217,7 +217,7 @@ impl Editor {
         }
     }
 
-    /// Centre and radius of a sphere around what casts shadows or shines now, in metres; around everything where nothing does.
+    /// Centre and radius in metres of a sphere around all entities that occlude or emit; around all entities if none does.
     pub fn bounds(&self) -> (DVec3, f64) {
         let placements = self.placements();
         let spheres: Vec<(DVec3, f64)> = self.affected_of(None).map(|i| self.sphere(i, &placements[i])).collect();
@@ -239,7 +239,7 @@ impl Editor {
         (placement.position.as_dvec3() + rotation * (centre.as_dvec3() * scale), f64::from(radius_m) * scale)
     }
 
-    /// Entities that a step concerns: the selected one; else all that occlude or emit, and where none does, all.
+    /// Entities that a step moves: the selected one; else all that occlude or emit; if none does, all.
     pub(super) fn affected_of(&self, selection: Option<usize>) -> impl Iterator<Item = usize> {
         let entities = &self.scene.entities;
         let acts = |i: &usize| entities[*i].occludes || entities[*i].emits;
@@ -287,7 +287,7 @@ impl Editor {
         match self.load_next() {
             Ok((scene, path)) => {
                 let former = self.replace(Editor::new(scene, &path));
-                // Z is near Ctrl-Z: changes are not lost to it.
+                // Z is easily pressed instead of Ctrl-Z, so the changed scene is kept.
                 self.former = (former.undo_count() > 0).then(|| Box::new(Editor { former: None, ..former }));
                 Changed { scene: true, ..Changed::default() }.into()
             }
@@ -295,7 +295,7 @@ impl Editor {
         }
     }
 
-    /// Takes the loading of another scene back, if the one before had been changed.
+    /// Returns to the previous scene, if that was changed.
     pub(super) fn return_to_former(&mut self) -> Option<Effect> {
         let former = self.former.take()?;
         self.replace(*former);
@@ -303,7 +303,7 @@ impl Editor {
         Some(Effect { changed: Changed { scene: true, ..Changed::default() }, message, request: None })
     }
 
-    /// Puts another scene in place; what belongs to the window stays. Returns what was there.
+    /// Replaces the scene and keeps the window's state. Returns the old editor.
     fn replace(&mut self, next: Editor) -> Editor {
         let next = Editor {
             size: self.size,
@@ -318,7 +318,7 @@ impl Editor {
         std::mem::replace(self, next)
     }
 
-    /// The built-in scene after this one; the first where this is none of them.
+    /// The next built-in scene; the first one if this is not a built-in scene.
     fn load_next(&self) -> Result<(Scene, PathBuf)> {
         let scenes = embedded::scenes();
         let now = self.path.file_stem().and_then(|stem| scenes.iter().position(|(name, _)| stem == *name));

@@ -1,4 +1,4 @@
-//! The viewer after a change: what is taken over at once, what is baked in the background first, what is rebuilt.
+//! Updates the viewer after a change: at once, after a background bake, or by a rebuild.
 
 use super::command::Changed;
 use super::task::{BackgroundTask, TaskWorker};
@@ -14,7 +14,7 @@ use crate::merge::variant::Variant;
 use crate::scene_buffers::Store;
 
 impl Viewer {
-    /// Brings the frame up to what the editor says.
+    /// Updates the frame to the editor's state.
     pub(super) fn follow(&mut self, changed: Changed) -> Result<()> {
         if !changed.any() {
             return Ok(());
@@ -52,7 +52,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Builds the frame if all of it is in the cache, else has it baked first.
+    /// Builds the frame if all its fields are cached, else starts a bake.
     pub(super) fn prepare(&mut self) -> Result<()> {
         self.bake = None;
         let (cache, bake) = (self.setup.cache.clone(), self.setup.frame.bake);

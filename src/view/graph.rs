@@ -1,4 +1,4 @@
-//! The graph of frame times by pass.
+//! Draws the graph of frame times by pass.
 
 use super::viewer::HISTORY;
 use crate::gpu::Timing;
@@ -13,7 +13,7 @@ const PASS_COLORS: [Color32; 4] = [
     Color32::from_rgb(200, 120, 200),
 ];
 
-/// Stacked times of the passes, newest at the right.
+/// Draws stacked times of the passes in milliseconds, the newest at the right.
 pub(super) fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
     let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), 64.0), Sense::hover());
     let area = response.rect;
@@ -27,7 +27,7 @@ pub(super) fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
     let order = ["merge", "draw", "show"];
     names.sort_by_key(|name| order.iter().position(|o| o == name).unwrap_or(order.len()));
     let total = |frame: &Vec<Timing>| frame.iter().map(|t| t.milliseconds).sum::<f64>();
-    // All but the slowest few: the first frame compiles shaders.
+    // The range leaves out the slowest few frames, because the first frame compiles shaders.
     let mut totals: Vec<f64> = timings.iter().map(total).collect();
     totals.sort_by(f64::total_cmp);
     let most = totals.get((totals.len() * 19 / 20).saturating_sub(1)).copied().unwrap_or(0.0);
@@ -45,7 +45,7 @@ pub(super) fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
         }
     }
     for (limit, text) in [(1000.0 / 60.0, "60/s"), (1000.0 / 30.0, "30/s")] {
-        // Apart enough to be read.
+        // Labels that would overlap are left out.
         if limit < top && limit > top / 5.0 {
             let y = area.bottom() - (limit / top) as f32 * area.height();
             painter.hline(area.x_range(), y, Stroke::new(1.0, Color32::from_white_alpha(70)));

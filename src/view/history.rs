@@ -1,14 +1,14 @@
-//! What can be undone: the parts of a scene as they were, bounded in number and size.
+//! Undo history: earlier states of changed parts of the scene, bounded in number and size.
 
 use crate::asset::environment::EnvironmentData;
 use crate::scene::data::EntityData;
 
-/// Most changes that are kept.
+/// Largest number of changes that are kept.
 pub const STEP_LIMIT: usize = 256;
-/// Most entities that all changes together keep: about 100 MB of the plainest.
+/// Largest number of entities that all changes together keep: at least 100 MB.
 pub const ENTITY_LIMIT: usize = 1 << 18;
 
-/// Parts of a scene at one moment. Only what a change touches is kept.
+/// The parts of a scene that a change concerns, at one moment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Snapshot {
     /// Entities by index.
@@ -19,14 +19,14 @@ pub struct Snapshot {
     pub exposure_ev: Option<f32>,
 }
 
-/// What kind of change a step is: the same kind in a row may be one step.
+/// Kind of a change. Consecutive changes of the same kind may be undone as one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EditKind {
     /// A key that moves, scales or turns.
     Step(super::Step),
     /// A drag.
     Drag,
-    /// Occluder to light or back.
+    /// Change between occluder and light.
     Role,
     /// A turn of the distant light by key.
     SkyTurn,
@@ -47,18 +47,18 @@ pub enum Slider {
     Exposure,
 }
 
-/// The changes made and those taken back.
+/// The changes that can be undone and redone.
 #[derive(Clone, Debug, Default)]
 pub struct History {
     done: Vec<Snapshot>,
     undone: Vec<Snapshot>,
-    /// Kind and selection of the last change, while more of the same joins it.
+    /// Kind and selection of the last change, while further changes of this kind may join it.
     open: Option<(EditKind, Option<usize>)>,
 }
 
 impl History {
-    /// Notes that a change of `kind` follows; `before` makes what it touches as it is now. Where `joins` and the last change
-    /// was of the same kind to the same selection, it becomes part of that.
+    /// Notes that a change of `kind` follows; `before` makes a snapshot of what it will change. If `joins`, and the last change
+    /// had the same kind and selection, the change becomes part of the last one.
     pub fn note(&mut self, kind: EditKind, selection: Option<usize>, joins: bool, before: impl FnOnce() -> Snapshot) {
         if joins && self.open == Some((kind, selection)) {
             return;
@@ -72,12 +72,12 @@ impl History {
         }
     }
 
-    /// What follows is a change of its own.
+    /// Ends the last change, so that no further change joins it.
     pub fn close(&mut self) {
         self.open = None;
     }
 
-    /// Takes the last change back: `swap` puts a snapshot in place and returns what stood there. Whether there was one.
+    /// Undoes the last change: `swap` restores a snapshot and returns the replaced state. Returns whether there was a change.
     pub fn undo(&mut self, swap: impl FnOnce(Snapshot) -> Snapshot) -> bool {
         self.open = None;
         let Some(snapshot) = self.done.pop() else { return false };
@@ -85,7 +85,7 @@ impl History {
         true
     }
 
-    /// Does again what was taken back last. Whether there was anything.
+    /// Redoes the change that was undone last. Returns whether there was one.
     pub fn redo(&mut self, swap: impl FnOnce(Snapshot) -> Snapshot) -> bool {
         self.open = None;
         let Some(snapshot) = self.undone.pop() else { return false };
@@ -93,12 +93,12 @@ impl History {
         true
     }
 
-    /// How many changes can be taken back.
+    /// Number of changes that can be undone.
     pub fn len(&self) -> usize {
         self.done.len()
     }
 
-    /// Whether nothing can be taken back.
+    /// Whether no change can be undone.
     pub fn is_empty(&self) -> bool {
         self.done.is_empty()
     }

@@ -1,15 +1,15 @@
-//! Keys and pointer to commands, whatever library they come from, and the help that lists them.
+//! Maps keys and pointer events to commands, independent of the window library, and lists them as help.
 
 use super::command::{Command, Step};
 use super::editor::Editor;
 use std::fmt::Write;
 
-/// Pointer travel in pixels of a 96 dpi screen below which a press is a click.
+/// A press is a click if the pointer moves less than this, in pixels of a 96 dpi screen.
 const CLICK_SLACK_PX: f32 = 4.0;
-/// Angle by which a key turns the distant light.
+/// Angle in degrees by which a key turns the distant light.
 const SKY_STEP_DEG: f32 = 5.0;
 
-/// A key, by what it types without Shift.
+/// A key, named by what it types without Shift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Key {
     /// A lower-case letter.
@@ -35,42 +35,42 @@ pub enum Button {
     Middle,
 }
 
-/// What a window hears. Places are in pixels of the window, x to the right, y down; the picture that is edited is at its left.
+/// An event of the window. Positions are in pixels of the window, x to the right, y down; the edited picture is at its left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// A key went down, or was said again because it is held.
+    /// A key was pressed, or repeats because it is held.
     Key {
-        /// Which.
+        /// The key.
         key: Key,
         /// Whether Ctrl is held.
         control: bool,
-        /// Whether it is held since an earlier event.
+        /// Whether the event repeats a held key.
         repeat: bool,
     },
-    /// A button went down.
+    /// A button was pressed at a position.
     Press(Button, [f32; 2]),
-    /// The pointer is there now.
+    /// The pointer moved to a position.
     Move([f32; 2]),
-    /// A button went up.
+    /// A button was released.
     Release(Button),
     /// Notches of the wheel, positive away from the user.
     Wheel(f32),
-    /// The window lost the pointer or the keyboard: whatever was held is let go.
+    /// The window lost the pointer or the keyboard, so everything held is released.
     Lost,
 }
 
-/// One line of the help, and what stands behind it.
+/// One line of the help with its key bindings.
 pub struct KeyHelp {
-    /// Keys as they are shown.
+    /// Names of the keys in the help.
     pub keys: &'static str,
-    /// What they do.
+    /// Description of what they do.
     pub what: &'static str,
-    /// The keys, whether with Ctrl, and their command. Empty for the pointer's rows.
+    /// Each key, whether with Ctrl, and its command. Empty for lines about the pointer.
     bindings: &'static [(Key, bool, Command)],
 }
 
 impl KeyHelp {
-    /// What its keys ask for.
+    /// The commands of its keys.
     pub fn commands(&self) -> Vec<Command> {
         self.bindings.iter().map(|(.., command)| *command).collect()
     }
@@ -135,7 +135,7 @@ pub const CONTROLS: &[KeyHelp] = &[
     row("Ctrl-Q", "close", &[(Key::Letter('q'), true, Command::Quit)]),
 ];
 
-/// The controls as text, a line each, for `--help` and README.
+/// The controls as text, one line each, for `--help` and README.
 pub fn help() -> String {
     let width = CONTROLS.iter().map(|row| row.keys.len()).max().unwrap_or(0);
     CONTROLS.iter().fold(String::new(), |mut text, row| {
@@ -144,7 +144,7 @@ pub fn help() -> String {
     })
 }
 
-/// What a held button does.
+/// What dragging with a held button does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Held {
     Turn,
@@ -159,9 +159,9 @@ struct PointerDrag {
     held: Held,
     start: [f32; 2],
     last: [f32; 2],
-    /// Left edge of the part of the window that it began in.
+    /// Left edge of the half of the window in which the press began.
     left: f32,
-    /// Whether it went farther than a click does.
+    /// Whether it moved farther than a click may.
     moved: bool,
 }
 
@@ -173,23 +173,23 @@ pub struct Input {
 }
 
 impl Input {
-    /// Nothing held. `scale` is the screen's pixels per pixel of a 96 dpi screen.
+    /// Input with nothing held. `scale` is the number of screen pixels per pixel of a 96 dpi screen.
     pub fn new(scale: f32) -> Self {
         Input { drag: None, scale: if scale.is_finite() { scale.max(0.1) } else { 1.0 } }
     }
 
-    /// Whether the pointer holds something: events are the scene's then, even over the overlay.
+    /// Whether the pointer drags something. Events then belong to the scene, even over the overlay.
     pub fn is_dragging(&self) -> bool {
         self.drag.is_some()
     }
 
-    /// What an event asks for, in order.
+    /// The commands of an event, in order.
     pub fn commands(&mut self, event: Event, editor: &Editor) -> Vec<Command> {
         match event {
             Event::Key { key, control, repeat } => of_key(key, control, repeat).into_iter().collect(),
             Event::Press(button, at) => {
                 let out = self.let_go();
-                // The reference beside the picture shows the same scene from the same eye: a place in it is that place.
+                // The reference beside the picture has the same camera, so positions in it are used as positions in the picture.
                 let width = editor.size()[0] as f32;
                 let left = if at[0] >= width { width } else { 0.0 };
                 let at = [at[0] - left, at[1]];
@@ -244,7 +244,7 @@ impl Input {
     }
 }
 
-/// The command of a key. Held keys repeat where that makes sense: steps, turns, undo and the walk through entities.
+/// The command of a key. Held keys repeat steps, turns, undo, redo and selection; other commands do not repeat.
 fn of_key(key: Key, control: bool, repeat: bool) -> Option<Command> {
     let mut bindings = CONTROLS.iter().flat_map(|row| row.bindings);
     let (.., command) = bindings.find(|(k, c, _)| (*k, *c) == (key, control))?;

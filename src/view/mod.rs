@@ -1,8 +1,8 @@
-//! What `shadow-fields view` shows and what can be done with it, without a window or a device: commands in, state out.
+//! The state and the drawing of `shadow-fields view`.
 //!
-//! [`Editor`] owns the scene, the camera and the clock. The window turns events into a [`Command`], hands it to
-//! [`Editor::apply`], and does what the returned [`Effect`] says: merge again, bake a field, write a picture. Everything here
-//! runs in tests without a display.
+//! [`Editor`] owns the scene, the camera and the clock, and needs no device. The window turns events into a [`Command`], passes
+//! it to [`Editor::apply`], and acts on the returned [`Effect`]: merge again, bake a field, write a picture. Tests run all of it
+//! without a display.
 
 mod change;
 pub mod command;

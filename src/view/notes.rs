@@ -1,4 +1,4 @@
-//! What is written over the picture besides the panels: names of its halves, messages, the scale of the error.
+//! Text over the picture besides the panels: labels of its halves, messages, the scale of the error.
 
 use super::Editor;
 use super::panel::{ERROR, MARGIN, Status, WARNING, grouped};
@@ -6,7 +6,7 @@ use crate::asset::false_color::{ColorScale, Scheme};
 use crate::asset::picture::srgb_from_linear;
 use egui::{Align2, Color32, Context, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
 
-/// Says which half is which, on both sides of where they meet.
+/// Labels the two halves beside the line where they meet.
 pub(super) fn halves(context: &Context, editor: &Editor) {
     if !editor.shows_reference() {
         return;
@@ -22,7 +22,7 @@ pub(super) fn halves(context: &Context, editor: &Editor) {
     }
 }
 
-/// What is to be told at the bottom: reference and error, shader errors, messages.
+/// Draws the notes at the bottom: reference and error, shader errors, messages.
 pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
     let mut lines: Vec<(String, Color32)> = Vec::new();
     if editor.shows_reference() || editor.shows_error() {
@@ -53,7 +53,7 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
                 ),
                 if fresh { Color32::WHITE } else { WARNING },
             ),
-            None => ("error: waits for the reference of a scene that stands still (Space pauses)".to_owned(), WARNING),
+            None => ("error: needs the reference of a scene at rest (Space pauses)".to_owned(), WARNING),
         });
     }
     lines.extend(status.messages.iter().map(|text| ((*text).to_owned(), Color32::WHITE)));
@@ -73,13 +73,13 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
                 bar(ui, scale.limit);
             }
             if let Some(error) = status.shader_error {
-                ui.colored_label(WARNING, "a shader does not compile; the one before stays in use");
+                ui.colored_label(WARNING, "a shader does not compile; the previous one stays in use");
                 ui.label(RichText::new(error.trim()).monospace().color(ERROR));
             }
         });
 }
 
-/// Which colour is which error, from -`limit` to `limit`.
+/// Draws the colour bar of errors from -`limit` to `limit`.
 fn bar(ui: &mut Ui, limit: f64) {
     let scale = ColorScale { scheme: Scheme::Signed, limit };
     let width = ui.available_width().min(420.0);

@@ -4,25 +4,25 @@ use crate::scene::Camera;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
-/// Largest angle of the eye above or below the target: up in the picture is +y there still.
+/// Largest angle of the eye above or below the target; up to it, +y is up in the picture.
 const PITCH_LIMIT_RAD: f64 = 89.0 * PI / 180.0;
-/// What a notch of the wheel divides the distance by.
+/// Factor by which one notch of the wheel divides the distance.
 const NOTCH: f64 = 1.15;
-/// Distances lie between 1 / this and this many scene radii.
+/// Distances lie between 1/1000 and 1000 scene radii.
 const DISTANCE_RANGE: f64 = 1e3;
-/// Targets stay within this many metres of the origin: what a scene file can hold.
+/// Targets stay within this many metres of the origin, so that a scene file can hold them and the eye.
 const TARGET_LIMIT_M: f64 = 9e6;
 
-/// Where the eye is seen from the target. All methods leave it finite, whatever they are given.
+/// The eye's position relative to the target. All methods keep it finite for any arguments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbitCamera {
-    /// What is looked at, metres.
+    /// Target point, metres.
     pub target: DVec3,
     /// Angle about +y of the eye from +z, radians, -pi to pi.
     pub yaw_rad: f64,
     /// Angle of the eye above the horizon, radians.
     pub pitch_rad: f64,
-    /// Metres, above 0.
+    /// Distance from target to eye, metres, above 0.
     pub distance_m: f64,
     /// Vertical field of view in degrees.
     pub fov_deg: f32,
@@ -35,45 +35,45 @@ impl OrbitCamera {
         let offset = eye - target;
         let distance_m = offset.length();
         let pitch_rad = (offset.y / distance_m).clamp(-1.0, 1.0).asin();
-        // Seen from straight above or below, what is up in the picture tells where the eye would lean to.
+        // If the eye is straight above or below, the picture's up direction gives the yaw.
         let lean = if camera.up() == glam::Vec3::Y { offset } else { -camera.up().as_dvec3() * offset.y.signum() };
         let yaw_rad = lean.x.atan2(lean.z);
         OrbitCamera { target, yaw_rad, pitch_rad, distance_m, fov_deg: camera.fov_deg }
     }
 
-    /// From the target to the eye, unit.
+    /// Unit vector from the target to the eye.
     pub fn outward(&self) -> DVec3 {
         let (sin, cos) = self.yaw_rad.sin_cos();
         let (up, out) = self.pitch_rad.sin_cos();
         DVec3::new(sin * out, up, cos * out)
     }
 
-    /// Right in the picture, unit, level.
+    /// Unit vector to the right in the picture; it is horizontal.
     pub fn right(&self) -> DVec3 {
         let (sin, cos) = self.yaw_rad.sin_cos();
         DVec3::new(cos, 0.0, -sin)
     }
 
-    /// Away from the camera in the ground plane, unit.
+    /// Unit vector away from the camera in the ground plane.
     pub fn ahead(&self) -> DVec3 {
         let (sin, cos) = self.yaw_rad.sin_cos();
         DVec3::new(-sin, 0.0, -cos)
     }
 
-    /// Up in the picture, unit.
+    /// Unit vector up in the picture.
     pub fn up(&self) -> DVec3 {
         self.outward().cross(self.right())
     }
 
-    /// As a scene has it.
+    /// The camera in the form of a scene.
     pub fn camera(&self) -> Camera {
-        // Far from the origin, f32 holds no eye that is nearer to the target.
+        // Far from the origin, f32 cannot represent an eye nearer to the target.
         let distance_m = self.distance_m.max(1e-5 * self.target.abs().max_element());
         let eye = self.target + distance_m * self.outward();
         Camera { eye: eye.as_vec3(), target: self.target.as_vec3(), fov_deg: self.fov_deg }
     }
 
-    /// A drag across a picture of that height; dragging across all of it is half a turn.
+    /// Turns by a drag in a picture of that height; a drag across the whole height is half a turn.
     pub fn turn(&mut self, drag_px: [f32; 2], height_px: u32) {
         let [dx, dy] = drag_px.map(|d| f64::from(d) * PI / f64::from(height_px.max(1)));
         if dx.is_finite() && dy.is_finite() {
@@ -92,7 +92,7 @@ impl OrbitCamera {
         }
     }
 
-    /// Comes nearer by notches of a wheel, in a scene of that radius.
+    /// Moves nearer by notches of the wheel, in a scene of that radius.
     pub fn zoom(&mut self, notches: f32, scene_radius_m: f64) {
         if notches.is_finite() {
             let notches = f64::from(notches).clamp(-100.0, 100.0);
@@ -100,7 +100,7 @@ impl OrbitCamera {
         }
     }
 
-    /// Looks at a sphere so that it fills the picture, from the side it is seen from now. `aspect` is width / height.
+    /// Looks at a sphere from the current direction so that it fills the picture. `aspect` is width / height.
     pub fn frame(&mut self, centre: DVec3, radius_m: f64, aspect: f64) {
         let half = (f64::from(self.fov_deg).to_radians() / 2.0).tan() * aspect.min(1.0);
         let distance_m = radius_m / half.atan().sin();
@@ -113,7 +113,7 @@ impl OrbitCamera {
 }
 
 fn limited(distance_m: f64, scene_radius_m: f64) -> f64 {
-    // The eye's offset must not vanish in the f32 of a scene file, nor its place leave the file's range.
+    // In a scene file's f32, the eye's offset must not vanish and its position must stay in range.
     let radius_m = if scene_radius_m.is_finite() { scene_radius_m.max(1e-6) } else { 1.0 };
     distance_m.clamp((radius_m / DISTANCE_RANGE).max(1e-5), (radius_m * DISTANCE_RANGE).min(1e6))
 }

@@ -1,12 +1,12 @@
-//! The outline of an entity as the camera sees it: edges between a face that looks at the eye and one that does not.
+//! The outline of an entity as the camera sees it: its silhouette edges.
 
 use crate::asset::edges::Edges;
 use crate::draw::camera::world_from_centred;
 use crate::scene::Placement;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
-/// Line segments of an outline in a picture of `size` pixels (any unit), in its coordinates: x right, y down. They end at the
-/// picture's edges. `centre_m` is that of the mesh's bounding sphere.
+/// Line segments of an outline in a picture of `size` (in any unit), with x to the right and y down. Segments are clipped to the
+/// picture. `centre_m` is the centre of the mesh's bounding sphere.
 pub fn outline(
     edges: &Edges,
     centre_m: DVec3,

@@ -1,4 +1,4 @@
-//! The overlay: help, times, counts, sliders, messages. It reads the state and returns what its widgets ask for.
+//! The overlay: help, times, counts, sliders, messages. It reads the state and returns the commands of its widgets.
 
 use super::Editor;
 use super::command::Command;
@@ -13,11 +13,11 @@ use egui::collapsing_header::CollapsingState;
 use egui::{Align2, Color32, Context, Id, Pos2, RichText, Stroke, Ui, pos2, vec2};
 use std::collections::VecDeque;
 
-/// Space around panels, points.
+/// Margin around panels, points.
 pub(super) const MARGIN: f32 = 8.0;
 /// Width of the panel of figures, points.
 const FIGURES_WIDTH: f32 = 268.0;
-/// Room for its title bar where it is folded, points.
+/// Width of the folded panel of figures, points.
 const FOLDED_WIDTH: f32 = 104.0;
 /// Width of the help, points.
 const HELP_WIDTH: f32 = 350.0;
@@ -25,16 +25,16 @@ pub(super) const WARNING: Color32 = Color32::from_rgb(255, 190, 90);
 pub(super) const ERROR: Color32 = Color32::from_rgb(255, 120, 110);
 const OUTLINE: Color32 = Color32::from_rgb(255, 200, 60);
 
-/// Colours of the error as they are shown.
+/// The error that the colours show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorScale {
-    /// Root mean square relative to that of the reference.
+    /// Root mean square of the error, relative to that of the reference.
     pub rms: f64,
-    /// Error of the ends of the scale, in the same unit.
+    /// Error at the ends of the colour scale, in the same unit.
     pub limit: f64,
 }
 
-/// What the overlay shows besides the editor's state.
+/// The viewer's state that the overlay shows besides the editor's.
 pub struct Status<'s> {
     /// Name of the device.
     pub device: &'s str,
@@ -42,31 +42,31 @@ pub struct Status<'s> {
     pub driver: &'s str,
     /// Width and height of the picture, pixels.
     pub size: [u32; 2],
-    /// Passes of the last frames, oldest first.
+    /// Times of the passes of the last frames, oldest first.
     pub timings: &'s VecDeque<Vec<Timing>>,
     /// Lookups of the last merge.
     pub counts: Option<Counts>,
-    /// Clusters that the last frame merged, and all; `None` before the first frame of a scene.
+    /// Number of clusters that the last frame merged, and of all clusters; `None` before the first frame of a scene.
     pub merged: Option<(usize, usize)>,
-    /// Vertices that are lit.
+    /// Number of lit vertices.
     pub vertices: usize,
     /// Merge variant in use; `None` before the first frame of a scene.
     pub variant: Option<&'s str>,
-    /// The bake in the background.
+    /// Progress of the background bake.
     pub bake: Option<TaskProgress>,
-    /// The rays that are being cast.
+    /// Progress of the background rays.
     pub rays: Option<TaskProgress>,
-    /// Rays a vertex, relative standard error, whether it belongs to the state shown.
+    /// Reference: rays per vertex, relative standard error, and whether it is up to date.
     pub reference: Option<(u32, f64, bool)>,
-    /// The error's colours and whether they belong to the state shown.
+    /// Error, and whether it is up to date.
     pub error: Option<(ErrorScale, bool)>,
-    /// The compiler's lines.
+    /// The compiler's messages.
     pub shader_error: Option<&'s str>,
-    /// Lines for the user, oldest first.
+    /// Messages for the user, oldest first.
     pub messages: Vec<&'s str>,
 }
 
-/// Dark, and clear enough to see the scene through.
+/// A dark style with translucent panels.
 pub fn visuals() -> egui::Visuals {
     let mut visuals = egui::Visuals::dark();
     visuals.window_fill = Color32::from_black_alpha(246);
@@ -85,7 +85,7 @@ pub fn outline(context: &Context, lines: &[[Pos2; 2]]) {
     }
 }
 
-/// Lays the overlay out and returns what is asked for. Hidden, it shows nothing but a bake in progress.
+/// Lays out the overlay and returns the commands of its widgets. A hidden overlay shows only a bake in progress.
 pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Command> {
     let mut commands = Vec::new();
     let screen = context.content_rect();
@@ -102,13 +102,13 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
         window.auto_sized().default_width(width).max_width(width).default_open(open)
     };
     notes::halves(context, editor);
-    // Two panels side by side need room; in a narrow window the help starts folded away, in a narrower one the figures too.
+    // In a narrow window the help starts folded, and in a narrower one the figures do too.
     let wide = screen.width() >= FIGURES_WIDTH + HELP_WIDTH + 100.0;
     panel("Controls", screen.left() + MARGIN, HELP_WIDTH, wide).show(context, |ui| {
         scrolled(ui, height, help);
     });
     let open = screen.width() >= 2.0 * FIGURES_WIDTH;
-    // egui takes a folded window for one without width, so that it cannot be put to the right.
+    // egui gives a folded window no width, so its position at the right needs a width of its own.
     let folding = CollapsingState::load_with_default_open(context, Id::new("Figures").with("collapsing"), open);
     let width = if folding.openness(context) > 0.0 { FIGURES_WIDTH } else { FOLDED_WIDTH };
     let x = (screen.right() - MARGIN - width).max(screen.left() + MARGIN);
@@ -119,7 +119,7 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
     commands
 }
 
-/// As high as its content, but within the window.
+/// Adds content with a scroll bar if it is higher than `height` points.
 fn scrolled(ui: &mut Ui, height: f32, add: impl FnOnce(&mut Ui)) {
     egui::ScrollArea::vertical().max_height(height - 44.0).show(ui, add);
 }
@@ -231,7 +231,7 @@ fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {
         ui.spacing_mut().slider_width = 110.0;
         let slider = egui::Slider::new(&mut now, range).suffix(unit).text(name).max_decimals(2);
         let response = ui.add(slider);
-        // The slider itself rounds what it shows.
+        // The slider rounds its value, so small differences are no changes.
         if response.changed() && (now - value).abs() > 0.006 {
             commands.push(command(now));
         }
@@ -247,7 +247,7 @@ fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {
     slide(ui, "sky turned", editor.sky_turn_deg(), -180.0..=180.0, "°", Command::SetSkyTurn);
 }
 
-/// 12345 as 12 345.
+/// A number with spaces between groups of three digits: 12 345.
 pub(super) fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut out = String::new();

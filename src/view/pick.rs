@@ -1,4 +1,4 @@
-//! Rays from the picture into the scene: what is seen at a pixel, and what is dragged there.
+//! Picking and dragging: rays from the picture into the scene.
 
 use super::command::{Changed, Command, Effect};
 use super::edit;
@@ -10,55 +10,55 @@ use crate::truth::ray_mesh::RayMesh;
 use glam::{DVec3, DVec4};
 use std::sync::OnceLock;
 
-/// A drag follows no farther than this many scene radii from the eye: near the horizon a pixel is kilometres.
+/// A drag reaches at most this many scene radii from the eye, because near the horizon a pixel covers kilometres.
 const REACH: f64 = 30.0;
 
-/// Hierarchies of the scene's meshes, each built when a ray first comes near its mesh.
+/// Hierarchies of the scene's meshes, each built when a ray first enters its bounding sphere.
 #[derive(Default)]
 pub struct Picker {
     shapes: Vec<OnceLock<RayMesh>>,
 }
 
 impl Picker {
-    /// For that many meshes.
+    /// A picker for that number of meshes.
     pub fn new(mesh_count: usize) -> Self {
         Picker { shapes: (0..mesh_count).map(|_| OnceLock::new()).collect() }
     }
 }
 
-/// What is being dragged.
+/// An entity that is being dragged.
 pub struct EntityDrag {
     entity: usize,
-    /// The entity as it was.
+    /// The entity before the drag.
     before: EntityData,
-    /// Where it was grabbed, metres.
+    /// The point where it was grabbed, metres.
     anchor: DVec3,
     moved: bool,
 }
 
-/// A half line in the world.
+/// A ray in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
-    /// Metres.
+    /// Origin in metres.
     pub origin: DVec3,
-    /// Unit.
+    /// Unit direction.
     pub direction: DVec3,
 }
 
 impl Editor {
-    /// The ray through a place of the picture (pixels; centres of pixels lie at halves).
+    /// The ray through a position in the picture (in pixels, with pixel centres at halves).
     pub fn ray(&self, at: [f32; 2]) -> Ray {
         let [width, height] = self.size().map(f64::from);
         let camera = self.camera();
         let across = |p: f32, of: f64| 2.0 * f64::from(p) / of - 1.0;
-        // Depth 1 is the near plane; any point of it but the eye will do.
+        // Depth 1 is the near plane; any point in front of the eye gives the direction.
         let near = DVec4::new(across(at[0], width), across(at[1], height), 1.0, 1.0);
         let world = clip_from_world(camera, width / height).inverse() * near;
         let origin = camera.eye.as_dvec3();
         Ray { origin, direction: (world.truncate() / world.w - origin).normalize() }
     }
 
-    /// The entity seen at a place of the picture, and the point of it in the world.
+    /// The entity that is seen at a position in the picture, and the visible point in the world.
     pub fn hit(&self, at: [f32; 2]) -> Option<(usize, DVec3)> {
         let ray = self.ray(at);
         if !ray.direction.is_finite() {
@@ -74,7 +74,7 @@ impl Editor {
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<(f64, usize)> = None;
         for (enters_m, entity) in near {
-            // Spheres come near to far: what lies behind the best hit cannot be nearer.
+            // Spheres are ordered from near to far, so a sphere behind the best hit contains no nearer one.
             if best.is_some_and(|(distance_m, _)| distance_m < enters_m) {
                 break;
             }
@@ -93,13 +93,14 @@ impl Editor {
         let shape = self.picker.shapes[mesh].get_or_init(|| RayMesh::new(&self.scene.meshes[mesh]));
         let (centre, radius_m) = self.sphere(entity, placement);
         let to_object = placement.rotation.as_dquat().normalize().inverse();
-        // From the sphere on, in its radii: f32 keeps its precision however far the camera is.
+        // The ray starts at the sphere, in units of its radius, so f32 is precise for any distance of the camera.
         let start = to_object * (ray.origin + enters_m * ray.direction - centre) / radius_m;
         let hit = shape.first_hit(start.as_vec3a(), (to_object * ray.direction).as_vec3a())?;
         Some(enters_m + f64::from(hit) * radius_m)
     }
 
-    /// Whether a drag from there moves the selected entity rather than the camera: it is seen there, and is no mere ground.
+    /// Whether a drag from a position moves the selected entity instead of the camera: the entity is seen there, and occludes or
+    /// emits.
     pub fn grabs(&self, at: [f32; 2]) -> bool {
         self.selection().is_some_and(|selected| {
             let entity = &self.scene.entities[selected];
@@ -107,7 +108,7 @@ impl Editor {
         })
     }
 
-    /// Does a command of the pointer.
+    /// Executes a command of the pointer.
     pub(super) fn point(&mut self, command: Command) -> Effect {
         match command {
             Command::Pick(at) => {
@@ -153,12 +154,12 @@ impl Editor {
 }
 
 impl Ray {
-    /// Distance at which it enters a sphere: 0 from inside, `None` where it misses.
+    /// Distance at which the ray enters a sphere: 0 from inside, `None` if it misses.
     fn enters(&self, centre: DVec3, radius_m: f64) -> Option<f64> {
         let toward = centre - self.origin;
         let along = toward.dot(self.direction);
         let beside = (toward - along * self.direction).length_squared();
-        // A hair more than the sphere: its radius is rounded to f32, and so is the mesh in it.
+        // The sphere is slightly enlarged, because its radius and the mesh are rounded to f32.
         let half = (radius_m * (1.0 + 1e-6)).powi(2) - beside;
         (half >= 0.0 && along + half.sqrt() >= 0.0).then(|| (along - half.sqrt()).max(0.0))
     }

@@ -1,4 +1,4 @@
-//! The viewer's frames: into a window, into an image, into files.
+//! Draws the viewer's frames into a window, an image or files.
 
 use super::outline::outline;
 use super::save::unedited;
@@ -13,20 +13,20 @@ use glam::DVec2;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How long nothing has to happen before what was hidden is lit: shorter than a pause between two looks, longer than between
-/// events of a drag.
+/// Time without events after which hidden clusters are lit. It is longer than the interval between events of a drag, and short
+/// enough not to be noticed.
 const REST: Duration = Duration::from_millis(100);
 
-/// What a frame is drawn into.
+/// The target of a frame.
 pub enum FrameTarget<'c> {
-    /// A window; the frame is shown.
+    /// A window, which presents the frame.
     Window(&'c mut Window),
-    /// An image of the setup's format, left to be copied from.
+    /// An image of the setup's format; it is left ready to be copied from.
     Image(&'c Image),
 }
 
 impl Viewer {
-    /// Draws a frame. False where there was nothing to draw into, as in a minimised window.
+    /// Draws a frame. Returns false if the target has no image, as in a minimised window.
     ///
     /// # Errors
     /// `Device` when the device or the surface was lost.
@@ -34,7 +34,7 @@ impl Viewer {
         let pending = self.pending;
         let drawn = self.draw_pending(canvas);
         if drawn.is_err() {
-            // What was recorded may not have run: the next frame merges all of it again.
+            // The recorded merge may not have run, so the next frame merges everything again.
             if let Some(frame) = &mut self.frame {
                 frame.forget();
             }
@@ -65,13 +65,13 @@ impl Viewer {
         let placements = self.editor.placements();
         let white = (-self.editor.exposure_ev()).exp2();
         let pending = std::mem::take(&mut self.pending);
-        // What was hidden while things moved is lit once they rest.
+        // Clusters that were hidden during motion are lit when motion has ended.
         let stale = self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0);
         let light = pending.light() || pending.variant || stale;
         if let Some(frame) = &mut self.frame {
             frame.resize(size)?;
             if light {
-                // An error is compared everywhere.
+                // The error needs all clusters, not only the visible ones.
                 frame.prepare(&placements, if self.editor.shows_error() { &[] } else { &parts })?;
             }
             if pending.any() || resized {
@@ -126,7 +126,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Ends the oldest flight and keeps its times.
+    /// Waits for the oldest flight and keeps its times.
     pub(super) fn land(&mut self) -> Result<()> {
         if let Some(flight) = self.flights.pop_front() {
             self.timings.push_back(flight.wait()?);
@@ -137,7 +137,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Parts of the picture: merged or error, and the reference on the right of it.
+    /// Viewports of the picture: the merged picture or its error, and the reference to the right.
     pub(super) fn parts(&self, [width, height]: [u32; 2]) -> Vec<Part> {
         let error = self.editor.shows_error() && self.error_shown.is_some();
         let own = if error { Lit::Colors(ERROR) } else { Lit::Merged };
@@ -154,7 +154,7 @@ impl Viewer {
 
     /// Writes the picture beside the saved scene, at full quality and without the overlay.
     pub(super) fn screenshot(&mut self) -> Result<String> {
-        let Some(frame) = &mut self.frame else { return Err(Error::Failed("nothing is shown yet".into())) };
+        let Some(frame) = &mut self.frame else { return Err(Error::Failed("no picture has been drawn yet".into())) };
         let [width, height] = frame.size();
         let (placements, ev) = (self.editor.placements(), self.editor.exposure_ev());
         let png = free_name(&self.editor.save_path());

@@ -1,22 +1,22 @@
-//! The ray-cast reference beside the picture: cast in the background, coarse first, then finer while nothing changes.
+//! The ray-cast reference beside the picture. A background task casts it, first coarsely, then more finely while nothing changes.
 
 use super::task::{BackgroundTask, TaskWorker};
 use crate::error::Result;
 use crate::scene::{Placement, Scene};
 use crate::truth::{EntityRadiosity, RayCast, RayMeshes, World, raycast, receiver_vertices};
 
-/// Rays a vertex and light of each round; each round starts anew.
+/// Rays per vertex and light in each round; a round does not reuse the previous one.
 const ROUNDS: [u32; 3] = [32, 256, 2048];
-/// Runs of a round, for the standard error.
+/// Independent runs per round, for the standard error.
 const RUNS: u32 = 4;
-/// Vertices between two looks at whether to stop.
+/// Number of vertices between two checks whether to stop.
 const CHUNK: usize = 512;
 
-/// What a round found.
+/// The result of a round.
 pub struct Reference {
-    /// State of the light it was cast for, as the caller counts them.
+    /// Version of the light for which it was cast, as the caller counts versions.
     pub version: u64,
-    /// Rays a vertex and light.
+    /// Rays per vertex and light.
     pub rays: u32,
     /// Relative standard error.
     pub error: f64,
@@ -24,7 +24,7 @@ pub struct Reference {
     pub radiosity: Vec<EntityRadiosity>,
 }
 
-/// Starts the rounds for a scene as it stands.
+/// Starts casting for the current state of a scene.
 pub fn cast(scene: Scene, placements: Vec<Placement>, version: u64, seed: u64) -> BackgroundTask<Reference> {
     BackgroundTask::new(move |worker: &TaskWorker<Reference>| {
         let shapes = RayMeshes::new(&scene);

@@ -1,10 +1,10 @@
-//! Which shader files changed on disk: looked at now and then, by time and length.
+//! Polls a folder for changed shader files, by modification time and length.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-/// How often the folder is looked at.
+/// Interval between two polls.
 pub const PERIOD: Duration = Duration::from_millis(250);
 
 type Stamps = BTreeMap<String, (Option<SystemTime>, u64)>;
@@ -14,17 +14,17 @@ pub struct Watch {
     folder: PathBuf,
     stamps: Stamps,
     looked: Instant,
-    /// Changed since they were last compiled without an error.
+    /// Files that changed since they were last compiled without an error.
     changed: BTreeSet<String>,
 }
 
 impl Watch {
-    /// What is there now counts as compiled.
+    /// Starts watching; the present files count as compiled.
     pub fn new(folder: &Path) -> Self {
         Watch { folder: folder.to_owned(), stamps: stamps(folder), looked: Instant::now(), changed: BTreeSet::new() }
     }
 
-    /// Files to compile anew, if any has changed since the last look; all that have not been [`Watch::compiled`] since.
+    /// If a file changed since the last poll, returns all files that changed since the last call of [`Watch::compiled`].
     pub fn poll(&mut self) -> Option<Vec<String>> {
         if self.looked.elapsed() < PERIOD {
             return None;
@@ -32,7 +32,7 @@ impl Watch {
         self.look()
     }
 
-    /// As [`Watch::poll`], at once.
+    /// As [`Watch::poll`], without waiting for the interval.
     pub fn look(&mut self) -> Option<Vec<String>> {
         self.looked = Instant::now();
         let now = stamps(&self.folder);
@@ -47,7 +47,7 @@ impl Watch {
         Some(self.changed.iter().cloned().collect())
     }
 
-    /// All of them have compiled.
+    /// Notes that all changed files have compiled.
     pub fn compiled(&mut self) {
         self.changed.clear();
     }

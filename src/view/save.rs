@@ -1,4 +1,4 @@
-//! The state as a scene file that `render` turns into the same picture.
+//! Saves the state as a scene file from which `render` makes the same picture.
 
 use super::editor::Editor;
 use crate::asset::embedded;
@@ -7,13 +7,13 @@ use crate::files;
 use crate::scene::Data;
 use std::path::{Path, PathBuf};
 
-/// What is added to a scene's name, so that its own file and its comments stay.
+/// Suffix of a saved scene's name, so that the original file with its comments is kept.
 const SUFFIX: &str = "-edited";
 
 impl Editor {
-    /// Where [`Editor::save`] writes unless told otherwise: `NAME-edited.toml` beside the scene's file, or in the current folder
-    /// for a built-in scene; with the next free number where there is such a file that this editor did not write. An edited
-    /// scene that was opened is written over.
+    /// Default path of [`Editor::save`]: `NAME-edited.toml` beside the scene's file, or in the current folder for a built-in
+    /// scene. If another program wrote such a file, the name gets the next free number. An edited scene that was opened is
+    /// overwritten.
     pub fn save_path(&self) -> PathBuf {
         let own = self.path().exists();
         let folder = if own { self.path().parent() } else { None }.unwrap_or(Path::new(""));
@@ -30,11 +30,11 @@ impl Editor {
         (1..).map(numbered).find(usable).expect("numbers do not end")
     }
 
-    /// The state as scene data for a file in `folder`: placed, lit, seen, sized and timed as now, so that its first picture is
-    /// the one that is shown. Files that it names are found from there; those of built-in scenes by their built-in names.
+    /// The current state as scene data for a file in `folder`, so that its first picture is the one shown now. Paths in it are
+    /// relative to `folder`; files of built-in scenes keep their built-in names.
     ///
     /// # Errors
-    /// `Failed` where the path of a file is no UTF-8.
+    /// `Failed` when the path of a file is not UTF-8.
     pub fn data(&self, folder: &Path) -> Result<Data> {
         let mut data = self.scene().data.clone();
         [data.output.width, data.output.height] = self.size();
@@ -53,7 +53,7 @@ impl Editor {
     /// Writes the state as a scene file.
     ///
     /// # Errors
-    /// `Failed` where it cannot be written; an older file is left as it was then.
+    /// `Failed` when it cannot be written; then an older file is unchanged.
     pub fn save(&mut self, path: &Path) -> Result<()> {
         let data = self.data(path.parent().unwrap_or(Path::new("")))?;
         let text = format!(
@@ -67,21 +67,21 @@ impl Editor {
     }
 }
 
-/// A name without what [`Editor::save_path`] adds to it.
+/// A name without the suffix and number that [`Editor::save_path`] adds.
 pub(super) fn unedited(stem: &str) -> &str {
     let number = stem.trim_end_matches(|c: char| c.is_ascii_digit());
     let marked = if number.len() < stem.len() { number.strip_suffix('-') } else { Some(stem) };
     marked.and_then(|marked| marked.strip_suffix(SUFFIX)).unwrap_or(stem)
 }
 
-/// How a file that a scene in `from` calls `file` is called by a scene in `to`.
+/// Converts a path `file` of a scene in folder `from` to a path for a scene in folder `to`.
 fn found_from(to: &Path, from: &Path, file: &Path) -> PathBuf {
     let here = |folder: &Path| std::path::absolute(folder).and_then(|f| f.canonicalize()).ok();
     let full = from.join(file);
     match full.canonicalize() {
         Ok(_) if here(to).is_some() && here(to) == here(from) => file.to_owned(),
         Ok(full) => here(to).and_then(|to| full.strip_prefix(to).ok().map(Path::to_owned)).unwrap_or(full),
-        // Not on disk, so it was read from the binary: under its own name, or where the built-in scene stands.
+        // A file that is not on disk is embedded, under its own name or relative to the built-in scene.
         Err(_) if embedded::find(file).is_some() => file.to_owned(),
         Err(_) => embedded::name(&full).map_or(full, PathBuf::from),
     }

@@ -1,4 +1,4 @@
-//! Work in the background: bakes and rays, each on a thread of its own that can be told to stop.
+//! Background tasks, bakes and ray casting, each on its own thread, which can be stopped.
 
 use crate::error::{Error, Result};
 use std::any::Any;
@@ -8,45 +8,45 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-/// How far a task is.
+/// Progress of a task.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TaskProgress {
-    /// What is being done.
+    /// Description of the current work.
     pub what: String,
-    /// Parts done.
+    /// Number of parts that are done.
     pub done: u32,
-    /// Parts in all.
+    /// Number of parts.
     pub all: u32,
 }
 
-/// The thread's end of a task: where it says how far it is and hands over what it has.
+/// The thread's side of a task: it reports progress and sends results.
 pub struct TaskWorker<T> {
     stop: Arc<AtomicBool>,
     progress: Arc<Mutex<TaskProgress>>,
     results: Sender<T>,
 }
 
-/// Thrown through a task's stack when it is to stop: nobody waits for its result.
+/// Payload of the unwinding that stops a task.
 struct Stopped;
 
 impl<T> TaskWorker<T> {
-    /// Says how far the task is. Where the task is to stop, this unwinds its thread, which frees what it holds.
+    /// Reports progress. If the task was told to stop, this unwinds its thread, which drops everything on its stack.
     pub fn report(&self, what: &str, done: u32, all: u32) {
         if self.stop.load(Ordering::Relaxed) {
-            // Not a panic: nothing is printed, and `BackgroundTask` expects it.
+            // Unlike a panic, `resume_unwind` prints nothing; `BackgroundTask` expects the payload.
             resume_unwind(Box::new(Stopped));
         }
         let progress = TaskProgress { what: what.to_owned(), done, all };
         *self.progress.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = progress;
     }
 
-    /// Hands over a result.
+    /// Sends a result.
     pub fn send(&self, result: T) {
-        let _ = self.results.send(result); // a task that is dropped needs none
+        let _ = self.results.send(result); // fails only if the task was dropped, which needs no result
     }
 }
 
-/// A task under way. Dropping it stops it and waits for its thread.
+/// A running task. Dropping it stops it and waits for its thread.
 pub struct BackgroundTask<T> {
     thread: Option<JoinHandle<Result<()>>>,
     stop: Arc<AtomicBool>,
@@ -55,7 +55,7 @@ pub struct BackgroundTask<T> {
 }
 
 impl<T: Send + 'static> BackgroundTask<T> {
-    /// Starts a thread.
+    /// Starts `work` on a thread.
     pub fn new(work: impl FnOnce(&TaskWorker<T>) -> Result<()> + Send + 'static) -> Self {
         let (stop, progress) = (Arc::<AtomicBool>::default(), Arc::<Mutex<TaskProgress>>::default());
         let (sender, results) = channel();
@@ -64,22 +64,22 @@ impl<T: Send + 'static> BackgroundTask<T> {
         BackgroundTask { thread: Some(thread), stop, progress, results }
     }
 
-    /// What the task has handed over since, oldest first.
+    /// Results since the last call, oldest first.
     pub fn results(&self) -> Vec<T> {
         self.results.try_iter().collect()
     }
 
-    /// How far it is.
+    /// Its progress.
     pub fn progress(&self) -> TaskProgress {
         self.progress.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).clone()
     }
 
-    /// How it ended, once it has.
+    /// Its outcome, once it has ended; `None` before, and after the outcome was taken.
     pub fn ended(&mut self) -> Option<Result<()>> {
         self.thread.take_if(|thread| thread.is_finished()).map(|thread| outcome(thread.join()))
     }
 
-    /// Whether it goes on.
+    /// Whether it is still running.
     pub fn is_running(&self) -> bool {
         self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }

@@ -1,6 +1,6 @@
-//! What `view` shows: the editor's state turned into frames, with the overlay on top.
+//! Draws the editor's state as frames with the overlay on top.
 //!
-//! A frame goes into a window or into an image, so that everything here runs without a display: events and time in, picture out.
+//! A frame is drawn into a window or into an image, so everything here also runs without a display.
 
 use super::Editor;
 use super::command::{Changed, Command, Effect, Request};
@@ -23,27 +23,27 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Frames whose times are kept for the graph.
+/// Number of frames whose times are kept for the graph.
 pub const HISTORY: usize = 120;
-/// How long a message stands.
+/// Seconds for which a message is shown.
 const MESSAGE_S: f64 = 6.0;
-/// Panels of the frame: radiosity of the reference, colours of the error.
+/// Additional radiosity buffers of the frame: the reference, and the colours of the error.
 pub(super) const REFERENCE: usize = 0;
 pub(super) const ERROR: usize = 1;
 
-/// What a viewer is made of.
+/// Parameters of a viewer.
 pub struct Setup {
-    /// The device that it draws on.
+    /// The device on which it draws.
     pub device: Arc<Device>,
-    /// How background bakes open one of their own.
+    /// Options with which background bakes open their own device.
     pub options: gpu::DeviceOptions,
     /// Shaders.
     pub library: Library,
-    /// Where bakes are kept; it needs a folder.
+    /// Cache of bakes; it must have a folder.
     pub cache: Cache,
-    /// Bake and merge; the size is the window's.
+    /// Options of bake and merge; the picture's size is the window's.
     pub frame: frame::Options,
-    /// Format of what is drawn into.
+    /// Format of the frame's target.
     pub format: vk::Format,
     /// Whether that format encodes sRGB.
     pub encodes_srgb: bool,
@@ -51,7 +51,7 @@ pub struct Setup {
     pub seed: u64,
 }
 
-/// The editor with all that shows it.
+/// An editor with everything that is needed to show it.
 pub struct Viewer {
     pub(super) setup: Setup,
     pub(super) editor: Editor,
@@ -63,11 +63,11 @@ pub struct Viewer {
     pub(super) egui: egui::Context,
     pub(super) paint: Paint,
     pub(super) flights: VecDeque<Flight>,
-    /// What is not yet seen in a frame.
+    /// Changes that no frame shows yet.
     pub(super) pending: Changed,
     pub(super) bake: Option<BackgroundTask<()>>,
     pub(super) rays: Option<BackgroundTask<Reference>>,
-    /// Version of the light that the rays are cast for.
+    /// Version of the light for which rays are being cast.
     pub(super) rays_version: u64,
     pub(super) reference: Option<Reference>,
     pub(super) error_shown: Option<(u64, u32, panel::ErrorScale)>,
@@ -81,19 +81,19 @@ pub struct Viewer {
     pub(super) quit: bool,
     /// Width and height of the window's picture, pixels.
     pub(super) size: [u32; 2],
-    /// When egui wants to be drawn again by itself.
+    /// Time at which egui wants to be drawn again without an event.
     pub(super) repaint_at: Option<Instant>,
-    /// Progress that was shown last.
+    /// The progress that was shown last.
     pub(super) told: [Option<TaskProgress>; 2],
-    /// Lookups that lists leave off, of the version counted.
+    /// Version of the light, and the lookups that its lists skip.
     pub(super) counts: Option<(u64, Counts)>,
-    /// When they may be counted again: it takes a look at every cluster and entity.
+    /// Time of the next count, which is limited because it visits every cluster and entity.
     pub(super) count_at: Instant,
     pub(super) frame_count: u64,
 }
 
 impl Viewer {
-    /// Starts with a scene; what it needs is baked in the background.
+    /// Starts with a scene; missing fields are baked in the background.
     ///
     /// # Errors
     /// `Failed` when a shader does not compile, `Device` when memory ran out.
@@ -141,32 +141,32 @@ impl Viewer {
         &self.editor
     }
 
-    /// The frame, once its fields are there.
+    /// The frame, once its fields are baked.
     pub fn frame(&self) -> Option<&Frame> {
         self.frame.as_ref()
     }
 
-    /// egui's context, for whoever feeds it.
+    /// egui's context, for its input and output.
     pub fn egui(&self) -> &egui::Context {
         &self.egui
     }
 
-    /// Whether the window is to be closed.
+    /// Whether the user asked to close the window.
     pub fn wants_to_quit(&self) -> bool {
         self.quit
     }
 
-    /// Whether the pointer holds something of the scene.
+    /// Whether the pointer drags the scene or an entity.
     pub fn is_dragging(&self) -> bool {
         self.input.is_dragging()
     }
 
-    /// Whether a bake goes on in the background.
+    /// Whether a background bake is running.
     pub fn is_baking(&self) -> bool {
         self.bake.is_some()
     }
 
-    /// The reference that is known: rays a vertex and whether it belongs to the state shown.
+    /// The latest reference: rays per vertex, and whether it is up to date.
     pub fn reference(&self) -> Option<(u32, bool)> {
         self.reference.as_ref().map(|r| (r.rays, r.version == self.version))
     }
@@ -176,17 +176,17 @@ impl Viewer {
         self.timings.back().map_or(Vec::new(), |passes| passes.iter().map(|t| t.pass.as_str()).collect())
     }
 
-    /// Whether the error's colours of the state shown are known.
+    /// Whether the error's colours are up to date.
     pub fn shows_error_colors(&self) -> bool {
         self.editor.shows_error() && self.error_shown.as_ref().is_some_and(|(version, ..)| *version == self.version)
     }
 
-    /// The compiler's lines about the last change of a shader file.
+    /// The compiler's messages about the last change of a shader file.
     pub fn shader_error(&self) -> Option<&str> {
         self.shader_error.as_deref()
     }
 
-    /// What was last said to the user.
+    /// The last message to the user.
     pub fn message(&self) -> Option<&str> {
         self.messages.back().map(|(_, text)| text.as_str())
     }
@@ -202,7 +202,7 @@ impl Viewer {
         self.pending.any() || moves && self.frame.is_some() || self.repaint_at.is_some_and(|at| at <= Instant::now())
     }
 
-    /// How soon [`Viewer::update`] may find something new by itself; `None`: not before an event.
+    /// Time until [`Viewer::update`] should run again; `None` if it can wait for an event.
     pub fn idle(&self) -> Option<Duration> {
         let busy =
             self.bake.is_some() || self.rays.as_ref().is_some_and(BackgroundTask::is_running) || self.watch.is_some();
@@ -211,7 +211,7 @@ impl Viewer {
         poll.into_iter().chain(repaint).min()
     }
 
-    /// Takes an event of the window that is not egui's.
+    /// Handles an event of the window that egui does not use.
     ///
     /// # Errors
     /// As [`Viewer::apply`].
@@ -222,10 +222,10 @@ impl Viewer {
         Ok(())
     }
 
-    /// Does a command, down to the files that it writes.
+    /// Executes a command, including the files that it writes.
     ///
     /// # Errors
-    /// `Device` when the device was lost. What the user can do something about becomes a message instead.
+    /// `Device` when the device was lost. Errors that the user can resolve become messages instead.
     pub fn apply(&mut self, command: Command) -> Result<()> {
         match command {
             Command::Orbit(_) | Command::Pan(_) | Command::DragTo(_) | Command::Resize(_) => {
@@ -233,7 +233,7 @@ impl Viewer {
             }
             _ => log::info!("frame {}: command {command:?}", self.frame_count),
         }
-        // The editor sees the part of the window that shows what it edits.
+        // The editor's picture is the viewport that shows the merged scene.
         let command = match command {
             Command::Resize(size) => {
                 self.size = if size.contains(&0) { self.size } else { size };
@@ -266,7 +266,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Lets time pass and takes in what background work has done.
+    /// Advances the time by `dt_s` seconds and receives results of background tasks.
     ///
     /// # Errors
     /// As [`Viewer::apply`].
@@ -298,7 +298,7 @@ impl Viewer {
         self.look_at_rays()
     }
 
-    /// Counts what the lists leave off where that is not known, at most a twentieth of the time.
+    /// Counts the lookups that lists skip, if unknown, in at most a twentieth of the time.
     fn count(&mut self) {
         let Some(frame) = &self.frame else { return };
         let known = self.counts.as_ref().is_some_and(|(version, _)| *version == self.version);
@@ -310,7 +310,7 @@ impl Viewer {
         }
     }
 
-    /// Runs the overlay on egui's input; what its widgets ask for is done.
+    /// Runs the overlay on egui's input and executes the commands of its widgets.
     ///
     /// # Errors
     /// As [`Viewer::apply`].
@@ -337,7 +337,7 @@ impl Viewer {
         Ok(output.platform_output)
     }
 
-    /// The part of the window that shows the merged picture: its left half beside a reference.
+    /// Size in pixels of the merged picture: the window's, or half of it beside a reference.
     pub(super) fn pane(&self) -> [u32; 2] {
         self.pane_of(self.size)
     }
@@ -354,7 +354,7 @@ impl Viewer {
         }
     }
 
-    /// Passes on what no user can mend; the rest becomes a message.
+    /// Returns `Device` and `Unsupported` errors; all other errors become messages.
     pub(super) fn tolerate<T>(&mut self, outcome: Result<T>) -> Result<Option<T>> {
         match outcome {
             Ok(value) => Ok(Some(value)),

@@ -1,15 +1,15 @@
-//! Axes: from values to places, and where the ticks stand.
+//! Axes of plots: map values to positions and choose ticks.
 
-/// How values are spread over an axis.
+/// Mapping from values to positions on an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisScale {
-    /// By their logarithm; what is not above 0 stands at the low end.
+    /// Logarithmic; values that are not above 0 lie at the low end.
     Log,
-    /// In proportion, from one value to another; what is beyond stands at the edge.
+    /// Linear between two values; values outside lie at the edge.
     Linear(f64, f64),
 }
 
-/// An axis between two places of a drawing.
+/// An axis between two positions of a drawing.
 pub(super) struct Axis {
     scale: AxisScale,
     low: f64,
@@ -26,7 +26,7 @@ impl Axis {
                 let within = values.filter(|v| *v > 0.0 && v.is_finite());
                 let (low, high) = within.fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
                 let (low, high) = if low <= high { (low, high) } else { (0.1, 10.0) };
-                // A twelfth of the length on either side, and never less than a few percent.
+                // A margin of a twelfth of the length at both ends, and at least 3 %.
                 let room = ((high / low).ln() / 12.0).max(0.03);
                 (low.ln() - room, high.ln() + room)
             }
@@ -44,7 +44,7 @@ impl Axis {
         self.from + share * (self.to - self.from)
     }
 
-    /// Values with round names that stand at least `apart` from each other, and their names.
+    /// Round values whose positions are at least `apart` from each other, with their names.
     pub fn ticks(&self, apart: f64) -> Vec<(f64, String)> {
         let most = ((self.to - self.from).abs() / apart).floor().max(2.0) as usize;
         match self.scale {
@@ -54,7 +54,7 @@ impl Axis {
         }
     }
 
-    /// As many round numbers of each power of ten as there is room for.
+    /// As many round numbers per power of ten as there is room for.
     fn decades(&self, most: usize) -> Vec<(f64, String)> {
         let powers = (self.low / 10_f64.ln()).floor() as i32..=(self.high / 10_f64.ln()).ceil() as i32;
         let of = |leading: &[i32], every: usize| -> Vec<(f64, String)> {

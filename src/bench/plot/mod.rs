@@ -1,6 +1,6 @@
-//! Plots as SVG: points that are numbered and listed, their Pareto front and curves beside them ([`Plot`]), and named rows with
-//! a mark a series ([`Rows`]). Series differ by colour and by shape; the colours are those of Okabe and Ito and a grey,
-//! which people tell apart who do not see all colours.
+//! Plots as SVG: numbered points with a list, their Pareto front and curves ([`Plot`]), and named rows with one mark per series
+//! ([`Rows`]). Series differ by colour and by shape; the colours are those of Okabe and Ito and a grey, which colour-blind
+//! readers can distinguish.
 
 mod axis;
 mod points;
@@ -12,9 +12,9 @@ pub use rows::{PlotColumn, RowGroup, Rows};
 
 use std::fmt::Write;
 
-/// Colours of series in their order; after the last they begin again with other shapes.
+/// Colours of series in order; after the last colour they repeat with other shapes.
 const COLORS: [&str; 8] = ["#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8a8a"];
-/// Width of a letter of 11 px, on average and a little more.
+/// Width in pixels of a letter of 11 px, a little above the average.
 const LETTER: f64 = 6.3;
 
 /// An SVG document that grows.
@@ -29,7 +29,7 @@ impl Svg {
         Svg { width, height, body: String::new() }
     }
 
-    /// One element. Writing to a string cannot fail.
+    /// Appends one element. Writing to a string cannot fail.
     fn put(&mut self, element: std::fmt::Arguments<'_>) {
         let _ = writeln!(self.body, "{element}");
     }
@@ -39,7 +39,7 @@ impl Svg {
         self.put(format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" {extra}>{words}</text>"));
     }
 
-    /// Grey words that stay readable where they cross a line.
+    /// Grey text with a white outline, readable where it crosses a line.
     fn noted(&mut self, x: f64, y: f64, extra: &str, words: &str) {
         let halo = "stroke=\"white\" stroke-width=\"4\" stroke-linejoin=\"round\" fill=\"white\"";
         self.text(x, y, &format!("{extra} {halo}"), words);
@@ -85,7 +85,7 @@ fn color(series: usize) -> &'static str {
     COLORS[series % COLORS.len()]
 }
 
-/// Place of a name among the names in order of appearance.
+/// Index of a name among the names in order of appearance.
 fn place(names: &mut Vec<String>, name: &str) -> usize {
     names.iter().position(|n| n == name).unwrap_or_else(|| {
         names.push(name.to_owned());

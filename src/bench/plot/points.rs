@@ -1,4 +1,4 @@
-//! Points that are numbered and listed, the front of those that nothing beats, and curves.
+//! Plots of numbered points with a list, their Pareto front, and curves.
 
 use super::axis::{Axis, AxisScale};
 use super::{LETTER, Svg, color, place};
@@ -10,61 +10,61 @@ const TOP: f64 = 74.0;
 const BOTTOM: f64 = TOP + HEIGHT;
 const LEGEND_ROW: f64 = 14.5;
 
-/// A point with its line in the list.
+/// A point, and its line in the list.
 #[derive(Clone)]
 pub struct Dot {
-    /// For the list.
+    /// Text in the list.
     pub label: String,
-    /// Points of one group have one colour and shape.
+    /// Points of one group have the same colour and shape.
     pub group: String,
-    /// Place.
+    /// Value on the x axis.
     pub x: f64,
-    /// Place.
+    /// Value on the y axis.
     pub y: f64,
-    /// What its x spreads over.
+    /// Range of x, drawn as a line.
     pub x_range: Option<(f64, f64)>,
 }
 
 /// A line through points.
 #[derive(Clone, Default)]
 pub struct Curve {
-    /// For the list.
+    /// Text in the list.
     pub label: String,
-    /// (x, y).
+    /// Values (x, y).
     pub points: Vec<(f64, f64)>,
-    /// Words at its points, as many or none.
+    /// Text at each point; may be empty.
     pub notes: Vec<String>,
 }
 
-/// A distance along x that is pointed out.
+/// A marked distance along x.
 #[derive(Clone)]
 pub struct Gap {
-    /// From there.
+    /// Start on the x axis.
     pub from: f64,
-    /// To there.
+    /// End on the x axis.
     pub to: f64,
-    /// At this height.
+    /// Value on the y axis.
     pub y: f64,
-    /// Above the middle.
+    /// Text at the end of the marked distance.
     pub label: String,
 }
 
 /// A pair of axes.
 #[derive(Clone)]
 pub struct Panel {
-    /// Above it.
+    /// Title above the panel.
     pub title: String,
-    /// Below the x axis, unit included.
+    /// Label below the x axis, with its unit.
     pub x_label: String,
-    /// Beside the y axis, unit included.
+    /// Label beside the y axis, with its unit.
     pub y_label: String,
-    /// Of x and of y.
+    /// Scales of x and y.
     pub scales: [AxisScale; 2],
     /// Points.
     pub dots: Vec<Dot>,
-    /// Whether numbers lead from the points to the list.
+    /// Whether points are numbered as in the list.
     pub numbered: bool,
-    /// Indices into `dots` by rising x, joined by steps.
+    /// Indices into `dots` in order of x; they are joined by steps.
     pub front: Vec<usize>,
     /// Lines.
     pub curves: Vec<Curve>,
@@ -73,7 +73,7 @@ pub struct Panel {
 }
 
 impl Default for Panel {
-    /// Nothing on logarithmic axes.
+    /// An empty panel with logarithmic axes.
     fn default() -> Self {
         Panel {
             title: String::new(),
@@ -91,13 +91,13 @@ impl Default for Panel {
 
 /// Panels side by side and one list of what they show.
 pub struct Plot {
-    /// Above it.
+    /// Title above the panels.
     pub title: String,
-    /// From left to right; the first one's points are listed.
+    /// Panels from left to right; the first one's points are listed.
     pub panels: Vec<Panel>,
 }
 
-/// Names of groups and of curves in order of appearance, which decides colours and shapes.
+/// Names of groups and curves in order of appearance, which determines colours and shapes.
 struct Names {
     groups: Vec<String>,
     curves: Vec<String>,
@@ -154,7 +154,7 @@ fn stroke(series: usize) -> String {
     format!("stroke=\"{}\" stroke-width=\"1.5\"", color(series))
 }
 
-/// A panel at its place.
+/// A panel at its position in the plot.
 struct PanelDrawing<'p> {
     panel: &'p Panel,
     names: &'p Names,
@@ -207,7 +207,7 @@ impl<'p> PanelDrawing<'p> {
             let (x, y) = self.at((panel.dots[i].x, panel.dots[i].y));
             svg.put(format_args!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"7.5\" fill=\"none\" stroke=\"#0072b2\"/>"));
         }
-        // The first lies on top.
+        // The first point is drawn last, on top.
         for dot in panel.dots.iter().rev() {
             let (at, series) = (self.at((dot.x, dot.y)), self.series(&dot.group));
             if let Some((low, high)) = dot.x_range {
@@ -222,7 +222,7 @@ impl<'p> PanelDrawing<'p> {
             let (from, to, y) = (self.x.at(gap.from), self.x.at(gap.to), self.y.at(gap.y));
             svg.line([from, y, to, y], "stroke=\"#444444\" stroke-width=\"1.2\" stroke-dasharray=\"2 3\"");
             svg.line([to, y - 5.0, to, y + 5.0], "stroke=\"#444444\" stroke-width=\"1.2\"");
-            // Beyond the gap, where a falling curve leaves room, if it ends early enough.
+            // The label lies right of the gap, where a falling curve leaves room, if the gap ends early enough.
             let (at, anchor) =
                 if to < self.left + 0.6 * WIDTH { (to + 9.0, "start") } else { (from.max(to) - 9.0, "end") };
             svg.noted(at, y - 7.0, &format!("text-anchor=\"{anchor}\""), &gap.label);
@@ -237,7 +237,7 @@ impl<'p> PanelDrawing<'p> {
         self.names.groups.iter().position(|g| g == group).unwrap_or(0)
     }
 
-    /// Steps from the top edge over the points to the right edge.
+    /// Draws steps from the top edge over the points to the right edge.
     fn front(&self, svg: &mut Svg) {
         let points = self.panel.front.iter().map(|&i| self.at((self.panel.dots[i].x, self.panel.dots[i].y)));
         let mut steps = String::new();
@@ -259,7 +259,7 @@ impl<'p> PanelDrawing<'p> {
             for (i, (x, y)) in points.iter().enumerate() {
                 svg.mark(*x, *y, series, 3.5);
                 if let Some(note) = curve.notes.get(i) {
-                    // Notes of the second curve stand below it, so that two close ones stay apart.
+                    // Notes of the second curve are below it, so that notes of close curves do not overlap.
                     let y = if place == 1 { y + 14.0 } else { y - 6.0 };
                     svg.noted(x + 6.0, y, "font-size=\"10\"", note);
                 }
@@ -267,7 +267,7 @@ impl<'p> PanelDrawing<'p> {
         }
     }
 
-    /// Numbers beside their points, those of points on one spot together, where they cover neither points nor each other.
+    /// Draws numbers beside their points where they cover neither points nor other numbers. Coinciding points share a label.
     fn numbers(&self, svg: &mut Svg) {
         let places: Vec<(f64, f64)> = self.panel.dots.iter().map(|d| self.at((d.x, d.y))).collect();
         let mut spots: Vec<Vec<usize>> = Vec::new();
@@ -307,7 +307,7 @@ impl<'p> PanelDrawing<'p> {
     }
 }
 
-/// Numbers from 1, runs of three and more shortened.
+/// Numbers counted from 1; runs of three or more are written as a range.
 fn ranges(indices: &[usize]) -> String {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for &i in indices {

@@ -1,4 +1,4 @@
-//! Named rows with a mark a series, in one column or several.
+//! Plots of named rows with one mark per series, in one or more columns.
 
 use super::axis::{Axis, AxisScale};
 use super::{LETTER, Svg, color};
@@ -10,33 +10,33 @@ const TOP: f64 = 84.0;
 
 /// Rows under one heading.
 pub struct RowGroup {
-    /// Above them; may be empty.
+    /// Heading above the rows; may be empty.
     pub heading: String,
-    /// Their names.
+    /// Names of the rows.
     pub rows: Vec<String>,
 }
 
-/// What is shown of every row.
+/// A quantity that is shown for every row.
 pub struct PlotColumn {
-    /// Below it, unit included.
+    /// Label below the column, with its unit.
     pub x_label: String,
-    /// How values are spread.
+    /// Scale of the values.
     pub scale: AxisScale,
-    /// What values are to stay below, with a word for it.
+    /// A marked limit with its label.
     pub limit: Option<(f64, String)>,
-    /// By row over all groups, by series.
+    /// Values by row (over all groups) and by series.
     pub values: Vec<Vec<Option<f64>>>,
 }
 
 /// A table as a plot.
 pub struct Rows {
-    /// Above it.
+    /// Title above the plot.
     pub title: String,
     /// Names of the series.
     pub series: Vec<String>,
     /// The rows.
     pub groups: Vec<RowGroup>,
-    /// Side by side.
+    /// Columns from left to right.
     pub columns: Vec<PlotColumn>,
 }
 
@@ -103,7 +103,7 @@ impl Rows {
             if low < high {
                 svg.line([low, *y, high, *y], "stroke=\"#aaaaaa\" stroke-width=\"2\"");
             }
-            // Later series are smaller, so that what lies below is seen.
+            // Marks of later series are smaller, so that earlier marks remain visible.
             for (series, x) in places.iter().enumerate() {
                 let Some(x) = x else { continue };
                 svg.mark(*x, *y, series, 5.5 - 1.5 * series.min(2) as f64);

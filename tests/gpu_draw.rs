@@ -102,6 +102,34 @@ fn nearer_hides_farther() {
     assert!(behind.iter().flatten().all(|c| *c == 0.0), "what is behind the camera is not seen");
 }
 
+/// Nothing in view is a picture of the background alone, whatever smooths the edges, and what comes back into view is drawn again.
+#[test]
+fn nothing_in_view_is_a_picture_too() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("environment = { uniform = [0.25, 0.5, 0.75] }", &[RED, BLUE]);
+    let (seen, unseen) = ([at(-0.5, 0.0, 0.0), at(0.5, 0.2, 0.0)], [at(0.0, 0.0, 9.0), at(0.0, 1.0, 9.0)]);
+    for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
+        for finish in [Finish::Linear, Finish::Display] {
+            let mut frame = stage.frame(&scene, options(antialias));
+            frame.set_finish(finish, antialias).unwrap();
+            // 8 bits of a display's picture tell values apart by 0.003 here.
+            let is_background = |picture: &[f32]| {
+                picture.chunks_exact(3).all(|p| (0..3).all(|c| (p[c] - [0.25, 0.5, 0.75][c]).abs() < 4e-3))
+            };
+            frame.render(&unseen, Some(1.0)).unwrap();
+            assert!(is_background(&frame.picture()), "{antialias:?}, {finish:?}: nothing in the first picture");
+            frame.render(&seen, Some(1.0)).unwrap();
+            let first = frame.picture();
+            assert!(!is_background(&first), "{antialias:?}, {finish:?}: something is seen");
+            frame.render(&unseen, Some(1.0)).unwrap();
+            assert!(is_background(&frame.picture()), "{antialias:?}, {finish:?}: nothing is seen any more");
+            frame.show(&unseen, 1.0).unwrap();
+            frame.render(&seen, Some(1.0)).unwrap();
+            assert!(frame.picture() == first, "{antialias:?}, {finish:?}: what comes back is as it was");
+        }
+    }
+}
+
 /// A picture that several render passes make is the one of a single pass, with samples and without.
 #[test]
 fn batches_change_nothing() {

@@ -12,6 +12,7 @@ use room::apart;
 use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
+use shadow_fields::draw::Antialias;
 use shadow_fields::frame::{Frame, Options};
 use shadow_fields::gpu::{self, Access, Buffer, BufferKind, Commands, FLIGHTS, Image, ImageShape, Validation};
 use shadow_fields::scene::Scene;
@@ -36,12 +37,16 @@ struct Stand {
 
 impl Stand {
     fn new(name: &str, shader_dir: Option<&Path>) -> Option<Self> {
+        Self::smoothed(name, shader_dir, small().antialias)
+    }
+
+    fn smoothed(name: &str, shader_dir: Option<&Path>, antialias: Antialias) -> Option<Self> {
         let gpu = gpu()?;
         let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("view-{name}"));
         let _ = std::fs::remove_dir_all(&cache);
         let mut library = gpu.library.clone();
         library.shader_dir = shader_dir.map(Path::to_owned);
-        let options = Options { size: SIZE, ..small() };
+        let options = Options { size: SIZE, antialias, ..small() };
         let setup = Setup {
             device: gpu.device.clone(),
             options: gpu::DeviceOptions {
@@ -235,6 +240,28 @@ fn a_scene_that_stands_still_costs_only_its_showing() {
     stand.letter('j');
     assert_eq!(passes(&mut stand), "merge draw show");
     assert!(!stand.viewer.wants_frame() || stand.viewer.idle().is_some());
+}
+
+/// A scene that is panned out of sight, changed there, and panned back, however edges are smoothed.
+#[test]
+fn a_scene_out_of_sight_is_shown_and_comes_back() {
+    for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {
+        let Some(mut stand) = Stand::smoothed(&format!("out-{antialias:?}"), None, antialias) else { return };
+        stand.ready();
+        let first = stand.shown();
+        let away = 100.0 * SIZE[0] as f32;
+        stand.viewer.apply(Command::Pan([away, 0.0])).unwrap();
+        let empty = stand.shown();
+        assert!(empty.iter().all(|pixel| *pixel == empty[0]), "{antialias:?}: the background alone");
+        stand.viewer.apply(Command::SetSky(0.5)).unwrap();
+        let darker = stand.shown();
+        assert!(darker.iter().all(|pixel| *pixel == darker[0]) && darker[0] != empty[0], "{antialias:?}: it changes");
+        stand.viewer.apply(Command::SetSky(1.0)).unwrap();
+        assert_eq!(apart(&stand.shown(), &empty), 0);
+        stand.turn();
+        stand.viewer.apply(Command::Pan([-away, 0.0])).unwrap();
+        assert_eq!(apart(&stand.shown(), &first), 0, "{antialias:?}: it is back");
+    }
 }
 
 #[test]

@@ -169,9 +169,6 @@ impl Smooth {
     ) -> Result<()> {
         commands.copy_between(picture, &self.picture);
         commands.image_barrier(&self.picture, Some(Access::TransferWrite), Access::ColorWrite);
-        if panes.iter().all(|(_, range)| range.is_empty()) {
-            return Ok(());
-        }
         commands.image_barrier(picture, Some(Access::TransferRead), Access::FragmentSampled);
         commands.image_barrier(depth, Some(Access::DepthWrite), Access::FragmentSampled);
         let target = Target { color: &self.picture, clear: None, depth: None, resolve: None };

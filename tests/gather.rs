@@ -7,7 +7,7 @@ mod stage;
 
 use common::report;
 use glam::{DQuat, DVec3};
-use shadow_fields::frame::Options;
+use shadow_fields::frame::{Options, Target, record};
 use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, FLIGHTS};
 use shadow_fields::layout::{Cluster, ENTRY_ENTITIES, Entity, ListEntry};
 use shadow_fields::lists::gather::{
@@ -298,11 +298,11 @@ fn frames_are_the_same_by_either() {
             let expected = stage.light(&mut by_host, &placements);
             let found: Vec<_> = (0..placements.len()).map(|entity| by_device.radiosity(entity).unwrap()).collect();
             assert!(found == expected, "eps {eps}, round {round}");
-            assert!(by_device.merged.merged_entries > 0);
-            assert_eq!(by_device.merged, by_host.merged, "eps {eps}, round {round}");
+            assert!(by_device.merged().merged_entries > 0);
+            assert_eq!(by_device.merged(), by_host.merged(), "eps {eps}, round {round}");
             assert!(by_device.render(&placements, None).unwrap().is_empty(), "at rest nothing is gathered");
         }
-        report(&format!("{:?}", by_host.merged));
+        report(&format!("{:?}", by_host.merged()));
     }
 }
 
@@ -317,7 +317,7 @@ fn crowd(stage: &Stage, lights: usize) -> (shadow_fields::scene::Scene, Options,
     let options = Options { eps: 0.0, ..small() };
     let mut by_host = stage.frame(&scene, Options { lists: Some(Place::Host), ..options });
     by_host.render(&scene.at(0.0), None).unwrap();
-    assert!(by_host.merged.merged_entries > FOUND * by_host.merged.clusters);
+    assert!(by_host.merged().merged_entries > FOUND * by_host.merged().clusters);
     let light = by_host.radiosity(100).unwrap();
     (scene, Options { lists: Some(Place::Device), ..options }, light)
 }
@@ -358,10 +358,10 @@ fn a_crowd_is_gathered_in_a_window() {
             let flight: shadow_fields::gpu::Flight = flights.pop_front().unwrap();
             flight.wait().unwrap();
         }
-        frame.prepare(&placements, &[]).unwrap();
+        frame.prepare_light(&placements, &[]).unwrap();
         let mut commands = Commands::new(device, "frame").unwrap();
         commands.after_flights();
-        frame.record_light(&mut commands).unwrap();
+        record(&mut commands, frame.merge_work().unwrap().as_ref(), None, Target::Device).unwrap();
         flights.push_back(commands.launch().unwrap());
         device.settle();
         let light = frame.radiosity(100).unwrap();
@@ -374,7 +374,7 @@ fn a_crowd_is_gathered_in_a_window() {
     }
     // Lists of 64 entries at first: that they were too short is seen before the third frame.
     assert_eq!(lit, ["dark", "dark", "lit", "lit", "lit"]);
-    assert_eq!(frame.merged.merged_clusters, 0, "at rest nothing is merged");
+    assert_eq!(frame.merged().merged_clusters, 0, "at rest nothing is merged");
 }
 
 /// Every sum and product of the pass is rounded by itself: a compiler that contracted some would come to other lists.

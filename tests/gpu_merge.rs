@@ -63,7 +63,7 @@ fn variants_lookups_lattices_and_bands() {
     let mut first: Option<Vec<Vec<[f32; 3]>>> = None;
     for &variant in VARIANTS.iter().filter(|variant| !variant.image) {
         let mut frame = stage.frame(&scene, Options { variant: Some(variant), ..base });
-        assert_eq!(frame.variant, variant, "the scene is small enough for each");
+        assert_eq!(frame.variant(), variant, "the scene is small enough for each");
         agrees(variant.name, &mut frame, &placements);
         let light = stage.light(&mut frame, &placements);
         for (a, b) in light.iter().zip(first.get_or_insert_with(|| light.clone())) {
@@ -104,7 +104,7 @@ fn a_sampler_interpolates() {
     for (name, instead) in [("image", "texel-packed"), ("image-uniform", "storage-uniform")] {
         let variant = Some(Variant::named(name).unwrap());
         let mut frame = stage.frame(&scene, Options { variant, bake: halves, ..base });
-        assert_eq!(frame.variant.name, name);
+        assert_eq!(frame.variant().name, name);
         agrees_within(FILTER, name, &mut frame, &placements);
         let exact = Variant::named("texel-packed").unwrap();
         frame.set_variant(Some(exact)).unwrap();
@@ -121,7 +121,7 @@ fn a_sampler_interpolates() {
                 ..base
             },
         ] {
-            assert_eq!(stage.frame(&scene, options).variant.name, instead, "{options:?}");
+            assert_eq!(stage.frame(&scene, options).variant().name, instead, "{options:?}");
         }
     }
 }

@@ -93,7 +93,7 @@ fn pictures_are_the_same_to_the_bit() {
                 picture(frame, &placements)
             });
             assert!(pictures[0] == pictures[1], "{antialias:?}, round {round}, {movers:?} moved");
-            let now = [&frames[0], &frames[1]].map(|frame| frame.merged);
+            let now = [&frames[0], &frames[1]].map(|frame| frame.merged());
             if round == 0 || movers.is_empty() {
                 assert_eq!(frames[0].stale_count(), 0, "at first and at rest everything is lit");
                 continue;
@@ -155,7 +155,7 @@ fn what_comes_into_view_is_lit_then() {
     assert!(passes(&mut frames[0]) && frames[0].stale_count() == 0);
     for round in 0..6 {
         frames[0].set_camera(&eye(round));
-        assert!(!passes(&mut frames[0]) && frames[0].merged.merged_clusters == 0, "camera {round}");
+        assert!(!passes(&mut frames[0]) && frames[0].merged().merged_clusters == 0, "camera {round}");
     }
 }
 
@@ -167,15 +167,15 @@ fn nothing_is_lit_twice() {
     let mut frame = stage.frame(&scene, Options { size: [64, 48], ..small() });
     let mut placements = scene.at(0.0);
     picture(&mut frame, &placements);
-    let clusters = frame.merged.clusters;
+    let clusters = frame.merged().clusters;
     frame.set_camera(&eye(2));
     // Everything is lit anew by the light; then a ball far from all moves by nothing that matters to others.
     placements[5].position.x += 0.2;
     picture(&mut frame, &placements);
-    let [first, left] = [frame.merged.merged_clusters, frame.stale_count()];
+    let [first, left] = [frame.merged().merged_clusters, frame.stale_count()];
     assert!(first > 0 && left > 0 && first + left <= clusters, "{first} and {left} of {clusters}");
     picture(&mut frame, &placements);
-    assert_eq!([frame.merged.merged_clusters, frame.stale_count()], [left, 0], "at rest the others, and they alone");
+    assert_eq!([frame.merged().merged_clusters, frame.stale_count()], [left, 0], "at rest the others, and they alone");
     // Whoever reads radiosity gets all of it, as it would be without the skip.
     placements[5].position.x += 0.2;
     picture(&mut frame, &placements);

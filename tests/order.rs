@@ -114,7 +114,7 @@ fn lit(stage: &Stage, occluders: &[[f64; 3]]) -> (Frame, Vec<[f32; 3]>) {
     let scene = patch(occluders);
     let mut frame = stage.frame(&scene, small());
     let light = stage.light(&mut frame, &scene.at(0.0)).swap_remove(0);
-    assert_eq!((light.len(), frame.merged.clusters), (64, 1), "one cluster, one list");
+    assert_eq!((light.len(), frame.merged().clusters), (64, 1), "one cluster, one list");
     (frame, light)
 }
 

@@ -72,13 +72,13 @@ fn what_moves_is_merged_again_to_the_same_bits() {
             }
             let found = stage.light(&mut kept, &placements);
             let expected = stage.light(&mut anew, &placements);
-            assert_eq!(anew.merged.merged_clusters, anew.merged.clusters);
+            assert_eq!(anew.merged().merged_clusters, anew.merged().clusters);
             let same = |a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]| {
                 let bits = |v: &[Vec<[f32; 3]>]| v.iter().flatten().flatten().map(|c| c.to_bits()).collect::<Vec<_>>();
                 bits(a) == bits(b)
             };
             assert!(same(&found, &expected), "round {round}, eps {eps}");
-            let now = kept.merged;
+            let now = kept.merged();
             report(&format!("eps {eps}, {movers:?} moved: {} of {} clusters", now.merged_clusters, now.clusters));
             if round > 0 && movers.is_empty() {
                 assert_eq!(now.merged_clusters, 0, "nothing has moved");
@@ -123,13 +123,13 @@ fn exact_skips_change_nothing() {
     let placements = scene.at(0.0);
     let mut all = stage.frame(&scene, small());
     let expected = stage.light(&mut all, &placements);
-    let entries = all.merged.merged_entries;
+    let entries = all.merged().merged_entries;
     for name in ["behind", "facing", "empty", "unseen", "unmoved"] {
         let mut frame = stage.frame(&scene, Options { skip: Skip::without(name), ..small() });
         assert_eq!(stage.light(&mut frame, &placements), expected, "without {name}");
         let counts = all.counts(&placements);
-        report(&format!("without {name}: {} entries, with it {entries}; {counts:?}", frame.merged.merged_entries));
-        assert!(name != "behind" || frame.merged.merged_entries > entries);
+        report(&format!("without {name}: {} entries, with it {entries}; {counts:?}", frame.merged().merged_entries));
+        assert!(name != "behind" || frame.merged().merged_entries > entries);
     }
 }
 
@@ -160,7 +160,7 @@ fn a_light_that_faces_away_is_left_off() {
     assert!(a[1].iter().any(|c| c[0] > 0.05), "the ceiling is lit");
     let counts = with.counts(&placements);
     report(&format!("{counts:?}"));
-    assert!(counts.facing_away > 0 && with.merged.merged_entries < without.merged.merged_entries);
+    assert!(counts.facing_away > 0 && with.merged().merged_entries < without.merged().merged_entries);
     // Black altogether, it is no light.
     let black = vec![Vec3::ZERO; scene.meshes[1].positions.len()];
     let lamp = &scene.meshes[1];
@@ -169,11 +169,11 @@ fn a_light_that_faces_away_is_left_off() {
         shadow_fields::asset::Mesh::new("lamp", positions, normals, Some(black), triangles).unwrap().into();
     let mut with = stage.frame(&scene, options);
     let light = stage.light(&mut with, &placements);
-    assert!(light.iter().flatten().flatten().all(|c| *c == 0.0) && with.merged.merged_entries == 0);
+    assert!(light.iter().flatten().flatten().all(|c| *c == 0.0) && with.merged().merged_entries == 0);
     assert_eq!(with.counts(&placements).empty, 1);
     let mut without = stage.frame(&scene, Options { skip: Skip::without("empty"), ..options });
     assert_eq!(stage.light(&mut without, &placements), light);
-    assert!(without.merged.merged_entries > 0 && without.counts(&placements).empty == 0);
+    assert!(without.merged().merged_entries > 0 && without.counts(&placements).empty == 0);
 }
 
 /// The one ball that is lit shadows nothing but itself: its field is not baked, and its light is the same as if it were.
@@ -281,7 +281,7 @@ fn nothing_pops_as_fields_become_caps() {
             let by_fields = stage.light(&mut fields, &placements).swap_remove(0);
             let (far, bright) = stage::difference(&by_caps, &by_fields);
             (apart, brightest) = (apart.max(far), bright);
-            kinds.insert([caps.merged.merged_entries, caps.counts(&placements).caps as usize]);
+            kinds.insert([caps.merged().merged_entries, caps.counts(&placements).caps as usize]);
             walk.push([by_caps, by_fields]);
         }
         // What a step changes in how far the two are apart, less what the one before it did, of any vertex: a pop is as large as they
@@ -350,5 +350,5 @@ fn the_house_has_something_for_every_skip() {
     let light = stage.light(&mut frame, &placements);
     let mut without = stage.frame(&house, Options { skip: Skip::without("empty"), ..exact });
     assert_eq!(stage.light(&mut without, &placements), light);
-    assert!(without.merged.merged_entries > 2 * frame.merged.merged_entries);
+    assert!(without.merged().merged_entries > 2 * frame.merged().merged_entries);
 }

@@ -201,7 +201,7 @@ fn still(
         draw_1_sample_ms: output::median(&single.draw),
         frame_1_sample_ms: output::median(&single.whole),
         first_picture_s,
-        variant: frame.variant.name,
+        variant: frame.variant().name,
     })
 }
 

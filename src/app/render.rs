@@ -123,7 +123,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             picture::write_png(&path, width, height, &draw(index)?, shape.exposure_ev)?;
         }
     }
-    let last_frame = frame.merged;
+    let last_frame = frame.merged();
     let last = scene.at(timings.last().map_or(first_s, |(time_s, ..)| *time_s));
     if let Some(path) = &arguments.vertices {
         if !arguments.reference {
@@ -155,7 +155,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "scene": arguments.scene.display().to_string(),
         "entities": scene.entities.len(),
         "receiver_vertices": frame.receiver_vertex_count(),
-        "variant": frame.variant.name,
+        "variant": frame.variant().name,
         "lookups": frame.counts(&last),
         "last_frame": last_frame,
         "memory_bytes": frame.memory(),
@@ -189,7 +189,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             if arguments.reference {
                 format!("none: {} rays, relative standard error {worst_error:.1e}", arguments.rays)
             } else {
-                frame.variant.name.into()
+                frame.variant().name.into()
             }
         ));
     }

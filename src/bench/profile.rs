@@ -229,7 +229,7 @@ pub fn scene(
                     other => others.entry(other.to_owned()).or_default().push(pass.milliseconds),
                 }
             }
-            *pairs = 64 * frame.merged.merged_entries as u64;
+            *pairs = 64 * frame.merged().merged_entries as u64;
         }
     }
     for (contender, frame, times, pairs) in &frames {

@@ -178,7 +178,7 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
     };
     let (walls, merges) = timed(&mut frame, &|round| everything(round as f64))?;
     let vertices = frame.receiver_vertex_count();
-    let entries_a_vertex = frame.merged.merged_entries as f64 / frame.merged.clusters.max(1) as f64;
+    let entries_a_vertex = frame.merged().merged_entries as f64 / frame.merged().clusters.max(1) as f64;
     let last = scene.entities.len() - 1;
     let (one, _) = timed(&mut frame, &|round| {
         let mut now = placements.clone();

@@ -289,7 +289,7 @@ impl Judge {
                 }
             }
         }
-        let entries = [frames[0].merged.merged_entries, frames[1].merged.merged_entries];
+        let entries = [frames[0].merged().merged_entries, frames[1].merged().merged_entries];
         let mut found = Vec::new();
         for frame in &mut frames {
             frame.render(placements, None)?;

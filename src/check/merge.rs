@@ -150,13 +150,13 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
     let mut compare = |what: String, options: Options| -> Result<()> {
         let mut frame = Frame::new(baker, &cache, &scene, options, &|_, _, _| ())?;
         let found = against_twin(&mut frame, &placements)?;
-        let what = if options.variant.is_none_or(|v| v == frame.variant) {
+        let what = if options.variant.is_none_or(|v| v == frame.variant()) {
             what
         } else {
-            format!("{what} (as {}: the device's limits)", frame.variant.name)
+            format!("{what} (as {}: the device's limits)", frame.variant().name)
         };
         let (tolerance, near) = match options.bake.lattice.directions {
-            _ if frame.variant.image => (FILTER, true),
+            _ if frame.variant().image => (FILTER, true),
             crate::field::lattice::Directions::LatLon { .. } => (ANGLES, true),
             crate::field::lattice::Directions::Cube { .. } => (ARITHMETIC, options.lookup == Lookup::Trilinear),
         };

@@ -189,14 +189,16 @@ pub struct Item<'d> {
     pub tag: f32,
 }
 
-/// Items in a part of the picture, lit one way.
-pub struct Pane<'i, 'd> {
-    /// What is drawn.
-    pub items: &'i [Item<'d>],
-    /// Radiosity of their vertices.
-    pub radiosity: &'d Buffer,
+/// A region of the picture, and what is drawn there.
+pub struct DrawnViewport<'d> {
     /// Left, top, width and height in pixels.
     pub area: [u32; 4],
+    /// The entities that are drawn, in this order.
+    pub items: Vec<Item<'d>>,
+    /// Radiosity of their vertices.
+    pub radiosity: &'d Buffer,
+    /// Which of the lines that pass "smooth" reads belong to this region.
+    pub lines: Range<u32>,
 }
 
 #[repr(C)]
@@ -285,9 +287,10 @@ impl Draw {
         self.smooth.as_ref().map_or(&self.picture, |smooth| &smooth.picture)
     }
 
-    /// Images whose content is thrown away before each frame: colour ones first, the depth image last.
-    pub fn attachments(&self) -> impl Iterator<Item = &Image> {
-        self.samples.iter().chain([&self.picture, &self.depth])
+    /// Images that the pass writes, and how: colour ones first, the depth image last. No picture needs what they held before.
+    pub fn attachments(&self) -> impl Iterator<Item = (&Image, Access)> {
+        let colors = self.samples.iter().chain([&self.picture]).map(|image| (image, Access::ColorWrite));
+        colors.chain([(&self.depth, Access::DepthWrite)])
     }
 
     /// Device memory of the images, bytes: 8 a sample of linear colour, 4 of encoded colour and of depth.
@@ -297,18 +300,19 @@ impl Draw {
             let texel_bytes = if shape.format == COLOR { 8 } else { 4 };
             texel_bytes * u64::from(shape.width) * u64::from(shape.height) * u64::from(shape.samples)
         };
-        self.attachments().chain(self.smooth.iter().map(|smooth| &smooth.picture)).map(texels).sum()
+        let attachments = self.attachments().map(|(image, _)| image);
+        attachments.chain(self.smooth.iter().map(|smooth| &smooth.picture)).map(texels).sum()
     }
 
-    /// Draws all panes, one after the other, over a background of one colour. Radiance above `white` is brought down to it, hue
-    /// kept.
+    /// Draws all viewports, one after the other, over a background of one colour. Radiance above `white` is brought down to it,
+    /// hue kept. Between the render passes of a large picture stand barriers of the pass's own.
     ///
     /// # Errors
     /// What recording returns.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
-        panes: &[Pane<'_, 'r>],
+        viewports: &[DrawnViewport<'r>],
         background: Vec3,
         white: f32,
     ) -> Result<()> {
@@ -322,24 +326,23 @@ impl Draw {
             depth: Some(&self.depth),
             resolve: self.samples.as_ref().map(|_| &self.picture),
         };
-        let every = panes.iter().flat_map(|pane| pane.items.iter().map(move |item| (pane, item)));
+        let every = viewports.iter().flat_map(|viewport| viewport.items.iter().map(move |item| (viewport, item)));
         let batches = batches(every, 3 * self.batch_triangles);
         let count = batches.len();
         for (number, batch) in batches.into_iter().enumerate() {
             if number > 0 {
-                for image in self.attachments() {
-                    let access = if image.shape.format == DEPTH { Access::DepthWrite } else { Access::ColorWrite };
+                for (image, access) in self.attachments() {
                     commands.image_barrier(image, Some(access), access);
                 }
             }
             commands.render_part(&target, [number == 0, number + 1 == count], |drawing| {
                 let mut bound: Option<&Item<'_>> = None;
-                for (pane, item, indices) in batch {
+                for (viewport, item, indices) in batch {
                     if bound.is_none_or(|bound| !std::ptr::eq(bound, item)) {
-                        let [left, top, width, height] = pane.area;
+                        let [left, top, width, height] = viewport.area;
                         drawing.area(left, top, width, height);
                         if let Drawable::Triangles { positions, emission, indices, .. } = item.drawable {
-                            let vertices = [(positions, 0), (emission, 0), (pane.radiosity, item.radiosity_offset)];
+                            let vertices = [(positions, 0), (emission, 0), (viewport.radiosity, item.radiosity_offset)];
                             drawing.bind(if item.culls { &self.solid } else { &self.open }, &vertices, indices);
                             drawing.push(&Push {
                                 clip_from_object: item.clip_from_object.to_cols_array(),
@@ -352,7 +355,7 @@ impl Draw {
                     match item.drawable {
                         Drawable::Triangles { .. } => drawing.indexed(indices),
                         Drawable::Grid(grid, _) => {
-                            self.grid.record(drawing, (grid, indices), item, pane.radiosity, white)?;
+                            self.grid.record(drawing, (grid, indices), item, viewport.radiosity, white)?;
                         }
                     }
                 }
@@ -364,12 +367,12 @@ impl Draw {
 }
 
 /// Indices of items, in runs of at most `most`; at least one run, which may be empty.
-fn batches<'p, 'i, 'd>(
-    items: impl Iterator<Item = (&'p Pane<'i, 'd>, &'i Item<'d>)>,
+fn batches<'v, 'd>(
+    items: impl Iterator<Item = (&'v DrawnViewport<'d>, &'v Item<'d>)>,
     most: u32,
-) -> Vec<Vec<(&'p Pane<'i, 'd>, &'i Item<'d>, Range<u32>)>> {
+) -> Vec<Vec<(&'v DrawnViewport<'d>, &'v Item<'d>, Range<u32>)>> {
     let (mut batches, mut room) = (vec![Vec::new()], most);
-    for (pane, item) in items {
+    for (viewport, item) in items {
         for &Range { mut start, end } in &item.indices {
             while start < end {
                 if room == 0 {
@@ -378,7 +381,7 @@ fn batches<'p, 'i, 'd>(
                 }
                 let next = end.min(start.saturating_add(room));
                 room -= next - start;
-                batches.last_mut().expect("one at least").push((pane, item, start..next));
+                batches.last_mut().expect("one at least").push((viewport, item, start..next));
                 start = next;
             }
         }

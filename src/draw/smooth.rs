@@ -9,13 +9,13 @@
 //! centres lie within half a pixel of it, along y where it is rather level and along x where it is steep. Output: the picture.
 
 use crate::asset::edges::Line;
+use crate::draw::DrawnViewport;
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Target, Upload};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, IVec2};
-use std::ops::Range;
 use std::sync::Arc;
 
 /// What lies behind a line may seem nearer by this share of its distance, as in `smooth.frag`.
@@ -155,8 +155,8 @@ impl Smooth {
         })
     }
 
-    /// Copies `picture` and smooths the copy. `panes` are parts of the picture, left, top, width and height, and the lines
-    /// of each. Expects the picture as source of a copy and its own one as target, and leaves it as colour attachment.
+    /// Copies `picture` and smooths the copy along the lines of each viewport. Expects the picture as source of a copy, its own one
+    /// as target and the depth to be read, and leaves its own picture as colour attachment, also where no line is in view.
     ///
     /// # Errors
     /// What recording returns.
@@ -165,20 +165,20 @@ impl Smooth {
         commands: &mut Commands<'r>,
         (picture, depth): (&'r Image, &'r Image),
         lines: &'r Lines,
-        panes: &[([u32; 4], Range<u32>)],
+        viewports: &[DrawnViewport<'_>],
     ) -> Result<()> {
         commands.copy_between(picture, &self.picture);
         commands.image_barrier(&self.picture, Some(Access::TransferWrite), Access::ColorWrite);
         commands.image_barrier(picture, Some(Access::TransferRead), Access::FragmentSampled);
-        commands.image_barrier(depth, Some(Access::DepthWrite), Access::FragmentSampled);
         let target = Target { color: &self.picture, clear: None, depth: None, resolve: None };
         commands.render(&target, |drawing| {
             drawing.bind(&self.pipeline, &[(&lines.corners, 0), (&lines.marks, 0)], &lines.indices);
             drawing.resources(&[Bind::Image(picture), Bind::Image(depth)])?;
-            for ([left, top, width, height], range) in panes.iter().filter(|(_, range)| !range.is_empty()) {
-                drawing.area(*left, *top, *width, *height);
-                drawing.push(&Push { area: [*left, *top, left + width - 1, top + height - 1].map(u32::cast_signed) });
-                drawing.indexed(6 * range.start..6 * range.end);
+            for DrawnViewport { area, lines, .. } in viewports.iter().filter(|viewport| !viewport.lines.is_empty()) {
+                let [left, top, width, height] = *area;
+                drawing.area(left, top, width, height);
+                drawing.push(&Push { area: [left, top, left + width - 1, top + height - 1].map(u32::cast_signed) });
+                drawing.indexed(6 * lines.start..6 * lines.end);
             }
             Ok(())
         })

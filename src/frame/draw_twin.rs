@@ -30,7 +30,7 @@ struct Corners {
 impl Frame {
     /// Samples a pixel of its pictures.
     pub fn samples(&self) -> u32 {
-        self.draw.samples()
+        self.picture.draw.samples()
     }
 
     /// The picture that the radiosity on the device should give, rows from the top; `white` as in [`Frame::render`].
@@ -41,7 +41,7 @@ impl Frame {
         let [width, height] = self.options.size;
         let samples: &[DVec2] = if self.samples() > 1 { &FOUR } else { &ONE };
         let texels = self.reference_texels(placements, white, samples)?;
-        if self.draw.smooth.is_none() {
+        if self.picture.draw.smooth.is_none() {
             return Ok(texels.iter().map(|texel| texel.color.to_array()).collect());
         }
         let lines = self.outlines(placements, f64::from(width) / f64::from(height));
@@ -79,7 +79,7 @@ impl Frame {
                     }
                     None => {
                         (texel.depth, texel.tag) = (0.0, 1.0);
-                        self.background.as_dvec3()
+                        self.sky.background.as_dvec3()
                     }
                 };
                 texel.color += color / samples.len() as f64;

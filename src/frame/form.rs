@@ -1,11 +1,42 @@
-//! What the merge shader is compiled for, and what of that a scene and device allow.
+//! The merge pass as it is compiled for a scene: what was asked for, less what scene or device do not allow.
 
 use super::Options;
 use crate::error::Result;
 use crate::gpu::{Device, TexelView, Volume};
+use crate::merge::Merge;
 use crate::merge::variant::{Form, Variant};
 use crate::scene_buffers::Store;
+use crate::shaders::Library;
 use ash::vk;
+use std::sync::Arc;
+
+/// The merge pass of a frame.
+pub(super) struct CompiledMerge {
+    pub pass: Merge,
+    /// What its shader was compiled for.
+    pub form: Form,
+    /// The fields as an image, where the variant samples one.
+    pub image: Option<Volume>,
+}
+
+impl CompiledMerge {
+    /// Compiles it for what [`usable`] returned.
+    ///
+    /// # Errors
+    /// As [`Merge::new`].
+    pub fn new(device: &Arc<Device>, library: &Library, (form, image): (Form, Option<Volume>)) -> Result<Self> {
+        Ok(CompiledMerge { pass: Merge::new(device, library, form)?, form, image })
+    }
+
+    /// Compiles its shader anew, from files that have changed.
+    ///
+    /// # Errors
+    /// As [`Merge::new`].
+    pub fn rebuild(&mut self, device: &Arc<Device>, library: &Library) -> Result<()> {
+        self.pass = Merge::new(device, library, self.form)?;
+        Ok(())
+    }
+}
 
 /// The form with its variant less the texel views or uniform blocks that cannot hold the scene.
 pub(super) fn usable(

@@ -2,7 +2,6 @@
 
 use super::Frame;
 use crate::gpu::Volume;
-use crate::lists::gathering::Gathering;
 use serde::Serialize;
 
 /// Bytes by use.
@@ -36,18 +35,15 @@ impl Memory {
 impl Frame {
     /// Memory that the scene takes now, meshes as read from their files apart.
     pub fn memory(&self) -> Memory {
-        let uploads = [&self.entities, &self.clusters, &self.entries, &self.sky];
         Memory {
-            fields: self.store.fields.size_bytes + self.image.as_ref().map_or(0, Volume::size_bytes),
+            fields: self.store.fields.size_bytes + self.merge.image.as_ref().map_or(0, Volume::size_bytes),
             transfers: self.store.transfers.size_bytes,
             vertices: self.store.vertices.size_bytes,
-            radiosity: self.radiosity.size_bytes,
+            radiosity: self.radiosity.merged.size_bytes,
             drawables: self.store.geometries.iter().map(|geometry| geometry.drawable.size_bytes()).sum(),
-            lists: uploads.iter().map(|upload| upload.all_bytes()).sum::<u64>()
-                + self.lines.size_bytes()
-                + self.gathering.as_ref().map_or(0, Gathering::size_bytes),
-            pictures: self.readback.size_bytes + self.draw.size_bytes(),
-            host_lists: self.lists.size_bytes(),
+            lists: self.work.size_bytes() + self.sky.coefficients.all_bytes() + self.picture.lines.size_bytes(),
+            pictures: self.picture.readback.size_bytes + self.picture.draw.size_bytes(),
+            host_lists: self.work.lists.size_bytes(),
         }
     }
 }

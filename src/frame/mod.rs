@@ -1,47 +1,50 @@
-//! A frame on one screen: upload, passes in order, the barriers between them.
+//! A scene on a device, lit and drawn again and again. [`record()`] is one frame from top to bottom: its passes in order, with all
+//! barriers between them. The other files prepare what those passes read.
 //!
 //! ```text
-//! placements -> entities, rotations, clusters to merge (host) -> gather (device or host) -> entries of every cluster -> merge -> radiosity -> draw -> picture -> read back
+//! placements -> what an entity is now (pose) -> clusters to merge and their lists (work) -+-> record -> window, image or file
+//!            -> what each viewport shows of it (viewport), outlines (picture) ------------+
 //! ```
 
 mod draw_twin;
 mod form;
-mod live;
 pub mod memory;
 mod picture;
 mod pose;
+mod radiosity;
+mod record;
+mod sky;
 mod twin;
+mod viewport;
+mod work;
 
-use crate::asset::edges::Edges;
 use crate::bake;
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
-use crate::draw::smooth::Lines;
-use crate::draw::{Antialias, Draw, Finish};
+use crate::draw::{Antialias, Draw};
 use crate::error::Result;
 use crate::field::Lookup;
-use crate::field::quantity::channel_stride;
-use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing, Upload, Volume};
-use crate::layout;
+use crate::gpu::{Commands, Device, Timing};
 use crate::lists::gather::Place;
 use crate::lists::gathering::Gathering;
 use crate::lists::incremental::{ClusterLists, Merged};
 use crate::lists::skip::Skip;
 use crate::merge::calibrate;
 use crate::merge::variant::{Chain, Form, Variant, uniform_entities};
-use crate::merge::{Inputs, Merge, Readable};
-use crate::scene::{Placement, Scene};
+use crate::merge::{Inputs, Readable};
+use crate::scene::{Camera, Placement, Scene};
 use crate::scene_buffers::{Progress, Store};
-use crate::sh::basis::{Y00, coefficient_count};
 use crate::shaders::Library;
 use ash::vk;
-use form::{form, usable};
-use glam::Vec3;
-use std::ops::Range;
+use form::{CompiledMerge, form, usable};
+use picture::Picture;
+use radiosity::Radiosity;
+use sky::Sky;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use work::ClusterWork;
 
-pub use live::{Lit, Part, is_cached};
+pub use record::{MergeWork, PictureWork, Target, record};
+pub use viewport::{RadiositySource, Viewport};
 
 /// What decides a frame besides the scene.
 #[derive(Clone, Copy, Debug)]
@@ -70,134 +73,61 @@ pub struct Options {
 /// A scene on a device, ready to be lit and drawn at any time.
 pub struct Frame {
     device: Arc<Device>,
+    library: Library,
     scene: Scene,
     options: Options,
     /// Baked and uploaded data.
     pub store: Store,
-    /// Variant in use.
-    pub variant: Variant,
-    form: Form,
-    /// Fields as the variant's sampler reads them.
-    image: Option<Volume>,
-    merge: Merge,
-    draw: Draw,
-    library: Library,
-    entities: Upload,
-    clusters: Upload,
-    entries: Upload,
-    sky: Upload,
-    radiosity: Buffer,
-    radiosity_offsets: Vec<u64>,
-    readback: Buffer,
-    lists: ClusterLists,
-    /// Where the device makes the lists.
-    gathering: Option<Gathering>,
-    /// What the last frame did about its clusters.
-    pub merged: Merged,
-    /// Whether the merge that was prepared last was recorded.
-    recorded: AtomicBool,
-    /// Largest radiance of the sky as projected, of any colour.
-    sky_radiance: f64,
-    background: Vec3,
-    /// Radiosity from elsewhere that is shown beside the merged one or in its place.
-    panels: [Option<Buffer>; 2],
-    /// Outlines and creases of the picture that was prepared last, and which of them belong to each of its parts.
-    lines: Lines,
-    line_ranges: Vec<Range<u32>>,
-    /// Edges of each mesh, once a picture wants its outlines.
-    edges: Vec<Edges>,
+    merge: CompiledMerge,
+    work: ClusterWork,
+    sky: Sky,
+    radiosity: Radiosity,
+    picture: Picture,
 }
 
 impl Frame {
     /// Bakes or finds what the scene needs and builds the passes.
     ///
     /// # Errors
-    /// As [`Store::new`], [`Merge::new`] and [`Draw::new`]; `Usage` as [`crate::merge::variant::Product::check`].
+    /// As [`Store::new`], [`crate::merge::Merge::new`] and [`Draw::new`]; `Usage` as [`crate::merge::variant::Product::check`].
     pub fn new(baker: &Baker, cache: &Cache, scene: &Scene, options: Options, progress: Progress<'_>) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
         options.chain.product.check(options.bake.bands, options.bake.occlusion_bands())?;
         let store = Store::new(baker, cache, scene, &options.bake, options.skip, progress)?;
+        let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
-        let (form, image) =
-            usable(device, &store, scene.entities.len(), form(&options, wanted, uniform_entities(device)))?;
-        let (variant, entity_limit) = (form.variant, form.entity_limit);
+        let wanted = form(&options, wanted, uniform_entities(device));
+        let merge = CompiledMerge::new(device, library, usable(device, &store, entity_count, wanted)?)?;
 
-        let mut radiosity_offsets = Vec::new();
-        let (mut radiosity_size, mut lists) = (0, ClusterLists::default());
-        for (index, entity) in scene.entities.iter().enumerate() {
+        let radiosity = Radiosity::new(device, scene, &store)?;
+        let mut lists = ClusterLists::default();
+        for (index, entity) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
             let geometry = &store.geometries[entity.mesh];
-            radiosity_offsets.push(radiosity_size);
-            if entity.receives {
-                lists.add(index, pose::clusters(index, geometry, radiosity_size / 16, options.bake.bands));
-            }
-            radiosity_size += 16 * geometry.vertices.len() as u64;
+            lists.add(index, pose::clusters(index, geometry, radiosity.offsets[index] / 16, options.bake.bands));
         }
-        let merge = Merge::new(device, library, form)?;
-        let gathers = options.lists.unwrap_or_else(|| Place::quicker(device, scene.entities.len())) == Place::Device
-            && !lists.clusters.is_empty();
-        let gathering = gathers.then(|| Gathering::new(device, library, &lists, scene.entities.len())).transpose()?;
-        let draw = Draw::new(device, library, options.size, options.antialias, Finish::Linear)?;
-        let count = scene.entities.len().max(entity_limit as usize) as u64;
-        let upload = |name: &str, bytes: u64| Upload::new(device, name, bytes);
-        let bands = options.bake.bands;
-        let mut radiosity = Buffer::new(device, "radiosity", BufferKind::Device, radiosity_size.max(16))?;
-        radiosity.fill(0, &vec![0.0_f32; radiosity.size_bytes as usize / 4])?;
-        let mut frame = Frame {
+        let place = options.lists.unwrap_or_else(|| Place::quicker(device, entity_count));
+        let gathers = place == Place::Device && !lists.clusters.is_empty();
+        let gathering = gathers.then(|| Gathering::new(device, library, &lists, entity_count)).transpose()?;
+        let entity_room = entity_count.max(merge.form.entity_limit as usize);
+        let mut sky = Sky::new(device, options.bake.bands)?;
+        sky.write(scene, options.bake.bands)?;
+        Ok(Frame {
             device: device.clone(),
+            library: library.clone(),
             scene: scene.clone(),
             options,
-            variant,
-            form,
-            image,
             merge,
-            draw,
-            library: library.clone(),
-            panels: Default::default(),
-            lines: Lines::new(device)?,
-            line_ranges: Vec::new(),
-            edges: Vec::new(),
-            entities: upload("entities", count * size_of::<layout::Entity>() as u64)?,
-            clusters: upload("clusters", (lists.clusters.len() * size_of::<layout::Cluster>()) as u64)?,
-            entries: upload("entries", 4 * lists.clusters.len() as u64)?,
-            sky: upload("sky", 12 * channel_stride(bands) as u64)?,
+            work: ClusterWork::new(device, lists, gathering, entity_room)?,
+            sky,
             radiosity,
-            radiosity_offsets,
-            readback: Buffer::new(
-                device,
-                "readback",
-                BufferKind::Readback,
-                8 * u64::from(options.size[0]) * u64::from(options.size[1]),
-            )?,
-            lists,
-            gathering,
-            merged: Merged::default(),
-            recorded: AtomicBool::new(true),
-            sky_radiance: 0.0,
-            background: Vec3::ZERO,
+            picture: Picture::new(device, library, &options)?,
             store,
-        };
-        frame.write_sky()?;
-        Ok(frame)
-    }
-
-    /// Writes the sky's coefficients and takes the background from them.
-    fn write_sky(&mut self) -> Result<()> {
-        let bands = self.options.bake.bands;
-        let channels = self.scene.environment.coefficients(bands);
-        let stride = channel_stride(bands);
-        let mut floats = vec![0.0_f32; 3 * stride];
-        for (to, from) in floats.chunks_exact_mut(stride).zip(&channels) {
-            to.iter_mut().zip(&from[..coefficient_count(bands)]).for_each(|(to, from)| *to = *from as f32);
-        }
-        self.sky_radiance = pose::brightest(&channels, bands);
-        self.background = Vec3::from_array(channels.map(|c| (c[0] * Y00) as f32));
-        self.lists.renew();
-        self.sky.write(&floats)
+        })
     }
 
     /// Lights every receiver as far as anything has changed since the last call, and draws the picture where `white` is given:
     /// radiance above it is brought down to it, hue kept, before samples are averaged, so that edges of lights are smooth;
-    /// infinity leaves radiance as it is. Returns each pass's duration.
+    /// infinity leaves radiance as it is. The host can read the picture afterwards. Returns each pass's duration.
     ///
     /// While things move a picture lights only what it may show ([`Skip::hidden`]): whoever wants radiosity rather than a picture
     /// calls this without `white`, which lights everything.
@@ -205,65 +135,135 @@ impl Frame {
     /// # Errors
     /// `Device` when the device was lost, `Failed` when a barrier is missing.
     pub fn render(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
-        let outcome = self.light_and_draw(placements, white);
+        self.light_and_draw(placements, white, true)
+    }
+
+    /// As [`Frame::render`] with a picture that stays on the device, where a window would show it.
+    ///
+    /// # Errors
+    /// As [`Frame::render`].
+    pub fn show(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
+        self.light_and_draw(placements, Some(white), false)
+    }
+
+    fn light_and_draw(&mut self, placements: &[Placement], white: Option<f32>, reads: bool) -> Result<Vec<Timing>> {
+        let outcome = self.try_light_and_draw(placements, white, reads);
         if outcome.is_err() {
             // Perhaps nothing ran: no cluster can be taken for merged.
-            self.lists.forget();
+            self.forget();
         }
         outcome
     }
 
-    fn light_and_draw(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
-        let parts: &[Part] = if white.is_some() { &[self.whole(Lit::Merged)] } else { &[] };
+    fn try_light_and_draw(&mut self, placements: &[Placement], white: Option<f32>, reads: bool) -> Result<Vec<Timing>> {
+        let viewports: &[Viewport] = if white.is_some() { &[self.whole()] } else { &[] };
         if white.is_some() {
-            self.prepare_picture(placements, parts)?;
+            self.prepare_picture(placements, viewports)?;
         }
         loop {
-            self.upload(placements, parts)?;
-            let items = self.items(placements, self.options.size);
-            let mut commands = Commands::new(&self.device, "frame")?;
-            self.record_merge(&mut commands)?;
-            if let Some(white) = white {
-                if self.merged.merged_clusters > 0 {
-                    commands.barrier(Access::ComputeWrite, Access::VertexRead);
-                    commands.barrier(Access::ComputeWrite, Access::FragmentSampled);
-                }
-                self.record_file(&mut commands, &items, self.background, white)?;
-            }
-            let timings = commands.submit()?;
-            if self.all_gathered() {
+            self.prepare_light(placements, viewports)?;
+            let picture = white.map(|white| self.picture_work(placements, white));
+            let timings = self.run(self.merge_work()?.as_ref(), picture.as_ref(), reads)?;
+            drop(picture);
+            if self.work.all_gathered() {
                 return Ok(timings);
             }
         }
     }
 
-    /// The passes that bring light to the clusters of the last upload; nothing where there are none.
-    fn record_merge<'f>(&'f self, commands: &mut Commands<'f>) -> Result<()> {
-        let cluster_count = self.merged.merged_clusters as u32;
-        if cluster_count == 0 {
-            return Ok(());
-        }
-        if let Some(gathering) = &self.gathering {
-            gathering.record(commands, &self.entities, &self.clusters)?;
-        }
-        let inputs = self.inputs()?;
-        commands.pass("merge", |c| self.merge.record(c, &inputs, &self.radiosity, cluster_count))
+    /// Draws the picture from the radiosity as it stands, the last merge's or what [`Frame::set_radiosity`] put there.
+    ///
+    /// # Errors
+    /// As [`Frame::render`].
+    pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
+        self.prepare_picture(placements, &[self.whole()])?;
+        self.run(None, Some(&self.picture_work(placements, white)), true)
     }
 
-    /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what was computed elsewhere.
+    /// As [`Frame::redraw`] for numbers that are no light: nothing shines, nothing is brought down, and the background is given.
+    ///
+    /// # Errors
+    /// As [`Frame::render`].
+    pub fn redraw_unlit(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
+        self.prepare_picture(placements, &[Viewport { adds_emission: false, ..self.whole() }])?;
+        let picture = self.picture_work(placements, f32::INFINITY);
+        self.run(None, Some(&PictureWork { background: background.into(), ..picture }), true)
+    }
+
+    /// Records a frame for a file or a bench, and waits for its end. The picture, if there is one, is read back where `reads` says so.
+    fn run<'f>(
+        &'f self,
+        merge: Option<&MergeWork<'f>>,
+        picture: Option<&PictureWork<'f>>,
+        reads: bool,
+    ) -> Result<Vec<Timing>> {
+        let host = Target::Host { picture: self.shown(), readback: &self.picture.readback };
+        let target = if reads && picture.is_some() { host } else { Target::Device };
+        let mut commands = Commands::new(&self.device, "frame")?;
+        record(&mut commands, merge, picture, target)?;
+        commands.submit()
+    }
+
+    /// Writes what the next merge reads, in buffers of that flight's own. While things move only what may be seen in `viewports`
+    /// that show merged light is merged. Where there are none, or nothing has changed since the last call, everything is merged
+    /// that is not merged yet. The merge has to be recorded next, or every cluster is merged again.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn prepare_light(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
+        let (state, sights) = (self.state(placements), self.sights(placements, viewports));
+        self.work.prepare(state, sights.as_deref())
+    }
+
+    /// What [`record()`] needs to do the merge that [`Frame::prepare_light`] has prepared; `None` where no cluster has changed. When
+    /// the recording does not run, call [`Frame::forget`].
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn merge_work(&self) -> Result<Option<MergeWork<'_>>> {
+        let cluster_count = self.work.start();
+        if cluster_count == 0 {
+            return Ok(None);
+        }
+        Ok(Some(MergeWork {
+            gathering: self.work.gathering(),
+            entities: &self.work.entities,
+            clusters: &self.work.clusters,
+            cluster_count,
+            inputs: self.inputs()?,
+            merge: &self.merge.pass,
+            radiosity: &self.radiosity.merged,
+        }))
+    }
+
+    fn inputs(&self) -> Result<Inputs<'_>> {
+        let floats = vk::Format::R32G32B32A32_SFLOAT;
+        let CompiledMerge { form, image, .. } = &self.merge;
+        Ok(Inputs {
+            entities: Readable::shared(&self.work.entities, form.variant)?,
+            entries: self.work.entries(),
+            clusters: &self.work.clusters,
+            fields: Readable::fields(&self.store.fields, image.as_ref(), form)?,
+            transfers: Readable::new(&self.store.transfers, form.variant, floats)?,
+            vertices: Readable::new(&self.store.vertices, form.variant, floats)?,
+            sky: Readable::new(&self.sky.coefficients, form.variant, floats)?,
+        })
+    }
+
+    /// Order in which an entity's vertices are stored.
+    fn order(&self, entity: usize) -> &[u32] {
+        &self.store.geometries[self.scene.entities[entity].mesh].order
+    }
+
+    /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what was computed
+    /// elsewhere.
     ///
     /// # Errors
     /// `Device` when memory ran out.
     pub fn set_radiosity(&mut self, entity: usize, radiosity: &[[f32; 3]]) -> Result<()> {
-        self.lists.forget();
+        self.forget();
         let order = &self.store.geometries[self.scene.entities[entity].mesh].order;
-        assert_eq!(radiosity.len(), order.len(), "radiosity of entity {entity}");
-        let quad = |&v: &u32| {
-            let [r, g, b] = radiosity[v as usize];
-            [r, g, b, 0.0]
-        };
-        let quads: Vec<[f32; 4]> = order.iter().map(quad).collect();
-        self.radiosity.fill(self.radiosity_offsets[entity], &quads)
+        self.radiosity.write(entity, order, radiosity)
     }
 
     /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without emission;
@@ -273,15 +273,18 @@ impl Frame {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn radiosity(&self, entity: usize) -> Result<Vec<[f32; 3]>> {
-        let first = self.radiosity_offsets[entity];
-        let count = self.store.geometries[self.scene.entities[entity].mesh].vertices.len() as u64;
-        let quads: Vec<[f32; 4]> = self.radiosity.download_range(first..first + 16 * count)?;
-        let mut out = vec![[0.0; 3]; quads.len()];
-        let order = &self.store.geometries[self.scene.entities[entity].mesh].order;
-        for (&v, [r, g, b, _]) in order.iter().zip(quads) {
-            out[v as usize] = [r, g, b];
-        }
-        Ok(out)
+        self.radiosity.read(entity, self.order(entity))
+    }
+
+    /// Radiosity of every entity's vertices from elsewhere, by entity in the mesh's order, for [`RadiositySource::Comparison`] of
+    /// that place: 0 or 1. Entities that are not named are `rest`.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn set_comparison(&mut self, place: usize, radiosity: &[(usize, Vec<[f32; 3]>)], rest: [f32; 3]) -> Result<()> {
+        let order = |entity: usize| &self.store.geometries[self.scene.entities[entity].mesh].order[..];
+        let entities = radiosity.iter().map(|(entity, values)| (*entity, order(*entity), &values[..]));
+        self.radiosity.compare(place, entities, rest)
     }
 
     /// The scene that the frame was built for.
@@ -294,31 +297,109 @@ impl Frame {
         self.options.size
     }
 
+    /// The variant that it merges by.
+    pub fn variant(&self) -> Variant {
+        self.merge.form.variant
+    }
+
+    /// What its merge was compiled for.
+    pub fn form(&self) -> Form {
+        self.merge.form
+    }
+
+    /// What the last frame did about its clusters.
+    pub fn merged(&self) -> Merged {
+        self.work.merged
+    }
+
     /// Vertices that are lit.
     pub fn receiver_vertex_count(&self) -> usize {
-        self.lists.clusters.iter().map(|cluster| cluster.vertex_count as usize).sum()
+        self.work.lists.clusters.iter().map(|cluster| cluster.vertex_count as usize).sum()
     }
 
     /// Clusters whose light is of an earlier moment, as no picture since then showed them.
     pub fn stale_count(&self) -> usize {
-        self.lists.stale_count()
+        self.work.lists.stale_count()
     }
 
     /// Merges every cluster in the next frame, moved or not.
     pub fn forget(&mut self) {
-        self.lists.forget();
+        self.work.lists.forget();
     }
 
-    fn inputs(&self) -> Result<Inputs<'_>> {
-        let floats = vk::Format::R32G32B32A32_SFLOAT;
-        Ok(Inputs {
-            entities: Readable::shared(&self.entities, self.variant)?,
-            entries: self.gathering.as_ref().and_then(Gathering::entries).unwrap_or(&self.entries),
-            clusters: &self.clusters,
-            fields: Readable::fields(&self.store.fields, self.image.as_ref(), &self.form)?,
-            transfers: Readable::new(&self.store.transfers, self.variant, floats)?,
-            vertices: Readable::new(&self.store.vertices, self.variant, floats)?,
-            sky: Readable::new(&self.sky, self.variant, floats)?,
-        })
+    /// Whether the fields that `scene` needs are here; it has the meshes and entities that this frame was made for.
+    pub fn covers(&self, scene: &Scene) -> bool {
+        self.store.covers(scene)
     }
+
+    /// Takes over lights, switches, sky and camera of a scene that has the meshes and receivers that this frame was made for.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    ///
+    /// # Panics
+    /// When entities or receivers are others.
+    pub fn set_scene(&mut self, scene: &Scene) -> Result<()> {
+        let receivers = |scene: &Scene| scene.entities.iter().map(|e| (e.mesh, e.receives)).collect::<Vec<_>>();
+        assert_eq!(receivers(scene), receivers(&self.scene), "another scene needs another frame");
+        let sky = scene.data.environment != self.scene.data.environment;
+        self.scene = scene.clone();
+        if sky {
+            self.work.lists.renew();
+            self.sky.write(scene, self.options.bake.bands)?;
+        }
+        Ok(())
+    }
+
+    /// Sees the scene from elsewhere from now on.
+    pub fn set_camera(&mut self, camera: &Camera) {
+        self.scene.data.camera = camera.clone();
+    }
+
+    /// Draws at most so many triangles in one render pass from now on, see [`Draw::batch_triangles`]; at least one.
+    pub fn set_batch(&mut self, triangles: u32) {
+        self.picture.draw.batch_triangles = triangles.max(1);
+    }
+
+    /// Merges by another variant from now on; `None` is the device's fastest.
+    ///
+    /// # Errors
+    /// `Failed` when its shader does not compile.
+    pub fn set_variant(&mut self, variant: Option<Variant>) -> Result<()> {
+        let variant = variant.unwrap_or_else(|| calibrate::best_known(&self.device));
+        let wanted = Form { variant, ..self.merge.form };
+        let usable = usable(&self.device, &self.store, self.scene.entities.len(), wanted)?;
+        if usable.0 != self.merge.form {
+            self.merge = CompiledMerge::new(&self.device, &self.library, usable)?;
+            self.forget();
+        }
+        Ok(())
+    }
+
+    /// Builds anew what is made from any of the shader files named. What does not compile stays as it was.
+    ///
+    /// # Errors
+    /// `Failed` with the compiler's lines.
+    pub fn reload(&mut self, changed: &[String]) -> Result<()> {
+        let uses = |entry: &str| self.library.files(entry).iter().any(|file| changed.contains(file));
+        let drawing = ["draw.vert", "draw.frag", "grid.vert", "grid.frag", "smooth.vert", "smooth.frag"];
+        let [draws, gathers, merges] = [drawing.into_iter().any(uses), uses("gather.comp"), uses("merge.comp")];
+        if draws {
+            let (Options { size, antialias, .. }, finish) = (self.options, self.picture.draw.finish());
+            self.picture.draw = Draw::new(&self.device, &self.library, size, antialias, finish)?;
+        }
+        if gathers {
+            self.work.rebuild(&self.library, self.scene.entities.len())?;
+        }
+        if merges {
+            self.merge.rebuild(&self.device, &self.library)?;
+            self.forget();
+        }
+        Ok(())
+    }
+}
+
+/// Whether a scene's fields and transfers are all in the cache, so that its frame is there at once.
+pub fn is_cached(cache: &Cache, scene: &Scene, options: &crate::bake::Options) -> bool {
+    Store::is_cached(cache, scene, options)
 }

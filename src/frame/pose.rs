@@ -1,18 +1,14 @@
 //! What an entity is to the merge at a moment: its place, rotation and light, and the entries of every cluster.
 
 use super::Frame;
-use super::live::{Lit, Part};
-use crate::error::Result;
 use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::lists::gather::{Bounds, EntityBounds, Report, SceneBounds};
-use crate::lists::gathering::Gathering;
-use crate::lists::incremental::{Dirty, Member, Merged, State};
-use crate::lists::sight::{Faces, Sight};
+use crate::lists::gather::{Bounds, EntityBounds, SceneBounds};
+use crate::lists::incremental::{Member, State};
+use crate::lists::sight::Faces;
 use crate::scene::Placement;
-use crate::scene_buffers::limits;
 use crate::scene_buffers::{self, Slot};
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use crate::sh::cube::{self, FACE_COUNT, texel_st};
@@ -21,79 +17,12 @@ use glam::DVec3;
 use std::f64::consts::PI;
 
 impl Frame {
-    /// Writes what has changed for the merge at this moment: clusters to light, their entries, and all entities. Where merged light
-    /// is shown in `parts` of the picture, only what they may show has to be lit.
-    pub(super) fn upload(&mut self, placements: &[Placement], parts: &[Part]) -> Result<()> {
-        let sights = self.sights(placements, parts);
-        let dirty = self.lists.update(self.state(placements), sights.as_deref());
-        let merged_clusters = dirty.iter().map(Dirty::cluster_count).sum();
-        let stale_clusters = self.lists.stale_count();
-        self.merged = Merged { clusters: self.lists.clusters.len(), merged_clusters, stale_clusters, ..self.merged };
-        if dirty.is_empty() {
-            self.merged.merged_entries = 0;
-            return Ok(());
-        }
-        self.entities.write(&self.lists.now().entities)?;
-        if let Some(gathering) = &mut self.gathering
-            && let Some(clusters) = gathering.prepare(&self.lists, &dirty)?
-        {
-            return self.clusters.write(&clusters);
-        }
-        let (clusters, entries) = self.lists.gather(&dirty);
-        if self.device.info.is_software() {
-            limits::check_entries(clusters.iter().map(|cluster| cluster.entry_count).max().unwrap_or(0))?;
-        }
-        self.merged.merged_entries = entries.len();
-        self.entries.write(&entries)?;
-        self.clusters.write(&clusters)
-    }
-
-    /// Whether every list of the last frame was as long as it had to be, now that all that was submitted has ended; otherwise the
-    /// next upload takes every cluster.
-    pub(super) fn all_gathered(&mut self) -> bool {
-        if self.merged.merged_clusters == 0 {
-            return true;
-        }
-        let report = self.gathering.as_mut().and_then(Gathering::report);
-        !report.is_some_and(|report| self.heed(&report))
-    }
-
-    /// Goes on to the next frame of a window: where lists were lost two frames ago, every cluster is merged again.
-    pub(super) fn heed_report(&mut self) {
-        if let Some(report) = self.gathering.as_mut().and_then(Gathering::next_frame) {
-            self.heed(&report);
-        }
-    }
-
-    fn heed(&mut self, report: &Report) -> bool {
-        self.merged.merged_entries = report.entry_total as usize;
-        let lost = self.gathering.as_mut().is_some_and(|gathering| gathering.lost(report));
-        if lost {
-            self.lists.forget();
-        }
-        lost
-    }
-
-    /// How each entity is seen in each of the parts that show merged light; `None` where there is none, and light is for others to read.
-    fn sights(&self, placements: &[Placement], parts: &[Part]) -> Option<Vec<Vec<Sight>>> {
-        let shown = parts.iter().filter(|part| part.lit == Lit::Merged);
-        let cameras: Vec<_> = shown.map(|part| self.camera([part.area[2], part.area[3]])).collect();
-        let of = |(index, placement)| cameras.iter().map(|camera| self.sight(camera, index, placement)).collect();
-        (!cameras.is_empty()).then(|| placements.iter().enumerate().map(of).collect())
-    }
-
-    /// Clusters that the camera does not see in the whole picture.
-    pub(super) fn hidden_count(&self, placements: &[Placement]) -> usize {
-        let sights = self.sights(placements, &[self.whole(Lit::Merged)]);
-        sights.map_or(0, |sights| self.lists.hidden_count(&sights))
-    }
-
     /// All that lists and merge depend on at this moment.
     pub(super) fn state(&self, placements: &[Placement]) -> State {
         let bounds: Vec<EntityBounds> =
             placements.iter().enumerate().map(|(index, p)| self.entity_bounds(index, p)).collect();
         let white = f64::from(-self.scene.data.output.exposure_ev).exp2();
-        let sky = (!self.scene.environment.is_none()).then_some(self.sky_radiance);
+        let sky = (!self.scene.environment.is_none()).then_some(self.sky.brightest);
         let eps = f64::from(self.options.eps) * white;
         State {
             entities: placements.iter().enumerate().map(|(index, p)| self.entity(index, p)).collect(),
@@ -139,7 +68,7 @@ impl Frame {
             Some(slot) if entity.emits => entity.emission * slot.header.radiance_scale,
             _ => entity.emission,
         };
-        let base = |slot: &Slot| if self.image.is_some() { slot.channel } else { slot.quad() };
+        let base = |slot: &Slot| if self.merge.image.is_some() { slot.channel } else { slot.quad() };
         let slot = geometry.blocked.as_ref().or(geometry.radiance.as_ref());
         // Both fields of a mesh have the same shells.
         let radial = slot.map_or([0.0; 4], |slot| {

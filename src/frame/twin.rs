@@ -31,13 +31,13 @@ impl Frame {
             },
             hidden: if self.options.skip.hidden { self.hidden_count(placements) as u64 } else { 0 },
             undrawn: self.undrawn_count(placements) as u64,
-            ..self.lists.counts(&self.state(placements))
+            ..self.work.lists.counts(&self.state(placements))
         }
     }
 
     /// Entities that stand on the list of any cluster of a receiver at this moment.
     pub fn listed(&self, placements: &[Placement], receiver: usize) -> BTreeSet<usize> {
-        self.lists.entities_on(&self.state(placements), receiver)
+        self.work.lists.entities_on(&self.state(placements), receiver)
     }
 
     /// The CPU twin of the merge in f64: radiosity of every receiver's vertices, by entity. Reads the fields back.

@@ -2,7 +2,7 @@
 //! next frame merges again with more room, or with lists that the host makes.
 
 use crate::error::Result;
-use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, FLIGHTS, Upload};
+use crate::gpu::{Buffer, BufferKind, Commands, Device, FLIGHTS, Upload};
 use crate::lists::gather::{Gather, Inputs, Packed, Report};
 use crate::lists::incremental::{ClusterLists, Dirty};
 use crate::shaders::Library;
@@ -91,7 +91,7 @@ impl Gathering {
         self.packed.as_ref().map(|_| &self.entries)
     }
 
-    /// Records the pass, if the frame gathers, and makes its lists known to the merge.
+    /// Records the pass for a frame that gathers. The merge then reads the lists, and the host the report.
     ///
     /// # Errors
     /// As [`Gather::record`].
@@ -106,10 +106,7 @@ impl Gathering {
             entries: &self.entries,
             report: &self.report,
         };
-        commands.pass("gather", |c| self.pass.record(c, &inputs, packed, *capacity, *group_count))?;
-        commands.barrier(Access::ComputeWrite, Access::ComputeRead);
-        commands.barrier(Access::ComputeWrite, Access::HostRead);
-        Ok(())
+        self.pass.record(commands, &inputs, packed, *capacity, *group_count)
     }
 
     /// Goes on to the next frame of a window: what the flight before the last one reported, if it gathered. It has ended.

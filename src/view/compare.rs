@@ -19,7 +19,7 @@ impl Viewer {
         }
         if let Some(found) = self.rays.as_ref().and_then(|rays| rays.results().pop()) {
             let frame = self.frame.as_mut().expect("checked above");
-            frame.set_panel(REFERENCE, &found.radiosity, [0.0; 3])?;
+            frame.set_comparison(REFERENCE, &found.radiosity, [0.0; 3])?;
             self.reference = Some(found);
             self.pending |= Changed { display: true, ..Changed::default() };
         }
@@ -60,7 +60,7 @@ impl Viewer {
         }
         let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference.radiosity, Scheme::Signed);
         let scale = map.scale();
-        frame.set_panel(ERROR, &map.colors(&scale), NEUTRAL)?;
+        frame.set_comparison(ERROR, &map.colors(&scale), NEUTRAL)?;
         let shown = panel::ErrorScale { rms: map.rms(), limit: scale.limit };
         self.error_shown = Some((self.version, reference.rays, shown));
         self.pending |= Changed { display: true, ..Changed::default() };

@@ -7,8 +7,8 @@ use crate::asset::edges::Edges;
 use crate::asset::picture;
 use crate::draw::camera::clip_from_world;
 use crate::error::{Error, Result};
-use crate::frame::{Lit, Part};
-use crate::gpu::{Access, Commands, FLIGHTS, Image, Target, Window};
+use crate::frame::{self, RadiositySource, Viewport, record};
+use crate::gpu::{Access, Commands, FLIGHTS, Image, Window};
 use glam::DVec2;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -61,46 +61,41 @@ impl Viewer {
         };
         let size = [target.shape.width, target.shape.height];
         let resized = self.frame.as_ref().is_some_and(|frame| frame.size() != size);
-        let parts = self.parts(size);
+        let viewports = self.viewports(size);
         let placements = self.editor.placements();
         let white = (-self.editor.exposure_ev()).exp2();
         let pending = std::mem::take(&mut self.pending);
         // Clusters that were hidden during motion are lit when motion has ended.
         let stale = self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0);
         let light = pending.light() || pending.variant || stale;
+        let draws = pending.any() || resized;
         if let Some(frame) = &mut self.frame {
             frame.resize(size)?;
             if light {
                 // The error needs all clusters, not only the visible ones.
-                frame.prepare(&placements, if self.editor.shows_error() { &[] } else { &parts })?;
+                frame.prepare_light(&placements, if self.editor.shows_error() { &[] } else { &viewports })?;
             }
-            if pending.any() || resized {
-                frame.prepare_picture(&placements, &parts)?;
-            }
-        }
-        let mut commands = Commands::new(&self.setup.device, "frame")?;
-        commands.after_flights();
-        if let Some(frame) = &self.frame {
-            if light {
-                frame.record_light(&mut commands)?;
-            }
-            if pending.any() || resized {
-                frame.record_picture(&mut commands, &placements, &parts, white)?;
+            if draws {
+                frame.prepare_picture(&placements, &viewports)?;
             }
         }
-        commands.image_barrier(target, None, Access::ColorWrite);
-        let (frame, show, overlay, paint) = (&self.frame, &self.show, &mut self.overlay, &self.paint);
-        let color = Target { color: target, clear: Some([0.02, 0.02, 0.025, 1.0]), depth: None, resolve: None };
-        commands.pass("show", |c| {
-            c.render(&color, |drawing| {
+        let (frame, show, overlay, paint) = (self.frame.as_ref(), &self.show, &mut self.overlay, &self.paint);
+        let merge = frame.filter(|_| light).map_or(Ok(None), |frame| frame.merge_work())?;
+        let picture = frame.filter(|_| draws).map(|frame| frame.picture_work(&placements, white));
+        let mut overlay = Some(overlay);
+        let screen = frame::Target::Screen {
+            image: target,
+            clear: [0.02, 0.02, 0.025, 1.0],
+            show: &mut |drawing| {
                 if let Some(frame) = frame {
                     show.record(drawing, frame.shown(), white)?;
                 }
-                drawing.overlay(overlay, target, paint)
-            })
-        })?;
-        let after = if shot.is_some() { Access::Present } else { Access::TransferRead };
-        commands.image_barrier(target, Some(Access::ColorWrite), after);
+                overlay.take().map_or(Ok(()), |overlay| drawing.overlay(overlay, target, paint))
+            },
+            next: if shot.is_some() { Access::Present } else { Access::TransferRead },
+        };
+        let mut commands = Commands::new(&self.setup.device, "frame")?;
+        record(&mut commands, merge.as_ref(), picture.as_ref(), screen)?;
         let flight = match (canvas, &shot) {
             (FrameTarget::Window(window), Some(shot)) => window.present(commands, shot)?,
             _ => commands.launch()?,
@@ -137,19 +132,19 @@ impl Viewer {
         Ok(())
     }
 
-    /// Viewports of the picture: the merged picture or its error, and the reference to the right.
-    pub(super) fn parts(&self, [width, height]: [u32; 2]) -> Vec<Part> {
-        let error = self.editor.shows_error() && self.error_shown.is_some();
-        let own = if error { Lit::Colors(ERROR) } else { Lit::Merged };
-        if !self.editor.shows_reference() {
-            return vec![Part { area: [0, 0, width, height], lit: own }];
+    /// Viewports of the picture: the merged light or its error, and the reference on the right of it.
+    fn viewports(&self, [width, height]: [u32; 2]) -> Vec<Viewport> {
+        let [own_width, _] = self.own_size_of([width, height]);
+        let mut own = Viewport::merged([0, 0, own_width, height]);
+        if self.editor.shows_error() && self.error_shown.is_some() {
+            own = Viewport { radiosity: RadiositySource::Comparison(ERROR), adds_emission: false, ..own };
         }
-        let [half, _] = self.pane_of([width, height]);
-        let mut parts = vec![Part { area: [0, 0, half, height], lit: own }];
-        if self.reference.is_some() && width > half {
-            parts.push(Part { area: [half, 0, width - half, height], lit: Lit::Panel(REFERENCE) });
+        let mut viewports = vec![own];
+        if self.editor.shows_reference() && self.reference.is_some() && width > own_width {
+            let right = Viewport::merged([own_width, 0, width - own_width, height]);
+            viewports.push(Viewport { radiosity: RadiositySource::Comparison(REFERENCE), ..right });
         }
-        parts
+        viewports
     }
 
     /// Writes the picture beside the saved scene, at full quality and without the overlay.

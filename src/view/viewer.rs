@@ -237,13 +237,13 @@ impl Viewer {
         let command = match command {
             Command::Resize(size) => {
                 self.size = if size.contains(&0) { self.size } else { size };
-                Command::Resize(self.pane())
+                Command::Resize(self.own_size())
             }
             other => other,
         };
         let Effect { mut changed, request, message } = self.editor.apply(command);
         if command == Command::ToggleReference {
-            changed |= self.editor.apply(Command::Resize(self.pane())).changed;
+            changed |= self.editor.apply(Command::Resize(self.own_size())).changed;
         }
         self.say(message);
         self.follow(changed)?;
@@ -254,7 +254,7 @@ impl Viewer {
                 let path = self.editor.save_path();
                 self.editor.apply(Command::Resize(self.size));
                 let outcome = self.editor.save(&path).map(|()| format!("wrote {}", path.display()));
-                self.editor.apply(Command::Resize(self.pane()));
+                self.editor.apply(Command::Resize(self.own_size()));
                 self.say(Some(outcome.unwrap_or_else(|error| error.to_string())));
             }
             Some(Request::Screenshot) => {
@@ -337,12 +337,13 @@ impl Viewer {
         Ok(output.platform_output)
     }
 
-    /// Size in pixels of the merged picture: the window's, or half of it beside a reference.
-    pub(super) fn pane(&self) -> [u32; 2] {
-        self.pane_of(self.size)
+    /// Size of the viewport that shows the merged picture: the window's left half beside a reference.
+    fn own_size(&self) -> [u32; 2] {
+        self.own_size_of(self.size)
     }
 
-    pub(super) fn pane_of(&self, [width, height]: [u32; 2]) -> [u32; 2] {
+    /// The same in a window of another size.
+    pub(super) fn own_size_of(&self, [width, height]: [u32; 2]) -> [u32; 2] {
         [if self.editor.shows_reference() { (width / 2).max(1) } else { width }, height]
     }
 
@@ -374,9 +375,9 @@ impl Viewer {
             size: self.size,
             timings: &self.timings,
             counts: self.counts.as_ref().map(|(_, counts)| *counts),
-            merged: self.frame.as_ref().map(|f| (f.merged.merged_clusters, f.merged.clusters)),
+            merged: self.frame.as_ref().map(|f| (f.merged().merged_clusters, f.merged().clusters)),
             vertices: self.frame.as_ref().map_or(0, Frame::receiver_vertex_count),
-            variant: self.frame.as_ref().map(|frame| frame.variant.name),
+            variant: self.frame.as_ref().map(|frame| frame.variant().name),
             bake: self.bake.as_ref().map(BackgroundTask::progress),
             rays: self.rays.as_ref().filter(|rays| rays.is_running()).map(BackgroundTask::progress),
             reference: self.reference.as_ref().map(|r| (r.rays, r.error, r.version == self.version)),

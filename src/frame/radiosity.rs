@@ -1,0 +1,98 @@
+//! Radiosity of all vertices: what the merge writes, and what comes from elsewhere to be compared with it.
+
+use super::viewport::RadiositySource;
+use crate::error::Result;
+use crate::gpu::{Buffer, BufferKind, Device};
+use crate::scene::Scene;
+use crate::scene_buffers::Store;
+use std::sync::Arc;
+
+/// Four floats a vertex: linear RGB radiance that leaves the surface, and 0. The vertices of one entity follow those of another, each
+/// in the order of its mesh's [`crate::scene_buffers::Geometry`].
+pub(super) struct Radiosity {
+    /// What the merge writes.
+    pub merged: Buffer,
+    /// The first byte of each entity.
+    pub offsets: Vec<u64>,
+    comparisons: [Option<Buffer>; 2],
+}
+
+impl Radiosity {
+    /// Zero for every vertex of a scene.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn new(device: &Arc<Device>, scene: &Scene, store: &Store) -> Result<Self> {
+        let (mut offsets, mut size_bytes) = (Vec::new(), 0);
+        for entity in &scene.entities {
+            offsets.push(size_bytes);
+            size_bytes += 16 * store.geometries[entity.mesh].vertices.len() as u64;
+        }
+        let mut merged = Buffer::new(device, "radiosity", BufferKind::Device, size_bytes.max(16))?;
+        merged.fill(0, &vec![0.0_f32; merged.size_bytes as usize / 4])?;
+        Ok(Radiosity { merged, offsets, comparisons: Default::default() })
+    }
+
+    /// Replaces an entity's values. They come in the mesh's order of vertices, which `order` lists as they are stored.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn write(&mut self, entity: usize, order: &[u32], values: &[[f32; 3]]) -> Result<()> {
+        assert_eq!(values.len(), order.len(), "radiosity of entity {entity}");
+        self.merged.fill(self.offsets[entity], &quads(order, values).collect::<Vec<_>>())
+    }
+
+    /// An entity's values in the mesh's order of vertices.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn read(&self, entity: usize, order: &[u32]) -> Result<Vec<[f32; 3]>> {
+        let first = self.offsets[entity];
+        let quads: Vec<[f32; 4]> = self.merged.download_range(first..first + 16 * order.len() as u64)?;
+        let mut values = vec![[0.0; 3]; quads.len()];
+        for (&v, [r, g, b, _]) in order.iter().zip(quads) {
+            values[v as usize] = [r, g, b];
+        }
+        Ok(values)
+    }
+
+    /// Writes one of the two comparisons: for each entity its order of vertices and its values; what is not given is `rest`.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn compare<'v>(
+        &mut self,
+        place: usize,
+        entities: impl Iterator<Item = (usize, &'v [u32], &'v [[f32; 3]])>,
+        rest: [f32; 3],
+    ) -> Result<()> {
+        let [r, g, b] = rest;
+        let size_bytes = self.merged.size_bytes;
+        let mut all = vec![[r, g, b, 0.0]; size_bytes as usize / 16];
+        for (entity, order, values) in entities {
+            let first = self.offsets[entity] as usize / 16;
+            all[first..].iter_mut().zip(quads(order, values)).for_each(|(to, from)| *to = from);
+        }
+        let buffer = match &mut self.comparisons[place] {
+            Some(buffer) => buffer,
+            none => none.insert(Buffer::new(self.merged.device(), "comparison", BufferKind::Device, size_bytes)?),
+        };
+        buffer.fill(0, &all)
+    }
+
+    /// The buffer that a viewport shows: the merged one where a comparison was never written.
+    pub fn source(&self, source: RadiositySource) -> &Buffer {
+        match source {
+            RadiositySource::Merged => &self.merged,
+            RadiositySource::Comparison(place) => self.comparisons[place].as_ref().unwrap_or(&self.merged),
+        }
+    }
+}
+
+/// Values in the mesh's order of vertices, as they are stored.
+fn quads(order: &[u32], values: &[[f32; 3]]) -> impl Iterator<Item = [f32; 4]> {
+    order.iter().map(|&v| {
+        let [r, g, b] = values[v as usize];
+        [r, g, b, 0.0]
+    })
+}

@@ -1,0 +1,124 @@
+//! One frame from top to bottom: every pass in its order, with every barrier between passes.
+//!
+//! Files, benches and the window record their frames by this one function. They differ in the target of the picture, and in who
+//! waits: a file submits the recording and waits for its end, the window launches it and goes on to the next frame.
+
+use crate::draw::smooth::Lines;
+use crate::draw::{Draw, DrawnViewport};
+use crate::error::Result;
+use crate::gpu::{self, Access, Buffer, Commands, Drawing, Image};
+use crate::lists::gathering::Gathering;
+use crate::merge::{Inputs, Merge};
+use glam::Vec3;
+
+/// The clusters to light, and all that lights them.
+pub struct MergeWork<'f> {
+    /// The lists that the device makes; `None` where the host has made them.
+    pub(super) gathering: Option<&'f Gathering>,
+    pub(super) entities: &'f Buffer,
+    pub(super) clusters: &'f Buffer,
+    pub(super) cluster_count: u32,
+    pub(super) inputs: Inputs<'f>,
+    pub(super) merge: &'f Merge,
+    pub(super) radiosity: &'f Buffer,
+}
+
+/// The picture to draw.
+pub struct PictureWork<'f> {
+    pub(super) draw: &'f Draw,
+    pub(super) viewports: Vec<DrawnViewport<'f>>,
+    pub(super) background: Vec3,
+    pub(super) white: f32,
+    pub(super) lines: &'f Lines,
+}
+
+/// Where the picture goes once it is drawn.
+pub enum Target<'t, 'f> {
+    /// It stays on the device, where a fragment shader may read it.
+    Device,
+    /// Into a buffer that the host reads.
+    Host {
+        /// The finished picture.
+        picture: &'f Image,
+        /// As large as the picture.
+        readback: &'f Buffer,
+    },
+    /// Onto an image of a window, or onto one that stands for it.
+    Screen {
+        /// Its content is thrown away first.
+        image: &'f Image,
+        /// Linear RGBA where nothing is shown.
+        clear: [f32; 4],
+        /// Draws the picture that was made last, and what lies over it.
+        show: &'t mut dyn FnMut(&mut Drawing<'_, 'f>) -> Result<()>,
+        /// What the image is used for afterwards.
+        next: Access,
+    },
+}
+
+/// Records one frame: lights `merge`'s clusters, draws `picture`, and brings it to the target. Where one of them is `None`, light or
+/// picture stay as the last frame left them.
+///
+/// On a software device every pass begins and ends with a full barrier besides the ones below, see
+/// [`Commands::separates_passes`]: timestamps need it there. No pass may rely on it, and the tracker does not count it.
+///
+/// # Errors
+/// `Device` when memory ran out, `Input` when a buffer is larger than the device can bind.
+pub fn record<'f>(
+    commands: &mut Commands<'f>,
+    merge: Option<&MergeWork<'f>>,
+    picture: Option<&PictureWork<'f>>,
+    target: Target<'_, 'f>,
+) -> Result<()> {
+    if matches!(target, Target::Screen { .. }) {
+        // The frame before may be under way, and uses the same buffers and images.
+        commands.after_flights();
+    }
+    if let Some(work) = merge {
+        if let Some(gathering) = work.gathering {
+            commands.pass("gather", |c| gathering.record(c, work.entities, work.clusters))?;
+            // The merge reads the lists, and the host reads how long they are.
+            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+            commands.barrier(Access::ComputeWrite, Access::HostRead);
+        }
+        commands.pass("merge", |c| work.merge.record(c, &work.inputs, work.radiosity, work.cluster_count))?;
+    }
+    if merge.is_some() && picture.is_some() {
+        // Triangles read the radiosity as a vertex attribute, grids look it up in the fragment shader.
+        commands.barrier(Access::ComputeWrite, Access::VertexRead);
+        commands.barrier(Access::ComputeWrite, Access::FragmentSampled);
+    }
+    if let Some(PictureWork { draw, viewports, background, white, lines }) = picture {
+        for (image, access) in draw.attachments() {
+            commands.image_barrier(image, None, access);
+        }
+        commands.pass("draw", |c| draw.record(c, viewports, *background, *white))?;
+        if let Some(smooth) = &draw.smooth {
+            // The pass copies the picture, and then reads picture and depth while it changes the copy.
+            commands.barrier(Access::ColorWrite, Access::FragmentSampled);
+            commands.image_barrier(&draw.picture, Some(Access::ColorWrite), Access::TransferRead);
+            commands.image_barrier(&draw.depth, Some(Access::DepthWrite), Access::FragmentSampled);
+            commands.image_barrier(&smooth.picture, None, Access::TransferWrite);
+            commands.pass("smooth", |c| smooth.record(c, (&draw.picture, &draw.depth), lines, viewports))?;
+        }
+        let reader = if matches!(target, Target::Host { .. }) { Access::TransferRead } else { Access::FragmentSampled };
+        commands.image_barrier(draw.finished(), Some(Access::ColorWrite), reader);
+    }
+    match target {
+        Target::Device => {}
+        Target::Host { picture, readback } => {
+            commands.pass("read back", |c| {
+                c.copy_image(picture, readback);
+                Ok(())
+            })?;
+            commands.barrier(Access::TransferWrite, Access::HostRead);
+        }
+        Target::Screen { image, clear, show, next } => {
+            commands.image_barrier(image, None, Access::ColorWrite);
+            let color = gpu::Target { color: image, clear: Some(clear), depth: None, resolve: None };
+            commands.pass("show", |c| c.render(&color, show))?;
+            commands.image_barrier(image, Some(Access::ColorWrite), next);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,140 @@
+//! Regions of a picture, and what the camera may see in each.
+
+use super::Frame;
+use crate::asset::edges::Line;
+use crate::draw::smooth;
+use crate::draw::{Item, camera};
+use crate::lists::sight::{self, Sight};
+use crate::scene::Placement;
+use glam::Vec3;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Which radiosity a viewport shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RadiositySource {
+    /// The merge's.
+    Merged,
+    /// What [`Frame::set_comparison`] put at that place.
+    Comparison(usize),
+}
+
+/// A region of the picture. Each shows the whole scene by the same camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Viewport {
+    /// Left, top, width and height in pixels.
+    pub area: [u32; 4],
+    /// The radiosity that it shows.
+    pub radiosity: RadiositySource,
+    /// Whether what entities emit is added. It is not where radiosity stands for something else, as the colours of an error do.
+    pub adds_emission: bool,
+}
+
+impl Viewport {
+    /// A region that shows what the merge lights.
+    pub fn merged(area: [u32; 4]) -> Self {
+        Viewport { area, radiosity: RadiositySource::Merged, adds_emission: true }
+    }
+}
+
+impl Frame {
+    /// All of the picture.
+    pub(super) fn whole(&self) -> Viewport {
+        let [width, height] = self.options.size;
+        Viewport::merged([0, 0, width, height])
+    }
+
+    /// How each entity is seen in each of the viewports that show merged light; `None` where none does, and light is for others to
+    /// read.
+    pub(super) fn sights(&self, placements: &[Placement], viewports: &[Viewport]) -> Option<Vec<Vec<Sight>>> {
+        let shown = viewports.iter().filter(|viewport| viewport.radiosity == RadiositySource::Merged);
+        let cameras: Vec<_> = shown.map(|viewport| self.camera([viewport.area[2], viewport.area[3]])).collect();
+        let of = |(index, placement)| cameras.iter().map(|camera| self.sight(camera, index, placement)).collect();
+        (!cameras.is_empty()).then(|| placements.iter().enumerate().map(of).collect())
+    }
+
+    /// Clusters that the camera does not see in the whole picture.
+    pub(super) fn hidden_count(&self, placements: &[Placement]) -> usize {
+        let sights = self.sights(placements, &[self.whole()]);
+        sights.map_or(0, |sights| self.work.lists.hidden_count(&sights))
+    }
+
+    /// Triangles that the whole picture leaves out.
+    pub(super) fn undrawn_count(&self, placements: &[Placement]) -> usize {
+        let count = |indices: Vec<Range<u32>>| indices.iter().map(|range| range.len() / 3).sum::<usize>();
+        let items = self.items(placements, self.options.size);
+        items.into_iter().map(|item| count(item.drawable.seen(None)) - count(item.indices)).sum()
+    }
+
+    /// The camera for a viewport of `size` pixels.
+    fn camera(&self, size: [u32; 2]) -> sight::Camera {
+        let camera = &self.scene.data.camera;
+        let aspect = f64::from(size[0]) / f64::from(size[1].max(1));
+        sight::Camera {
+            clip_from_world: camera::clip_from_world(camera, aspect),
+            eye: camera.eye.as_dvec3(),
+            near_m: camera::near_corner_m(camera, aspect),
+            size,
+            samples: self.picture.draw.samples() > 1,
+        }
+    }
+
+    /// How an entity is seen.
+    fn sight(&self, camera: &sight::Camera, index: usize, placement: &Placement) -> Sight {
+        let mesh = self.scene.entities[index].mesh;
+        let geometry = &self.store.geometries[mesh];
+        let world_from_object = camera::world_from_centred(placement, geometry.centre_m);
+        Sight::new(camera, world_from_object, geometry.radius_m, self.scene.meshes[mesh].is_solid())
+    }
+
+    /// All entities in the order in which they are drawn, for a viewport of `size` pixels.
+    pub(super) fn items(&self, placements: &[Placement], size: [u32; 2]) -> Vec<Item<'_>> {
+        let camera = self.camera(size);
+        let items = placements.iter().enumerate().map(|(index, placement)| {
+            let entity = &self.scene.entities[index];
+            let geometry = &self.store.geometries[entity.mesh];
+            let world_from_object = camera::world_from_centred(placement, geometry.centre_m);
+            let sight = self.sight(&camera, index, placement);
+            let item = Item {
+                drawable: &geometry.drawable,
+                indices: geometry.drawable.seen(self.options.skip.hidden.then_some(&sight)),
+                clip_from_object: (camera.clip_from_world * world_from_object).as_mat4(),
+                culls: sight.culls(),
+                emission: entity.emission,
+                radiosity_offset: self.radiosity.offsets[index],
+                tag: smooth::tag(index),
+            };
+            let radius_m = geometry.radius_m * f64::from(placement.scale);
+            let distance_m = self.centre(index, placement).distance(camera.eye) - radius_m;
+            (item.drawable.is_grid(), distance_m, item)
+        });
+        // From near to far, so that few fragments are shaded that something nearer hides later. Grids come last: a fragment of a
+        // grid costs most.
+        let mut items: Vec<(bool, f64, Item<'_>)> = items.collect();
+        items.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        items.into_iter().map(|(_, _, item)| item).collect()
+    }
+
+    /// The same for a viewport, without emission where it shows none.
+    pub(super) fn viewport_items(&self, placements: &[Placement], viewport: &Viewport) -> Vec<Item<'_>> {
+        let mut items = self.items(placements, [viewport.area[2], viewport.area[3]]);
+        if !viewport.adds_emission {
+            items.iter_mut().for_each(|item| item.emission = Vec3::ZERO);
+        }
+        items
+    }
+
+    /// Outlines and creases of all entities as the camera sees them, and the tag of each.
+    pub(super) fn outlines(&self, placements: &[Placement], aspect: f64) -> Vec<(Line, f32)> {
+        let camera = &self.scene.data.camera;
+        let clip_from_world = camera::clip_from_world(camera, aspect);
+        let lines = placements.par_iter().enumerate().flat_map_iter(|(index, placement)| {
+            let mesh = self.scene.entities[index].mesh;
+            let world = camera::world_from_centred(placement, self.store.geometries[mesh].centre_m);
+            let eye = world.inverse().transform_point3(camera.eye.as_dvec3());
+            let lines = self.picture.edges[mesh].lines(clip_from_world * world, eye, true);
+            lines.into_iter().map(move |line| (line, smooth::tag(index)))
+        });
+        lines.collect()
+    }
+}

@@ -54,7 +54,8 @@ impl<'r> Commands<'r> {
         })
     }
 
-    /// Runs `record` as one labelled, timed pass.
+    /// Runs `record` as one labelled, timed pass. On some devices full barriers stand around it, see
+    /// [`Commands::separates_passes`].
     ///
     /// # Errors
     /// What `record` returns.
@@ -100,14 +101,20 @@ impl<'r> Commands<'r> {
                 query,
             )
         };
-        if self.recording.device.info.is_software() {
+        if self.separates_passes() {
             self.timestamp_barrier(stage);
         }
     }
 
-    /// An execution barrier without memory access after a timestamp, on software devices only. llvmpipe takes a timestamp when
-    /// it next rasterises or meets a barrier, not at its place among dispatches. The tracker does not count this barrier, so it
-    /// cannot replace one between passes; but passes that could overlap do not overlap on a software device.
+    /// Whether a barrier between all commands stands on both sides of each pass, so that passes do not overlap. This is so on
+    /// software devices, whose timestamps need it. The tracker does not count these barriers, so they cannot replace one
+    /// between passes.
+    pub fn separates_passes(&self) -> bool {
+        self.recording.device.info.is_software()
+    }
+
+    /// The barrier of [`Commands::separates_passes`], after a timestamp. It orders execution and makes no memory visible. llvmpipe
+    /// takes a timestamp when it next rasterises or meets a barrier, not at its place among dispatches.
     fn timestamp_barrier(&self, stage: vk::PipelineStageFlags2) {
         let barriers = [vk::MemoryBarrier2::default().src_stage_mask(stage).dst_stage_mask(stage)];
         let info = vk::DependencyInfo::default().memory_barriers(&barriers);

@@ -210,3 +210,89 @@ fn every_shader_file_is_embedded() {
     let all = std::fs::read_dir(root().join("glsl")).unwrap().count();
     assert_eq!(all, on_disk.len(), "glsl/ holds files of an unknown kind");
 }
+
+/// Every pass by its one word, in the order of execution, and the Rust file that holds it. From the word follow its shaders
+/// `glsl/WORD.*`, its struct, its timer and the debug name of its pipeline.
+const PASSES: &[(&str, &str)] = &[
+    ("capture", "src/bake/capture.rs"),
+    ("project", "src/bake/project.rs"),
+    ("assemble", "src/bake/assemble.rs"),
+    ("gather", "src/lists/gather.rs"),
+    ("merge", "src/merge/mod.rs"),
+    ("draw", "src/draw/mod.rs"),
+    ("smooth", "src/draw/smooth.rs"),
+    ("show", "src/draw/show.rs"),
+];
+
+/// Timers of passes that copy and have no shader.
+const COPIES: &[&str] = &["read back"];
+
+/// Shaders that are no pass of their own: the second half of pass "draw", and what only benches run.
+const OTHER_SHADERS: &[&str] = &["grid", "product", "ceiling"];
+
+/// Folders whose files record passes for a test or a bench, outside the sequences.
+const NO_SEQUENCE: &[&str] = &["src/bench", "src/check"];
+
+/// Words that follow `prefix` up to the next quotation mark.
+fn quoted_after(code: &str, prefix: &str) -> BTreeSet<String> {
+    let quoted = |(at, _): (usize, _)| code[at + prefix.len()..].split('"').next().unwrap().to_owned();
+    code.match_indices(prefix).map(quoted).collect()
+}
+
+#[test]
+fn each_pass_is_found_by_one_word() {
+    let shaders = files("glsl", &["comp", "vert", "frag"]);
+    let stem = |path: &Path| path.file_stem().unwrap().to_string_lossy().into_owned();
+    let in_sequence = |path: &PathBuf| !NO_SEQUENCE.iter().any(|folder| path.starts_with(folder));
+    let timers: BTreeSet<String> = files("src", &["rs"])
+        .iter()
+        .filter(|path| in_sequence(path))
+        .flat_map(|path| quoted_after(&code(&text(path)), ".pass(\""))
+        .collect();
+    for (word, file) in PASSES {
+        let path = Path::new(file);
+        let is_module = path.file_name().is_some_and(|name| name == "mod.rs");
+        let named = if is_module { stem(path.parent().unwrap()) } else { stem(path) };
+        assert_eq!(named, *word, "{file} is named by the word of its pass");
+        let source = text(path);
+        assert!(source.starts_with(&format!("//! Pass \"{word}\":")), "{file} begins with its pass");
+        let code = code(&source);
+        let type_name = word[..1].to_uppercase() + &word[1..];
+        assert!(code.contains(&format!("pub struct {type_name} {{")), "{file}: no struct {type_name}");
+        assert!(code.contains(&format!("\"{word}\"")), "{file}: no pipeline has the debug name \"{word}\"");
+        let own: Vec<_> = shaders.iter().filter(|shader| stem(shader) == *word).collect();
+        assert!(!own.is_empty(), "no shader glsl/{word}.*");
+        for shader in own {
+            let name = format!("\"{}\"", shader.file_name().unwrap().to_string_lossy());
+            assert!(code.contains(&name), "{file} does not use the shader {name}");
+        }
+        assert!(timers.contains(*word), "no sequence times pass \"{word}\"");
+    }
+    let is_pass = |word: &str| PASSES.iter().any(|(pass, _)| *pass == word);
+    for timer in &timers {
+        assert!(is_pass(timer) || COPIES.contains(&timer.as_str()), "timer \"{timer}\" is not of a pass in the table");
+    }
+    for shader in shaders.iter().map(|path| stem(path)) {
+        assert!(is_pass(&shader) || OTHER_SHADERS.contains(&shader.as_str()), "glsl/{shader}.* is not of a pass");
+    }
+}
+
+/// Files of the frame's rooms that hold barriers: the sequence, and passes of several steps between their own steps.
+const BARRIERS: &[&str] = &["src/draw/mod.rs", "src/draw/smooth.rs", "src/frame/record.rs", "src/lists/gather.rs"];
+
+#[test]
+fn barriers_of_a_frame_stand_in_its_sequence() {
+    let rooms = ["src/draw", "src/frame", "src/lists", "src/merge", "src/scene_buffers", "src/view", "src/app"];
+    let found: Vec<PathBuf> = rooms
+        .iter()
+        .flat_map(|room| files(room, &["rs"]))
+        .filter(|path| code(&text(path)).contains("barrier("))
+        .collect();
+    let mut found: Vec<_> = found.iter().map(|path| path.to_str().unwrap()).collect();
+    found.sort_unstable();
+    assert_eq!(found, BARRIERS);
+    let sequence = code(&text(Path::new("src/frame/record.rs")));
+    for pass in ["gather", "merge", "draw", "smooth", "read back", "show"] {
+        assert!(sequence.contains(&format!(".pass(\"{pass}\"")), "the sequence does not record \"{pass}\"");
+    }
+}

@@ -1,10 +1,10 @@
 //! Part of pass "draw": meshes that are grids, each as one parallelogram whose fragment shader finds the triangle of its cell.
 //!
-//! A floor's cells are small on the screen so that light on them is smooth, and to a software rasteriser small triangles cost
-//! far more than their area. The picture is that of the triangles, but for rounding.
+//! The cells of a floor are small on the screen, so that light on them is smooth. A software rasteriser takes far longer for many
+//! small triangles than for a large one of the same area. The picture is that of the triangles, except for rounding.
 
 use crate::asset::grid::{Grid, UPWARDS};
-use crate::draw::Item;
+use crate::draw::DrawnEntity;
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
 use crate::shaders::{Library, ShaderPermutation};
@@ -18,7 +18,7 @@ const QUADS: vk::Format = vk::Format::R32G32B32A32_UINT;
 const FLOATS: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// A grid on the device.
-pub struct GridDrawable {
+pub struct DrawnGrid {
     positions: Buffer,
     places: Buffer,
     indices: Buffer,
@@ -26,7 +26,7 @@ pub struct GridDrawable {
     cells: [u32; 2],
 }
 
-impl GridDrawable {
+impl DrawnGrid {
     /// Indices of the two triangles that it is drawn as.
     pub const INDEX_COUNT: u32 = 6;
 
@@ -46,7 +46,7 @@ impl GridDrawable {
             .iter()
             .map(|cell| cell.map(|vertex| place[(vertex & !UPWARDS) as usize] | vertex & UPWARDS))
             .collect();
-        Ok(GridDrawable {
+        Ok(DrawnGrid {
             positions: Buffer::with_data(device, "grid positions", &positions)?,
             places: Buffer::with_data(device, "grid places", &places)?,
             indices: Buffer::with_data(device, "grid indices", &[[0_u32, 1, 2], [2, 1, 3]])?,
@@ -99,8 +99,8 @@ impl DrawGrid {
     pub fn record<'r>(
         &'r self,
         drawing: &mut Drawing<'_, 'r>,
-        (grid, indices): (&'r GridDrawable, Range<u32>),
-        item: &Item<'r>,
+        (grid, indices): (&'r DrawnGrid, Range<u32>),
+        entity: &DrawnEntity<'r>,
         radiosity: &'r Buffer,
         white: f32,
     ) -> Result<()> {
@@ -108,10 +108,10 @@ impl DrawGrid {
         let views = [TexelView::new(&grid.corners, QUADS)?, TexelView::new(radiosity, FLOATS)?];
         drawing.resources(&views.map(Bind::Texel))?;
         drawing.push(&Push {
-            clip_from_object: item.clip_from_object.to_cols_array(),
-            emission_white: item.emission.extend(white).to_array(),
-            tag: item.tag,
-            first: (item.radiosity_offset / 16) as u32,
+            clip_from_object: entity.clip_from_object.to_cols_array(),
+            emission_white: entity.emission.extend(white).to_array(),
+            tag: entity.tag,
+            first: (entity.radiosity_offset / 16) as u32,
             cells: grid.cells,
         });
         drawing.indexed(indices);

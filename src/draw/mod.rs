@@ -1,8 +1,8 @@
 //! Pass "draw": lit vertices to a picture.
 //!
-//! Inputs: a mesh an entity (positions from its sphere's centre in metres, emission pattern, indices) and the entity's part
-//! of the radiosity buffer. Output: RGBA of `width` x `height`, linear or as a screen shows it: with one sample a pixel, that
-//! one's entity in alpha and its depth beside it, or multisampled and resolved.
+//! Inputs: for each entity its mesh (positions in metres from the centre of its bounding sphere, emission pattern, indices) and
+//! its range of the radiosity buffer. Output: RGBA of `width` x `height`, linear or encoded for a screen. With one sample a pixel,
+//! alpha holds the tag of the entity that is seen, and the depth image is kept. With more samples they are averaged.
 
 pub mod camera;
 pub mod grid;
@@ -12,7 +12,7 @@ pub mod smooth;
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
 use crate::asset::picture::srgb_from_linear;
-use crate::draw::grid::{DrawGrid, GridDrawable};
+use crate::draw::grid::{DrawGrid, DrawnGrid};
 use crate::draw::smooth::Smooth;
 use crate::error::Result;
 use crate::gpu::ImageShape;
@@ -26,10 +26,10 @@ use glam::{Mat4, Vec3};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Linear half floats: 11 bits are more than a PNG shows, at half the bandwidth of f32.
+/// Linear half floats. Their 11 bits are more than a PNG shows, and they take half the bandwidth of f32.
 const COLOR: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
-/// What a screen shows, encoded by the shader: half the bytes of half floats. A format that encodes by itself (_SRGB) takes
-/// llvmpipe half as long again with four samples.
+/// What a screen shows: the shader encodes it, and it takes half the bytes of half floats. With a format that encodes by itself
+/// (_SRGB), llvmpipe takes 1.5 times as long at four samples a pixel.
 const SHOWN: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
@@ -47,7 +47,7 @@ pub enum Finish {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Antialias {
-    /// They are not: one sample a pixel.
+    /// One sample a pixel; edges show as stairs.
     None,
     /// One sample a pixel, and outlines and creases smoothed by pass "smooth".
     Outlines,
@@ -57,7 +57,7 @@ pub enum Antialias {
 }
 
 impl Antialias {
-    /// What a device draws at interactive rates: a GPU has samples for next to nothing, a software device shades and resolves each.
+    /// What a device draws at interactive rates. On a GPU four samples cost little; a software device stores and averages each.
     pub fn usual(device: &Device) -> Self {
         if device.info.is_software() { Antialias::Outlines } else { Antialias::Samples }
     }
@@ -76,28 +76,29 @@ impl std::str::FromStr for Antialias {
 }
 
 /// A mesh as it is drawn.
-pub enum Drawable {
-    /// By its triangles.
+pub enum DrawnMesh {
+    /// The mesh is drawn by its triangles.
     Triangles {
-        /// Positions from the sphere's centre, metres.
+        /// Positions in metres from the centre of the bounding sphere.
         positions: Buffer,
-        /// Emission pattern.
+        /// Linear RGB that is multiplied by the entity's emission.
         emission: Buffer,
-        /// Three a triangle, neighbours together.
+        /// Three indices a triangle; neighbouring triangles stand together.
         indices: Buffer,
-        /// Runs of them, one after the other.
+        /// The indices in runs, and which way the triangles of each run face.
         runs: Vec<(Range<u32>, Faces)>,
     },
-    /// As a whole.
-    Grid(GridDrawable, Faces),
+    /// The mesh is a grid and is drawn as one parallelogram.
+    Grid(DrawnGrid, Faces),
 }
 
-/// Triangles of a run: few enough that most runs lie on one side of an object, enough that a draw call costs little beside them.
+/// Triangles in a run. They are few enough that most runs lie on one side of an object, and many enough that a draw call costs
+/// little beside them.
 const RUN_TRIANGLES: usize = 128;
 
-impl Drawable {
-    /// Uploads a mesh, its vertices in `order`; without colours its emission pattern is white. `vertices` are those of all that
-    /// will be drawn together.
+impl DrawnMesh {
+    /// Uploads a mesh with its vertices in `order`. The emission pattern of a mesh without colours is white. `vertices` counts the
+    /// vertices of everything that is drawn together.
     ///
     /// # Errors
     /// `Device` when memory ran out.
@@ -107,9 +108,9 @@ impl Drawable {
         for (at, &v) in order.iter().enumerate() {
             place[v as usize] = at as u32;
         }
-        if let Some(grid) = Grid::find(mesh).filter(|grid| GridDrawable::fits(device, grid.vertices.len(), vertices)) {
-            return Ok(Drawable::Grid(
-                GridDrawable::new(device, &grid, centre, &place)?,
+        if let Some(grid) = Grid::find(mesh).filter(|grid| DrawnGrid::fits(device, grid.vertices.len(), vertices)) {
+            return Ok(DrawnMesh::Grid(
+                DrawnGrid::new(device, &grid, centre, &place)?,
                 Faces::of(mesh, &mesh.triangles),
             ));
         }
@@ -127,7 +128,7 @@ impl Drawable {
             first = end;
         }
         triangles.iter_mut().flatten().for_each(|v| *v = place[*v as usize]);
-        Ok(Drawable::Triangles {
+        Ok(DrawnMesh::Triangles {
             positions: Buffer::with_data(device, "draw positions", &positions)?,
             emission: Buffer::with_data(device, "draw emission", &emission)?,
             indices: Buffer::with_data(device, "draw indices", &triangles)?,
@@ -136,14 +137,14 @@ impl Drawable {
     }
 }
 
-impl Drawable {
-    /// Indices that have to be drawn, in order: all, or those of runs that may be seen.
+impl DrawnMesh {
+    /// Ranges of indices that have to be drawn, in order: all of them, or those of the runs that may be seen.
     pub fn seen(&self, sight: Option<&Sight>) -> Vec<Range<u32>> {
         let may_see = |faces: &Faces| sight.is_none_or(|sight| sight.may_see(faces));
         let mut out: Vec<Range<u32>> = Vec::new();
         match self {
-            Drawable::Grid(_, faces) => out.extend(may_see(faces).then_some(0..GridDrawable::INDEX_COUNT)),
-            Drawable::Triangles { runs, .. } => {
+            DrawnMesh::Grid(_, faces) => out.extend(may_see(faces).then_some(0..DrawnGrid::INDEX_COUNT)),
+            DrawnMesh::Triangles { runs, .. } => {
                 for (range, _) in runs.iter().filter(|(_, faces)| may_see(faces)) {
                     match out.last_mut() {
                         Some(last) if last.end == range.start => last.end = range.end,
@@ -155,37 +156,37 @@ impl Drawable {
         out
     }
 
-    /// Whether it is drawn as a whole.
+    /// Whether it is drawn as a grid.
     pub fn is_grid(&self) -> bool {
-        matches!(self, Drawable::Grid(..))
+        matches!(self, DrawnMesh::Grid(..))
     }
 
     /// Device memory, bytes.
     pub fn size_bytes(&self) -> u64 {
         match self {
-            Drawable::Triangles { positions, emission, indices, .. } => {
+            DrawnMesh::Triangles { positions, emission, indices, .. } => {
                 positions.size_bytes + emission.size_bytes + indices.size_bytes
             }
-            Drawable::Grid(grid, _) => grid.size_bytes(),
+            DrawnMesh::Grid(grid, _) => grid.size_bytes(),
         }
     }
 }
 
 /// One entity to draw.
-pub struct Item<'d> {
-    /// Its mesh.
-    pub drawable: &'d Drawable,
+pub struct DrawnEntity<'d> {
+    /// The entity's mesh.
+    pub mesh: &'d DrawnMesh,
     /// From the mesh's frame (metres from its sphere's centre) to clip space, reversed depth.
     pub clip_from_object: Mat4,
-    /// Indices of it to draw.
+    /// The ranges of the mesh's indices that are drawn.
     pub indices: Vec<Range<u32>>,
-    /// Whether its backs are left out: they are never seen.
+    /// Whether back faces are culled, because they are never seen.
     pub culls: bool,
-    /// Radiance factor of its emission pattern.
+    /// The factor that turns the emission pattern into radiance, linear RGB.
     pub emission: Vec3,
     /// Byte offset of its vertices in the radiosity buffer.
     pub radiosity_offset: u64,
-    /// What a picture's alpha says where it is seen.
+    /// What a picture's alpha holds where the entity is seen.
     pub tag: f32,
 }
 
@@ -194,7 +195,7 @@ pub struct DrawnViewport<'d> {
     /// Left, top, width and height in pixels.
     pub area: [u32; 4],
     /// The entities that are drawn, in this order.
-    pub items: Vec<Item<'d>>,
+    pub entities: Vec<DrawnEntity<'d>>,
     /// Radiosity of their vertices.
     pub radiosity: &'d Buffer,
     /// Which of the lines that pass "smooth" reads belong to this region.
@@ -211,20 +212,20 @@ struct Push {
 
 /// The pipelines and their images.
 pub struct Draw {
-    /// For meshes that are seen from both sides.
+    /// Draws both sides of triangles.
     open: GraphicsPipeline,
-    /// For those of which only fronts are seen.
+    /// Culls back faces.
     solid: GraphicsPipeline,
     grid: DrawGrid,
     samples: Option<Image>,
-    /// Depth, reversed: of every sample.
+    /// Reversed depth of every sample: 1 at the near plane, 0 at infinity.
     pub depth: Image,
     /// The picture as it is drawn.
     pub picture: Image,
-    /// Triangles that a render pass draws at most before the next goes on. llvmpipe keeps what is drawn until it has filled it in:
-    /// of two million triangles 300 MiB, of which 250 went when it filled each in at once.
+    /// The most triangles that one render pass draws; the next one goes on. llvmpipe keeps all triangles of a render pass until its
+    /// end: for two million triangles it held 300 MiB, and 50 MiB when they were divided.
     pub batch_triangles: u32,
-    /// What comes after, where outlines are smoothed.
+    /// Pass "smooth", which follows where outlines are smoothed.
     pub smooth: Option<Smooth>,
 }
 
@@ -326,7 +327,8 @@ impl Draw {
             depth: Some(&self.depth),
             resolve: self.samples.as_ref().map(|_| &self.picture),
         };
-        let every = viewports.iter().flat_map(|viewport| viewport.items.iter().map(move |item| (viewport, item)));
+        let every =
+            viewports.iter().flat_map(|viewport| viewport.entities.iter().map(move |entity| (viewport, entity)));
         let batches = batches(every, 3 * self.batch_triangles);
         let count = batches.len();
         for (number, batch) in batches.into_iter().enumerate() {
@@ -336,26 +338,27 @@ impl Draw {
                 }
             }
             commands.render_part(&target, [number == 0, number + 1 == count], |drawing| {
-                let mut bound: Option<&Item<'_>> = None;
-                for (viewport, item, indices) in batch {
-                    if bound.is_none_or(|bound| !std::ptr::eq(bound, item)) {
+                let mut bound: Option<&DrawnEntity<'_>> = None;
+                for (viewport, entity, indices) in batch {
+                    if bound.is_none_or(|bound| !std::ptr::eq(bound, entity)) {
                         let [left, top, width, height] = viewport.area;
                         drawing.area(left, top, width, height);
-                        if let Drawable::Triangles { positions, emission, indices, .. } = item.drawable {
-                            let vertices = [(positions, 0), (emission, 0), (viewport.radiosity, item.radiosity_offset)];
-                            drawing.bind(if item.culls { &self.solid } else { &self.open }, &vertices, indices);
+                        if let DrawnMesh::Triangles { positions, emission, indices, .. } = entity.mesh {
+                            let vertices =
+                                [(positions, 0), (emission, 0), (viewport.radiosity, entity.radiosity_offset)];
+                            drawing.bind(if entity.culls { &self.solid } else { &self.open }, &vertices, indices);
                             drawing.push(&Push {
-                                clip_from_object: item.clip_from_object.to_cols_array(),
-                                emission_white: item.emission.extend(white).to_array(),
-                                tag: item.tag,
+                                clip_from_object: entity.clip_from_object.to_cols_array(),
+                                emission_white: entity.emission.extend(white).to_array(),
+                                tag: entity.tag,
                             });
                         }
-                        bound = Some(item);
+                        bound = Some(entity);
                     }
-                    match item.drawable {
-                        Drawable::Triangles { .. } => drawing.indexed(indices),
-                        Drawable::Grid(grid, _) => {
-                            self.grid.record(drawing, (grid, indices), item, viewport.radiosity, white)?;
+                    match entity.mesh {
+                        DrawnMesh::Triangles { .. } => drawing.indexed(indices),
+                        DrawnMesh::Grid(grid, _) => {
+                            self.grid.record(drawing, (grid, indices), entity, viewport.radiosity, white)?;
                         }
                     }
                 }
@@ -366,14 +369,14 @@ impl Draw {
     }
 }
 
-/// Indices of items, in runs of at most `most`; at least one run, which may be empty.
+/// Divides the indices of all entities into batches of at most `most` indices. There is at least one batch, which may be empty.
 fn batches<'v, 'd>(
-    items: impl Iterator<Item = (&'v DrawnViewport<'d>, &'v Item<'d>)>,
+    entities: impl Iterator<Item = (&'v DrawnViewport<'d>, &'v DrawnEntity<'d>)>,
     most: u32,
-) -> Vec<Vec<(&'v DrawnViewport<'d>, &'v Item<'d>, Range<u32>)>> {
+) -> Vec<Vec<(&'v DrawnViewport<'d>, &'v DrawnEntity<'d>, Range<u32>)>> {
     let (mut batches, mut room) = (vec![Vec::new()], most);
-    for (viewport, item) in items {
-        for &Range { mut start, end } in &item.indices {
+    for (viewport, entity) in entities {
+        for &Range { mut start, end } in &entity.indices {
             while start < end {
                 if room == 0 {
                     batches.push(Vec::new());
@@ -381,7 +384,7 @@ fn batches<'v, 'd>(
                 }
                 let next = end.min(start.saturating_add(room));
                 room -= next - start;
-                batches.last_mut().expect("one at least").push((viewport, item, start..next));
+                batches.last_mut().expect("one at least").push((viewport, entity, start..next));
                 start = next;
             }
         }

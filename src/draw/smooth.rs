@@ -1,12 +1,13 @@
 //! Pass "smooth": outlines and creases of a picture with one sample a pixel, smoothed by where they are.
 //!
-//! Every line that the geometry has there cuts the pixels that it runs through; of each, the share beyond the line is mixed in
-//! from the pixel on its other side (Persson, *Geometric Post-process Anti-Aliasing*, 2011). Only those pixels are touched, which
-//! is what makes it cheap where the rasteriser is software. Not smoothed are surfaces that run through one another, and what
-//! is thinner than a pixel stays as broken as one sample leaves it.
+//! An outline or crease cuts each pixel that it runs through into two shares. The share beyond the line takes the colour of the
+//! pixel on the line's other side (Persson, *Geometric Post-process Anti-Aliasing*, 2011). Only those pixels are touched, so the
+//! pass is cheap on a software rasteriser. It does not smooth the line where two surfaces run through one another, and what is
+//! thinner than a pixel stays as broken as one sample leaves it.
 //!
-//! Inputs: the picture with the entity's tag in alpha, its depth (reversed), and two triangles a line that cover the pixels whose
-//! centres lie within half a pixel of it, along y where it is rather level and along x where it is steep. Output: the picture.
+//! Inputs: the picture with the entity's tag in alpha, its reversed depth, and two triangles for each line. They cover the pixels
+//! whose centres lie within half a pixel of the line, measured along x where the line is steep and along y elsewhere. Output: the
+//! smoothed picture.
 
 use crate::asset::edges::Line;
 use crate::draw::DrawnViewport;
@@ -42,7 +43,7 @@ pub struct Strips {
 }
 
 impl Strips {
-    /// Adds a line of an entity in a picture, or a part of one, of `size` pixels.
+    /// Adds a line of an entity in a viewport of `size` pixels.
     pub fn add(&mut self, line: &Line, size: [u32; 2], tag: f32) {
         let Some(strip) = Strip::new(line, size) else { return };
         let half = if strip.steep { DVec2::new(0.5, 0.0) } else { DVec2::new(0.0, 0.5) };
@@ -56,7 +57,7 @@ impl Strips {
         }
     }
 
-    /// Lines so far.
+    /// The number of lines that were added.
     pub fn count(&self) -> usize {
         self.corners.len() / 4
     }
@@ -74,7 +75,7 @@ struct Strip {
 }
 
 impl Strip {
-    /// `None` for what is a point.
+    /// `None` where the line is shorter than a millionth of a pixel.
     fn new(line: &Line, size: [u32; 2]) -> Option<Self> {
         let size = DVec2::new(size[0].into(), size[1].into());
         let ends = line.ends.map(|c| (DVec2::new(c.x, c.y) / c.w + 1.0) / 2.0 * size);
@@ -94,7 +95,7 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// None yet.
+    /// No lines yet.
     ///
     /// # Errors
     /// `Device` when memory ran out.
@@ -141,7 +142,7 @@ pub struct Smooth {
 }
 
 impl Smooth {
-    /// For pictures of a shape; `display` where they are encoded.
+    /// For pictures of a shape. `display` says that they are encoded for a screen.
     ///
     /// # Errors
     /// `Failed` when a shader does not compile.

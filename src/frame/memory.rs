@@ -1,4 +1,4 @@
-//! What a scene takes of the device's memory and of the host's.
+//! How much memory a scene takes, on the device and on the host.
 
 use super::Frame;
 use crate::gpu::Volume;
@@ -26,21 +26,21 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// On the device, or visible to it.
+    /// All bytes on the device, or visible to it.
     pub fn device(&self) -> u64 {
         self.fields + self.transfers + self.vertices + self.radiosity + self.drawables + self.lists + self.pictures
     }
 }
 
 impl Frame {
-    /// Memory that the scene takes now, meshes as read from their files apart.
+    /// Memory that the scene takes now. Meshes as they were read from their files are not counted.
     pub fn memory(&self) -> Memory {
         Memory {
             fields: self.store.fields.size_bytes + self.merge.image.as_ref().map_or(0, Volume::size_bytes),
             transfers: self.store.transfers.size_bytes,
             vertices: self.store.vertices.size_bytes,
             radiosity: self.radiosity.merged.size_bytes,
-            drawables: self.store.geometries.iter().map(|geometry| geometry.drawable.size_bytes()).sum(),
+            drawables: self.store.geometries.iter().map(|geometry| geometry.drawn.size_bytes()).sum(),
             lists: self.work.size_bytes() + self.sky.coefficients.all_bytes() + self.picture.lines.size_bytes(),
             pictures: self.picture.readback.size_bytes + self.picture.draw.size_bytes(),
             host_lists: self.work.lists.size_bytes(),

@@ -93,7 +93,7 @@ impl Frame {
     pub fn picture_work(&self, placements: &[Placement], white: f32) -> PictureWork<'_> {
         let viewport = |(viewport, lines): &(Viewport, Range<u32>)| DrawnViewport {
             area: viewport.area,
-            items: self.viewport_items(placements, viewport),
+            entities: self.drawn_in(placements, viewport),
             radiosity: self.radiosity.source(viewport.radiosity),
             lines: lines.clone(),
         };

@@ -1,4 +1,4 @@
-//! What an entity is to the merge at a moment: its place, rotation and light, and the entries of every cluster.
+//! What an entity is to the merge at one time: its place, rotation and light; and the clusters of a receiver.
 
 use super::Frame;
 use crate::field::extent::Extent;

@@ -3,7 +3,7 @@
 use super::Frame;
 use crate::asset::edges::Line;
 use crate::draw::smooth;
-use crate::draw::{Item, camera};
+use crate::draw::{DrawnEntity, camera};
 use crate::lists::sight::{self, Sight};
 use crate::scene::Placement;
 use glam::Vec3;
@@ -62,8 +62,8 @@ impl Frame {
     /// Triangles that the whole picture leaves out.
     pub(super) fn undrawn_count(&self, placements: &[Placement]) -> usize {
         let count = |indices: Vec<Range<u32>>| indices.iter().map(|range| range.len() / 3).sum::<usize>();
-        let items = self.items(placements, self.options.size);
-        items.into_iter().map(|item| count(item.drawable.seen(None)) - count(item.indices)).sum()
+        let drawn = self.drawn_entities(placements, self.options.size);
+        drawn.into_iter().map(|entity| count(entity.mesh.seen(None)) - count(entity.indices)).sum()
     }
 
     /// The camera for a viewport of `size` pixels.
@@ -88,16 +88,16 @@ impl Frame {
     }
 
     /// All entities in the order in which they are drawn, for a viewport of `size` pixels.
-    pub(super) fn items(&self, placements: &[Placement], size: [u32; 2]) -> Vec<Item<'_>> {
+    fn drawn_entities(&self, placements: &[Placement], size: [u32; 2]) -> Vec<DrawnEntity<'_>> {
         let camera = self.camera(size);
-        let items = placements.iter().enumerate().map(|(index, placement)| {
+        let drawn = placements.iter().enumerate().map(|(index, placement)| {
             let entity = &self.scene.entities[index];
             let geometry = &self.store.geometries[entity.mesh];
             let world_from_object = camera::world_from_centred(placement, geometry.centre_m);
             let sight = self.sight(&camera, index, placement);
-            let item = Item {
-                drawable: &geometry.drawable,
-                indices: geometry.drawable.seen(self.options.skip.hidden.then_some(&sight)),
+            let drawn = DrawnEntity {
+                mesh: &geometry.drawn,
+                indices: geometry.drawn.seen(self.options.skip.hidden.then_some(&sight)),
                 clip_from_object: (camera.clip_from_world * world_from_object).as_mat4(),
                 culls: sight.culls(),
                 emission: entity.emission,
@@ -106,22 +106,22 @@ impl Frame {
             };
             let radius_m = geometry.radius_m * f64::from(placement.scale);
             let distance_m = self.centre(index, placement).distance(camera.eye) - radius_m;
-            (item.drawable.is_grid(), distance_m, item)
+            (drawn.mesh.is_grid(), distance_m, drawn)
         });
         // From near to far, so that few fragments are shaded that something nearer hides later. Grids come last: a fragment of a
         // grid costs most.
-        let mut items: Vec<(bool, f64, Item<'_>)> = items.collect();
-        items.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        items.into_iter().map(|(_, _, item)| item).collect()
+        let mut drawn: Vec<(bool, f64, DrawnEntity<'_>)> = drawn.collect();
+        drawn.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        drawn.into_iter().map(|(_, _, entity)| entity).collect()
     }
 
     /// The same for a viewport, without emission where it shows none.
-    pub(super) fn viewport_items(&self, placements: &[Placement], viewport: &Viewport) -> Vec<Item<'_>> {
-        let mut items = self.items(placements, [viewport.area[2], viewport.area[3]]);
+    pub(super) fn drawn_in(&self, placements: &[Placement], viewport: &Viewport) -> Vec<DrawnEntity<'_>> {
+        let mut drawn = self.drawn_entities(placements, [viewport.area[2], viewport.area[3]]);
         if !viewport.adds_emission {
-            items.iter_mut().for_each(|item| item.emission = Vec3::ZERO);
+            drawn.iter_mut().for_each(|entity| entity.emission = Vec3::ZERO);
         }
-        items
+        drawn
     }
 
     /// Outlines and creases of all entities as the camera sees them, and the tag of each.

@@ -7,7 +7,7 @@ pub mod limits;
 use crate::asset::mesh::Mesh;
 use crate::bake::cache::{Cache, field_name};
 use crate::bake::{self, Baker, Report};
-use crate::draw::Drawable;
+use crate::draw::DrawnMesh;
 use crate::error::Result;
 use crate::field::extent::{Extent, extent};
 use crate::field::quantity::{FieldKind, Storage, channel_stride};
@@ -68,7 +68,7 @@ pub struct Geometry {
     /// Radiance field, if an entity needs one.
     pub radiance: Option<Slot>,
     /// For drawing.
-    pub drawable: Drawable,
+    pub drawn: DrawnMesh,
     /// Centre of the bounding sphere, metres.
     pub centre_m: DVec3,
     /// Bounding radius, metres.
@@ -237,7 +237,7 @@ impl Store {
                 transfer_first,
                 blocked,
                 radiance,
-                drawable: Drawable::new(device, mesh, &order, drawn)?,
+                drawn: DrawnMesh::new(device, mesh, &order, drawn)?,
                 order,
                 centre_m: centre.as_dvec3(),
                 radius_m: f64::from(radius_m),

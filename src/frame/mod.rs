@@ -6,6 +6,7 @@
 //!            -> what each viewport shows of it (viewport), outlines (picture) ------------+
 //! ```
 
+mod change;
 mod draw_twin;
 mod form;
 pub mod memory;
@@ -32,7 +33,7 @@ use crate::lists::skip::Skip;
 use crate::merge::calibrate;
 use crate::merge::variant::{Chain, Form, Variant, uniform_entities};
 use crate::merge::{Inputs, Readable};
-use crate::scene::{Camera, Placement, Scene};
+use crate::scene::{Placement, Scene};
 use crate::scene_buffers::{Progress, Store};
 use crate::shaders::Library;
 use ash::vk;
@@ -325,77 +326,6 @@ impl Frame {
     /// Merges every cluster in the next frame, moved or not.
     pub fn forget(&mut self) {
         self.work.lists.forget();
-    }
-
-    /// Whether the fields that `scene` needs are here; it has the meshes and entities that this frame was made for.
-    pub fn covers(&self, scene: &Scene) -> bool {
-        self.store.covers(scene)
-    }
-
-    /// Takes over lights, switches, sky and camera of a scene that has the meshes and receivers that this frame was made for.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    ///
-    /// # Panics
-    /// When entities or receivers are others.
-    pub fn set_scene(&mut self, scene: &Scene) -> Result<()> {
-        let receivers = |scene: &Scene| scene.entities.iter().map(|e| (e.mesh, e.receives)).collect::<Vec<_>>();
-        assert_eq!(receivers(scene), receivers(&self.scene), "another scene needs another frame");
-        let sky = scene.data.environment != self.scene.data.environment;
-        self.scene = scene.clone();
-        if sky {
-            self.work.lists.renew();
-            self.sky.write(scene, self.options.bake.bands)?;
-        }
-        Ok(())
-    }
-
-    /// Sees the scene from elsewhere from now on.
-    pub fn set_camera(&mut self, camera: &Camera) {
-        self.scene.data.camera = camera.clone();
-    }
-
-    /// Draws at most so many triangles in one render pass from now on, see [`Draw::batch_triangles`]; at least one.
-    pub fn set_batch(&mut self, triangles: u32) {
-        self.picture.draw.batch_triangles = triangles.max(1);
-    }
-
-    /// Merges by another variant from now on; `None` is the device's fastest.
-    ///
-    /// # Errors
-    /// `Failed` when its shader does not compile.
-    pub fn set_variant(&mut self, variant: Option<Variant>) -> Result<()> {
-        let variant = variant.unwrap_or_else(|| calibrate::best_known(&self.device));
-        let wanted = Form { variant, ..self.merge.form };
-        let usable = usable(&self.device, &self.store, self.scene.entities.len(), wanted)?;
-        if usable.0 != self.merge.form {
-            self.merge = CompiledMerge::new(&self.device, &self.library, usable)?;
-            self.forget();
-        }
-        Ok(())
-    }
-
-    /// Builds anew what is made from any of the shader files named. What does not compile stays as it was.
-    ///
-    /// # Errors
-    /// `Failed` with the compiler's lines.
-    pub fn reload(&mut self, changed: &[String]) -> Result<()> {
-        let uses = |entry: &str| self.library.files(entry).iter().any(|file| changed.contains(file));
-        let drawing = ["draw.vert", "draw.frag", "grid.vert", "grid.frag", "smooth.vert", "smooth.frag"];
-        let [draws, gathers, merges] = [drawing.into_iter().any(uses), uses("gather.comp"), uses("merge.comp")];
-        if draws {
-            let (Options { size, antialias, .. }, finish) = (self.options, self.picture.draw.finish());
-            self.picture.draw = Draw::new(&self.device, &self.library, size, antialias, finish)?;
-        }
-        if gathers {
-            self.work.rebuild(&self.library, self.scene.entities.len())?;
-        }
-        if merges {
-            self.merge.rebuild(&self.device, &self.library)?;
-            self.forget();
-        }
-        Ok(())
     }
 }
 

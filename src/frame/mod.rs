@@ -22,7 +22,7 @@ mod work;
 use crate::bake;
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
-use crate::draw::{Antialias, Draw};
+use crate::draw::Antialias;
 use crate::error::Result;
 use crate::field::Lookup;
 use crate::gpu::{Commands, Device, Timing};
@@ -90,7 +90,7 @@ impl Frame {
     /// Bakes or finds what the scene needs and builds the passes.
     ///
     /// # Errors
-    /// As [`Store::new`], [`crate::merge::Merge::new`] and [`Draw::new`]; `Usage` as [`crate::merge::variant::Product::check`].
+    /// As [`Store::new`], [`crate::merge::Merge::new`] and [`crate::draw::Draw::new`]; `Usage` as [`crate::merge::variant::Product::check`].
     pub fn new(baker: &Baker, cache: &Cache, scene: &Scene, options: Options, progress: Progress<'_>) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
         options.chain.product.check(options.bake.bands, options.bake.occlusion_bands())?;

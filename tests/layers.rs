@@ -152,6 +152,50 @@ fn modules_use_only_what_stands_above_them() {
     }
 }
 
+/// Pairs of files of one folder that use each other, with the reason. The test below keeps the list complete and short.
+const CIRCLES: &[(&str, &str, &str)] = &[
+    ("src/bake/inside.rs", "src/bake/surface.rs", "a surface decides which of its samples lie inside"),
+    (
+        "src/field/directions.rs",
+        "src/field/lattice.rs",
+        "a lattice is its directions on shells, in two files of methods",
+    ),
+    (
+        "src/lists/scene_bounds.rs",
+        "src/lists/scope.rs",
+        "a scope is a cluster's part of the bounds that it is made from",
+    ),
+    ("src/view/editor.rs", "src/view/pick.rs", "the editor's methods for the pointer stand apart from its others"),
+];
+
+/// Files beside `path` whose module it uses, not counting its tests.
+fn siblings(path: &Path) -> BTreeSet<PathBuf> {
+    let text = text(path);
+    let body = text.split("\n#[cfg(test)]\nmod ").next().unwrap_or_default();
+    let folder: Vec<_> =
+        path.parent().into_iter().flat_map(|p| p.iter().skip(1)).map(|p| p.to_string_lossy()).collect();
+    let mut names = names_after(&code(body), "super::");
+    names.extend(names_after(&code(body), &format!("crate::{}::", folder.join("::"))));
+    let files = names.into_iter().map(|name| path.with_file_name(format!("{name}.rs")));
+    files.filter(|file| file != path && root().join(file).exists()).collect()
+}
+
+#[test]
+fn files_of_one_folder_do_not_use_each_other_in_circles() {
+    let mut found = Vec::new();
+    // `super` of a mod.rs is the folder above; its children may use it through its parent only.
+    for path in files("src", &["rs"]).iter().filter(|path| !path.ends_with("mod.rs")) {
+        for other in siblings(path).iter().filter(|other| path < *other && siblings(other).contains(path)) {
+            found.push((path.clone(), other.clone()));
+        }
+    }
+    for (one, other) in &found {
+        let known = CIRCLES.iter().any(|(a, b, _)| (one.as_path(), other.as_path()) == (Path::new(a), Path::new(b)));
+        assert!(known, "{} and {} use each other", one.display(), other.display());
+    }
+    assert_eq!(found.len(), CIRCLES.len(), "a circle is gone: take it off the list");
+}
+
 #[test]
 fn the_reader_of_paths_finds_what_is_there() {
     let source = "use crate::gpu::{Buffer, Device};\nuse crate::{field::{Lattice, Lookup}, scene};\n\

@@ -59,44 +59,10 @@ impl Grid {
         if columns <= 0 || rows <= 0 || columns * rows * 2 != triangles.len() as i64 {
             return None;
         }
-        const NONE: u32 = u32::MAX;
-        let mut cells = vec![[NONE; 4]; triangles.len() / 2];
-        // The halves found of each cell, as a bit for the corner that the half lacks.
-        let mut halves = vec![0_u8; cells.len()];
-        for triangle in triangles {
-            let corners = triangle.map(|v| places[v as usize]);
-            let first = [0, 1].map(|k| corners.iter().map(|c| c[k]).min().unwrap_or(0));
-            let cell = ((first[1] - least[1]) * columns + first[0] - least[0]) as usize;
-            let mut lacks = 0b1111_u8;
-            for (corner, &v) in corners.iter().zip(triangle) {
-                let [x, y] = [0, 1].map(|k| corner[k] - first[k]);
-                if x > 1 || y > 1 {
-                    return None;
-                }
-                let slot = (x + 2 * y) as usize;
-                let held = &mut cells.get_mut(cell)?[slot];
-                if *held != NONE && *held != v {
-                    return None;
-                }
-                *held = v;
-                lacks &= !(1 << slot);
-            }
-            if lacks.count_ones() != 1 || halves[cell] & lacks != 0 {
-                return None;
-            }
-            halves[cell] |= lacks;
-        }
-        for (cell, halves) in cells.iter_mut().zip(halves) {
-            match halves {
-                // The triangles lack (0, 0) and (1, 1): they share the line between the others.
-                0b1001 => {}
-                0b0110 => cell[0] |= UPWARDS,
-                _ => return None,
-            }
-        }
+        let vertices = cells(triangles, &places, least, columns)?;
         let corner = origin + steps[0] * least[0] as f64 + steps[1] * least[1] as f64;
         let sides = [steps[0] * columns as f64, steps[1] * rows as f64].map(|side| side.as_vec3());
-        Some(Grid { corner: corner.as_vec3(), sides, cells: [columns as u32, rows as u32], vertices: cells })
+        Some(Grid { corner: corner.as_vec3(), sides, cells: [columns as u32, rows as u32], vertices })
     }
 
     /// Vertices of the cells at its four sides; some occur more than once.
@@ -109,6 +75,47 @@ impl Grid {
         let cells = self.vertices.iter().enumerate().filter(move |(cell, _)| at_side(*cell));
         cells.flat_map(|(_, vertices)| vertices.map(|v| v & !UPWARDS))
     }
+}
+
+/// Vertices of every cell of a grid with `columns` cells in a row, if every cell has two halves along one diagonal. `places` are
+/// the vertices' grid coordinates, which start at `least`.
+fn cells(triangles: &[[u32; 3]], places: &[[i64; 2]], least: [i64; 2], columns: i64) -> Option<Vec<[u32; 4]>> {
+    const NONE: u32 = u32::MAX;
+    let mut cells = vec![[NONE; 4]; triangles.len() / 2];
+    // The halves found of each cell, as a bit for the corner that the half lacks.
+    let mut halves = vec![0_u8; cells.len()];
+    for triangle in triangles {
+        let corners = triangle.map(|v| places[v as usize]);
+        let first = [0, 1].map(|k| corners.iter().map(|c| c[k]).min().unwrap_or(0));
+        let cell = ((first[1] - least[1]) * columns + first[0] - least[0]) as usize;
+        let mut lacks = 0b1111_u8;
+        for (corner, &v) in corners.iter().zip(triangle) {
+            let [x, y] = [0, 1].map(|k| corner[k] - first[k]);
+            if x > 1 || y > 1 {
+                return None;
+            }
+            let slot = (x + 2 * y) as usize;
+            let held = &mut cells.get_mut(cell)?[slot];
+            if *held != NONE && *held != v {
+                return None;
+            }
+            *held = v;
+            lacks &= !(1 << slot);
+        }
+        if lacks.count_ones() != 1 || halves[cell] & lacks != 0 {
+            return None;
+        }
+        halves[cell] |= lacks;
+    }
+    for (cell, halves) in cells.iter_mut().zip(halves) {
+        match halves {
+            // The triangles lack (0, 0) and (1, 1): they share the line between the others.
+            0b1001 => {}
+            0b0110 => cell[0] |= UPWARDS,
+            _ => return None,
+        }
+    }
+    Some(cells)
 }
 
 #[cfg(test)]

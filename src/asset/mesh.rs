@@ -1,10 +1,8 @@
 //! A checked triangle mesh with derived data: bounding sphere, closedness, convexity, flatness and content hash.
 
-use std::path::Path;
-
 use glam::{DVec3, Vec3};
 
-use super::{enclose, obj, topology};
+use super::{enclose, topology};
 use crate::error::{Error, Result};
 
 /// Largest number of triangles of a mesh: 48 MB of indices, and edge tables of about 200 MB while it is checked.
@@ -77,22 +75,6 @@ impl Mesh {
         let shape = topology::shape(&positions, &triangles, centre, radius_m);
         let content_hash = hash(&positions, &normals, colors.as_deref(), &triangles);
         Ok(Self { name: name.into(), positions, normals, colors, triangles, centre, radius_m, shape, content_hash })
-    }
-
-    /// Reads a Wavefront OBJ file; see [`obj`] for what is understood.
-    ///
-    /// # Errors
-    /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line.
-    pub fn load(path: &Path) -> Result<Self> {
-        obj::load(path)
-    }
-
-    /// Reads OBJ text from memory, for files embedded in the binary; `path` is only for messages and the name.
-    ///
-    /// # Errors
-    /// As [`Mesh::load`].
-    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
-        obj::parse(bytes, path)
     }
 
     /// Centre and radius in metres of the smallest enclosing sphere (see [`enclose::bounding_sphere`]).

@@ -21,6 +21,7 @@ pub mod lettering;
 pub mod mesh;
 pub mod obj;
 pub mod picture;
+mod radiance;
 pub mod sky;
 pub mod teapot;
 pub mod topology;

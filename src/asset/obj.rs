@@ -21,33 +21,38 @@ use crate::error::{Error, Result};
 /// Largest file that is read, in bytes: 256 MiB.
 pub const FILE_LIMIT_BYTES: u64 = 256 << 20;
 
-/// Reads a file; see [`Mesh::load`].
-///
-/// # Errors
-/// [`Error::Input`]: missing, over [`FILE_LIMIT_BYTES`], or as [`parse`].
-pub fn load(path: &Path) -> Result<Mesh> {
-    parse(&super::read_file(path, FILE_LIMIT_BYTES)?, path)
-}
+impl Mesh {
+    /// Reads a Wavefront OBJ file; see [`super::obj`] for the accepted syntax.
+    ///
+    /// # Errors
+    /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line: missing, or as [`Mesh::parse`].
+    pub fn load(path: &Path) -> Result<Self> {
+        Self::parse(&super::read_file(path, FILE_LIMIT_BYTES)?, path)
+    }
 
-/// Reads OBJ text; see [`Mesh::parse`].
-///
-/// # Errors
-/// [`Error::Input`]: over [`FILE_LIMIT_BYTES`], not UTF-8, a malformed line, or as [`Mesh::new`].
-pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh> {
-    if bytes.len() as u64 > FILE_LIMIT_BYTES {
-        return Err(Error::input(path, format!("over the limit of {} MiB for a mesh file", FILE_LIMIT_BYTES >> 20)));
+    /// Reads OBJ text from memory, for files embedded in the binary; `path` is only for messages and the name.
+    ///
+    /// # Errors
+    /// [`Error::Input`]: over [`FILE_LIMIT_BYTES`], not UTF-8, a malformed line, or as [`Mesh::new`].
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
+        if bytes.len() as u64 > FILE_LIMIT_BYTES {
+            return Err(Error::input(
+                path,
+                format!("over the limit of {} MiB for a mesh file", FILE_LIMIT_BYTES >> 20),
+            ));
+        }
+        let text = std::str::from_utf8(bytes).map_err(|e| {
+            let line = 1 + bytes[..e.valid_up_to()].iter().filter(|&&b| b == b'\n').count();
+            Error::input_at(path, line, "not UTF-8 text")
+        })?;
+        let count = |keyword| text.lines().filter(|l| l.split_whitespace().next() == Some(keyword)).count();
+        let mut scan = Scan { position_total: count("v"), normal_total: count("vn"), ..Default::default() };
+        for (index, line) in text.lines().enumerate() {
+            scan.line(line).map_err(|what| Error::input_at(path, index + 1, what))?;
+        }
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        scan.into_mesh(&name).map_err(|e| e.context(path.display()))
     }
-    let text = std::str::from_utf8(bytes).map_err(|e| {
-        let line = 1 + bytes[..e.valid_up_to()].iter().filter(|&&b| b == b'\n').count();
-        Error::input_at(path, line, "not UTF-8 text")
-    })?;
-    let count = |keyword| text.lines().filter(|l| l.split_whitespace().next() == Some(keyword)).count();
-    let mut scan = Scan { position_total: count("v"), normal_total: count("vn"), ..Default::default() };
-    for (index, line) in text.lines().enumerate() {
-        scan.line(line).map_err(|what| Error::input_at(path, index + 1, what))?;
-    }
-    let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    scan.into_mesh(&name).map_err(|e| e.context(path.display()))
 }
 
 /// State of the reader: counts against which indices are checked, and the checked lines for `tobj`.

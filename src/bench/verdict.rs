@@ -99,6 +99,23 @@ pub fn swept(points: &[Point]) -> Vec<&str> {
     cases
 }
 
+/// Time, error and bytes of the default in one case.
+fn default_line(default: &Point) -> String {
+    format!(
+        "  {}: merged in {} ms (quarters {} to {}; the first time {} ms), off by {} (99 of 100 vertices below {}, the \
+             worst {}), {} kB of fields.\n",
+        default.case,
+        three(default.merge_ms.median),
+        three(default.merge_ms.lower),
+        three(default.merge_ms.upper),
+        three(default.first_merge_ms),
+        three(default.total.rms),
+        three(default.total.p99),
+        three(default.total.max),
+        default.field_bytes / 1024,
+    )
+}
+
 /// Compares the default with all settings, one line per setting.
 pub fn defaults(points: &[Point]) -> String {
     let cases = swept(points);
@@ -118,20 +135,7 @@ pub fn defaults(points: &[Point]) -> String {
         let _ = writeln!(text, "Only {only} was swept; a run of all cases judges by two.");
     }
     for default in &defaults {
-        let _ = writeln!(
-            text,
-            "  {}: merged in {} ms (quarters {} to {}; the first time {} ms), off by {} (99 of 100 vertices below {}, the \
-             worst {}), {} kB of fields.",
-            default.case,
-            three(default.merge_ms.median),
-            three(default.merge_ms.lower),
-            three(default.merge_ms.upper),
-            three(default.first_merge_ms),
-            three(default.total.rms),
-            three(default.total.p99),
-            three(default.total.max),
-            default.field_bytes / 1024,
-        );
+        text += &default_line(default);
     }
     let _ = writeln!(
         text,

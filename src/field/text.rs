@@ -4,7 +4,7 @@ use super::Fit;
 use super::lattice::{AUTOMATIC, Directions, Lattice, Spacing};
 
 impl std::fmt::Display for Lattice {
-    /// Writes the text that [`Lattice::from_str`] parses.
+    /// Writes the text that parsing accepts.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.directions {
             Directions::Cube { cells } => write!(f, "cube:{}x{cells}", self.shells)?,

@@ -4,9 +4,9 @@
 //! a resource waits for every launched recording ([`Device::settle`]), so nothing is destroyed while the device uses it.
 
 use super::access::{Access, Tracker};
-use super::descriptors::Bind;
+use super::bind::Bind;
 use super::device::Device;
-use super::flight::{Flight, MAX_PASSES, Recording, Signals};
+use super::flight::{Flight, MAX_PASSES, Recording, Signals, Timing};
 use super::image::{Image, whole};
 use super::memory::{Buffer, BufferKind};
 use super::pipeline::ComputePipeline;
@@ -17,15 +17,6 @@ use std::ffi::CString;
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Duration of one pass on the device.
-#[derive(Clone, Debug)]
-pub struct Timing {
-    /// Name of the pass.
-    pub pass: String,
-    /// Milliseconds between the timestamps around it.
-    pub milliseconds: f64,
-}
 
 /// A recording in progress. It borrows every resource that it uses until it is submitted.
 pub struct Commands<'r> {

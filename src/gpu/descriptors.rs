@@ -3,32 +3,19 @@
 
 use super::Checked;
 use super::access::Access;
+use super::bind::Bind;
 use super::commands::Commands;
-use super::image::Image;
-use super::memory::{Buffer, TexelView};
+use super::memory::Buffer;
 use super::pipeline::{Layout, descriptor_type};
-use super::reflect::BindingKind;
-use super::volume::Volume;
+use super::reflect::{Binding, BindingKind};
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
 use std::ops::Range;
 
-/// A resource given to a pass; its position in the list is its binding number.
-#[derive(Clone)]
-pub enum Bind<'r> {
-    /// A whole buffer, as storage or uniform block.
-    Buffer(&'r Buffer),
-    /// A byte range of a buffer. Its start keeps the device's offset alignment (at most 256 bytes).
-    Range(&'r Buffer, Range<u64>),
-    /// A texel view.
-    Texel(TexelView<'r>),
-    /// An image that is read with `texelFetch`.
-    Image(&'r Image),
-    /// An image of three dimensions with its sampler.
-    Volume(&'r Volume),
-    /// No resource: the shader permutation does not have this binding.
-    None,
+/// Panics because a resource does not match its binding.
+fn complain(pass: &str, binding: &Binding, what: &str) -> ! {
+    panic!("pass {pass}, binding {} ({}): {what}", binding.index, binding.name)
 }
 
 /// Descriptor sets in one pool; a full pool is followed by another.
@@ -75,8 +62,6 @@ impl<'r> Commands<'r> {
         let sampled = if graphics { Access::FragmentSampled } else { Access::ComputeSampled };
         for binding in &layout.bindings {
             let resource = resources.get(binding.index as usize).unwrap_or(&Bind::None);
-            let complain =
-                |what: &str| -> ! { panic!("pass {name}, binding {} ({}): {what}", binding.index, binding.name) };
             let mut write = vk::WriteDescriptorSet::default()
                 .dst_set(set)
                 .dst_binding(binding.index)
@@ -86,31 +71,8 @@ impl<'r> Commands<'r> {
                 ([Default::default()], [Default::default()], [Default::default()]);
             match (binding.kind, resource) {
                 (BindingKind::Storage | BindingKind::Uniform, Bind::Buffer(_) | Bind::Range(..)) => {
-                    let (buffer, range) = match resource {
-                        Bind::Range(buffer, range) => (*buffer, range.clone()),
-                        Bind::Buffer(buffer) => (*buffer, buffer.all()),
-                        _ => unreachable!("matched above"),
-                    };
+                    let (buffer, range) = self.buffer_range(binding, resource, name)?;
                     let size = range.end - range.start;
-                    let (most, alignment) = if binding.kind == BindingKind::Storage {
-                        let limits = &self.recording.device.limits;
-                        (limits.max_storage_buffer_range, limits.min_storage_buffer_offset_alignment)
-                    } else {
-                        let limits = &self.recording.device.limits;
-                        (limits.max_uniform_buffer_range, limits.min_uniform_buffer_offset_alignment)
-                    };
-                    if size > u64::from(most) {
-                        return Err(Error::Input(format!(
-                            "{}: {size} bytes in one buffer, the device can bind {most}",
-                            buffer.name
-                        )));
-                    }
-                    if range.end > buffer.size_bytes || size < u64::from(binding.block_bytes) {
-                        complain("the buffer is smaller than the shader's block or the range is outside it");
-                    }
-                    if !range.start.is_multiple_of(alignment) {
-                        complain("the range does not start at the device's offset alignment");
-                    }
                     let access = match (binding.kind, binding.writes) {
                         (BindingKind::Storage, true) => Access::ComputeWrite,
                         _ => Access::ComputeRead,
@@ -140,7 +102,7 @@ impl<'r> Commands<'r> {
                     images = [volume.descriptor(access.layout())];
                     write = write.image_info(&images);
                 }
-                _ => complain("another kind of resource, or none, was given"),
+                _ => complain(name, binding, "another kind of resource, or none, was given"),
             }
             // SAFETY: the set is fresh and not yet in use; every resource is borrowed until the commands have run.
             unsafe { self.recording.device.handle.update_descriptor_sets(&[write], &[]) };
@@ -158,6 +120,33 @@ impl<'r> Commands<'r> {
             );
         }
         Ok(())
+    }
+
+    /// The buffer and byte range of a block's resource, checked against the block and the device's limits.
+    fn buffer_range(&self, binding: &Binding, resource: &Bind<'r>, name: &str) -> Result<(&'r Buffer, Range<u64>)> {
+        let (buffer, range) = match resource {
+            Bind::Range(buffer, range) => (*buffer, range.clone()),
+            Bind::Buffer(buffer) => (*buffer, buffer.all()),
+            _ => unreachable!("only buffers have a range"),
+        };
+        let size = range.end - range.start;
+        let limits = &self.recording.device.limits;
+        let (most, alignment) = if binding.kind == BindingKind::Storage {
+            (limits.max_storage_buffer_range, limits.min_storage_buffer_offset_alignment)
+        } else {
+            (limits.max_uniform_buffer_range, limits.min_uniform_buffer_offset_alignment)
+        };
+        if size > u64::from(most) {
+            let buffer = &buffer.name;
+            return Err(Error::Input(format!("{buffer}: {size} bytes in one buffer, the device can bind {most}")));
+        }
+        if range.end > buffer.size_bytes || size < u64::from(binding.block_bytes) {
+            complain(name, binding, "the buffer is smaller than the shader's block or the range is outside it");
+        }
+        if !range.start.is_multiple_of(alignment) {
+            complain(name, binding, "the range does not start at the device's offset alignment");
+        }
+        Ok((buffer, range))
     }
 
     fn descriptor_set(&mut self, layout: &Layout) -> Result<vk::DescriptorSet> {

@@ -1,8 +1,8 @@
 //! Render passes: what they draw into, and what is drawn.
 
 use super::access::Access;
+use super::bind::Bind;
 use super::commands::Commands;
-use super::descriptors::Bind;
 use super::image::Image;
 use super::memory::Buffer;
 use super::pipeline::GraphicsPipeline;

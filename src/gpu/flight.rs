@@ -4,7 +4,6 @@
 //! anything that they may use waits for all of them before it destroys it ([`Device::settle`]).
 
 use super::Checked;
-use super::commands::Timing;
 use super::device::Device;
 use crate::error::Result;
 use ash::vk;
@@ -15,6 +14,15 @@ pub const FLIGHTS: usize = 2;
 
 /// Largest number of timed passes in one recording; each pass takes two timestamps.
 pub(super) const MAX_PASSES: u32 = 64;
+
+/// Duration of one pass on the device.
+#[derive(Clone, Debug)]
+pub struct Timing {
+    /// Name of the pass.
+    pub pass: String,
+    /// Milliseconds between the timestamps around it.
+    pub milliseconds: f64,
+}
 
 /// Semaphores around a submission.
 #[derive(Default)]

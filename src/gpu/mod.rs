@@ -4,6 +4,7 @@
 //! has one owner whose `Drop` destroys it; every owner keeps the [`Device`] alive.
 
 pub mod access;
+mod bind;
 pub mod census;
 pub mod commands;
 pub mod descriptors;
@@ -30,11 +31,11 @@ pub mod volume;
 pub mod window;
 
 pub use access::Access;
-pub use commands::{Commands, Timing};
-pub use descriptors::Bind;
+pub use bind::Bind;
+pub use commands::Commands;
 pub use device::{Device, DeviceOptions};
 pub use drawing::{Drawing, Target};
-pub use flight::{FLIGHTS, Flight};
+pub use flight::{FLIGHTS, Flight, Timing};
 pub use image::{Image, ImageShape};
 pub use memory::{Buffer, BufferKind, TexelView};
 pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState};

@@ -235,23 +235,7 @@ impl GraphicsPipeline {
                 vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(c"main")
             });
         let inputs = vertex.reflection.inputs.clone();
-        let bindings: Vec<_> = inputs
-            .iter()
-            .map(|i| vk::VertexInputBindingDescription {
-                binding: i.location,
-                stride: i.components * 4,
-                input_rate: vk::VertexInputRate::VERTEX,
-            })
-            .collect();
-        let attributes: Vec<_> = inputs
-            .iter()
-            .map(|i| vk::VertexInputAttributeDescription {
-                location: i.location,
-                binding: i.location,
-                format: attribute_format(i.components),
-                offset: 0,
-            })
-            .collect();
+        let (bindings, attributes) = vertex_layout(&inputs);
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&bindings)
             .vertex_attribute_descriptions(&attributes);
@@ -302,6 +286,24 @@ impl GraphicsPipeline {
     pub(super) fn raw(&self) -> vk::Pipeline {
         self.handle.1
     }
+}
+
+/// One tightly packed vertex buffer per input, bound at the number of the input's location.
+fn vertex_layout(
+    inputs: &[VertexInput],
+) -> (Vec<vk::VertexInputBindingDescription>, Vec<vk::VertexInputAttributeDescription>) {
+    let binding = |i: &VertexInput| vk::VertexInputBindingDescription {
+        binding: i.location,
+        stride: i.components * 4,
+        input_rate: vk::VertexInputRate::VERTEX,
+    };
+    let attribute = |i: &VertexInput| vk::VertexInputAttributeDescription {
+        location: i.location,
+        binding: i.location,
+        format: attribute_format(i.components),
+        offset: 0,
+    };
+    (inputs.iter().map(binding).collect(), inputs.iter().map(attribute).collect())
 }
 
 fn attribute_format(components: u32) -> vk::Format {

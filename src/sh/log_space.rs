@@ -26,7 +26,7 @@ impl LogSpace {
     }
 
     /// Coefficients of the logarithm of the visibility 1 - `blocked`: that of its product matrix, with eigenvalues of at least
-    /// [`FLOOR`], applied to the constant function 1. Turns with its factor.
+    /// `FLOOR`, applied to the constant function 1. Turns with its factor.
     pub fn logarithm(&self, blocked: &[f64]) -> Vec<f64> {
         let n = self.count;
         let (values, vectors) = eigenvectors(&self.tensor.matrix(blocked));

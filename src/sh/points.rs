@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
-use super::product_program::ProductOperation;
+use super::product::ProductOperation;
 use super::program::{Program, Term, Value, elements};
 use super::quadrature::icosahedral_rule;
 

@@ -10,6 +10,21 @@ use super::quadrature::sphere_rule;
 /// bands, and the errors of the sums are below 1e-14.
 const ZERO: f64 = 1e-9;
 
+/// The operation that code of a product computes (see [`super::product_program`]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProductOperation {
+    /// `c = product(a, b)`: inputs a then b, outputs c.
+    Product,
+    /// `t -= product(t, b)`, multiplication by 1 - b: inputs t then b, outputs t.
+    Subtract,
+}
+
+impl ProductOperation {
+    pub(super) fn sign(self) -> f64 {
+        if self == ProductOperation::Product { 1.0 } else { -1.0 }
+    }
+}
+
 /// One non-zero entry of a tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {

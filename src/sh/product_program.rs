@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 
 use super::basis::{Y00, coefficient_count};
 use super::points;
+pub use super::product::ProductOperation;
 use super::product::Tensor;
 use super::program::{Cost, Program, Term, Value, elements};
 
@@ -130,21 +131,6 @@ impl Emitter<'_> {
                 self.emit(next, vec![Term::new(1.0, &[x]), Term::new(ratio, &[y])]);
             }
         }
-    }
-}
-
-/// What a product program computes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ProductOperation {
-    /// `c = product(a, b)`: inputs a then b, outputs c.
-    Product,
-    /// `t -= product(t, b)`, multiplication by 1 - b: inputs t then b, outputs t.
-    Subtract,
-}
-
-impl ProductOperation {
-    fn sign(self) -> f64 {
-        if self == ProductOperation::Product { 1.0 } else { -1.0 }
     }
 }
 

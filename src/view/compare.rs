@@ -1,8 +1,8 @@
 //! The viewer's ray-cast reference, which a background task computes, and the error of the merge against it.
 
 use super::command::Changed;
-use super::panel;
 use super::reference;
+use super::status::ErrorScale;
 use super::task::BackgroundTask;
 use super::viewer::{ERROR, REFERENCE, Viewer};
 use crate::asset::false_color::{NEUTRAL, Scheme};
@@ -61,7 +61,7 @@ impl Viewer {
         let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference.radiosity, Scheme::Signed);
         let scale = map.scale();
         frame.set_comparison(ERROR, &map.colors(&scale), NEUTRAL)?;
-        let shown = panel::ErrorScale { rms: map.rms(), limit: scale.limit };
+        let shown = ErrorScale { rms: map.rms(), limit: scale.limit };
         self.error_shown = Some((self.version, reference.rays, shown));
         self.pending |= Changed { display: true, ..Changed::default() };
         Ok(())

@@ -1,6 +1,6 @@
 //! Draws the graph of frame times by pass.
 
-use super::viewer::HISTORY;
+use super::status::HISTORY;
 use crate::gpu::Timing;
 use egui::{Align2, Color32, FontId, Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
 use std::collections::VecDeque;

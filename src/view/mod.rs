@@ -28,6 +28,8 @@ mod picture;
 pub mod reference;
 pub mod reload;
 mod save;
+#[cfg(feature = "view")]
+pub mod status;
 pub mod task;
 #[cfg(feature = "view")]
 pub mod viewer;

@@ -1,7 +1,7 @@
 //! Text over the picture besides the panels: labels of its halves, messages, the scale of the error.
 
 use super::Editor;
-use super::panel::{ERROR, MARGIN, Status, WARNING, grouped};
+use super::status::{ERROR, MARGIN, Status, WARNING, grouped};
 use crate::asset::false_color::{ColorScale, Scheme};
 use crate::asset::picture::srgb_from_linear;
 use egui::{Align2, Color32, Context, FontId, Rect, RichText, Sense, Ui, pos2, vec2};

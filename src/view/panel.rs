@@ -5,66 +5,19 @@ use super::command::Command;
 use super::graph;
 use super::input::CONTROLS;
 use super::notes;
+use super::status::{MARGIN, Status, grouped};
 use super::task::TaskProgress;
-use crate::gpu::Timing;
-use crate::lists::gather::Counts;
 use crate::merge::variant::VARIANTS;
 use egui::collapsing_header::CollapsingState;
 use egui::{Align2, Color32, Context, Id, Pos2, RichText, Stroke, Ui, pos2, vec2};
-use std::collections::VecDeque;
 
-/// Margin around panels, points.
-pub(super) const MARGIN: f32 = 8.0;
 /// Width of the panel of figures, points.
 const FIGURES_WIDTH: f32 = 268.0;
 /// Width of the folded panel of figures, points.
 const FOLDED_WIDTH: f32 = 104.0;
 /// Width of the help, points.
 const HELP_WIDTH: f32 = 350.0;
-pub(super) const WARNING: Color32 = Color32::from_rgb(255, 190, 90);
-pub(super) const ERROR: Color32 = Color32::from_rgb(255, 120, 110);
 const OUTLINE: Color32 = Color32::from_rgb(255, 200, 60);
-
-/// The error that the colours show.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ErrorScale {
-    /// Root mean square of the error, relative to that of the reference.
-    pub rms: f64,
-    /// Error at the ends of the colour scale, in the same unit.
-    pub limit: f64,
-}
-
-/// The viewer's state that the overlay shows besides the editor's.
-pub struct Status<'s> {
-    /// Name of the device.
-    pub device: &'s str,
-    /// Its driver.
-    pub driver: &'s str,
-    /// Width and height of the picture, pixels.
-    pub size: [u32; 2],
-    /// Times of the passes of the last frames, oldest first.
-    pub timings: &'s VecDeque<Vec<Timing>>,
-    /// Lookups of the last merge.
-    pub counts: Option<Counts>,
-    /// Number of clusters that the last frame merged, and of all clusters; `None` before the first frame of a scene.
-    pub merged: Option<(usize, usize)>,
-    /// Number of lit vertices.
-    pub vertices: usize,
-    /// Merge variant in use; `None` before the first frame of a scene.
-    pub variant: Option<&'s str>,
-    /// Progress of the background bake.
-    pub bake: Option<TaskProgress>,
-    /// Progress of the background rays.
-    pub rays: Option<TaskProgress>,
-    /// Reference: rays per vertex, relative standard error, and whether it is up to date.
-    pub reference: Option<(u32, f64, bool)>,
-    /// Error, and whether it is up to date.
-    pub error: Option<(ErrorScale, bool)>,
-    /// The compiler's messages.
-    pub shader_error: Option<&'s str>,
-    /// Messages for the user, oldest first.
-    pub messages: Vec<&'s str>,
-}
 
 /// A dark style with translucent panels.
 pub fn visuals() -> egui::Visuals {
@@ -247,23 +200,11 @@ fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {
     slide(ui, "sky turned", editor.sky_turn_deg(), -180.0..=180.0, "°", Command::SetSkyTurn);
 }
 
-/// A number with spaces between groups of three digits: 12 345.
-pub(super) fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut out = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            out.push(' ');
-        }
-        out.push(digit);
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use egui::Rect;
+    use std::collections::VecDeque;
 
     #[test]
     fn numbers_read_in_threes() {

@@ -2,7 +2,8 @@
 
 use super::outline::outline;
 use super::save::unedited;
-use super::viewer::{ERROR, HISTORY, REFERENCE, Viewer};
+use super::status::HISTORY;
+use super::viewer::{ERROR, REFERENCE, Viewer};
 use crate::asset::edges::Edges;
 use crate::asset::picture;
 use crate::draw::camera::clip_from_world;

@@ -5,9 +5,10 @@
 use super::Editor;
 use super::command::{Changed, Command, Effect, Request};
 use super::input::{Event, Input};
-use super::panel::{self, Status};
+use super::panel;
 use super::reference::Reference;
 use super::reload::Watch;
+use super::status::{ErrorScale, Status};
 use super::task::{BackgroundTask, TaskProgress};
 use crate::asset::edges::Edges;
 use crate::bake::Baker;
@@ -23,8 +24,6 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Number of frames whose times are kept for the graph.
-pub const HISTORY: usize = 120;
 /// Seconds for which a message is shown.
 const MESSAGE_S: f64 = 6.0;
 /// Additional radiosity buffers of the frame: the reference, and the colours of the error.
@@ -70,7 +69,7 @@ pub struct Viewer {
     /// Version of the light for which rays are being cast.
     pub(super) rays_version: u64,
     pub(super) reference: Option<Reference>,
-    pub(super) error_shown: Option<(u64, u32, panel::ErrorScale)>,
+    pub(super) error_shown: Option<(u64, u32, ErrorScale)>,
     /// Counts every change of the light on vertices.
     pub(super) version: u64,
     pub(super) watch: Option<Watch>,

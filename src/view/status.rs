@@ -1,0 +1,70 @@
+//! What the overlay's panels and notes show of the viewer's state, and their common style.
+
+use super::task::TaskProgress;
+use crate::gpu::Timing;
+use crate::lists::gather::Counts;
+use egui::Color32;
+use std::collections::VecDeque;
+
+/// Margin around panels, points.
+pub(super) const MARGIN: f32 = 8.0;
+/// Colour of warnings.
+pub(super) const WARNING: Color32 = Color32::from_rgb(255, 190, 90);
+/// Colour of errors.
+pub(super) const ERROR: Color32 = Color32::from_rgb(255, 120, 110);
+/// Number of frames whose times are kept for the graph.
+pub(super) const HISTORY: usize = 120;
+
+/// The error that the colours show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorScale {
+    /// Root mean square of the error, relative to that of the reference.
+    pub rms: f64,
+    /// Error at the ends of the colour scale, in the same unit.
+    pub limit: f64,
+}
+
+/// The viewer's state that the overlay shows besides the editor's.
+pub struct Status<'s> {
+    /// Name of the device.
+    pub device: &'s str,
+    /// Its driver.
+    pub driver: &'s str,
+    /// Width and height of the picture, pixels.
+    pub size: [u32; 2],
+    /// Times of the passes of the last frames, oldest first.
+    pub timings: &'s VecDeque<Vec<Timing>>,
+    /// Lookups of the last merge.
+    pub counts: Option<Counts>,
+    /// Number of clusters that the last frame merged, and of all clusters; `None` before the first frame of a scene.
+    pub merged: Option<(usize, usize)>,
+    /// Number of lit vertices.
+    pub vertices: usize,
+    /// Merge variant in use; `None` before the first frame of a scene.
+    pub variant: Option<&'s str>,
+    /// Progress of the background bake.
+    pub bake: Option<TaskProgress>,
+    /// Progress of the background rays.
+    pub rays: Option<TaskProgress>,
+    /// Reference: rays per vertex, relative standard error, and whether it is up to date.
+    pub reference: Option<(u32, f64, bool)>,
+    /// Error, and whether it is up to date.
+    pub error: Option<(ErrorScale, bool)>,
+    /// The compiler's messages.
+    pub shader_error: Option<&'s str>,
+    /// Messages for the user, oldest first.
+    pub messages: Vec<&'s str>,
+}
+
+/// A number with spaces between groups of three digits: 12 345.
+pub(super) fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut out = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            out.push(' ');
+        }
+        out.push(digit);
+    }
+    out
+}

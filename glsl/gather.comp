@@ -3,7 +3,7 @@
 // occluders that may matter to any of the clusters, by the block and then one by one, and put them into the receiver's order;
 // then each walks its own cluster through what was found, light by light and at last the sky, and writes what it keeps.
 // A group that finds more than there is room for is left to a second round (ROOMY), which keeps what it finds in a buffer.
-// Decisions come from sums and products alone (repeatable.glsl), so that the host can make the same lists.
+// The rule has a slack that is larger than rounding (gather_scope.glsl); only the order has to be the host's to the bit.
 #extension GL_KHR_memory_scope_semantics : enable
 #include "merge_layout.glsl"
 
@@ -22,14 +22,14 @@ struct Group {
 
 // Spheres of all entities (centre in the world, radius), then blocks of occluders, their members, and lights.
 #if TEXEL
-layout(binding = 0) uniform textureBuffer bodies;
-vec4 body(uint i) {
-    return texelFetch(bodies, int(i));
+layout(binding = 0) uniform textureBuffer scene_quads;
+vec4 scene_quad(uint i) {
+    return texelFetch(scene_quads, int(i));
 }
 #else
-layout(std430, binding = 0) readonly buffer Bodies { vec4 bodies[]; };
-vec4 body(uint i) {
-    return bodies[i];
+layout(std430, binding = 0) readonly buffer SceneQuads { vec4 scene_quads[]; };
+vec4 scene_quad(uint i) {
+    return scene_quads[i];
 }
 #endif
 layout(std430, binding = 1) readonly buffer Entities { Entity entities[]; };
@@ -47,8 +47,8 @@ layout(push_constant) uniform Push {
     uint occluder_count;
     uint block_first;  // quads: centre and reach; largest radius
     uint member_first; // four to a quad
-    uint lamp_first;   // quads: axis and cosine; radiance, entity, whether coloured
-    uint lamp_count;
+    uint light_first;   // quads: axis and cosine; radiance, entity, whether coloured
+    uint light_count;
     uint capacity;     // entries of a cluster
     uint switches;
     float sky;         // radiance; negative without one
@@ -90,12 +90,18 @@ void meet() {
 #endif
 }
 
+// Near to far. The host has the same bits: each product and sum is rounded by itself.
+uint distance_key(vec3 a, vec3 b) {
+    precise vec3 to = a - b;
+    precise float square = to.x * to.x + to.y * to.y + to.z * to.z;
+    return floatBitsToUint(square); // of what is not negative, more is more in bits too
+}
+
 // Occluders that may matter to any cluster of the group, in no order.
 void find(Scope scope, uint receiver, uint lane) {
     for (uint b = lane; b * BLOCK < occluder_count; b += LANES) {
-        float radius = body(block_first + 2 * b + 1).x;
-        precise float most = crowd_weight(scope, body(block_first + 2 * b), radius) * brightest;
-        if (!negligible(scope, most)) {
+        float radius = scene_quad(block_first + 2 * b + 1).x;
+        if (!leaves_out(scope, scene_quad(block_first + 2 * b), radius)) {
             blocks[atomicAdd(block_count, 1)] = b;
         }
     }
@@ -105,14 +111,12 @@ void find(Scope scope, uint receiver, uint lane) {
         if (m >= occluder_count) {
             continue;
         }
-        uint e = floatBitsToUint(body(member_first + m / 4)[m % 4]);
-        vec4 sphere = body(e);
-        precise float most = crowd_weight(scope, vec4(sphere.xyz, 0.0), sphere.w) * brightest;
-        if (e != receiver && !negligible(scope, most)) {
+        uint e = floatBitsToUint(scene_quad(member_first + m / 4)[m % 4]);
+        vec4 sphere = scene_quad(e);
+        if (e != receiver && !leaves_out(scope, vec4(sphere.xyz, 0.0), sphere.w)) {
             uint at = atomicAdd(found, 1);
             if (at < FOUND) {
-                precise vec3 to = sphere.xyz - scope.origin;
-                KEY(at) = floatBitsToUint(sum_of_products(to, to)); // not negative: more in bits is more
+                KEY(at) = distance_key(sphere.xyz, scope.origin);
                 OCCLUDER(at) = e;
             }
         }
@@ -192,25 +196,25 @@ void order(uint count, uint lane) {
 
 // One cluster: its entries.
 void walk(uint at, Entity receiver, uint receiver_index, uint count) {
-    Scope scope = scope_of(receiver, bounds[clusters[at].bounds]);
+    Scope scope = scope_of(receiver, bounds[clusters[at].bounds], SLACK);
     uint first = at * capacity, made = 0;
-    uint chains = lamp_count + uint(sky >= 0.0);
+    uint chains = light_count + uint(sky >= 0.0);
     for (uint l = 0; l < chains; l++) {
-        bool of_sky = l == lamp_count;
-        vec4 facing = body(of_sky ? 0 : lamp_first + 2 * l);
-        vec4 lamp = body(of_sky ? 0 : lamp_first + 2 * l + 1);
-        uint lamp_index = floatBitsToUint(lamp.y);
+        bool of_sky = l == light_count;
+        vec4 facing = scene_quad(of_sky ? 0 : light_first + 2 * l);
+        vec4 numbers = scene_quad(of_sky ? 0 : light_first + 2 * l + 1);
+        uint light_index = floatBitsToUint(numbers.y);
         // The sky has no place; any will do to keep the read in bounds.
-        View light = view_of(scope, body(of_sky ? 0 : lamp_index));
-        if (!of_sky && (lamp_index == receiver_index || !light_listed(scope, facing, lamp.x, light))) {
+        View light = view_of(scope, scene_quad(of_sky ? 0 : light_index));
+        if (!of_sky && (light_index == receiver_index || !light_listed(scope, facing, numbers.x, light))) {
             continue;
         }
-        uint chain = (of_sky ? SKY_CHAIN : lamp_index) << ENTRY_BITS;
+        uint chain = (of_sky ? SKY_CHAIN : light_index) << ENTRY_BITS;
         for (uint k = 0; k < count; k++) {
             uint e = ORDERED(k);
-            View view = view_of(scope, body(e));
+            View view = view_of(scope, scene_quad(e));
             bool needed = of_sky ? occluder_listed(scope, view, sky)
-                                 : e != lamp_index && occluder_listed(scope, view, light, lamp.x);
+                                 : e != light_index && occluder_listed(scope, view, light, numbers.x);
             if (needed && view.whole) {
                 if (made < capacity) {
                     entries[first + made] = e | chain;
@@ -225,11 +229,11 @@ void walk(uint at, Entity receiver, uint receiver_index, uint count) {
             }
         }
         if (!of_sky) {
-            bool coloured = floatBitsToUint(lamp.z) != 0;
+            bool coloured = floatBitsToUint(numbers.z) != 0;
             for (uint channel = coloured ? 0 : 2; channel < 3; channel++) {
                 uint flags = ENTRY_LIGHT | (coloured ? channel : 3) << ENTRY_CHANNEL | (channel == 2 ? ENTRY_LAST : 0);
                 if (made < capacity) {
-                    entries[first + made] = lamp_index | chain | flags;
+                    entries[first + made] = light_index | chain | flags;
                 }
                 made++;
             }
@@ -261,12 +265,12 @@ void gather(uint number) {
         buckets[b] = 0;
     }
     meet();
-    find(scope_of(receiver, bounds[groups[number].bounds]), receiver_index, lane);
+    find(scope_of(receiver, bounds[groups[number].bounds], 2.0 * SLACK), receiver_index, lane);
     meet();
     if (lane == 0) {
         atomicMax(most_found, found);
     }
-    if (found * (lamp_count + 1) > TURNS) {
+    if (found * (light_count + 1) > TURNS) {
         // llvmpipe ends all loops of an invocation after 65 535 turns together.
         clusters[at].vertex_count = 0;
         atomicMax(longest, ~0u);

@@ -37,7 +37,6 @@ embedded!(
     "merge_product.glsl",
     "product.comp",
     "project.comp",
-    "repeatable.glsl",
     "show.frag",
     "show.vert",
     "smooth.frag",

@@ -9,7 +9,7 @@ use serde_json::Value;
 use shadow_fields::shaders::FILES;
 use std::path::Path;
 
-const PASSES: [&str; 5] = ["capture", "project", "assemble", "merge", "draw"];
+const PASSES: [&str; 7] = ["capture", "project", "assemble", "gather", "merge", "draw", "smooth"];
 
 fn check(folder: &Path, pass: Option<&str>, shaders: Option<&Path>) -> (i32, Value, String) {
     let mut command = command(folder, &["check", "--json", "--no-progress"]);
@@ -58,7 +58,9 @@ fn a_wrong_shader_is_found() {
         ("merge.comp", "float weight = above_horizon", "float weight = 0.999 * above_horizon", "merge"),
         ("draw.frag", "finish(radiance,", "1.01 * finish(radiance,", "draw"),
         ("grid.frag", "push.emission_white.rgb + light", "1.01 * light", "draw"),
-        ("smooth.frag", "float share = 0.5", "float share = 0.6", "draw"),
+        ("smooth.frag", "float share = 0.5", "float share = 0.6", "smooth"),
+        ("gather.comp", "KEY(at) = distance_key", "KEY(at) = ~distance_key", "gather"),
+        ("gather_scope.glsl", "+ FADE_SINE * view.farthest", "+ FADE_SINE * view.nearest", "gather"),
     ];
     for (file, from, to, pass) in wrong {
         let text = FILES.iter().find(|(name, _)| *name == file).unwrap().1;

@@ -1,139 +1,34 @@
-//! Lists of clusters: those made through a tree are those of a look at everything, and those of the device are those of the host
-//! to the bit; what does not fit is made again with more room, and never merged by half.
+//! Cluster lists: those made through a tree are those of a look at everything, and those of the device hold what the rule without
+//! slack lists and nothing beyond the rule with twice the slack. What does not fit is made again with more room, and never
+//! merged by half.
 
 mod common;
 #[path = "common/stage.rs"]
 mod stage;
 
 use common::report;
-use glam::{DQuat, DVec3};
+use shadow_fields::check::gather::Crowded;
 use shadow_fields::frame::{Options, Target, record};
-use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, FLIGHTS};
-use shadow_fields::layout::{Cluster, ENTRY_ENTITIES, Entity, ListEntry};
+use shadow_fields::gpu::{Commands, FLIGHTS};
+use shadow_fields::layout::{Cluster, ENTRY_ENTITIES, ListEntry};
 use shadow_fields::lists::gather::{
-    self, Bounds, Chains, EntityBounds, FOUND, GROUP_CLUSTERS, Gather, Group, Inputs, Packed, Place, Report,
-    SceneBounds, Scope,
+    self, Bounds, Candidates, FOUND, Gather, Packed, Place, Report, SLACK, SceneBounds, Scope,
 };
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::sh::rotation::turns;
 use stage::{Stage, scene, small, stage};
 use std::fmt::Write;
 
-fn random_direction(rng: &mut fastrand::Rng) -> DVec3 {
-    loop {
-        let p = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5);
-        if (1e-3..0.25).contains(&p.length_squared()) {
-            return p.normalize();
-        }
-    }
+/// Lists by the device and its report.
+fn lists(crowded: &Crowded, stage: &Stage, texel: bool, capacity: u32) -> (Vec<(Cluster, Vec<u32>)>, Report) {
+    crowded.on_device(&stage.gpu.device, &stage.gpu.library, texel, capacity).unwrap()
 }
 
-/// A receiver among many things, with clusters of its own.
-struct Crowded {
-    scene_bounds: SceneBounds,
-    receiver: u32,
-    entity: Entity,
-    clusters: Vec<Bounds>,
-}
-
-/// Near and far, with and without a sky, lights and each skip; every other round at a corner of the world.
-fn crowded(rng: &mut fastrand::Rng, round: usize, count: usize) -> Crowded {
-    let spread_m = if round.is_multiple_of(2) { 60.0 } else { 8.0 };
-    let corner = if round % 3 == 2 { DVec3::new(4e3, -7e3, 1e4) } else { DVec3::ZERO };
-    let bounds: Vec<EntityBounds> = (0..count)
-        .map(|i| EntityBounds {
-            centre: corner + DVec3::new(rng.f64() - 0.5, 0.1 * rng.f64(), rng.f64() - 0.5) * spread_m,
-            radius_m: 0.1 + 0.4 * rng.f64(),
-            occludes: i % 5 != 0,
-            emits: i % 25 == 0,
-            coloured: i % 50 == 0,
-            radiance: 3.0 * rng.f64(),
-            facing: (i % 50 == 25).then(|| (random_direction(rng), 1.8)),
-        })
-        .collect();
-    let receiver = rng.u32(0..count as u32);
-    let rotation = DQuat::from_axis_angle(random_direction(rng), 6.0 * rng.f64());
-    let turns = turns(rotation).map(|x| x as f32);
-    let own = bounds[receiver as usize];
-    let entity = Entity {
-        centre: own.centre.as_vec3().extend(1.0 / own.radius_m as f32).to_array(),
-        alpha_beta: [turns[0], turns[1], turns[2], turns[3]],
-        gamma: [turns[4], turns[5]],
-        emission: [0.0, 0.0, 0.0, 0.3 + 0.7 * rng.f32()],
-        albedo: [0.0, 0.0, 0.0, 0.5 + rng.f32()],
-        ..Default::default()
-    };
-    let skips = [Skip::ALL, Skip::NONE]
-        .into_iter()
-        .chain(["cones", "behind", "horizon", "caps"].map(Skip::without))
-        .collect::<Vec<_>>();
-    let eps = if round % 6 == 5 { 0.0 } else { 10_f64.powf(-1.5 - 2.5 * rng.f64()) };
-    let scene_bounds = SceneBounds::new(bounds, (round % 4 != 3).then_some(1.2), skips[round % skips.len()], eps);
-    let facing = random_direction(rng);
-    let clusters = (0..GROUP_CLUSTERS)
-        .map(|_| {
-            let centre = 2.0 * random_direction(rng) * rng.f64();
-            let axis = (facing + 0.5 * random_direction(rng)).normalize();
-            Bounds::from_parts(centre, 0.3 * rng.f64(), axis, 0.4 * rng.f64())
-        })
-        .collect();
-    Crowded { scene_bounds, receiver, entity, clusters }
-}
-
-impl Crowded {
-    /// Lists by a look at everything.
-    fn expected(&self) -> Vec<Vec<u32>> {
-        let everything = Chains::all(&self.scene_bounds, self.receiver);
-        let of = |bounds| {
-            let mut entries = Vec::new();
-            gather::reference(&self.scene_bounds, &self.entity, bounds, &everything, &mut entries);
-            entries
-        };
-        self.clusters.iter().map(of).collect()
-    }
-
-    /// Lists by the device, each with its cluster, and its report.
-    fn on_device(&self, stage: &Stage, texel: bool, capacity: u32) -> (Vec<(Cluster, Vec<u32>)>, Report) {
-        let device = &stage.gpu.device;
-        let count = self.clusters.len() as u32;
-        let mut bounds = self.clusters.clone();
-        bounds.push(Bounds::union(&self.clusters));
-        let cluster = |i: u32| Cluster { receiver: self.receiver, vertex_count: 64, bounds: i, ..Default::default() };
-        let mut entities = vec![Entity::default(); self.scene_bounds.spheres.len()];
-        entities[self.receiver as usize] = self.entity;
-        let packed = Packed::new(&self.scene_bounds);
-        let bodies = Buffer::with_data(device, "bodies", &packed.quads).unwrap();
-        let entities = Buffer::with_data(device, "entities", &entities).unwrap();
-        let bounds = Buffer::with_data(device, "bounds", &bounds).unwrap();
-        // Two groups, the second of one cluster that is bounded by itself.
-        let groups = [
-            Group { first: 0, count: count - 1, bounds: count, left: 0 },
-            Group { first: count - 1, count: 1, bounds: count - 1, left: 0 },
-        ];
-        let groups = Buffer::with_data(device, "groups", &groups).unwrap();
-        let clusters: Vec<Cluster> = (0..count).map(cluster).collect();
-        let clusters = Buffer::with_data(device, "clusters", &clusters).unwrap();
-        let entries = Buffer::new(device, "entries", BufferKind::Device, 4 * u64::from(count * capacity)).unwrap();
-        let told = Buffer::with_data(device, "report", &[Report::default()]).unwrap();
-        let pass = Gather::new(device, &stage.gpu.library, texel, self.scene_bounds.spheres.len()).unwrap();
-        let inputs = Inputs {
-            bodies: &bodies,
-            entities: &entities,
-            bounds: &bounds,
-            groups: &groups,
-            clusters: &clusters,
-            entries: &entries,
-            report: &told,
-        };
-        let mut commands = Commands::new(device, "gather").unwrap();
-        commands.pass("gather", |c| pass.record(c, &inputs, &packed, capacity, 2)).unwrap();
-        commands.barrier(Access::ComputeWrite, Access::TransferRead);
-        commands.submit().unwrap();
-        let clusters: Vec<Cluster> = clusters.download(count as usize).unwrap();
-        let entries: Vec<u32> = entries.download((count * capacity) as usize).unwrap();
-        let list = |cluster: &Cluster| entries[cluster.entry_first as usize..][..cluster.entry_count as usize].to_vec();
-        (clusters.iter().map(|cluster| (*cluster, list(cluster))).collect(), told.download(1).unwrap()[0])
-    }
+/// Holds lists of the device against the rule, and returns how many entries they have, and how many of these for the slack alone.
+fn held(crowded: &Crowded, lists: &[(Cluster, Vec<u32>)], what: &str) -> [usize; 2] {
+    let agreement = crowded.hold(lists);
+    assert_eq!(agreement.wrong_lists, 0, "{what}: {agreement:?}");
+    assert!(lists.iter().all(|(cluster, _)| cluster.vertex_count == 64), "{what}");
+    [agreement.entries, agreement.extra_entries]
 }
 
 fn is_cap(entry: u32) -> bool {
@@ -147,20 +42,21 @@ fn the_tree_leaves_every_list_as_it_is() {
     let mut rng = fastrand::Rng::with_seed(21);
     let (mut listed, mut offered, mut all) = (0, 0, 0);
     for round in 0..60 {
-        let crowded = crowded(&mut rng, round, 200);
+        let crowded = Crowded::new(&mut rng, round, 200);
         let Crowded { scene_bounds, receiver, entity, clusters } = &crowded;
-        let group = Chains::of_group(scene_bounds, *receiver, entity, &Bounds::union(clusters));
+        let group = Candidates::of_group(scene_bounds, *receiver, entity, &Bounds::union(clusters));
         offered += group.occluder_count();
-        all += Chains::all(scene_bounds, *receiver).occluder_count();
-        for (bounds, expected) in clusters.iter().zip(crowded.expected()) {
+        all += Candidates::all(scene_bounds, *receiver).occluder_count();
+        let lists = crowded.expected(SLACK);
+        for ((bounds, expected), most) in clusters.iter().zip(&lists).zip(crowded.expected(2.0 * SLACK)) {
+            let scope = Scope::new(scene_bounds, entity, bounds, SLACK);
             let mut found = Vec::new();
-            gather::reference(scene_bounds, entity, bounds, &group, &mut found);
-            assert_eq!(found, expected, "round {round}");
+            gather::reference(&scope, &group, &mut found);
+            assert_eq!(found, *expected, "round {round}");
             listed += expected.len();
             // An occluder may stand there by its field and as a cap.
-            let whole = expected.iter().filter(|&&entry| !is_cap(entry));
-            let count = whole.count() as u64;
-            let counts = gather::counts(scene_bounds, *receiver, entity, bounds);
+            let count = expected.iter().filter(|&&entry| !is_cap(entry)).count() as u64;
+            let counts = gather::counts(&scope, *receiver);
             let left = counts.below_horizon
                 + counts.behind_light
                 + counts.apart
@@ -168,36 +64,37 @@ fn the_tree_leaves_every_list_as_it_is() {
                 + counts.below_eps
                 + counts.caps;
             assert_eq!(left + count, counts.considered, "every lookup is listed or has a reason");
-            let scope = Scope::new(scene_bounds, entity, bounds);
-            for (j, body) in scene_bounds.entities.iter().enumerate().filter(|(j, _)| *j != *receiver as usize) {
-                let on = expected.iter().any(|&entry| ListEntry::entities(entry)[0] as usize == j);
-                assert_eq!(scope.lists(j as u32, body, *receiver), on, "round {round}, entity {j}");
-                assert!(!on || scope.may_list(body, scene_bounds.spheres[j]), "round {round}, entity {j}");
+            // The test for what was touched takes twice the slack.
+            let scope = Scope::new(scene_bounds, entity, bounds, 2.0 * SLACK);
+            for j in (0..scene_bounds.entities.len()).filter(|&j| j != *receiver as usize) {
+                let on = most.iter().any(|&entry| ListEntry::entities(entry)[0] as usize == j);
+                assert_eq!(scope.lists(j, *receiver), on, "round {round}, entity {j}");
+                assert!(!on || scope.may_list(j), "round {round}, entity {j}");
             }
         }
     }
     report(&format!("{listed} entries; the tree offers {offered} of {all} occluders to groups"));
-    assert!(listed > 10_000 && 2 * offered < all, "the tree is of use: {offered} of {all}");
+    // A group is searched once for all chains, under the brightest light, so that each occluder counts once.
+    assert!(listed > 10_000 && 10 * offered < 7 * all, "the tree is of use: {offered} of {all}");
 }
 
 #[test]
-fn the_device_makes_the_lists_of_its_twin() {
+fn the_device_lists_what_matters_within_the_slack() {
     let Some(stage) = stage() else { return };
     let mut rng = fastrand::Rng::with_seed(4);
+    let mut totals = [0; 2];
     for round in 0..40 {
         // Few, several blocks, and a block that is not full.
-        let crowded = crowded(&mut rng, round, [30, 200, 700][round % 3]);
-        let expected = crowded.expected();
-        let (lists, said) =
-            crowded.on_device(&stage, round.is_multiple_of(2), Packed::new(&crowded.scene_bounds).longest() as u32);
-        for (i, ((cluster, found), expected)) in lists.iter().zip(&expected).enumerate() {
-            assert!(found == expected, "round {round}, cluster {i}: {} entries for {}", found.len(), expected.len());
-            assert_eq!(cluster.vertex_count, 64);
-        }
-        let longest = expected.iter().map(Vec::len).max().unwrap();
-        let entries: usize = expected.iter().map(Vec::len).sum();
-        assert_eq!((said.longest as usize, said.entry_total as usize), (longest, entries), "round {round}");
+        let crowded = Crowded::new(&mut rng, round, [30, 200, 700][round % 3]);
+        let room = Packed::new(&crowded.scene_bounds).longest() as u32;
+        let (lists, said) = lists(&crowded, &stage, round.is_multiple_of(2), room);
+        let counts = held(&crowded, &lists, &format!("round {round}"));
+        totals = [0, 1].map(|i| totals[i] + counts[i]);
+        let longest = lists.iter().map(|(_, list)| list.len()).max().unwrap();
+        assert_eq!((said.longest as usize, said.entry_total as usize), (longest, counts[0]), "round {round}");
     }
+    report(&format!("{} entries, {} of them for the slack alone", totals[0], totals[1]));
+    assert!(totals[0] > 10_000 && 100 * totals[1] < 3 * totals[0], "the slack costs next to nothing: {totals:?}");
 }
 
 /// Too little room for a list: that is told, and the clusters lose their vertices.
@@ -205,43 +102,40 @@ fn the_device_makes_the_lists_of_its_twin() {
 fn what_does_not_fit_is_told() {
     let Some(stage) = stage() else { return };
     let mut rng = fastrand::Rng::with_seed(9);
-    let some = crowded(&mut rng, 0, 200);
-    let expected = some.expected();
-    let longest = expected.iter().map(Vec::len).max().unwrap();
+    let some = Crowded::new(&mut rng, 0, 200);
+    let (whole, _) = lists(&some, &stage, true, Packed::new(&some.scene_bounds).longest() as u32);
+    let longest = whole.iter().map(|(_, list)| list.len()).max().unwrap();
     let room = longest as u32 / 2;
-    let (lists, said) = some.on_device(&stage, true, room);
+    let (lists, said) = lists(&some, &stage, true, room);
     assert_eq!((said.longest as usize, said.left_count), (longest, 0));
-    for ((cluster, found), expected) in lists.iter().zip(&expected) {
+    for ((cluster, found), (_, expected)) in lists.iter().zip(&whole) {
         assert_eq!(cluster.vertex_count == 0, expected.len() > room as usize);
         assert_eq!(found[..], expected[..expected.len().min(room as usize)]);
     }
 }
 
-/// More occluders than a workgroup's memory holds, near both groups or near one: those are gathered in the second round, to the
-/// same lists.
+/// More occluders than a workgroup's memory holds, near both groups or near one: those are gathered in the second round, by the
+/// same rule.
 #[test]
 fn what_a_group_has_no_room_for_is_gathered_again() {
     let Some(stage) = stage() else { return };
     let mut rng = fastrand::Rng::with_seed(9);
     let mut left = Vec::new();
     for round in 0..12 {
-        let mut many = crowded(&mut rng, 5, 2000);
+        let mut many = Crowded::new(&mut rng, 5, 2000);
         // With no threshold all that occlude are found. One that takes fewer of them makes groups differ.
         let eps = if round == 0 { 0.0 } else { 1e-4 * 2.0_f64.powi(round) };
-        let mut lamps = 0;
-        for body in &mut many.scene_bounds.entities {
-            lamps += usize::from(body.emits);
-            body.emits &= lamps <= 9;
+        let mut lights = 0;
+        for entity in &mut many.scene_bounds.entities {
+            lights += usize::from(entity.emits);
+            entity.emits &= lights <= 9;
         }
         many.scene_bounds = SceneBounds::new(many.scene_bounds.entities, Some(1.2), Skip::ALL, eps);
-        let expected = many.expected();
-        let (lists, said) = many.on_device(&stage, round % 2 == 0, Packed::new(&many.scene_bounds).longest() as u32);
-        for (i, ((cluster, found), expected)) in lists.iter().zip(&expected).enumerate() {
-            assert!(found == expected, "round {round}, cluster {i}: {} entries for {}", found.len(), expected.len());
-            assert_eq!(cluster.vertex_count, 64);
-        }
+        let room = Packed::new(&many.scene_bounds).longest() as u32;
+        let (lists, said) = lists(&many, &stage, round % 2 == 0, room);
+        let [entries, _] = held(&many, &lists, &format!("round {round}"));
         assert_eq!(said.left_count > 0, said.most_found as usize > FOUND, "{said:?}");
-        assert_eq!(said.entry_total as usize, expected.iter().map(Vec::len).sum::<usize>());
+        assert_eq!(said.entry_total as usize, entries);
         left.push(said.left_count);
     }
     report(&format!("groups left to the second round: {left:?}"));
@@ -253,8 +147,8 @@ fn what_a_group_has_no_room_for_is_gathered_again() {
 fn what_cannot_be_gone_through_is_told() {
     let Some(stage) = stage() else { return };
     let mut rng = fastrand::Rng::with_seed(9);
-    let many = crowded(&mut rng, 5, 2000);
-    let (lists, said) = many.on_device(&stage, true, 100);
+    let many = Crowded::new(&mut rng, 5, 2000);
+    let (lists, said) = lists(&many, &stage, true, 100);
     assert_eq!(said.longest, u32::MAX, "{said:?}");
     assert!(lists.iter().all(|(cluster, _)| cluster.vertex_count == 0));
 }
@@ -278,8 +172,9 @@ fn town(edge: usize) -> shadow_fields::scene::Scene {
     scene(&text)
 }
 
-/// Whole frames by both, moving and at rest: the same light to the bit, the same clusters merged, the same entries. Lists of more
-/// than 64 entries need a second try, which nobody sees.
+/// Whole frames by both, moving and at rest, merge the same clusters. Without a threshold the light is the same to the bit: what only one of
+/// them lists has no weight. With a threshold it may differ by what the other leaves off, which eps bounds. Lists of
+/// more than 64 entries need a second try, which nobody sees.
 #[test]
 fn frames_are_the_same_by_either() {
     let Some(stage) = stage() else { return };
@@ -296,10 +191,14 @@ fn frames_are_the_same_by_either() {
             let passes = by_device.render(&placements, None).unwrap();
             assert!(passes.iter().any(|pass| pass.pass == "gather"), "{passes:?}");
             let expected = stage.light(&mut by_host, &placements);
-            let found: Vec<_> = (0..placements.len()).map(|entity| by_device.radiosity(entity).unwrap()).collect();
-            assert!(found == expected, "eps {eps}, round {round}");
-            assert!(by_device.merged().merged_entries > 0);
-            assert_eq!(by_device.merged(), by_host.merged(), "eps {eps}, round {round}");
+            for (entity, expected) in expected.iter().enumerate() {
+                let (apart, _) = stage::difference(&by_device.radiosity(entity).unwrap(), expected);
+                assert!(apart <= eps, "eps {eps}, round {round}, entity {entity}: {apart}");
+            }
+            let [device, host] = [&by_device, &by_host].map(|frame| frame.merged());
+            assert_eq!((device.clusters, device.merged_clusters), (host.clusters, host.merged_clusters));
+            let entries = [device, host].map(|merged| merged.merged_entries);
+            assert!(entries[0] > 0 && 1000 * entries[0].abs_diff(entries[1]) <= entries[0], "{entries:?}");
             assert!(by_device.render(&placements, None).unwrap().is_empty(), "at rest nothing is gathered");
         }
         report(&format!("{:?}", by_host.merged()));
@@ -377,9 +276,9 @@ fn a_crowd_is_gathered_in_a_window() {
     assert_eq!(frame.merged().merged_clusters, 0, "at rest nothing is merged");
 }
 
-/// Every sum and product of the pass is rounded by itself: a compiler that contracted some would come to other lists.
+/// The key of the order has the same bits on every device only if no product and sum of it are contracted into one operation.
 #[test]
-fn nothing_is_contracted() {
+fn the_key_of_the_order_is_not_contracted() {
     use rspirv::spirv::{Decoration, Op};
     for (texel, roomy) in [(false, false), (true, false), (false, true), (true, true)] {
         let shader = common::library().shader(&Gather::row(texel, roomy)).unwrap();
@@ -390,12 +289,8 @@ fn nothing_is_contracted() {
             .filter(|i| i.operands.contains(&rspirv::dr::Operand::Decoration(Decoration::NoContraction)))
             .map(|i| i.operands[0].unwrap_id_ref())
             .collect();
-        let arithmetic =
-            [Op::FAdd, Op::FSub, Op::FMul, Op::VectorTimesScalar, Op::Dot, Op::FDiv, Op::FMod, Op::MatrixTimesVector];
-        let found: Vec<_> = module.all_inst_iter().filter(|i| arithmetic.contains(&i.class.opcode)).collect();
-        assert!(found.len() > 100, "{} operations", found.len());
-        let loose: Vec<_> = found.iter().filter(|i| !exact.contains(&i.result_id.unwrap())).collect();
-        assert!(loose.is_empty(), "{} of {}: {loose:?}", loose.len(), found.len());
-        assert!(!found.iter().any(|i| matches!(i.class.opcode, Op::FDiv | Op::Dot)), "by sums and products alone");
+        let is_exact = |i: &&rspirv::dr::Instruction| i.result_id.is_some_and(|id| exact.contains(&id));
+        let count = |op| module.all_inst_iter().filter(is_exact).filter(|i| i.class.opcode == op).count();
+        assert_eq!([Op::FSub, Op::FMul, Op::FAdd].map(count), [1, 3, 2], "one difference, three squares, two sums");
     }
 }

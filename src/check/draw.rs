@@ -35,29 +35,29 @@ pub fn against_twin(frame: &mut Frame, placements: &[Placement], white: f32) -> 
     Ok(if plain { f64::INFINITY } else { f64::from(differing as u32) / wanted.len() as f64 })
 }
 
+/// Compares pictures with one kind of antialiasing, at a white and without one. Rows are those of `pass`.
+pub(super) fn compare(baker: &Baker, pass: &'static str, antialias: Antialias, add: &mut dyn FnMut(Row)) -> Result<()> {
+    let scene = scene(MIXED)?;
+    let placements = scene.at(0.0);
+    let mut options = Options { size: [96, 64], antialias, ..options() };
+    options.bake.lattice = "cube:2x1".parse().expect("a lattice");
+    let mut frame = Frame::new(baker, &Cache::default(), &scene, options, &|_, _, _| ())?;
+    for white in [1.0, f32::INFINITY] {
+        let worst = against_twin(&mut frame, &placements, white)?;
+        let plural = if frame.samples() > 1 { "s" } else { "" };
+        let what = format!("{} sample{plural} a pixel, white {white}", frame.samples());
+        // Across an outline a pixel takes from its neighbour, so that a sample which differs shows in both.
+        let pixels = if antialias == Antialias::Outlines { 2.0 } else { 1.0 };
+        add(Row::new(pass, what, "share of pixels", worst, pixels * EDGES * snapping(baker.device())));
+    }
+    Ok(())
+}
+
 /// The comparisons of `check`.
 ///
 /// # Errors
 /// As [`Frame::new`] and [`Frame::render`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
-    let scene = scene(MIXED)?;
-    let placements = scene.at(0.0);
-    for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
-        let mut options = Options { size: [96, 64], antialias, ..options() };
-        options.bake.lattice = "cube:2x1".parse().expect("a lattice");
-        let mut frame = Frame::new(baker, &Cache::default(), &scene, options, &|_, _, _| ())?;
-        for white in [1.0, f32::INFINITY] {
-            let worst = against_twin(&mut frame, &placements, white)?;
-            let what = format!(
-                "{} sample{} a pixel{}, white {white}",
-                frame.samples(),
-                if frame.samples() > 1 { "s" } else { "" },
-                if antialias == Antialias::Outlines { ", outlines" } else { "" }
-            );
-            // Across an outline a pixel takes from its neighbour, so that a sample which differs shows in both.
-            let pixels = if antialias == Antialias::Outlines { 2.0 } else { 1.0 };
-            add(Row::new("draw", what, "share of pixels", worst, pixels * EDGES * snapping(baker.device())));
-        }
-    }
-    Ok(())
+    compare(baker, "draw", Antialias::None, add)?;
+    compare(baker, "draw", Antialias::Samples, add)
 }

@@ -9,6 +9,7 @@ use crate::draw::Antialias;
 use crate::error::Result;
 use crate::field::{Lookup, Storage};
 use crate::frame::{Frame, Options};
+use crate::lists::gather::Place;
 use crate::lists::skip::Skip;
 use crate::merge::Variant;
 use crate::merge::variant::{Chain, PRODUCTS, VARIANTS};
@@ -84,7 +85,7 @@ pub fn options() -> Options {
         skip: Skip::ALL,
         chain: Chain::default(),
         eps: 0.0,
-        lists: Some(crate::lists::gather::Place::Host),
+        lists: Some(Place::Host),
         size: [64, 48],
         antialias: Antialias::Samples,
     }
@@ -179,6 +180,10 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
         }
     }
     compare("no skip".into(), Options { skip: Skip::NONE, ..base })?;
+    // The twin looks at everything, so these rows hold for lists that the device makes too.
+    let by_device = Options { lists: Some(Place::Device), ..base };
+    compare("lists made on the device".into(), by_device)?;
+    compare("lists made on the device, no skip".into(), Options { skip: Skip::NONE, ..by_device })?;
     for name in ["cones", "horizon", "caps"] {
         compare(format!("without {name}"), Options { skip: Skip::without(name), ..base })?;
     }

@@ -6,8 +6,10 @@
 pub mod assemble;
 pub mod capture;
 pub mod draw;
+pub mod gather;
 pub mod merge;
 pub mod project;
+pub mod smooth;
 
 use crate::bake::Baker;
 use crate::error::Result;
@@ -53,12 +55,14 @@ impl Row {
 type Part = fn(&Baker, &mut dyn FnMut(Row)) -> Result<()>;
 
 /// Every pass, by the one word that names it everywhere.
-pub const PASSES: [(&str, Part); 5] = [
+pub const PASSES: [(&str, Part); 7] = [
     ("capture", capture::rows),
     ("project", project::rows),
     ("assemble", assemble::rows),
+    ("gather", gather::rows),
     ("merge", merge::rows),
     ("draw", draw::rows),
+    ("smooth", smooth::rows),
 ];
 
 /// Runs every comparison of the given passes; `told` hears each row as it comes.

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::field::log_space::{logarithms, widened};
 use crate::field::{Area, ShadowField};
 use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
-use crate::lists::gather::{self, Chains, Counts};
+use crate::lists::gather::{self, Candidates, Counts, SLACK, Scope};
 use crate::lists::incremental::State;
 use crate::merge::chain::Method;
 use crate::merge::reference::{Object, Task};
@@ -187,10 +187,11 @@ fn listed(state: &State, receiver: usize, geometry: &Geometry) -> Listed {
     for (place, &v) in geometry.order.iter().enumerate() {
         cluster_of[v as usize] = place / CLUSTER_VERTICES as usize;
     }
-    let chains = Chains::all(scene_bounds, receiver as u32);
+    let candidates = Candidates::all(scene_bounds, receiver as u32);
     let of_cluster = |bounds| {
         let mut entries = Vec::new();
-        gather::reference(scene_bounds, entity, bounds, &chains, &mut entries);
+        let scope = Scope::new(scene_bounds, entity, bounds, SLACK);
+        gather::reference(&scope, &candidates, &mut entries);
         entries.into_iter().map(|entry| ListEntry::entities(entry).into()).collect()
     };
     (cluster_of, geometry.clusters.iter().map(of_cluster).collect())

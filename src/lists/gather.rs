@@ -1,20 +1,27 @@
-//! Pass "gather": which lookups each cluster of vertices needs, in which order. On the device as a pass of the frame, or on the
-//! host, with the same outcome to the bit.
+//! Pass "gather": which lookups each cluster of vertices needs, in which order. It runs on the device as a pass of the frame, or on
+//! the host.
 //!
 //! Inputs: bounding spheres of the entities, their switches, bounds of the clusters. Output: a list of [`ListEntry`]s a cluster.
 //! An entry is left off when it changes no vertex of the cluster (an occluder farther than the light from all of them, or one
 //! that the skips in `merge_cone.glsl` weigh with zero everywhere), and, with a threshold `eps`, when the light that it could
-//! take or bring is bounded below it ([`crate::lists::scope`]). Neighbouring clusters are gathered together, so that the work grows with
-//! what may matter to any of them and not with what exists: the host finds that through a tree of the occluders, the device by
-//! looking at blocks of them and then into those that matter. The lists depend on neither: what a group leaves out, each cluster
-//! would leave off by itself.
+//! take or bring is bounded below it.
+//!
+//! A list is a superset of what matters, within a stated slack ([`crate::lists::scope`]). Lists by host and device may differ by
+//! entities within that slack: without a threshold these have a weight of exactly zero in the merge, so the light is the same to the
+//! bit; with a threshold each may change a vertex by eps at most. The order in which occluders are multiplied is the same
+//! everywhere ([`SceneBounds::order`]).
+//!
+//! Neighbouring clusters are gathered together, so that the work grows with what may matter to any of them and not with what exists:
+//! the host finds that through a tree of the occluders, the device by looking at blocks of them and then into those that matter.
+//! What a group leaves out, each cluster would leave off by itself.
 
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{self, ListEntry};
-pub use crate::lists::scene_bounds::{Bounds, Counts, EntityBounds, Lamp, SceneBounds, distance_key};
-pub use crate::lists::scope::Scope;
-use crate::lists::scope::{BELOW, CullResult, GROUP_SLACK, SLACK, SLACK_RAD, View, cap_sines, fade, fade_sine};
+pub use crate::lists::scene_bounds::{Bounds, Counts, EntityBounds, Light, SceneBounds, distance_key};
+use crate::lists::scope::{CullResult, View};
+pub use crate::lists::scope::{SLACK, Scope};
+use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -70,55 +77,50 @@ impl std::str::FromStr for Place {
     }
 }
 
-/// The chains that a group of clusters may need: each light (`None`: the sky) with its occluders in the order in which they are
-/// multiplied ([`SceneBounds::order`]), itself left out.
-pub struct Chains(Vec<(Option<Lamp>, Vec<u32>)>);
+/// What may matter to any cluster of a group.
+pub struct Candidates {
+    /// Occluders in the order in which they are multiplied ([`SceneBounds::order`]), the receiver left out.
+    occluders: Vec<u32>,
+    /// Lights in the order of entities, the receiver left out.
+    lights: Vec<Light>,
+}
 
-impl Chains {
+impl Candidates {
     /// What may matter to any cluster of a group with these bounds.
-    pub fn of_group(scene_bounds: &SceneBounds, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Self {
-        let scope = Scope::new(scene_bounds, entity, bounds);
-        Self::new(scene_bounds, receiver, |lamp| scope.candidates(lamp))
+    pub fn of_group(scene: &SceneBounds, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Self {
+        let scope = Scope::new(scene, entity, bounds, 2.0 * SLACK);
+        let mut occluders = Vec::new();
+        scene.tree.find(|crowd| scope.leaves_out(crowd), |j| occluders.push(j));
+        Self::new(scene, receiver, occluders, |light| scope.may_list(light.entity as usize))
     }
 
     /// Everything.
-    pub fn all(scene_bounds: &SceneBounds, receiver: u32) -> Self {
-        Self::new(scene_bounds, receiver, |_| Some(scene_bounds.occluders.clone()))
+    pub fn all(scene: &SceneBounds, receiver: u32) -> Self {
+        Self::new(scene, receiver, scene.occluders.clone(), |_| true)
     }
 
-    /// Occluders of all chains together.
+    fn new(scene: &SceneBounds, receiver: u32, mut occluders: Vec<u32>, keeps: impl Fn(&Light) -> bool) -> Self {
+        occluders.retain(|&j| j != receiver);
+        occluders.sort_by_cached_key(|&j| scene.order(receiver, j));
+        let lights = scene.lights.iter().filter(|light| light.entity != receiver && keeps(light));
+        Candidates { occluders, lights: lights.copied().collect() }
+    }
+
+    /// How many occluders there are.
     pub fn occluder_count(&self) -> usize {
-        self.0.iter().map(|(_, occluders)| occluders.len()).sum()
-    }
-
-    fn new(scene_bounds: &SceneBounds, receiver: u32, candidates: impl Fn(Option<&Lamp>) -> Option<Vec<u32>>) -> Self {
-        let lamps = scene_bounds.lamps.iter().filter(|lamp| lamp.entity != receiver).map(Some);
-        let chains = lamps.chain(scene_bounds.sky.map(|_| None)).filter_map(|lamp| {
-            let mut occluders = candidates(lamp)?;
-            occluders.retain(|&j| j != receiver && lamp.is_none_or(|lamp| lamp.entity != j));
-            occluders.sort_by_cached_key(|&j| scene_bounds.order(receiver, j));
-            Some((lamp.copied(), occluders))
-        });
-        Chains(chains.collect())
+        self.occluders.len()
     }
 }
 
-/// The CPU twin of the pass for one cluster: appends its entries. `chains` are those of a group that the cluster belongs to, or all.
-pub fn reference(
-    scene_bounds: &SceneBounds,
-    entity: &layout::Entity,
-    bounds: &Bounds,
-    chains: &Chains,
-    out: &mut Vec<u32>,
-) {
-    walk(scene_bounds, &Scope::new(scene_bounds, entity, bounds), chains, out, &mut |_, _| ());
+/// The CPU twin of the pass for one cluster: appends its entries. `candidates` are those of a group that the cluster belongs to, or all.
+pub fn reference(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) {
+    walk(scope, candidates, out, |_, _| ());
 }
 
 /// What of all that exists is left off the list of one cluster, and why.
-pub fn counts(scene_bounds: &SceneBounds, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Counts {
+pub fn counts(scope: &Scope<'_>, receiver: u32) -> Counts {
     let (mut counts, mut dropped) = (Counts::default(), 0.0);
-    let scope = Scope::new(scene_bounds, entity, bounds);
-    walk(scene_bounds, &scope, &Chains::all(scene_bounds, receiver), &mut Vec::new(), &mut |result, lookups| {
+    walk(scope, &Candidates::all(scope.scene(), receiver), &mut Vec::new(), |result, lookups| {
         counts.considered += lookups;
         match result {
             CullResult::Listed => {}
@@ -129,52 +131,47 @@ pub fn counts(scene_bounds: &SceneBounds, receiver: u32, entity: &layout::Entity
             CullResult::FacingAway => counts.facing_away += lookups,
             CullResult::BelowEps(bound) => {
                 counts.below_eps += lookups;
-                dropped += f64::from(bound);
+                dropped += bound;
             }
         }
     });
     Counts { dropped_bound: dropped, ..counts }
 }
 
-/// Goes through all chains; tells of every entity and channel what becomes of it.
-fn walk(
-    scene_bounds: &SceneBounds,
-    scope: &Scope<'_>,
-    chains: &Chains,
-    out: &mut Vec<u32>,
-    tell: &mut dyn FnMut(CullResult, u64),
-) {
-    for (lamp, occluders) in &chains.0 {
-        let light: Option<View> = lamp.as_ref().map(|lamp| scope.view(scene_bounds.spheres[lamp.entity as usize]));
-        if let (Some(lamp), Some(light)) = (lamp, &light) {
-            let result = scope.light_result(lamp, light);
-            tell(result, if lamp.coloured == 0 { 1 } else { 3 });
-            if result != CullResult::Listed {
-                let result = if let CullResult::BelowEps(_) = result { CullResult::BelowEps(0.0) } else { result };
-                tell(result, occluders.len() as u64);
-                continue;
-            }
+/// Goes through all chains of a cluster, light by light and at last the sky: appends what is listed, and tells of every entity and
+/// channel what becomes of it.
+fn walk(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>, mut tell: impl FnMut(CullResult, u64)) {
+    let spheres = &scope.scene().spheres;
+    let views: Vec<View> = candidates.occluders.iter().map(|&j| scope.view(spheres[j as usize])).collect();
+    let occlude = |light: Option<(u32, &View)>, radiance: f32, out: &mut Vec<u32>, tell: &mut dyn FnMut(_, _)| {
+        let (light, light_view) = light.unzip();
+        for (&entity, view) in candidates.occluders.iter().zip(&views).filter(|(j, _)| light != Some(**j)) {
+            let result = scope.occluder_result(view, light_view, radiance);
+            let listed = result == CullResult::Listed;
+            tell(if listed && !view.whole { CullResult::Cap } else { result }, 1);
+            out.extend((listed && view.whole).then(|| ListEntry::Occlude { entity, light }.pack()));
+            out.extend((listed && view.cap).then(|| ListEntry::Cap { entity, light }.pack()));
         }
-        let radiance = lamp.map_or(scene_bounds.sky.unwrap_or(0.0), |lamp| lamp.radiance);
-        for &j in occluders {
-            let view = scope.view(scene_bounds.spheres[j as usize]);
-            let result = scope.occluder_result(&view, light.as_ref(), radiance);
-            tell(if result == CullResult::Listed && !view.whole { CullResult::Cap } else { result }, 1);
-            let (entity, light) = (j, lamp.map(|lamp| lamp.entity));
-            if result == CullResult::Listed && view.whole {
-                out.push(ListEntry::Occlude { entity, light }.pack());
-            }
-            if result == CullResult::Listed && view.cap {
-                out.push(ListEntry::Cap { entity, light }.pack());
-            }
-        }
-        if let Some(lamp) = lamp {
-            let channels = if lamp.coloured == 0 { 1 } else { 3 };
+    };
+    for light in &candidates.lights {
+        let (entity, view) = (light.entity, scope.view(spheres[light.entity as usize]));
+        let channels = if light.coloured == 0 { 1 } else { 3 };
+        let result = scope.light_result(light, &view);
+        tell(result, channels.into());
+        if result == CullResult::Listed {
+            occlude(Some((entity, &view)), light.radiance, out, &mut tell);
             out.extend((0..channels).map(|channel| {
                 let last = channel + 1 == channels;
-                ListEntry::Shine { entity: lamp.entity, channel: (lamp.coloured != 0).then_some(channel), last }.pack()
+                ListEntry::Shine { entity, channel: (light.coloured != 0).then_some(channel), last }.pack()
             }));
+        } else {
+            // Its occluders go with it; the bound of what is left off counts once.
+            let others = candidates.occluders.iter().filter(|&&j| j != entity).count();
+            tell(if let CullResult::BelowEps(_) = result { CullResult::BelowEps(0.0) } else { result }, others as u64);
         }
+    }
+    if let Some(sky) = scope.scene().sky {
+        occlude(None, sky, out, &mut tell);
     }
 }
 
@@ -219,8 +216,8 @@ struct Push {
     occluder_count: u32,
     block_first: u32,
     member_first: u32,
-    lamp_first: u32,
-    lamp_count: u32,
+    light_first: u32,
+    light_count: u32,
     capacity: u32,
     switches: u32,
     sky: f32,
@@ -228,7 +225,7 @@ struct Push {
     eps: f32,
 }
 
-/// A moment as the device reads it: quads of spheres, blocks of occluders (two quads each), their members, and lamps (two each).
+/// A moment as the device reads it: quads of spheres, blocks of occluders (two quads each), their members, and lights (two each).
 pub struct Packed {
     /// The quads.
     pub quads: Vec<[f32; 4]>,
@@ -237,37 +234,37 @@ pub struct Packed {
 
 impl Packed {
     /// Packs a moment.
-    pub fn new(scene_bounds: &SceneBounds) -> Self {
-        let mut quads = scene_bounds.spheres.clone();
-        let members = scene_bounds.tree.members();
+    pub fn new(scene: &SceneBounds) -> Self {
+        let mut quads = scene.spheres.clone();
+        let members = scene.tree.members();
         let block_first = quads.len();
         for block in members.chunks(BLOCK) {
-            let crowd = Crowd::around(block.iter().map(|&j| scene_bounds.spheres[j as usize]));
+            let crowd = Crowd::around(block.iter().map(|&j| scene.spheres[j as usize]));
             let [x, y, z] = crowd.centre;
             quads.extend([[x, y, z, crowd.reach_m], [crowd.radius_m, 0.0, 0.0, 0.0]]);
         }
         let member_first = quads.len();
         let member = |quad: &[u32]| [0, 1, 2, 3].map(|i| f32::from_bits(quad.get(i).copied().unwrap_or(0)));
         quads.extend(members.chunks(4).map(member));
-        let lamp_first = quads.len();
-        for lamp in &scene_bounds.lamps {
-            let numbers = [lamp.radiance, f32::from_bits(lamp.entity), f32::from_bits(lamp.coloured), 0.0];
-            quads.extend([lamp.facing, numbers]);
+        let light_first = quads.len();
+        for light in &scene.lights {
+            let numbers = [light.radiance, f32::from_bits(light.entity), f32::from_bits(light.coloured), 0.0];
+            quads.extend([light.facing, numbers]);
         }
-        let skip = scene_bounds.skip;
+        let skip = scene.skip;
         let switches = [skip.horizon, skip.cones, skip.behind, skip.facing, skip.caps];
         Packed {
             push: Push {
                 occluder_count: members.len() as u32,
                 block_first: block_first as u32,
                 member_first: member_first as u32,
-                lamp_first: lamp_first as u32,
-                lamp_count: scene_bounds.lamps.len() as u32,
+                light_first: light_first as u32,
+                light_count: scene.lights.len() as u32,
                 capacity: 0,
                 switches: switches.iter().enumerate().map(|(bit, &on)| u32::from(on) << bit).sum(),
-                sky: scene_bounds.sky.unwrap_or(-1.0),
-                brightest: scene_bounds.brightest,
-                eps: scene_bounds.eps,
+                sky: scene.sky.unwrap_or(-1.0),
+                brightest: scene.brightest,
+                eps: scene.eps,
             },
             quads,
         }
@@ -275,17 +272,17 @@ impl Packed {
 
     /// Entries of the longest list that there can be.
     pub fn longest(&self) -> u64 {
-        let Push { occluder_count, lamp_count, sky, .. } = self.push;
+        let Push { occluder_count, light_count, sky, .. } = self.push;
         // Each by its field and as a cap.
-        let (occluders, lamps) = (2 * u64::from(occluder_count), u64::from(lamp_count));
-        lamps * (occluders + 3) + if sky >= 0.0 { occluders } else { 0 }
+        let (occluders, lights) = (2 * u64::from(occluder_count), u64::from(light_count));
+        lights * (occluders + 3) + if sky >= 0.0 { occluders } else { 0 }
     }
 }
 
 /// What the pass reads and writes.
 pub struct Inputs<'b> {
     /// [`Packed::quads`].
-    pub bodies: &'b Buffer,
+    pub scene_quads: &'b Buffer,
     /// [`layout::Entity`] of every entity.
     pub entities: &'b Buffer,
     /// [`Bounds`] of clusters and groups.
@@ -345,15 +342,11 @@ impl Gather {
             .define("BLOCKS", layout::ENTRY_ENTITIES.div_ceil(BLOCK as u32))
             .define("ROOM", FOUND as u32)
             .define("TURNS", if texel { TURNS } else { u32::MAX })
-            .number("FADE_SINE", fade_sine().into())
-            .number("FADE_SINE_SLACK", fade().sine.into())
-            .number("FADE_COSINE_SLACK", fade().cosine.into())
-            .number("SLACK_ANGLE", SLACK_RAD)
-            .number("CAP_SINE_LEAST", cap_sines()[0].into())
-            .number("CAP_SINE_MOST", cap_sines()[1].into())
-            .number("BELOW", BELOW.into())
-            .number("SLACK", SLACK.into())
-            .number("GROUP_SLACK", GROUP_SLACK.into())
+            .number("SLACK", SLACK)
+            .number("FADE_SINE", SKIP_FADE_RAD.sin())
+            .number("FADE_COSINE", SKIP_FADE_RAD.cos())
+            .number("CAP_SINE_LEAST", CAP_SINES[0])
+            .number("CAP_SINE_MOST", CAP_SINES[1])
     }
 
     /// Makes the lists of `group_count` groups, `capacity` entries a cluster at most.
@@ -368,14 +361,14 @@ impl Gather {
         capacity: u32,
         group_count: u32,
     ) -> Result<()> {
-        let bodies = if self.texel {
-            Bind::Texel(TexelView::new(inputs.bodies, vk::Format::R32G32B32A32_SFLOAT)?)
+        let scene_quads = if self.texel {
+            Bind::Texel(TexelView::new(inputs.scene_quads, vk::Format::R32G32B32A32_SFLOAT)?)
         } else {
-            Bind::Buffer(inputs.bodies)
+            Bind::Buffer(inputs.scene_quads)
         };
         let others = [inputs.entities, inputs.bounds, inputs.groups, inputs.clusters, inputs.entries, inputs.report]
             .map(Bind::Buffer);
-        let mut resources: Vec<Bind<'r>> = std::iter::once(bodies).chain(others).collect();
+        let mut resources: Vec<Bind<'r>> = std::iter::once(scene_quads).chain(others).collect();
         let push = Push { capacity, ..packed.push };
         commands.dispatch(&self.pipeline, &resources, &push, [group_count * LANES, 1, 1])?;
         let Some(second) = self.second.as_ref().filter(|_| push.occluder_count as usize > FOUND) else { return Ok(()) };

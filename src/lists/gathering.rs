@@ -18,7 +18,7 @@ pub(crate) struct Gathering {
     device: Arc<Device>,
     pass: Gather,
     bounds: Buffer,
-    bodies: Upload,
+    scene_quads: Upload,
     groups: Upload,
     report: Upload,
     /// Entries of all clusters.
@@ -45,7 +45,7 @@ impl Gathering {
             device: device.clone(),
             pass: Gather::new(device, library, device.info.is_software(), entity_count)?,
             bounds: Buffer::with_data(device, "bounds", &lists.all_bounds())?,
-            bodies: upload("bodies", 16)?,
+            scene_quads: upload("scene_quads", 16)?,
             groups: upload("groups", 16)?,
             report: upload("report", size_of::<Report>() as u64)?,
             entries: Buffer::new(device, "lists", BufferKind::Device, 4)?,
@@ -78,7 +78,7 @@ impl Gathering {
         if bytes > self.entries.size_bytes {
             self.entries = Buffer::new(&self.device, "lists", BufferKind::Device, bytes)?;
         }
-        self.bodies.write(&packed.quads)?;
+        self.scene_quads.write(&packed.quads)?;
         self.groups.write(&groups)?;
         self.report.write(&[Report::default()])?;
         self.begun[self.report.place()] = Some(self.frames);
@@ -98,7 +98,7 @@ impl Gathering {
     pub fn record<'f>(&'f self, commands: &mut Commands<'f>, entities: &'f Buffer, clusters: &'f Buffer) -> Result<()> {
         let Some((packed, capacity, group_count)) = &self.packed else { return Ok(()) };
         let inputs = Inputs {
-            bodies: &self.bodies,
+            scene_quads: &self.scene_quads,
             entities,
             bounds: &self.bounds,
             groups: &self.groups,
@@ -145,7 +145,7 @@ impl Gathering {
 
     /// Bytes on the device.
     pub fn size_bytes(&self) -> u64 {
-        let uploads = self.bodies.all_bytes() + self.groups.all_bytes() + self.report.all_bytes();
+        let uploads = self.scene_quads.all_bytes() + self.groups.all_bytes() + self.report.all_bytes();
         self.bounds.size_bytes + self.entries.size_bytes + self.pass.size_bytes() + uploads
     }
 }

@@ -9,7 +9,7 @@
 //! once nothing moves any more.
 
 use crate::layout::{self, ListEntry};
-use crate::lists::gather::{self, Bounds, Chains, Counts, GROUP_CLUSTERS, SceneBounds, Scope};
+use crate::lists::gather::{self, Bounds, Candidates, Counts, GROUP_CLUSTERS, SLACK, SceneBounds, Scope};
 use crate::lists::sight::{Faces, Sight};
 use crate::scene::Placement;
 use rayon::prelude::*;
@@ -211,10 +211,11 @@ impl ClusterLists {
         let of_group = |dirty: &Dirty| {
             let group = &self.groups[dirty.group];
             let entity = &now.entities[group.receiver];
-            let chains = Chains::of_group(&now.scene_bounds, group.receiver as u32, entity, &group.bounds);
+            let candidates = Candidates::of_group(&now.scene_bounds, group.receiver as u32, entity, &group.bounds);
             let (mut ends, mut entries) = (Vec::with_capacity(dirty.clusters.len()), Vec::new());
             for &cluster in &dirty.clusters {
-                gather::reference(&now.scene_bounds, entity, &self.bounds[cluster], &chains, &mut entries);
+                let scope = Scope::new(&now.scene_bounds, entity, &self.bounds[cluster], SLACK);
+                gather::reference(&scope, &candidates, &mut entries);
                 ends.push(entries.len());
             }
             (ends, entries)
@@ -253,7 +254,8 @@ impl ClusterLists {
             let entity = &state.entities[group.receiver];
             let clusters = self.bounds[group.clusters.clone()].iter();
             clusters.fold(Counts::default(), |mut counts, bounds| {
-                counts += gather::counts(&state.scene_bounds, group.receiver as u32, entity, bounds);
+                let scope = Scope::new(&state.scene_bounds, entity, bounds, SLACK);
+                counts += gather::counts(&scope, group.receiver as u32);
                 counts
             })
         };
@@ -267,11 +269,11 @@ impl ClusterLists {
     pub fn entities_on(&self, state: &State, receiver: usize) -> BTreeSet<usize> {
         let (mut entries, entity) = (Vec::new(), &state.entities[receiver]);
         for group in self.groups.iter().filter(|group| group.receiver == receiver) {
-            let chains = Chains::of_group(&state.scene_bounds, receiver as u32, entity, &group.bounds);
-            let clusters = &self.bounds[group.clusters.clone()];
-            clusters
-                .iter()
-                .for_each(|bounds| gather::reference(&state.scene_bounds, entity, bounds, &chains, &mut entries));
+            let candidates = Candidates::of_group(&state.scene_bounds, receiver as u32, entity, &group.bounds);
+            for bounds in &self.bounds[group.clusters.clone()] {
+                let scope = Scope::new(&state.scene_bounds, entity, bounds, SLACK);
+                gather::reference(&scope, &candidates, &mut entries);
+            }
         }
         entries.into_iter().map(|entry| ListEntry::entities(entry)[0] as usize).collect()
     }
@@ -306,18 +308,17 @@ impl<'b> Moved<'b> {
     /// Those that may stand on the list of a cluster within these bounds, before or now; its receiver has not moved.
     fn near(&self, now: &State, receiver: usize, bounds: &Bounds) -> Vec<usize> {
         let both = [&self.before.scene_bounds, &now.scene_bounds];
-        let scopes = both.map(|scene_bounds| Scope::new(scene_bounds, &now.entities[receiver], bounds));
-        let near = |j: usize| {
-            j != receiver && both.iter().zip(&scopes).any(|(m, scope)| scope.may_list(&m.entities[j], m.spheres[j]))
-        };
+        let scopes = both.map(|scene| Scope::new(scene, &now.entities[receiver], bounds, 2.0 * SLACK));
+        let near = |j: usize| j != receiver && scopes.iter().any(|scope| scope.may_list(j));
         self.list.iter().copied().filter(|&j| near(j)).collect()
     }
 
-    /// Whether any of `list` stands on the list of a cluster, before or now.
+    /// Whether any of `list` may stand on the list of a cluster, before or now: with twice the slack, so that it holds for lists that
+    /// either host or device made.
     fn any_on_list(&self, now: &State, receiver: usize, bounds: &Bounds, list: &[usize]) -> bool {
-        let on = |scene_bounds: &SceneBounds| {
-            let scope = Scope::new(scene_bounds, &now.entities[receiver], bounds);
-            list.iter().any(|&j| scope.lists(j as u32, &scene_bounds.entities[j], receiver as u32))
+        let on = |scene: &SceneBounds| {
+            let scope = Scope::new(scene, &now.entities[receiver], bounds, 2.0 * SLACK);
+            list.iter().any(|&j| scope.lists(j, receiver as u32))
         };
         on(&self.before.scene_bounds) || on(&now.scene_bounds)
     }

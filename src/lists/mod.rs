@@ -3,7 +3,6 @@
 pub mod gather;
 pub mod gathering;
 pub mod incremental;
-pub mod repeatable;
 pub mod scene_bounds;
 pub mod scope;
 pub mod sight;

@@ -1,14 +1,15 @@
-//! What the lists of pass "gather" are made from at one moment: bounds of clusters and of entities, lights; and
-//! counts of what they leave off.
+//! What cluster lists are made from at one time: bounds of clusters, bounds of entities and lights. And counts of what the lists
+//! leave off.
 
-use crate::lists::repeatable::dot;
-use crate::lists::scope::SLACK_RAD;
 use crate::lists::skip::Skip;
 use crate::lists::tree::Tree;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 use std::f64::consts::PI;
+
+/// Angle by which cones are widened: their cosines are stored in f32, which near 1 tells angles apart by 0.00035 rad only.
+const CONE_ROUNDING_RAD: f64 = 1e-3;
 
 /// Where a cluster's vertices are and where they face, in its mesh's frame: metres from the bounding sphere's centre.
 #[repr(C)]
@@ -20,7 +21,7 @@ pub struct Bounds {
     pub radius_m: f32,
     /// Unit axis of a cone around the normals.
     pub axis: [f32; 3],
-    /// Cosine of its half-angle with [`SLACK_RAD`]; -1 where it bounds nothing.
+    /// Cosine of its half-angle with [`CONE_ROUNDING_RAD`]; -1 where it bounds nothing.
     pub cosine: f32,
 }
 
@@ -33,7 +34,7 @@ impl Bounds {
             // What rounding of the centre, here and where it is turned, may add.
             radius_m: ((radius_m + centre.distance(rounded.as_dvec3()) + 1e-6 * centre.length()) * (1.0 + 1e-6)) as f32,
             axis: axis.as_vec3().to_array(),
-            cosine: (spread_rad + SLACK_RAD).min(PI).cos() as f32,
+            cosine: (spread_rad + CONE_ROUNDING_RAD).min(PI).cos() as f32,
         }
     }
 
@@ -88,8 +89,8 @@ pub struct EntityBounds {
 /// A light as the gather sees it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Lamp {
-    /// Axis (world) and cosine of the half-angle, with [`SLACK_RAD`], of a cone of directions outside of which its radiance
+pub struct Light {
+    /// Axis (world) and cosine of the half-angle, with [`CONE_ROUNDING_RAD`], of a cone of directions outside of which its radiance
     /// field is zero; cosine -2 where it shines all round.
     pub facing: [f32; 4],
     /// Largest radiance that it shines with, of any colour.
@@ -113,7 +114,7 @@ pub struct SceneBounds {
     /// Indices of those that occlude.
     pub occluders: Vec<u32>,
     /// Those that shine, in the order of entities.
-    pub lamps: Vec<Lamp>,
+    pub lights: Vec<Light>,
     /// Largest radiance of distant light, if there is any.
     pub sky: Option<f32>,
     /// Radiance of the brightest light, distant or not.
@@ -130,20 +131,20 @@ impl SceneBounds {
         let sphere = |entity: &EntityBounds| entity.centre.as_vec3().extend(entity.radius_m as f32).to_array();
         let spheres: Vec<[f32; 4]> = entities.iter().map(sphere).collect();
         let occluders: Vec<u32> = (0..entities.len()).filter(|&j| entities[j].occludes).map(|j| j as u32).collect();
-        let lamps = entities.iter().enumerate().filter(|(_, entity)| entity.emits).map(|(j, entity)| Lamp {
+        let lights = entities.iter().enumerate().filter(|(_, entity)| entity.emits).map(|(j, entity)| Light {
             facing: entity.facing.map_or([0.0, 0.0, 0.0, -2.0], |(axis, half_angle)| {
-                axis.as_vec3().extend((half_angle + SLACK_RAD).min(PI).cos() as f32).to_array()
+                axis.as_vec3().extend((half_angle + CONE_ROUNDING_RAD).min(PI).cos() as f32).to_array()
             }),
             radiance: entity.radiance as f32,
             entity: j as u32,
             coloured: u32::from(entity.coloured),
             spare: 0,
         });
-        let lamps: Vec<Lamp> = lamps.collect();
+        let lights: Vec<Light> = lights.collect();
         let sky = sky.map(|sky| sky as f32);
-        let brightest = lamps.iter().map(|lamp| lamp.radiance).fold(sky.unwrap_or(0.0), f32::max);
+        let brightest = lights.iter().map(|light| light.radiance).fold(sky.unwrap_or(0.0), f32::max);
         let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));
-        SceneBounds { tree, occluders, lamps, sky, brightest, skip, eps: eps as f32, spheres, entities }
+        SceneBounds { tree, occluders, lights, sky, brightest, skip, eps: eps as f32, spheres, entities }
     }
 
     /// Whether lists of the other moment hold here too where no entity has changed.
@@ -161,11 +162,13 @@ impl SceneBounds {
     }
 }
 
-/// Bits of the squared distance of two centres, in f32, by which [`SceneBounds::order`] goes: of what is not negative, more is more in bits
-/// too. Centres that differ by less than a part in 10^7 may come as equal; the f64 twins go by the same key.
+/// The key by which [`SceneBounds::order`] goes: the bits of the squared distance of two centres in f32, which rise with it as it is not
+/// negative. `distance_key` in `gather.comp` has the same bits: products and sums are rounded alike on every device as long as a
+/// compiler does not contract them, which Rust never does and `precise` forbids there. Centres whose distances differ by less than a part in
+/// 10^7 may have equal keys; the f64 twins go by this key too.
 pub fn distance_key(a: [f32; 3], b: [f32; 3]) -> u32 {
-    let to = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    dot(to, to).to_bits()
+    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    (x * x + y * y + z * z).to_bits()
 }
 
 /// What was considered and left off, in (cluster, chain, entity) triples unless said otherwise, and a bound of the light in what was left off.

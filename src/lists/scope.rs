@@ -1,40 +1,33 @@
-//! What a cluster of vertices, or a group of them, sees of spheres: whether a light or an occluder may be left off its list.
+//! The rule that keeps an entity off a cluster's list: what a cluster of vertices, or a group of clusters, sees of bounding spheres.
 //!
-//! In f32 and by [`crate::lists::repeatable`] alone, as `glsl/gather_scope.glsl` has it: host and device decide alike to the bit.
+//! The rule has a slack ([`SLACK`]). Without slack it lists what may change a vertex of the cluster and nothing that cannot. With
+//! slack it lists a little more. The host computes it in f64; `glsl/gather_scope.glsl` computes it in f32. Lists of both are made
+//! with one slack, so each holds everything of the rule without slack, and nothing beyond the rule with twice the slack. A search
+//! for a whole group takes twice the slack, and so does the test whether an entity that has moved stands on a list
+//! ([`crate::lists::incremental`]): neither misses what a list of either kind holds.
+//!
+//! An entity that is listed for the slack alone adds no light of its own: the weights of cone, horizon and cap in the merge have
+//! faded to exactly zero where the rule without slack ends, and what is bounded below eps stays below eps.
 
 use crate::layout;
-use crate::lists::repeatable::{Angle, dot, inverse, inverse_root};
-use crate::lists::scene_bounds::{Bounds, EntityBounds, Lamp, SceneBounds};
+use crate::lists::scene_bounds::{Bounds, EntityBounds, Light, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
+use glam::{DVec2, DVec3};
 
-/// Slack on angles, for the rounding of cosines near 0 and pi and of the merge's own.
-pub const SLACK_RAD: f64 = 1e-3;
-/// Slack on lengths and weights of one cluster.
-pub const SLACK: f32 = 1.0 + 1e-5;
-/// Slack on what holds for a group and then for each of its clusters.
-pub const GROUP_SLACK: f32 = 1.0 + 1e-4;
+/// How much larger a cluster's bounding sphere is taken, as a share of the distance of what is seen from it. So every angle gains
+/// at least as many radians, and every length gains at least this share of itself.
+///
+/// It has to exceed the error of f32 on the device. A length or a weight there is off by less than a share of 1e-5. A cosine is off by
+/// at most 5e-7 (eight roundings of 6e-8), so an angle near 0 or pi is off by at most sqrt(2 * 5e-7) = 0.001 rad. Only one
+/// angle of each comparison, that of the direction, comes from a computed cosine; that of the normals' cone is off by at most
+/// 0.00035 rad.
+pub const SLACK: f64 = 0.002;
 /// The weight of what may be anywhere: more than any light makes negligible.
-pub const EVERYTHING: f32 = 1e30;
-/// What is multiplied onto the merge's threshold of the horizon.
-pub const BELOW: f32 = -1.0 - SLACK_RAD as f32;
-/// Sine of the fade of skips.
-pub fn fade_sine() -> f32 {
-    SKIP_FADE_RAD.sin() as f32
-}
-/// What a radius is compared with per distance, for whether a vertex may see a sphere so large that its field is looked up, and so
-/// small that it is a cap.
-pub fn cap_sines() -> [f32; 2] {
-    [(CAP_SINES[0] * (1.0 - 1e-4)) as f32, (CAP_SINES[1] * (1.0 + 1e-4)) as f32]
-}
-/// Fade and slack together.
-pub fn fade() -> Angle {
-    let angle = SKIP_FADE_RAD + SLACK_RAD;
-    Angle { cosine: angle.cos() as f32, sine: angle.sin() as f32 }
-}
+pub const EVERYTHING: f64 = 1e30;
 
 /// What becomes of an entity in a chain.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CullResult {
     /// It stands on the list.
     Listed,
@@ -48,21 +41,57 @@ pub enum CullResult {
     Apart,
     /// No vertex is on the side to which it shines.
     FacingAway,
-    /// With a bound of the radiosity that goes with it.
-    BelowEps(f32),
+    /// The radiosity that goes with it is bounded by this, which is below eps.
+    BelowEps(f64),
+}
+
+/// An angle from 0 to pi as its cosine and sine. Sums beyond pi stay there.
+#[derive(Clone, Copy)]
+struct Angle {
+    cosine: f64,
+    sine: f64,
+}
+
+impl Angle {
+    /// From its sine, up to a right angle.
+    fn of_sine(sine: f64) -> Self {
+        let sine = sine.min(1.0);
+        Angle { cosine: (1.0 - sine * sine).sqrt(), sine }
+    }
+
+    fn of_cosine(cosine: f64) -> Self {
+        let cosine = cosine.clamp(-1.0, 1.0);
+        Angle { cosine, sine: (1.0 - cosine * cosine).sqrt() }
+    }
+
+    fn plus(self, other: Angle) -> Angle {
+        // cos a + cos b = 2 cos((a + b) / 2) cos((a - b) / 2) is negative where the sum exceeds pi.
+        if self.cosine + other.cosine < 0.0 {
+            return Angle { cosine: -1.0, sine: 0.0 };
+        }
+        let sine = self.sine * other.cosine + self.cosine * other.sine;
+        Angle { cosine: self.cosine * other.cosine - self.sine * other.sine, sine: sine.max(0.0) }
+    }
+
+    /// Cosine of the difference; 1 where the other is larger.
+    fn cosine_less(self, other: Angle) -> f64 {
+        if self.cosine >= other.cosine { 1.0 } else { self.cosine * other.cosine + self.sine * other.sine }
+    }
 }
 
 /// A sphere as seen from a cluster.
 pub struct View {
-    to: [f32; 3],
-    inverse: f32,
-    distance: f32,
-    /// Its half-angle at most and the turn of the direction between vertices; `None` when a vertex may be inside.
+    /// Unit direction from the cluster's centre to the sphere's.
+    toward: DVec3,
+    /// Least and largest distance of the sphere's centre from a vertex, metres.
+    nearest: f64,
+    farthest: f64,
+    /// Its half-angle at most, with the turn; `None` when a vertex may be inside.
     spread: Option<Angle>,
-    /// Of the turn alone.
+    /// The angle between the directions from the cluster's centre and from a vertex, at most.
     turn: Angle,
     below: bool,
-    weight: f32,
+    weight: f64,
     /// Whether a vertex may see it too large for a cap.
     pub whole: bool,
     /// Whether a vertex may see it small enough for one.
@@ -70,9 +99,9 @@ pub struct View {
 }
 
 /// Share of the irradiance under a uniform sky that a small cap takes whose nearest point to the normal stands at this cosine,
-/// per cap of the same size at the zenith. The chain's cosine lobe has few bands and does not vanish at the horizon: .094 with
-/// four (Ramamoorthi, Hanrahan 2001, section 5).
-fn lobe(cosine: f32) -> f32 {
+/// per cap of the same size at the zenith. The chain's cosine lobe has few bands and does not vanish at the horizon: it is 0.094
+/// there with four bands (Ramamoorthi, Hanrahan 2001, section 5).
+fn lobe(cosine: f64) -> f64 {
     let c = cosine.max(0.0);
     c.max(0.09375 + c * (0.5 + c * 0.46875))
 }
@@ -81,201 +110,180 @@ fn lobe(cosine: f32) -> f32 {
 /// of a white surface: its form factor with a bound of the cosine. `half` is at least its half-angle, `cosine` at least that of
 /// the angle between its nearest point and the normal. It bounds true visibility, and the chain's own change to first order,
 /// since the lobe is that of the chain.
-fn weight(half: Angle, cosine: f32) -> f32 {
-    let cap = 2.0 * half.sine * half.sine * inverse(1.0 + half.cosine);
-    cap * lobe((cosine + SLACK_RAD as f32).min(1.0)) * SLACK
+fn weight(half: Angle, cosine: f64) -> f64 {
+    2.0 * half.sine * half.sine / (1.0 + half.cosine) * lobe(cosine)
 }
 
-fn less(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-/// A cluster of a receiver, or a group of them, at one moment. Places are world axes from the receiver's centre.
+/// A cluster of a receiver, or a group of clusters, at one time.
 pub struct Scope<'m> {
-    scene_bounds: &'m SceneBounds,
-    receiver: &'m layout::Entity,
-    centre: [f32; 3],
-    radius: f32,
-    axis: [f32; 3],
+    scene: &'m SceneBounds,
+    /// Albedo of the receiver, of its brightest colour.
+    reflectance: f64,
+    /// World, metres.
+    centre: DVec3,
+    radius_m: f64,
+    axis: DVec3,
     spread: Angle,
+    slack: f64,
 }
 
 impl<'m> Scope<'m> {
     /// Places bounds of a receiver's mesh in the world.
-    pub fn new(scene_bounds: &'m SceneBounds, receiver: &'m layout::Entity, bounds: &Bounds) -> Self {
-        let scale = receiver.albedo[3];
-        let [x, y, z] = bounds.centre;
+    pub fn new(scene: &'m SceneBounds, receiver: &layout::Entity, bounds: &Bounds, slack: f64) -> Self {
+        let scale = f64::from(receiver.albedo[3]);
+        let [x, y, z, _] = receiver.centre;
+        let vector = |[x, y, z]: [f32; 3]| DVec3::new(x.into(), y.into(), z.into());
         Scope {
-            scene_bounds,
-            receiver,
-            centre: to_world(receiver, [x * scale, y * scale, z * scale]),
-            radius: bounds.radius_m * scale,
-            axis: to_world(receiver, bounds.axis),
-            spread: Angle::of_cosine(bounds.cosine),
+            scene,
+            reflectance: receiver.emission[3].into(),
+            centre: vector([x, y, z]) + to_world(receiver, vector(bounds.centre) * scale),
+            radius_m: f64::from(bounds.radius_m) * scale,
+            axis: to_world(receiver, vector(bounds.axis)),
+            spread: Angle::of_cosine(bounds.cosine.into()),
+            slack,
         }
     }
 
-    /// Whether so much radiance, reflected, stays below eps.
-    pub fn negligible(&self, radiance: f32) -> bool {
-        self.reflected(radiance) < self.scene_bounds.eps
+    /// What the rule looks at.
+    pub fn scene(&self) -> &'m SceneBounds {
+        self.scene
     }
 
-    fn reflected(&self, radiance: f32) -> f32 {
-        self.receiver.emission[3] * radiance
-    }
-
-    /// A sphere of the moment: centre in the world, radius.
-    pub fn view(&self, [x, y, z, radius]: [f32; 4]) -> View {
-        let [cx, cy, cz, _] = self.receiver.centre;
-        let to = less(less([x, y, z], [cx, cy, cz]), self.centre);
-        let square = dot(to, to).max(1e-30);
-        let inverse_distance = inverse_root(square);
-        let distance = square * inverse_distance;
-        let toward = Angle::of_cosine(dot(to, self.axis) * inverse_distance);
-        let turn = Angle::of_sine((self.radius * inverse_distance).min(1.0));
-        // The highest that any vertex sees the centre above its horizon, against the threshold of the shader.
-        let highest = distance * toward.cosine_less(self.spread) + self.radius;
-        let threshold = radius + fade_sine() * (distance + self.radius);
-        let below = self.scene_bounds.skip.horizon && highest < threshold * BELOW;
-        let nearest = distance - self.radius;
-        let [least, most] = cap_sines();
-        let caps = self.scene_bounds.skip.caps;
-        let (whole, cap) = (!caps || radius > least * nearest, caps && radius < most * (distance + self.radius));
-        let inside =
-            View { to, inverse: inverse_distance, distance, spread: None, turn, below, weight: EVERYTHING, whole, cap };
-        if nearest <= radius.max(1e-15) {
-            return inside;
-        }
-        let half = Angle::of_sine((radius * inverse(nearest)).min(1.0));
-        let spread = half.plus(turn);
-        let weight = weight(half, toward.cosine_less(self.spread.plus(spread)));
-        View { spread: Some(spread), weight, ..inside }
+    /// A sphere of the scene: centre in the world, radius.
+    pub fn view(&self, [x, y, z, sphere_radius]: [f32; 4]) -> View {
+        let (skip, sphere_radius) = (self.scene.skip, f64::from(sphere_radius));
+        let to = DVec3::new(x.into(), y.into(), z.into()) - self.centre;
+        let distance = to.length().max(1e-15);
+        let toward = to / distance;
+        let radius = self.radius_m + self.slack * distance;
+        let (nearest, farthest) = (distance - radius, distance + radius);
+        let from_axis = Angle::of_cosine(toward.dot(self.axis));
+        let turn = Angle::of_sine(radius / distance);
+        // The highest that any vertex sees the centre above its horizon, against what `above_horizon` in the merge asks for.
+        let highest = distance * from_axis.cosine_less(self.spread) + radius;
+        let below = skip.horizon && highest < -(sphere_radius + SKIP_FADE_RAD.sin() * farthest);
+        let half = (nearest > sphere_radius).then(|| Angle::of_sine(sphere_radius / nearest));
+        let spread = half.map(|half| half.plus(turn));
+        let weight = half
+            .zip(spread)
+            .map_or(EVERYTHING, |(half, spread)| weight(half, from_axis.cosine_less(self.spread.plus(spread))));
+        let whole = !skip.caps || sphere_radius > CAP_SINES[0] * nearest;
+        let cap = skip.caps && sphere_radius < CAP_SINES[1] * farthest;
+        View { toward, nearest, farthest, spread, turn, below, weight, whole, cap }
     }
 
     /// What becomes of a light.
-    pub fn light_result(&self, lamp: &Lamp, light: &View) -> CullResult {
-        if light.below {
+    pub fn light_result(&self, light: &Light, view: &View) -> CullResult {
+        if view.below {
             return CullResult::BelowHorizon;
         }
-        if self.scene_bounds.skip.facing && lamp.facing[3] >= -1.0 && light.distance > self.radius {
-            let [x, y, z, cosine] = lamp.facing;
-            let away = -dot(light.to, [x, y, z]) * light.inverse;
-            if away < Angle::of_cosine(cosine).plus(light.turn).cosine {
+        let [x, y, z, cosine] = light.facing.map(f64::from);
+        if self.scene.skip.facing && cosine >= -1.0 && view.nearest > 0.0 {
+            let away = -view.toward.dot(DVec3::new(x, y, z));
+            if away < Angle::of_cosine(cosine).plus(view.turn).cosine {
                 return CullResult::FacingAway;
             }
         }
-        self.of_weight(lamp.radiance * light.weight)
+        self.of_weight(f64::from(light.radiance) * view.weight)
     }
 
-    fn of_weight(&self, radiance: f32) -> CullResult {
-        if self.negligible(radiance) { CullResult::BelowEps(self.reflected(radiance)) } else { CullResult::Listed }
+    fn of_weight(&self, radiance: f64) -> CullResult {
+        let reflected = self.reflectance * radiance;
+        if reflected < self.scene.eps.into() { CullResult::BelowEps(reflected) } else { CullResult::Listed }
     }
 
-    /// An occluder takes at most what comes from its part of the view, and at most what the light brings.
+    /// What becomes of an occluder in the chain of a light (`None`: of the sky). It takes at most what comes from its part of the view,
+    /// and at most what the light brings.
     pub fn occluder_result(&self, view: &View, light: Option<&View>, radiance: f32) -> CullResult {
+        let radiance = f64::from(radiance);
         if view.below {
             return CullResult::BelowHorizon;
         }
         let Some(light) = light else { return self.of_weight(radiance * view.weight) };
-        if self.scene_bounds.skip.behind && view.distance > (light.distance + 2.0 * self.radius) * SLACK {
+        if self.scene.skip.behind && view.nearest > light.farthest {
             return CullResult::BehindLight;
         }
-        if self.scene_bounds.skip.cones && apart(view, light) {
+        if self.scene.skip.cones && apart(view, light) {
             return CullResult::Apart;
         }
         self.of_weight(radiance * view.weight.min(light.weight))
     }
 
-    /// At least the weight of every member of a crowd, from every cluster within the bounds.
-    pub fn crowd_weight(&self, crowd: &Crowd) -> f32 {
-        let (_, _, weight) = self.crowd(crowd);
-        weight
-    }
-
-    /// Way to a crowd, inverse of its length, and its weight.
-    fn crowd(&self, crowd: &Crowd) -> ([f32; 3], f32, f32) {
-        let [cx, cy, cz, _] = self.receiver.centre;
-        let to = less(less(crowd.centre, [cx, cy, cz]), self.centre);
-        let square = dot(to, to).max(1e-30);
-        let inverse_distance = inverse_root(square);
-        let blur = self.radius + crowd.reach_m;
-        let nearest = square * inverse_distance - blur;
-        if nearest <= crowd.radius_m.max(self.radius).max(1e-15) {
-            return (to, inverse_distance, EVERYTHING);
-        }
-        let toward = Angle::of_cosine(dot(to, self.axis) * inverse_distance);
-        let inverse_nearest = inverse(nearest);
-        let half = Angle::of_sine((crowd.radius_m * inverse_nearest).min(1.0));
-        // Directions differ by at most asin(blur / distance) between member and crowd; a cluster adds its own turn.
-        let between = Angle::of_sine((blur * inverse_distance).min(1.0));
-        let turn = Angle::of_sine((self.radius * inverse_nearest).min(1.0));
-        let reach = self.spread.plus(half.plus(turn)).plus(between);
-        (to, inverse_distance, weight(half, toward.cosine_less(reach)) * GROUP_SLACK)
-    }
-
-    /// Occluders that a chain may need in any cluster within the bounds; `None` where none needs the chain.
-    pub fn candidates(&self, lamp: Option<&Lamp>) -> Option<Vec<u32>> {
-        let scene_bounds = self.scene_bounds;
-        let radiance = lamp.map_or(scene_bounds.sky.unwrap_or(0.0), |lamp| lamp.radiance);
-        let light = lamp.map(|lamp| {
-            let [x, y, z, radius_m] = scene_bounds.spheres[lamp.entity as usize];
-            let (to, inverse, weight) = self.crowd(&Crowd { centre: [x, y, z], reach_m: 0.0, radius_m });
-            (to, dot(to, to).max(1e-30) * inverse, weight)
-        });
-        if light.is_some_and(|(_, _, weight)| self.negligible(weight * radiance)) {
-            return None;
-        }
-        let leave = |crowd: &Crowd| {
-            let (to, inverse, weight) = self.crowd(crowd);
-            if self.negligible(weight * radiance) {
-                return true;
-            }
-            let distance = dot(to, to).max(1e-30) * inverse;
-            light.is_some_and(|(_, to_light, _)| {
-                let blur = self.radius + crowd.reach_m;
-                scene_bounds.skip.behind && distance - blur > (to_light + self.radius) * GROUP_SLACK
-            })
+    /// Whether no member of a crowd matters to any cluster within the bounds: their weight under the brightest light is negligible.
+    pub fn leaves_out(&self, crowd: &Crowd) -> bool {
+        let [x, y, z] = crowd.centre.map(f64::from);
+        let (reach, largest) = (f64::from(crowd.reach_m), f64::from(crowd.radius_m));
+        let to = DVec3::new(x, y, z) - self.centre;
+        let distance = to.length().max(1e-15);
+        let radius = self.radius_m + self.slack * distance;
+        let blur = radius + reach;
+        let nearest = distance - blur;
+        let weight = if nearest > largest.max(radius) {
+            // Directions differ by at most asin(blur / distance) between member and crowd; a cluster adds its own turn.
+            let turn = Angle::of_sine(radius / nearest).plus(Angle::of_sine(blur / distance));
+            let half = Angle::of_sine(largest / nearest);
+            let from_axis = Angle::of_cosine(to.dot(self.axis) / distance);
+            weight(half, from_axis.cosine_less(self.spread.plus(half.plus(turn))))
+        } else {
+            EVERYTHING
         };
-        let mut found = Vec::new();
-        scene_bounds.tree.find(leave, |j| found.push(j));
-        Some(found)
+        self.of_weight(weight * f64::from(self.scene.brightest)) != CullResult::Listed
     }
 
     /// Whether an entity may stand on the list of any cluster within the bounds.
-    pub fn may_list(&self, body: &EntityBounds, [x, y, z, radius_m]: [f32; 4]) -> bool {
-        let weight = self.crowd_weight(&Crowd { centre: [x, y, z], reach_m: 0.0, radius_m });
-        (body.occludes || body.emits) && !self.negligible(weight * self.scene_bounds.brightest)
+    pub fn may_list(&self, index: usize) -> bool {
+        let EntityBounds { occludes, emits, .. } = self.scene.entities[index];
+        (occludes || emits) && !self.leaves_out(&Crowd::of(self.scene.spheres[index]))
     }
 
     /// Whether an entity stands on the list of the cluster.
-    pub fn lists(&self, index: u32, body: &EntityBounds, receiver: u32) -> bool {
-        let scene_bounds = self.scene_bounds;
-        let view = body.occludes.then(|| self.view(scene_bounds.spheres[index as usize]));
-        let mut chains = scene_bounds.lamps.iter().filter(|lamp| lamp.entity != receiver);
-        chains.any(|lamp| {
-            let light = self.view(scene_bounds.spheres[lamp.entity as usize]);
-            let needs = |view: &View| self.occluder_result(view, Some(&light), lamp.radiance) == CullResult::Listed;
-            self.light_result(lamp, &light) == CullResult::Listed
-                && (lamp.entity == index || view.as_ref().is_some_and(needs))
-        }) || scene_bounds.sky.is_some_and(|sky| {
-            view.as_ref().is_some_and(|view| self.occluder_result(view, None, sky) == CullResult::Listed)
-        })
+    pub fn lists(&self, index: usize, receiver: u32) -> bool {
+        let scene = self.scene;
+        let view = scene.entities[index].occludes.then(|| self.view(scene.spheres[index]));
+        let blocks = |light: Option<&View>, radiance: f32| {
+            view.as_ref().is_some_and(|view| self.occluder_result(view, light, radiance) == CullResult::Listed)
+        };
+        let mut lights = scene.lights.iter().filter(|light| light.entity != receiver);
+        scene.sky.is_some_and(|sky| blocks(None, sky))
+            || lights.any(|light| {
+                let light_view = self.view(scene.spheres[light.entity as usize]);
+                self.light_result(light, &light_view) == CullResult::Listed
+                    && (light.entity as usize == index || blocks(Some(&light_view), light.radiance))
+            })
     }
 }
 
 /// Whether no vertex sees the two spheres within the fade of one another.
 fn apart(a: &View, b: &View) -> bool {
     let (Some(spread_a), Some(spread_b)) = (a.spread, b.spread) else { return false };
-    let cosine = (dot(a.to, b.to) * a.inverse * b.inverse).clamp(-1.0, 1.0);
-    cosine < spread_a.plus(spread_b.plus(fade())).cosine
+    let (sine, cosine) = SKIP_FADE_RAD.sin_cos();
+    a.toward.dot(b.toward) < spread_a.plus(spread_b.plus(Angle { cosine, sine })).cosine
 }
 
 /// The rotation of an entity, as `to_world` in `merge_layout.glsl`.
-fn to_world(entity: &layout::Entity, [x, y, z]: [f32; 3]) -> [f32; 3] {
-    let turn = |[c, s]: [f32; 2], [a, b]: [f32; 2]| [c * a - s * b, s * a + c * b];
-    let [cos_a, sin_a, cos_b, sin_b] = entity.alpha_beta;
-    let [x, y] = turn(entity.gamma, [x, y]);
-    let [z, x] = turn([cos_b, sin_b], [z, x]);
-    let [x, y] = turn([cos_a, sin_a], [x, y]);
-    [x, y, z]
+fn to_world(entity: &layout::Entity, p: DVec3) -> DVec3 {
+    let turn = |cosine: f32, sine: f32, a: f64, b: f64| DVec2::new(cosine.into(), sine.into()).rotate(DVec2::new(a, b));
+    let ([cos_a, sin_a, cos_b, sin_b], [cos_c, sin_c]) = (entity.alpha_beta, entity.gamma);
+    let first = turn(cos_c, sin_c, p.x, p.y);
+    let second = turn(cos_b, sin_b, p.z, first.x);
+    let third = turn(cos_a, sin_a, second.y, first.y);
+    DVec3::new(third.x, third.y, second.x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_add_up_to_half_a_turn() {
+        use std::f64::consts::PI;
+        let mut rng = fastrand::Rng::with_seed(6);
+        for _ in 0..10_000 {
+            let (a, b) = (PI * rng.f64(), PI * rng.f64());
+            let sum = Angle::of_cosine(a.cos()).plus(Angle::of_cosine(b.cos()));
+            assert!((sum.cosine - (a + b).min(PI).cos()).abs() < 1e-12, "{a} {b}");
+            let less = Angle::of_cosine(a.cos()).cosine_less(Angle::of_cosine(b.cos()));
+            assert!((less - (a - b).max(0.0).cos()).abs() < 1e-12, "{a} {b}");
+        }
+    }
 }

@@ -1,13 +1,13 @@
-//! A tree of spheres over the bodies of a scene, so that a group of clusters finds those that matter to it without looking at
+//! A tree of spheres over the entities of a scene, so that a group of clusters finds those that matter to it without looking at
 //! the rest.
 
 use glam::Vec3;
 use std::ops::Range;
 
-/// Bodies in a leaf: below this, looking at each costs less than another level.
-const LEAF_BODIES: usize = 4;
+/// Entities in a leaf: below this, looking at each costs less than another level.
+const LEAF_ENTITIES: usize = 4;
 
-/// Several bodies as one: their centres lie within `reach_m` of `centre`, none is larger than `radius_m`.
+/// Several entities as one: their centres lie within `reach_m` of `centre`, none is larger than `radius_m`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crowd {
     /// World, metres.
@@ -19,6 +19,11 @@ pub struct Crowd {
 }
 
 impl Crowd {
+    /// One sphere: centre and radius.
+    pub fn of([x, y, z, radius_m]: [f32; 4]) -> Self {
+        Crowd { centre: [x, y, z], reach_m: 0.0, radius_m }
+    }
+
     /// Around spheres: centre and radius.
     pub fn around(spheres: impl Iterator<Item = [f32; 4]> + Clone) -> Self {
         let places = spheres.clone().map(|[x, y, z, _]| Vec3::new(x, y, z));
@@ -52,46 +57,46 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// A tree over the given bodies: index, and sphere of centre and radius.
-    pub fn new(bodies: impl Iterator<Item = (u32, [f32; 4])>) -> Self {
-        let mut bodies: Vec<(u32, [f32; 4])> = bodies.collect();
+    /// A tree over the given entities: index, and sphere of centre and radius.
+    pub fn new(entities: impl Iterator<Item = (u32, [f32; 4])>) -> Self {
+        let mut entities: Vec<(u32, [f32; 4])> = entities.collect();
         let mut tree = Tree::default();
-        if !bodies.is_empty() {
-            let count = bodies.len();
-            tree.split(&mut bodies, 0..count);
+        if !entities.is_empty() {
+            let count = entities.len();
+            tree.split(&mut entities, 0..count);
         }
-        tree.members = bodies.iter().map(|body| body.0).collect();
+        tree.members = entities.iter().map(|entity| entity.0).collect();
         tree
     }
 
-    /// Its bodies, neighbours beside each other.
+    /// Its entities, neighbours beside each other.
     pub fn members(&self) -> &[u32] {
         &self.members
     }
 
-    fn split(&mut self, bodies: &mut [(u32, [f32; 4])], members: Range<usize>) {
-        let of = &mut bodies[members.clone()];
-        let crowd = Crowd::around(of.iter().map(|body| body.1));
+    fn split(&mut self, entities: &mut [(u32, [f32; 4])], members: Range<usize>) {
+        let of = &mut entities[members.clone()];
+        let crowd = Crowd::around(of.iter().map(|entity| entity.1));
         let at = self.nodes.len();
-        let leaf = of.len() <= LEAF_BODIES;
+        let leaf = of.len() <= LEAF_ENTITIES;
         self.nodes.push(Node { crowd, members: members.clone(), next: 0, leaf });
         if !leaf {
             let along = |axis: usize| {
-                let (low, high) = of.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), body| {
-                    (low.min(body.1[axis]), high.max(body.1[axis]))
+                let (low, high) = of.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), entity| {
+                    (low.min(entity.1[axis]), high.max(entity.1[axis]))
                 });
                 high - low
             };
             let axis = (0..3).max_by(|&a, &b| along(a).total_cmp(&along(b))).unwrap_or(0);
             let middle = of.len() / 2;
             of.select_nth_unstable_by(middle, |a, b| a.1[axis].total_cmp(&b.1[axis]));
-            self.split(bodies, members.start..members.start + middle);
-            self.split(bodies, members.start + middle..members.end);
+            self.split(entities, members.start..members.start + middle);
+            self.split(entities, members.start + middle..members.end);
         }
         self.nodes[at].next = self.nodes.len();
     }
 
-    /// The bodies in no crowd that `leave` leaves out, in no order.
+    /// The entities in no crowd that `leave` leaves out, in no order.
     pub fn find(&self, leave: impl Fn(&Crowd) -> bool, mut found: impl FnMut(u32)) {
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
@@ -113,17 +118,17 @@ mod tests {
         let mut rng = fastrand::Rng::with_seed(11);
         for count in [0, 1, 4, 5, 300] {
             let point = |rng: &mut fastrand::Rng| Vec3::new(rng.f32(), rng.f32(), rng.f32());
-            let bodies: Vec<(u32, [f32; 4])> =
+            let entities: Vec<(u32, [f32; 4])> =
                 (0..count).map(|i| (i, point(&mut rng).extend(0.1 * rng.f32()).to_array())).collect();
-            let tree = Tree::new(bodies.iter().copied());
+            let tree = Tree::new(entities.iter().copied());
             let mut visited = 0;
             for _ in 0..20 {
                 let (eye, reach) = (point(&mut rng), 0.3 * rng.f32());
                 let far = |[x, y, z]: [f32; 3], radius: f32| Vec3::new(x, y, z).distance(eye) - radius > reach;
                 let mut found = Vec::new();
-                tree.find(|crowd| far(crowd.centre, crowd.reach_m + crowd.radius_m), |body| found.push(body));
+                tree.find(|crowd| far(crowd.centre, crowd.reach_m + crowd.radius_m), |entity| found.push(entity));
                 visited += found.len();
-                for (index, [x, y, z, radius]) in &bodies {
+                for (index, [x, y, z, radius]) in &entities {
                     // Less a little, for rounding.
                     assert!(far([*x, *y, *z], *radius - 1e-5) || found.contains(index), "{index} of {count}");
                 }

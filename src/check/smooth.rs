@@ -1,0 +1,14 @@
+//! "smooth" against its twin: pictures whose outlines are smoothed, on the device and in f64.
+
+use super::{Row, draw};
+use crate::bake::Baker;
+use crate::draw::Antialias;
+use crate::error::Result;
+
+/// The comparisons of `check`.
+///
+/// # Errors
+/// As [`crate::frame::Frame::new`] and [`crate::frame::Frame::render`].
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
+    draw::compare(baker, "smooth", Antialias::Outlines, add)
+}

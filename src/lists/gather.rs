@@ -52,15 +52,15 @@ pub const TURNS: u32 = 30_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Place {
-    /// By the host, on all its cores.
+    /// The host makes them, on all its cores.
     Host,
-    /// By the pass.
+    /// The pass makes them, on the device.
     Device,
 }
 
 impl Place {
-    /// Where lists are made unless somebody says otherwise: llvmpipe takes .1 ms longer than two cores of the host among 64 entities
-    /// (.52 and .41 ms), .7 of their time among 256, .55 among 1 024 and .43 among 4 096 (8.6 and 20.3 ms).
+    /// Where lists are made unless somebody says otherwise. On software the device makes them from 128 entities on, where it takes
+    /// less time than the host's cores.
     pub fn quicker(device: &Device, entity_count: usize) -> Self {
         if device.info.is_software() && entity_count < 128 { Place::Host } else { Place::Device }
     }
@@ -86,7 +86,7 @@ pub struct Candidates {
 }
 
 impl Candidates {
-    /// What may matter to any cluster of a group with these bounds.
+    /// What may matter to any cluster of a group with these bounds, found with twice the slack of the lists.
     pub fn of_group(scene: &SceneBounds, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Self {
         let scope = Scope::new(scene, entity, bounds, 2.0 * SLACK);
         let mut occluders = Vec::new();
@@ -225,7 +225,7 @@ struct Push {
     eps: f32,
 }
 
-/// A moment as the device reads it: quads of spheres, blocks of occluders (two quads each), their members, and lights (two each).
+/// Scene bounds as the device reads them: quads of spheres, blocks of occluders (two quads each), their members, and lights (two each).
 pub struct Packed {
     /// The quads.
     pub quads: Vec<[f32; 4]>,
@@ -233,7 +233,7 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// Packs a moment.
+    /// Packs scene bounds.
     pub fn new(scene: &SceneBounds) -> Self {
         let mut quads = scene.spheres.clone();
         let members = scene.tree.members();

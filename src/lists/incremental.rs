@@ -1,5 +1,6 @@
 //! Which clusters a frame merges, and their entries where the host makes them: a cluster is merged again only when its receiver
-//! or an entity that stands on its list has changed, before or now.
+//! or an entity that stands on its list has changed. "On its list" is asked with twice the slack ([`crate::lists::scope`]), before
+//! and after the change, so that it holds for lists that host or device made.
 //!
 //! What a cluster's merge reads is its receiver, its list and the entities on it, and nothing else that ever changes; and what
 //! keeps an entity on or off a list is that entity, the receiver and, for an occluder, a light that stands there itself. So a
@@ -16,13 +17,13 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-/// All that lists and merge depend on at one moment.
+/// All that cluster lists and merge depend on at one time.
 pub(crate) struct State {
-    /// For the lists.
+    /// What the lists are made from.
     pub scene_bounds: SceneBounds,
-    /// As the device sees them.
+    /// The entities as shaders read them.
     pub entities: Vec<layout::Entity>,
-    /// From which all of the above follows.
+    /// Where the entities are; all of the above follows from this.
     pub placements: Vec<Placement>,
 }
 
@@ -40,7 +41,7 @@ pub(crate) struct Dirty {
 }
 
 impl Dirty {
-    /// How many they are.
+    /// How many clusters these are.
     pub fn cluster_count(&self) -> usize {
         self.clusters.len()
     }
@@ -48,24 +49,24 @@ impl Dirty {
 
 /// A cluster of one receiver.
 pub(crate) struct Member {
-    /// Without its entries.
+    /// The cluster; its list follows separately.
     pub cluster: layout::Cluster,
-    /// Of its vertices.
+    /// Bounds of its vertices.
     pub bounds: Bounds,
-    /// By which they are seen.
+    /// The triangles by which its light is seen.
     pub faces: Faces,
 }
 
-/// All clusters.
+/// The clusters of all receivers, and which of them have changed since they were merged.
 #[derive(Default)]
 pub(crate) struct ClusterLists {
-    /// Without their entries.
+    /// The clusters; their lists follow separately.
     pub clusters: Vec<layout::Cluster>,
     bounds: Vec<Bounds>,
     faces: Vec<Faces>,
     groups: Vec<Group>,
     now: Option<State>,
-    /// Every cluster has changed since the last update, by something that no moment tells.
+    /// Every cluster has changed since the last update by something that no [`State`] holds.
     renewed: bool,
     /// Clusters that have changed since they were merged, and how many they are.
     stale: Vec<bool>,
@@ -289,7 +290,7 @@ struct Moved<'b> {
     before: &'b State,
     flags: Vec<bool>,
     list: Vec<usize>,
-    /// So many that asking for each whether it matters costs more than merging anew.
+    /// Whether so many have changed that to ask of each whether it matters costs more than merging anew.
     most: bool,
 }
 

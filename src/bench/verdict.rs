@@ -119,8 +119,8 @@ fn default_line(default: &Point) -> String {
 /// Compares the default with all settings, one line per setting.
 pub fn defaults(points: &[Point]) -> String {
     let cases = swept(points);
-    let of_case = |case: &str| points.iter().filter(|p| p.case == case).collect::<Vec<_>>();
-    let by_case: Vec<Vec<&Point>> = cases.iter().map(|case| of_case(case)).collect();
+    let of_case = |case: &&str| points.iter().filter(|p| p.case == *case).collect();
+    let by_case: Vec<Vec<&Point>> = cases.iter().map(of_case).collect();
     let defaults: Vec<&Point> = by_case.iter().filter_map(|points| points.first().copied()).collect();
     if defaults.is_empty() {
         return "Nothing was swept.\n".into();
@@ -134,9 +134,7 @@ pub fn defaults(points: &[Point]) -> String {
     if let [only] = cases[..] {
         let _ = writeln!(text, "Only {only} was swept; a run of all cases judges by two.");
     }
-    for default in &defaults {
-        text += &default_line(default);
-    }
+    text.extend(defaults.iter().map(|default| default_line(default)));
     let _ = writeln!(
         text,
         "\nThe rule: another setting takes its place if time multiplied by error falls by more than {:.0} % (what two quiet runs may \

@@ -108,6 +108,11 @@ impl<'r> Commands<'r> {
             unsafe { self.recording.device.handle.update_descriptor_sets(&[write], &[]) };
             let _ = (buffers, views, images);
         }
+        self.bind_set(layout, point, set);
+        Ok(())
+    }
+
+    fn bind_set(&self, layout: &Layout, point: vk::PipelineBindPoint, set: vk::DescriptorSet) {
         // SAFETY: the command buffer is recording and the set matches the layout.
         unsafe {
             self.recording.device.handle.cmd_bind_descriptor_sets(
@@ -119,7 +124,6 @@ impl<'r> Commands<'r> {
                 &[],
             );
         }
-        Ok(())
     }
 
     /// The buffer and byte range of a block's resource, checked against the block and the device's limits.

@@ -160,11 +160,6 @@ const CIRCLES: &[(&str, &str, &str)] = &[
         "src/field/lattice.rs",
         "a lattice is its directions on shells, in two files of methods",
     ),
-    (
-        "src/lists/scene_bounds.rs",
-        "src/lists/scope.rs",
-        "a scope is a cluster's part of the bounds that it is made from",
-    ),
     ("src/view/editor.rs", "src/view/pick.rs", "the editor's methods for the pointer stand apart from its others"),
 ];
 

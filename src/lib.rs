@@ -29,7 +29,7 @@
 //!
 //! | module | what stands there |
 //! |---|---|
-//! | [`error`], [`files`] | errors with their exit codes; files that are replaced whole |
+//! | [`error`], [`files`], [`text`] | errors with their exit codes; files that are replaced whole; text files of results |
 //! | [`sh`] | spherical harmonics in f64, and the GLSL that is generated from them |
 //! | [`layout`] | structs that two or more shaders read |
 //! | [`gpu`] | Vulkan: device, memory, pipelines, commands, barriers, window; all `unsafe` code |
@@ -83,6 +83,7 @@ pub mod scene;
 pub mod scene_buffers;
 pub mod sh;
 pub mod shaders;
+pub mod text;
 pub mod truth;
 pub mod view;
 

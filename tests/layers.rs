@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 const ORDER: &[&str] = &[
     "error",
     "files",
+    "text",
     "sh",
     "layout",
     "gpu",

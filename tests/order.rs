@@ -52,7 +52,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
         .collect();
     let object = |(entity, place): (&shadow_fields::scene::Entity, &shadow_fields::scene::Placement)| {
         let geometry = &frame.store.geometries[entity.mesh];
-        let rotation = place.rotation.as_dquat().normalize();
+        let rotation = place.turn();
         let scale = f64::from(place.scale);
         Object {
             centre: place.position.as_dvec3() + rotation * (geometry.centre_m * scale),

@@ -51,7 +51,9 @@ pub(super) fn color(text: &str) -> std::result::Result<Vec3, String> {
         [r, g, b] if text.split(',').count() == 3 && numbers.iter().all(|c| (0.0..=RADIANCE_LIMIT).contains(c)) => {
             Ok(Vec3::new(r, g, b))
         }
-        _ => Err(format!("\"{text}\" is no radiance like 1,0.5,0.2: three numbers from 0 to {RADIANCE_LIMIT:e}")),
+        _ => Err(format!(
+            "expected a radiance like 1,0.5,0.2, three numbers from 0 to {RADIANCE_LIMIT:e}, got \"{text}\""
+        )),
     }
 }
 

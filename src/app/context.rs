@@ -26,7 +26,7 @@ pub struct Global {
     #[arg(long, global = true, value_name = "INDEX|NAME|UUID")]
     pub device: Option<String>,
     /// Run under the Khronos validation layer; any message makes the run fail
-    #[arg(long, global = true, default_value = "off", value_name = "off|core|sync|gpu")]
+    #[arg(long, global = true, default_value = "off", value_name = "MODE")]
     pub validation: Validation,
     /// Seed of everything random
     #[arg(long, global = true, default_value_t = 1)]
@@ -73,7 +73,7 @@ pub struct BakeArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7))]
     pub field_bands: Option<u32>,
     /// Number format of stored coefficients
-    #[arg(long, default_value = "f16", value_name = "f16|f32")]
+    #[arg(long, default_value = "f16", value_name = "FORMAT")]
     pub storage: Storage,
 }
 
@@ -99,7 +99,7 @@ pub struct MergeArguments {
     #[arg(long, value_name = "NAME", value_parser = Variant::named)]
     pub variant: Option<Variant>,
     /// Samples that a lookup takes
-    #[arg(long, default_value = "trilinear", value_name = "nearest|radial|trilinear")]
+    #[arg(long, default_value = "trilinear", value_name = "LOOKUP")]
     pub lookup: Lookup,
     /// Work to leave out: all, none, or a list of horizon, cones, behind, facing, empty, unseen, caps, unmoved, hidden. Horizon and
     /// cones leave out what true visibility makes zero, which is nearer to ray casting than the stored bands are, and caps looks up
@@ -112,7 +112,7 @@ pub struct MergeArguments {
     pub eps: f32,
     /// Where the lists of what concerns each cluster of vertices are made, with the same outcome; default: device, but host
     /// for fewer than 128 entities on a software device
-    #[arg(long, value_name = "host|device")]
+    #[arg(long, value_name = "WHERE")]
     pub lists: Option<Place>,
     /// How an occluder's visibility is multiplied in: factored, pairs, matrix and points compute the same in different ways;
     /// point-chain keeps chains at 32 points and projects once, which is quicker and less exact
@@ -137,20 +137,20 @@ pub fn on_or_off(text: &str) -> std::result::Result<bool, String> {
     match text {
         "on" => Ok(true),
         "off" => Ok(false),
-        _ => Err(format!("\"{text}\" is neither on nor off")),
+        _ => Err(format!("expected on or off, got \"{text}\"")),
     }
 }
 
 fn eps(text: &str) -> std::result::Result<f32, String> {
     let number = text.parse().ok().filter(|eps| (0.0..=1.0).contains(eps));
-    number.ok_or_else(|| format!("\"{text}\" is no number from 0 to 1"))
+    number.ok_or_else(|| format!("expected a number from 0 to 1, got \"{text}\""))
 }
 
 /// Width and height from `WxH`.
 pub fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let pair = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     pair.filter(|[w, h]| (1..=16384).contains(w) && (1..=16384).contains(h))
-        .ok_or_else(|| format!("\"{text}\" is no size like 1280x720"))
+        .ok_or_else(|| format!("expected a size like 1280x720, got \"{text}\""))
 }
 
 /// An open device with what goes with it.
@@ -198,7 +198,7 @@ impl Context {
         if let Some(folder) = &global.shader_dir
             && !folder.is_dir()
         {
-            return Err(Error::input(folder, "is no folder of shaders"));
+            return Err(Error::input(folder, "expected a folder of shaders"));
         }
         let device = open(&gpu::DeviceOptions {
             device: global.device.clone(),

@@ -1,7 +1,6 @@
 //! `shadow-fields demo`
 
 use super::context::{Context, MergeArguments, size};
-use super::render::white;
 use super::{Global, output};
 use crate::asset::{embedded, picture};
 use crate::bake;
@@ -28,7 +27,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     timed_frames: u32,
     /// How stairs along edges are smoothed in the pictures; all ways are timed
-    #[arg(long, default_value = "samples", value_name = "samples|outlines|none")]
+    #[arg(long, default_value = "samples", value_name = "HOW")]
     antialias: Antialias,
     /// No animations
     #[arg(long)]
@@ -177,7 +176,7 @@ fn still(
         for index in 0..arguments.timed_frames + 2 {
             let placements = scene.at(f64::from(index) / 30.0);
             let start = Instant::now();
-            let passes = frame.show(&placements, white(scene.data.output.exposure_ev))?;
+            let passes = frame.show(&placements, scene.data.output.white())?;
             let wall = start.elapsed().as_secs_f64() * 1e3;
             if index >= 2 {
                 let of = |name: &str| passes.iter().find(|t| t.pass == name).map_or(0.0, |t| t.milliseconds);
@@ -215,7 +214,7 @@ struct Times {
 
 fn draw(frame: &mut Frame, scene: &Scene, options: Options, path: &Path) -> Result<()> {
     let exposure_ev = scene.data.output.exposure_ev;
-    frame.render(&scene.at(0.0), Some(white(exposure_ev)))?;
+    frame.render(&scene.at(0.0), Some(scene.data.output.white()))?;
     picture::write_png(path, options.size[0], options.size[1], &frame.picture(), exposure_ev)
 }
 
@@ -226,7 +225,7 @@ fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene
     let (count, fps) = ANIMATION;
     let mut pictures = Vec::new();
     for index in 0..count {
-        frame.render(&scene.at(f64::from(index) / f64::from(fps)), Some(white(exposure_ev)))?;
+        frame.render(&scene.at(f64::from(index) / f64::from(fps)), Some(scene.data.output.white()))?;
         pictures.push(picture::encode_srgb(&frame.picture(), exposure_ev));
     }
     let path = arguments.output.join(format!("{name}_animation.png"));

@@ -6,11 +6,11 @@ use super::sheet::{self, Cell};
 use super::{Global, output};
 use crate::asset::Mesh;
 use crate::bake::{self, snapshot::snapshot};
-use crate::bench::text;
 use crate::error::{Error, Result, one_line};
 use crate::field::{FieldHeader, FieldKind, Lookup, ShadowField, growth};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
+use crate::text;
 use clap::Args;
 use glam::{DVec3, Vec3};
 use serde_json::json;
@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(long, value_name = "R,G,B", requires = "mesh", value_parser = color, allow_hyphen_values = true)]
     radiance: Option<Vec3>,
     /// With --at: samples that the lookup takes
-    #[arg(long, default_value = "trilinear", value_name = "nearest|radial|trilinear")]
+    #[arg(long, default_value = "trilinear", value_name = "LOOKUP")]
     lookup: Lookup,
 }
 
@@ -47,7 +47,7 @@ fn place(text: &str) -> std::result::Result<DVec3, String> {
         [x, y, z] if text.split(',').count() == 3 && numbers.iter().all(|n| n.abs() <= PLACE_LIMIT_M) => {
             Ok(DVec3::new(x, y, z))
         }
-        _ => Err(format!("\"{text}\" is no place like 1,0.5,-2, within {PLACE_LIMIT_M:e} m")),
+        _ => Err(format!("expected a place like 1,0.5,-2 within {PLACE_LIMIT_M:e} m, got \"{text}\"")),
     }
 }
 

@@ -3,14 +3,15 @@
 use super::context::{Context, size};
 use super::{Global, output};
 use crate::asset::Mesh;
+use crate::bench::Bench;
 use crate::bench::ceilings::{self, Ceilings};
 use crate::bench::profile::{self, Contender, Row, Start, Tenths};
-use crate::bench::{Bench, text};
 use crate::error::{Error, Result};
 use crate::gpu::{self, Device, Validation};
 use crate::merge::calibrate;
 use crate::merge::workload::Workload;
 use crate::scene::Scene;
+use crate::text;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;

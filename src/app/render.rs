@@ -4,11 +4,11 @@ use super::context::{BakeArguments, Context, MergeArguments, size};
 use super::{Global, output};
 use crate::asset::false_color::Scheme;
 use crate::asset::picture;
-use crate::bench::text;
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::scene::{Scene, values::NUMBER_LIMIT};
+use crate::text;
 use crate::truth::{self, ErrorMap, error_map, raycast::RayCast};
 use clap::Args;
 use serde_json::json;
@@ -52,7 +52,7 @@ pub struct Arguments {
     #[arg(long, value_name = "E.png", group = "judge", conflicts_with = "reference")]
     error: Option<PathBuf>,
     /// With --error: blue too dark and red too bright, or dark right and light wrong
-    #[arg(long, default_value = "signed", value_name = "signed|absolute", requires = "error")]
+    #[arg(long, default_value = "signed", value_name = "SCHEME", requires = "error")]
     error_scheme: Scheme,
     /// With --error: the error with the last colour, relative to the root mean square of the radiosity; default: the 99th
     /// percentile, rounded up
@@ -62,7 +62,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1024, value_name = "N", requires = "judge", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
     rays: u32,
     /// How stairs along edges are smoothed: four samples a pixel, outlines and creases alone (quick on a software device), or not
-    #[arg(long, default_value = "samples", value_name = "samples|outlines|none")]
+    #[arg(long, default_value = "samples", value_name = "HOW")]
     antialias: Antialias,
     #[command(flatten)]
     merge: MergeArguments,
@@ -100,9 +100,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         let start = Instant::now();
         let passes = if arguments.reference {
             worst_error = light_by_rays(&mut frame, &placements, arguments.rays, global.seed)?.max(worst_error);
-            frame.redraw(&placements, white(shape.exposure_ev))?
+            frame.redraw(&placements, shape.white())?
         } else {
-            frame.render(&placements, Some(white(shape.exposure_ev)))?
+            frame.render(&placements, Some(shape.white()))?
         };
         timings.push((time_s, start.elapsed(), passes));
         let rgb = frame.picture();
@@ -219,12 +219,7 @@ fn time_s(text: &str) -> std::result::Result<f64, String> {
 /// A number above 0.
 fn positive(text: &str) -> std::result::Result<f64, String> {
     let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
-    number.ok_or_else(|| format!("\"{text}\" is no number above 0"))
-}
-
-/// Radiance that the exposure shows as white.
-pub fn white(exposure_ev: f32) -> f32 {
-    (-exposure_ev).exp2()
+    number.ok_or_else(|| format!("expected a number above 0, got \"{text}\""))
 }
 
 /// An output name with a run of `#` that stands for the frame's number.
@@ -268,7 +263,7 @@ fn vertex_table(frame: &Frame, placements: &[crate::scene::Placement]) -> Result
         } else {
             entity.name.clone()
         };
-        let rotation = placement.rotation.as_dquat().normalize();
+        let rotation = placement.turn();
         for ((position, normal), [r, g, b]) in mesh.positions.iter().zip(&mesh.normals).zip(frame.radiosity(index)?) {
             let p = placement.position.as_dvec3() + rotation * (position.as_dvec3() * f64::from(placement.scale));
             let n = rotation * normal.as_dvec3();

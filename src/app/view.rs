@@ -40,11 +40,11 @@ pub struct Arguments {
     #[arg(long, value_parser = size, value_name = "WxH")]
     size: Option<[u32; 2]>,
     /// When finished frames are shown
-    #[arg(long, default_value = "fifo", value_name = "fifo|fifo-relaxed|mailbox|immediate")]
+    #[arg(long, default_value = "fifo", value_name = "MODE")]
     present_mode: PresentMode,
     /// How stairs along edges are smoothed: four samples a pixel (default on a GPU), outlines and creases alone (default on a
     /// software device), or not
-    #[arg(long, value_name = "samples|outlines|none")]
+    #[arg(long, value_name = "HOW")]
     antialias: Option<Antialias>,
     /// Start with the motion paused
     #[arg(long)]

@@ -5,10 +5,9 @@
 
 use super::lettering;
 use super::picture::linear_from_srgb;
-use std::str::FromStr;
 
 /// What the colours show.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Scheme {
     /// Blue where a value is too small, red where it is too large.
@@ -16,17 +15,6 @@ pub enum Scheme {
     Signed,
     /// Dark where a value is right, light where it is off.
     Absolute,
-}
-
-impl FromStr for Scheme {
-    type Err = String;
-    fn from_str(word: &str) -> Result<Self, String> {
-        match word {
-            "signed" => Ok(Scheme::Signed),
-            "absolute" => Ok(Scheme::Absolute),
-            _ => Err(format!("unknown scheme \"{word}\" (signed or absolute)")),
-        }
-    }
 }
 
 /// The mapping from errors to colours.

@@ -1,11 +1,12 @@
 //! Skips of the bake, part of `bench skip`: time, number of captures and the field's error, with each skip off and on in turns.
 
-use super::{Bench, text};
+use super::Bench;
 use crate::asset::{Mesh, generate};
 use crate::bake::{self, Baker, Report};
 use crate::error::Result;
 use crate::field::{FieldKind, Storage};
 use crate::gpu::{Buffer, BufferKind};
+use crate::text;
 use serde::Serialize;
 use serde_json::json;
 use std::path::Path;

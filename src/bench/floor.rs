@@ -2,11 +2,11 @@
 
 use super::budget::{Budget, Effort, Truth, budget};
 use super::cases;
-use super::text::{csv, write};
 use super::{Bench, default_options};
 use crate::bake;
 use crate::error::{Error, Result};
 use crate::frame;
+use crate::text::{csv, write};
 use serde::Serialize;
 use serde_json::json;
 use std::path::Path;

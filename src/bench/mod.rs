@@ -19,7 +19,6 @@ pub mod scaling;
 pub mod skips;
 pub mod stability;
 pub mod sweep;
-pub mod text;
 pub mod time_error;
 pub mod town;
 pub mod trials;

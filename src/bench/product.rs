@@ -2,7 +2,6 @@
 
 use super::Bench;
 use super::figures::{Spread, spread};
-use super::text::{csv, write};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferKind, Commands};
 use crate::merge::product::{Products, Push, Shape, reference};
@@ -11,6 +10,7 @@ use crate::sh::basis::coefficient_count;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::points;
 use crate::sh::product_program::{ProductOperation, styled_program};
+use crate::text::{csv, write};
 use glam::DVec3;
 use serde::Serialize;
 use serde_json::{Value, json};

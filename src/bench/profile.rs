@@ -384,7 +384,7 @@ pub fn write_spirv(folder: &Path, library: &Library, workload: &Workload, chosen
         let words: Vec<u8> = shader.spirv.iter().flat_map(|word| word.to_le_bytes()).collect();
         crate::files::replace(&path("spv"), &words)
             .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path("spv").display())))?;
-        super::text::write(&path("spvasm"), &disassemble(&shader)?)?;
+        crate::text::write(&path("spvasm"), &disassemble(&shader)?)?;
     }
     Ok(())
 }

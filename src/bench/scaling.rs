@@ -4,7 +4,6 @@ use super::budget::device_radiosity;
 use super::figures::{Radiosity, Spread, difference, rms, spread};
 use super::plot::{Curve, Panel, Plot};
 use super::sweep::merge_ms;
-use super::text::{csv, write};
 use super::town::{Town, moved};
 use super::{Bench, default_options};
 use crate::error::{Error, Result};
@@ -14,6 +13,7 @@ use crate::layout::CLUSTER_VERTICES;
 use crate::lists::gather::{Counts, Place};
 use crate::lists::skip::Skip;
 use crate::scene::{Placement, Scene};
+use crate::text::{csv, write};
 use crate::truth::{RayCast, RayMeshes, World, sample_vertices};
 use serde::Serialize;
 use serde_json::json;
@@ -235,7 +235,7 @@ fn plot(axis: &str, points: &[&ScalingPoint]) -> Plot {
         let known: Vec<(f64, f64)> = points.iter().filter_map(|p| Some((size(p), value(p)?))).collect();
         (known.len() > 1).then(|| Curve {
             label: format!("{label}: slope {:.2}", slope(known.iter().copied())),
-            notes: known.iter().filter(|_| noted).map(|p| super::text::three(p.1)).collect(),
+            notes: known.iter().filter(|_| noted).map(|p| crate::text::three(p.1)).collect(),
             points: known,
         })
     };

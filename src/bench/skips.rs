@@ -102,9 +102,9 @@ pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Ro
         "errors": "relative to the root mean square of T0 over the judged vertices",
     });
     let values: Vec<_> = rows.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect();
-    super::text::write(&folder.join("skip.csv"), &super::text::csv(&origin, &values))?;
-    super::text::write(&folder.join("skip.json"), &format!("{:#}\n", json!({ "origin": origin, "rows": rows })))?;
-    super::text::write(&folder.join("skip.svg"), &plot(&rows).svg())?;
+    crate::text::write(&folder.join("skip.csv"), &crate::text::csv(&origin, &values))?;
+    crate::text::write(&folder.join("skip.json"), &format!("{:#}\n", json!({ "origin": origin, "rows": rows })))?;
+    crate::text::write(&folder.join("skip.svg"), &plot(&rows).svg())?;
     Ok(rows)
 }
 

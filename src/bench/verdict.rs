@@ -4,8 +4,8 @@
 use super::budget::Budget;
 use super::rival::Comparison;
 use super::sweep::Point;
-use super::text::three;
 use crate::merge::variant::PRODUCTS;
+use crate::text::three;
 use std::fmt::Write;
 
 /// Changes of time, error or bytes by less than this factor count as none, because medians of repeated runs differ by as much.

@@ -14,7 +14,7 @@ pub fn clip_from_world(camera: &Camera, aspect: f64) -> DMat4 {
 }
 
 /// Distance of the near plane in metres.
-fn near_m(camera: &Camera) -> f64 {
+pub fn near_m(camera: &Camera) -> f64 {
     1e-3 * camera.eye.as_dvec3().distance(camera.target.as_dvec3())
 }
 
@@ -26,7 +26,7 @@ pub fn near_corner_m(camera: &Camera, aspect: f64) -> f64 {
 
 /// From a mesh's frame, metres from the centre of its bounding sphere, to the world; `centre_m` is that centre in the file's.
 pub fn world_from_centred(placement: &Placement, centre_m: DVec3) -> DMat4 {
-    let rotation = placement.rotation.as_dquat().normalize();
+    let rotation = placement.turn();
     let scale = f64::from(placement.scale);
     let centre = placement.position.as_dvec3() + rotation * (centre_m * scale);
     DMat4::from_scale_rotation_translation(DVec3::splat(scale), rotation, centre)

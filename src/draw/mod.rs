@@ -44,7 +44,7 @@ pub enum Finish {
 }
 
 /// How the edges of what is drawn are kept from showing as stairs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Antialias {
     /// One sample a pixel; edges show as stairs.
@@ -60,18 +60,6 @@ impl Antialias {
     /// What a device draws at interactive rates. On a GPU four samples cost little; a software device stores and averages each.
     pub fn usual(device: &Device) -> Self {
         if device.info.is_software() { Antialias::Outlines } else { Antialias::Samples }
-    }
-}
-
-impl std::str::FromStr for Antialias {
-    type Err = String;
-    fn from_str(word: &str) -> std::result::Result<Self, String> {
-        match word {
-            "none" => Ok(Antialias::None),
-            "outlines" => Ok(Antialias::Outlines),
-            "samples" => Ok(Antialias::Samples),
-            _ => Err(format!("\"{word}\" is none of none, outlines and samples")),
-        }
     }
 }
 

@@ -99,7 +99,7 @@ pub struct Corners {
 }
 
 /// Which samples a lookup takes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Lookup {
     /// The one nearest sample.
@@ -109,18 +109,6 @@ pub enum Lookup {
     /// Bilinear in direction, linear between shells.
     #[default]
     Trilinear,
-}
-
-impl std::str::FromStr for Lookup {
-    type Err = String;
-    fn from_str(word: &str) -> std::result::Result<Self, String> {
-        match word {
-            "nearest" => Ok(Lookup::Nearest),
-            "radial" => Ok(Lookup::Radial),
-            "trilinear" => Ok(Lookup::Trilinear),
-            _ => Err(format!("unknown lookup \"{word}\" (nearest, radial or trilinear)")),
-        }
-    }
 }
 
 impl Spacing {

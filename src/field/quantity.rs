@@ -23,7 +23,7 @@ impl FieldKind {
 }
 
 /// Number format of stored coefficients.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Storage {
     /// 32-bit floats.
@@ -39,17 +39,6 @@ impl Storage {
         match self {
             Storage::F32 => 4,
             Storage::F16 => 2,
-        }
-    }
-}
-
-impl std::str::FromStr for Storage {
-    type Err = String;
-    fn from_str(word: &str) -> Result<Self, String> {
-        match word {
-            "f32" => Ok(Storage::F32),
-            "f16" => Ok(Storage::F16),
-            _ => Err(format!("unknown storage \"{word}\" (f16 or f32)")),
         }
     }
 }

@@ -57,7 +57,7 @@ impl Frame {
         let [width, height] = self.options.size;
         let triangles = self.triangles(placements)?;
         let camera = &self.scene.data.camera;
-        let near_m = 1e-3 * camera.eye.as_dvec3().distance(camera.target.as_dvec3());
+        let near_m = crate::draw::camera::near_m(camera);
         let shade = |pixel: u32| {
             let corner = DVec2::new(f64::from(pixel % width), f64::from(pixel / width));
             let clip =
@@ -98,7 +98,7 @@ impl Frame {
             let entity = &self.scene.entities[index];
             let mesh = &self.scene.meshes[entity.mesh];
             let radiosity = self.radiosity(index)?;
-            let rotation = placement.rotation.as_dquat().normalize();
+            let rotation = placement.turn();
             let grid = self.store.geometries[entity.mesh].drawn.is_grid().then_some(index);
             let corner = |&i: &u32| {
                 let v = i as usize;

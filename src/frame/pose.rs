@@ -21,7 +21,7 @@ impl Frame {
     pub(super) fn state(&self, placements: &[Placement]) -> State {
         let bounds: Vec<EntityBounds> =
             placements.iter().enumerate().map(|(index, p)| self.entity_bounds(index, p)).collect();
-        let white = f64::from(-self.scene.data.output.exposure_ev).exp2();
+        let white = f64::from(self.scene.data.output.white());
         let sky = (!self.scene.environment.is_none()).then_some(self.sky.brightest);
         let eps = f64::from(self.options.eps) * white;
         State {
@@ -40,7 +40,7 @@ impl Frame {
         };
         let coloured = geometry.radiance.is_some() && entity.emits;
         let source = if coloured { &geometry.radiance } else { &geometry.blocked };
-        let rotation = placement.rotation.as_dquat().normalize();
+        let rotation = placement.turn();
         let facing = source.as_ref().and_then(|slot| match slot.extent {
             Extent::Cone { axis, half_angle_rad } => Some((rotation * axis, half_angle_rad)),
             Extent::Nothing | Extent::All => None,
@@ -60,7 +60,7 @@ impl Frame {
     fn entity(&self, index: usize, placement: &Placement) -> layout::Entity {
         let entity = &self.scene.entities[index];
         let geometry = &self.store.geometries[entity.mesh];
-        let rotation = placement.rotation.as_dquat().normalize();
+        let rotation = placement.turn();
         let [cos_a, sin_a, cos_b, sin_b, cos_c, sin_c] = turns(rotation).map(|x| x as f32);
         let centre = self.centre(index, placement).as_vec3();
         let radius_m = geometry.radius_m * f64::from(placement.scale);
@@ -99,7 +99,7 @@ impl Frame {
     /// Centre of an entity's bounding sphere in the world, metres.
     pub(super) fn centre(&self, index: usize, placement: &Placement) -> DVec3 {
         let centre_m = self.store.geometries[self.scene.entities[index].mesh].centre_m;
-        let rotation = placement.rotation.as_dquat().normalize();
+        let rotation = placement.turn();
         placement.position.as_dvec3() + rotation * (centre_m * f64::from(placement.scale))
     }
 

@@ -140,7 +140,7 @@ impl Twin<'_> {
             let [blocked, radiance] = &self.fields[entity.mesh];
             Object {
                 centre: self.frame.centre(index, placement),
-                rotation: placement.rotation.as_dquat().normalize(),
+                rotation: placement.turn(),
                 scale: placement.scale.into(),
                 radius_m: store.geometries[entity.mesh].radius_m * f64::from(placement.scale),
                 albedo_over_pi: (entity.albedo.as_dvec3() / PI).to_array(),

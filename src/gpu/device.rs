@@ -146,6 +146,7 @@ impl Drop for Instance {
 /// Everything that owns a Vulkan object holds an `Arc<Device>`.
 pub struct Device {
     pub(super) handle: ash::Device,
+    #[cfg(feature = "view")]
     pub(super) physical: vk::PhysicalDevice,
     pub(super) queue: Mutex<vk::Queue>,
     /// Fences of launched recordings; see `flight`.
@@ -237,6 +238,7 @@ impl Device {
         let names = instance.has_debug_utils.then(|| ash::ext::debug_utils::Device::new(&instance.handle, &handle));
         let mut device = Device {
             handle,
+            #[cfg(feature = "view")]
             physical,
             queue: Mutex::new(queue),
             flights: Mutex::default(),

@@ -12,7 +12,7 @@ pub const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 const ACCEPTED: &[(&str, &str)] = &[];
 
 /// How much of the validation layer is switched on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Validation {
     /// The layer is not loaded.
     #[default]
@@ -23,19 +23,6 @@ pub enum Validation {
     Sync,
     /// Usage checks and GPU-assisted checks of shader accesses.
     Gpu,
-}
-
-impl std::str::FromStr for Validation {
-    type Err = String;
-    fn from_str(word: &str) -> std::result::Result<Self, String> {
-        match word {
-            "off" => Ok(Validation::Off),
-            "core" => Ok(Validation::Core),
-            "sync" => Ok(Validation::Sync),
-            "gpu" => Ok(Validation::Gpu),
-            _ => Err(format!("unknown validation mode \"{word}\" (off, core, sync or gpu)")),
-        }
-    }
 }
 
 impl Validation {

@@ -3,10 +3,11 @@
 use super::device::{Device, DeviceOptions};
 use super::flight::{FLIGHTS, Flight, Signals};
 use super::image::{Image, ImageShape};
-use super::present::{MODES, PresentMode, best_format, extent, is_srgb};
+use super::present::{PresentMode, best_format, extent, is_srgb};
 use super::{Checked, Commands};
 use crate::error::{Error, Result};
 use ash::{khr, vk};
+use clap::ValueEnum;
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle};
 use std::ffi::CStr;
 use std::sync::Arc;
@@ -176,8 +177,8 @@ impl Window {
         let modes = modes.checked("vkGetPhysicalDeviceSurfacePresentModesKHR", "window")?;
         let formats = formats.checked("vkGetPhysicalDeviceSurfaceFormatsKHR", "window")?;
         if !modes.contains(&mode.raw()) {
-            let known = MODES.iter().filter(|(_, m)| modes.contains(&m.raw())).map(|(name, _)| *name);
-            let known: Vec<_> = known.collect();
+            let known = PresentMode::value_variants().iter().filter(|m| modes.contains(&m.raw()));
+            let known: Vec<_> = known.map(|mode| mode.name()).collect();
             return Err(Error::Unsupported(format!(
                 "this display does not support the present mode; it supports {}",
                 known.join(", ")

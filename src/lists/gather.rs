@@ -49,7 +49,7 @@ const ROOMS: u32 = 16;
 pub const TURNS: u32 = 30_000;
 
 /// Where lists are made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Place {
     /// The host makes them, on all its cores.
@@ -63,17 +63,6 @@ impl Place {
     /// less time than the host's cores.
     pub fn quicker(device: &Device, entity_count: usize) -> Self {
         if device.info.is_software() && entity_count < 128 { Place::Host } else { Place::Device }
-    }
-}
-
-impl std::str::FromStr for Place {
-    type Err = String;
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        match text {
-            "host" => Ok(Place::Host),
-            "device" => Ok(Place::Device),
-            _ => Err(format!("lists are made by \"host\" or \"device\", not \"{text}\"")),
-        }
     }
 }
 

@@ -124,7 +124,7 @@ impl Default for Chain {
 }
 
 /// How a product is computed. All compute the same function, save [`Product::PointChain`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Product {
     /// Tensor pairs, shared sums factored out. "matrix" where transfer and field differ in bands.
@@ -148,16 +148,6 @@ pub const PRODUCTS: &[(&str, Product)] = &[
     ("points", Product::Points),
     ("point-chain", Product::PointChain),
 ];
-
-impl std::str::FromStr for Product {
-    type Err = String;
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        PRODUCTS.iter().find(|(name, _)| *name == text).map(|(_, product)| *product).ok_or_else(|| {
-            let names: Vec<_> = PRODUCTS.iter().map(|(name, _)| *name).collect();
-            format!("unknown product \"{text}\" ({})", names.join(", "))
-        })
-    }
-}
 
 impl Product {
     /// The generated code. At points there is none of coefficients, so any will do.

@@ -131,6 +131,13 @@ pub struct Output {
     pub time_s: f64,
 }
 
+impl Output {
+    /// Radiance that the exposure shows as white.
+    pub fn white(&self) -> f32 {
+        (-self.exposure_ev).exp2()
+    }
+}
+
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }

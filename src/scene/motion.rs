@@ -18,6 +18,13 @@ pub struct Placement {
     pub scale: f32,
 }
 
+impl Placement {
+    /// The rotation in double precision, of unit length there too.
+    pub fn turn(&self) -> DQuat {
+        self.rotation.as_dquat().normalize()
+    }
+}
+
 /// A rotation in a scene file: `{ axis = [0, 1, 0], angle_deg = 30 }` (right-handed) or `{ quaternion = [x, y, z, w] }` of any
 /// length but zero.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -72,7 +72,7 @@ impl<'s> World<'s> {
     pub fn new(scene: &'s Scene, meshes: &'s RayMeshes, placements: &[Placement]) -> Self {
         let placed = |(entity, placement): (&crate::scene::Entity, &Placement)| {
             let (centre, radius_m) = scene.meshes[entity.mesh].bounding_sphere();
-            let rotation = placement.rotation.as_dquat().normalize();
+            let rotation = placement.turn();
             let scale = f64::from(placement.scale);
             PlacedEntity {
                 mesh: &meshes.0[entity.mesh],

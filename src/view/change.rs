@@ -95,7 +95,7 @@ impl Editor {
     fn fitting_emission(&self, index: usize) -> Vec3 {
         let (_, radius_m) = self.sphere(index, &self.placements()[index]);
         let (_, distance_m) = self.bounds();
-        let white = (-self.exposure_ev()).exp2();
+        let white = self.white();
         let needed = f64::from(white) * (distance_m / radius_m).powi(2);
         let hue = self.scene.entities[index].albedo.max(Vec3::splat(0.02));
         hue / hue.max_element() * (needed.clamp(1.0, 1e4) as f32)

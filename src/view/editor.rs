@@ -131,6 +131,11 @@ impl Editor {
         self.variant
     }
 
+    /// Radiance that the exposure shows as white.
+    pub fn white(&self) -> f32 {
+        self.scene.data.output.white()
+    }
+
     /// Exposure in stops.
     pub fn exposure_ev(&self) -> f32 {
         self.scene.data.output.exposure_ev
@@ -235,7 +240,7 @@ impl Editor {
     pub fn sphere(&self, entity: usize, placement: &Placement) -> (DVec3, f64) {
         let (centre, radius_m) = self.scene.meshes[self.scene.entities[entity].mesh].bounding_sphere();
         let scale = f64::from(placement.scale);
-        let rotation = placement.rotation.as_dquat().normalize();
+        let rotation = placement.turn();
         (placement.position.as_dvec3() + rotation * (centre.as_dvec3() * scale), f64::from(radius_m) * scale)
     }
 

@@ -92,7 +92,7 @@ impl Editor {
         let mesh = self.scene.entities[entity].mesh;
         let shape = self.picker.shapes[mesh].get_or_init(|| RayMesh::new(&self.scene.meshes[mesh]));
         let (centre, radius_m) = self.sphere(entity, placement);
-        let to_object = placement.rotation.as_dquat().normalize().inverse();
+        let to_object = placement.turn().inverse();
         // The ray starts at the sphere, in units of its radius, so f32 is precise for any distance of the camera.
         let start = to_object * (ray.origin + enters_m * ray.direction - centre) / radius_m;
         let hit = shape.first_hit(start.as_vec3a(), (to_object * ray.direction).as_vec3a())?;

@@ -64,7 +64,7 @@ impl Viewer {
         let resized = self.frame.as_ref().is_some_and(|frame| frame.size() != size);
         let viewports = self.viewports(size);
         let placements = self.editor.placements();
-        let white = (-self.editor.exposure_ev()).exp2();
+        let white = self.editor.white();
         let pending = std::mem::take(&mut self.pending);
         // Clusters that were hidden during motion are lit when motion has ended.
         let stale = self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0);
@@ -152,13 +152,13 @@ impl Viewer {
     pub(super) fn screenshot(&mut self) -> Result<String> {
         let Some(frame) = &mut self.frame else { return Err(Error::Failed("no picture has been drawn yet".into())) };
         let [width, height] = frame.size();
-        let (placements, ev) = (self.editor.placements(), self.editor.exposure_ev());
+        let (placements, ev, white) = (self.editor.placements(), self.editor.exposure_ev(), self.editor.white());
         let png = free_name(&self.editor.save_path());
         let exr = png.with_extension("exr");
         for flight in self.flights.drain(..) {
             flight.wait()?;
         }
-        picture::write_png(&png, width, height, &frame.still(&placements, (-ev).exp2())?, ev)?;
+        picture::write_png(&png, width, height, &frame.still(&placements, white)?, ev)?;
         picture::write_exr(&exr, width, height, &frame.still(&placements, f32::INFINITY)?)?;
         Ok(format!("wrote {} and {}", png.display(), exr.display()))
     }

@@ -29,8 +29,7 @@ fn brute_force(editor: &Editor, origin: DVec3, direction: DVec3) -> Option<(usiz
     for (index, (entity, place)) in editor.scene().entities.iter().zip(editor.placements()).enumerate() {
         let mesh = &editor.scene().meshes[entity.mesh];
         let at = |i: u32| {
-            place.rotation.as_dquat().normalize() * (mesh.positions[i as usize].as_dvec3() * f64::from(place.scale))
-                + place.position.as_dvec3()
+            place.turn() * (mesh.positions[i as usize].as_dvec3() * f64::from(place.scale)) + place.position.as_dvec3()
         };
         for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(at);

@@ -3,9 +3,10 @@
 use super::common::start;
 use crate::app::{Global, output};
 use crate::bake;
-use crate::bench::{floor, text::three};
+use crate::bench::floor;
 use crate::error::{Error, Result};
 use crate::field::Lattice;
+use crate::text::three;
 use clap::Args;
 use std::path::PathBuf;
 

@@ -2,8 +2,9 @@
 
 use super::common::start;
 use crate::app::{Global, output};
-use crate::bench::{product, text::three};
+use crate::bench::product;
 use crate::error::Result;
+use crate::text::three;
 use clap::Args;
 use std::path::PathBuf;
 

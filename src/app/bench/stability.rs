@@ -4,9 +4,9 @@ use super::common::start;
 use crate::app::{Global, output};
 use crate::bench::refusals::Refusal;
 use crate::bench::stability::{self, NEAR_F16, NEAR_F32};
-use crate::bench::text::three;
 use crate::bench::trials::NEAR_TWIN;
 use crate::error::{Error, Result};
+use crate::text::three;
 use clap::Args;
 use std::path::PathBuf;
 

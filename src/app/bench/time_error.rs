@@ -2,9 +2,9 @@
 
 use super::common::start;
 use crate::app::{Global, output};
-use crate::bench::text::three;
 use crate::bench::time_error::{self, Selection};
 use crate::error::Result;
+use crate::text::three;
 use clap::Args;
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! Result files: CSV with its origin in the first line.
+//! Text files of results: CSV with its origin in the first line, and numbers with three digits.
 
 use crate::error::{Error, Result};
 use serde_json::Value;

@@ -17,7 +17,7 @@ const PAYLOAD_LENGTH_AT: usize = 16;
 
 fn header(kind: FieldKind, storage: Storage, lattice: &str) -> FieldHeader {
     let options =
-        bake::Options { field_bands: None, storage, lattice: lattice.parse().unwrap(), bands: 2, face_px: 16 };
+        bake::Options { storage, lattice: lattice.parse().unwrap(), bands: 2, face_px: 16, ..Default::default() };
     bake::header(&generate::sphere(0.7, 1), kind, &options)
 }
 

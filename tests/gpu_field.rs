@@ -5,17 +5,20 @@ mod common;
 use common::{Gpu, gpu, library, open, report};
 use fastrand::Rng;
 use glam::{DQuat, DVec3, Vec3};
+use half::f16;
 use shadow_fields::asset::{Mesh, generate};
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::capture::unit_positions;
 use shadow_fields::bake::inside::{inside, pushed_out};
 use shadow_fields::bake::project::{self, Projection};
 use shadow_fields::bake::surface::Surface;
-use shadow_fields::bake::{self, Baker};
+use shadow_fields::bake::{self, Baker, SceneNeeds};
 use shadow_fields::bake::{TRANSFER_OFFSET, capture};
 use shadow_fields::field::quantity::channel_stride;
 use shadow_fields::field::{FieldHeader, FieldKind, Lookup, ShadowField, Storage};
-use shadow_fields::gpu::{Buffer, BufferKind, Device};
+use shadow_fields::gpu::Device;
+use shadow_fields::scene::Scene;
+use shadow_fields::scene_buffers::Store;
 use shadow_fields::sh::lobe;
 use shadow_fields::sh::rotation::Rotation;
 use std::path::{Path, PathBuf};
@@ -25,27 +28,17 @@ fn quiet(_: u32, _: u32) {}
 
 /// A small field for tests that are not about accuracy.
 fn small(lattice: &str, storage: Storage, bands: usize) -> bake::Options {
-    bake::Options { bands, field_bands: None, storage, lattice: lattice.parse().unwrap(), face_px: 32 }
-}
-
-/// A store whose bytes are not those of a new one, so that what a bake leaves out shows.
-fn store(device: &Arc<Device>, header: &FieldHeader, fill: u8) -> Buffer {
-    Buffer::with_data(device, "store", &vec![fill; header.payload_bytes() as usize]).unwrap()
+    bake::Options { bands, storage, lattice: lattice.parse().unwrap(), face_px: 32, ..Default::default() }
 }
 
 fn bake_field(device: &Arc<Device>, mesh: &Mesh, kind: FieldKind, options: &bake::Options) -> ShadowField {
-    let mut header = bake::header(mesh, kind, options);
-    let store = store(device, &header, 0xff);
     let baker = Baker::new(device, &library());
-    let report = baker.field(mesh, &mut header, (&store, 0), &quiet).unwrap();
-    assert_eq!(report.samples + report.filled, header.lattice.sample_count());
-    let payload = store.download(header.payload_bytes() as usize).unwrap();
-    let field = ShadowField { header, payload };
+    let (field, report) = baker.field(mesh, bake::header(mesh, kind, options), &quiet).unwrap();
+    assert_eq!(report.samples + report.filled, field.header.lattice.sample_count());
     assert_finite(&field);
     field
 }
 
-/// 0xff in the store is NaN in f16 and f32: this also shows that every number was written.
 fn assert_finite(field: &ShadowField) {
     let header = &field.header;
     for sample in 0..header.lattice.stored_count() {
@@ -267,7 +260,9 @@ fn one_colour_shines_where_it_blocks() {
 }
 
 fn bake_transfer(gpu: &Gpu, mesh: &Mesh, bands: usize) -> Vec<f32> {
-    let (transfer, report) = Baker::new(&gpu.device, &gpu.library).transfer(mesh, bands, 64, &quiet).unwrap();
+    let (transfer, report) = Baker::new(&gpu.device, &gpu.library)
+        .transfer(mesh, &bake::Options { bands, ..Default::default() }, &quiet)
+        .unwrap();
     assert_eq!(report.samples as usize, mesh.positions.len());
     assert_eq!(transfer.len(), mesh.positions.len() * channel_stride(bands));
     assert!(transfer.iter().all(|t| t.is_finite()));
@@ -340,31 +335,47 @@ fn a_second_bake_has_the_same_bytes() {
     assert_eq!(bits(bake_transfer(&gpu, &mesh, 3)), bits(bake_transfer(&gpu, &mesh, 3)));
 }
 
+/// In the buffer of all fields each stands at its own place, as if it had been baked alone.
 #[test]
-fn a_field_lands_at_its_offset() {
+fn a_field_lands_at_its_place_in_a_scene() {
     let Some(gpu) = gpu() else { return };
-    let (mesh, options) = (generate::sphere(1.0, 2), small("cube:3x2", Storage::F16, 4));
-    let alone = bake_field(&gpu.device, &mesh, FieldKind::Occlusion, &options);
-    let mut header = bake::header(&mesh, FieldKind::Occlusion, &options);
-    let size = header.payload_bytes() as usize;
-    let store = Buffer::with_data(&gpu.device, "store", &vec![0x5a_u8; size + 1024]).unwrap();
-    Baker::new(&gpu.device, &gpu.library).field(&mesh, &mut header, (&store, 512), &quiet).unwrap();
-    let bytes: Vec<u8> = store.download(size + 1024).unwrap();
-    assert!(bytes[512..512 + size] == alone.payload, "the same field");
-    assert!(bytes[..512].iter().chain(&bytes[512 + size..]).all(|b| *b == 0x5a), "and nothing beside it");
+    let options = small("cube:3x2", Storage::F16, 4);
+    let mesh =
+        |name: &str, shape: &str| format!("[[mesh]]\nname = \"{name}\"\n{shape}\n[[entity]]\nmesh = \"{name}\"\n");
+    let text = [
+        "[environment]\nuniform = [1, 1, 1]\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n".to_owned(),
+        mesh("ball", "sphere = { radius_m = 1.0, subdivisions = 2 }"),
+        mesh("ring", "torus = { major_m = 1.0, minor_m = 0.35, segments = 32, sides = 16 }"),
+    ];
+    let read = &shadow_fields::asset::embedded::read;
+    let scene = Scene::parse(&text.concat(), Path::new("test.toml"), read).unwrap();
+    let needs = SceneNeeds::of(&scene, &options, true);
+    let baker = Baker::new(&gpu.device, &gpu.library);
+    let baked = bake::ensure(&baker, &Cache::new(None), &scene, &needs, &|_, _, _| ()).unwrap();
+    let store = Store::new(&gpu.device, &scene, &options, baked).unwrap();
+    let mut ends = Vec::new();
+    for (mesh, geometry) in scene.meshes.iter().zip(&store.geometries) {
+        let slot = geometry.blocked.as_ref().unwrap();
+        let alone = bake_field(&gpu.device, mesh, FieldKind::Occlusion, &options);
+        assert!(store.field(slot).unwrap() == alone, "{}: the same field", mesh.name);
+        assert!(
+            slot.bytes.start.is_multiple_of(256) && slot.bytes.end - slot.bytes.start == alone.header.payload_bytes()
+        );
+        ends.push(slot.bytes.clone());
+    }
+    assert!(ends[0].start == 0 && ends[0].end <= ends[1].start && ends[1].end <= store.fields.size_bytes);
 }
 
 #[test]
 fn progress_is_told_up_to_the_end() {
     let Some(gpu) = gpu() else { return };
     let (mesh, options) = (generate::sphere(1.0, 1), small("cube:3x4", Storage::F16, 4));
-    let mut header = bake::header(&mesh, FieldKind::Occlusion, &options);
-    let store = store(&gpu.device, &header, 0);
+    let header = bake::header(&mesh, FieldKind::Occlusion, &options);
     let told = std::cell::RefCell::new(Vec::new());
     let progress = |done, all| told.borrow_mut().push((done, all));
-    Baker::new(&gpu.device, &gpu.library).field(&mesh, &mut header, (&store, 0), &progress).unwrap();
+    let (field, _) = Baker::new(&gpu.device, &gpu.library).field(&mesh, header, &progress).unwrap();
     let told = told.into_inner();
-    let count = header.captured_samples;
+    let count = field.header.captured_samples;
     assert_eq!(told.last(), Some(&(count, count)));
     assert!(told.windows(2).all(|w| w[0].0 < w[1].0));
 }
@@ -380,9 +391,9 @@ fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
 /// (whether it was baked, header, payload) of a field that comes through the cache.
 fn cached(device: &Arc<Device>, folder: &Path, mesh: &Mesh, header: &mut FieldHeader) -> (bool, Vec<u8>) {
     let cache = Cache::new(Some(folder));
-    let mut store = store(device, header, 0xff);
-    let report = cache.field(&Baker::new(device, &library()), mesh, header, (&mut store, 0), &quiet).unwrap();
-    (report.is_some(), store.download(header.payload_bytes() as usize).unwrap())
+    let (field, report) = cache.field(&Baker::new(device, &library()), mesh, header, &quiet).unwrap();
+    *header = field.header.clone();
+    (report.is_some(), field.payload.clone())
 }
 
 #[test]
@@ -469,7 +480,8 @@ fn the_cache_keeps_transfers() {
     let mesh = generate::torus(1.0, 0.3, 12, 8);
     let cache = Cache::new(Some(folder.path()));
     let baker = Baker::new(&gpu.device, &gpu.library);
-    let run = |bands| cache.transfer(&baker, &mesh, bands, 16, &quiet).unwrap();
+    let options = |bands| bake::Options { bands, face_px: 16, ..Default::default() };
+    let run = |bands| cache.transfer(&baker, &mesh, &options(bands), &quiet).unwrap();
     let (first, baked) = run(3);
     assert!(baked.is_some());
     let (second, found) = run(3);
@@ -487,14 +499,23 @@ fn the_cache_keeps_transfers() {
 }
 
 #[test]
-fn without_a_folder_nothing_is_kept() {
+fn without_a_folder_a_bake_is_kept_in_memory() {
     let Some(gpu) = gpu() else { return };
-    let (mesh, options) = (generate::sphere(1.0, 1), small("cube:2x1", Storage::F16, 2));
+    let (mesh, options) = (generate::torus(1.0, 0.3, 12, 8), small("cube:2x1", Storage::F16, 2));
+    let baker = Baker::new(&gpu.device, &gpu.library);
+    let header = bake::header(&mesh, FieldKind::Occlusion, &options);
     for _ in 0..2 {
-        let mut header = bake::header(&mesh, FieldKind::Occlusion, &options);
-        let mut store = Buffer::new(&gpu.device, "store", BufferKind::Device, header.payload_bytes()).unwrap();
-        let baker = Baker::new(&gpu.device, &gpu.library);
-        assert!(Cache::new(None).field(&baker, &mesh, &mut header, (&mut store, 0), &quiet).unwrap().is_some());
+        let cache = Cache::new(None);
+        let run = || {
+            let (field, baked) = cache.field(&baker, &mesh, &header, &quiet).unwrap();
+            let (transfer, baked_transfer) = cache.transfer(&baker, &mesh, &options, &quiet).unwrap();
+            (field, transfer, [baked.is_some(), baked_transfer.is_some()])
+        };
+        assert!(!cache.has_field(&header) && !cache.has_transfer(&mesh, &options));
+        let (first, second) = (run(), run());
+        assert!(cache.has_field(&header) && cache.has_transfer(&mesh, &options));
+        assert_eq!([first.2, second.2], [[true; 2], [false; 2]], "another cache knows nothing of it");
+        assert!(first.0 == second.0 && first.1 == second.1);
     }
 }
 
@@ -532,11 +553,40 @@ fn what_cannot_be_baked_is_bad_input() {
     let baker = Baker::new(&gpu.device, &gpu.library);
     let refused = |edit: &dyn Fn(&mut FieldHeader)| {
         let mut header = bake::header(&mesh, FieldKind::Occlusion, &small("cube:2x2", Storage::F16, 4));
-        let store = store(&gpu.device, &header, 0);
         edit(&mut header);
-        baker.field(&mesh, &mut header, (&store, 0), &quiet).expect_err("refused").exit_code()
+        baker.field(&mesh, header, &quiet).map(|_| ()).expect_err("refused").exit_code()
     };
     assert_eq!(refused(&|h| h.bands = 9), 4);
     assert_eq!(refused(&|h| h.face_px = 1), 4);
     assert_eq!(refused(&|h| (h.lattice.inner, h.lattice.outer) = (0.2, 0.8)), 4, "every sample lies inside");
+}
+
+/// A stored half is what rounding makes of the exact number, not merely near it: to the nearest, or towards zero, as the device
+/// rounds; numbers below the least normal half may be stored as zero. Two shaders compute the number, so that one of a thousand may
+/// fall to the other side. (Halves that are scaled by 0.9996 are all within one step of the right ones, and most are wrong.)
+#[test]
+fn stored_halves_are_rounded_from_the_exact_numbers() {
+    let Some(gpu) = gpu() else { return };
+    let plain = torus();
+    let colors = plain.positions.iter().map(|p| Vec3::new(3.0, 1.0 + p.x.abs(), 0.7)).collect();
+    let bright =
+        Mesh::new("bright", plain.positions.clone(), Vec::new(), Some(colors), plain.triangles.clone()).unwrap();
+    for (mesh, kind) in [(plain, FieldKind::Occlusion), (bright, FieldKind::Radiance)] {
+        let [exact, halves] = [Storage::F32, Storage::F16]
+            .map(|storage| bake_field(&gpu.device, &mesh, kind, &small("cube:4x3", storage, 4)).payload);
+        let exact = exact.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
+        let halves = halves.chunks_exact(2).map(|b| f16::from_le_bytes(b.try_into().unwrap()));
+        let (mut count, mut off_nearest, mut off_zero) = (0, 0, 0);
+        for (exact, half) in exact.zip(halves).filter(|(exact, _)| exact.abs() >= f16::MIN_POSITIVE.to_f32()) {
+            let nearest = f16::from_f32(exact);
+            let beyond = nearest.to_f32().abs() > exact.abs();
+            let towards_zero = if beyond { f16::from_bits(nearest.to_bits() - 1) } else { nearest };
+            assert!(half.to_bits().abs_diff(nearest.to_bits()) <= 1, "{half} of {exact}");
+            count += 1;
+            off_nearest += usize::from(half != nearest);
+            off_zero += usize::from(half != towards_zero);
+        }
+        report(&format!("{count} halves: {off_nearest} are not the nearest, {off_zero} not the next towards zero"));
+        assert!(count > 2000 && 1000 * off_nearest.min(off_zero) <= count, "{off_nearest} and {off_zero} of {count}");
+    }
 }

@@ -146,6 +146,7 @@ fn field(lattice: Lattice, seed: u64) -> ShadowField {
         storage: Storage::F32,
         lattice,
         face_px: 8,
+        shortcuts: Default::default(),
         filled_samples: 0,
         captured_samples: 0,
         symmetry: String::new(),

@@ -6,8 +6,7 @@ use crate::asset::Mesh;
 use crate::asset::environment::RADIANCE_LIMIT;
 use crate::bake;
 use crate::error::{Error, Result};
-use crate::field::{FieldKind, ShadowField};
-use crate::gpu::{Buffer, BufferKind};
+use crate::field::{FieldKind, Shortcuts};
 use clap::Args;
 use glam::Vec3;
 use serde_json::json;
@@ -25,14 +24,10 @@ pub struct Arguments {
     /// instead of an occlusion field
     #[arg(long, value_name = "R,G,B", value_parser = color, allow_hyphen_values = true)]
     radiance: Option<Vec3>,
-    /// Capture far samples of a large mesh from simplified ones, at most an eighth of a texel off: for lattices whose samples
-    /// mostly stand far from it
-    #[arg(long)]
-    simplify: bool,
     /// Capture only one of samples that turns and mirrors of the mesh carry into one another, and turn its coefficients for the
     /// rest: symmetric meshes, bodies of revolution, spheres; at most a quarter of a texel off
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
-    orbit: bool,
+    symmetry: bool,
     /// Draw only cube faces that the object reaches, of these only what reaches into them, and of closed meshes no backs
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
     faces: bool,
@@ -80,22 +75,13 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if let Some(radiance) = arguments.radiance {
         mesh = shining(mesh, radiance, &arguments.mesh)?;
     }
-    let mut context = Context::new(global)?;
-    context.baker.simplify = arguments.simplify;
-    context.baker.orbit = arguments.orbit;
-    context.baker.faces = arguments.faces;
-    context.baker.inside = arguments.inside;
-    let mut header = bake::header(&mesh, kind, &arguments.bake.options());
-    header.validate().map_err(|error| error.context(arguments.mesh.display()))?;
-    context.baker.fits(&header).map_err(|error| error.context(arguments.mesh.display()))?;
-    let store = Buffer::new(&context.device, "field", BufferKind::Device, header.payload_bytes())?;
-    let report = context
+    let context = Context::new(global)?;
+    let shortcuts = Shortcuts { symmetry: arguments.symmetry, faces: arguments.faces, inside: arguments.inside };
+    let options = bake::Options { shortcuts, ..arguments.bake.options() };
+    let (field, report) = context
         .baker
-        .field(&mesh, &mut header, (&store, 0), &|done, all| context.progress.show(&mesh.name, done, all))
+        .field(&mesh, bake::header(&mesh, kind, &options), &|done, all| context.progress.show(&mesh.name, done, all))
         .map_err(|error| error.context(arguments.mesh.display()))?;
-    let payload = store.download_range(0..header.payload_bytes())?;
-    let field = ShadowField { header, payload };
-    drop(store);
     let result = json!({
         "origin": context.origin(global), "file": arguments.output.display().to_string(),
         "triangles": mesh.triangles.len(), "report": report, "header": field.header,

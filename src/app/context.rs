@@ -86,6 +86,7 @@ impl BakeArguments {
             storage: self.storage,
             lattice: self.lattice,
             face_px: self.face_px,
+            ..Default::default()
         }
     }
 }

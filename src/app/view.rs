@@ -2,7 +2,6 @@
 
 use super::Global;
 use super::context::{BakeArguments, Context, MergeArguments, size};
-use crate::bake::cache::Cache;
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::gpu::{self, Device, PresentMode, Window};
@@ -129,8 +128,6 @@ struct Shown {
     hidden: bool,
     /// When it was tried.
     tried: Instant,
-    /// Holds bakes where nothing is to be kept.
-    _folder: Option<tempfile::TempDir>,
 }
 
 impl Shown {
@@ -160,19 +157,12 @@ impl App<'_> {
         let window = Arc::new(events.create_window(attributes).map_err(no_display)?);
         let own: [u32; 2] = window.inner_size().into();
         let target = Window::new(device, &window, own, self.arguments.present_mode)?;
-        let folder = if self.global.no_cache {
-            let made = tempfile::tempdir();
-            Some(made.map_err(|error| Error::Failed(format!("no folder for background bakes: {error}")))?)
-        } else {
-            None
-        };
-        let cache = folder.as_ref().map_or_else(|| self.context.cache.clone(), |f| Cache::new(Some(f.path())));
         let antialias = self.arguments.antialias.unwrap_or_else(|| Antialias::usual(device));
         let setup = Setup {
             device: device.clone(),
             options: self.device_options.clone(),
             library: self.context.baker.library().clone(),
-            cache,
+            cache: self.context.cache.clone(),
             frame: self.arguments.merge.options(self.arguments.bake.options(), own, antialias),
             format: target.format(),
             encodes_srgb: target.encodes_srgb(),
@@ -207,7 +197,6 @@ impl App<'_> {
             updated: Instant::now(),
             hidden: false,
             tried: Instant::now(),
-            _folder: folder,
         })
     }
 

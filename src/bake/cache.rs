@@ -1,38 +1,51 @@
-//! Baked fields and transfers on disk, found again by the content of the mesh and everything else that decides them.
+//! Baked fields and transfers, found again by the content of the mesh and everything else that decides them.
 
 use super::partial::Partial;
-use super::{Baker, Progress, Report, TRANSFER_OFFSET};
+use super::{Baker, Options, Progress, Report, TRANSFER_OFFSET};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
 use crate::field::file::{self, TRANSFER_MAGIC, VERSION};
 use crate::field::quantity::channel_stride;
-use crate::field::{FieldHeader, ShadowField};
-use crate::gpu::Buffer;
+use crate::field::{FieldHeader, ShadowField, Shortcuts};
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A folder of baked things; without one, everything is baked anew.
-#[derive(Clone, Debug, Default)]
+/// A folder of baked fields and transfers. What cannot be kept on disk, for want of a folder or of room, is kept in memory as long
+/// as any clone of the cache is there, so that nothing is baked twice.
+#[derive(Clone, Default)]
 pub struct Cache {
     folder: Option<PathBuf>,
+    memory: Arc<Mutex<InMemory>>,
 }
 
-/// Header of a cached transfer file.
+/// What is not on disk, by name.
+#[derive(Default)]
+struct InMemory {
+    fields: HashMap<String, Arc<ShadowField>>,
+    transfers: HashMap<String, Arc<Vec<f32>>>,
+}
+
+/// FieldHeader of a cached transfer file: everything that decides transfer vectors.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct TransferHeader {
     mesh_hash: String,
     bands: usize,
     face_px: u32,
+    #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
+    shortcuts: Shortcuts,
     offset: f32,
     vertex_count: usize,
 }
 
 impl TransferHeader {
-    fn new(mesh: &Mesh, bands: usize, face_px: u32) -> Self {
+    fn new(mesh: &Mesh, options: &Options) -> Self {
         TransferHeader {
             mesh_hash: super::hash_text(mesh),
-            bands,
-            face_px,
+            bands: options.bands,
+            face_px: options.face_px,
+            shortcuts: options.shortcuts,
             offset: TRANSFER_OFFSET,
             vertex_count: mesh.positions.len(),
         }
@@ -62,27 +75,36 @@ pub fn field_name(header: &FieldHeader) -> String {
 }
 
 impl Cache {
-    /// A cache below `folder`, or none.
+    /// A cache below `folder`; without one, in memory.
     pub fn new(folder: Option<&Path>) -> Self {
-        Cache { folder: folder.map(|f| f.join("fields")) }
+        Cache { folder: folder.map(|f| f.join("fields")), memory: Arc::default() }
     }
 
     fn path(&self, key: &str, ending: &str) -> Option<PathBuf> {
         Some(self.folder.as_ref()?.join(format!("{key}.{ending}")))
     }
 
-    /// Whether the field that `header` describes is on disk.
+    fn exists(&self, key: &str, ending: &str) -> bool {
+        self.path(key, ending).is_some_and(|path| path.exists())
+    }
+
+    fn memory(&self) -> MutexGuard<'_, InMemory> {
+        self.memory.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether the field that `header` describes is there.
     pub fn has_field(&self, header: &FieldHeader) -> bool {
-        self.path(&field_name(header), "sf").is_some_and(|path| path.exists())
+        let key = field_name(header);
+        self.memory().fields.contains_key(&key) || self.exists(&key, "sf")
     }
 
-    /// Whether the transfer vectors of a mesh are on disk.
-    pub fn has_transfer(&self, mesh: &Mesh, bands: usize, face_px: u32) -> bool {
-        self.path(&key(&TransferHeader::new(mesh, bands, face_px)), "transfer").is_some_and(|path| path.exists())
+    /// Whether the transfer vectors of a mesh are there.
+    pub fn has_transfer(&self, mesh: &Mesh, options: &Options) -> bool {
+        let key = key(&TransferHeader::new(mesh, options));
+        self.memory().transfers.contains_key(&key) || self.exists(&key, "transfer")
     }
 
-    /// Puts the field that `header` describes into `store` at `offset_bytes`: from disk, else baked and kept. Returns the
-    /// report of a bake, `None` when it was found.
+    /// The field that `header` describes, and the report of its bake, `None` where it was there.
     ///
     /// # Errors
     /// As [`Baker::field`]. A damaged or unreadable cache file is baked anew.
@@ -90,67 +112,153 @@ impl Cache {
         &self,
         baker: &Baker,
         mesh: &Mesh,
-        header: &mut FieldHeader,
-        (store, offset_bytes): (&mut Buffer, u64),
+        header: &FieldHeader,
         progress: Progress<'_>,
-    ) -> Result<Option<Report>> {
-        let path = self.path(&field_name(header), "sf");
-        if let Some(path) = path.as_ref().filter(|path| path.exists()) {
-            match ShadowField::read(path) {
-                Ok(found) if identity(&found.header) == identity(header) => {
-                    *header = FieldHeader { mesh: header.mesh.clone(), ..found.header };
-                    store.fill(offset_bytes, &found.payload)?;
-                    return Ok(None);
-                }
-                Ok(_) => log::warn!("{}: does not fit its name; baking anew", path.display()),
-                Err(error) => log::warn!("{error}; baking anew"),
-            }
+    ) -> Result<(Arc<ShadowField>, Option<Report>)> {
+        let key = field_name(header);
+        let path = self.path(&key, "sf");
+        if let Some(found) = self.memory().fields.get(&key) {
+            return Ok((found.clone(), None));
+        }
+        if let Some(found) = path.as_deref().and_then(|path| read_field(path, header)) {
+            return Ok((Arc::new(found), None));
         }
         let partial = Partial::new(path.as_ref().map(|path| path.with_extension("part")));
-        let report = baker.field_from(&partial, mesh, header, (store, offset_bytes), progress)?;
-        if let Some(path) = path {
-            let payload = store.download_range(offset_bytes..offset_bytes + header.payload_bytes())?;
-            let field = ShadowField { header: header.clone(), payload };
-            if let Err(error) = field.write(&path) {
-                log::warn!("{error}; the field was not cached");
-            }
+        let (field, report) = baker.field_from(&partial, mesh, header.clone(), progress)?;
+        let field = Arc::new(field);
+        if !is_kept(path.as_deref(), |path| field.write(path)) {
+            self.memory().fields.insert(key, field.clone());
         }
-        Ok(Some(report))
+        Ok((field, Some(report)))
     }
 
-    /// The transfer vectors of a mesh: from disk, else baked and kept.
+    /// The transfer vectors of a mesh, and the report of their bake, `None` where they were there.
     ///
     /// # Errors
-    /// As [`Baker::transfer`].
+    /// As [`Baker::transfer`]. A damaged or unreadable cache file is baked anew.
     pub fn transfer(
         &self,
         baker: &Baker,
         mesh: &Mesh,
-        bands: usize,
-        face_px: u32,
+        options: &Options,
         progress: Progress<'_>,
-    ) -> Result<(Vec<f32>, Option<Report>)> {
-        let header = TransferHeader::new(mesh, bands, face_px);
-        let path = self.path(&key(&header), "transfer");
-        if let Some(path) = path.as_ref().filter(|path| path.exists()) {
-            match file::read::<TransferHeader>(path, TRANSFER_MAGIC) {
-                Ok((found, payload))
-                    if found == header && payload.len() == 4 * header.vertex_count * channel_stride(bands) =>
-                {
-                    let floats = payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes")));
-                    return Ok((floats.collect(), None));
-                }
-                Ok(_) => log::warn!("{}: does not fit its name; baking anew", path.display()),
-                Err(error) => log::warn!("{error}; baking anew"),
-            }
+    ) -> Result<(Arc<Vec<f32>>, Option<Report>)> {
+        let header = TransferHeader::new(mesh, options);
+        let key = key(&header);
+        let path = self.path(&key, "transfer");
+        if let Some(found) = self.memory().transfers.get(&key) {
+            return Ok((found.clone(), None));
+        }
+        if let Some(found) = path.as_deref().and_then(|path| read_transfer(path, &header)) {
+            return Ok((Arc::new(found), None));
         }
         let partial = Partial::new(path.as_ref().map(|path| path.with_extension("transfer-part")));
-        let (transfer, report) = baker.transfer_from(&partial, mesh, bands, face_px, progress)?;
-        if let Some(path) = path
-            && let Err(error) = file::write(&path, TRANSFER_MAGIC, &header, bytemuck::cast_slice(&transfer))
-        {
-            log::warn!("{error}; the transfer was not cached");
+        let (transfer, report) = baker.transfer_from(&partial, mesh, options, progress)?;
+        let transfer = Arc::new(transfer);
+        let write = |path: &Path| file::write(path, TRANSFER_MAGIC, &header, bytemuck::cast_slice(&transfer));
+        if !is_kept(path.as_deref(), write) {
+            self.memory().transfers.insert(key, transfer.clone());
         }
         Ok((transfer, Some(report)))
+    }
+}
+
+/// Writes to a path, if there is one; whether it is on disk now.
+fn is_kept(path: Option<&Path>, write: impl FnOnce(&Path) -> Result<()>) -> bool {
+    let Some(path) = path else { return false };
+    match write(path) {
+        Ok(()) => true,
+        Err(error) => {
+            log::warn!("{error}; it is kept in memory only");
+            false
+        }
+    }
+}
+
+/// The field of a file, under the mesh's present name; `None` where it is missing, damaged or another one.
+fn read_field(path: &Path, header: &FieldHeader) -> Option<ShadowField> {
+    match path.exists().then(|| ShadowField::read(path))? {
+        Ok(found) if identity(&found.header) == identity(header) => {
+            Some(ShadowField { header: FieldHeader { mesh: header.mesh.clone(), ..found.header }, ..found })
+        }
+        Ok(_) => doubt(path, &"it does not fit its name"),
+        Err(error) => doubt(path, &error),
+    }
+}
+
+/// The transfer vectors of a file; `None` where it is missing, damaged or another one.
+fn read_transfer(path: &Path, header: &TransferHeader) -> Option<Vec<f32>> {
+    let bytes = 4 * header.vertex_count * channel_stride(header.bands);
+    match path.exists().then(|| file::read::<TransferHeader>(path, TRANSFER_MAGIC))? {
+        Ok((found, payload)) if found == *header && payload.len() == bytes => {
+            Some(payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes"))).collect())
+        }
+        Ok(_) => doubt(path, &"it does not fit its name"),
+        Err(error) => doubt(path, &error),
+    }
+}
+
+fn doubt<T>(path: &Path, why: &dyn std::fmt::Display) -> Option<T> {
+    log::warn!("{}: {why}; baking anew", path.display());
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate;
+    use crate::field::{FieldKind, Storage};
+    use std::collections::BTreeSet;
+
+    /// Names of occlusion field, radiance field and transfer vectors.
+    fn names(mesh: &Mesh, options: &Options) -> [String; 3] {
+        let field = |kind| field_name(&crate::bake::header(mesh, kind, options));
+        [field(FieldKind::Occlusion), field(FieldKind::Radiance), key(&TransferHeader::new(mesh, options))]
+    }
+
+    /// Flips each option: what it decides is kept under another name, and the rest under the same.
+    #[test]
+    fn every_option_is_part_of_the_names_that_it_decides() {
+        let mesh = generate::torus_two_colour(1.0, 0.3, 12, 6);
+        let base = Options::default();
+        // A new option does not compile here until it has a row below.
+        let Options { bands, field_bands, storage, lattice, face_px, shortcuts } = base;
+        let Shortcuts { symmetry, faces, inside } = shortcuts;
+        assert!(field_bands.is_none() && storage == Storage::F16);
+        let shortcuts = |shortcuts| Options { shortcuts, ..base };
+        let all = [true; 3];
+        let flipped: Vec<(&str, Options, [bool; 3])> = vec![
+            ("bands", Options { bands: bands + 1, ..base }, all),
+            ("field_bands", Options { field_bands: Some(bands + 1), ..base }, [true, false, false]),
+            ("storage", Options { storage: Storage::F32, ..base }, [true, true, false]),
+            ("lattice", Options { lattice: "cube:4x3".parse().unwrap(), ..base }, [true, true, false]),
+            ("face_px", Options { face_px: face_px / 2, ..base }, all),
+            ("symmetry", shortcuts(Shortcuts { symmetry: !symmetry, faces, inside }), all),
+            ("faces", shortcuts(Shortcuts { symmetry, faces: !faces, inside }), all),
+            ("inside", shortcuts(Shortcuts { symmetry, faces, inside: !inside }), all),
+        ];
+        assert_ne!(lattice, flipped[3].1.lattice);
+        let usual = names(&mesh, &base);
+        let mut distinct = BTreeSet::new();
+        for (option, options, decides) in flipped {
+            let found = names(&mesh, &options);
+            for ((name, usual), decides) in found.iter().zip(&usual).zip(decides) {
+                assert_eq!(name != usual, decides, "{option}");
+                assert!(!decides || distinct.insert(name.clone()), "{option}: the name of another option's change");
+            }
+        }
+    }
+
+    /// What was baked before shortcuts had a place in headers is still found: all of them on leaves the name as it was.
+    #[test]
+    fn headers_leave_out_shortcuts_that_are_all_on() {
+        let header = crate::bake::header(&generate::sphere(1.0, 1), FieldKind::Occlusion, &Options::default());
+        let text = serde_json::to_string(&header).unwrap();
+        assert!(!text.contains("shortcuts"), "{text}");
+        assert_eq!(serde_json::from_str::<FieldHeader>(&text).unwrap(), header);
+        let shortcuts = Shortcuts { symmetry: false, ..Shortcuts::default() };
+        let changed = FieldHeader { shortcuts, ..header };
+        let text = serde_json::to_string(&changed).unwrap();
+        assert_eq!(serde_json::from_str::<FieldHeader>(&text).unwrap(), changed);
     }
 }

@@ -7,7 +7,7 @@
 //! those that may show a front.
 
 use super::chunk::{Chunk, Chunked, chunk, joined, reaches};
-use super::simplify::Level;
+use super::triangles::distinct;
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::gpu::ImageShape;
@@ -43,33 +43,15 @@ impl Model {
     /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, mesh: &Mesh, with_colors: bool) -> Result<Self> {
         let colors = with_colors.then(|| mesh.colors.clone().unwrap_or_else(|| vec![Vec3::ONE; mesh.positions.len()]));
-        Self::build(device, &unit_positions(mesh), &mesh.triangles, colors, mesh.is_closed())
-    }
-
-    /// Uploads a mesh that stands for another, in r, of one colour where `color` is given.
-    ///
-    /// # Errors
-    /// As [`Model::new`].
-    pub fn stand_in(device: &Arc<Device>, level: &Level, color: Option<Vec3>) -> Result<Self> {
-        let colors = color.map(|color| vec![color; level.positions.len()]);
-        Self::build(device, &level.positions, &level.triangles, colors, level.closed)
-    }
-
-    fn build(
-        device: &Arc<Device>,
-        positions: &[Vec3],
-        triangles: &[[u32; 3]],
-        colors: Option<Vec<Vec3>>,
-        closed: bool,
-    ) -> Result<Self> {
-        let Chunked { vertices, triangles, chunks } = chunk(positions, triangles)?;
+        let unit = unit_positions(mesh);
+        let Chunked { vertices, triangles, chunks } = chunk(&unit, &distinct(mesh))?;
         let gather = |of: &[Vec3]| -> Vec<[f32; 3]> { vertices.iter().map(|&v| of[v as usize].to_array()).collect() };
         Ok(Model {
-            positions: Buffer::with_data(device, "capture positions", &gather(positions))?,
+            positions: Buffer::with_data(device, "capture positions", &gather(&unit))?,
             colors: colors.map(|colors| Buffer::with_data(device, "capture colors", &gather(&colors))).transpose()?,
             indices: Buffer::with_data(device, "capture indices", &triangles)?,
             chunks,
-            closed,
+            closed: mesh.is_closed(),
         })
     }
 }

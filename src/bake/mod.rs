@@ -1,171 +1,122 @@
-//! The bake: from a mesh to its field and to its transfer, every stage on the device.
+//! The bake: from a mesh to its field and to its transfer vectors. [`ensure()`] is the way in for everything that shows a scene.
 //!
 //! ```text
-//! sample points -> capture -> project -> (all batches) -> assemble -> field in the store
-//! vertices      -> capture -> project (times cosine)               -> transfer
+//! sample points -> capture -> project -> host (all batches) -> turned samples -> assemble -> field
+//! vertices      -> capture -> project -> host (all batches) -> turned vertices -> transfer vectors
 //! ```
+//!
+//! [`record_batch`] and [`record_assembly`] hold every pass and every barrier of a bake in order.
 
 pub mod assemble;
+mod batches;
 pub mod cache;
 pub mod capture;
 pub mod chunk;
+pub mod ensure;
+mod header;
 pub mod inside;
 pub mod orbit;
 pub mod partial;
 pub mod project;
 pub mod report;
-pub mod simplify;
+mod samples;
 pub mod snapshot;
 pub mod surface;
-mod sweep;
 pub mod symmetry;
+pub mod triangles;
 
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
-use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
-use crate::field::quantity::{FieldKind, Storage, channel_stride};
-use crate::field::{FieldHeader, Fit, Lattice, ShadowField, growth};
-use crate::gpu::{Buffer, Commands, Device};
+use crate::field::quantity::{FieldKind, channel_stride};
+use crate::field::{FieldHeader, ShadowField, growth};
+use crate::gpu::memory::TexelView;
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
+use batches::{Batch, Batches, Captures, Target};
 use capture::unit_positions;
-use glam::{DVec3, Vec3};
-use orbit::{Plan, Twin};
+pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, is_seen, needs};
+pub use header::{Options, first_shell, hash_text, header};
+use orbit::Twin;
 use partial::Partial;
 use project::{Job, Projection};
-pub use report::{LevelReport, Report};
-use serde::{Deserialize, Serialize};
+pub use report::Report;
+use samples::FieldSamples;
 use std::sync::Arc;
 use std::time::Instant;
-use surface::Surface;
-use sweep::Sweep;
 use symmetry::Symmetry;
 
-/// What decides a field besides the mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Options {
-    /// SH bands of transfers and radiance fields.
-    pub bands: usize,
-    /// SH bands of occlusion fields; `None`: as many.
-    pub field_bands: Option<usize>,
-    /// Number format.
-    pub storage: Storage,
-    /// Sample points; the first shell may be left to the bake.
-    pub lattice: Lattice,
-    /// Edge of a captured face in texels.
-    pub face_px: u32,
-}
-
-impl Default for Options {
-    /// 4 bands, f16, the default lattice, 64 px: a binary cap's error is .0033 at 64 px (DESIGN, section 3).
-    fn default() -> Self {
-        Options { bands: 4, field_bands: None, storage: Storage::default(), lattice: Lattice::default(), face_px: 64 }
-    }
-}
-
-impl Options {
-    /// SH bands of occlusion fields.
-    pub fn occlusion_bands(&self) -> usize {
-        self.field_bands.unwrap_or(self.bands)
-    }
-
-    /// SH bands of what has the most.
-    pub fn most_bands(&self) -> usize {
-        self.bands.max(self.occlusion_bands())
-    }
-}
-
-/// Where the eye of a transfer capture stands: this share of r off the surface, along the normal. Large enough that the
-/// surface's own facets stay below the horizon, small enough that contact shadows do not move visibly.
+/// Where the eye of a transfer capture stands: this share of r off the surface, along the normal. It is large enough that the
+/// surface's own facets stay below the horizon, and small enough that contact shadows do not move visibly.
 pub const TRANSFER_OFFSET: f32 = 2e-3;
 
 /// Told how many of how many samples are done.
 pub type Progress<'p> = &'p dyn Fn(u32, u32);
-
-/// First shell that an object needs, in the lattice's space: just off a ball if the object fills one; the distance of its surface
-/// from the centre if that is inside the solid, since no receiver comes nearer; else well inside.
-pub fn first_shell(fit: &Fit, positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
-    let placed: Vec<Vec3> = positions.iter().map(|p| fit.apply(p.as_dvec3()).as_vec3()).collect();
-    let surface = Surface::new(&placed, triangles);
-    if !surface.encloses(DVec3::ZERO) {
-        return ROOMY_INNER;
-    }
-    let nearest = surface.distance(DVec3::ZERO);
-    let farthest = placed.iter().map(|p| f64::from(p.length())).fold(0.0, f64::max);
-    // A tessellated sphere's facets lie a few percent inside it.
-    if nearest > 0.93 * farthest { OUTSIDE_INNER * farthest.max(1.0) } else { nearest.max(ROOMY_INNER) }
-}
-
-/// Share of its box above which a solid counts as one.
-const BOXED: f64 = 0.9;
-
-/// Whether samples on the edges of a cube's faces serve a solid: most, but not one that fills its box. Its edges lie where those are,
-/// and what is captured below an edge, off one of two sides at random, serves neither (a cube on a floor: .034 for .023).
-fn is_served_by_edges(positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
-    let (low, high) = positions.iter().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
-    let boxed = (high - low).as_dvec3().element_product();
-    let corner = |i: u32| positions[i as usize].as_dvec3();
-    let volume: f64 = triangles.iter().map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2]))) / 6.0).sum();
-    volume.abs() < BOXED * boxed
-}
-
-/// The hash of a mesh's contents as headers hold it.
-pub fn hash_text(mesh: &Mesh) -> String {
-    mesh.content_hash().iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// Header of the field that a bake of `mesh` would make.
-pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
-    let (centre, radius_m) = mesh.bounding_sphere();
-    let positions = unit_positions(mesh);
-    let first = |fit: &Fit| first_shell(fit, &positions, &mesh.triangles);
-    let mut lattice = options.lattice.fitted(Fit::new(&positions), first);
-    lattice.edges.get_or_insert_with(|| is_served_by_edges(&positions, &mesh.triangles));
-    let brightest = mesh.colors.iter().flatten().map(|c| c.max_element()).fold(0.0, f32::max);
-    FieldHeader {
-        kind,
-        bands: if kind == FieldKind::Occlusion { options.occlusion_bands() } else { options.bands },
-        storage: options.storage,
-        lattice,
-        face_px: options.face_px,
-        filled_samples: 0,
-        captured_samples: 0,
-        symmetry: String::new(),
-        growth: 0.0,
-        centre_m: centre.to_array(),
-        radius_m,
-        radiance_scale: if kind == FieldKind::Radiance && mesh.colors.is_some() { brightest } else { 1.0 },
-        mesh: mesh.name.clone(),
-        mesh_hash: hash_text(mesh),
-    }
-}
 
 /// Bytes of the samples of a field before they are put into its stored order and number format.
 fn captured_bytes(header: &FieldHeader) -> u64 {
     4 * u64::from(header.lattice.sample_count()) * header.sample_stride() as u64
 }
 
-/// Bakes on one device.
+/// Records one batch of a field's or a transfer's bake: captures the eyes, projects their faces, copies the samples to the host.
+fn record_batch<'r>(
+    commands: &mut Commands<'r>,
+    batches: &'r Batches,
+    batch: &Batch,
+    texels: &'r TexelView<'r>,
+) -> Result<()> {
+    let Batches { capture, project, model, jobs, samples, results, .. } = batches;
+    let count = batch.eyes.len();
+    commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
+    if let Some(depth) = capture.depth() {
+        commands.image_barrier(depth, None, Access::DepthWrite);
+    }
+    commands.pass("capture", |c| capture.record(c, model, &batch.eyes, &batch.slots, batches.culls))?;
+    commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::ComputeSampled);
+    commands.pass("project", |c| project.record(c, &capture.atlas, jobs, texels, samples, count as u32))?;
+    commands.barrier(Access::ComputeWrite, Access::TransferRead);
+    commands.copy_range(samples, 0..4 * (count * batches.sample_floats) as u64, results, 0);
+    commands.barrier(Access::TransferWrite, Access::HostRead);
+    Ok(())
+}
+
+/// Buffers of the end of a field's bake.
+struct Assembly {
+    assemble: Assemble,
+    captured: Buffer,
+    offsets: Buffer,
+    list: Buffer,
+    /// The field's payload on the device.
+    field: Buffer,
+    /// The same on its way to the host.
+    payload: Buffer,
+}
+
+/// Records the end of a field's bake, once all samples are on the host and back: puts them into the stored order and number
+/// format, and copies the payload to the host.
+fn record_assembly<'r>(commands: &mut Commands<'r>, assembly: &'r Assembly, header: &FieldHeader) -> Result<()> {
+    let Assembly { assemble, captured, offsets, list, field, payload } = assembly;
+    let bytes = 0..header.payload_bytes();
+    let counts = (header.lattice.stored_count(), (header.sample_stride() / 4) as u32);
+    let factor = if header.radiance_scale > 0.0 { 1.0 / header.radiance_scale } else { 1.0 };
+    commands
+        .pass("assemble", |c| assemble.record(c, [captured, offsets, list], (field, bytes.clone()), counts, factor))?;
+    commands.barrier(Access::ComputeWrite, Access::TransferRead);
+    commands.copy_range(field, bytes, payload, 0);
+    commands.barrier(Access::TransferWrite, Access::HostRead);
+    Ok(())
+}
+
+/// Bakes on one device. It has no options: what decides a stored number stands in [`Options`].
 pub struct Baker {
     device: Arc<Device>,
     library: Library,
-    /// Whether eyes far from a large mesh see a simplified one. Not by default: of the default lattice's samples too few stand far
-    /// off, and making the levels costs more than they save (102 400 triangles: 39.3 s with, 34.7 s without).
-    pub simplify: bool,
-    /// Whether of samples that a symmetry of the mesh carries into one another only one is captured.
-    pub orbit: bool,
-    /// Whether only faces that the object reaches are drawn, of these only what reaches into them, and of closed meshes no backs.
-    pub faces: bool,
-    /// Whether samples inside a solid are captured off its nearest surface, or left out and filled from their neighbours where that
-    /// sees nothing either. If not, they are captured where they stand, from where both sides of every face are drawn: all dark.
-    pub inside: bool,
 }
 
 impl Baker {
     /// A baker that compiles its shaders from `library`.
     pub fn new(device: &Arc<Device>, library: &Library) -> Self {
-        let (device, library) = (device.clone(), library.clone());
-        Baker { device, library, simplify: false, orbit: true, faces: true, inside: true }
+        Baker { device: device.clone(), library: library.clone() }
     }
 
     /// Checks that the device can bind the field that `header` describes, and what it is baked from.
@@ -186,18 +137,12 @@ impl Baker {
         Ok(())
     }
 
-    /// Bakes the field that `header` describes (see [`header`]) into `store` at `offset_bytes`, a multiple of 256.
+    /// Bakes the field that `header` describes (see [`header()`]).
     ///
     /// # Errors
     /// `Input` when no sample point can see the object, or a buffer is larger than the device can hold or bind.
-    pub fn field(
-        &self,
-        mesh: &Mesh,
-        header: &mut FieldHeader,
-        target: (&Buffer, u64),
-        progress: Progress<'_>,
-    ) -> Result<Report> {
-        self.field_from(&Partial::new(None), mesh, header, target, progress)
+    pub fn field(&self, mesh: &Mesh, header: FieldHeader, progress: Progress<'_>) -> Result<(ShadowField, Report)> {
+        self.field_from(&Partial::new(None), mesh, header, progress)
     }
 
     /// As [`Baker::field`], going on from what a cancelled bake of the same field has kept.
@@ -208,84 +153,63 @@ impl Baker {
         &self,
         partial: &Partial,
         mesh: &Mesh,
-        header: &mut FieldHeader,
-        (store, offset_bytes): (&Buffer, u64),
+        mut header: FieldHeader,
         progress: Progress<'_>,
-    ) -> Result<Report> {
+    ) -> Result<(ShadowField, Report)> {
         header.validate()?;
+        self.fits(&header)?;
         let started = Instant::now();
-        let lattice = header.lattice;
-        self.fits(header)?;
-        let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
-        let surface = Surface::new(&unit_positions(mesh), &mesh.triangles);
-        let mut inside = if self.inside { inside::inside(&surface, &positions) } else { vec![false; positions.len()] };
-        let pushed = inside::pushed_out(&surface, &positions, &inside);
-        let mut unseen: Vec<bool> = inside.iter().zip(&pushed).map(|(inside, eye)| *inside && eye.is_none()).collect();
-        let plan = self.plan(mesh, header, &surface, &inside);
-        let twins = &plan.twins;
-        for (sample, twin) in twins.iter().enumerate().filter_map(|(sample, twin)| Some((sample, twin.as_ref()?))) {
-            inside[sample] = inside[twin.of as usize];
-            unseen[sample] = unseen[twin.of as usize];
-        }
-        header.filled_samples = inside.iter().filter(|i| **i).count() as u32;
-        let sources = Sources::new(&lattice, &inside, &unseen)?;
-
-        let radiance = header.kind == FieldKind::Radiance;
-        let mut values = vec![0.0_f32; captured_bytes(header) as usize / 4];
-        let mut targets = Vec::new();
-        let seen = positions.iter().enumerate().filter(|(index, _)| !unseen[*index] && twins[*index].is_none());
-        for (index, position) in seen {
-            let eye = pushed[index].unwrap_or(*position);
-            let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
-            targets.push((eye.as_vec3(), Job { normal: [0.0; 4], slots: [0; 6], target: index as u32, scale }));
-        }
-        let projection = if radiance { Projection::Radiance } else { Projection::Blocked };
-        let sweep = Sweep { baker: self, mesh, bands: header.bands, projection, face_px: header.face_px, partial };
-        let mut report = if self.simplify {
-            sweep.at_levels(&targets, &mut values, progress)?
-        } else {
-            sweep.alone(&targets, &mut values, progress)?
-        };
-        orbit::spread(&mut values, &plan, &lattice, header.bands, header.kind.channels());
+        triangles::tell_repeated(mesh);
+        let FieldSamples { targets, plan, sources } = FieldSamples::new(mesh, &mut header)?;
+        let projection = if header.kind == FieldKind::Radiance { Projection::Radiance } else { Projection::Blocked };
+        let FieldHeader { bands, face_px, shortcuts, .. } = header;
+        let captures = Captures { mesh, bands, projection, face_px, shortcuts, partial };
+        let mut values = vec![0.0_f32; captured_bytes(&header) as usize / 4];
+        let mut report = captures.run(self, &targets, &mut values, progress)?;
+        orbit::spread(&mut values, &plan, &header.lattice, bands, header.kind.channels());
         header.captured_samples = targets.len() as u32;
-        report.turned = twins.iter().flatten().count() as u32;
+        report.turned = plan.twins.iter().flatten().count() as u32;
         report.filled = header.filled_samples;
-        report.samples = lattice.sample_count() - report.filled;
-
-        let captured = Buffer::with_data(&self.device, "captured samples", &values)?;
-        let assemble = Assemble::new(&self.device, &self.library, header.storage)?;
-        let offsets = Buffer::with_data(&self.device, "assemble offsets", &sources.offsets)?;
-        let list = Buffer::with_data(&self.device, "assemble sources", &sources.list)?;
-        let quads = (header.sample_stride() / 4) as u32;
-        let factor = if header.radiance_scale > 0.0 { 1.0 / header.radiance_scale } else { 1.0 };
-        let range = offset_bytes..offset_bytes + header.payload_bytes();
-        let mut commands = Commands::new(&self.device, "assemble")?;
-        commands.pass("assemble", |commands| {
-            let inputs = [&captured, &offsets, &list];
-            assemble.record(commands, inputs, (store, range), (lattice.stored_count(), quads), factor)
-        })?;
-        report.add(&commands.submit()?);
-        if header.kind == FieldKind::Occlusion {
-            let payload = store.download_range(offset_bytes..offset_bytes + header.payload_bytes())?;
-            header.growth = growth::growth(&ShadowField { header: header.clone(), payload });
+        report.samples = header.lattice.sample_count() - report.filled;
+        let payload = self.assemble(&header, &values, &sources, &mut report)?;
+        let mut field = ShadowField { header, payload };
+        if field.header.kind == FieldKind::Occlusion {
+            field.header.growth = growth::growth(&field);
         }
         report.total = started.elapsed();
-        Ok(report)
+        Ok((field, report))
     }
 
-    /// Bakes the transfer vector of every vertex: `channel_stride(bands)` floats each, object's frame. A flat or convex mesh
-    /// has none to bake: there the cosine lobe of the normal is exact.
+    /// The payload of a field from its samples.
+    fn assemble(
+        &self,
+        header: &FieldHeader,
+        values: &[f32],
+        sources: &Sources,
+        report: &mut Report,
+    ) -> Result<Vec<u8>> {
+        let (device, bytes) = (&self.device, header.payload_bytes());
+        let assembly = Assembly {
+            assemble: Assemble::new(device, &self.library, header.storage)?,
+            captured: Buffer::with_data(device, "captured samples", values)?,
+            offsets: Buffer::with_data(device, "assemble offsets", &sources.offsets)?,
+            list: Buffer::with_data(device, "assemble sources", &sources.list)?,
+            field: Buffer::new(device, "baked field", BufferKind::Device, bytes)?,
+            payload: Buffer::new(device, "baked payload", BufferKind::Readback, bytes)?,
+        };
+        let mut commands = Commands::new(device, "assemble")?;
+        record_assembly(&mut commands, &assembly, header)?;
+        report.add(&commands.submit()?);
+        Ok(assembly.payload.read(0, bytes as usize))
+    }
+
+    /// Bakes the transfer vector of every vertex: `channel_stride(bands)` floats each, in the object's frame. A flat or convex mesh
+    /// needs none: there the cosine lobe of the normal is exact.
     ///
     /// # Errors
     /// As [`Baker::field`].
-    pub fn transfer(
-        &self,
-        mesh: &Mesh,
-        bands: usize,
-        face_px: u32,
-        progress: Progress<'_>,
-    ) -> Result<(Vec<f32>, Report)> {
-        self.transfer_from(&Partial::new(None), mesh, bands, face_px, progress)
+    pub fn transfer(&self, mesh: &Mesh, options: &Options, progress: Progress<'_>) -> Result<(Vec<f32>, Report)> {
+        self.transfer_from(&Partial::new(None), mesh, options, progress)
     }
 
     /// As [`Baker::transfer`], going on from what a cancelled bake of the same transfer has kept.
@@ -296,66 +220,27 @@ impl Baker {
         &self,
         partial: &Partial,
         mesh: &Mesh,
-        bands: usize,
-        face_px: u32,
+        options: &Options,
         progress: Progress<'_>,
     ) -> Result<(Vec<f32>, Report)> {
         let started = Instant::now();
+        triangles::tell_repeated(mesh);
+        let Options { bands, face_px, shortcuts, .. } = *options;
+        let twins = vertex_twins(mesh, face_px, shortcuts.symmetry);
+        let vertices = unit_positions(mesh).into_iter().zip(&mesh.normals).enumerate();
+        let target = |(vertex, (position, normal)): (usize, (glam::Vec3, &glam::Vec3))| Target {
+            eye: position + TRANSFER_OFFSET * normal,
+            job: Job { normal: normal.extend(0.0).to_array(), slots: [0; 6], target: vertex as u32, scale: 1.0 },
+        };
+        let targets: Vec<Target> = vertices.filter(|(vertex, _)| twins[*vertex].is_none()).map(target).collect();
+        let captures = Captures { mesh, bands, projection: Projection::Transfer, face_px, shortcuts, partial };
         let mut transfer = vec![0.0_f32; mesh.positions.len() * channel_stride(bands)];
-        let positions = unit_positions(mesh);
-        let targets: Vec<(Vec3, Job)> = positions
-            .iter()
-            .zip(&mesh.normals)
-            .enumerate()
-            .map(|(index, (position, normal))| {
-                let job =
-                    Job { normal: normal.extend(0.0).to_array(), slots: [0; 6], target: index as u32, scale: 1.0 };
-                (position + TRANSFER_OFFSET * normal, job)
-            })
-            .collect();
-        let twins = self.vertex_twins(mesh, face_px);
-        let (targets, _): (Vec<_>, Vec<_>) =
-            targets.into_iter().partition(|(_, job)| twins[job.target as usize].is_none());
-        // A vertex sees its own surface from nearby: no simplified mesh will do.
-        let projection = Projection::Transfer;
-        let sweep = Sweep { baker: self, mesh, bands, projection, face_px, partial };
-        let mut report = sweep.alone(&targets, &mut transfer, progress)?;
+        let mut report = captures.run(self, &targets, &mut transfer, progress)?;
         orbit::turn_all(&mut transfer, &twins, bands, 1);
-        report.samples = positions.len() as u32;
+        report.samples = mesh.positions.len() as u32;
         report.turned = twins.iter().flatten().count() as u32;
         report.total = started.elapsed();
         Ok((transfer, report))
-    }
-
-    /// Which samples are turned from which others; says in the header by what symmetries.
-    fn plan(&self, mesh: &Mesh, header: &mut FieldHeader, surface: &Surface, inside: &[bool]) -> Plan {
-        if !self.orbit {
-            header.symmetry = "off".to_owned();
-            return Plan { twins: orbit::same(&header.lattice), round: Vec::new() };
-        }
-        let symmetry = Symmetry::of(mesh, surface, header.kind == FieldKind::Radiance).kept_by(&header.lattice.fit());
-        header.symmetry = symmetry.describe();
-        let distance = |sample: u32| {
-            let position = header.lattice.position(sample);
-            match inside[sample as usize] {
-                true => f64::from(TRANSFER_OFFSET),
-                // A bound will do for those far off.
-                false if position.length() > 2.0 => position.length() - 1.0,
-                false => surface.distance(position),
-            }
-        };
-        let plan = orbit::plan(&header.lattice, &symmetry, header.face_px, distance);
-        let turned = plan.twins.iter().flatten().count();
-        log::info!("{}: symmetries: {}; {turned} of {} samples turned", mesh.name, header.symmetry, inside.len());
-        plan
-    }
-
-    /// Which vertices' transfer vectors are turned from which others'.
-    fn vertex_twins(&self, mesh: &Mesh, face_px: u32) -> Vec<Option<Twin>> {
-        if !self.orbit {
-            return vec![None; mesh.positions.len()];
-        }
-        orbit::plan_vertices(mesh, &Symmetry::of_vertices(mesh, None), face_px, f64::from(TRANSFER_OFFSET))
     }
 
     /// The library that shaders come from.
@@ -367,4 +252,12 @@ impl Baker {
     pub fn device(&self) -> &Arc<Device> {
         &self.device
     }
+}
+
+/// Which vertices' transfer vectors are turned from which others'.
+fn vertex_twins(mesh: &Mesh, face_px: u32, symmetry: bool) -> Vec<Option<Twin>> {
+    if !symmetry {
+        return vec![None; mesh.positions.len()];
+    }
+    orbit::plan_vertices(mesh, &Symmetry::of_vertices(mesh, None), face_px, f64::from(TRANSFER_OFFSET))
 }

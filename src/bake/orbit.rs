@@ -17,7 +17,7 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 /// Largest displacement of what is captured, in texels of a face. Facets go to and fro, so that the solid neither shrinks nor
-/// grows with them: less strict than for simplified meshes.
+/// grows with them.
 pub const TEXEL_SHARE: f64 = 0.25;
 
 /// A sample that is made from another.

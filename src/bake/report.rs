@@ -14,8 +14,6 @@ pub struct Report {
     pub faces: u32,
     /// Samples inside the solid, captured off the nearest surface or, where that sees nothing, filled from neighbours.
     pub filled: u32,
-    /// Meshes that samples were captured from: simplified ones for those far off, the full one last.
-    pub levels: Vec<LevelReport>,
     /// Device time in capture passes.
     pub capture_ms: f64,
     /// Device time in project passes.
@@ -24,15 +22,6 @@ pub struct Report {
     pub assemble_ms: f64,
     /// Wall time of the whole bake.
     pub total: Duration,
-}
-
-/// Samples that were captured from one mesh.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct LevelReport {
-    /// Its triangles.
-    pub triangles: usize,
-    /// How many.
-    pub samples: u32,
 }
 
 impl Report {

@@ -2,10 +2,9 @@
 
 use super::Bench;
 use crate::asset::{Mesh, generate};
-use crate::bake::{self, Baker, Report};
+use crate::bake::{self, Report};
 use crate::error::Result;
-use crate::field::{FieldKind, Storage};
-use crate::gpu::{Buffer, BufferKind};
+use crate::field::{FieldKind, Shortcuts, Storage};
 use crate::text;
 use serde::Serialize;
 use serde_json::json;
@@ -47,55 +46,45 @@ pub struct BakeSkipRow {
     pub times_faster: f64,
 }
 
-type Set = fn(&mut Baker);
+const NONE: Shortcuts = Shortcuts { symmetry: false, faces: false, inside: true };
 
-/// The skips by name, with the functions that switch them off and on.
-const SKIPS: [(&str, Set, Set); 5] = [
-    ("faces", |_| (), |baker| baker.faces = true),
-    ("orbit", |_| (), |baker| baker.orbit = true),
-    ("inside", |baker| baker.inside = false, |_| ()),
-    ("simplify", |_| (), |baker| baker.simplify = true),
-    ("all but simplify", |_| (), |baker| (baker.faces, baker.orbit) = (true, true)),
+/// The skips by name, with the shortcuts of a bake without them and with them. Samples inside a solid are captured off its surface
+/// but where that is what is measured.
+const SKIPS: [(&str, [Shortcuts; 2]); 4] = [
+    ("faces", [NONE, Shortcuts { faces: true, ..NONE }]),
+    ("symmetry", [NONE, Shortcuts { symmetry: true, ..NONE }]),
+    ("inside", [Shortcuts { inside: false, ..NONE }, NONE]),
+    ("all", [NONE, Shortcuts { symmetry: true, faces: true, ..NONE }]),
 ];
 
 /// Half of the default shells and directions.
-const SMALL: &str = "cube:8x5";
-/// About as many samples as by default, most of them far away, where simplified meshes help.
-const FAR: &str = "cube:16x8,log,outer=64";
+const LATTICE: &str = "cube:8x5";
 
 /// Measures every skip on a few meshes, and writes `skip_bake.csv` and `skip_bake.json` into `folder`. `cases`: of all meshes only
 /// those that have one of these texts in their names.
 ///
 /// # Errors
-/// `Failed` when a file cannot be written; else as [`Baker::field`].
+/// `Failed` when a file cannot be written; else as [`bake::Baker::field`].
 pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<BakeSkipRow>> {
-    let mut meshes = vec![(generate::sphere(0.5, 4), SMALL), (generate::torus(0.5, 0.2, 96, 48), SMALL)];
+    let mut meshes = vec![generate::sphere(0.5, 4), generate::torus(0.5, 0.2, 96, 48)];
     if !bench.quick {
-        meshes.push((generate::torus(0.5, 0.2, 200, 100), SMALL));
-        meshes.push((large(), FAR));
+        meshes.push(generate::torus(0.5, 0.2, 200, 100));
     }
-    meshes.retain(|(mesh, _)| cases.is_empty() || cases.iter().any(|text| mesh.name.contains(text)));
+    meshes.retain(|mesh| cases.is_empty() || cases.iter().any(|text| mesh.name.contains(text)));
     let mut rows = Vec::new();
-    for (mesh, lattice) in &meshes {
-        let far = *lattice == FAR;
-        let exact = if far { None } else { Some(bake_once(bench, mesh, lattice, 128, &|_| ())?.1) };
-        for (skip, off, on) in SKIPS.into_iter().filter(|(skip, ..)| !far || *skip == "simplify") {
-            let (mut sides, rounds) = ([None::<BakeTime>; 2], if bench.quick || far { 1 } else { 3 });
-            let mut exact = exact.clone();
+    for mesh in &meshes {
+        let (_, exact) = bake_once(bench, mesh, 128, NONE)?;
+        for (skip, shortcuts) in SKIPS {
+            let (mut sides, rounds) = ([None::<BakeTime>; 2], if bench.quick { 1 } else { 3 });
             for _ in 0..rounds {
-                for (side, set) in sides.iter_mut().zip([off, on]) {
-                    // Faces and orbits as usual where the mesh is large: without them it would take minutes.
-                    let (report, values) = bake_once(bench, mesh, lattice, 64, &|baker| {
-                        (baker.faces, baker.orbit) = (far, far);
-                        set(baker);
-                    })?;
-                    let exact = exact.get_or_insert_with(|| values.clone());
+                for (side, shortcuts) in sides.iter_mut().zip(shortcuts) {
+                    let (report, values) = bake_once(bench, mesh, 64, shortcuts)?;
                     let now = BakeTime {
                         bake_ms: report.total.as_secs_f64() * 1e3,
                         captured_count: report.samples + report.filled - report.turned,
                         filled_count: report.filled,
                         face_count: report.faces,
-                        error: relative(&values, exact),
+                        error: relative(&values, &exact),
                     };
                     *side = Some(side.filter(|before| before.bake_ms < now.bake_ms).unwrap_or(now));
                 }
@@ -105,7 +94,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Bak
             rows.push(BakeSkipRow {
                 case: mesh.name.clone(),
                 triangle_count: mesh.triangles.len(),
-                lattice: (*lattice).to_owned(),
+                lattice: LATTICE.to_owned(),
                 skip: skip.to_owned(),
                 times_faster: off.bake_ms / on.bake_ms,
                 off,
@@ -120,31 +109,13 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Bak
     Ok(rows)
 }
 
-/// A ring of 102 400 triangles with waves on it.
-fn large() -> Mesh {
-    let ring = generate::torus(0.5, 0.2, 320, 160);
-    let wave = |p: &glam::Vec3| 0.01 * (18.0 * p.x).sin() * (22.0 * p.z + 4.0 * p.y).cos();
-    let moved = ring.positions.iter().zip(&ring.normals).map(|(p, n)| *p + wave(p) * *n).collect();
-    Mesh::new("large", moved, Vec::new(), None, ring.triangles).expect("a ring with waves is a mesh")
-}
-
-/// An occlusion field in f32, nothing left out but what `set` sets.
-fn bake_once(
-    bench: &Bench<'_>,
-    mesh: &Mesh,
-    lattice: &str,
-    face_px: u32,
-    set: &dyn Fn(&mut Baker),
-) -> Result<(Report, Vec<f32>)> {
-    let mut baker = Baker::new(bench.baker.device(), bench.baker.library());
-    (baker.faces, baker.orbit, baker.simplify) = (false, false, false);
-    set(&mut baker);
-    let lattice = lattice.parse().expect("a lattice");
-    let options = bake::Options { lattice, storage: Storage::F32, face_px, ..Default::default() };
-    let mut header = bake::header(mesh, FieldKind::Occlusion, &options);
-    let store = Buffer::new(baker.device(), "field", BufferKind::Device, header.payload_bytes())?;
-    let report = baker.field(mesh, &mut header, (&store, 0), &|_, _| ())?;
-    Ok((report, store.download_range(0..header.payload_bytes())?))
+/// An occlusion field in f32.
+fn bake_once(bench: &Bench<'_>, mesh: &Mesh, face_px: u32, shortcuts: Shortcuts) -> Result<(Report, Vec<f32>)> {
+    let lattice = LATTICE.parse().expect("a lattice");
+    let options = bake::Options { lattice, storage: Storage::F32, face_px, shortcuts, ..Default::default() };
+    let header = bake::header(mesh, FieldKind::Occlusion, &options);
+    let (field, report) = bench.baker.field(mesh, header, &|_, _| ())?;
+    Ok((report, field.payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes"))).collect()))
 }
 
 fn relative(values: &[f32], exact: &[f32]) -> f64 {

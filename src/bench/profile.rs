@@ -7,8 +7,8 @@ use crate::bake;
 use crate::draw::{Antialias, Finish};
 use crate::error::{Error, Result};
 use crate::field::FieldKind;
+use crate::gpu::Device;
 use crate::gpu::census::{Census, disassemble};
-use crate::gpu::{Buffer, BufferKind, Device};
 use crate::merge::Merge;
 use crate::merge::variant::{Chain, Form, PRODUCTS, Product, VARIANTS, Variant};
 use crate::merge::workload::Workload;
@@ -276,19 +276,16 @@ pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(Row, Vec<f
     let small = bake::Options { lattice: "cube:2x1".parse().expect("a lattice"), ..options };
     let mut times: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
     let field = |kind: FieldKind, options: &bake::Options| -> Result<bake::Report> {
-        let mut header = bake::header(mesh, kind, options);
-        let store = Buffer::new(bench.baker.device(), "field", BufferKind::Device, header.payload_bytes())?;
-        bench.baker.field(mesh, &mut header, (&store, 0), &|_, _| ())
+        Ok(bench.baker.field(mesh, bake::header(mesh, kind, options), &|_, _| ())?.1)
     };
     for kind in [FieldKind::Occlusion, FieldKind::Radiance] {
         field(kind, &small)?;
     }
     for _ in 0..runs.min(3) {
-        let (bands, face_px) = (options.bands, options.face_px);
         let reports = [
             ("occlusion", field(FieldKind::Occlusion, &options)?),
             ("radiance", field(FieldKind::Radiance, &options)?),
-            ("transfer", bench.baker.transfer(mesh, bands, face_px, &|_, _| ())?.1),
+            ("transfer", bench.baker.transfer(mesh, &options, &|_, _| ())?.1),
         ];
         for (what, report) in reports {
             let mut add = |pass, ms: f64| times.entry((what, pass)).or_default().push(ms);

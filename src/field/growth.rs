@@ -85,6 +85,7 @@ mod tests {
             storage: Storage::F32,
             lattice,
             face_px: 64,
+            shortcuts: Default::default(),
             filled_samples: 0,
             captured_samples: 0,
             symmetry: String::new(),

@@ -9,12 +9,14 @@ pub mod growth;
 pub mod lattice;
 pub mod log_space;
 pub mod quantity;
+pub mod shortcuts;
 mod text;
 
 pub use area::Area;
 pub use fit::Fit;
 pub use lattice::{Lattice, Lookup};
 pub use quantity::{FieldKind, Storage};
+pub use shortcuts::Shortcuts;
 
 use crate::error::{Error, Result};
 use crate::sh::basis::coefficient_count;
@@ -35,6 +37,9 @@ pub struct FieldHeader {
     pub lattice: Lattice,
     /// Edge of the captured cube faces in texels.
     pub face_px: u32,
+    /// What the bake did in place of capturing everything; left out of files where all shortcuts were taken.
+    #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
+    pub shortcuts: Shortcuts,
     /// Number of sample points inside the solid. They hold captures from just outside the nearest surface.
     pub filled_samples: u32,
     /// Number of captured samples; the others follow from these by the mesh's symmetries or from neighbours.

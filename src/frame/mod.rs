@@ -19,9 +19,9 @@ mod twin;
 mod viewport;
 mod work;
 
-use crate::bake;
-use crate::bake::Baker;
 use crate::bake::cache::Cache;
+use crate::bake::ensure::SceneProgress;
+use crate::bake::{self, Baker, SceneNeeds};
 use crate::draw::Antialias;
 use crate::error::Result;
 use crate::field::Lookup;
@@ -34,7 +34,7 @@ use crate::merge::calibrate;
 use crate::merge::variant::{Chain, Form, Variant, uniform_entities};
 use crate::merge::{Inputs, Readable};
 use crate::scene::{Placement, Scene};
-use crate::scene_buffers::{Progress, Store};
+use crate::scene_buffers::{Store, limits};
 use crate::shaders::Library;
 use ash::vk;
 use form::{CompiledMerge, form, usable};
@@ -90,11 +90,21 @@ impl Frame {
     /// Bakes or finds what the scene needs and builds the passes.
     ///
     /// # Errors
-    /// As [`Store::new`], [`crate::merge::Merge::new`] and [`crate::draw::Draw::new`]; `Usage` as [`crate::merge::variant::Product::check`].
-    pub fn new(baker: &Baker, cache: &Cache, scene: &Scene, options: Options, progress: Progress<'_>) -> Result<Self> {
+    /// As [`bake::ensure()`], [`crate::merge::Merge::new`] and [`crate::draw::Draw::new`]; `Input` where the device cannot hold the
+    /// scene; `Usage` as [`crate::merge::variant::Product::check`].
+    pub fn new(
+        baker: &Baker,
+        cache: &Cache,
+        scene: &Scene,
+        options: Options,
+        progress: SceneProgress<'_>,
+    ) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
         options.chain.product.check(options.bake.bands, options.bake.occlusion_bands())?;
-        let store = Store::new(baker, cache, scene, &options.bake, options.skip, progress)?;
+        let needs = SceneNeeds::of(scene, &options.bake, options.skip.unseen);
+        limits::check(device, scene, &needs)?;
+        let baked = bake::ensure(baker, cache, scene, &needs, progress)?;
+        let store = Store::new(device, scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
         let wanted = form(&options, wanted, uniform_entities(device));
@@ -327,9 +337,4 @@ impl Frame {
     pub fn forget(&mut self) {
         self.work.lists.forget();
     }
-}
-
-/// Whether a scene's fields and transfers are all in the cache, so that its frame is there at once.
-pub fn is_cached(cache: &Cache, scene: &Scene, options: &crate::bake::Options) -> bool {
-    Store::is_cached(cache, scene, options)
 }

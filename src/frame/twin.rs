@@ -25,7 +25,7 @@ impl Frame {
         Counts {
             empty: if self.options.skip.empty { entities().filter(empty).count() as u64 } else { 0 },
             unseen: if self.options.skip.unseen {
-                entities().filter(|e| !scene_buffers::is_seen(&self.scene, e)).count() as u64
+                entities().filter(|e| !crate::bake::is_seen(&self.scene, e)).count() as u64
             } else {
                 0
             },

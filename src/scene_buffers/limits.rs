@@ -1,11 +1,22 @@
 //! Whether a scene fits a device, asked before anything is baked.
 
+use super::ALIGNMENT;
+use crate::bake::{SceneNeeds, bakes_transfer};
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
+use crate::gpu::Device;
 use crate::lists::gather::TURNS;
 use crate::scene::Scene;
-use crate::scene_buffers::bakes_transfer;
 use ash::vk;
+
+/// Refuses a scene that the device cannot hold, before anything is baked.
+///
+/// # Errors
+/// `Input` as [`Needs::check`].
+pub fn check(device: &Device, scene: &Scene, baked: &SceneNeeds) -> Result<()> {
+    let needs = Needs::of(scene, baked.field_bytes(ALIGNMENT), baked.options.bands);
+    needs.check(&device.limits, device.heap_bytes())
+}
 
 /// Bytes that a scene keeps on the device, by buffer. Each is bound as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

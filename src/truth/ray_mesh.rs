@@ -2,11 +2,10 @@
 
 use crate::asset::mesh::Mesh;
 use crate::bake::capture::unit_positions;
-use crate::bake::first_shell;
+use crate::bake::{bakes_transfer, first_shell};
 use crate::field::Fit;
 use crate::field::lattice::ROOMY_INNER;
 use crate::scene::Scene;
-use crate::scene_buffers::bakes_transfer;
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};

@@ -7,11 +7,10 @@ use super::pick::{EntityDrag, Picker};
 use crate::asset::embedded;
 use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
+use crate::bake;
 use crate::error::Result;
 use crate::field::quantity;
-use crate::lists::skip::Skip;
 use crate::scene::{Camera, Placement, Scene};
-use crate::scene_buffers;
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -158,7 +157,7 @@ impl Editor {
 
     /// Fields that a mesh needs for its entities' switches: occlusion, radiance.
     pub fn needs(&self, mesh: usize) -> [Option<quantity::FieldKind>; 2] {
-        scene_buffers::needs(&self.scene, mesh, Skip::ALL)
+        bake::needs(&self.scene, mesh, true)
     }
 
     /// Advances the time by `dt_s` seconds if the motion runs. Placements depend only on the sum of all `dt_s`.

@@ -3,15 +3,14 @@
 use super::command::Changed;
 use super::task::{BackgroundTask, TaskWorker};
 use super::viewer::Viewer;
-use crate::bake::Baker;
+use crate::bake::{self, Baker, SceneNeeds};
 use crate::draw::show::Show;
 use crate::error::Result;
-use crate::frame::{self, Frame, is_cached};
+use crate::frame::{self, Frame};
 use crate::gpu::Device;
 use crate::gpu::validation::Messages;
-use crate::lists::skip::Skip;
 use crate::merge::variant::Variant;
-use crate::scene_buffers::Store;
+use crate::scene_buffers::limits;
 
 impl Viewer {
     /// Updates the frame to the editor's state.
@@ -55,9 +54,9 @@ impl Viewer {
     /// Builds the frame if all its fields are cached, else starts a bake.
     pub(super) fn prepare(&mut self) -> Result<()> {
         self.bake = None;
-        let (cache, bake) = (self.setup.cache.clone(), self.setup.frame.bake);
-        let scene = self.editor.scene().clone();
-        if is_cached(&cache, &scene, &bake) {
+        let (cache, scene) = (self.setup.cache.clone(), self.editor.scene().clone());
+        let needs = SceneNeeds::of(&scene, &self.setup.frame.bake, true);
+        if needs.are_cached(&scene, &cache) {
             return self.build();
         }
         let (options, library) = (self.setup.options.clone(), self.setup.library.clone());
@@ -65,10 +64,9 @@ impl Viewer {
             worker.report("opening the device for it", 0, 1);
             let device = Device::new(&options)?;
             let baker = Baker::new(&device, &library);
-            let store = Store::new(&baker, &cache, &scene, &bake, Skip::ALL, &|what, done, all| {
-                worker.report(what, done, all)
-            })?;
-            drop((store, baker));
+            limits::check(&device, &scene, &needs)?;
+            bake::ensure(&baker, &cache, &scene, &needs, &|what, done, all| worker.report(what, done, all))?;
+            drop(baker);
             Messages::into_result(device.take_validation_messages())
         }));
         Ok(())

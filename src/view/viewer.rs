@@ -38,7 +38,7 @@ pub struct Setup {
     pub options: gpu::DeviceOptions,
     /// Shaders.
     pub library: Library,
-    /// Cache of bakes; it must have a folder.
+    /// Where bakes are kept: on disk, or in memory.
     pub cache: Cache,
     /// Options of bake and merge; the picture's size is the window's.
     pub frame: frame::Options,

@@ -66,8 +66,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     ];
     output::table(&header, &cells.collect::<Vec<_>>());
     output::say(
-        "\nBakes, nothing left out and this skip alone; the field against one of faces of 128 px. Of the large mesh: simplify off and on,\n\
-         all else as usual; the field against that without. Filled: samples inside the solid, captured off its surface or filled",
+        "\nBakes, nothing left out and this skip alone; the field against one of faces of 128 px. Filled: samples inside the solid, captured off its surface or filled",
     );
     let cells = bakes.iter().map(|row| {
         let mut cells = vec![row.case.clone(), row.triangle_count.to_string(), row.lattice.clone(), row.skip.clone()];

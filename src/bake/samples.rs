@@ -1,0 +1,84 @@
+//! Which samples of a field are captured, from where, and how the others are made of them.
+
+use super::TRANSFER_OFFSET;
+use super::assemble::Sources;
+use super::batches::Target;
+use super::capture::unit_positions;
+use super::inside;
+use super::orbit::{self, Plan};
+use super::project::Job;
+use super::surface::Surface;
+use super::symmetry::Symmetry;
+use super::triangles::distinct;
+use crate::asset::Mesh;
+use crate::error::Result;
+use crate::field::{FieldHeader, FieldKind};
+use glam::DVec3;
+
+/// The samples of one field.
+pub(super) struct FieldSamples {
+    /// Samples that are captured, with the eye of each.
+    pub targets: Vec<Target>,
+    /// What is turned from what is captured.
+    pub plan: Plan,
+    /// What every stored sample is assembled from.
+    pub sources: Sources,
+}
+
+impl FieldSamples {
+    /// Plans the samples of the field that `header` describes, and says in the header which symmetries the mesh has and how many
+    /// samples lie inside the solid.
+    ///
+    /// # Errors
+    /// `Input` when no sample can see the object.
+    pub fn new(mesh: &Mesh, header: &mut FieldHeader) -> Result<Self> {
+        let lattice = header.lattice;
+        let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
+        let surface = Surface::new(&unit_positions(mesh), &distinct(mesh));
+        let mut inside =
+            if header.shortcuts.inside { inside::inside(&surface, &positions) } else { vec![false; positions.len()] };
+        let pushed = inside::pushed_out(&surface, &positions, &inside);
+        let mut unseen: Vec<bool> = inside.iter().zip(&pushed).map(|(inside, eye)| *inside && eye.is_none()).collect();
+        let plan = symmetry_plan(mesh, header, &surface, &inside);
+        for (sample, twin) in plan.twins.iter().enumerate().filter_map(|(sample, twin)| Some((sample, twin.as_ref()?)))
+        {
+            inside[sample] = inside[twin.of as usize];
+            unseen[sample] = unseen[twin.of as usize];
+        }
+        header.filled_samples = inside.iter().filter(|i| **i).count() as u32;
+        let sources = Sources::new(&lattice, &inside, &unseen)?;
+        let mut targets = Vec::new();
+        let captured =
+            positions.iter().enumerate().filter(|(sample, _)| !unseen[*sample] && plan.twins[*sample].is_none());
+        for (sample, position) in captured {
+            let eye = pushed[sample].unwrap_or(*position);
+            let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
+            let job = Job { normal: [0.0; 4], slots: [0; 6], target: sample as u32, scale };
+            targets.push(Target { eye: eye.as_vec3(), job });
+        }
+        Ok(FieldSamples { targets, plan, sources })
+    }
+}
+
+/// Which samples are turned from which others. Says in the header by what symmetries.
+fn symmetry_plan(mesh: &Mesh, header: &mut FieldHeader, surface: &Surface, inside: &[bool]) -> Plan {
+    if !header.shortcuts.symmetry {
+        header.symmetry = "off".to_owned();
+        return Plan { twins: orbit::same(&header.lattice), round: Vec::new() };
+    }
+    let symmetry = Symmetry::of(mesh, surface, header.kind == FieldKind::Radiance).kept_by(&header.lattice.fit());
+    header.symmetry = symmetry.describe();
+    let distance = |sample: u32| {
+        let position = header.lattice.position(sample);
+        match inside[sample as usize] {
+            true => f64::from(TRANSFER_OFFSET),
+            // A lower bound is enough for samples that are far off.
+            false if position.length() > 2.0 => position.length() - 1.0,
+            false => surface.distance(position),
+        }
+    };
+    let plan = orbit::plan(&header.lattice, &symmetry, header.face_px, distance);
+    let turned = plan.twins.iter().flatten().count();
+    log::info!("{}: symmetries: {}; {turned} of {} samples turned", mesh.name, header.symmetry, inside.len());
+    plan
+}

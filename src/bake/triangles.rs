@@ -1,0 +1,60 @@
+//! Triangles of a mesh that repeat others.
+
+use crate::asset::Mesh;
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
+
+/// The triangles of a mesh without those that repeat another: corners of the same place and colour, the same way around. What is
+/// seen does not change. A surface tree can part stacked triangles by nothing, so each query would look at every one of them.
+pub fn distinct(mesh: &Mesh) -> Cow<'_, [[u32; 3]]> {
+    let mut first_of = HashMap::with_capacity(mesh.positions.len());
+    let first: Vec<u32> = (0..mesh.positions.len())
+        .map(|vertex| {
+            let color = mesh.colors.as_ref().map(|colors| colors[vertex].to_array().map(f32::to_bits));
+            let key = (mesh.positions[vertex].to_array().map(f32::to_bits), color);
+            *first_of.entry(key).or_insert(vertex as u32)
+        })
+        .collect();
+    let mut known = HashSet::with_capacity(mesh.triangles.len());
+    let mut is_new = |triangle: &&[u32; 3]| {
+        let mut corners = triangle.map(|vertex| first[vertex as usize]);
+        let least = (0..3).min_by_key(|&k| corners[k]).unwrap_or(0);
+        corners.rotate_left(least);
+        known.insert(corners)
+    };
+    let kept: Vec<[u32; 3]> = mesh.triangles.iter().filter(|triangle| is_new(triangle)).copied().collect();
+    if kept.len() == mesh.triangles.len() { Cow::Borrowed(&mesh.triangles) } else { Cow::Owned(kept) }
+}
+
+/// Says in one line how many triangles of a mesh repeat others, if any do.
+pub(super) fn tell_repeated(mesh: &Mesh) {
+    let repeated = mesh.triangles.len() - distinct(mesh).len();
+    if repeated > 0 {
+        log::warn!("{}: {repeated} of {} triangles repeat others and count once", mesh.name, mesh.triangles.len());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate;
+    use glam::Vec3;
+
+    #[test]
+    fn repeated_triangles_count_once_and_backs_stay() {
+        let square = [Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y].to_vec();
+        let triangles = [[0, 1, 2], [1, 2, 0], [0, 2, 3], [0, 1, 2], [2, 1, 0]];
+        let mesh = Mesh::new("square", square, Vec::new(), None, triangles.to_vec()).unwrap();
+        assert_eq!(distinct(&mesh).len(), 3, "one is turned around its corners, one is the same, one shows its back");
+        let ring = generate::torus(1.0, 0.3, 24, 12);
+        assert!(matches!(distinct(&ring), Cow::Borrowed(_)));
+        // Vertices of their own at the same places change nothing; another colour does.
+        let twice = |other: Vec3| {
+            let positions = [Vec3::ZERO, Vec3::X, Vec3::Y].repeat(2);
+            let colors = [[Vec3::ONE; 3], [other; 3]].concat();
+            let mesh = Mesh::new("twice", positions, Vec::new(), Some(colors), vec![[0, 1, 2], [3, 4, 5]]).unwrap();
+            distinct(&mesh).len()
+        };
+        assert_eq!((twice(Vec3::ONE), twice(Vec3::X)), (1, 2));
+    }
+}

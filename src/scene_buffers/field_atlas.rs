@@ -1,0 +1,106 @@
+//! All fields of a scene in one buffer, and where each of them lies.
+
+use super::ALIGNMENT;
+use crate::bake::{BakedMesh, Options};
+use crate::error::Result;
+use crate::field::extent::{Extent, extent};
+use crate::field::quantity::channel_stride;
+use crate::field::{Area, FieldHeader, FieldKind, ShadowField};
+use crate::gpu::{Buffer, BufferKind, Device, Volume};
+use crate::merge::shelf::Shelf;
+use crate::scene::Scene;
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A field in the atlas.
+#[derive(Clone)]
+pub struct Slot {
+    /// Its parameters.
+    pub header: FieldHeader,
+    /// Its bytes in the atlas.
+    pub bytes: Range<u64>,
+    /// Number of its first channel among those of all fields, as they stand in an image.
+    pub channel: u32,
+    /// Directions in which it is not zero.
+    pub extent: Extent,
+    /// What its object covers from afar, if it is an occlusion field.
+    pub area: Area,
+}
+
+impl Slot {
+    /// First quad of the field, as shaders count.
+    pub fn quad(&self) -> u32 {
+        (self.bytes.start / (4 * self.header.storage.bytes() as u64)) as u32
+    }
+}
+
+/// Puts the fields of a scene's meshes into one buffer. Meshes that share a field share its place: occlusion and radiance by mesh.
+///
+/// # Errors
+/// `Device` when memory ran out.
+pub(super) fn field_atlas(
+    device: &Arc<Device>,
+    scene: &Scene,
+    baked: &[BakedMesh],
+    options: &Options,
+) -> Result<(Buffer, Vec<[Option<Slot>; 2]>)> {
+    let (mut total, mut channels) = (0, 0);
+    let mut known = HashMap::<*const ShadowField, Slot>::new();
+    let mut distinct: Vec<(Arc<ShadowField>, u64)> = Vec::new();
+    let mut slot = |field: &Arc<ShadowField>, name: &str| {
+        let slot = known.entry(Arc::as_ptr(field)).or_insert_with(|| {
+            let bytes = total..total + field.payload.len() as u64;
+            total = bytes.end.next_multiple_of(ALIGNMENT);
+            distinct.push((field.clone(), bytes.start));
+            let channel = channels;
+            channels += field.header.kind.channels() as u32;
+            let is_occlusion = field.header.kind == FieldKind::Occlusion;
+            let area = if is_occlusion { Area::new(field) } else { Area::default() };
+            Slot { header: field.header.clone(), bytes, channel, extent: extent(field), area }
+        });
+        Slot { header: FieldHeader { mesh: name.to_owned(), ..slot.header.clone() }, ..slot.clone() }
+    };
+    let slots = scene.meshes.iter().zip(baked).map(|(mesh, baked)| {
+        [&baked.blocked, &baked.radiance].map(|field| field.as_ref().map(|field| slot(field, &mesh.name)))
+    });
+    let slots = slots.collect();
+    // Where bands differ, the shader reads as much of any sample as the larger kind has: at the end, past the last.
+    let overrun = if options.field_bands.is_some() { 8 * channel_stride(options.most_bands()) as u64 } else { 0 };
+    let mut fields = Buffer::new(device, "fields", BufferKind::Device, total.max(ALIGNMENT) + overrun)?;
+    for (field, first) in distinct {
+        fields.fill(first, &field.payload)?;
+    }
+    Ok((fields, slots))
+}
+
+/// A copy of one field in host memory.
+///
+/// # Errors
+/// `Device` when memory ran out.
+pub(super) fn download(fields: &Buffer, slot: &Slot) -> Result<ShadowField> {
+    Ok(ShadowField { header: slot.header.clone(), payload: fields.download_range(slot.bytes.clone())? })
+}
+
+/// Fields as one image; `None` where the device or their shape rules that out.
+///
+/// # Errors
+/// `Device` when memory ran out.
+pub(super) fn image(device: &Arc<Device>, fields: &[ShadowField], bands: usize) -> Result<Option<Volume>> {
+    let Some(lattice) = fields.first().map(|field| field.header.lattice) else { return Ok(None) };
+    let count = fields.iter().map(|field| field.header.kind.channels() as u32).sum();
+    let Some(shelf) = Shelf::new(device, lattice, bands, count) else { return Ok(None) };
+    type Quads<'f> = Box<dyn Fn(usize, usize) -> [u16; 4] + 'f>;
+    let channels = fields.iter().flat_map(|field| {
+        (0..field.header.kind.channels()).map(move |channel| {
+            let stride = field.header.channel_stride();
+            Box::new(move |sample: usize, quad: usize| {
+                let first = sample * field.header.sample_stride() + channel * stride + 4 * quad;
+                [0, 1, 2, 3]
+                    .map(|k| 2 * (first + k))
+                    .map(|at| u16::from_le_bytes([field.payload[at], field.payload[at + 1]]))
+            }) as Quads<'_>
+        })
+    });
+    Ok(Some(shelf.fill(device, channels)?))
+}

@@ -19,6 +19,13 @@ use std::collections::{HashMap, HashSet};
 const MATCH: f64 = 2e-5;
 /// A deviation beyond this, in r, is of no use: it would be seen from everywhere.
 const USELESS: f64 = 0.05;
+/// Most comparisons of triangles, for each triangle of a mesh, that finding the deviation of one symmetry may take. Where squares are
+/// cut along one diagonal it takes 72 for each square, and 304 for each triangle at the pole of a sphere of 64 segments. A mesh of
+/// many triangles around one vertex can ask for the square of their number: such a symmetry is not used.
+const COMPARISONS_A_TRIANGLE: usize = 1_000;
+/// Most vertices in one cell of the search, and at one place. A mesh with more, all but a few of its vertices in a thousandth of its
+/// radius, is taken for one without symmetries: each search would look at all of them.
+const CROWD: usize = 1_024;
 /// Angles, in radians, at which a body of revolution is tried: no small multiples of parts of a circle.
 const ANGLES_RAD: [f64; 3] = [0.1234, 0.5077, -1.0609];
 /// Vertices lie between the facets of a turned ring at any place; the angles tried come near the middle, within this.
@@ -67,7 +74,7 @@ impl Symmetry {
         let mut operations: Vec<Operation> = cube_group()
             .into_par_iter()
             .skip(1)
-            .filter_map(|matrix| Some(Operation { matrix, deviation: points.deviation(matrix)? }))
+            .filter_map(|matrix| Some(Operation { matrix, deviation: points.deviation(matrix, &mut 0)? }))
             .collect();
         operations.sort_by(|a, b| a.deviation.total_cmp(&b.deviation));
         Symmetry { operations, ..Symmetry::default() }
@@ -113,7 +120,8 @@ pub fn cube_group() -> Vec<DMat3> {
     orders.into_iter().flat_map(of_order).collect()
 }
 
-/// The mesh's vertices, joined where they coincide, to be found by place.
+/// The mesh's vertices, joined where they coincide, to be found by place. Empty where too many of them lie too close together.
+#[derive(Default)]
 pub struct Points {
     places: Vec<DVec3>,
     colors: Vec<Vec3>,
@@ -130,15 +138,7 @@ impl Points {
     /// Joins vertices that agree in place, and in colour where given.
     pub fn new(mesh: &Mesh, colors: Option<&Vec<Vec3>>) -> Self {
         let unit = unit_positions(mesh);
-        let mut points = Points {
-            places: Vec::new(),
-            colors: Vec::new(),
-            of_vertex: Vec::new(),
-            cells: HashMap::new(),
-            triangles: Vec::new(),
-            known: HashSet::new(),
-            around: Vec::new(),
-        };
+        let mut points = Points::default();
         for (vertex, position) in unit.iter().enumerate() {
             let place = position.as_dvec3();
             let color = colors.map_or(Vec3::ONE, |colors| colors[vertex]);
@@ -150,14 +150,20 @@ impl Points {
                 index
             });
             points.of_vertex.push(index);
+            if points.cells.get(&cell(place)).is_some_and(|within| within.len() > CROWD) {
+                return Points::default();
+            }
         }
         points.around = vec![Vec::new(); points.places.len()];
         for triangle in &mesh.triangles {
             let joined = triangle.map(|i| points.of_vertex[i as usize]);
+            // Triangles of the same corners count once.
+            if !points.known.insert(sorted(joined)) {
+                continue;
+            }
             for corner in joined {
                 points.around[corner as usize].push(points.triangles.len() as u32);
             }
-            points.known.insert(sorted(joined));
             points.triangles.push(joined);
         }
         points
@@ -188,8 +194,9 @@ impl Points {
         self.places.iter().zip(&self.colors).map(|(place, color)| self.find(matrix * *place, *color)).collect()
     }
 
-    /// How far the moved surface is from the surface; `None` where a vertex has no counterpart or it is too far.
-    fn deviation(&self, matrix: DMat3) -> Option<f64> {
+    /// How far the moved surface is from the surface; `None` where a vertex has no counterpart, where it is too far, and where more
+    /// than [`COMPARISONS_A_TRIANGLE`] would be needed. Counts comparisons of triangles in `compared`.
+    fn deviation(&self, matrix: DMat3, compared: &mut usize) -> Option<f64> {
         // Most meshes fail at once.
         let few = self.places.len().div_ceil(50);
         let tried = || self.places.iter().zip(&self.colors).step_by(few);
@@ -204,6 +211,10 @@ impl Points {
             let to = triangle.map(|i| image[i as usize]);
             if self.known.contains(&sorted(to)) {
                 continue;
+            }
+            *compared += 4 * to.iter().map(|&i| self.around[i as usize].len()).sum::<usize>();
+            if *compared > COMPARISONS_A_TRIANGLE * self.triangles.len() {
+                return None;
             }
             let [a, b, c] = triangle.map(moved);
             for point in [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0] {
@@ -224,6 +235,9 @@ impl Points {
             let off = |p: &DVec3| Some(surface.distance(turn * *p)).filter(|d| *d < USELESS);
             points.par_iter().map(off).try_reduce(|| 0.0, |a, b| Some(a.max(b)))
         };
+        if self.places.is_empty() {
+            return None;
+        }
         // Most meshes fail at once.
         let few: Vec<DVec3> = self.places.iter().copied().step_by(self.places.len().div_ceil(50)).collect();
         farthest(&few, ANGLES_RAD[0])?;
@@ -246,7 +260,7 @@ impl Points {
         let of = |(vertex, joined): (usize, &u32)| {
             let normal = matrix * mesh.normals[vertex].as_dvec3();
             let agrees = |v: &&u32| mesh.normals[**v as usize].as_dvec3().distance(normal) < NORMAL_MATCH;
-            at[image[*joined as usize] as usize].iter().find(agrees).copied()
+            at[image[*joined as usize] as usize].iter().take(CROWD).find(agrees).copied()
         };
         self.of_vertex.iter().enumerate().map(of).collect()
     }
@@ -263,4 +277,69 @@ fn cell(place: DVec3) -> IVec3 {
 fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
     triangle.sort_unstable();
     triangle
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Operations that are found, and the most comparisons that any of the 48 takes.
+    fn search(mesh: &Mesh) -> (usize, usize) {
+        let points = Points::new(mesh, None);
+        let mut most = 0;
+        for matrix in cube_group() {
+            let mut compared = 0;
+            points.deviation(matrix, &mut compared);
+            most = most.max(compared);
+        }
+        (Symmetry::of_vertices(mesh, None).operations.len(), most)
+    }
+
+    fn mesh(name: &str, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
+        Mesh::new(name, positions, Vec::new(), None, triangles).unwrap()
+    }
+
+    /// A quarter turn takes the diagonal of a square to the other one, so that its triangles have to be compared.
+    #[test]
+    fn stacked_triangles_are_compared_once() {
+        let corners = vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
+        let square = |times| mesh("square", corners.clone(), [[0, 1, 2], [0, 2, 3]].repeat(times));
+        let (once, stacked) = (search(&square(1)), search(&square(1_000)));
+        assert_eq!(once, stacked);
+        assert!(once.0 == 15 && once.1 > 0 && once.1 < 100, "{once:?}");
+    }
+
+    /// Triangles around one vertex, whose other corners a quarter turn takes to those of triangles that are not there.
+    #[test]
+    fn the_search_is_bounded_where_many_triangles_meet() {
+        let count = 64;
+        let on_ring = |k: u32| {
+            let angle = std::f32::consts::TAU * k as f32 / count as f32;
+            Vec3::new(angle.cos(), 0.0, angle.sin())
+        };
+        let positions: Vec<Vec3> = std::iter::once(Vec3::ZERO).chain((0..count).map(on_ring)).collect();
+        let mut rng = fastrand::Rng::with_seed(7);
+        let pairs = (1..=count).flat_map(|a| (1..a).map(move |b| [0, a, b]));
+        let triangles: Vec<[u32; 3]> = pairs.filter(|_| rng.bool()).collect();
+        let hub = mesh("hub", positions, triangles);
+        let points = Points::new(&hub, None);
+        let (_, most) = search(&hub);
+        // One triangle alone costs four times all that meet at the hub.
+        let limit = COMPARISONS_A_TRIANGLE * hub.triangles.len() + 5 * hub.triangles.len();
+        assert!(points.triangles.len() > 900 && most > limit / 2 && most <= limit, "{most} of {limit}");
+    }
+
+    #[test]
+    fn a_crowd_of_vertices_has_no_symmetries() {
+        let mut rng = fastrand::Rng::with_seed(8);
+        let mut near = || 2e-4 * Vec3::new(rng.f32(), rng.f32(), rng.f32());
+        let mut positions: Vec<Vec3> = (0..60_000).map(|_| near()).collect();
+        positions.push(2.0 * Vec3::X);
+        let triangles = (0..20_000).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).chain([[0, 1, 60_000]]).collect();
+        let crowd = mesh("crowd", positions, triangles);
+        let points = Points::new(&crowd, None);
+        assert!(points.places.is_empty(), "{} places", points.places.len());
+        let surface = Surface::new(&unit_positions(&crowd), &crowd.triangles);
+        assert_eq!(Symmetry::of(&crowd, &surface, false).describe(), "none");
+    }
 }

@@ -211,17 +211,7 @@ void main() {
         } while (i < cluster.entry_count);
     }
 
-#if POINT_CHAIN
-    float rest[TERMS];
-    [[unroll]] for (uint k = 0; k < TERMS; k++) {
-        rest[k] = t[k];
-    }
-    sh_from_points(rest, through);
-#else
-    [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
-        through[k] = t[k];
-    }
-#endif
+    chain_end(t, through);
     [[unroll]] for (uint channel = 0; channel < 3; channel++) {
         [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
             sum[channel] += sky_quad(channel * CHANNEL_QUADS + k / 4)[k % 4] * through[k];

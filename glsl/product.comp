@@ -2,7 +2,11 @@
 #extension GL_EXT_control_flow_attributes : require
 // Chains of products alone, one an invocation: what a product costs without the reads around it. Every chain is multiplied by
 // 1 - b again and again, b fading from step to step, so that nothing that depends on it can be computed once for all steps.
+#if POINT_CHAIN
+#include "product_points.glsl"
+#else
 #include "merge_product.glsl"
+#endif
 
 layout(local_size_x = WORKGROUP) in;
 
@@ -46,17 +50,7 @@ void main() {
         }
         step++;
     } while (step < push.steps);
-#if POINT_CHAIN
-    float values[TERMS];
-    [[unroll]] for (uint k = 0; k < TERMS; k++) {
-        values[k] = c[k];
-    }
-    sh_from_points(values, transfer);
-#else
-    [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
-        transfer[k] = c[k];
-    }
-#endif
+    chain_end(c, transfer);
     [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
         products[i * COEFFICIENTS + k] = transfer[k];
     }

@@ -36,6 +36,7 @@ embedded!(
     "merge_layout.glsl",
     "merge_product.glsl",
     "product.comp",
+    "product_points.glsl",
     "project.comp",
     "show.frag",
     "show.vert",

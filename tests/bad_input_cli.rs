@@ -253,7 +253,6 @@ fn usage() {
     let render = ["render", "s.toml", "-o", "p.png"];
     for (option, word, part) in [
         ("--variant", "fast", "texel-packed"),
-        ("--lookup", "far", "trilinear"),
         ("--size", "10", "1280x720"),
         ("--size", "0x10", "1280x720"),
         ("--size", "-1x10", "1280x720"),

@@ -7,8 +7,8 @@ mod stage;
 use common::report;
 use shadow_fields::frame::Options;
 use shadow_fields::gpu::{Buffer, BufferKind, Commands};
+use shadow_fields::merge::chain::{Chain, PRODUCTS, Product};
 use shadow_fields::merge::product::{Products, Push, Shape, reference};
-use shadow_fields::merge::variant::{Chain, PRODUCTS, Product};
 use shadow_fields::sh::basis::coefficient_count;
 use shadow_fields::sh::lobe::{cap, clamped_cosine};
 use stage::{Stage, scene, small, stage};
@@ -130,7 +130,7 @@ fn merges_of_many_occluders_stay_bounded() {
         stage.light(&mut frame, &scene.at(0.0)).swap_remove(0)
     };
     let options = small();
-    assert!(options.chain.guard, "the guard is the default");
+    assert!(options.guard, "the guard is the default");
     let open = light(&balls(0, false), options);
     for distinct in [false, true] {
         for count in [1, 64, 1000] {
@@ -144,7 +144,7 @@ fn merges_of_many_occluders_stay_bounded() {
             assert!(worst <= 1.0 + 1e-6 && least >= 0.0, "{count} balls, distinct {distinct}: {least} to {worst}");
         }
     }
-    let plain = Options { chain: Chain { guard: false, ..options.chain }, ..options };
+    let plain = Options { guard: false, ..options };
     let grown = light(&balls(1000, false), plain);
     let worst = grown.iter().map(|f| f[0].abs()).fold(0.0, f32::max);
     assert!(worst > 100.0 || grown.iter().any(|f| !f[0].is_finite()), "without the guard it grows: {worst}");

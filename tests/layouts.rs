@@ -10,7 +10,7 @@ use shadow_fields::gpu::reflect::Reflection;
 use shadow_fields::layout::{Cluster, Entity};
 use shadow_fields::lists::gather::{Bounds, Gather, Group, Report};
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::merge::variant::{Chain, Form, VARIANTS, Variant};
+use shadow_fields::merge::variant::{Form, VARIANTS, Variant};
 use std::mem::offset_of;
 
 /// Compares a struct of the shader with a Rust struct, field by field. The pattern names every field, so one that is missing
@@ -30,7 +30,7 @@ fn merge() -> Vec<(Variant, Reflection)> {
         variant,
         bands: 4,
         field_bands: 4,
-        chain: Chain::default(),
+        guard: true,
         storage: Storage::F16,
         lattice: Lattice::default().starting_at(1.02),
         lookup: Lookup::Trilinear,

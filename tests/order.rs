@@ -13,7 +13,6 @@ use shadow_fields::field::ShadowField;
 use shadow_fields::frame::Frame;
 use shadow_fields::lists::gather::{EntityBounds, SceneBounds};
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::merge::chain::Method;
 use shadow_fields::merge::reference::{Object, Task};
 use shadow_fields::scene::Scene;
 use stage::{Stage, scene, small, stage};
@@ -63,7 +62,6 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
             emission: entity.emission.as_dvec3().to_array(),
             blocked: fields[entity.mesh].as_ref(),
             area: geometry.blocked.as_ref().map_or(Default::default(), |slot| slot.area),
-            logarithm: None,
             radiance: None,
         }
     };
@@ -89,7 +87,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
             normals: &[normal],
             transfer: None,
             bands: 4,
-            method: Method::Products(small().chain),
+            guard: small().guard,
             lookup: small().lookup,
             skip: small().skip,
             leaves: &|_, _, _| false,

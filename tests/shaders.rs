@@ -9,8 +9,9 @@ use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::lists::gather::Gather;
 use shadow_fields::lists::skip::Skip;
+use shadow_fields::merge::chain::{Chain, PRODUCTS};
 use shadow_fields::merge::product::{Products, Shape};
-use shadow_fields::merge::variant::{Chain, Form, PRODUCTS, VARIANTS, Variant};
+use shadow_fields::merge::variant::{Form, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, ShaderPermutation};
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -55,7 +56,7 @@ fn usual_form() -> Form {
         variant: VARIANTS[0],
         bands: 4,
         field_bands: 4,
-        chain: Chain::default(),
+        guard: true,
         storage: Storage::F16,
         lattice: Lattice::default().starting_at(1.02),
         lookup: Lookup::Trilinear,
@@ -87,7 +88,7 @@ fn merging() -> Vec<ShaderPermutation> {
         forms.push(Form { lookup, ..usual });
         forms.extend(lattices.map(|text| Form { lattice: lattice(text), lookup, ..usual }));
     }
-    forms.extend(PRODUCTS.iter().map(|&(_, product)| Form { chain: Chain { product, guard: false }, ..usual }));
+    forms.push(Form { guard: false, ..usual });
     forms.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| Form { bands, field_bands, ..usual }));
     forms.push(Form {
         variant: Variant::named("texel-shifted").unwrap(),

@@ -10,7 +10,6 @@ use crate::frame;
 use crate::gpu::{self, Device, Validation};
 use crate::lists::gather::Place;
 use crate::lists::skip::{EPS, Skip};
-use crate::merge::variant::{Chain, Product};
 use crate::merge::{Variant, calibrate};
 use crate::scene::Scene;
 use crate::shaders::Library;
@@ -99,9 +98,6 @@ pub struct MergeArguments {
     /// interpolates less exactly; default: of the former what was measured to be the device's fastest, after a first run
     #[arg(long, value_name = "NAME", value_parser = Variant::named)]
     pub variant: Option<Variant>,
-    /// Samples that a lookup takes
-    #[arg(long, default_value = "trilinear", value_name = "LOOKUP")]
-    pub lookup: Lookup,
     /// Work to leave out: all, none, or a list of horizon, cones, behind, facing, empty, unseen, caps, unmoved, hidden. Horizon and
     /// cones leave out what true visibility makes zero, which is nearer to ray casting than the stored bands are, and caps looks up
     /// no field of an occluder that is small as seen from a vertex but takes it for a point: pictures differ a little from those
@@ -115,10 +111,6 @@ pub struct MergeArguments {
     /// for fewer than 128 entities on a software device
     #[arg(long, value_name = "WHERE")]
     pub lists: Option<Place>,
-    /// How an occluder's visibility is multiplied in: factored, pairs, matrix and points compute the same in different ways;
-    /// point-chain keeps chains at 32 points and projects once, which is quicker and less exact
-    #[arg(long, default_value = "factored", value_name = "NAME")]
-    pub product: Product,
     /// Whether a chain of occluders is kept from growing
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
     pub guard: bool,
@@ -127,9 +119,9 @@ pub struct MergeArguments {
 impl MergeArguments {
     /// A frame of that size, merged as the arguments say.
     pub fn options(&self, bake: bake::Options, size: [u32; 2], antialias: Antialias) -> frame::Options {
-        let chain = Chain { product: self.product, guard: self.guard };
-        let (lookup, variant, skip, eps, lists) = (self.lookup, self.variant, self.skip, self.eps, self.lists);
-        frame::Options { bake, lookup, variant, skip, chain, eps, lists, size, antialias }
+        let (lookup, guard) = (Lookup::Trilinear, self.guard);
+        let (variant, skip, eps, lists) = (self.variant, self.skip, self.eps, self.lists);
+        frame::Options { bake, lookup, variant, skip, guard, eps, lists, size, antialias }
     }
 }
 

@@ -163,7 +163,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "reference_standard_error": arguments.reference.then_some(worst_error),
         "error": error,
         "options": {
-            "bake": options.bake, "lattice": options.bake.lattice.to_string(), "lookup": options.lookup, "skip": options.skip,
+            "bake": options.bake, "lattice": options.bake.lattice.to_string(), "skip": options.skip,
             "eps": options.eps,
             "size": options.size, "antialias": options.antialias,
         },

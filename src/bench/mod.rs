@@ -67,8 +67,8 @@ pub fn default_options() -> frame::Options {
     frame::Options {
         bake: crate::bake::Options::default(),
         lookup: crate::field::Lookup::default(),
-        chain: crate::merge::variant::Chain::default(),
-        // Frames are timed without motion, and each must merge everything.
+        guard: true,
+        // Frames are timed at rest: each must merge everything.
         skip: crate::lists::skip::Skip::without("unmoved"),
         eps: crate::lists::skip::EPS,
         lists: None,

@@ -4,8 +4,8 @@ use super::Bench;
 use super::figures::{Spread, spread};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferKind, Commands};
+use crate::merge::chain::{Chain, PRODUCTS, Product};
 use crate::merge::product::{Products, Push, Shape, reference};
-use crate::merge::variant::{Chain, PRODUCTS, Product};
 use crate::sh::basis::coefficient_count;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::points;
@@ -24,7 +24,7 @@ const STEPS: u32 = 64;
 /// One form.
 #[derive(Clone, Debug, Serialize)]
 pub struct Timed {
-    /// Name on the command line.
+    /// Name in the table.
     pub product: &'static str,
     /// Whether chains are guarded.
     pub guard: bool,

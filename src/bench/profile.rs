@@ -10,7 +10,7 @@ use crate::field::FieldKind;
 use crate::gpu::Device;
 use crate::gpu::census::{Census, disassemble};
 use crate::merge::Merge;
-use crate::merge::variant::{Chain, Form, PRODUCTS, Product, VARIANTS, Variant};
+use crate::merge::variant::{Form, VARIANTS, Variant};
 use crate::merge::workload::Workload;
 use crate::scene::Scene;
 use crate::shaders::Library;
@@ -20,26 +20,23 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A way to merge: a variant of the shader, and how it multiplies.
+/// A way to merge: a variant of the shader, guarded or not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contender {
-    /// The variant's name; of other products "variant/product", without the guard "variant/unguarded".
+    /// The variant's name; without the guard "variant/unguarded".
     pub name: String,
     /// How it reads.
     pub variant: Variant,
-    /// How it multiplies.
-    pub chain: Chain,
+    /// Whether chains are guarded.
+    pub guard: bool,
 }
 
-/// Everything that is timed: each variant as it is used, then other products in the device's usual variant.
+/// Everything that is timed: each variant as it is used, then the device's usual variant without the guard.
 pub fn contenders(device: &Device) -> Vec<Contender> {
     let usual = Variant::sane_default(device);
-    let with = |what: &str, chain| Contender { name: format!("{}/{what}", usual.name), variant: usual, chain };
-    let plain = |&variant: &Variant| Contender { name: variant.name.into(), variant, chain: Chain::default() };
-    let products = PRODUCTS.iter().filter(|(_, product)| *product != Product::default());
-    let products = products.map(|(name, product)| with(name, Chain { product: *product, ..Chain::default() }));
-    let unguarded = with("unguarded", Chain { guard: false, ..Chain::default() });
-    VARIANTS.iter().map(plain).chain([unguarded]).chain(products).collect()
+    let unguarded = Contender { name: format!("{}/unguarded", usual.name), variant: usual, guard: false };
+    let guarded = |&variant: &Variant| Contender { name: variant.name.into(), variant, guard: true };
+    VARIANTS.iter().map(guarded).chain([unguarded]).collect()
 }
 
 /// The contender of that name.
@@ -173,7 +170,7 @@ pub fn made_up(
     let (device, library) = (bench.baker.device(), bench.baker.library());
     let mut ready = Vec::new();
     for contender in chosen {
-        let form = Form { chain: contender.chain, ..workload.form(contender.variant) };
+        let form = Form { guard: contender.guard, ..workload.form(contender.variant) };
         let census = Census::new(&library.shader(&form.row())?)?;
         let merge = Merge::new(device, library, form)?;
         ready.push((contender, form, census, merge, workload.inputs(contender.variant)?, Vec::new()));
@@ -212,7 +209,7 @@ pub fn scene(
     let mut frames = Vec::new();
     for contender in chosen {
         let options = crate::frame::Options {
-            chain: contender.chain,
+            guard: contender.guard,
             variant: Some(contender.variant),
             size,
             ..super::default_options()
@@ -344,7 +341,7 @@ pub fn starts(fresh: &Arc<Device>, library: &Library, chosen: &[Contender]) -> R
     let since = |start: Instant| start.elapsed().as_secs_f64() * 1e3;
     let mut out = Vec::new();
     for contender in chosen {
-        let form = Form { chain: contender.chain, ..workload.form(contender.variant) };
+        let form = Form { guard: contender.guard, ..workload.form(contender.variant) };
         let compile = |library: &Library| -> Result<f64> {
             let start = Instant::now();
             library.shader(&form.row())?;
@@ -375,7 +372,7 @@ pub fn starts(fresh: &Arc<Device>, library: &Library, chosen: &[Contender]) -> R
 /// `Failed` when a file cannot be written.
 pub fn write_spirv(folder: &Path, library: &Library, workload: &Workload, chosen: &[Contender]) -> Result<()> {
     for contender in chosen {
-        let form = Form { chain: contender.chain, ..workload.form(contender.variant) };
+        let form = Form { guard: contender.guard, ..workload.form(contender.variant) };
         let shader = library.shader(&form.row())?;
         let path = |ending: &str| folder.join(format!("{}.{ending}", contender.name.replace('/', "-")));
         let words: Vec<u8> = shader.spirv.iter().flat_map(|word| word.to_le_bytes()).collect();

@@ -7,8 +7,7 @@ use super::refusals::{Refusal, refusals};
 use super::trials::{self, Trial, Turn};
 use crate::error::{Error, Result};
 use crate::field::Storage;
-use crate::merge::chain::Multiplier;
-use crate::merge::variant::{self, Product};
+use crate::merge::chain::{self, Multiplier};
 use crate::sh::basis::MAX_COEFFICIENTS;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::product::Tensor;
@@ -104,8 +103,7 @@ type Cap = (DVec3, f64);
 
 fn chain(caps: &[Cap], rule: Rule) -> f64 {
     let tensor = Tensor::new(BANDS, rule.visibility_bands, BANDS);
-    let guarded = variant::Chain { product: Product::Factored, guard: rule.guard };
-    let multiplier = Multiplier::new(guarded, BANDS, rule.visibility_bands);
+    let multiplier = Multiplier::new(chain::Chain::factored(rule.guard), BANDS, rule.visibility_bands);
     let mut t = multiplier.begin(&clamped_cosine(BANDS, DVec3::Y));
     for &(axis, half_angle) in caps {
         let mut blocked = [0.0; MAX_COEFFICIENTS];

@@ -1,6 +1,6 @@
 //! What the choices in bake and merge cost and give, one axis at a time round the default.
 
-use super::budget::{Truth, device_radiosity, select};
+use super::budget::{Truth, device_radiosity};
 use super::cases::Case;
 use super::figures::{Difference, Radiosity, Spread, difference, spread};
 use super::{Bench, default_options};
@@ -8,8 +8,6 @@ use crate::error::Result;
 use crate::field::{Lookup, Storage};
 use crate::frame::{self, Frame};
 use crate::gpu::Timing;
-use crate::merge::chain::Method;
-use crate::merge::variant::{Chain, PRODUCTS, Product};
 use crate::scene::Placement;
 use serde::Serialize;
 use std::time::Instant;
@@ -25,8 +23,6 @@ pub struct Variation {
     pub name: String,
     /// Everything.
     pub options: frame::Options,
-    /// Merged by the CPU twin, in f64 on all threads, rather than on the device: how.
-    pub on_cpu: Option<Method>,
 }
 
 /// What was measured of it.
@@ -38,19 +34,17 @@ pub struct Point {
     pub axis: &'static str,
     /// Its setting.
     pub name: String,
-    /// What merges: "device", or "CPU" for the twin in f64 on all threads, whose times are wall times and compare with one another.
-    pub runs_on: &'static str,
     /// Whether long chains are bounded: by the guard.
     pub guarded: bool,
     /// Bytes of all fields of the scene.
     pub field_bytes: u64,
     /// Device time of the bakes, milliseconds; none where all was in the cache.
     pub bake_ms: Option<f64>,
-    /// Device time of the first merge, shader compilation by the driver included, milliseconds; on the CPU wall time.
+    /// Device time of the first merge, shader compilation by the driver included, milliseconds.
     pub first_merge_ms: f64,
-    /// Device time of the merge pass, milliseconds; on the CPU wall time.
+    /// Device time of the merge pass, milliseconds.
     pub merge_ms: Spread,
-    /// Merge time over that of the default in the same round: median over rounds. On the CPU over the default's median.
+    /// Merge time over that of the default in the same round: median over rounds.
     #[serde(rename = "time_per_default_ratio")]
     pub time_per_default: f64,
     /// T0 to T3.
@@ -62,11 +56,11 @@ pub struct Point {
 /// The settings, the default first.
 pub fn variations(quick: bool) -> Vec<Variation> {
     let base = default_options();
-    let mut all = vec![Variation { axis: "default", name: base.bake.lattice.to_string(), options: base, on_cpu: None }];
+    let mut all = vec![Variation { axis: "default", name: base.bake.lattice.to_string(), options: base }];
     let mut add = |axis, name: &str, change: &dyn Fn(&mut frame::Options)| {
         let mut options = base;
         change(&mut options);
-        all.push(Variation { axis, name: name.to_owned(), options, on_cpu: None });
+        all.push(Variation { axis, name: name.to_owned(), options });
     };
     add("lookup", "nearest", &|o| o.lookup = Lookup::Nearest);
     add("lookup", "radial", &|o| o.lookup = Lookup::Radial);
@@ -99,10 +93,7 @@ pub fn variations(quick: bool) -> Vec<Variation> {
             add(axis, text, &|o| o.bake.lattice = lattice);
         }
     }
-    for &(name, product) in PRODUCTS.iter().filter(|(_, product)| *product != base.chain.product) {
-        add("product", name, &|o| o.chain.product = product);
-    }
-    add("guard", "off", &|o| o.chain.guard = false);
+    add("guard", "off", &|o| o.guard = false);
     let faces: &[u32] = if quick { &[16] } else { &[8, 16, 32, 128] };
     for &face_px in faces {
         add("face", &format!("{face_px} px"), &|o| o.bake.face_px = face_px);
@@ -115,7 +106,7 @@ pub fn variations(quick: bool) -> Vec<Variation> {
             add("stored bands", &format!("{bands} of visibility"), &|o| o.bake.field_bands = Some(bands));
         }
         add("stored bands", "7 of visibility, no guard", &|o| {
-            (o.bake.field_bands, o.chain.guard) = (Some(7), false);
+            (o.bake.field_bands, o.guard) = (Some(7), false);
         });
         add("stored bands", "3 of transfer, 4 of visibility", &|o| (o.bake.bands, o.bake.field_bands) = (3, Some(4)));
         let student = "latlon:8x4x4,linear,raw,inner=0.2".parse().expect("a lattice");
@@ -133,22 +124,8 @@ pub fn variations(quick: bool) -> Vec<Variation> {
             (o.bake.lattice, o.bake.storage, o.bake.face_px) = (fine, Storage::F32, 128);
         });
     }
-    let after = all.iter().rposition(|v| v.axis == "product").map_or(all.len(), |last| last + 1);
-    let on_cpu = |(name, method): (&str, Method)| Variation {
-        axis: "product",
-        name: name.to_owned(),
-        options: base,
-        on_cpu: Some(method),
-    };
-    all.splice(after..after, CPU_PRODUCTS.map(on_cpu));
     all
 }
-
-/// The first is what the second is to be compared with: the default's products in the same program.
-const CPU_PRODUCTS: [(&str, Method); 2] = [
-    ("pairs, CPU", Method::Products(Chain { product: Product::Pairs, guard: true })),
-    ("log-space with the matrix logarithm, CPU", Method::Logarithms),
-];
 
 /// Device time of the merge in milliseconds.
 pub fn merge_ms(timings: &[Timing]) -> f64 {
@@ -189,43 +166,29 @@ struct Measured {
 /// # Errors
 /// As [`Frame::new`] and [`Frame::render`].
 pub fn sweep(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variation]) -> Result<Vec<Point>> {
-    let (on_device, on_cpu): (Vec<usize>, Vec<usize>) =
-        (0..variations.len()).partition(|&i| variations[i].on_cpu.is_none());
-    let of = |indices: &[usize]| indices.iter().map(|&i| &variations[i]).collect::<Vec<_>>();
-    let mut measured: Vec<(usize, Measured)> = Vec::new();
-    measured.extend(on_device.iter().copied().zip(by_device(bench, case, truth, &of(&on_device))?));
-    measured.extend(on_cpu.iter().copied().zip(by_cpu(bench, case, truth, &of(&on_cpu))?));
-    measured.sort_by_key(|(index, _)| *index);
-    let default_ms = measured[0].1.times_ms.clone();
-    let point = |(index, m): (usize, Measured)| {
-        let variation = &variations[index];
+    let measured = by_device(bench, case, truth, variations)?;
+    let default_ms = measured[0].times_ms.clone();
+    let point = |(variation, m): (&Variation, Measured)| {
         let merge_ms = spread(&m.times_ms);
         let ratios: Vec<f64> = m.times_ms.iter().zip(&default_ms).map(|(t, default)| t / default).collect();
         Point {
             case: case.name.clone(),
             axis: variation.axis,
             name: variation.name.clone(),
-            runs_on: if variation.on_cpu.is_some() { "CPU" } else { "device" },
-            guarded: match variation.on_cpu {
-                None => variation.options.chain.guard,
-                Some(method) => matches!(method, Method::Products(chain) if chain.guard),
-            },
+            guarded: variation.options.guard,
             field_bytes: m.field_bytes,
             bake_ms: m.bake_ms,
             first_merge_ms: m.first_merge_ms,
-            time_per_default: match variation.on_cpu {
-                None => spread(&ratios).median,
-                Some(_) => merge_ms.median / spread(&default_ms).median,
-            },
+            time_per_default: spread(&ratios).median,
             merge_ms,
             total: truth.error(&m.found),
             below_bands: difference(&m.found, &truth.t1, truth.unit),
         }
     };
-    Ok(measured.into_iter().map(point).collect())
+    Ok(variations.iter().zip(measured).map(point).collect())
 }
 
-fn by_device(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[&Variation]) -> Result<Vec<Measured>> {
+fn by_device(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variation]) -> Result<Vec<Measured>> {
     let placements = case.scene.at(case.time_s);
     let (mut frames, mut first) = (Vec::new(), Vec::new());
     for variation in variations {
@@ -249,40 +212,6 @@ fn by_device(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[&Varia
         })
     });
     measured.collect()
-}
-
-fn by_cpu(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[&Variation]) -> Result<Vec<Measured>> {
-    let placements = case.scene.at(case.time_s);
-    let methods = variations.iter().filter_map(|v| Some((v.options, v.on_cpu?)));
-    let frames = methods
-        .map(|(options, method)| Ok((bench.frame(&case.scene, options)?, method)))
-        .collect::<Result<Vec<_>>>()?;
-    let mut twins = Vec::new();
-    for (frame, method) in &frames {
-        let mut twin = frame.twin(&placements)?;
-        if *method == Method::Logarithms {
-            twin.take_logarithms();
-            (bench.progress)(&format!("{}: logarithms taken", case.name));
-        }
-        twins.push((twin, *method));
-    }
-    let mut found = vec![Vec::new(); twins.len()];
-    let mut times = vec![Vec::new(); twins.len()];
-    for _ in 0..=if bench.quick { 5 } else { 15 } {
-        for (index, (twin, method)) in twins.iter().enumerate() {
-            let started = Instant::now();
-            found[index] = twin.run(*method);
-            times[index].push(started.elapsed().as_secs_f64() * 1e3);
-        }
-    }
-    let measured = twins.iter().zip(found).zip(times).map(|(((twin, method), found), mut times_ms)| Measured {
-        field_bytes: twin.field_bytes(*method),
-        bake_ms: None,
-        first_merge_ms: times_ms.remove(0),
-        times_ms,
-        found: select(&found, &truth.vertices),
-    });
-    Ok(measured.collect())
 }
 
 /// Indices of the points that no other beats in both numbers (smaller is better), by the first.
@@ -316,8 +245,8 @@ mod tests {
             for variation in &all[1..] {
                 variation.options.bake.lattice.starting_at(0.5).validate().unwrap();
                 assert_ne!(
-                    format!("{:?} {:?}", variation.options, variation.on_cpu),
-                    format!("{:?} {:?}", all[0].options, all[0].on_cpu),
+                    format!("{:?}", variation.options),
+                    format!("{:?}", all[0].options),
                     "{} {}",
                     variation.axis,
                     variation.name

@@ -4,7 +4,6 @@
 use super::budget::Budget;
 use super::rival::Comparison;
 use super::sweep::Point;
-use crate::merge::variant::PRODUCTS;
 use crate::text::three;
 use std::fmt::Write;
 
@@ -74,17 +73,16 @@ impl Ratios {
 /// Description of the program's defaults.
 fn default_in_words() -> String {
     let options = super::default_options();
-    let (bake, chain) = (options.bake, options.chain);
-    let product = PRODUCTS.iter().find(|(_, product)| *product == chain.product).map_or("", |(name, _)| name);
+    let bake = options.bake;
     format!(
-        "lattice {}, {} lookup, {}, {} px a face, {} bands of transfer and {} of visibility, {product} products{}",
+        "lattice {}, {} lookup, {}, {} px a face, {} bands of transfer and {} of visibility{}",
         bake.lattice,
         format!("{:?}", options.lookup).to_lowercase(),
         format!("{:?}", bake.storage).to_lowercase(),
         bake.face_px,
         bake.bands,
         bake.occlusion_bands(),
-        if chain.guard { ", guarded" } else { "" },
+        if options.guard { ", guarded" } else { "" },
     )
 }
 
@@ -165,10 +163,6 @@ pub fn defaults(points: &[Point]) -> String {
             each(&ratios.bytes[..1]),
             ratios.word()
         );
-    }
-    if points.iter().any(|p| p.runs_on == "CPU") {
-        text += "What says CPU is no shader but the f64 twin on all threads: its wall times compare with one another, less so with the \
-                 device's.\n";
     }
     text += &match better.is_empty() {
         true => format!("By this rule none of the {} takes its place.\n", plural(count - 1, "other setting")),

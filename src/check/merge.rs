@@ -12,7 +12,7 @@ use crate::frame::{Frame, Options};
 use crate::lists::gather::Place;
 use crate::lists::skip::Skip;
 use crate::merge::Variant;
-use crate::merge::variant::{Chain, PRODUCTS, VARIANTS};
+use crate::merge::variant::VARIANTS;
 use crate::scene::{Placement, Scene};
 use std::path::Path;
 
@@ -83,7 +83,7 @@ pub fn options() -> Options {
         lookup: Lookup::Trilinear,
         variant: Some(Variant::named("texel").expect("a variant")),
         skip: Skip::ALL,
-        chain: Chain::default(),
+        guard: true,
         eps: 0.0,
         lists: Some(Place::Host),
         size: [64, 48],
@@ -187,13 +187,7 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
     for name in ["cones", "horizon", "caps"] {
         compare(format!("without {name}"), Options { skip: Skip::without(name), ..base })?;
     }
-    for &(name, product) in PRODUCTS {
-        let chain = Chain { product, ..base.chain };
-        if chain != base.chain {
-            compare(format!("product {name}"), Options { chain, ..base })?;
-        }
-    }
-    compare("no guard".into(), Options { chain: Chain { guard: false, ..base.chain }, ..base })?;
+    compare("no guard".into(), Options { guard: false, ..base })?;
     let bake = bake::Options { field_bands: Some(6), ..base.bake };
     compare("6 bands of visibility".into(), Options { bake, ..base })?;
     for lookup in [Lookup::Nearest, Lookup::Radial] {

@@ -7,7 +7,6 @@ pub mod file;
 pub mod fit;
 pub mod growth;
 pub mod lattice;
-pub mod log_space;
 pub mod quantity;
 pub mod shortcuts;
 mod text;
@@ -123,6 +122,18 @@ impl ShadowField {
             }
         };
         raw * f64::from(header.radiance_scale)
+    }
+
+    /// The same field in floats, which hold every half exactly and are read sooner.
+    pub fn widened(&self) -> Self {
+        let payload = match self.header.storage {
+            Storage::F32 => self.payload.clone(),
+            Storage::F16 => {
+                let halves = self.payload.as_chunks::<2>().0.iter().map(|bytes| f16::from_le_bytes(*bytes));
+                halves.flat_map(|half| half.to_f32().to_le_bytes()).collect()
+            }
+        };
+        ShadowField { header: Header { storage: Storage::F32, ..self.header.clone() }, payload }
     }
 
     /// The field at `position` (object's frame, in r from the sphere's centre): coefficients of one channel. The twin of

@@ -63,7 +63,7 @@ pub(super) fn form(options: &Options, variant: Variant, entity_limit: u32) -> Fo
         variant,
         bands: options.bake.bands,
         field_bands: options.bake.occlusion_bands(),
-        chain: options.chain,
+        guard: options.guard,
         storage: options.bake.storage,
         lattice: options.bake.lattice,
         lookup: options.lookup,

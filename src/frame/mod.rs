@@ -31,7 +31,7 @@ use crate::lists::gathering::Gathering;
 use crate::lists::incremental::{ClusterLists, Merged};
 use crate::lists::skip::Skip;
 use crate::merge::calibrate;
-use crate::merge::variant::{Chain, Form, Variant, uniform_entities};
+use crate::merge::variant::{Form, Variant, uniform_entities};
 use crate::merge::{Inputs, Readable};
 use crate::scene::{Placement, Scene};
 use crate::scene_buffers::{Store, limits};
@@ -58,8 +58,8 @@ pub struct Options {
     pub variant: Option<Variant>,
     /// What the merge leaves out.
     pub skip: Skip,
-    /// How occluders are multiplied.
-    pub chain: Chain,
+    /// Whether an occluder is kept from lengthening a chain of products (see `glsl/merge_product.glsl`).
+    pub guard: bool,
     /// Light that the merge leaves out: contributions to a vertex that are bounded below this share of the radiance that the
     /// scene's exposure shows as white; 0 leaves none out.
     pub eps: f32,
@@ -90,8 +90,8 @@ impl Frame {
     /// Bakes or finds what the scene needs and builds the passes.
     ///
     /// # Errors
-    /// As [`bake::ensure()`], [`crate::merge::Merge::new`] and [`crate::draw::Draw::new`]; `Input` where the device cannot hold the
-    /// scene; `Usage` as [`crate::merge::variant::Product::check`].
+    /// As [`bake::ensure()`], [`crate::merge::Merge::new`] and [`crate::draw::Draw::new`]; `Input` where the device cannot hold
+    /// the scene.
     pub fn new(
         baker: &Baker,
         cache: &Cache,
@@ -100,7 +100,6 @@ impl Frame {
         progress: SceneProgress<'_>,
     ) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
-        options.chain.product.check(options.bake.bands, options.bake.occlusion_bands())?;
         let needs = SceneNeeds::of(scene, &options.bake, options.skip.unseen);
         limits::check(device, scene, &needs)?;
         let baked = bake::ensure(baker, cache, scene, &needs, progress)?;

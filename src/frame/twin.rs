@@ -2,12 +2,10 @@
 
 use super::Frame;
 use crate::error::Result;
-use crate::field::log_space::{logarithms, widened};
 use crate::field::{Area, ShadowField};
 use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
 use crate::lists::gather::{self, Candidates, Counts, SLACK, Scope};
 use crate::lists::incremental::State;
-use crate::merge::chain::Method;
 use crate::merge::reference::{Object, Task};
 use crate::scene::{Entity, Placement, Scene};
 use crate::scene_buffers;
@@ -45,7 +43,7 @@ impl Frame {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn reference(&self, placements: &[Placement]) -> Result<Vec<(usize, Vec<[f64; 3]>)>> {
-        Ok(self.twin(placements)?.run(Method::Products(self.options.chain)))
+        Ok(self.twin(placements)?.run())
     }
 
     /// Everything that the CPU twin of a merge reads.
@@ -57,7 +55,10 @@ impl Frame {
         for geometry in &self.store.geometries {
             let load =
                 |slot: &Option<scene_buffers::Slot>| slot.as_ref().map(|slot| self.store.field(slot)).transpose();
-            fields.push([load(&geometry.blocked)?, load(&geometry.radiance)?].map(|field| field.as_ref().map(widened)));
+            fields.push(
+                [load(&geometry.blocked)?, load(&geometry.radiance)?]
+                    .map(|field| field.as_ref().map(ShadowField::widened)),
+            );
         }
         let state = self.state(placements);
         let mut receivers = Vec::new();
@@ -79,7 +80,6 @@ impl Frame {
             frame: self,
             placements,
             fields,
-            logarithms: vec![None; self.store.geometries.len()],
             receivers,
             lights: indices(&self.scene, |e| e.emits),
             sky: self.scene.environment.coefficients(self.options.bake.bands),
@@ -93,7 +93,6 @@ pub struct Twin<'f> {
     placements: &'f [Placement],
     /// Occlusion and radiance by mesh.
     fields: Vec<[Option<ShadowField>; 2]>,
-    logarithms: Vec<Option<ShadowField>>,
     receivers: Vec<Receiver>,
     lights: Vec<usize>,
     sky: [Vec<f64>; 3],
@@ -110,30 +109,8 @@ struct Receiver {
 }
 
 impl Twin<'_> {
-    /// Takes the logarithm of every field that blocks: once, as a bake would.
-    pub fn take_logarithms(&mut self) {
-        let blocks = |mesh: usize| self.frame.scene.entities.iter().any(|e| e.mesh == mesh && e.occludes);
-        let take = |(mesh, [blocked, _]): (usize, &[Option<ShadowField>; 2])| {
-            blocked.as_ref().filter(|_| blocks(mesh)).map(logarithms)
-        };
-        self.logarithms = self.fields.iter().enumerate().map(take).collect();
-    }
-
-    /// Bytes of all fields that a method reads: logarithms stand in for what blocks, not for what shines.
-    pub fn field_bytes(&self, method: Method) -> u64 {
-        let shines = |mesh: usize| self.frame.scene.entities.iter().any(|e| e.mesh == mesh && e.emits);
-        let kept = |mesh: usize| method != Method::Logarithms || shines(mesh);
-        let fields = self.fields.iter().enumerate().flat_map(|(mesh, [blocked, radiance])| {
-            [blocked.as_ref().filter(|_| kept(mesh)), self.logarithms[mesh].as_ref(), radiance.as_ref()]
-        });
-        fields.flatten().map(|field| field.payload.len() as u64).sum()
-    }
-
     /// Radiosity of every receiver's vertices, by entity, on all threads.
-    ///
-    /// # Panics
-    /// When logarithms are to be added that were not taken.
-    pub fn run(&self, method: Method) -> Vec<(usize, Vec<[f64; 3]>)> {
+    pub fn run(&self) -> Vec<(usize, Vec<[f64; 3]>)> {
         let Frame { scene, store, options, .. } = self.frame;
         let object = |(index, placement): (usize, &Placement)| {
             let entity = &scene.entities[index];
@@ -147,7 +124,6 @@ impl Twin<'_> {
                 emission: entity.emission.as_dvec3().to_array(),
                 blocked: blocked.as_ref(),
                 area: store.geometries[entity.mesh].blocked.as_ref().map_or(Area::default(), |slot| slot.area),
-                logarithm: self.logarithms[entity.mesh].as_ref(),
                 radiance: radiance.as_ref().filter(|_| entity.emits),
             }
         };
@@ -169,7 +145,7 @@ impl Twin<'_> {
                 bands: options.bake.bands,
                 lookup: options.lookup,
                 skip: options.skip,
-                method,
+                guard: options.guard,
                 leaves: &leaves,
             };
             (receiver.index, task.run())

@@ -1,25 +1,78 @@
-//! A chain of occluders on one vertex's transfer, in f64: the twin of `glsl/merge_product.glsl`, and the choices that both have.
+//! A chain of occluders on one vertex's transfer, in f64: the twin of `glsl/merge_product.glsl` and `glsl/product_points.glsl`.
 
-use crate::merge::variant::Chain;
 use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
-use crate::sh::log_space::LogSpace;
 use crate::sh::points;
 use crate::sh::product::Tensor;
+use crate::sh::product_program::Style;
 
-/// Coefficients, or values at points times the weights; zero past the last. In log space the transfer, and from `SUM` on the sum
-/// of the factors' logarithms.
+/// Coefficients, or values at points times the weights; zero past the last.
 pub type State = [f64; MAX_COEFFICIENTS];
 
-/// Where the sum of logarithms begins.
-const SUM: usize = MAX_COEFFICIENTS / 2;
+/// How a factor is multiplied into a chain. The merge has factored products; the others are what `bench product` compares with them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+pub struct Chain {
+    /// How the product is computed, and in which space the chain stays meanwhile.
+    pub product: Product,
+    /// Whether a factor is kept from lengthening a chain (see `glsl/merge_product.glsl`).
+    pub guard: bool,
+}
 
-/// How factors come into a chain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// One product after the other, as the device does it.
-    Products(Chain),
-    /// Their logarithms are added, and the exponential of the sum is multiplied in at the end. For comparison, on the CPU only.
-    Logarithms,
+impl Default for Chain {
+    /// Factored products, guarded.
+    fn default() -> Self {
+        Chain::factored(true)
+    }
+}
+
+impl Chain {
+    /// What the merge does, with the guard or without it.
+    pub fn factored(guard: bool) -> Self {
+        Chain { product: Product::Factored, guard }
+    }
+}
+
+/// How a product is computed. All compute the same function, save [`Product::PointChain`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Product {
+    /// Tensor pairs, shared sums factored out. "matrix" where transfer and field differ in bands.
+    #[default]
+    Factored,
+    /// Tensor pairs. "matrix" where transfer and field differ in bands.
+    Pairs,
+    /// The matrix of multiplication by the occluder's visibility.
+    Matrix,
+    /// Evaluated at 32 points, multiplied and projected back. Up to 4 bands.
+    Points,
+    /// A whole chain stays at the 32 points and is projected once: exact for one factor only. Up to 4 bands.
+    PointChain,
+}
+
+/// Every product, by its name in `bench product`.
+pub const PRODUCTS: &[(&str, Product)] = &[
+    ("factored", Product::Factored),
+    ("pairs", Product::Pairs),
+    ("matrix", Product::Matrix),
+    ("points", Product::Points),
+    ("point-chain", Product::PointChain),
+];
+
+impl Product {
+    /// The generated code. At points there is none of coefficients, so any will do.
+    pub fn style(self, bands: usize, field_bands: usize) -> Style {
+        let style = match self {
+            Product::Factored | Product::PointChain => Style::Factored,
+            Product::Pairs => Style::Pairs,
+            Product::Matrix => Style::Matrix,
+            Product::Points => Style::Points,
+        };
+        if style.fits(bands, field_bands) { style } else { Style::Matrix }
+    }
+
+    /// Whether a chain is kept as values at points rather than as coefficients.
+    pub fn stays_at_points(self) -> bool {
+        self == Product::PointChain
+    }
 }
 
 /// Multiplies chains of some bands by factors of some bands.
@@ -28,7 +81,6 @@ pub struct Multiplier {
     guard: bool,
     /// The basis at each point with the point's weight, where a chain stays at points.
     points: Option<Vec<(State, f64)>>,
-    logarithms: Option<LogSpace>,
 }
 
 impl Multiplier {
@@ -44,25 +96,6 @@ impl Multiplier {
             tensor: Tensor::new(bands, field_bands, bands),
             guard: chain.guard,
             points: chain.product.stays_at_points().then(points),
-            logarithms: None,
-        }
-    }
-
-    /// For a method, transfers of `bands` bands and factors of `field_bands`.
-    ///
-    /// # Panics
-    /// When logarithms are to be added of more than 5 bands, or of others than the transfer's.
-    pub fn by(method: Method, bands: usize, field_bands: usize) -> Self {
-        match method {
-            Method::Products(chain) => Self::new(chain, bands, field_bands),
-            Method::Logarithms => {
-                assert!(
-                    bands == field_bands && coefficient_count(bands) <= SUM,
-                    "{bands} and {field_bands} bands in log space"
-                );
-                let plain = Chain { guard: false, ..Chain::default() };
-                Multiplier { logarithms: Some(LogSpace::new(bands)), ..Self::new(plain, bands, field_bands) }
-            }
         }
     }
 
@@ -80,15 +113,7 @@ impl Multiplier {
         state
     }
 
-    /// Ends a chain: nothing more is multiplied in.
-    pub fn finish(&self, state: &mut State) {
-        if let Some(space) = &self.logarithms {
-            let (transfer, sum) = state.split_at_mut(SUM);
-            space.multiply(transfer, sum);
-        }
-    }
-
-    /// The integral of a finished chain against a function of as many bands as the transfer.
+    /// The integral of a chain against a function of as many bands as the transfer.
     pub fn meet(&self, state: &State, function: &[f64]) -> f64 {
         match &self.points {
             None => dot(state, &function[..self.count()]),
@@ -98,12 +123,8 @@ impl Multiplier {
         }
     }
 
-    /// Multiplies by 1 - `blocked`; in log space `blocked` is that factor's logarithm.
+    /// Multiplies by 1 - `blocked`.
     pub fn multiply(&self, state: &mut State, blocked: &[f64]) {
-        if self.logarithms.is_some() {
-            state[SUM..].iter_mut().zip(&blocked[..self.count()]).for_each(|(sum, log)| *sum += log);
-            return;
-        }
         let before = self.parts(state);
         match &self.points {
             None => {
@@ -183,7 +204,6 @@ mod tests {
     use super::*;
     use crate::lists::skip::CAP_SINES;
     use crate::merge::reference::Cone;
-    use crate::merge::variant::PRODUCTS;
     use crate::sh::lobe::clamped_cosine;
     use glam::DVec3;
     use std::f64::consts::PI;

@@ -5,9 +5,8 @@
 
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device};
-use crate::merge::chain::Multiplier;
-use crate::merge::variant::Chain;
-use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count};
+use crate::merge::chain::{Chain, Multiplier};
+use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count};
 use crate::sh::product_program::STYLES;
 use crate::shaders::{Library, ShaderPermutation};
 use bytemuck::{Pod, Zeroable};
@@ -53,15 +52,16 @@ impl Products {
             .define("PRODUCT", STYLES.iter().position(|s| *s == style).expect("every style is listed") as u32)
             .define("POINT_CHAIN", shape.chain.product.stays_at_points())
             .define("GUARD", shape.chain.guard)
+            .number("Y00", Y00)
             .define("MULTIPLY", multiply)
     }
 
     /// The pipeline of a shape.
     ///
     /// # Errors
-    /// `Usage` as [`crate::merge::variant::Product::check`], `Failed` when the shader does not compile.
+    /// `Failed` when the shader does not compile: products at points want transfer and factors of the same bands, at most
+    /// [`crate::sh::points::BANDS`].
     pub fn new(device: &Arc<Device>, library: &Library, shape: Shape, multiply: bool) -> Result<Self> {
-        shape.chain.product.check(shape.bands, shape.field_bands)?;
         let shader = library.shader(&Self::row(shape, multiply))?;
         Ok(Products { pipeline: ComputePipeline::new(device, "product", &shader, &[])? })
     }

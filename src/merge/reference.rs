@@ -2,7 +2,7 @@
 
 use crate::field::{Area, Lookup, ShadowField};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
-use crate::merge::chain::{Method, Multiplier, State};
+use crate::merge::chain::{Chain, Multiplier, State};
 use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;
@@ -26,8 +26,6 @@ pub struct Object<'f> {
     pub emission: [f64; 3],
     /// Occlusion field, if one was baked.
     pub blocked: Option<&'f ShadowField>,
-    /// The same field's logarithms (see [`crate::field::log_space`]), where factors come in as such.
-    pub logarithm: Option<&'f ShadowField>,
     /// What it covers from afar.
     pub area: Area,
     /// Radiance field, if its light varies over the surface.
@@ -54,8 +52,8 @@ pub struct Task<'t> {
     pub transfer: Option<(&'t [f32], usize)>,
     /// SH bands of transfer and light; an occlusion field has its own.
     pub bands: usize,
-    /// How factors come into a chain.
-    pub method: Method,
+    /// Whether a factor is kept from lengthening a chain.
+    pub guard: bool,
     /// Which samples a lookup takes.
     pub lookup: Lookup,
     /// What is left out.
@@ -71,7 +69,7 @@ impl Task<'_> {
     /// Radiosity of every vertex: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self) -> Vec<[f64; 3]> {
         let field_bands = self.field_bands();
-        let multiplier = Multiplier::by(self.method, self.bands, field_bands);
+        let multiplier = Multiplier::new(Chain::factored(self.guard), self.bands, field_bands);
         let bands = self.bands.max(field_bands);
         let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(bands, o.rotation)).collect();
         (0..self.positions.len()).into_par_iter().map(|v| self.vertex(v, &multiplier, &rotations)).collect()
@@ -94,10 +92,8 @@ impl Task<'_> {
             .occluders
             .iter()
             .map(|&j| {
-                // A logarithm of a cap there is not: in log space all factors are looked up.
-                let caps = self.skip.caps && self.method != Method::Logarithms;
-                let share = cones[j].field_share(Skip { caps, ..self.skip });
-                let blocked = self.factor(j, position, rotations).map(|b| b * share);
+                let share = cones[j].field_share(self.skip);
+                let blocked = self.field(j, position, None, rotations).map(|b| b * share);
                 let object = &self.objects[j];
                 let area = || object.area.at(object.rotation.inverse() * cones[j].toward);
                 let cap = (share < 1.0).then(|| cones[j].cap(area()).by(1.0 - share));
@@ -114,7 +110,6 @@ impl Task<'_> {
                     cap.by(share).cover(multiplier, &mut state);
                 }
             }
-            multiplier.finish(&mut state);
             state
         };
 
@@ -154,35 +149,13 @@ impl Task<'_> {
         out
     }
 
-    /// What object `j` multiplies a chain at a world position by, in the world frame: the blocked part, or the logarithm of the rest.
-    fn factor(&self, j: usize, position: DVec3, rotations: &[Rotation]) -> Coefficients {
-        match self.method {
-            Method::Products(_) => self.field(j, position, None, rotations),
-            Method::Logarithms => {
-                let field = self.objects[j].logarithm.expect("what blocks has logarithms");
-                self.look_up(j, position, (field, 0), rotations)
-            }
-        }
-    }
-
     /// The field of object `j` at a world position, in the world frame: radiance of a channel, or the blocked part.
     fn field(&self, j: usize, position: DVec3, channel: Option<usize>, rotations: &[Rotation]) -> Coefficients {
         let object = &self.objects[j];
-        let source = match (object.radiance, channel) {
+        let (field, channel) = match (object.radiance, channel) {
             (Some(field), Some(channel)) => (field, channel),
             _ => (object.blocked.expect("what blocks or shines in one colour has an occlusion field"), 0),
         };
-        self.look_up(j, position, source, rotations)
-    }
-
-    fn look_up(
-        &self,
-        j: usize,
-        position: DVec3,
-        (field, channel): (&ShadowField, usize),
-        rotations: &[Rotation],
-    ) -> Coefficients {
-        let object = &self.objects[j];
         let local = object.rotation.inverse() * (position - object.centre) / object.radius_m;
         let (mut found, mut out) = ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
         field.lookup(local, self.lookup, channel, &mut found);

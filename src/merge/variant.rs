@@ -6,8 +6,9 @@ use crate::field::quantity::{Storage, channel_stride};
 use crate::gpu::Device;
 use crate::layout::{CLUSTER_VERTICES, Entity};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
-use crate::sh::points;
-use crate::sh::product_program::{STYLES, Style};
+use crate::merge::chain::Product;
+use crate::sh::basis::Y00;
+use crate::sh::product_program::STYLES;
 use crate::shaders::ShaderPermutation;
 use ash::vk;
 
@@ -93,8 +94,8 @@ pub struct Form {
     pub bands: usize,
     /// SH bands of occlusion fields.
     pub field_bands: usize,
-    /// How a factor is multiplied into a chain.
-    pub chain: Chain,
+    /// Whether a factor is kept from lengthening a chain (see `glsl/merge_product.glsl`).
+    pub guard: bool,
     /// Number format of the fields.
     pub storage: Storage,
     /// Samples of the fields. First and last shell are data, not code.
@@ -105,81 +106,6 @@ pub struct Form {
     pub skip: Skip,
     /// Entities that uniform blocks hold on the device, [`uniform_entities`].
     pub entity_limit: u32,
-}
-
-/// How a factor is multiplied into a chain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
-pub struct Chain {
-    /// How the product is computed, and in which space the chain stays meanwhile.
-    pub product: Product,
-    /// Whether a factor is kept from lengthening a chain (see `glsl/merge_product.glsl`).
-    pub guard: bool,
-}
-
-impl Default for Chain {
-    /// Factored products, guarded.
-    fn default() -> Self {
-        Chain { product: Product::default(), guard: true }
-    }
-}
-
-/// How a product is computed. All compute the same function, save [`Product::PointChain`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Product {
-    /// Tensor pairs, shared sums factored out. "matrix" where transfer and field differ in bands.
-    #[default]
-    Factored,
-    /// Tensor pairs. "matrix" where transfer and field differ in bands.
-    Pairs,
-    /// The matrix of multiplication by the occluder's visibility.
-    Matrix,
-    /// Evaluated at 32 points, multiplied and projected back. Up to 4 bands.
-    Points,
-    /// A whole chain stays at the 32 points and is projected once: exact for one factor only. Up to 4 bands.
-    PointChain,
-}
-
-/// Every product, by its name on the command line.
-pub const PRODUCTS: &[(&str, Product)] = &[
-    ("factored", Product::Factored),
-    ("pairs", Product::Pairs),
-    ("matrix", Product::Matrix),
-    ("points", Product::Points),
-    ("point-chain", Product::PointChain),
-];
-
-impl Product {
-    /// The generated code. At points there is none of coefficients, so any will do.
-    pub fn style(self, bands: usize, field_bands: usize) -> Style {
-        let style = match self {
-            Product::Factored | Product::PointChain => Style::Factored,
-            Product::Pairs => Style::Pairs,
-            Product::Matrix => Style::Matrix,
-            Product::Points => Style::Points,
-        };
-        if style.fits(bands, field_bands) { style } else { Style::Matrix }
-    }
-
-    /// Whether a chain is kept as values at points rather than as coefficients.
-    pub fn stays_at_points(self) -> bool {
-        self == Product::PointChain
-    }
-
-    /// Checks that the product can multiply transfers and fields of these bands.
-    ///
-    /// # Errors
-    /// `Usage` where 32 points are too few for them.
-    pub fn check(self, bands: usize, field_bands: usize) -> Result<()> {
-        let at_points = matches!(self, Product::Points | Product::PointChain);
-        if at_points && !Style::Points.fits(bands, field_bands) {
-            return Err(Error::Usage(format!(
-                "--product points and point-chain want transfer and fields of the same bands, at most {}, not {bands} and {field_bands}",
-                points::BANDS
-            )));
-        }
-        Ok(())
-    }
 }
 
 impl Form {
@@ -214,12 +140,12 @@ impl Form {
             Directions::LatLon { latitudes, longitudes } => (0, latitudes, longitudes),
         };
         let cube = matches!(lattice.directions, Directions::Cube { .. });
-        let product = self.chain.product.style(self.bands, self.field_bands);
+        let product = Product::Factored.style(self.bands, self.field_bands);
         let row = ShaderPermutation::new("merge.comp", self.bands)
             .field_bands(self.field_bands)
             .define("PRODUCT", STYLES.iter().position(|style| *style == product).expect("every style is listed") as u32)
-            .define("POINT_CHAIN", self.chain.product.stays_at_points())
-            .define("GUARD", self.chain.guard)
+            .define("GUARD", self.guard)
+            .number("Y00", Y00)
             .define("WORKGROUP", CLUSTER_VERTICES)
             .define("TEXEL", self.variant.texel)
             .define("IMAGE", self.variant.image && self.fits_image())

@@ -8,7 +8,7 @@ use crate::gpu::{Buffer, BufferKind, Commands, Device, Volume};
 use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, ListEntry, NONE};
 use crate::lists::skip::Skip;
 use crate::merge::shelf::Shelf;
-use crate::merge::variant::{Chain, Form, Variant, uniform_entities};
+use crate::merge::variant::{Form, Variant, uniform_entities};
 use crate::merge::{Inputs, Merge, Readable};
 use crate::sh::rotation::turns;
 use ash::vk;
@@ -138,7 +138,7 @@ impl Workload {
             variant,
             bands: BANDS,
             field_bands: BANDS,
-            chain: Chain::default(),
+            guard: true,
             storage: Storage::F16,
             lattice: self.lattice,
             lookup: Lookup::Trilinear,

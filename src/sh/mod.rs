@@ -16,7 +16,6 @@
 //! | [`mod@project`] | texels to coefficients |
 //! | [`product`] | the triple-product tensor, products, growth certificates |
 //! | [`product_program`] | the product as straight-line code, and its GLSL |
-//! | [`log_space`] | logarithm and exponential of visibility |
 //! | [`points`] | products at the 32 points of a rule |
 //! | [`rotation`] | block-diagonal rotation, and its GLSL |
 //! | [`lobe`] | closed forms: caps, spheres, the clamped cosine |
@@ -31,13 +30,10 @@
 //! 4. R. Ramamoorthi, P. Hanrahan, *An Efficient Representation for Irradiance Environment Maps*, SIGGRAPH 2001: the
 //!    clamped cosine.
 //! 5. A. D. McLaren, *Optimal Numerical Integration on a Sphere*, Mathematics of Computation 17, 1963: the 32-point rule.
-//! 6. Z. Ren, R. Wang, J. Snyder, K. Zhou, X. Liu, B. Sun, P.-P. Sloan, H. Bao, Q. Peng, B. Guo, *Real-time Soft Shadows in Dynamic
-//!    Scenes using Spherical Harmonic Exponentiation*, SIGGRAPH 2006: logarithms by product matrix, exponentials by squaring.
 
 pub mod basis;
 pub mod cube;
 pub mod lobe;
-pub mod log_space;
 pub mod points;
 pub mod product;
 pub mod product_program;

@@ -6,9 +6,8 @@ use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
 use super::world::{EntityView, VertexView, World};
 use crate::lists::gather::distance_key;
 use crate::lists::skip::Skip;
-use crate::merge::chain::Multiplier;
+use crate::merge::chain::{Chain, Multiplier};
 use crate::merge::reference::{Cap, Cone};
-use crate::merge::variant::Chain;
 use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use glam::DVec3;
@@ -86,7 +85,6 @@ impl ExactChain {
                     cap.by(share).cover(multiplier, &mut state);
                 }
             }
-            multiplier.finish(&mut state);
             state
         };
 

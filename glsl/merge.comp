@@ -139,7 +139,7 @@ void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN]
     }
 }
 
-#if CAPS
+#if SKIP_CAPS
 bool is_cap(uint packed) {
     return (packed & (ENTRY_LIGHT | ENTRY_CAP)) == ENTRY_CAP;
 }
@@ -189,7 +189,7 @@ void main() {
         // Loops are tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the loop. It jumps
         // nowhere else, so entries of either kind run as loops of their own, each in turn as long as there are such entries.
         do {
-#if CAPS
+#if SKIP_CAPS
             do {
                 if (!is_cap(packed)) {
                     look(vertex, packed, t_start, t, sum);

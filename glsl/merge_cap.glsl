@@ -4,14 +4,14 @@
 
 // Share of the field; the rest is the cap's.
 float field_share(Cone cone) {
-#if CAPS
+#if SKIP_CAPS
     return smoothstep(CAP_SINE_LEAST, CAP_SINE_MOST, cone.sine);
 #else
     return 1.0;
 #endif
 }
 
-#if CAPS
+#if SKIP_CAPS
 // The cap: solid angle and, in the world, the basis in its direction. Cut to a few bands a disc of mean square radius q (radians)
 // has 1 - l (l + 1) q / 4 of what a point has in band l.
 float cap_of(Entity entity, Cone cone, out float y[COEFFICIENTS]) {

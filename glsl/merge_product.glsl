@@ -41,7 +41,7 @@ float chain_meet(float c[CHAIN], float f[COEFFICIENTS]) {
     return sum;
 }
 
-#if CAPS
+#if SKIP_CAPS
 // Takes away what comes from one direction: the chain's value there, over a small solid angle. `y` is the basis in that direction, each
 // band a little less for the cap's extent. What a chain has of light is not negative, so a value that is takes nothing, and coefficient
 // 0 does not change sign; with that, and up to 1.5 sr, it is no longer than before: the guard has nothing to take back.

@@ -98,10 +98,10 @@ pub struct MergeArguments {
     /// interpolates less exactly; default: of the former what was measured to be the device's fastest, after a first run
     #[arg(long, value_name = "NAME", value_parser = Variant::named)]
     pub variant: Option<Variant>,
-    /// Work to leave out: all, none, or a list of horizon, cones, behind, facing, empty, unseen, caps, unmoved, hidden. Horizon and
-    /// cones leave out what true visibility makes zero, which is nearer to ray casting than the stored bands are, and caps looks up
-    /// no field of an occluder that is small as seen from a vertex but takes it for a point: pictures differ a little from those
-    /// of none. The others change nothing that is shown: hidden leaves unlit what the camera cannot see while things move
+    /// Work to leave out: all, none, or a list of horizon, cones, behind, caps, unmoved, hidden. Horizon and cones leave out what
+    /// true visibility makes zero, which is nearer to ray casting than the stored bands are. Caps looks up no field of an occluder
+    /// that is small as seen from a vertex but takes it for a point. Pictures with these three differ a little from those without.
+    /// The others change nothing that is shown: hidden leaves unlit what the camera cannot see while things move
     #[arg(long, default_value = "all", value_name = "all|none|LIST")]
     pub skip: Skip,
     /// Leave out light and shadow that is bounded below this share of white, a vertex and entity; 0 leaves none out

@@ -51,10 +51,10 @@ pub struct SceneNeeds {
 }
 
 impl SceneNeeds {
-    /// Of a scene whose fields and transfers are baked with `options`; with `skips_unseen` no field is baked that nothing sees.
-    pub fn of(scene: &Scene, options: &Options, skips_unseen: bool) -> Self {
+    /// Of a scene whose fields and transfers are baked with `options`. No field is baked that nothing sees.
+    pub fn of(scene: &Scene, options: &Options) -> Self {
         let fields = |index: usize| {
-            let kinds = needs(scene, index, skips_unseen);
+            let kinds = needs(scene, index);
             kinds.map(|kind| kind.map(|kind| header(&scene.meshes[index], kind, options)))
         };
         let receives = |index: usize| scene.entities.iter().any(|e| e.mesh == index && e.receives);
@@ -84,9 +84,8 @@ impl SceneNeeds {
 
 /// Which fields the entities of a mesh need: none for what only receives or what nothing else can see, none for shadows where
 /// there is no light, no radiance field for a light of one colour.
-pub fn needs(scene: &Scene, mesh: usize, skips_unseen: bool) -> [Option<FieldKind>; 2] {
-    let matters = |e: &&Entity| !skips_unseen || is_seen(scene, e);
-    let entities = || scene.entities.iter().filter(|e| e.mesh == mesh).filter(matters);
+pub fn needs(scene: &Scene, mesh: usize) -> [Option<FieldKind>; 2] {
+    let entities = || scene.entities.iter().filter(|e| e.mesh == mesh && is_seen(scene, e));
     let coloured = scene.meshes[mesh].colors.is_some();
     let light = !scene.environment.is_none() || scene.entities.iter().any(|e| e.emits);
     let blocked = entities().any(|e| (e.occludes && light) || (e.emits && !coloured));

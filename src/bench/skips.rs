@@ -14,7 +14,7 @@ use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame};
 use crate::lists::gather::Counts;
-use crate::lists::skip::{EPS, Skip};
+use crate::lists::skip::{self, BenchCase, EPS, Skip};
 use crate::scene::{Placement, Scene};
 use crate::truth::raycast::{Distant, relative_error};
 use crate::truth::{RayCast, RayMeshes, Vertex, World, sample_vertices};
@@ -37,8 +37,6 @@ pub struct Side {
     pub error: Difference,
     /// Fields on the device, bytes.
     pub field_bytes: u64,
-    /// Wall time until the frame was ready with no fields in a cache, milliseconds; where something is not baked alone.
-    pub ready_ms: Option<f64>,
 }
 
 /// One skip in one case.
@@ -67,19 +65,9 @@ pub struct Row {
     pub left_off_count: Option<u64>,
 }
 
-/// The count that goes with a skip.
-fn left_off(skip: &str, counts: &Counts) -> Option<u64> {
-    let name = match skip {
-        "horizon" => "below_horizon",
-        "cones" => "apart",
-        "behind" => "behind_light",
-        "facing" => "facing_away",
-        eps if eps.starts_with("eps") => "below_eps",
-        hidden if hidden.starts_with("hidden") => "hidden",
-        empty if empty.starts_with("empty") => "empty",
-        other => other,
-    };
-    serde_json::to_value(counts).ok()?.get(name)?.as_u64()
+/// What the skip of that row's name left off.
+fn left_off(name: &str, counts: &Counts) -> Option<u64> {
+    serde_json::to_value(counts).ok()?.get(skip::row(name)?.counter?)?.as_u64()
 }
 
 /// Measures, and writes `skip.csv`, `skip.json` and `skip.svg` into `folder`. `chosen`: of all cases only those that have one of these
@@ -152,12 +140,12 @@ fn all(quick: bool) -> Result<Vec<Case>> {
         })
     };
     if quick {
-        return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?, house()?, alone()?]);
+        return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?, house()?]);
     }
     let mut cases = cases::scenes()?;
     cases.push(town(64, 4, 160)?);
     cases.push(town(256, 8, 160)?);
-    cases.extend([house()?, alone()?]);
+    cases.extend([house()?]);
     Ok(cases)
 }
 
@@ -167,15 +155,6 @@ fn house() -> Result<Case> {
     let scene = house::scene()?;
     let light = cases::light(&scene);
     Ok(Case { name: "house".into(), light, scene, time_s: 0.0, distant: Distant::Exact })
-}
-
-/// One ring under a sky: nothing but itself is lit, so its shadow falls on nothing that its transfer does not know of.
-fn alone() -> Result<Case> {
-    let text = "environment = { gradient = { radiance = [0.8, 0.9, 1.0] } }\n[camera]\neye = [0, 2, 4]\ntarget = [0, 0, 0]\n\
-                [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.7, minor_m = 0.3, segments = 48, sides = 24 }\n\
-                [[entity]]\nmesh = \"ring\"\n";
-    let scene = Scene::parse(text, Path::new("assets/scenes/alone.toml"), &embedded::read)?;
-    Ok(Case { name: "ring alone".into(), light: cases::light(&scene), scene, time_s: 0.0, distant: Distant::Exact })
 }
 
 fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<Row>> {
@@ -192,46 +171,30 @@ fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<Row>> {
     (bench.progress)(&format!("{}: relative standard error of T0 {:.1e}", case.name, relative_error(&lit)));
 
     let at_rest = default_options();
-    let skip_without = |name: &str| {
-        let mut skip = Skip::without(name);
-        skip.unmoved = false;
-        frame::Options { skip, ..at_rest }
-    };
-    let mut rows = Vec::new();
-    for name in Skip::NAMES.into_iter().filter(|name| !["unmoved", "hidden"].contains(name)) {
-        let mut sides = [skip_without(name), at_rest];
-        // With a threshold what shines with nothing is below it in any case.
-        let exact = name == "empty";
-        sides.iter_mut().filter(|_| exact).for_each(|side| side.eps = 0.0);
-        let row = if exact { "empty, eps 0" } else { name };
-        rows.push(judge.row(bench, case, &placements, row, sides, Timed::AtRest)?);
-    }
-    let eps = format!("eps {EPS}");
-    let without_eps = frame::Options { eps: 0.0, ..at_rest };
-    rows.push(judge.row(bench, case, &placements, &eps, [without_eps, at_rest], Timed::AtRest)?);
-    let none = frame::Options { eps: 0.0, skip: Skip::NONE, ..at_rest };
-    rows.push(judge.row(bench, case, &placements, "all but unmoved", [none, at_rest], Timed::AtRest)?);
     let kept = frame::Options { skip: Skip::ALL, ..at_rest };
-    rows.push(judge.row(bench, case, &placements, "unmoved, one moves", [at_rest, kept], Timed::OneMoves)?);
     let shown = frame::Options { size: PICTURE, antialias: Antialias::usual(bench.baker.device()), ..kept };
-    let all_shown = frame::Options { skip: Skip::without("hidden"), ..shown };
-    rows.push(judge.row(bench, case, &placements, "hidden, all move", [all_shown, shown], Timed::Pictures)?);
+    let mut rows = Vec::new();
+    for row in skip::switches() {
+        let (what, base, timed) = match row.bench {
+            Some(BenchCase::OneMoves) => (format!("{}, one moves", row.name), kept, BenchCase::OneMoves),
+            Some(BenchCase::AllMove) => (format!("{}, all move", row.name), shown, BenchCase::AllMove),
+            _ => (row.name.to_owned(), at_rest, BenchCase::AtRest),
+        };
+        let mut off = base;
+        *off.skip.switch(row.name).expect("a row with a switch") = false;
+        rows.push(judge.row(bench, case, &placements, [row.name, &what], [off, base], timed)?);
+    }
+    let what = format!("eps {EPS}");
+    let without_eps = frame::Options { eps: 0.0, ..at_rest };
+    rows.push(judge.row(bench, case, &placements, ["eps", &what], [without_eps, at_rest], BenchCase::AtRest)?);
+    let none = frame::Options { eps: 0.0, skip: Skip::NONE, ..at_rest };
+    let what = "all but unmoved";
+    rows.push(judge.row(bench, case, &placements, [what, what], [none, at_rest], BenchCase::AtRest)?);
     Ok(rows)
 }
 
 /// Size of the pictures where they are timed.
 const PICTURE: [u32; 2] = [1280, 720];
-
-/// What is timed.
-#[derive(Clone, Copy, PartialEq)]
-enum Timed {
-    /// Frames of a scene at rest, without drawing.
-    AtRest,
-    /// The same while one thing moves.
-    OneMoves,
-    /// Frames as a window shows them, while all that casts shadows or shines moves.
-    Pictures,
-}
 
 /// What results are held against.
 struct Judge {
@@ -247,26 +210,17 @@ impl Judge {
         bench: &Bench<'_>,
         case: &Case,
         placements: &[Placement],
-        skip: &str,
+        [name, what]: [&str; 2],
         [off, on]: [frame::Options; 2],
-        timed: Timed,
+        timed: BenchCase,
     ) -> Result<Row> {
-        let none = Cache::new(None);
-        let anew = skip == "unseen" && case.scene.entities.iter().any(|e| e.occludes && !is_seen(&case.scene, e));
-        let bench = &if anew { Bench { cache: &none, origin: json!(null), ..*bench } } else { bench.clone() };
-        let ready = |options| -> Result<(Frame, Option<f64>)> {
-            let started = Instant::now();
-            let frame = bench.frame(&case.scene, options)?;
-            Ok((frame, anew.then(|| started.elapsed().as_secs_f64() * 1e3)))
-        };
-        let ((first, first_ms), (second, second_ms)) = (ready(off)?, ready(on)?);
-        let (mut frames, ready_ms) = ([first, second], [first_ms, second_ms]);
+        let mut frames = [bench.frame(&case.scene, off)?, bench.frame(&case.scene, on)?];
         let entities = &case.scene.entities;
         let mut movers: Vec<usize> = (0..entities.len()).filter(|&i| entities[i].occludes).collect();
         match timed {
-            Timed::AtRest => movers.clear(),
-            Timed::OneMoves => movers.truncate(1),
-            Timed::Pictures => {
+            BenchCase::AtRest => movers.clear(),
+            BenchCase::OneMoves => movers.truncate(1),
+            BenchCase::AllMove => {
                 movers.extend((0..entities.len()).filter(|&i| entities[i].emits && !entities[i].occludes))
             }
         }
@@ -280,7 +234,7 @@ impl Judge {
             for (side, frame) in frames.iter_mut().enumerate() {
                 let started = Instant::now();
                 let passes =
-                    if timed == Timed::Pictures { frame.show(&now, 1.0)? } else { frame.render(&now, None)? };
+                    if timed == BenchCase::AllMove { frame.show(&now, 1.0)? } else { frame.render(&now, None)? };
                 let merge = merge_ms(&passes);
                 // The first frames compile.
                 if round >= 2 {
@@ -301,18 +255,17 @@ impl Judge {
             entries: entries[i],
             error: difference(&found[i], &self.truth, self.unit),
             field_bytes: frames[i].memory().fields,
-            ready_ms: ready_ms[i],
         };
         let (off, on) = (side(0), side(1));
         let counts = frames[1].counts(placements);
-        (bench.progress)(&format!("{}: {skip} measured", case.name));
+        (bench.progress)(&format!("{}: {what} measured", case.name));
         Ok(Row {
             case: case.name.clone(),
-            skip: skip.to_owned(),
+            skip: what.to_owned(),
             vertices: frames[0].receiver_vertex_count(),
             times_faster: off.frame_ms.median / on.frame_ms.median,
             change: difference(&found[0], &found[1], self.unit),
-            left_off_count: left_off(skip, &counts),
+            left_off_count: left_off(name, &counts),
             counts,
             off,
             on,

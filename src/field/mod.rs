@@ -133,7 +133,7 @@ impl ShadowField {
                 halves.flat_map(|half| half.to_f32().to_le_bytes()).collect()
             }
         };
-        ShadowField { header: Header { storage: Storage::F32, ..self.header.clone() }, payload }
+        ShadowField { header: FieldHeader { storage: Storage::F32, ..self.header.clone() }, payload }
     }
 
     /// The field at `position` (object's frame, in r from the sphere's centre): coefficients of one channel. The twin of

@@ -100,7 +100,7 @@ impl Frame {
         progress: SceneProgress<'_>,
     ) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
-        let needs = SceneNeeds::of(scene, &options.bake, options.skip.unseen);
+        let needs = SceneNeeds::of(scene, &options.bake);
         limits::check(device, scene, &needs)?;
         let baked = bake::ensure(baker, cache, scene, &needs, progress)?;
         let store = Store::new(device, scene, &options.bake, baked)?;

@@ -35,9 +35,7 @@ impl Frame {
         let entity = &self.scene.entities[index];
         let geometry = &self.store.geometries[entity.mesh];
         // A field that nobody needs was not baked, and one of zeros changes nothing.
-        let holds = |slot: &Option<Slot>| {
-            slot.as_ref().is_some_and(|slot| !self.options.skip.empty || slot.extent != Extent::Nothing)
-        };
+        let holds = |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing);
         let coloured = geometry.radiance.is_some() && entity.emits;
         let source = if coloured { &geometry.radiance } else { &geometry.blocked };
         let rotation = placement.turn();

@@ -21,12 +21,8 @@ impl Frame {
         let entities = || self.scene.entities.iter().filter(|entity| entity.occludes || entity.emits);
         let empty = |entity: &&Entity| self.store.geometries[entity.mesh].is_empty(entity.emits);
         Counts {
-            empty: if self.options.skip.empty { entities().filter(empty).count() as u64 } else { 0 },
-            unseen: if self.options.skip.unseen {
-                entities().filter(|e| !crate::bake::is_seen(&self.scene, e)).count() as u64
-            } else {
-                0
-            },
+            empty: entities().filter(empty).count() as u64,
+            unseen: entities().filter(|e| !crate::bake::is_seen(&self.scene, e)).count() as u64,
             hidden: if self.options.skip.hidden { self.hidden_count(placements) as u64 } else { 0 },
             undrawn: self.undrawn_count(placements) as u64,
             ..self.work.lists.counts(&self.state(placements))

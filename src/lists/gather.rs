@@ -240,8 +240,6 @@ impl Packed {
             let numbers = [light.radiance, f32::from_bits(light.entity), f32::from_bits(light.coloured), 0.0];
             quads.extend([light.facing, numbers]);
         }
-        let skip = scene.skip;
-        let switches = [skip.horizon, skip.cones, skip.behind, skip.facing, skip.caps];
         Packed {
             push: Push {
                 occluder_count: members.len() as u32,
@@ -250,7 +248,7 @@ impl Packed {
                 light_first: light_first as u32,
                 light_count: scene.lights.len() as u32,
                 capacity: 0,
-                switches: switches.iter().enumerate().map(|(bit, &on)| u32::from(on) << bit).sum(),
+                switches: scene_bounds.skip.bits(),
                 sky: scene.sky.unwrap_or(-1.0),
                 brightest: scene.brightest,
                 eps: scene.eps,

@@ -154,11 +154,8 @@ impl Form {
             .define("UNIFORM", self.variant.uniform)
             .define("ENTITY_LIMIT", self.entity_limit)
             .define("HALF", self.storage == Storage::F16)
-            .define("SKIP_HORIZON", self.skip.horizon)
-            .define("SKIP_CONES", self.skip.cones)
             .number("FADE", SKIP_FADE_RAD)
             .number("MEET", CONES_MEET_RAD)
-            .define("CAPS", self.skip.caps)
             .number("CAP_SINE_LEAST", CAP_SINES[0])
             .number("CAP_SINE_MOST", CAP_SINES[1])
             .number("CAP_SPREAD", CAP_SPREAD)
@@ -184,6 +181,7 @@ impl Form {
             .define("CELLS", cells)
             .define("LATITUDES", latitudes)
             .define("LONGITUDES", longitudes);
+        let row = self.skip.merge_defines().fold(row, |row, (name, on)| row.define(name, on));
         ["WARP_0", "WARP_1", "WARP_2"]
             .into_iter()
             .zip(CELL_WARP)

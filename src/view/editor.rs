@@ -157,7 +157,7 @@ impl Editor {
 
     /// Fields that a mesh needs for its entities' switches: occlusion, radiance.
     pub fn needs(&self, mesh: usize) -> [Option<quantity::FieldKind>; 2] {
-        bake::needs(&self.scene, mesh, true)
+        bake::needs(&self.scene, mesh)
     }
 
     /// Advances the time by `dt_s` seconds if the motion runs. Placements depend only on the sum of all `dt_s`.

@@ -94,8 +94,7 @@ impl BakeArguments {
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "Merging")]
 pub struct MergeArguments {
-    /// Shader variant: storage, storage-uniform, texel, texel-packed or texel-shifted, or image or image-uniform, whose sampler
-    /// interpolates less exactly; default: of the former what was measured to be the device's fastest, after a first run
+    /// Shader variant: storage, storage-uniform, texel, texel-packed or texel-shifted, or image, whose sampler interpolates less exactly; default: of the former what was measured to be the device's fastest, after a first run
     #[arg(long, value_name = "NAME", value_parser = Variant::named)]
     pub variant: Option<Variant>,
     /// Work to leave out: all, none, or a list of horizon, cones, behind, caps, unmoved, hidden. Horizon and cones leave out what

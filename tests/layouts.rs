@@ -10,7 +10,7 @@ use shadow_fields::gpu::reflect::Reflection;
 use shadow_fields::layout::{Cluster, Entity};
 use shadow_fields::lists::gather::{Bounds, Gather, Group, Report};
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::merge::variant::{Form, VARIANTS, Variant};
+use shadow_fields::merge::variant::{MergePermutation, VARIANTS, Variant};
 use std::mem::offset_of;
 
 /// Compares a struct of the shader with a Rust struct, field by field. The pattern names every field, so one that is missing
@@ -26,7 +26,7 @@ macro_rules! same_layout {
 }
 
 fn merge() -> Vec<(Variant, Reflection)> {
-    let form = |variant| Form {
+    let permutation = |variant| MergePermutation {
         variant,
         bands: 4,
         field_bands: 4,
@@ -38,7 +38,7 @@ fn merge() -> Vec<(Variant, Reflection)> {
         entity_limit: 48,
     };
     let reflection = |row| library().shader(&row).unwrap().reflection;
-    VARIANTS.iter().map(|&variant| (variant, reflection(form(variant).row()))).collect()
+    VARIANTS.iter().map(|&variant| (variant, reflection(permutation(variant).row()))).collect()
 }
 
 #[test]

@@ -11,7 +11,7 @@ use shadow_fields::lists::gather::Gather;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::chain::{Chain, PRODUCTS};
 use shadow_fields::merge::product::{Products, Shape};
-use shadow_fields::merge::variant::{Form, VARIANTS, Variant};
+use shadow_fields::merge::variant::{MergePermutation, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, ShaderPermutation};
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -51,8 +51,8 @@ fn lattice(text: &str) -> Lattice {
     text.parse().unwrap()
 }
 
-fn usual_form() -> Form {
-    Form {
+fn usual_permutation() -> MergePermutation {
+    MergePermutation {
         variant: VARIANTS[0],
         bands: 4,
         field_bands: 4,
@@ -65,16 +65,25 @@ fn usual_form() -> Form {
     }
 }
 
-/// A usual form, everything that differs from it in one choice, and a few far from it.
+/// A usual permutation, everything that differs from it in one choice, and a few far from it.
 fn merging() -> Vec<ShaderPermutation> {
-    let usual = usual_form();
-    let mut forms = vec![usual];
-    forms.extend(["none", "horizon", "cones", "caps"].map(|skip| Form { skip: skip.parse().unwrap(), ..usual }));
+    let usual = usual_permutation();
+    let mut permutations = vec![usual];
+    permutations.extend(
+        ["none", "horizon", "cones", "caps"].map(|skip| MergePermutation { skip: skip.parse().unwrap(), ..usual }),
+    );
     // Seven bands take 33 s to optimise, six 5 s, four 0.6 s; see the ignored test.
-    forms.extend((2..=6).map(|bands| Form { bands, field_bands: bands, ..usual }));
+    permutations.extend((2..=6).map(|bands| MergePermutation { bands, field_bands: bands, ..usual }));
     for &variant in VARIANTS {
-        forms.extend([Storage::F16, Storage::F32].map(|storage| Form { variant, storage, ..usual }));
-        forms.push(Form { variant, storage: Storage::F32, bands: 3, field_bands: 3, skip: Skip::NONE, ..usual });
+        permutations.extend([Storage::F16, Storage::F32].map(|storage| MergePermutation { variant, storage, ..usual }));
+        permutations.push(MergePermutation {
+            variant,
+            storage: Storage::F32,
+            bands: 3,
+            field_bands: 3,
+            skip: Skip::NONE,
+            ..usual
+        });
     }
     let lattices = [
         "cube:16x8,log,inner=0.25",
@@ -85,18 +94,22 @@ fn merging() -> Vec<ShaderPermutation> {
         "latlon:1x1x1,inner=1.02",
     ];
     for lookup in [Lookup::Nearest, Lookup::Radial, Lookup::Trilinear] {
-        forms.push(Form { lookup, ..usual });
-        forms.extend(lattices.map(|text| Form { lattice: lattice(text), lookup, ..usual }));
+        permutations.push(MergePermutation { lookup, ..usual });
+        permutations.extend(lattices.map(|text| MergePermutation { lattice: lattice(text), lookup, ..usual }));
     }
-    forms.push(Form { guard: false, ..usual });
-    forms.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| Form { bands, field_bands, ..usual }));
-    forms.push(Form {
+    permutations.push(MergePermutation { guard: false, ..usual });
+    permutations.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| MergePermutation {
+        bands,
+        field_bands,
+        ..usual
+    }));
+    permutations.push(MergePermutation {
         variant: Variant::named("texel-shifted").unwrap(),
         lattice: lattice("latlon:8x4x4,log,raw,inner=0.2"),
         lookup: Lookup::Nearest,
         ..usual
     });
-    forms.iter().map(Form::row).collect()
+    permutations.iter().map(MergePermutation::row).collect()
 }
 
 /// Every product, with its loop alone, guarded or not, and by fields of more or fewer bands.
@@ -174,7 +187,7 @@ fn merge_shaders_are_valid() {
 #[test]
 #[ignore = "half a minute of shader optimisation"]
 fn merge_of_seven_bands_is_valid() {
-    check(vec![Form { bands: 7, ..usual_form() }.row()]);
+    check(vec![MergePermutation { bands: 7, ..usual_permutation() }.row()]);
 }
 
 #[test]

@@ -6,8 +6,8 @@ mod common;
 mod stage;
 
 use common::report;
-use shadow_fields::check::merge::{ARITHMETIC, against_twin};
 use glam::{Quat, Vec3};
+use shadow_fields::check::merge::{ARITHMETIC, against_twin};
 use shadow_fields::frame::Options;
 use shadow_fields::lists::skip::{Kind, Skip, switches};
 use shadow_fields::scene::{Placement, Scene};
@@ -181,8 +181,7 @@ fn a_light_that_faces_away_is_left_off() {
 #[test]
 fn what_no_receiver_sees_is_not_baked() {
     let Some(stage) = stage() else { return };
-    let ball_and_ring =
-        "environment = { uniform = [0.4, 0.5, 0.6] }\n\
+    let ball_and_ring = "environment = { uniform = [0.4, 0.5, 0.6] }\n\
          [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.3, subdivisions = 2 }\n\
          [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.3, minor_m = 0.1, segments = 12, sides = 6 }\n\
          [[entity]]\nmesh = \"ball\"\n[[entity]]\nmesh = \"ring\"\nposition = [0, 0.5, 0]\nreceives = false\n";

@@ -10,7 +10,7 @@ use crate::field::FieldKind;
 use crate::gpu::Device;
 use crate::gpu::census::{Census, disassemble};
 use crate::merge::Merge;
-use crate::merge::variant::{Form, VARIANTS, Variant};
+use crate::merge::variant::{MergePermutation, VARIANTS, Variant};
 use crate::merge::workload::Workload;
 use crate::scene::Scene;
 use crate::shaders::Library;
@@ -112,10 +112,10 @@ pub struct Row {
     pub read_share: Option<f64>,
 }
 
-fn work(form: &Form, census: &Census) -> Work {
+fn work(permutation: &MergePermutation, census: &Census) -> Work {
     // A sampler reads eight texels of four halves.
     let texel = |name: &str| match name {
-        "field_quads" => texel_bytes(form),
+        "field_quads" => texel_bytes(permutation),
         "field_image" => 64,
         _ => 16,
     };
@@ -124,18 +124,26 @@ fn work(form: &Form, census: &Census) -> Work {
     Work { flops: census.flops, fetches: census.fetch_count(), bytes: fetched + loaded }
 }
 
-fn texel_bytes(form: &Form) -> u32 {
-    if form.field_format() == ash::vk::Format::R16G16B16A16_SFLOAT { 8 } else { 16 }
+fn texel_bytes(permutation: &MergePermutation) -> u32 {
+    if permutation.field_format() == ash::vk::Format::R16G16B16A16_SFLOAT { 8 } else { 16 }
 }
 
-fn row(case: &str, name: &str, pairs: u64, times: &[f64], form: &Form, census: &Census, at_best: &Ceilings) -> Row {
+fn row(
+    case: &str,
+    name: &str,
+    pairs: u64,
+    times: &[f64],
+    permutation: &MergePermutation,
+    census: &Census,
+    at_best: &Ceilings,
+) -> Row {
     let ms = Tenths::new(times);
-    let work = work(form, census);
+    let work = work(permutation, census);
     // Per nanosecond is 10^9 a second.
     let ns = ms.median * 1e6 / pairs.max(1) as f64;
     let field = census.fetches.get("field_quads").copied().unwrap_or(0);
     let filtered = census.fetches.get("field_image").copied().unwrap_or(0);
-    let field_rate = if texel_bytes(form) == 8 { at_best.texel_halves_giga } else { at_best.texel_packed_giga };
+    let field_rate = if texel_bytes(permutation) == 8 { at_best.texel_halves_giga } else { at_best.texel_packed_giga };
     let other = f64::from(work.fetches - field - filtered) / at_best.texel_packed_giga
         + f64::from(filtered) / at_best.filtered_giga;
     let loaded: u32 = census.block_bytes.values().sum();
@@ -170,10 +178,10 @@ pub fn made_up(
     let (device, library) = (bench.baker.device(), bench.baker.library());
     let mut ready = Vec::new();
     for contender in chosen {
-        let form = Form { guard: contender.guard, ..workload.form(contender.variant) };
-        let census = Census::new(&library.shader(&form.row())?)?;
-        let merge = Merge::new(device, library, form)?;
-        ready.push((contender, form, census, merge, workload.inputs(contender.variant)?, Vec::new()));
+        let permutation = MergePermutation { guard: contender.guard, ..workload.permutation(contender.variant) };
+        let census = Census::new(&library.shader(&permutation.row())?)?;
+        let merge = Merge::new(device, library, permutation)?;
+        ready.push((contender, permutation, census, merge, workload.inputs(contender.variant)?, Vec::new()));
     }
     for run in 0..=runs {
         for (.., merge, inputs, times) in &mut ready {
@@ -184,8 +192,8 @@ pub fn made_up(
         }
     }
     let case = format!("{} x {}", workload.vertex_count(), workload.occluder_count());
-    let rows = ready.into_iter().map(|(contender, form, census, _, _, times)| {
-        (row(&case, &contender.name, workload.pairs(), &times, &form, &census, at_best), times)
+    let rows = ready.into_iter().map(|(contender, permutation, census, _, _, times)| {
+        (row(&case, &contender.name, workload.pairs(), &times, &permutation, &census, at_best), times)
     });
     Ok(rows.collect())
 }
@@ -230,9 +238,9 @@ pub fn scene(
         }
     }
     for (contender, frame, times, pairs) in &frames {
-        let form = frame.form();
-        let census = Census::new(&library.shader(&form.row())?)?;
-        rows.push((row(name, &contender.name, *pairs, times, &form, &census, at_best), times.clone()));
+        let permutation = frame.permutation();
+        let census = Census::new(&library.shader(&permutation.row())?)?;
+        rows.push((row(name, &contender.name, *pairs, times, &permutation, &census, at_best), times.clone()));
     }
     let mut add = |pass: &str, variant: &str, times: Vec<f64>| rows.push((plain(name, pass, variant, &times), times));
     others.into_iter().for_each(|(pass, times)| add(&pass, "", times));
@@ -341,16 +349,16 @@ pub fn starts(fresh: &Arc<Device>, library: &Library, chosen: &[Contender]) -> R
     let since = |start: Instant| start.elapsed().as_secs_f64() * 1e3;
     let mut out = Vec::new();
     for contender in chosen {
-        let form = Form { guard: contender.guard, ..workload.form(contender.variant) };
+        let permutation = MergePermutation { guard: contender.guard, ..workload.permutation(contender.variant) };
         let compile = |library: &Library| -> Result<f64> {
             let start = Instant::now();
-            library.shader(&form.row())?;
+            library.shader(&permutation.row())?;
             Ok(since(start))
         };
         let inputs = workload.inputs(contender.variant)?;
         let first = || -> Result<f64> {
             let start = Instant::now();
-            let merge = Merge::new(fresh, library, form)?;
+            let merge = Merge::new(fresh, library, permutation)?;
             workload.run(&merge, &inputs)?;
             Ok(since(start))
         };
@@ -372,8 +380,8 @@ pub fn starts(fresh: &Arc<Device>, library: &Library, chosen: &[Contender]) -> R
 /// `Failed` when a file cannot be written.
 pub fn write_spirv(folder: &Path, library: &Library, workload: &Workload, chosen: &[Contender]) -> Result<()> {
     for contender in chosen {
-        let form = Form { guard: contender.guard, ..workload.form(contender.variant) };
-        let shader = library.shader(&form.row())?;
+        let permutation = MergePermutation { guard: contender.guard, ..workload.permutation(contender.variant) };
+        let shader = library.shader(&permutation.row())?;
         let path = |ending: &str| folder.join(format!("{}.{ending}", contender.name.replace('/', "-")));
         let words: Vec<u8> = shader.spirv.iter().flat_map(|word| word.to_le_bytes()).collect();
         crate::files::replace(&path("spv"), &words)

@@ -1,11 +1,11 @@
 //! What may change from frame to frame: the scene's lights and camera, the merge's variant, and shader files.
 
-use super::form::{CompiledMerge, usable};
+use super::permutation::{CompiledMerge, usable};
 use super::{Frame, Options};
 use crate::draw::Draw;
 use crate::error::Result;
 use crate::merge::calibrate;
-use crate::merge::variant::{Form, Variant};
+use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{Camera, Scene};
 
 impl Frame {
@@ -49,9 +49,9 @@ impl Frame {
     /// `Failed` when its shader does not compile.
     pub fn set_variant(&mut self, variant: Option<Variant>) -> Result<()> {
         let variant = variant.unwrap_or_else(|| calibrate::best_known(&self.device));
-        let wanted = Form { variant, ..self.merge.form };
+        let wanted = MergePermutation { variant, ..self.merge.permutation };
         let usable = usable(&self.device, &self.store, self.scene.entities.len(), wanted)?;
-        if usable.0 != self.merge.form {
+        if usable.0 != self.merge.permutation {
             self.merge = CompiledMerge::new(&self.device, &self.library, usable)?;
             self.forget();
         }

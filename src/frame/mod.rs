@@ -8,8 +8,8 @@
 
 mod change;
 mod draw_twin;
-mod form;
 pub mod memory;
+mod permutation;
 mod picture;
 mod pose;
 mod radiosity;
@@ -31,13 +31,13 @@ use crate::lists::gathering::Gathering;
 use crate::lists::incremental::{ClusterLists, Merged};
 use crate::lists::skip::Skip;
 use crate::merge::calibrate;
-use crate::merge::variant::{Form, Variant, uniform_entities};
+use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
 use crate::merge::{Inputs, Readable};
 use crate::scene::{Placement, Scene};
 use crate::scene_buffers::{Store, limits};
 use crate::shaders::Library;
 use ash::vk;
-use form::{CompiledMerge, form, usable};
+use permutation::{CompiledMerge, permutation, usable};
 use picture::Picture;
 use radiosity::Radiosity;
 use sky::Sky;
@@ -106,7 +106,7 @@ impl Frame {
         let store = Store::new(device, scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
-        let wanted = form(&options, wanted, uniform_entities(device));
+        let wanted = permutation(&options, wanted, uniform_entities(device));
         let merge = CompiledMerge::new(device, library, usable(device, &store, entity_count, wanted)?)?;
 
         let radiosity = Radiosity::new(device, scene, &store)?;
@@ -118,7 +118,7 @@ impl Frame {
         let place = options.lists.unwrap_or_else(|| Place::quicker(device, entity_count));
         let gathers = place == Place::Device && !lists.clusters.is_empty();
         let gathering = gathers.then(|| Gathering::new(device, library, &lists, entity_count)).transpose()?;
-        let entity_room = entity_count.max(merge.form.entity_limit as usize);
+        let entity_room = entity_count.max(merge.permutation.entity_limit as usize);
         let mut sky = Sky::new(device, options.bake.bands)?;
         sky.write(scene, options.bake.bands)?;
         Ok(Frame {
@@ -248,15 +248,15 @@ impl Frame {
 
     fn inputs(&self) -> Result<Inputs<'_>> {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
-        let CompiledMerge { form, image, .. } = &self.merge;
+        let CompiledMerge { permutation, image, .. } = &self.merge;
         Ok(Inputs {
-            entities: Readable::shared(&self.work.entities, form.variant)?,
+            entities: Readable::shared(&self.work.entities, permutation.variant)?,
             entries: self.work.entries(),
             clusters: &self.work.clusters,
-            fields: Readable::fields(&self.store.fields, image.as_ref(), form)?,
-            transfers: Readable::new(&self.store.transfers, form.variant, floats)?,
-            vertices: Readable::new(&self.store.vertices, form.variant, floats)?,
-            sky: Readable::new(&self.sky.coefficients, form.variant, floats)?,
+            fields: Readable::fields(&self.store.fields, image.as_ref(), permutation)?,
+            transfers: Readable::new(&self.store.transfers, permutation.variant, floats)?,
+            vertices: Readable::new(&self.store.vertices, permutation.variant, floats)?,
+            sky: Readable::new(&self.sky.coefficients, permutation.variant, floats)?,
         })
     }
 
@@ -309,12 +309,12 @@ impl Frame {
 
     /// The variant that it merges by.
     pub fn variant(&self) -> Variant {
-        self.merge.form.variant
+        self.merge.permutation.variant
     }
 
     /// What its merge was compiled for.
-    pub fn form(&self) -> Form {
-        self.merge.form
+    pub fn permutation(&self) -> MergePermutation {
+        self.merge.permutation
     }
 
     /// What the last frame did about its clusters.

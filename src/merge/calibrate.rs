@@ -83,7 +83,7 @@ pub fn measure(device: &Arc<Device>, library: &Library) -> Result<Calibration> {
     let workload = Workload::new(device, VERTICES, OCCLUDERS)?;
     let mut contenders = Vec::new();
     for variant in candidates() {
-        let merge = match Merge::new(device, library, workload.form(variant)) {
+        let merge = match Merge::new(device, library, workload.permutation(variant)) {
             Err(error @ (Error::Failed(_) | Error::Shader(_))) => {
                 log::warn!("calibration: {} takes no part: {error}", variant.name);
                 None

@@ -18,7 +18,7 @@ use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::Library;
 use ash::vk;
 use std::sync::Arc;
-use variant::Form;
+use variant::MergePermutation;
 pub use variant::Variant;
 
 /// A resource that a variant reads as a block, through a texel view, or through a sampler.
@@ -46,9 +46,9 @@ impl<'b> Readable<'b> {
     ///
     /// # Errors
     /// As [`Readable::new`].
-    pub fn fields(buffer: &'b Buffer, image: Option<&'b Volume>, form: &Form) -> Result<Self> {
+    pub fn fields(buffer: &'b Buffer, image: Option<&'b Volume>, permutation: &MergePermutation) -> Result<Self> {
         image.map_or_else(
-            || Self::new(buffer, form.variant, form.field_format()),
+            || Self::new(buffer, permutation.variant, permutation.field_format()),
             |image| Ok(Readable(Bind::Volume(image))),
         )
     }
@@ -89,12 +89,12 @@ pub struct Merge {
 }
 
 impl Merge {
-    /// The pipeline of one form.
+    /// The pipeline of one permutation.
     ///
     /// # Errors
     /// `Failed` when the shader does not compile.
-    pub fn new(device: &Arc<Device>, library: &Library, form: Form) -> Result<Self> {
-        Ok(Merge { pipeline: ComputePipeline::new(device, "merge", &library.shader(&form.row())?, &[])? })
+    pub fn new(device: &Arc<Device>, library: &Library, permutation: MergePermutation) -> Result<Self> {
+        Ok(Merge { pipeline: ComputePipeline::new(device, "merge", &library.shader(&permutation.row())?, &[])? })
     }
 
     /// Lights the first `cluster_count` clusters.

@@ -83,7 +83,7 @@ pub fn uniform_entities(device: &Device) -> u32 {
 
 /// What the merge shader is compiled for: a variant, the shape of the fields, and what is left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Form {
+pub struct MergePermutation {
     /// How it is done.
     pub variant: Variant,
     /// SH bands of transfer, light and products.
@@ -104,7 +104,7 @@ pub struct Form {
     pub entity_limit: u32,
 }
 
-impl Form {
+impl MergePermutation {
     /// Format of the texels that fields are read through.
     pub fn field_format(&self) -> vk::Format {
         match self.storage {
@@ -114,7 +114,7 @@ impl Form {
         }
     }
 
-    /// Whether fields of this form can be read as an image.
+    /// Whether fields of this permutation can be read as an image.
     pub fn fits_image(&self) -> bool {
         self.storage == Storage::F16
             && self.bands == self.field_bands

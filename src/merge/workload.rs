@@ -8,7 +8,7 @@ use crate::gpu::{Buffer, BufferKind, Commands, Device, Volume};
 use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, ListEntry, NONE};
 use crate::lists::skip::Skip;
 use crate::merge::shelf::Shelf;
-use crate::merge::variant::{Form, Variant, uniform_entities};
+use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
 use crate::merge::{Inputs, Merge, Readable};
 use crate::sh::rotation::turns;
 use ash::vk;
@@ -132,9 +132,9 @@ impl Workload {
         self.fields.size_bytes
     }
 
-    /// The form of the shader for a variant.
-    pub fn form(&self, variant: Variant) -> Form {
-        Form {
+    /// The permutation of the shader for a variant.
+    pub fn permutation(&self, variant: Variant) -> MergePermutation {
+        MergePermutation {
             variant,
             bands: BANDS,
             field_bands: BANDS,
@@ -157,7 +157,7 @@ impl Workload {
             entities: Readable::shared(&self.entities, variant)?,
             entries: &self.entries,
             clusters: &self.clusters,
-            fields: Readable::fields(&self.fields, variant.image.then_some(&self.image), &self.form(variant))?,
+            fields: Readable::fields(&self.fields, variant.image.then_some(&self.image), &self.permutation(variant))?,
             transfers: Readable::new(&self.transfers, variant, floats)?,
             vertices: Readable::new(&self.vertices, variant, floats)?,
             sky: Readable::new(&self.sky, variant, floats)?,

@@ -4,7 +4,7 @@ use super::Options;
 use crate::error::Result;
 use crate::gpu::{Device, TexelView, Volume};
 use crate::merge::Merge;
-use crate::merge::variant::{Form, Variant};
+use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene_buffers::Store;
 use crate::shaders::Library;
 use ash::vk;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub(super) struct CompiledMerge {
     pub pass: Merge,
     /// What its shader was compiled for.
-    pub form: Form,
+    pub permutation: MergePermutation,
     /// The fields as an image, where the variant samples one.
     pub image: Option<Volume>,
 }
@@ -24,8 +24,12 @@ impl CompiledMerge {
     ///
     /// # Errors
     /// As [`Merge::new`].
-    pub fn new(device: &Arc<Device>, library: &Library, (form, image): (Form, Option<Volume>)) -> Result<Self> {
-        Ok(CompiledMerge { pass: Merge::new(device, library, form)?, form, image })
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        (permutation, image): (MergePermutation, Option<Volume>),
+    ) -> Result<Self> {
+        Ok(CompiledMerge { pass: Merge::new(device, library, permutation)?, permutation, image })
     }
 
     /// Compiles its shader anew, from files that have changed.
@@ -33,33 +37,38 @@ impl CompiledMerge {
     /// # Errors
     /// As [`Merge::new`].
     pub fn rebuild(&mut self, device: &Arc<Device>, library: &Library) -> Result<()> {
-        self.pass = Merge::new(device, library, self.form)?;
+        self.pass = Merge::new(device, library, self.permutation)?;
         Ok(())
     }
 }
 
-/// The form with its variant less the texel views or uniform blocks that cannot hold the scene.
+/// The permutation with its variant less the texel views or uniform blocks that cannot hold the scene.
 pub(super) fn usable(
     device: &Device,
     store: &Store,
     entity_count: usize,
-    form: Form,
-) -> Result<(Form, Option<Volume>)> {
+    permutation: MergePermutation,
+) -> Result<(MergePermutation, Option<Volume>)> {
     let floats = vk::Format::R32G32B32A32_SFLOAT;
-    let fits = TexelView::fits(device, form.field_format(), store.fields.size_bytes)
+    let fits = TexelView::fits(device, permutation.field_format(), store.fields.size_bytes)
         && TexelView::fits(device, floats, store.transfers.size_bytes)
         && TexelView::fits(device, floats, store.vertices.size_bytes);
-    let image = (form.variant.image && form.fits_image()).then(|| store.image()).transpose()?.flatten();
-    let variant = form.variant.restricted(fits, entity_count <= form.entity_limit as usize, image.is_some());
-    if variant != form.variant {
-        log::info!("the scene is too large for the variant \"{}\"; using \"{}\"", form.variant.name, variant.name);
+    let image = (permutation.variant.image && permutation.fits_image()).then(|| store.image()).transpose()?.flatten();
+    let variant =
+        permutation.variant.restricted(fits, entity_count <= permutation.entity_limit as usize, image.is_some());
+    if variant != permutation.variant {
+        log::info!(
+            "the scene is too large for the variant \"{}\"; using \"{}\"",
+            permutation.variant.name,
+            variant.name
+        );
     }
-    Ok((Form { variant, ..form }, image.filter(|_| variant.image)))
+    Ok((MergePermutation { variant, ..permutation }, image.filter(|_| variant.image)))
 }
 
-/// The form of the merge shader.
-pub(super) fn form(options: &Options, variant: Variant, entity_limit: u32) -> Form {
-    Form {
+/// The permutation of the merge shader.
+pub(super) fn permutation(options: &Options, variant: Variant, entity_limit: u32) -> MergePermutation {
+    MergePermutation {
         variant,
         bands: options.bake.bands,
         field_bands: options.bake.occlusion_bands(),

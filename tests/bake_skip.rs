@@ -139,7 +139,7 @@ fn samples_inside_a_solid_are_captured_off_its_surface() {
         let p = DVec3::new(radius * along.cos(), 0.33 * around.sin(), radius * along.sin()) / 1.3;
         let mut seen = 0.0;
         for face in 0..6 {
-            let covered = capture::reference(&positions, &mesh.triangles, p, face, 16);
+            let covered = capture::twin(&positions, &mesh.triangles, p, face, 16);
             let texels = covered.iter().enumerate().filter(|(_, covered)| **covered);
             seen += texels.map(|(i, _)| weights[i]).sum::<f64>() * Y00;
         }

@@ -205,7 +205,7 @@ fn outlines_are_smoother_than_four_samples() {
         let mut frame = stage.frame(&scene, options(antialias));
         frame.render(&placements, Some(1.0)).unwrap();
         if wanted.is_empty() {
-            wanted = frame.reference_texels(&placements, 1.0, &grid).unwrap();
+            wanted = frame.twin_texels(&placements, 1.0, &grid).unwrap();
         }
         frame.picture()
     });

@@ -201,13 +201,13 @@ fn samples_in_the_tube_are_filled_from_outside() {
         }
         // What it holds is what rays see from there.
         let px = field.header.face_px;
-        let faces: Vec<Vec<bool>> = (0..6).map(|f| capture::reference(&unit, &mesh.triangles, eye, f, px)).collect();
+        let faces: Vec<Vec<bool>> = (0..6).map(|f| capture::twin(&unit, &mesh.triangles, eye, f, px)).collect();
         let texel = |face: usize, x: usize, y: usize| {
             let covered: bool = faces[face][y * px as usize + x];
             [if covered { 0.0 } else { 1.0 }, 0.0, 0.0]
         };
         let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
-        let wanted = project::reference(4, Projection::Blocked, px as usize, Vec3::Y, scale, texel);
+        let wanted = project::twin(4, Projection::Blocked, px as usize, Vec3::Y, scale, texel);
         let stored = (sample / directions) as u32 * lattice.stored_direction_count() + own[sample % directions];
         for (k, wanted) in wanted.iter().enumerate() {
             let found = field.stored(stored, 0, k);

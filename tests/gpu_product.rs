@@ -8,7 +8,7 @@ use common::report;
 use shadow_fields::frame::Options;
 use shadow_fields::gpu::{Buffer, BufferKind, Commands};
 use shadow_fields::merge::chain::{Chain, PRODUCTS, Product};
-use shadow_fields::merge::product::{Products, Push, Shape, reference};
+use shadow_fields::merge::product::{Products, Push, Shape, twin};
 use shadow_fields::sh::basis::coefficient_count;
 use shadow_fields::sh::lobe::{cap, clamped_cosine};
 use stage::{Stage, scene, small, stage};
@@ -48,7 +48,7 @@ fn error(stage: &Stage, shape: Shape, count: usize, steps: u32) -> f64 {
     let chains = inputs[0].chunks(sizes[0]).zip(inputs[1].chunks(sizes[1])).zip(found.chunks(sizes[0]));
     let mut worst = 0.0_f64;
     for ((transfer, factor), found) in chains {
-        for (f, e) in found.iter().zip(reference(shape, transfer, factor, push)) {
+        for (f, e) in found.iter().zip(twin(shape, transfer, factor, push)) {
             assert!(f.is_finite(), "{shape:?}");
             worst = worst.max((f64::from(*f) - e).abs());
         }
@@ -100,7 +100,7 @@ fn guarded_chains_stay_bounded() {
             .chunks(16)
             .zip(inputs[1].chunks(16))
             .take(16)
-            .map(|(transfer, factor)| reference(shape(false), transfer, factor, push)[0].abs());
+            .map(|(transfer, factor)| twin(shape(false), transfer, factor, push)[0].abs());
         assert!(grown.fold(0.0, f64::max) > 100.0, "without the guard {product:?} grows");
     }
 }

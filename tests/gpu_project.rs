@@ -5,7 +5,7 @@ mod common;
 use common::{gpu, pot, report};
 use glam::Vec3;
 use shadow_fields::asset::{Mesh, generate};
-use shadow_fields::bake::assemble::{Source, Sources, reference};
+use shadow_fields::bake::assemble::{Source, Sources, twin};
 use shadow_fields::bake::capture::NO_SLOT;
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::check::assemble;
@@ -161,7 +161,7 @@ fn samples_are_lowered_by_the_sag_between_them() {
     let shell = |sample: u32| f64::from(sample / lattice.direction_count());
     let stored = |of: &dyn Fn(u32) -> f64| {
         let captured: Vec<f32> = (0..count).map(|s| of(s) as f32).collect();
-        reference(&captured, &sources, 1, 1.0)
+        twin(&captured, &sources, 1, 1.0)
     };
     let per_shell = lattice.stored_direction_count() as usize;
     for (power, sag) in [(0, 0.0), (1, 0.0), (2, 2.0 / 12.0)] {

@@ -13,7 +13,7 @@ use shadow_fields::field::ShadowField;
 use shadow_fields::frame::Frame;
 use shadow_fields::lists::gather::{EntityBounds, SceneBounds};
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::merge::reference::{Object, Task};
+use shadow_fields::merge::twin::{Object, Task};
 use shadow_fields::scene::Scene;
 use stage::{Stage, scene, small, stage};
 use std::collections::BTreeMap;

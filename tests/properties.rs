@@ -7,7 +7,7 @@ use common::report;
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
-use shadow_fields::bake::assemble::{Sources, reference};
+use shadow_fields::bake::assemble::{Sources, twin};
 use shadow_fields::field::{FieldHeader, FieldKind, Lattice, Lookup, ShadowField, Storage};
 use shadow_fields::sh::basis::{Y00, coefficient_count};
 use shadow_fields::sh::product::Tensor;
@@ -161,7 +161,7 @@ fn field(lattice: Lattice, seed: u64) -> ShadowField {
         (0..lattice.sample_count() as usize * header.sample_stride()).map(|_| rng.f32() - 0.5).collect();
     let none = vec![false; lattice.sample_count() as usize];
     let sources = Sources::new(&lattice, &none, &none).unwrap();
-    let stored = reference(&captured, &sources, header.sample_stride(), 1.0);
+    let stored = twin(&captured, &sources, header.sample_stride(), 1.0);
     let payload = stored.iter().flat_map(|x| (*x as f32).to_le_bytes()).collect();
     ShadowField { header, payload }
 }

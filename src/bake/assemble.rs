@@ -208,7 +208,7 @@ impl Assemble {
 }
 
 /// The CPU twin, before rounding to the storage format.
-pub fn reference(captured: &[f32], sources: &Sources, sample_stride: usize, factor: f32) -> Vec<f64> {
+pub fn twin(captured: &[f32], sources: &Sources, sample_stride: usize, factor: f32) -> Vec<f64> {
     let lists = sources.offsets.windows(2).map(|w| &sources.list[w[0] as usize..w[1] as usize]);
     lists
         .flat_map(|list| {

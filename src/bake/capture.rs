@@ -228,14 +228,14 @@ fn face_axes(face: usize) -> (Vec3, Vec3, Vec3) {
 
 /// The CPU twin, by another method: casts a ray through every texel centre of one face. Row-major, true where the object
 /// is hit. Slow; positions are those of [`unit_positions`].
-pub fn reference(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: usize, face_px: u32) -> Vec<bool> {
+pub fn twin(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: usize, face_px: u32) -> Vec<bool> {
     let mut covered = vec![false; (face_px * face_px) as usize];
     rays(positions, triangles, eye, face, face_px, |texel, _, _| covered[texel] = true);
     covered
 }
 
 /// The same for a radiance capture: the colour of the nearest thing that each ray meets, black where there is none.
-pub fn reference_colors(
+pub fn twin_colors(
     (positions, colors): (&[Vec3], &[Vec3]),
     triangles: &[[u32; 3]],
     eye: DVec3,

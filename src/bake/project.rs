@@ -163,7 +163,7 @@ fn texel_table(face_px: usize) -> Vec<[f32; 4]> {
 
 /// The CPU twin: `texel(face, x, y)` is what was captured, per channel. Coefficients by channel, `channel_stride(bands)`
 /// apart.
-pub fn reference(
+pub fn twin(
     bands: usize,
     projection: Projection,
     face_px: usize,

@@ -139,7 +139,7 @@ pub struct Budget {
 pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Options) -> Result<Budget> {
     let placements = case.scene.at(case.time_s);
     let wide = frame::Options { bake: crate::bake::Options { storage: Storage::F32, ..options.bake }, ..options };
-    let t2 = select(&bench.frame(&case.scene, wide)?.reference(&placements)?, &truth.vertices);
+    let t2 = select(&bench.frame(&case.scene, wide)?.twin(&placements)?, &truth.vertices);
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, None)?;
     let t3 = device_radiosity(&frame, &truth.vertices)?;

@@ -5,7 +5,7 @@ use super::figures::{Spread, spread};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferKind, Commands};
 use crate::merge::chain::{Chain, PRODUCTS, Product};
-use crate::merge::product::{Products, Push, Shape, reference};
+use crate::merge::product::{Products, Push, Shape, twin};
 use crate::sh::basis::coefficient_count;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::points;
@@ -124,7 +124,7 @@ pub fn measure(bench: &Bench<'_>) -> Result<Vec<Timed>> {
             gflops: (cost.multiply_count + cost.add_count) as f64 / ns_per_product.median,
             ns_per_product,
             error,
-            identical_64: reference(shape, &start, &caps, push)[0] / start[0],
+            identical_64: twin(shape, &start, &caps, push)[0] / start[0],
         }
     });
     Ok(rows.collect())
@@ -144,7 +144,7 @@ fn error_of(shape: Shape, transfers: &[f64], factors: &[f64], found: &[f32]) -> 
     let sizes = [shape.bands, shape.field_bands].map(coefficient_count);
     let chains = transfers.chunks(sizes[0]).zip(factors.chunks(sizes[1])).zip(found.chunks(sizes[0])).take(64);
     let apart = chains.flat_map(|((transfer, factor), found)| {
-        let expected = reference(shape, transfer, factor, Push { count: 1, steps: 1, fade: 1.0 });
+        let expected = twin(shape, transfer, factor, Push { count: 1, steps: 1, fade: 1.0 });
         found.iter().zip(expected).map(|(f, e)| (f64::from(*f) - e).abs()).collect::<Vec<_>>()
     });
     apart.fold(0.0, |worst, d| if d.is_nan() { f64::INFINITY } else { worst.max(d) })

@@ -223,7 +223,7 @@ pub fn run(case: &Case, mut frame: Frame, storage: Storage) -> Result<Trial> {
     let first = device_radiosity(&frame, &vertices)?;
     frame.render(&placements, None)?;
     let second = device_radiosity(&frame, &vertices)?;
-    let twin: Vec<f64> = frame.reference(&placements)?.into_iter().flat_map(|(_, all)| all).flatten().collect();
+    let twin: Vec<f64> = frame.twin(&placements)?.into_iter().flat_map(|(_, all)| all).flatten().collect();
     let device: Vec<f64> = first.iter().flatten().copied().collect();
     let largest = |values: &[f64]| values.iter().fold(0.0, |worst: f64, v| worst.max(v.abs()));
     let apart: Vec<f64> = device.iter().zip(&twin).map(|(a, b)| a - b).collect();

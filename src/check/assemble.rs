@@ -38,7 +38,7 @@ pub fn compare(
     let number = |inside: bool, rng: &mut Rng| if inside { f32::NAN } else { 8.0 * rng.f32() - 4.0 };
     let captured: Vec<f32> =
         inside.iter().flat_map(|&inside| (0..stride).map(|_| number(inside, &mut rng)).collect::<Vec<_>>()).collect();
-    let wanted = assemble::reference(&captured, &sources, stride, FACTOR);
+    let wanted = assemble::twin(&captured, &sources, stride, FACTOR);
     assert_eq!(wanted.len(), lattice.stored_count() as usize * stride);
 
     let device = baker.device();

@@ -130,7 +130,7 @@ pub fn coverage(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Resu
     let mut out = Coverage::default();
     for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, false, true))?) {
         for (face, texels) in faces.iter().enumerate() {
-            let wanted = capture::reference(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
+            let wanted = capture::twin(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
             let Some(texels) = texels else {
                 out.left_out += 1;
                 out.left_out_wrongly += usize::from(wanted.iter().any(|c| *c));
@@ -163,8 +163,7 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
     let (mut texels, mut differing, mut lit) = (0, 0, 0);
     for (eye, faces) in eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, true, true))?) {
         for (face, found) in faces.iter().enumerate() {
-            let wanted =
-                capture::reference_colors((&positions, colors), &mesh.triangles, eye.as_dvec3(), face, face_px);
+            let wanted = capture::twin_colors((&positions, colors), &mesh.triangles, eye.as_dvec3(), face, face_px);
             for (i, wanted) in wanted.iter().enumerate() {
                 let found = found.as_ref().map_or([0.0; 3], |texels| [texels[i][0], texels[i][1], texels[i][2]]);
                 let found = Vec3::from_array(found).as_dvec3();

@@ -24,7 +24,7 @@ const EDGES: f64 = 2e-3;
 pub fn against_twin(frame: &mut Frame, placements: &[Placement], white: f32) -> Result<f64> {
     frame.render(placements, Some(white))?;
     let found = frame.picture();
-    let wanted = frame.reference_picture(placements, white)?;
+    let wanted = frame.twin_picture(placements, white)?;
     assert_eq!(found.len(), 3 * wanted.len(), "pixels");
     let mut differing = 0;
     for (found, wanted) in found.chunks_exact(3).zip(&wanted) {

@@ -108,10 +108,10 @@ pub struct Agreement {
 /// As [`Frame::render`].
 pub fn against_twin(frame: &mut Frame, placements: &[Placement]) -> Result<Agreement> {
     frame.render(placements, None)?;
-    let reference = frame.reference(placements)?;
+    let twin = frame.twin(placements)?;
     let (mut worst, mut off, mut count) = (0.0_f64, 0, 0);
-    let brightest = reference.iter().flat_map(|(_, v)| v.iter().flatten()).fold(0.0_f64, |m, b| m.max(b.abs()));
-    for (entity, expected) in &reference {
+    let brightest = twin.iter().flat_map(|(_, v)| v.iter().flatten()).fold(0.0_f64, |m, b| m.max(b.abs()));
+    for (entity, expected) in &twin {
         let found = frame.radiosity(*entity)?;
         assert_eq!(found.len(), expected.len(), "vertices of entity {entity}");
         for (found, expected) in found.iter().zip(expected) {

@@ -128,7 +128,7 @@ pub fn compare(content: &Content<'_>, bands: usize, projection: Projection) -> R
     for (eye, job) in jobs.iter().enumerate() {
         let normal = Vec3::from_slice(&job.normal[..3]);
         let texel = |face, x, y| content.texel(eye, face, x, y, projection);
-        let wanted = project::reference(bands, projection, content.capture.face_px as usize, normal, job.scale, texel);
+        let wanted = project::twin(bands, projection, content.capture.face_px as usize, normal, job.scale, texel);
         let first = job.target as usize * stride;
         for (found, wanted) in found[first..first + stride].iter().zip(&wanted) {
             let error = (f64::from(*found) - wanted).abs() / (1.0 + wanted.abs());

@@ -47,7 +47,7 @@ impl Show {
     }
 
     /// The twin: a channel of radiance as 8 bits.
-    pub fn reference(radiance: f32, white: f32) -> u8 {
+    pub fn twin(radiance: f32, white: f32) -> u8 {
         (255.0 * srgb_from_linear(radiance / white)).round() as u8
     }
 }

@@ -186,7 +186,7 @@ impl Smooth {
     }
 
     /// The twin: smooths a linear picture of `width` x `height`.
-    pub fn reference(texels: &[Texel], [width, height]: [u32; 2], lines: &[(Line, f32)]) -> Vec<DVec3> {
+    pub fn twin(texels: &[Texel], [width, height]: [u32; 2], lines: &[(Line, f32)]) -> Vec<DVec3> {
         let last = IVec2::new(width.cast_signed() - 1, height.cast_signed() - 1);
         let at = |pixel: IVec2| {
             let pixel = pixel.clamp(IVec2::ZERO, last);

@@ -37,15 +37,15 @@ impl Frame {
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn reference_picture(&self, placements: &[Placement], white: f32) -> Result<Vec<[f64; 3]>> {
+    pub fn twin_picture(&self, placements: &[Placement], white: f32) -> Result<Vec<[f64; 3]>> {
         let [width, height] = self.options.size;
         let samples: &[DVec2] = if self.samples() > 1 { &FOUR } else { &ONE };
-        let texels = self.reference_texels(placements, white, samples)?;
+        let texels = self.twin_texels(placements, white, samples)?;
         if self.picture.draw.smooth.is_none() {
             return Ok(texels.iter().map(|texel| texel.color.to_array()).collect());
         }
         let lines = self.outlines(placements, f64::from(width) / f64::from(height));
-        Ok(Smooth::reference(&texels, [width, height], &lines).iter().map(|color| color.to_array()).collect())
+        Ok(Smooth::twin(&texels, [width, height], &lines).iter().map(|color| color.to_array()).collect())
     }
 
     /// The same for samples at other places of a pixel, (0, 0) to (1, 1), as it is before outlines are smoothed. Depth and tag are
@@ -53,7 +53,7 @@ impl Frame {
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn reference_texels(&self, placements: &[Placement], white: f32, samples: &[DVec2]) -> Result<Vec<Texel>> {
+    pub fn twin_texels(&self, placements: &[Placement], white: f32, samples: &[DVec2]) -> Result<Vec<Texel>> {
         let [width, height] = self.options.size;
         let triangles = self.triangles(placements)?;
         let camera = &self.scene.data.camera;

@@ -6,7 +6,7 @@ use crate::field::{Area, ShadowField};
 use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
 use crate::lists::gather::{self, Candidates, Counts, SLACK, Scope};
 use crate::lists::incremental::State;
-use crate::merge::reference::{Object, Task};
+use crate::merge::twin::{Object, Task};
 use crate::scene::{Entity, Placement, Scene};
 use crate::scene_buffers;
 use crate::scene_buffers::Geometry;
@@ -38,15 +38,15 @@ impl Frame {
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn reference(&self, placements: &[Placement]) -> Result<Vec<(usize, Vec<[f64; 3]>)>> {
-        Ok(self.twin(placements)?.run())
+    pub fn twin(&self, placements: &[Placement]) -> Result<Vec<(usize, Vec<[f64; 3]>)>> {
+        Ok(self.merge_twin(placements)?.run())
     }
 
     /// Everything that the CPU twin of a merge reads.
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn twin<'f>(&'f self, placements: &'f [Placement]) -> Result<Twin<'f>> {
+    fn merge_twin<'f>(&'f self, placements: &'f [Placement]) -> Result<MergeTwin<'f>> {
         let mut fields: Vec<[Option<ShadowField>; 2]> = Vec::new();
         for geometry in &self.store.geometries {
             let load =
@@ -72,7 +72,7 @@ impl Frame {
                 listed: (self.options.eps > 0.0).then(|| listed(&state, index, geometry)),
             });
         }
-        Ok(Twin {
+        Ok(MergeTwin {
             frame: self,
             placements,
             fields,
@@ -84,7 +84,7 @@ impl Frame {
 }
 
 /// The CPU twin of a merge, ready to run.
-pub struct Twin<'f> {
+struct MergeTwin<'f> {
     frame: &'f Frame,
     placements: &'f [Placement],
     /// Occlusion and radiance by mesh.
@@ -104,7 +104,7 @@ struct Receiver {
     listed: Option<Listed>,
 }
 
-impl Twin<'_> {
+impl MergeTwin<'_> {
     /// Radiosity of every receiver's vertices, by entity, on all threads.
     pub fn run(&self) -> Vec<(usize, Vec<[f64; 3]>)> {
         let Frame { scene, store, options, .. } = self.frame;

@@ -203,7 +203,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::lists::skip::CAP_SINES;
-    use crate::merge::reference::Cone;
+    use crate::merge::twin::Cone;
     use crate::sh::lobe::clamped_cosine;
     use glam::DVec3;
     use std::f64::consts::PI;

@@ -7,8 +7,8 @@
 pub mod calibrate;
 pub mod chain;
 pub mod product;
-pub mod reference;
 pub mod shelf;
+pub mod twin;
 pub mod variant;
 pub mod workload;
 

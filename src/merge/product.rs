@@ -82,7 +82,7 @@ impl Products {
 }
 
 /// The CPU twin of one chain.
-pub fn reference(shape: Shape, transfer: &[f64], factor: &[f64], push: Push) -> Vec<f64> {
+pub fn twin(shape: Shape, transfer: &[f64], factor: &[f64], push: Push) -> Vec<f64> {
     let multiplier = Multiplier::new(shape.chain, shape.bands, shape.field_bands);
     let mut state = multiplier.begin(transfer);
     let mut blocked = [0.0; MAX_COEFFICIENTS];

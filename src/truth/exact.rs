@@ -7,7 +7,7 @@ use super::world::{EntityView, VertexView, World};
 use crate::lists::gather::distance_key;
 use crate::lists::skip::Skip;
 use crate::merge::chain::{Chain, Multiplier};
-use crate::merge::reference::{Cap, Cone};
+use crate::merge::twin::{Cap, Cone};
 use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use glam::DVec3;

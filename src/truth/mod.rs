@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | T0 | rays against the placed meshes, full visibility | [`raycast`] |
 //! | T1 | exact visibility of every occluder projected to SH, exact chain of products | [`exact`] |
-//! | T2 | fields looked up, f64 | [`crate::merge::reference`] |
+//! | T2 | fields looked up, f64 | [`crate::merge::twin`] |
 //! | T3 | the merge on the device, f32 | [`crate::merge`] |
 //!
 //! T0 and T1 use the same rules as the merge for what emits, occludes and receives. An occluder precedes a light if its bounding

@@ -1,6 +1,7 @@
 //! `shadow-fields bake`
 
-use super::context::{BakeArguments, Context, on_or_off};
+use super::context::{Context, on_or_off};
+use super::quality::BakeArguments;
 use super::{Global, output};
 use crate::asset::Mesh;
 use crate::asset::environment::RADIANCE_LIMIT;

@@ -4,7 +4,7 @@ use super::output::{self, Progress};
 use crate::bake::{self, Baker, cache::Cache};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
-use crate::field::{Lattice, Lookup, Storage};
+use crate::field::Lookup;
 use crate::files;
 use crate::frame;
 use crate::gpu::{self, Device, Validation};
@@ -51,43 +51,6 @@ pub struct Global {
     /// Folder whose shader files are used instead of the built-in ones of the same name
     #[arg(long, global = true, value_name = "DIR")]
     pub shader_dir: Option<PathBuf>,
-}
-
-/// Options of a bake.
-#[derive(Args, Clone, Copy, Debug)]
-#[command(next_help_heading = "Baking")]
-pub struct BakeArguments {
-    /// Sample points: cube:SHELLSxCELLS or latlon:SHELLSxLATITUDESxLONGITUDES, then optionally ,chord|log|linear (spacing of
-    /// shells) ,scaled|raw (what is interpolated) ,inner=R ,outer=R (in bounding radii) ,edges (samples on the edges of a cube's faces,
-    /// shared by them: finer steps in as many bytes; not for boxes) ,edges=auto (by the mesh)
-    #[arg(long, default_value_t = Lattice::default(), value_name = "LATTICE")]
-    pub lattice: Lattice,
-    /// Edge of a captured cube face in texels
-    #[arg(long, default_value_t = 64, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=1024))]
-    pub face_px: u32,
-    /// SH bands of light, transfer and what is stored, 2 to 7; N bands are N^2 coefficients
-    #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7))]
-    pub bands: u32,
-    /// SH bands of stored visibility if other than --bands: more of them cost fetches and bring long chains nearer to the truth
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7))]
-    pub field_bands: Option<u32>,
-    /// Number format of stored coefficients
-    #[arg(long, default_value = "f16", value_name = "FORMAT")]
-    pub storage: Storage,
-}
-
-impl BakeArguments {
-    /// As the bake wants them.
-    pub fn options(&self) -> bake::Options {
-        bake::Options {
-            bands: self.bands as usize,
-            field_bands: self.field_bands.map(|bands| bands as usize),
-            storage: self.storage,
-            lattice: self.lattice,
-            face_px: self.face_px,
-            ..Default::default()
-        }
-    }
 }
 
 /// Options of a merge.

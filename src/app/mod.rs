@@ -9,6 +9,7 @@ mod devices;
 mod inspect;
 mod output;
 mod profile;
+mod quality;
 mod render;
 mod sheet;
 #[cfg(feature = "view")]

@@ -1,6 +1,7 @@
 //! `shadow-fields render`
 
-use super::context::{BakeArguments, Context, MergeArguments, size};
+use super::context::{Context, MergeArguments, size};
+use super::quality::BakeArguments;
 use super::{Global, output};
 use crate::asset::false_color::Scheme;
 use crate::asset::picture;

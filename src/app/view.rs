@@ -1,7 +1,8 @@
 //! `shadow-fields view`
 
 use super::Global;
-use super::context::{BakeArguments, Context, MergeArguments, size};
+use super::context::{Context, MergeArguments, size};
+use super::quality::BakeArguments;
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::gpu::{self, Device, PresentMode, Window};

@@ -1,7 +1,6 @@
 // The rule that keeps an entity off a cluster's list, in f32: src/lists/scope.rs has the same functions in f64 and says why.
 
 const float EVERYTHING = 1e30;
-#include "generated/skip_bits.glsl"
 
 struct Scope {
     vec3 origin;  // centre of the receiver, world
@@ -73,13 +72,13 @@ View view_of(Scope scope, vec4 sphere) {
     vec2 from_axis = angle_of_cosine(dot(view.toward, scope.axis));
     view.turn = angle_of_sine(radius / distance);
     float highest = distance * cosine_less(from_axis, scope.spread) + radius;
-    view.below = (switches & SKIP_HORIZON_BIT) != 0 && highest < -(sphere.w + FADE_SINE * view.farthest);
+    view.below = (switches & SKIP_HORIZON) != 0 && highest < -(sphere.w + FADE_SINE * view.farthest);
     view.outside = view.nearest > sphere.w;
     vec2 half_angle = angle_of_sine(sphere.w / max(view.nearest, 1e-15));
     view.spread = plus(half_angle, view.turn);
     float weight = weight_of(half_angle, cosine_less(from_axis, plus(scope.spread, view.spread)));
     view.weight = view.outside ? weight : EVERYTHING;
-    bool caps = (switches & SKIP_CAPS_BIT) != 0;
+    bool caps = (switches & SKIP_CAPS) != 0;
     view.whole = !caps || sphere.w > CAP_SINE_LEAST * view.nearest;
     view.cap = caps && sphere.w < CAP_SINE_MOST * view.farthest;
     return view;
@@ -98,8 +97,8 @@ bool apart(View a, View b) {
 
 // Of a chain with a light.
 bool occluder_listed(Scope scope, View view, View light, float radiance) {
-    bool behind = (switches & SKIP_BEHIND_BIT) != 0 && view.nearest > light.farthest;
-    bool aside = (switches & SKIP_CONES_BIT) != 0 && apart(view, light);
+    bool behind = (switches & SKIP_BEHIND) != 0 && view.nearest > light.farthest;
+    bool aside = (switches & SKIP_CONES) != 0 && apart(view, light);
     return !view.below && !behind && !aside && !negligible(scope, radiance * min(view.weight, light.weight));
 }
 

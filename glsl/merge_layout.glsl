@@ -60,10 +60,10 @@ struct Cluster {
     uint bounds;          // for the gather
 };
 
-// An entry: what one lookup is for. Bits 0-13: entity. Bits 14-27: the light whose chain this is, SKY_CHAIN for the sky's.
-const uint ENTRY_BITS = 14;
+// An entry: what one lookup is for, as ListEntry::pack puts it together. The first ENTRY_BITS bits: entity. As many more: the light
+// whose chain this is, SKY_CHAIN for the sky's.
 const uint SKY_CHAIN = (1u << ENTRY_BITS) - 1u;
-const uint ENTRY_LIGHT = 1u << 28;    // meets the light rather than multiplying an occluder
-const uint ENTRY_CHANNEL = 29;        // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour
-const uint ENTRY_LAST = 1u << 31;     // ends the chain: the next entry begins anew from the transfer
-const uint ENTRY_CAP = 1u << 29;      // without ENTRY_LIGHT: an occluder as a cap
+const uint ENTRY_LIGHT = 1u << 2 * ENTRY_BITS;      // meets the light rather than multiplying an occluder
+const uint ENTRY_CHANNEL = 2 * ENTRY_BITS + 1;      // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour
+const uint ENTRY_LAST = 1u << 2 * ENTRY_BITS + 3;   // ends the chain: the next entry begins anew from the transfer
+const uint ENTRY_CAP = 1u << ENTRY_CHANNEL;         // without ENTRY_LIGHT: an occluder as a cap

@@ -14,12 +14,6 @@ layout(push_constant) uniform Push {
     ivec4 area; // pixels that may be read: from x, y, to x, y
 } push;
 
-// Relative depth tolerance: a surface behind the line may appear nearer by this share of its distance.
-const float TOLERANCE = 1e-3;
-
-// Largest displacement of a corner in pixels: two steps of the usual subpixel grid of 1/256, and rounding.
-const float SNAPPED = 0.01;
-
 vec4 picture_at(ivec2 pixel) {
     return texelFetch(picture, clamp(pixel, push.area.xy, push.area.zw), 0);
 }

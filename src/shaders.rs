@@ -165,7 +165,6 @@ fn generate(name: &str, row: &ShaderPermutation) -> Option<String> {
     let (bands, field_bands) = (row.bands, row.field_bands);
     match name {
         "basis.glsl" => Some(sh::basis::glsl_basis(bands)),
-        "skip_bits.glsl" => Some(crate::lists::skip::glsl_bits()),
         "cosine.glsl" => Some(sh::lobe::glsl_clamped_cosine(bands)),
         "points.glsl" if bands > sh::points::BANDS => Some(String::new()),
         "points.glsl" => Some(sh::points::glsl_points(bands)),

@@ -6,6 +6,7 @@ use common::{library, skip};
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::{Project, Projection};
+use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::lists::gather::Gather;
 use shadow_fields::lists::skip::Skip;
@@ -28,8 +29,9 @@ fn baking() -> Vec<ShaderPermutation> {
 
 fn drawing() -> Vec<ShaderPermutation> {
     let finished = |file| [false, true].map(|display| ShaderPermutation::new(file, 4).define("DISPLAY", display));
-    let fragments = ["draw.frag", "grid.frag", "smooth.frag"].into_iter().flat_map(finished);
+    let fragments = ["draw.frag", "grid.frag"].into_iter().flat_map(finished);
     fragments
+        .chain([false, true].map(Smooth::fragment))
         .chain(
             ["draw.vert", "grid.vert", "show.vert", "show.frag", "smooth.vert"]
                 .map(|file| ShaderPermutation::new(file, 4)),

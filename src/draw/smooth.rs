@@ -19,10 +19,10 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, IVec2};
 use std::sync::Arc;
 
-/// What lies behind a line may seem nearer by this share of its distance, as in `smooth.frag`.
+/// What lies behind a line may seem nearer by this share of its distance.
 const TOLERANCE: f64 = 1e-3;
 
-/// Pixels that a corner may be moved by, as in `smooth.frag`.
+/// Pixels that a corner may be moved by: two steps of 1/256, which is what devices have to offer at least, and rounding.
 const SNAPPED: f64 = 0.01;
 
 /// How far tags are apart: as 8 bits of alpha tell.
@@ -142,6 +142,14 @@ pub struct Smooth {
 }
 
 impl Smooth {
+    /// The fragment shader.
+    pub fn fragment(display: bool) -> ShaderPermutation {
+        ShaderPermutation::new("smooth.frag", 4)
+            .define("DISPLAY", display)
+            .number("TOLERANCE", TOLERANCE)
+            .number("SNAPPED", SNAPPED)
+    }
+
     /// For pictures of a shape. `display` says that they are encoded for a screen.
     ///
     /// # Errors
@@ -149,7 +157,7 @@ impl Smooth {
     pub fn new(device: &Arc<Device>, library: &Library, shape: ImageShape, display: bool) -> Result<Self> {
         let state = GraphicsState { color: shape.format, depth: None, samples: 1, cull: vk::CullModeFlags::NONE };
         let vertex = library.shader(&ShaderPermutation::new("smooth.vert", 4))?;
-        let fragment = library.shader(&ShaderPermutation::new("smooth.frag", 4).define("DISPLAY", display))?;
+        let fragment = library.shader(&Self::fragment(display))?;
         Ok(Smooth {
             pipeline: GraphicsPipeline::new(device, "smooth", &vertex, &fragment, state)?,
             picture: Image::new(device, "smooth picture", shape)?,

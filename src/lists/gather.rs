@@ -17,11 +17,11 @@
 
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
-use crate::layout::{self, ListEntry};
+use crate::layout::{self, ENTRY_BITS, ListEntry};
 pub use crate::lists::scene_bounds::{Bounds, Counts, EntityBounds, Light, SceneBounds, distance_key};
 use crate::lists::scope::{CullResult, View};
 pub use crate::lists::scope::{SLACK, Scope};
-use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
+use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD, Skip};
 use crate::lists::tree::Crowd;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -320,7 +320,9 @@ impl Gather {
 
     /// The row of the shader table; `roomy` for the second round.
     pub fn row(texel: bool, roomy: bool) -> ShaderPermutation {
-        ShaderPermutation::new("gather.comp", 4)
+        Skip::gather_defines()
+            .fold(ShaderPermutation::new("gather.comp", 4), |row, (name, bit)| row.define(name, bit))
+            .define("ENTRY_BITS", ENTRY_BITS)
             .define("TEXEL", texel)
             .define("ROOMY", roomy)
             .define("LANES", LANES)

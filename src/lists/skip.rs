@@ -36,9 +36,9 @@ pub struct Row {
     pub kind: Kind,
     /// The file in `src/` and the function that decides it on the host.
     pub host: &'static str,
-    /// The constant by which GLSL knows it. Pass "gather" gets all of them as bits.
+    /// The macro by which GLSL knows it: in pass "gather" its bit of [`Skip::bits`].
     pub glsl: Option<&'static str>,
-    /// Whether the merge shader decides it too, vertex by vertex: then the constant is a define of that shader.
+    /// Whether the merge shader decides it too, vertex by vertex: then the macro there says whether it is on.
     pub in_merge: bool,
     /// The field of [`crate::lists::gather::Counts`] that says what it left out.
     pub counter: Option<&'static str>,
@@ -144,16 +144,15 @@ impl Skip {
         switches().zip(self.values()).filter_map(|(row, on)| Some((row.glsl.filter(|_| row.in_merge)?, on)))
     }
 
-    /// The switches as bits: those of [`glsl_bits`].
+    /// Macros of pass "gather": the bit of each.
+    pub fn gather_defines() -> impl Iterator<Item = (&'static str, u32)> {
+        Skip::ALL.constants().enumerate().map(|(bit, (name, _))| (name, 1 << bit))
+    }
+
+    /// The switches as bits.
     pub fn bits(self) -> u32 {
         self.constants().enumerate().map(|(bit, (_, on))| u32::from(on) << bit).sum()
     }
-}
-
-/// GLSL constants of the bits of [`Skip::bits`], each with `_BIT` after its name.
-pub fn glsl_bits() -> String {
-    let line = |(bit, (name, _)): (usize, (&str, bool))| format!("const uint {name}_BIT = {}u;\n", 1_u32 << bit);
-    Skip::ALL.constants().enumerate().map(line).collect()
 }
 
 impl std::str::FromStr for Skip {

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::field::lattice::{CELL_WARP, Directions, Lattice, Lookup, Spacing};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::gpu::Device;
-use crate::layout::{CLUSTER_VERTICES, Entity};
+use crate::layout::{CLUSTER_VERTICES, ENTRY_BITS, Entity};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::merge::chain::Product;
 use crate::sh::basis::Y00;
@@ -144,6 +144,7 @@ impl MergePermutation {
             .define("GUARD", self.guard)
             .number("Y00", Y00)
             .define("WORKGROUP", CLUSTER_VERTICES)
+            .define("ENTRY_BITS", ENTRY_BITS)
             .define("TEXEL", self.variant.texel)
             .define("IMAGE", self.variant.image && self.fits_image())
             .define("PACKED", self.packed())
@@ -183,5 +184,51 @@ impl MergePermutation {
             .into_iter()
             .zip(CELL_WARP)
             .fold(row, |row, (name, value)| row.number(name, value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    /// Of one number of bands and one size of lattice there are 4 704: five ways to read halves and three to read floats, with three
+    /// lookups and two kinds of directions (48), and the image, which is trilinear and a cube; times three spacings, scaled or not,
+    /// guarded or not, and three skips on or off (96).
+    #[test]
+    fn there_are_as_many_permutations_as_counted() {
+        let mut rows = HashSet::new();
+        let lattices = ["chord", "log", "linear"].into_iter().flat_map(|spacing| {
+            ["scaled", "raw"].into_iter().flat_map(move |scale| {
+                ["cube:8x4", "latlon:8x4x4"].map(|shape| format!("{shape},{spacing},{scale},inner=1.02"))
+            })
+        });
+        for lattice in lattices.map(|text| text.parse().unwrap()) {
+            for &variant in VARIANTS {
+                for storage in [Storage::F16, Storage::F32] {
+                    for lookup in [Lookup::Nearest, Lookup::Radial, Lookup::Trilinear] {
+                        for switches in 0..16 {
+                            let on = |bit: u32| switches >> bit & 1 == 1;
+                            let skip = Skip { horizon: on(0), cones: on(1), caps: on(2), ..Skip::NONE };
+                            let guard = on(3);
+                            let (bands, field_bands, entity_limit) = (4, 4, 48);
+                            let permutation = MergePermutation {
+                                variant,
+                                bands,
+                                field_bands,
+                                guard,
+                                storage,
+                                lattice,
+                                lookup,
+                                skip,
+                                entity_limit,
+                            };
+                            rows.insert(permutation.row());
+                        }
+                    }
+                }
+            }
+        }
+        assert_eq!(rows.len(), (8 * 3 * 2 + 1) * 3 * 2 * 2 * 8);
     }
 }

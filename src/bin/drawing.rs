@@ -83,11 +83,11 @@ impl Subject {
 
     /// Captures six faces at `eye` and projects them, by the CPU twins of the two passes.
     fn capture(&self, eye: DVec3) -> Captured {
-        let face = |face| capture::reference(&self.positions, &self.triangles, eye, face, FACE_PX);
+        let face = |face| capture::twin(&self.positions, &self.triangles, eye, face, FACE_PX);
         let faces: Vec<Vec<bool>> = (0..FACE_COUNT).into_par_iter().map(face).collect();
         let px = FACE_PX as usize;
         let texel = |face: usize, x: usize, y: usize| [if faces[face][y * px + x] { 0.0 } else { 1.0 }; 3];
-        let found = project::reference(BANDS, project::Projection::Blocked, px, Vec3::Y, 1.0, texel);
+        let found = project::twin(BANDS, project::Projection::Blocked, px, Vec3::Y, 1.0, texel);
         Captured { blocked: std::array::from_fn(|k| found[k]), faces }
     }
 

@@ -248,7 +248,7 @@ impl Packed {
                 light_first: light_first as u32,
                 light_count: scene.lights.len() as u32,
                 capacity: 0,
-                switches: scene_bounds.skip.bits(),
+                switches: scene.skip.bits(),
                 sky: scene.sky.unwrap_or(-1.0),
                 brightest: scene.brightest,
                 eps: scene.eps,

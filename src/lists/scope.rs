@@ -178,7 +178,7 @@ impl<'m> Scope<'m> {
             return CullResult::BelowHorizon;
         }
         let [x, y, z, cosine] = light.facing.map(f64::from);
-        if self.scene.cosine >= -1.0 && view.nearest > 0.0 {
+        if cosine >= -1.0 && view.nearest > 0.0 {
             let away = -view.toward.dot(DVec3::new(x, y, z));
             if away < Angle::of_cosine(cosine).plus(view.turn).cosine {
                 return CullResult::FacingAway;

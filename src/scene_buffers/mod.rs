@@ -138,7 +138,7 @@ impl Store {
     /// Whether every field that `scene` needs is here; it has the meshes that these were made for.
     pub fn covers(&self, scene: &Scene) -> bool {
         self.geometries.iter().enumerate().all(|(mesh, geometry)| {
-            let [blocked, radiance] = bake::needs(scene, mesh, true).map(|kind| kind.is_some());
+            let [blocked, radiance] = bake::needs(scene, mesh).map(|kind| kind.is_some());
             (geometry.blocked.is_some() || !blocked) && (geometry.radiance.is_some() || !radiance)
         })
     }

@@ -15,13 +15,14 @@ pub mod chunk;
 pub mod ensure;
 mod header;
 pub mod inside;
-pub mod orbit;
+
 pub mod partial;
 pub mod project;
 pub mod report;
 mod samples;
 pub mod snapshot;
 pub mod surface;
+pub mod symmetric_samples;
 pub mod symmetry;
 pub mod triangles;
 
@@ -37,13 +38,14 @@ use batches::{Batch, Batches, Captures, Target};
 use capture::unit_positions;
 pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, is_seen, needs};
 pub use header::{Options, first_shell, hash_text, header};
-use orbit::Twin;
+
 use partial::Partial;
 use project::{Job, Projection};
 pub use report::Report;
 use samples::FieldSamples;
 use std::sync::Arc;
 use std::time::Instant;
+use symmetric_samples::Turned;
 use symmetry::Symmetry;
 
 /// Where the eye of a transfer capture stands: this share of r off the surface, along the normal. It is large enough that the
@@ -166,9 +168,9 @@ impl Baker {
         let captures = Captures { mesh, bands, projection, face_px, shortcuts, partial };
         let mut values = vec![0.0_f32; captured_bytes(&header) as usize / 4];
         let mut report = captures.run(self, &targets, &mut values, progress)?;
-        orbit::spread(&mut values, &plan, &header.lattice, bands, header.kind.channels());
+        symmetric_samples::spread(&mut values, &plan, &header.lattice, bands, header.kind.channels());
         header.captured_samples = targets.len() as u32;
-        report.turned = plan.twins.iter().flatten().count() as u32;
+        report.turned = plan.turned.iter().flatten().count() as u32;
         report.filled = header.filled_samples;
         report.samples = header.lattice.sample_count() - report.filled;
         let payload = self.assemble(&header, &values, &sources, &mut report)?;
@@ -226,19 +228,19 @@ impl Baker {
         let started = Instant::now();
         triangles::tell_repeated(mesh);
         let Options { bands, face_px, shortcuts, .. } = *options;
-        let twins = vertex_twins(mesh, face_px, shortcuts.symmetry);
+        let turned = turned_vertices(mesh, face_px, shortcuts.symmetry);
         let vertices = unit_positions(mesh).into_iter().zip(&mesh.normals).enumerate();
         let target = |(vertex, (position, normal)): (usize, (glam::Vec3, &glam::Vec3))| Target {
             eye: position + TRANSFER_OFFSET * normal,
             job: Job { normal: normal.extend(0.0).to_array(), slots: [0; 6], target: vertex as u32, scale: 1.0 },
         };
-        let targets: Vec<Target> = vertices.filter(|(vertex, _)| twins[*vertex].is_none()).map(target).collect();
+        let targets: Vec<Target> = vertices.filter(|(vertex, _)| turned[*vertex].is_none()).map(target).collect();
         let captures = Captures { mesh, bands, projection: Projection::Transfer, face_px, shortcuts, partial };
         let mut transfer = vec![0.0_f32; mesh.positions.len() * channel_stride(bands)];
         let mut report = captures.run(self, &targets, &mut transfer, progress)?;
-        orbit::turn_all(&mut transfer, &twins, bands, 1);
+        symmetric_samples::turn_all(&mut transfer, &turned, bands, 1);
         report.samples = mesh.positions.len() as u32;
-        report.turned = twins.iter().flatten().count() as u32;
+        report.turned = turned.iter().flatten().count() as u32;
         report.total = started.elapsed();
         Ok((transfer, report))
     }
@@ -255,9 +257,9 @@ impl Baker {
 }
 
 /// Which vertices' transfer vectors are turned from which others'.
-fn vertex_twins(mesh: &Mesh, face_px: u32, symmetry: bool) -> Vec<Option<Twin>> {
+fn turned_vertices(mesh: &Mesh, face_px: u32, symmetry: bool) -> Vec<Option<Turned>> {
     if !symmetry {
         return vec![None; mesh.positions.len()];
     }
-    orbit::plan_vertices(mesh, &Symmetry::of_vertices(mesh, None), face_px, f64::from(TRANSFER_OFFSET))
+    symmetric_samples::plan_vertices(mesh, &Symmetry::of_vertices(mesh, None), face_px, f64::from(TRANSFER_OFFSET))
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 pub struct Report {
     /// Samples that stand at their own place.
     pub samples: u32,
-    /// Of these, samples that were not captured but turned from others (see [`super::orbit`]).
+    /// Of these, samples that were not captured but turned from others (see [`super::symmetric_samples`]).
     pub turned: u32,
     /// Cube faces that were drawn; six a captured sample where none is left out.
     pub faces: u32,

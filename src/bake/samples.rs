@@ -5,9 +5,9 @@ use super::assemble::Sources;
 use super::batches::Target;
 use super::capture::unit_positions;
 use super::inside;
-use super::orbit::{self, Plan};
 use super::project::Job;
 use super::surface::Surface;
+use super::symmetric_samples::{self, SymmetricPlan};
 use super::symmetry::Symmetry;
 use super::triangles::distinct;
 use crate::asset::Mesh;
@@ -20,7 +20,7 @@ pub(super) struct FieldSamples {
     /// Samples that are captured, with the eye of each.
     pub targets: Vec<Target>,
     /// What is turned from what is captured.
-    pub plan: Plan,
+    pub plan: SymmetricPlan,
     /// What every stored sample is assembled from.
     pub sources: Sources,
 }
@@ -40,16 +40,17 @@ impl FieldSamples {
         let pushed = inside::pushed_out(&surface, &positions, &inside);
         let mut unseen: Vec<bool> = inside.iter().zip(&pushed).map(|(inside, eye)| *inside && eye.is_none()).collect();
         let plan = symmetry_plan(mesh, header, &surface, &inside);
-        for (sample, twin) in plan.twins.iter().enumerate().filter_map(|(sample, twin)| Some((sample, twin.as_ref()?)))
+        for (sample, captured) in
+            plan.turned.iter().enumerate().filter_map(|(sample, turned)| Some((sample, turned.as_ref()?.of as usize)))
         {
-            inside[sample] = inside[twin.of as usize];
-            unseen[sample] = unseen[twin.of as usize];
+            inside[sample] = inside[captured];
+            unseen[sample] = unseen[captured];
         }
         header.filled_samples = inside.iter().filter(|i| **i).count() as u32;
         let sources = Sources::new(&lattice, &inside, &unseen)?;
         let mut targets = Vec::new();
         let captured =
-            positions.iter().enumerate().filter(|(sample, _)| !unseen[*sample] && plan.twins[*sample].is_none());
+            positions.iter().enumerate().filter(|(sample, _)| !unseen[*sample] && plan.turned[*sample].is_none());
         for (sample, position) in captured {
             let eye = pushed[sample].unwrap_or(*position);
             let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
@@ -61,10 +62,10 @@ impl FieldSamples {
 }
 
 /// Which samples are turned from which others. Says in the header by what symmetries.
-fn symmetry_plan(mesh: &Mesh, header: &mut FieldHeader, surface: &Surface, inside: &[bool]) -> Plan {
+fn symmetry_plan(mesh: &Mesh, header: &mut FieldHeader, surface: &Surface, inside: &[bool]) -> SymmetricPlan {
     if !header.shortcuts.symmetry {
         header.symmetry = "off".to_owned();
-        return Plan { twins: orbit::same(&header.lattice), round: Vec::new() };
+        return SymmetricPlan { turned: symmetric_samples::same(&header.lattice), round: Vec::new() };
     }
     let symmetry = Symmetry::of(mesh, surface, header.kind == FieldKind::Radiance).kept_by(&header.lattice.fit());
     header.symmetry = symmetry.describe();
@@ -77,8 +78,8 @@ fn symmetry_plan(mesh: &Mesh, header: &mut FieldHeader, surface: &Surface, insid
             false => surface.distance(position),
         }
     };
-    let plan = orbit::plan(&header.lattice, &symmetry, header.face_px, distance);
-    let turned = plan.twins.iter().flatten().count();
+    let plan = symmetric_samples::plan(&header.lattice, &symmetry, header.face_px, distance);
+    let turned = plan.turned.iter().flatten().count();
     log::info!("{}: symmetries: {}; {turned} of {} samples turned", mesh.name, header.symmetry, inside.len());
     plan
 }

@@ -8,8 +8,8 @@ use fastrand::Rng;
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::{Mesh, generate};
 use shadow_fields::bake::capture::unit_positions;
-use shadow_fields::bake::orbit::{self, Turn};
 use shadow_fields::bake::surface::Surface;
+use shadow_fields::bake::symmetric_samples::{self, CoefficientTurn};
 use shadow_fields::bake::symmetry::{Symmetry, cube_group};
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::field::{FieldKind, Lookup, ShadowField, Shortcuts, Storage};
@@ -54,7 +54,7 @@ fn turning_coefficients_turns_the_function_mirrors_too() {
             let coefficients: [f64; MAX_COEFFICIENTS] = std::array::from_fn(|_| rng.f64() - 0.5);
             let (mut turned, mut at, mut there) =
                 ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
-            Turn::new(bands, *turn).apply(&coefficients, &mut turned);
+            CoefficientTurn::new(bands, *turn).apply(&coefficients, &mut turned);
             evaluate(bands, w, &mut at);
             evaluate(bands, *turn * w, &mut there);
             let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).take(bands * bands).map(|(a, b)| a * b).sum::<f64>();
@@ -100,26 +100,27 @@ fn symmetries_are_found_and_only_those() {
 }
 
 #[test]
-fn twins_lead_to_captured_samples_that_lie_where_they_should() {
+fn turned_samples_lead_to_captured_samples_that_lie_where_they_should() {
     for mesh in [generate::sphere(1.0, 3), generate::torus(1.0, 0.3, 48, 24), chessman(50)] {
         let surface = Surface::new(&unit_positions(&mesh), &mesh.triangles);
         let symmetry = found(&mesh);
         for lattice in ["cube:6x8", "cube:3x5", "cube:3x4,edges", "latlon:3x6x8"] {
             let lattice: bake::Options = bake::Options { lattice: lattice.parse().unwrap(), ..Default::default() };
             let lattice = lattice.lattice;
-            let twins = orbit::plan(&lattice, &symmetry, 64, |s| surface.distance(lattice.position(s))).twins;
-            let mut turned = 0;
-            for (sample, twin) in twins.iter().enumerate() {
-                let Some(twin) = twin else { continue };
-                turned += 1;
-                assert!(twins[twin.of as usize].is_none(), "{sample} is made of one that is not captured");
+            let turned =
+                symmetric_samples::plan(&lattice, &symmetry, 64, |s| surface.distance(lattice.position(s))).turned;
+            let mut count = 0;
+            for (sample, made) in turned.iter().enumerate() {
+                let Some(made) = made else { continue };
+                count += 1;
+                assert!(turned[made.of as usize].is_none(), "{sample} is made of one that is not captured");
                 let expected = lattice.position(sample as u32);
-                assert!((twin.turn * lattice.position(twin.of)).distance(expected) < 1e-9, "{sample}: {twin:?}");
-                let limit = orbit::allowed(surface.distance(expected), 64);
-                assert!(twin.deviation <= limit, "{sample}: {} over {limit}", twin.deviation);
+                assert!((made.turn * lattice.position(made.of)).distance(expected) < 1e-9, "{sample}: {made:?}");
+                let limit = symmetric_samples::allowed(surface.distance(expected), 64);
+                assert!(made.deviation <= limit, "{sample}: {} over {limit}", made.deviation);
             }
-            report(&format!("{}, {lattice}: {turned} of {}", mesh.name, twins.len()));
-            assert!(2 * turned > twins.len());
+            report(&format!("{}, {lattice}: {count} of {}", mesh.name, turned.len()));
+            assert!(2 * count > turned.len());
         }
     }
 }

@@ -11,7 +11,7 @@ use shadow_fields::bake::partial::Partial;
 use shadow_fields::bake::{self, Baker, SceneNeeds, capture};
 use shadow_fields::field::{FieldHeader, FieldKind, Lookup, ShadowField, Shortcuts, Storage};
 use shadow_fields::scene::Scene;
-use shadow_fields::scene_buffers::Store;
+use shadow_fields::scene_buffers::SceneBuffers;
 use shadow_fields::sh::basis::Y00;
 use shadow_fields::sh::cube;
 use std::cell::RefCell;
@@ -84,14 +84,14 @@ fn the_same_mesh_under_two_names_is_baked_once() {
     };
     let baker = Baker::new(&gpu.device, &gpu.library);
     let options = bake::Options { lattice: "cube:3x3".parse().unwrap(), face_px: 16, ..Default::default() };
-    let store = |scene: &Scene| {
+    let buffers = |scene: &Scene| {
         let needs = SceneNeeds::of(scene, &options);
         let baked = bake::ensure(&baker, &Cache::new(None), scene, &needs, &|_, _, _| ()).unwrap();
         assert_eq!(baked.meshes.len(), 2);
-        Store::new(&gpu.device, scene, &options, baked).unwrap()
+        SceneBuffers::new(&gpu.device, scene, &options, baked).unwrap()
     };
-    let (same, other) = (store(&meshes(["a", "b"], [8, 8])), store(&meshes(["a", "b"], [8, 10])));
-    let names = |store: &Store| store.baked.iter().map(|b| b.what.clone()).collect::<Vec<_>>();
+    let (same, other) = (buffers(&meshes(["a", "b"], [8, 8])), buffers(&meshes(["a", "b"], [8, 10])));
+    let names = |buffers: &SceneBuffers| buffers.baked.iter().map(|b| b.what.clone()).collect::<Vec<_>>();
     report(&format!("{:?} and {:?}", names(&same), names(&other)));
     assert_eq!(names(&same), ["a shadow", "a transfer"]);
     assert_eq!(names(&other), ["a shadow", "b shadow", "a transfer", "b transfer"]);

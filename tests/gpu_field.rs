@@ -18,7 +18,7 @@ use shadow_fields::field::quantity::channel_stride;
 use shadow_fields::field::{FieldHeader, FieldKind, Lookup, ShadowField, Storage};
 use shadow_fields::gpu::Device;
 use shadow_fields::scene::Scene;
-use shadow_fields::scene_buffers::Store;
+use shadow_fields::scene_buffers::SceneBuffers;
 use shadow_fields::sh::lobe;
 use shadow_fields::sh::rotation::Rotation;
 use std::path::{Path, PathBuf};
@@ -352,18 +352,18 @@ fn a_field_lands_at_its_place_in_a_scene() {
     let needs = SceneNeeds::of(&scene, &options);
     let baker = Baker::new(&gpu.device, &gpu.library);
     let baked = bake::ensure(&baker, &Cache::new(None), &scene, &needs, &|_, _, _| ()).unwrap();
-    let store = Store::new(&gpu.device, &scene, &options, baked).unwrap();
+    let buffers = SceneBuffers::new(&gpu.device, &scene, &options, baked).unwrap();
     let mut ends = Vec::new();
-    for (mesh, geometry) in scene.meshes.iter().zip(&store.geometries) {
+    for (mesh, geometry) in scene.meshes.iter().zip(&buffers.geometries) {
         let slot = geometry.blocked.as_ref().unwrap();
         let alone = bake_field(&gpu.device, mesh, FieldKind::Occlusion, &options);
-        assert!(store.field(slot).unwrap() == alone, "{}: the same field", mesh.name);
+        assert!(buffers.field(slot).unwrap() == alone, "{}: the same field", mesh.name);
         assert!(
             slot.bytes.start.is_multiple_of(256) && slot.bytes.end - slot.bytes.start == alone.header.payload_bytes()
         );
         ends.push(slot.bytes.clone());
     }
-    assert!(ends[0].start == 0 && ends[0].end <= ends[1].start && ends[1].end <= store.fields.size_bytes);
+    assert!(ends[0].start == 0 && ends[0].end <= ends[1].start && ends[1].end <= buffers.fields.size_bytes);
 }
 
 #[test]

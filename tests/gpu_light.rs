@@ -333,7 +333,7 @@ fn instances_and_equal_meshes_share_one_field() {
         let meshes = ball("ball", 0.4) + &ball("equal", 0.4) + &ball("other", 0.5);
         scene(&format!("{WHITE_SKY}{PATCH}{meshes}{}{entities}", entity("patch", "")))
     };
-    let bytes = |second: &str| stage.frame(&pair(second), small()).store.fields.size_bytes;
+    let bytes = |second: &str| stage.frame(&pair(second), small()).buffers.fields.size_bytes;
     assert_eq!(bytes("equal"), bytes("ball"), "a mesh of another name and the same contents shares the field");
     assert_eq!(bytes("other"), 2 * bytes("ball"), "another mesh has a field of its own");
     assert_eq!(lit(&pair("ball"), small(), &stage), lit(&pair("equal"), small(), &stage));

@@ -44,13 +44,13 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
     let scene = frame.scene();
     let placements = scene.at(0.0);
     let fields: Vec<Option<ShadowField>> = frame
-        .store
+        .buffers
         .geometries
         .iter()
-        .map(|g| g.blocked.as_ref().map(|slot| frame.store.field(slot).unwrap()))
+        .map(|g| g.blocked.as_ref().map(|slot| frame.buffers.field(slot).unwrap()))
         .collect();
     let object = |(entity, place): (&shadow_fields::scene::Entity, &shadow_fields::scene::Placement)| {
-        let geometry = &frame.store.geometries[entity.mesh];
+        let geometry = &frame.buffers.geometries[entity.mesh];
         let rotation = place.turn();
         let scale = f64::from(place.scale);
         Object {
@@ -70,7 +70,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
     let mesh = &scene.meshes[0];
     let (mut out, mut orders) = (Vec::new(), BTreeMap::new());
     for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
-        let (position, normal) = (position.as_dvec3() - frame.store.geometries[0].centre_m, normal.as_dvec3());
+        let (position, normal) = (position.as_dvec3() - frame.buffers.geometries[0].centre_m, normal.as_dvec3());
         let distance = |j: usize| objects[j].centre.distance(objects[0].centre + position);
         let mut all: Vec<usize> = (1..objects.len()).collect();
         all.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));

@@ -191,7 +191,7 @@ fn still(
         scene: name,
         vertices: frame.receiver_vertex_count(),
         entities: scene.entities.len(),
-        bake_s: frame.store.baked.iter().map(|b| b.report.total.as_secs_f64()).sum(),
+        bake_s: frame.buffers.baked.iter().map(|b| b.report.total.as_secs_f64()).sum(),
         merge_ms: output::median(&times.merge),
         draw_ms: output::median(&times.draw),
         frame_ms: output::median(&times.whole),

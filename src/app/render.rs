@@ -169,7 +169,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             "size": options.size, "antialias": options.antialias,
         },
         "prepare_ms": prepared.as_secs_f64() * 1e3,
-        "baked": frame.store.baked,
+        "baked": frame.buffers.baked,
         "frames": frames,
     });
     if let Some(path) = &arguments.stats {

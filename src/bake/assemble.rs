@@ -1,7 +1,7 @@
 //! Pass "assemble": captured samples to the field as stored: fitted to being interpolated, cube borders copied from neighbouring
 //! faces, samples that see nothing filled from valid ones around them, halves where wanted.
 //!
-//! Input: `captured`, floats of one sample after another. Output: the field's payload at a byte offset of the store.
+//! Input: `captured`, floats of one sample after another. Output: the field's payload at a byte offset of `field`.
 
 use crate::error::{Error, Result};
 use crate::field::lattice::{Directions, Lattice};
@@ -189,7 +189,7 @@ impl Assemble {
         Ok(Assemble { pipeline: ComputePipeline::new(device, "assemble", &shader, &[])? })
     }
 
-    /// Writes `stored_count` samples of `sample_quads` quads, each multiplied by `factor`, into a byte range of `store`.
+    /// Writes `stored_count` samples of `sample_quads` quads, each multiplied by `factor`, into a byte range of `field`.
     ///
     /// # Errors
     /// `Input` when a buffer is larger than the device can bind.
@@ -197,12 +197,12 @@ impl Assemble {
         &'r self,
         commands: &mut Commands<'r>,
         [captured, offsets, list]: [&'r Buffer; 3],
-        (store, range): (&'r Buffer, Range<u64>),
+        (field, range): (&'r Buffer, Range<u64>),
         (stored_count, sample_quads): (u32, u32),
         factor: f32,
     ) -> Result<()> {
         let push = Push { quad_count: stored_count * sample_quads, sample_quads, factor };
-        let resources = [Bind::Buffer(captured), Bind::Buffer(offsets), Bind::Buffer(list), Bind::Range(store, range)];
+        let resources = [Bind::Buffer(captured), Bind::Buffer(offsets), Bind::Buffer(list), Bind::Range(field, range)];
         commands.dispatch(&self.pipeline, &resources, &push, [push.quad_count, 1, 1])
     }
 }

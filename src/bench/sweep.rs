@@ -201,10 +201,10 @@ fn by_device(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variat
     }
     let times = interleaved(&mut frames, &placements, if bench.quick { 15 } else { 31 })?;
     let measured = frames.iter().zip(first).zip(times).map(|((frame, first_merge_ms), times_ms)| {
-        let baked = &frame.store.baked;
+        let baked = &frame.buffers.baked;
         let bake_ms = baked.iter().map(|b| b.report.capture_ms + b.report.project_ms + b.report.assemble_ms);
         Ok(Measured {
-            field_bytes: frame.store.fields.size_bytes,
+            field_bytes: frame.buffers.fields.size_bytes,
             bake_ms: (!baked.is_empty()).then(|| bake_ms.sum()),
             first_merge_ms,
             times_ms,

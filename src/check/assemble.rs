@@ -48,14 +48,14 @@ pub fn compare(
     let list = Buffer::with_data(device, "list", &sources.list)?;
     // Room before and behind, which must stay as it is.
     let size = wanted.len() * storage.bytes();
-    let store = Buffer::with_data(device, "store", &vec![0xab_u8; 256 + size + 256])?;
+    let field = Buffer::with_data(device, "field", &vec![0xab_u8; 256 + size + 256])?;
     let range = 256..256 + size as u64;
     let counts = (lattice.stored_count(), (stride / 4) as u32);
     let mut commands = Commands::new(device, "assemble check")?;
     commands
-        .pass("assemble", |c| pass.record(c, [&captured, &offsets, &list], (&store, range.clone()), counts, FACTOR))?;
+        .pass("assemble", |c| pass.record(c, [&captured, &offsets, &list], (&field, range.clone()), counts, FACTOR))?;
     commands.submit()?;
-    let bytes: Vec<u8> = store.download(256 + size + 256)?;
+    let bytes: Vec<u8> = field.download(256 + size + 256)?;
     if bytes[..256].iter().chain(&bytes[256 + size..]).any(|b| *b != 0xab) {
         return Ok(f64::INFINITY);
     }

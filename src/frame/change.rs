@@ -11,7 +11,7 @@ use crate::scene::{Camera, Scene};
 impl Frame {
     /// Whether the fields that `scene` needs are here; it has the meshes and entities that this frame was made for.
     pub fn covers(&self, scene: &Scene) -> bool {
-        self.store.covers(scene)
+        self.buffers.covers(scene)
     }
 
     /// Takes over lights, switches, sky and camera of a scene that has the meshes and receivers that this frame was made for.
@@ -50,7 +50,7 @@ impl Frame {
     pub fn set_variant(&mut self, variant: Option<Variant>) -> Result<()> {
         let variant = variant.unwrap_or_else(|| calibrate::best_known(&self.device));
         let wanted = MergePermutation { variant, ..self.merge.permutation };
-        let usable = usable(&self.device, &self.store, self.scene.entities.len(), wanted)?;
+        let usable = usable(&self.device, &self.buffers, self.scene.entities.len(), wanted)?;
         if usable.0 != self.merge.permutation {
             self.merge = CompiledMerge::new(&self.device, &self.library, usable)?;
             self.forget();

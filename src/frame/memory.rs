@@ -36,11 +36,11 @@ impl Frame {
     /// Memory that the scene takes now. Meshes as they were read from their files are not counted.
     pub fn memory(&self) -> Memory {
         Memory {
-            fields: self.store.fields.size_bytes + self.merge.image.as_ref().map_or(0, Volume::size_bytes),
-            transfers: self.store.transfers.size_bytes,
-            vertices: self.store.vertices.size_bytes,
+            fields: self.buffers.fields.size_bytes + self.merge.image.as_ref().map_or(0, Volume::size_bytes),
+            transfers: self.buffers.transfers.size_bytes,
+            vertices: self.buffers.vertices.size_bytes,
             radiosity: self.radiosity.merged.size_bytes,
-            drawables: self.store.geometries.iter().map(|geometry| geometry.drawn.size_bytes()).sum(),
+            drawables: self.buffers.geometries.iter().map(|geometry| geometry.drawn.size_bytes()).sum(),
             lists: self.work.size_bytes() + self.sky.coefficients.all_bytes() + self.picture.lines.size_bytes(),
             pictures: self.picture.readback.size_bytes + self.picture.draw.size_bytes(),
             host_lists: self.work.lists.size_bytes(),

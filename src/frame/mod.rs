@@ -34,7 +34,7 @@ use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
 use crate::merge::{Inputs, Readable};
 use crate::scene::{Placement, Scene};
-use crate::scene_buffers::{Store, limits};
+use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use ash::vk;
 use permutation::{CompiledMerge, permutation, usable};
@@ -78,7 +78,7 @@ pub struct Frame {
     scene: Scene,
     options: Options,
     /// Baked and uploaded data.
-    pub store: Store,
+    pub buffers: SceneBuffers,
     merge: CompiledMerge,
     work: ClusterWork,
     sky: Sky,
@@ -103,16 +103,16 @@ impl Frame {
         let needs = SceneNeeds::of(scene, &options.bake);
         limits::check(device, scene, &needs)?;
         let baked = bake::ensure(baker, cache, scene, &needs, progress)?;
-        let store = Store::new(device, scene, &options.bake, baked)?;
+        let buffers = SceneBuffers::new(device, scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
         let wanted = permutation(&options, wanted, uniform_entities(device));
-        let merge = CompiledMerge::new(device, library, usable(device, &store, entity_count, wanted)?)?;
+        let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted)?)?;
 
-        let radiosity = Radiosity::new(device, scene, &store)?;
+        let radiosity = Radiosity::new(device, scene, &buffers)?;
         let mut lists = ClusterLists::default();
         for (index, entity) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
-            let geometry = &store.geometries[entity.mesh];
+            let geometry = &buffers.geometries[entity.mesh];
             lists.add(index, pose::clusters(index, geometry, radiosity.offsets[index] / 16, options.bake.bands));
         }
         let place = options.lists.unwrap_or_else(|| Place::quicker(device, entity_count));
@@ -131,7 +131,7 @@ impl Frame {
             sky,
             radiosity,
             picture: Picture::new(device, library, &options)?,
-            store,
+            buffers,
         })
     }
 
@@ -253,16 +253,16 @@ impl Frame {
             entities: Readable::shared(&self.work.entities, permutation.variant)?,
             entries: self.work.entries(),
             clusters: &self.work.clusters,
-            fields: Readable::fields(&self.store.fields, image.as_ref(), permutation)?,
-            transfers: Readable::new(&self.store.transfers, permutation.variant, floats)?,
-            vertices: Readable::new(&self.store.vertices, permutation.variant, floats)?,
+            fields: Readable::fields(&self.buffers.fields, image.as_ref(), permutation)?,
+            transfers: Readable::new(&self.buffers.transfers, permutation.variant, floats)?,
+            vertices: Readable::new(&self.buffers.vertices, permutation.variant, floats)?,
             sky: Readable::new(&self.sky.coefficients, permutation.variant, floats)?,
         })
     }
 
     /// Order in which an entity's vertices are stored.
     fn order(&self, entity: usize) -> &[u32] {
-        &self.store.geometries[self.scene.entities[entity].mesh].order
+        &self.buffers.geometries[self.scene.entities[entity].mesh].order
     }
 
     /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what was computed
@@ -272,7 +272,7 @@ impl Frame {
     /// `Device` when memory ran out.
     pub fn set_radiosity(&mut self, entity: usize, radiosity: &[[f32; 3]]) -> Result<()> {
         self.forget();
-        let order = &self.store.geometries[self.scene.entities[entity].mesh].order;
+        let order = &self.buffers.geometries[self.scene.entities[entity].mesh].order;
         self.radiosity.write(entity, order, radiosity)
     }
 
@@ -292,7 +292,7 @@ impl Frame {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn set_comparison(&mut self, place: usize, radiosity: &[(usize, Vec<[f32; 3]>)], rest: [f32; 3]) -> Result<()> {
-        let order = |entity: usize| &self.store.geometries[self.scene.entities[entity].mesh].order[..];
+        let order = |entity: usize| &self.buffers.geometries[self.scene.entities[entity].mesh].order[..];
         let entities = radiosity.iter().map(|(entity, values)| (*entity, order(*entity), &values[..]));
         self.radiosity.compare(place, entities, rest)
     }

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::gpu::{Device, TexelView, Volume};
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Variant};
-use crate::scene_buffers::Store;
+use crate::scene_buffers::SceneBuffers;
 use crate::shaders::Library;
 use ash::vk;
 use std::sync::Arc;
@@ -45,15 +45,15 @@ impl CompiledMerge {
 /// The permutation with its variant less the texel views or uniform blocks that cannot hold the scene.
 pub(super) fn usable(
     device: &Device,
-    store: &Store,
+    buffers: &SceneBuffers,
     entity_count: usize,
     permutation: MergePermutation,
 ) -> Result<(MergePermutation, Option<Volume>)> {
     let floats = vk::Format::R32G32B32A32_SFLOAT;
-    let fits = TexelView::fits(device, permutation.field_format(), store.fields.size_bytes)
-        && TexelView::fits(device, floats, store.transfers.size_bytes)
-        && TexelView::fits(device, floats, store.vertices.size_bytes);
-    let image = (permutation.variant.image && permutation.fits_image()).then(|| store.image()).transpose()?.flatten();
+    let fits = TexelView::fits(device, permutation.field_format(), buffers.fields.size_bytes)
+        && TexelView::fits(device, floats, buffers.transfers.size_bytes)
+        && TexelView::fits(device, floats, buffers.vertices.size_bytes);
+    let image = (permutation.variant.image && permutation.fits_image()).then(|| buffers.image()).transpose()?.flatten();
     let variant =
         permutation.variant.restricted(fits, entity_count <= permutation.entity_limit as usize, image.is_some());
     if variant != permutation.variant {

@@ -33,7 +33,7 @@ impl Frame {
 
     fn entity_bounds(&self, index: usize, placement: &Placement) -> EntityBounds {
         let entity = &self.scene.entities[index];
-        let geometry = &self.store.geometries[entity.mesh];
+        let geometry = &self.buffers.geometries[entity.mesh];
         // A field that nobody needs was not baked, and one of zeros changes nothing.
         let holds = |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing);
         let coloured = geometry.radiance.is_some() && entity.emits;
@@ -57,7 +57,7 @@ impl Frame {
 
     fn entity(&self, index: usize, placement: &Placement) -> layout::Entity {
         let entity = &self.scene.entities[index];
-        let geometry = &self.store.geometries[entity.mesh];
+        let geometry = &self.buffers.geometries[entity.mesh];
         let rotation = placement.turn();
         let [cos_a, sin_a, cos_b, sin_b, cos_c, sin_c] = turns(rotation).map(|x| x as f32);
         let centre = self.centre(index, placement).as_vec3();
@@ -96,7 +96,7 @@ impl Frame {
 
     /// Centre of an entity's bounding sphere in the world, metres.
     pub(super) fn centre(&self, index: usize, placement: &Placement) -> DVec3 {
-        let centre_m = self.store.geometries[self.scene.entities[index].mesh].centre_m;
+        let centre_m = self.buffers.geometries[self.scene.entities[index].mesh].centre_m;
         let rotation = placement.turn();
         placement.position.as_dvec3() + rotation * (centre_m * f64::from(placement.scale))
     }
@@ -104,7 +104,7 @@ impl Frame {
     /// Whether an entity occludes and something sees it.
     fn occludes(&self, index: usize) -> bool {
         let entity = &self.scene.entities[index];
-        entity.occludes && self.store.geometries[entity.mesh].blocked.is_some()
+        entity.occludes && self.buffers.geometries[entity.mesh].blocked.is_some()
     }
 
     /// Occluders of a receiver in their order, [`SceneBounds::order`]; itself left out.

@@ -4,7 +4,7 @@ use super::viewport::RadiositySource;
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device};
 use crate::scene::Scene;
-use crate::scene_buffers::Store;
+use crate::scene_buffers::SceneBuffers;
 use std::sync::Arc;
 
 /// Four floats a vertex: linear RGB radiance that leaves the surface, and 0. The vertices of one entity follow those of another, each
@@ -22,11 +22,11 @@ impl Radiosity {
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn new(device: &Arc<Device>, scene: &Scene, store: &Store) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers) -> Result<Self> {
         let (mut offsets, mut size_bytes) = (Vec::new(), 0);
         for entity in &scene.entities {
             offsets.push(size_bytes);
-            size_bytes += 16 * store.geometries[entity.mesh].vertices.len() as u64;
+            size_bytes += 16 * buffers.geometries[entity.mesh].vertices.len() as u64;
         }
         let mut merged = Buffer::new(device, "radiosity", BufferKind::Device, size_bytes.max(16))?;
         merged.fill(0, &vec![0.0_f32; merged.size_bytes as usize / 4])?;

@@ -19,7 +19,7 @@ impl Frame {
     /// cluster and entity, which no frame does.
     pub fn counts(&self, placements: &[Placement]) -> Counts {
         let entities = || self.scene.entities.iter().filter(|entity| entity.occludes || entity.emits);
-        let empty = |entity: &&Entity| self.store.geometries[entity.mesh].is_empty(entity.emits);
+        let empty = |entity: &&Entity| self.buffers.geometries[entity.mesh].is_empty(entity.emits);
         Counts {
             empty: entities().filter(empty).count() as u64,
             unseen: entities().filter(|e| !crate::bake::is_seen(&self.scene, e)).count() as u64,
@@ -48,9 +48,9 @@ impl Frame {
     /// `Device` when memory ran out.
     fn merge_twin<'f>(&'f self, placements: &'f [Placement]) -> Result<MergeTwin<'f>> {
         let mut fields: Vec<[Option<ShadowField>; 2]> = Vec::new();
-        for geometry in &self.store.geometries {
+        for geometry in &self.buffers.geometries {
             let load =
-                |slot: &Option<scene_buffers::Slot>| slot.as_ref().map(|slot| self.store.field(slot)).transpose();
+                |slot: &Option<scene_buffers::Slot>| slot.as_ref().map(|slot| self.buffers.field(slot)).transpose();
             fields.push(
                 [load(&geometry.blocked)?, load(&geometry.radiance)?]
                     .map(|field| field.as_ref().map(ShadowField::widened)),
@@ -61,13 +61,13 @@ impl Frame {
         for index in indices(&self.scene, |e| e.receives) {
             let mesh_index = self.scene.entities[index].mesh;
             let mesh = &self.scene.meshes[mesh_index];
-            let geometry = &self.store.geometries[mesh_index];
+            let geometry = &self.buffers.geometries[mesh_index];
             receivers.push(Receiver {
                 index,
                 occluders: self.occluders(&state.scene_bounds, index),
                 positions: mesh.positions.iter().map(|p| p.as_dvec3() - geometry.centre_m).collect(),
                 normals: mesh.normals.iter().map(|n| n.as_dvec3()).collect(),
-                transfer: self.store.transfer(geometry)?,
+                transfer: self.buffers.transfer(geometry)?,
                 // Without a threshold the twin looks at everything, which is what the lists are held against.
                 listed: (self.options.eps > 0.0).then(|| listed(&state, index, geometry)),
             });
@@ -107,7 +107,7 @@ struct Receiver {
 impl MergeTwin<'_> {
     /// Radiosity of every receiver's vertices, by entity, on all threads.
     pub fn run(&self) -> Vec<(usize, Vec<[f64; 3]>)> {
-        let Frame { scene, store, options, .. } = self.frame;
+        let Frame { scene, buffers, options, .. } = self.frame;
         let object = |(index, placement): (usize, &Placement)| {
             let entity = &scene.entities[index];
             let [blocked, radiance] = &self.fields[entity.mesh];
@@ -115,11 +115,11 @@ impl MergeTwin<'_> {
                 centre: self.frame.centre(index, placement),
                 rotation: placement.turn(),
                 scale: placement.scale.into(),
-                radius_m: store.geometries[entity.mesh].radius_m * f64::from(placement.scale),
+                radius_m: buffers.geometries[entity.mesh].radius_m * f64::from(placement.scale),
                 albedo_over_pi: (entity.albedo.as_dvec3() / PI).to_array(),
                 emission: entity.emission.as_dvec3().to_array(),
                 blocked: blocked.as_ref(),
-                area: store.geometries[entity.mesh].blocked.as_ref().map_or(Area::default(), |slot| slot.area),
+                area: buffers.geometries[entity.mesh].blocked.as_ref().map_or(Area::default(), |slot| slot.area),
                 radiance: radiance.as_ref().filter(|_| entity.emits),
             }
         };

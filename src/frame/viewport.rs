@@ -82,7 +82,7 @@ impl Frame {
     /// How an entity is seen.
     fn sight(&self, camera: &sight::Camera, index: usize, placement: &Placement) -> Sight {
         let mesh = self.scene.entities[index].mesh;
-        let geometry = &self.store.geometries[mesh];
+        let geometry = &self.buffers.geometries[mesh];
         let world_from_object = camera::world_from_centred(placement, geometry.centre_m);
         Sight::new(camera, world_from_object, geometry.radius_m, self.scene.meshes[mesh].is_solid())
     }
@@ -92,7 +92,7 @@ impl Frame {
         let camera = self.camera(size);
         let drawn = placements.iter().enumerate().map(|(index, placement)| {
             let entity = &self.scene.entities[index];
-            let geometry = &self.store.geometries[entity.mesh];
+            let geometry = &self.buffers.geometries[entity.mesh];
             let world_from_object = camera::world_from_centred(placement, geometry.centre_m);
             let sight = self.sight(&camera, index, placement);
             let drawn = DrawnEntity {
@@ -130,7 +130,7 @@ impl Frame {
         let clip_from_world = camera::clip_from_world(camera, aspect);
         let lines = placements.par_iter().enumerate().flat_map_iter(|(index, placement)| {
             let mesh = self.scene.entities[index].mesh;
-            let world = camera::world_from_centred(placement, self.store.geometries[mesh].centre_m);
+            let world = camera::world_from_centred(placement, self.buffers.geometries[mesh].centre_m);
             let eye = world.inverse().transform_point3(camera.eye.as_dvec3());
             let lines = self.picture.edges[mesh].lines(clip_from_world * world, eye, true);
             lines.into_iter().map(move |line| (line, smooth::tag(index)))

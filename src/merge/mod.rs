@@ -1,6 +1,6 @@
 //! Pass "merge": light on every vertex of every receiver.
 //!
-//! Inputs: entities, clusters and their entries (see [`crate::lists::gather`]), the field store, transfer vectors,
+//! Inputs: entities, clusters and their entries (see [`crate::lists::gather`]), the fields, transfer vectors,
 //! vertices (position and normal, object frame, two quads each), the sky's coefficients. Output: `radiosity`, four floats a
 //! vertex: radiance that leaves the surface, albedo / pi times the integral of incoming light, without emission.
 
@@ -73,7 +73,7 @@ pub struct Inputs<'b> {
     pub entries: &'b Buffer,
     /// [`crate::layout::Cluster`] of every cluster.
     pub clusters: &'b Buffer,
-    /// Field store.
+    /// Fields of the scene.
     pub fields: Readable<'b>,
     /// Transfer vectors.
     pub transfers: Readable<'b>,

@@ -59,7 +59,7 @@ impl Geometry {
 }
 
 /// Device-resident data of a scene.
-pub struct Store {
+pub struct SceneBuffers {
     /// All fields.
     pub fields: Buffer,
     /// Transfer vectors of all receivers' meshes.
@@ -78,7 +78,7 @@ pub struct Store {
     pub field_bands: usize,
 }
 
-impl Store {
+impl SceneBuffers {
     /// Uploads what was baked of a scene with `options`, and its meshes.
     ///
     /// # Errors
@@ -123,7 +123,7 @@ impl Store {
         if transfers.is_empty() {
             transfers.resize(4, 0.0);
         }
-        Ok(Store {
+        Ok(SceneBuffers {
             fields,
             transfers: Buffer::with_data(device, "transfers", &transfers)?,
             vertices: Buffer::with_data(device, "vertices", &vertices)?,

@@ -9,7 +9,7 @@ use crate::lists::gather::{Bounds, EntityBounds, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::Faces;
 use crate::scene::Placement;
-use crate::scene_buffers::{self, Slot};
+use crate::scene_buffers::{self, FieldSlot};
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use crate::sh::cube::{self, FACE_COUNT, texel_st};
 use crate::sh::rotation::turns;
@@ -35,7 +35,7 @@ impl Frame {
         let entity = &self.scene.entities[index];
         let geometry = &self.buffers.geometries[entity.mesh];
         // A field that nobody needs was not baked, and one of zeros changes nothing.
-        let holds = |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing);
+        let holds = |slot: &Option<FieldSlot>| slot.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing);
         let coloured = geometry.radiance.is_some() && entity.emits;
         let source = if coloured { &geometry.radiance } else { &geometry.blocked };
         let rotation = placement.turn();
@@ -66,7 +66,7 @@ impl Frame {
             Some(slot) if entity.emits => entity.emission * slot.header.radiance_scale,
             _ => entity.emission,
         };
-        let base = |slot: &Slot| if self.merge.image.is_some() { slot.channel } else { slot.quad() };
+        let base = |slot: &FieldSlot| if self.merge.image.is_some() { slot.channel } else { slot.quad() };
         let slot = geometry.blocked.as_ref().or(geometry.radiance.as_ref());
         // Both fields of a mesh have the same shells.
         let radial = slot.map_or([0.0; 4], |slot| {

@@ -49,8 +49,9 @@ impl Frame {
     fn merge_twin<'f>(&'f self, placements: &'f [Placement]) -> Result<MergeTwin<'f>> {
         let mut fields: Vec<[Option<ShadowField>; 2]> = Vec::new();
         for geometry in &self.buffers.geometries {
-            let load =
-                |slot: &Option<scene_buffers::Slot>| slot.as_ref().map(|slot| self.buffers.field(slot)).transpose();
+            let load = |slot: &Option<scene_buffers::FieldSlot>| {
+                slot.as_ref().map(|slot| self.buffers.field(slot)).transpose()
+            };
             fields.push(
                 [load(&geometry.blocked)?, load(&geometry.radiance)?]
                     .map(|field| field.as_ref().map(ShadowField::widened)),

@@ -13,9 +13,9 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A field in the atlas.
+/// The place of a field in the atlas, and what a merge has to know of the field.
 #[derive(Clone)]
-pub struct Slot {
+pub struct FieldSlot {
     /// Its parameters.
     pub header: FieldHeader,
     /// Its bytes in the atlas.
@@ -28,7 +28,7 @@ pub struct Slot {
     pub area: Area,
 }
 
-impl Slot {
+impl FieldSlot {
     /// First quad of the field, as shaders count.
     pub fn quad(&self) -> u32 {
         (self.bytes.start / (4 * self.header.storage.bytes() as u64)) as u32
@@ -44,9 +44,9 @@ pub(super) fn field_atlas(
     scene: &Scene,
     baked: &[BakedMesh],
     options: &Options,
-) -> Result<(Buffer, Vec<[Option<Slot>; 2]>)> {
+) -> Result<(Buffer, Vec<[Option<FieldSlot>; 2]>)> {
     let (mut total, mut channels) = (0, 0);
-    let mut known = HashMap::<*const ShadowField, Slot>::new();
+    let mut known = HashMap::<*const ShadowField, FieldSlot>::new();
     let mut distinct: Vec<(Arc<ShadowField>, u64)> = Vec::new();
     let mut slot = |field: &Arc<ShadowField>, name: &str| {
         let slot = known.entry(Arc::as_ptr(field)).or_insert_with(|| {
@@ -57,9 +57,9 @@ pub(super) fn field_atlas(
             channels += field.header.kind.channels() as u32;
             let is_occlusion = field.header.kind == FieldKind::Occlusion;
             let area = if is_occlusion { Area::new(field) } else { Area::default() };
-            Slot { header: field.header.clone(), bytes, channel, extent: extent(field), area }
+            FieldSlot { header: field.header.clone(), bytes, channel, extent: extent(field), area }
         });
-        Slot { header: FieldHeader { mesh: name.to_owned(), ..slot.header.clone() }, ..slot.clone() }
+        FieldSlot { header: FieldHeader { mesh: name.to_owned(), ..slot.header.clone() }, ..slot.clone() }
     };
     let slots = scene.meshes.iter().zip(baked).map(|(mesh, baked)| {
         [&baked.blocked, &baked.radiance].map(|field| field.as_ref().map(|field| slot(field, &mesh.name)))
@@ -78,7 +78,7 @@ pub(super) fn field_atlas(
 ///
 /// # Errors
 /// `Device` when memory ran out.
-pub(super) fn download(fields: &Buffer, slot: &Slot) -> Result<ShadowField> {
+pub(super) fn download(fields: &Buffer, slot: &FieldSlot) -> Result<ShadowField> {
     Ok(ShadowField { header: slot.header.clone(), payload: fields.download_range(slot.bytes.clone())? })
 }
 

@@ -17,7 +17,7 @@ use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::Bounds;
 use crate::lists::sight::Faces;
 use crate::scene::Scene;
-pub use field_atlas::Slot;
+pub use field_atlas::FieldSlot;
 use glam::DVec3;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -39,9 +39,9 @@ pub struct Geometry {
     /// First quad of its transfer vectors, or [`NONE`] where the cosine of the normal is exact.
     pub transfer_first: u32,
     /// Occlusion field, if an entity needs one.
-    pub blocked: Option<Slot>,
+    pub blocked: Option<FieldSlot>,
     /// Radiance field, if an entity needs one.
-    pub radiance: Option<Slot>,
+    pub radiance: Option<FieldSlot>,
     /// For drawing.
     pub drawn: DrawnMesh,
     /// Centre of the bounding sphere, metres.
@@ -147,7 +147,7 @@ impl SceneBuffers {
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn field(&self, slot: &Slot) -> Result<ShadowField> {
+    pub fn field(&self, slot: &FieldSlot) -> Result<ShadowField> {
         field_atlas::download(&self.fields, slot)
     }
 

@@ -96,9 +96,9 @@ fn the_same_mesh_under_two_names_is_baked_once() {
     assert_eq!(names(&same), ["a shadow", "a transfer"]);
     assert_eq!(names(&other), ["a shadow", "b shadow", "a transfer", "b transfer"]);
     assert!(same.fields.size_bytes < other.fields.size_bytes);
-    let [a, b] = [0, 1].map(|i| same.geometries[i].blocked.as_ref().unwrap());
+    let [a, b] = [0, 1].map(|i| same.meshes[i].blocked.as_ref().unwrap());
     assert!(a.bytes == b.bytes && a.header.growth == b.header.growth && b.header.growth >= 1.0);
-    assert_eq!(same.geometries[0].transfer_first, same.geometries[1].transfer_first);
+    assert_eq!(same.meshes[0].transfer_first, same.meshes[1].transfer_first);
 }
 
 #[test]

@@ -354,8 +354,8 @@ fn a_field_lands_at_its_place_in_a_scene() {
     let baked = bake::ensure(&baker, &Cache::new(None), &scene, &needs, &|_, _, _| ()).unwrap();
     let buffers = SceneBuffers::new(&gpu.device, &scene, &options, baked).unwrap();
     let mut ends = Vec::new();
-    for (mesh, geometry) in scene.meshes.iter().zip(&buffers.geometries) {
-        let slot = geometry.blocked.as_ref().unwrap();
+    for (mesh, device_mesh) in scene.meshes.iter().zip(&buffers.meshes) {
+        let slot = device_mesh.blocked.as_ref().unwrap();
         let alone = bake_field(&gpu.device, mesh, FieldKind::Occlusion, &options);
         assert!(buffers.field(slot).unwrap() == alone, "{}: the same field", mesh.name);
         assert!(

@@ -45,23 +45,23 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
     let placements = scene.at(0.0);
     let fields: Vec<Option<ShadowField>> = frame
         .buffers
-        .geometries
+        .meshes
         .iter()
         .map(|g| g.blocked.as_ref().map(|slot| frame.buffers.field(slot).unwrap()))
         .collect();
     let object = |(entity, place): (&shadow_fields::scene::Entity, &shadow_fields::scene::Placement)| {
-        let geometry = &frame.buffers.geometries[entity.mesh];
+        let device_mesh = &frame.buffers.meshes[entity.mesh];
         let rotation = place.turn();
         let scale = f64::from(place.scale);
         Object {
-            centre: place.position.as_dvec3() + rotation * (geometry.centre_m * scale),
+            centre: place.position.as_dvec3() + rotation * (device_mesh.centre_m * scale),
             rotation,
             scale,
-            radius_m: geometry.radius_m * scale,
+            radius_m: device_mesh.radius_m * scale,
             albedo_over_pi: (entity.albedo.as_dvec3() / std::f64::consts::PI).to_array(),
             emission: entity.emission.as_dvec3().to_array(),
             blocked: fields[entity.mesh].as_ref(),
-            area: geometry.blocked.as_ref().map_or(Default::default(), |slot| slot.area),
+            area: device_mesh.blocked.as_ref().map_or(Default::default(), |slot| slot.area),
             radiance: None,
         }
     };
@@ -70,7 +70,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
     let mesh = &scene.meshes[0];
     let (mut out, mut orders) = (Vec::new(), BTreeMap::new());
     for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
-        let (position, normal) = (position.as_dvec3() - frame.buffers.geometries[0].centre_m, normal.as_dvec3());
+        let (position, normal) = (position.as_dvec3() - frame.buffers.meshes[0].centre_m, normal.as_dvec3());
         let distance = |j: usize| objects[j].centre.distance(objects[0].centre + position);
         let mut all: Vec<usize> = (1..objects.len()).collect();
         all.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));

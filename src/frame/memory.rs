@@ -40,7 +40,7 @@ impl Frame {
             transfers: self.buffers.transfers.size_bytes,
             vertices: self.buffers.vertices.size_bytes,
             radiosity: self.radiosity.merged.size_bytes,
-            drawables: self.buffers.geometries.iter().map(|geometry| geometry.drawn.size_bytes()).sum(),
+            drawables: self.buffers.meshes.iter().map(|device_mesh| device_mesh.drawn.size_bytes()).sum(),
             lists: self.work.size_bytes() + self.sky.coefficients.all_bytes() + self.picture.lines.size_bytes(),
             pictures: self.picture.readback.size_bytes + self.picture.draw.size_bytes(),
             host_lists: self.work.lists.size_bytes(),

@@ -112,8 +112,8 @@ impl Frame {
         let radiosity = Radiosity::new(device, scene, &buffers)?;
         let mut lists = ClusterLists::default();
         for (index, entity) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
-            let geometry = &buffers.geometries[entity.mesh];
-            lists.add(index, pose::clusters(index, geometry, radiosity.offsets[index] / 16, options.bake.bands));
+            let device_mesh = &buffers.meshes[entity.mesh];
+            lists.add(index, pose::clusters(index, device_mesh, radiosity.offsets[index] / 16, options.bake.bands));
         }
         let place = options.lists.unwrap_or_else(|| Place::quicker(device, entity_count));
         let gathers = place == Place::Device && !lists.clusters.is_empty();
@@ -262,7 +262,7 @@ impl Frame {
 
     /// Order in which an entity's vertices are stored.
     fn order(&self, entity: usize) -> &[u32] {
-        &self.buffers.geometries[self.scene.entities[entity].mesh].order
+        &self.buffers.meshes[self.scene.entities[entity].mesh].order
     }
 
     /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what was computed
@@ -272,7 +272,7 @@ impl Frame {
     /// `Device` when memory ran out.
     pub fn set_radiosity(&mut self, entity: usize, radiosity: &[[f32; 3]]) -> Result<()> {
         self.forget();
-        let order = &self.buffers.geometries[self.scene.entities[entity].mesh].order;
+        let order = &self.buffers.meshes[self.scene.entities[entity].mesh].order;
         self.radiosity.write(entity, order, radiosity)
     }
 
@@ -292,7 +292,7 @@ impl Frame {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn set_comparison(&mut self, place: usize, radiosity: &[(usize, Vec<[f32; 3]>)], rest: [f32; 3]) -> Result<()> {
-        let order = |entity: usize| &self.buffers.geometries[self.scene.entities[entity].mesh].order[..];
+        let order = |entity: usize| &self.buffers.meshes[self.scene.entities[entity].mesh].order[..];
         let entities = radiosity.iter().map(|(entity, values)| (*entity, order(*entity), &values[..]));
         self.radiosity.compare(place, entities, rest)
     }

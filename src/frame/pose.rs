@@ -33,21 +33,21 @@ impl Frame {
 
     fn entity_bounds(&self, index: usize, placement: &Placement) -> EntityBounds {
         let entity = &self.scene.entities[index];
-        let geometry = &self.buffers.geometries[entity.mesh];
+        let device_mesh = &self.buffers.meshes[entity.mesh];
         // A field that nobody needs was not baked, and one of zeros changes nothing.
         let holds = |slot: &Option<FieldSlot>| slot.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing);
-        let coloured = geometry.radiance.is_some() && entity.emits;
-        let source = if coloured { &geometry.radiance } else { &geometry.blocked };
+        let coloured = device_mesh.radiance.is_some() && entity.emits;
+        let source = if coloured { &device_mesh.radiance } else { &device_mesh.blocked };
         let rotation = placement.turn();
         let facing = source.as_ref().and_then(|slot| match slot.extent {
             Extent::Cone { axis, half_angle_rad } => Some((rotation * axis, half_angle_rad)),
             Extent::Nothing | Extent::All => None,
         });
-        let brightest = geometry.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale);
+        let brightest = device_mesh.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale);
         EntityBounds {
             centre: self.centre(index, placement),
-            radius_m: geometry.radius_m * f64::from(placement.scale),
-            occludes: entity.occludes && holds(&geometry.blocked),
+            radius_m: device_mesh.radius_m * f64::from(placement.scale),
+            occludes: entity.occludes && holds(&device_mesh.blocked),
             emits: entity.emits && holds(source),
             coloured,
             radiance: f64::from(entity.emission.max_element()) * f64::from(brightest),
@@ -57,24 +57,24 @@ impl Frame {
 
     fn entity(&self, index: usize, placement: &Placement) -> layout::Entity {
         let entity = &self.scene.entities[index];
-        let geometry = &self.buffers.geometries[entity.mesh];
+        let device_mesh = &self.buffers.meshes[entity.mesh];
         let rotation = placement.turn();
         let [cos_a, sin_a, cos_b, sin_b, cos_c, sin_c] = turns(rotation).map(|x| x as f32);
         let centre = self.centre(index, placement).as_vec3();
-        let radius_m = geometry.radius_m * f64::from(placement.scale);
-        let emission = match &geometry.radiance {
+        let radius_m = device_mesh.radius_m * f64::from(placement.scale);
+        let emission = match &device_mesh.radiance {
             Some(slot) if entity.emits => entity.emission * slot.header.radiance_scale,
             _ => entity.emission,
         };
         let base = |slot: &FieldSlot| if self.merge.image.is_some() { slot.channel } else { slot.quad() };
-        let slot = geometry.blocked.as_ref().or(geometry.radiance.as_ref());
+        let slot = device_mesh.blocked.as_ref().or(device_mesh.radiance.as_ref());
         // Both fields of a mesh have the same shells.
         let radial = slot.map_or([0.0; 4], |slot| {
             let lattice = slot.header.lattice;
             let (slope, offset) = lattice.radial_map();
             [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32]
         });
-        let area = geometry.blocked.as_ref().map_or(Area::default(), |slot| slot.area);
+        let area = device_mesh.blocked.as_ref().map_or(Area::default(), |slot| slot.area);
         let [area_x, area_y] = area.axes.map(|axis| (rotation * axis).as_vec3());
         let terms = area.terms.map(|term| term as f32);
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());
@@ -89,14 +89,14 @@ impl Frame {
             area_x: area_x.extend(terms[0]).to_array(),
             area_y: area_y.extend(terms[1]).to_array(),
             area_terms: [terms[2], terms[3], terms[4], terms[5]],
-            blocked_base: geometry.blocked.as_ref().map_or(0, base),
-            radiance_base: geometry.radiance.as_ref().map_or(0, base),
+            blocked_base: device_mesh.blocked.as_ref().map_or(0, base),
+            radiance_base: device_mesh.radiance.as_ref().map_or(0, base),
         }
     }
 
     /// Centre of an entity's bounding sphere in the world, metres.
     pub(super) fn centre(&self, index: usize, placement: &Placement) -> DVec3 {
-        let centre_m = self.buffers.geometries[self.scene.entities[index].mesh].centre_m;
+        let centre_m = self.buffers.meshes[self.scene.entities[index].mesh].centre_m;
         let rotation = placement.turn();
         placement.position.as_dvec3() + rotation * (centre_m * f64::from(placement.scale))
     }
@@ -104,7 +104,7 @@ impl Frame {
     /// Whether an entity occludes and something sees it.
     fn occludes(&self, index: usize) -> bool {
         let entity = &self.scene.entities[index];
-        entity.occludes && self.buffers.geometries[entity.mesh].blocked.is_some()
+        entity.occludes && self.buffers.meshes[entity.mesh].blocked.is_some()
     }
 
     /// Occluders of a receiver in their order, [`SceneBounds::order`]; itself left out.
@@ -119,7 +119,7 @@ impl Frame {
 /// Clusters of one receiver, without entries; `radiosity_first` is its first vertex in the radiosity buffer.
 pub(super) fn clusters(
     receiver: usize,
-    geometry: &scene_buffers::Geometry,
+    device_mesh: &scene_buffers::DeviceMesh,
     radiosity_first: u64,
     bands: usize,
 ) -> Vec<Member> {
@@ -128,9 +128,9 @@ pub(super) fn clusters(
         let first = i as u32 * CLUSTER_VERTICES;
         let cluster = layout::Cluster {
             receiver: receiver as u32,
-            vertex_first: geometry.vertices.start + first,
-            vertex_count: (geometry.vertices.len() as u32 - first).min(CLUSTER_VERTICES),
-            transfer_first: match geometry.transfer_first {
+            vertex_first: device_mesh.vertices.start + first,
+            vertex_count: (device_mesh.vertices.len() as u32 - first).min(CLUSTER_VERTICES),
+            transfer_first: match device_mesh.transfer_first {
                 NONE => NONE,
                 quad => quad + first * transfer_quads,
             },
@@ -139,7 +139,7 @@ pub(super) fn clusters(
         };
         Member { cluster, bounds: *bounds, faces: *faces }
     };
-    geometry.clusters.iter().zip(&geometry.faces).enumerate().map(cluster).collect()
+    device_mesh.clusters.iter().zip(&device_mesh.faces).enumerate().map(cluster).collect()
 }
 
 /// Largest value of a projected sky, of any colour, on a grid of directions that is fine against its bands; at least 0.

@@ -8,7 +8,7 @@ use crate::scene_buffers::SceneBuffers;
 use std::sync::Arc;
 
 /// Four floats a vertex: linear RGB radiance that leaves the surface, and 0. The vertices of one entity follow those of another, each
-/// in the order of its mesh's [`crate::scene_buffers::Geometry`].
+/// in the order of its mesh's [`crate::scene_buffers::DeviceMesh`].
 pub(super) struct Radiosity {
     /// What the merge writes.
     pub merged: Buffer,
@@ -26,7 +26,7 @@ impl Radiosity {
         let (mut offsets, mut size_bytes) = (Vec::new(), 0);
         for entity in &scene.entities {
             offsets.push(size_bytes);
-            size_bytes += 16 * buffers.geometries[entity.mesh].vertices.len() as u64;
+            size_bytes += 16 * buffers.meshes[entity.mesh].vertices.len() as u64;
         }
         let mut merged = Buffer::new(device, "radiosity", BufferKind::Device, size_bytes.max(16))?;
         merged.fill(0, &vec![0.0_f32; merged.size_bytes as usize / 4])?;

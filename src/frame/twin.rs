@@ -9,7 +9,7 @@ use crate::lists::incremental::State;
 use crate::merge::twin::{Object, Task};
 use crate::scene::{Entity, Placement, Scene};
 use crate::scene_buffers;
-use crate::scene_buffers::Geometry;
+use crate::scene_buffers::DeviceMesh;
 use glam::DVec3;
 use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
@@ -19,7 +19,7 @@ impl Frame {
     /// cluster and entity, which no frame does.
     pub fn counts(&self, placements: &[Placement]) -> Counts {
         let entities = || self.scene.entities.iter().filter(|entity| entity.occludes || entity.emits);
-        let empty = |entity: &&Entity| self.buffers.geometries[entity.mesh].is_empty(entity.emits);
+        let empty = |entity: &&Entity| self.buffers.meshes[entity.mesh].is_empty(entity.emits);
         Counts {
             empty: entities().filter(empty).count() as u64,
             unseen: entities().filter(|e| !crate::bake::is_seen(&self.scene, e)).count() as u64,
@@ -48,12 +48,12 @@ impl Frame {
     /// `Device` when memory ran out.
     fn merge_twin<'f>(&'f self, placements: &'f [Placement]) -> Result<MergeTwin<'f>> {
         let mut fields: Vec<[Option<ShadowField>; 2]> = Vec::new();
-        for geometry in &self.buffers.geometries {
+        for device_mesh in &self.buffers.meshes {
             let load = |slot: &Option<scene_buffers::FieldSlot>| {
                 slot.as_ref().map(|slot| self.buffers.field(slot)).transpose()
             };
             fields.push(
-                [load(&geometry.blocked)?, load(&geometry.radiance)?]
+                [load(&device_mesh.blocked)?, load(&device_mesh.radiance)?]
                     .map(|field| field.as_ref().map(ShadowField::widened)),
             );
         }
@@ -62,15 +62,15 @@ impl Frame {
         for index in indices(&self.scene, |e| e.receives) {
             let mesh_index = self.scene.entities[index].mesh;
             let mesh = &self.scene.meshes[mesh_index];
-            let geometry = &self.buffers.geometries[mesh_index];
+            let device_mesh = &self.buffers.meshes[mesh_index];
             receivers.push(Receiver {
                 index,
                 occluders: self.occluders(&state.scene_bounds, index),
-                positions: mesh.positions.iter().map(|p| p.as_dvec3() - geometry.centre_m).collect(),
+                positions: mesh.positions.iter().map(|p| p.as_dvec3() - device_mesh.centre_m).collect(),
                 normals: mesh.normals.iter().map(|n| n.as_dvec3()).collect(),
-                transfer: self.buffers.transfer(geometry)?,
+                transfer: self.buffers.transfer(device_mesh)?,
                 // Without a threshold the twin looks at everything, which is what the lists are held against.
-                listed: (self.options.eps > 0.0).then(|| listed(&state, index, geometry)),
+                listed: (self.options.eps > 0.0).then(|| listed(&state, index, device_mesh)),
             });
         }
         Ok(MergeTwin {
@@ -116,11 +116,11 @@ impl MergeTwin<'_> {
                 centre: self.frame.centre(index, placement),
                 rotation: placement.turn(),
                 scale: placement.scale.into(),
-                radius_m: buffers.geometries[entity.mesh].radius_m * f64::from(placement.scale),
+                radius_m: buffers.meshes[entity.mesh].radius_m * f64::from(placement.scale),
                 albedo_over_pi: (entity.albedo.as_dvec3() / PI).to_array(),
                 emission: entity.emission.as_dvec3().to_array(),
                 blocked: blocked.as_ref(),
-                area: buffers.geometries[entity.mesh].blocked.as_ref().map_or(Area::default(), |slot| slot.area),
+                area: buffers.meshes[entity.mesh].blocked.as_ref().map_or(Area::default(), |slot| slot.area),
                 radiance: radiance.as_ref().filter(|_| entity.emits),
             }
         };
@@ -154,10 +154,10 @@ impl MergeTwin<'_> {
 /// The cluster of every vertex of a mesh, and what stands on each cluster's list: entity and light, or the sky's number.
 type Listed = (Vec<usize>, Vec<HashSet<(u32, u32)>>);
 
-fn listed(state: &State, receiver: usize, geometry: &Geometry) -> Listed {
+fn listed(state: &State, receiver: usize, device_mesh: &DeviceMesh) -> Listed {
     let (scene_bounds, entity) = (&state.scene_bounds, &state.entities[receiver]);
-    let mut cluster_of = vec![0; geometry.order.len()];
-    for (place, &v) in geometry.order.iter().enumerate() {
+    let mut cluster_of = vec![0; device_mesh.order.len()];
+    for (place, &v) in device_mesh.order.iter().enumerate() {
         cluster_of[v as usize] = place / CLUSTER_VERTICES as usize;
     }
     let candidates = Candidates::all(scene_bounds, receiver as u32);
@@ -167,7 +167,7 @@ fn listed(state: &State, receiver: usize, geometry: &Geometry) -> Listed {
         gather::reference(&scope, &candidates, &mut entries);
         entries.into_iter().map(|entry| ListEntry::entities(entry).into()).collect()
     };
-    (cluster_of, geometry.clusters.iter().map(of_cluster).collect())
+    (cluster_of, device_mesh.clusters.iter().map(of_cluster).collect())
 }
 
 /// Entities that satisfy a condition.

@@ -82,9 +82,9 @@ impl Frame {
     /// How an entity is seen.
     fn sight(&self, camera: &sight::Camera, index: usize, placement: &Placement) -> Sight {
         let mesh = self.scene.entities[index].mesh;
-        let geometry = &self.buffers.geometries[mesh];
-        let world_from_object = camera::world_from_centred(placement, geometry.centre_m);
-        Sight::new(camera, world_from_object, geometry.radius_m, self.scene.meshes[mesh].is_solid())
+        let device_mesh = &self.buffers.meshes[mesh];
+        let world_from_object = camera::world_from_centred(placement, device_mesh.centre_m);
+        Sight::new(camera, world_from_object, device_mesh.radius_m, self.scene.meshes[mesh].is_solid())
     }
 
     /// All entities in the order in which they are drawn, for a viewport of `size` pixels.
@@ -92,19 +92,19 @@ impl Frame {
         let camera = self.camera(size);
         let drawn = placements.iter().enumerate().map(|(index, placement)| {
             let entity = &self.scene.entities[index];
-            let geometry = &self.buffers.geometries[entity.mesh];
-            let world_from_object = camera::world_from_centred(placement, geometry.centre_m);
+            let device_mesh = &self.buffers.meshes[entity.mesh];
+            let world_from_object = camera::world_from_centred(placement, device_mesh.centre_m);
             let sight = self.sight(&camera, index, placement);
             let drawn = DrawnEntity {
-                mesh: &geometry.drawn,
-                indices: geometry.drawn.seen(self.options.skip.hidden.then_some(&sight)),
+                mesh: &device_mesh.drawn,
+                indices: device_mesh.drawn.seen(self.options.skip.hidden.then_some(&sight)),
                 clip_from_object: (camera.clip_from_world * world_from_object).as_mat4(),
                 culls: sight.culls(),
                 emission: entity.emission,
                 radiosity_offset: self.radiosity.offsets[index],
                 tag: smooth::tag(index),
             };
-            let radius_m = geometry.radius_m * f64::from(placement.scale);
+            let radius_m = device_mesh.radius_m * f64::from(placement.scale);
             let distance_m = self.centre(index, placement).distance(camera.eye) - radius_m;
             (drawn.mesh.is_grid(), distance_m, drawn)
         });
@@ -130,7 +130,7 @@ impl Frame {
         let clip_from_world = camera::clip_from_world(camera, aspect);
         let lines = placements.par_iter().enumerate().flat_map_iter(|(index, placement)| {
             let mesh = self.scene.entities[index].mesh;
-            let world = camera::world_from_centred(placement, self.buffers.geometries[mesh].centre_m);
+            let world = camera::world_from_centred(placement, self.buffers.meshes[mesh].centre_m);
             let eye = world.inverse().transform_point3(camera.eye.as_dvec3());
             let lines = self.picture.edges[mesh].lines(clip_from_world * world, eye, true);
             lines.into_iter().map(move |line| (line, smooth::tag(index)))

@@ -26,8 +26,8 @@ use std::sync::Arc;
 /// Alignment of everything that a pass may bind as a range: the largest that Vulkan lets a device ask for.
 pub const ALIGNMENT: u64 = 256;
 
-/// One mesh of the scene.
-pub struct Geometry {
+/// One mesh of the scene: where its vertices, transfer vectors and fields lie, and how it is drawn.
+pub struct DeviceMesh {
     /// Its vertices in the vertex buffer.
     pub vertices: Range<u32>,
     /// Which vertex of the mesh stands at each place of that range: neighbours stand together.
@@ -50,7 +50,7 @@ pub struct Geometry {
     pub radius_m: f64,
 }
 
-impl Geometry {
+impl DeviceMesh {
     /// Whether the field that an entity casts shadows with, or shines with, is there and holds nothing but zeros.
     pub fn is_empty(&self, emits: bool) -> bool {
         let source = if emits && self.radiance.is_some() { &self.radiance } else { &self.blocked };
@@ -67,7 +67,7 @@ pub struct SceneBuffers {
     /// Position and normal of all meshes, a quad each.
     pub vertices: Buffer,
     /// The scene's meshes.
-    pub geometries: Vec<Geometry>,
+    pub meshes: Vec<DeviceMesh>,
     /// Bakes that were not found in the cache.
     pub baked: Vec<Baked>,
     /// Number format of the fields.
@@ -89,7 +89,7 @@ impl SceneBuffers {
         // All at once: growing by halves would hold up to three times as much.
         let quads = 2 * scene.meshes.iter().map(|mesh| mesh.positions.len()).sum::<usize>();
         let mut vertices = Vec::<[f32; 4]>::with_capacity(quads);
-        let (mut transfers, mut geometries) = (Vec::new(), Vec::new());
+        let (mut transfers, mut meshes) = (Vec::new(), Vec::new());
         let mut transfer_of = HashMap::<[u8; 32], u32>::new();
         let drawn = scene.entities.iter().map(|entity| scene.meshes[entity.mesh].positions.len()).sum();
         for ((mesh, [blocked, radiance]), baked) in scene.meshes.iter().zip(slots).zip(baked.meshes) {
@@ -107,7 +107,7 @@ impl SceneBuffers {
                     first
                 })
             });
-            geometries.push(Geometry {
+            meshes.push(DeviceMesh {
                 vertices: vertex_first / 2..vertices.len() as u32 / 2,
                 clusters: clusters::bounds(mesh, &order),
                 faces: Faces::around(mesh, &order, CLUSTER_VERTICES as usize),
@@ -127,7 +127,7 @@ impl SceneBuffers {
             fields,
             transfers: Buffer::with_data(device, "transfers", &transfers)?,
             vertices: Buffer::with_data(device, "vertices", &vertices)?,
-            geometries,
+            meshes,
             baked: baked.baked,
             storage: options.storage,
             bands: options.bands,
@@ -137,9 +137,9 @@ impl SceneBuffers {
 
     /// Whether every field that `scene` needs is here; it has the meshes that these were made for.
     pub fn covers(&self, scene: &Scene) -> bool {
-        self.geometries.iter().enumerate().all(|(mesh, geometry)| {
+        self.meshes.iter().enumerate().all(|(mesh, device_mesh)| {
             let [blocked, radiance] = bake::needs(scene, mesh).map(|kind| kind.is_some());
-            (geometry.blocked.is_some() || !blocked) && (geometry.radiance.is_some() || !radiance)
+            (device_mesh.blocked.is_some() || !blocked) && (device_mesh.radiance.is_some() || !radiance)
         })
     }
 
@@ -157,7 +157,7 @@ impl SceneBuffers {
     /// `Device` when memory ran out.
     pub fn image(&self) -> Result<Option<Volume>> {
         let device = self.fields.device();
-        let slots = self.geometries.iter().flat_map(|g| [&g.blocked, &g.radiance]).flatten();
+        let slots = self.meshes.iter().flat_map(|g| [&g.blocked, &g.radiance]).flatten();
         let fields = slots.map(|slot| self.field(slot)).collect::<Result<Vec<_>>>()?;
         field_atlas::image(device, &fields, self.bands)
     }
@@ -166,16 +166,16 @@ impl SceneBuffers {
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn transfer(&self, geometry: &Geometry) -> Result<Option<(Vec<f32>, usize)>> {
-        if geometry.transfer_first == NONE {
+    pub fn transfer(&self, device_mesh: &DeviceMesh) -> Result<Option<(Vec<f32>, usize)>> {
+        if device_mesh.transfer_first == NONE {
             return Ok(None);
         }
         let stride = channel_stride(self.bands);
-        let first = u64::from(geometry.transfer_first) * 16;
-        let size = geometry.vertices.len() as u64 * stride as u64 * 4;
+        let first = u64::from(device_mesh.transfer_first) * 16;
+        let size = device_mesh.vertices.len() as u64 * stride as u64 * 4;
         let stored: Vec<f32> = self.transfers.download_range(first..first + size)?;
         let mut floats = vec![0.0; stored.len()];
-        for (place, &v) in geometry.order.iter().enumerate() {
+        for (place, &v) in device_mesh.order.iter().enumerate() {
             floats[v as usize * stride..][..stride].copy_from_slice(&stored[place * stride..][..stride]);
         }
         Ok(Some((floats, stride)))

@@ -4,13 +4,21 @@ use crate::error::{Error, Result};
 use serde_json::Value;
 use std::path::Path;
 
-/// Writes a text file without leaving a partial one.
+/// Writes a file of results without leaving a partial one.
 ///
 /// # Errors
 /// `Failed` that names the file.
-pub fn write(path: &Path, text: &str) -> Result<()> {
-    crate::files::replace(path, text.as_bytes())
+pub fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<()> {
+    crate::files::replace(path, text.as_ref())
         .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
+}
+
+/// Makes the folder that results go to, with those that it stands in.
+///
+/// # Errors
+/// `Failed` that names the folder.
+pub fn make_folder(path: &Path) -> Result<()> {
+    std::fs::create_dir_all(path).map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", path.display())))
 }
 
 /// Serialisable rows as CSV: nested numbers get names joined by `_`, lists of objects are left out, and the first line, after

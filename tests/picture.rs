@@ -110,7 +110,7 @@ fn failure_leaves_what_was_there() {
         Err("no more".into())
     });
     let message = error.unwrap_err().to_string();
-    assert!(message.contains("p.png: cannot write: no more"), "{message}");
+    assert!(message.contains("p.png: cannot be written: no more"), "{message}");
     assert_eq!(std::fs::read(&path).unwrap(), before);
     assert_eq!(files(folder.path()), ["p.png"]);
     for bad in [folder.path().join("none/p.png"), folder.path().to_owned()] {

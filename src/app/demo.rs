@@ -55,8 +55,7 @@ const PAIR_SCENE: &str = "sphere_over_plane";
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let started = Instant::now();
     let context = Context::new(global)?;
-    std::fs::create_dir_all(&arguments.output)
-        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", arguments.output.display())))?;
+    crate::text::make_folder(&arguments.output)?;
     let mut written = Vec::new();
     let mut rows = Vec::new();
     for (name, animated) in SCENES {

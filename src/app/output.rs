@@ -56,12 +56,14 @@ pub fn note(global: &Global, line: impl AsRef<str>) {
 /// `Failed` with the file's name.
 pub fn check_folder(path: &Path) -> Result<()> {
     if path.is_dir() {
-        return Err(Error::Failed(format!("{}: cannot write: it is a folder", path.display())));
+        return Err(Error::Failed(format!("{}: cannot be written: it is a folder", path.display())));
     }
     match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-            Err(Error::Failed(format!("{}: cannot write: there is no folder {}", path.display(), folder.display())))
-        }
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => Err(Error::Failed(format!(
+            "{}: cannot be written: there is no folder {}",
+            path.display(),
+            folder.display()
+        ))),
         _ => Ok(()),
     }
 }

@@ -6,7 +6,7 @@ use crate::asset::Mesh;
 use crate::bench::Bench;
 use crate::bench::ceilings::{self, Ceilings};
 use crate::bench::profile::{self, Contender, Row, Start, Tenths};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::{self, Device, Validation};
 use crate::merge::calibrate;
 use crate::merge::workload::Workload;
@@ -55,8 +55,7 @@ pub struct Arguments {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let context = Context::new(global)?;
     for folder in [&arguments.spirv, &arguments.out].into_iter().flatten() {
-        std::fs::create_dir_all(folder)
-            .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+        crate::text::make_folder(folder)?;
     }
     let chosen: Vec<Contender> = match (&arguments.variant, &arguments.compare) {
         (Some(name), _) => vec![profile::named(&context.device, name)?],

@@ -59,7 +59,7 @@ pub fn write_apng(
     if frames.len() == 0 || fps == 0 {
         return Err(Error::Usage(format!("{}: an animation needs frames and a rate above 0", path.display())));
     }
-    let fail = |e: png::EncodingError| Error::Failed(format!("{}: cannot write: {e}", path.display()));
+    let fail = |e: png::EncodingError| Error::Failed(format!("{}: cannot be written: {e}", path.display()));
     let mut bytes = Vec::new();
     let mut encoder = rgb8_encoder(&mut bytes, width, height);
     encoder.set_animated(frames.len() as u32, 0).map_err(fail)?;

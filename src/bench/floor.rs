@@ -4,7 +4,7 @@ use super::budget::{Budget, Effort, Truth, budget};
 use super::cases;
 use super::{Bench, default_options};
 use crate::bake;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::frame;
 use crate::text::{csv, write};
 use serde::Serialize;
@@ -87,8 +87,7 @@ pub fn run(
     let known: Vec<_> = cases::floor(CELLS)?.into_iter().zip(INDEPENDENT).collect();
     let chosen = cases::named(known, lights, |(case, _)| &case.name)?;
     let options = frame::Options { bake, ..default_options() };
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+    crate::text::make_folder(folder)?;
     // All 1 600 vertices: most of the error sits in the few under the teapot.
     let rays = rays.unwrap_or(if bench.quick { 4096 } else { 16384 });
     let effort = Effort { vertices: usize::MAX, t0_rays: rays, t1_rays: rays };

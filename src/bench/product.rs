@@ -2,7 +2,7 @@
 
 use super::Bench;
 use super::figures::{Spread, spread};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Commands};
 use crate::merge::chain::{Chain, PRODUCTS, Product};
 use crate::merge::product::{Products, Push, Shape, twin};
@@ -155,8 +155,7 @@ fn error_of(shape: Shape, transfers: &[f64], factors: &[f64], found: &[f32]) -> 
 /// # Errors
 /// As [`measure`]; `Failed` when the folder cannot be written.
 pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Timed>> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+    crate::text::make_folder(folder)?;
     let timed = measure(bench)?;
     let origin = json!({ "origin": bench.origin, "quick": bench.quick, "seed": bench.seed });
     let rows: Vec<Value> = timed.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect();

@@ -384,8 +384,7 @@ pub fn write_spirv(folder: &Path, library: &Library, workload: &Workload, chosen
         let shader = library.shader(&permutation.row())?;
         let path = |ending: &str| folder.join(format!("{}.{ending}", contender.name.replace('/', "-")));
         let words: Vec<u8> = shader.spirv.iter().flat_map(|word| word.to_le_bytes()).collect();
-        crate::files::replace(&path("spv"), &words)
-            .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path("spv").display())))?;
+        crate::text::write(&path("spv"), words)?;
         crate::text::write(&path("spvasm"), &disassemble(&shader)?)?;
     }
     Ok(())

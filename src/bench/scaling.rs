@@ -71,8 +71,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Sc
         return Err(Error::Usage(format!("unknown axis \"{name}\" ({})", names.join(", "))));
     }
     axes.retain(|(axis, _)| chosen.is_empty() || chosen.iter().any(|name| name == axis));
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+    crate::text::make_folder(folder)?;
     let mut points = Vec::new();
     for (axis, towns) in &axes {
         for &town in towns {

@@ -8,7 +8,7 @@ use super::sweep::merge_ms;
 use super::town::{Town, moved};
 use super::{Bench, default_options, house};
 use crate::draw::Antialias;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::frame;
 use crate::lists::gather::Counts;
 use crate::lists::skip::{self, BenchCase, EPS, Skip};
@@ -73,8 +73,7 @@ fn left_off(name: &str, counts: &Counts) -> Option<u64> {
 /// # Errors
 /// `Failed` when the folder cannot be written; else as [`frame::Frame::new`].
 pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Row>> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+    crate::text::make_folder(folder)?;
     let mut rows = Vec::new();
     for case in all(bench.quick)? {
         if !chosen.is_empty() && !chosen.iter().any(|text| case.name.contains(text)) {

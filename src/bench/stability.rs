@@ -5,7 +5,7 @@ use super::default_options;
 use super::plot::{AxisScale, Curve, Panel, Plot, PlotColumn, RowGroup, Rows};
 use super::refusals::{Refusal, refusals};
 use super::trials::{self, Trial, Turn};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::field::Storage;
 use crate::merge::chain::{self, Multiplier};
 use crate::sh::basis::MAX_COEFFICIENTS;
@@ -191,8 +191,7 @@ pub fn chains(seed: u64, longest: usize) -> Vec<CapChain> {
 /// # Errors
 /// `Failed` when the folder cannot be written; else as [`crate::frame::Frame::new`].
 pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<StabilityOutcome> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+    crate::text::make_folder(folder)?;
     (bench.progress)("chains of caps");
     let chains = chains(bench.seed, if bench.quick { 64 } else { 1000 });
     let mut trials = Vec::new();

@@ -60,8 +60,7 @@ impl TimeErrorOutcome {
 pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection) -> Result<TimeErrorOutcome> {
     let cases = chosen(bench.quick, &selection.cases)?;
     let all = variations_of(bench.quick, &selection.axes)?;
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", folder.display())))?;
+    crate::text::make_folder(folder)?;
     let mut outcome = TimeErrorOutcome {
         budgets: Vec::new(),
         pictures: Vec::new(),

@@ -5,7 +5,7 @@ use crate::asset::{Mesh, embedded};
 use crate::error::Result;
 use crate::field::{Lattice, Storage};
 use crate::frame::Frame;
-use crate::scene::Scene;
+use crate::scene::{Placement, Scene};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;
 use crate::truth::receiver_vertices;
@@ -278,7 +278,7 @@ pub fn turns(steps: usize) -> Vec<Turn> {
             }
         }
         let exact = DQuat::from_axis_angle(axis, (0.01 * steps as f64).to_radians());
-        let given = single.as_dquat().normalize();
+        let given = Placement { position: Vec3::ZERO, rotation: single, scale: 1.0 }.turn();
         let rotation = Rotation::new(4, given);
         let mut worst = 0.0_f64;
         for k in 0..16 {

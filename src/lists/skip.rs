@@ -107,7 +107,7 @@ skips! {
         /// Entities whose field holds nothing but zeros.
         empty: Exact, "frame/pose.rs body", "empty";
         /// Entities that nothing but themselves is lit by: their fields are not baked.
-        unseen: Bake, "scene_buffers/mod.rs needs", "unseen";
+        unseen: Bake, "bake/ensure.rs needs", "unseen";
         /// Light and shadow that is bounded below `--eps`.
         eps: Approximate, "lists/scope.rs negligible", "below_eps";
     }
@@ -217,6 +217,21 @@ mod tests {
             let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(file);
             let text = std::fs::read_to_string(path).unwrap();
             assert!(text.contains(&format!("fn {function}(")), "{row:?}");
+        }
+    }
+
+    #[test]
+    fn every_macro_stands_in_the_shaders_that_its_row_names() {
+        let text = |file: &str| {
+            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl").join(file);
+            std::fs::read_to_string(path).unwrap()
+        };
+        let gather = text("gather_scope.glsl");
+        let merge = ["merge.comp", "merge_cone.glsl", "merge_cap.glsl"].map(text).concat();
+        for row in TABLE {
+            let is_used = |shader: &str| row.glsl.is_some_and(|name| shader.contains(name));
+            assert_eq!(is_used(&gather), row.glsl.is_some(), "{row:?}");
+            assert_eq!(is_used(&merge), row.in_merge, "{row:?}");
         }
     }
 

@@ -60,8 +60,9 @@ impl Editor {
             "# Written by shadow-fields view; `shadow-fields render` gives the same picture.\n\n{}",
             data.to_toml()
         );
-        files::replace_with(path, |file| file.write_all(text.as_bytes()))
-            .map_err(|error: std::io::Error| Error::Failed(format!("{}: cannot write: {error}", path.display())))?;
+        files::replace_with(path, |file| file.write_all(text.as_bytes())).map_err(|error: std::io::Error| {
+            Error::Failed(format!("{}: cannot be written: {error}", path.display()))
+        })?;
         self.saved.insert(path.to_owned());
         Ok(())
     }

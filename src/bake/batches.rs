@@ -3,7 +3,7 @@
 use super::capture::{Capture, Model, NO_SLOT, Slots};
 use super::partial::Partial;
 use super::project::{Job, Project, Projection};
-use super::{Baker, Progress, Report};
+use super::{BakeReport, Baker, Progress};
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::Shortcuts;
@@ -54,11 +54,17 @@ pub(super) struct Batch {
 impl Captures<'_> {
     /// Captures every target and puts what is projected into `values`, samples in the order of their numbers. Goes on from what a
     /// cancelled bake has kept.
-    pub fn run(&self, baker: &Baker, targets: &[Target], values: &mut [f32], progress: Progress<'_>) -> Result<Report> {
+    pub fn run(
+        &self,
+        baker: &Baker,
+        targets: &[Target],
+        values: &mut [f32],
+        progress: Progress<'_>,
+    ) -> Result<BakeReport> {
         let all = targets.len() as u32;
         let begun = self.partial.load(values, all);
         let mut batches = Batches::new(baker, self)?;
-        let mut report = Report::default();
+        let mut report = BakeReport::default();
         let mut rest = &targets[begun as usize..];
         while !rest.is_empty() {
             rest = batches.run_next(rest, values, &mut report)?;
@@ -93,7 +99,12 @@ impl Batches {
     }
 
     /// Captures and projects as many of the targets as fit into one atlas, and returns the others.
-    fn run_next<'t>(&mut self, targets: &'t [Target], values: &mut [f32], report: &mut Report) -> Result<&'t [Target]> {
+    fn run_next<'t>(
+        &mut self,
+        targets: &'t [Target],
+        values: &mut [f32],
+        report: &mut BakeReport,
+    ) -> Result<&'t [Target]> {
         let eyes: Vec<Vec3> = targets.iter().map(|target| target.eye).collect();
         let slots = self.capture.plan(&self.model, &eyes);
         let (now, rest) = targets.split_at(slots.len());

@@ -1,7 +1,7 @@
 //! Baked fields and transfers, found again by the content of the mesh and everything else that decides them.
 
 use super::partial::Partial;
-use super::{Baker, Options, Progress, Report, TRANSFER_OFFSET};
+use super::{BakeReport, Baker, Options, Progress, TRANSFER_OFFSET};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
 use crate::field::file::{self, TRANSFER_MAGIC, VERSION};
@@ -114,7 +114,7 @@ impl Cache {
         mesh: &Mesh,
         header: &FieldHeader,
         progress: Progress<'_>,
-    ) -> Result<(Arc<ShadowField>, Option<Report>)> {
+    ) -> Result<(Arc<ShadowField>, Option<BakeReport>)> {
         let key = field_name(header);
         let path = self.path(&key, "sf");
         if let Some(found) = self.memory().fields.get(&key) {
@@ -142,7 +142,7 @@ impl Cache {
         mesh: &Mesh,
         options: &Options,
         progress: Progress<'_>,
-    ) -> Result<(Arc<Vec<f32>>, Option<Report>)> {
+    ) -> Result<(Arc<Vec<f32>>, Option<BakeReport>)> {
         let header = TransferHeader::new(mesh, options);
         let key = key(&header);
         let path = self.path(&key, "transfer");

@@ -1,7 +1,7 @@
 //! The way in for everything that shows a scene: bakes or finds every field and transfer that the scene needs.
 
 use super::cache::{Cache, field_name};
-use super::{Baker, Options, Report, header};
+use super::{BakeReport, Baker, Options, header};
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::{FieldHeader, FieldKind, ShadowField};
@@ -17,8 +17,8 @@ pub type SceneProgress<'p> = &'p dyn Fn(&str, u32, u32);
 pub struct Baked {
     /// Mesh and kind.
     pub what: String,
-    /// Report of the bake.
-    pub report: Report,
+    /// What the bake did, and where its time went.
+    pub report: BakeReport,
 }
 
 /// What is baked of one mesh, as far as the scene's entities need it. Equal meshes share it.

@@ -41,7 +41,7 @@ pub use header::{Options, first_shell, hash_text, header};
 
 use partial::Partial;
 use project::{Job, Projection};
-pub use report::Report;
+pub use report::BakeReport;
 use samples::FieldSamples;
 use std::sync::Arc;
 use std::time::Instant;
@@ -143,7 +143,7 @@ impl Baker {
     ///
     /// # Errors
     /// `Input` when no sample point can see the object, or a buffer is larger than the device can hold or bind.
-    pub fn field(&self, mesh: &Mesh, header: FieldHeader, progress: Progress<'_>) -> Result<(ShadowField, Report)> {
+    pub fn field(&self, mesh: &Mesh, header: FieldHeader, progress: Progress<'_>) -> Result<(ShadowField, BakeReport)> {
         self.field_from(&Partial::new(None), mesh, header, progress)
     }
 
@@ -157,7 +157,7 @@ impl Baker {
         mesh: &Mesh,
         mut header: FieldHeader,
         progress: Progress<'_>,
-    ) -> Result<(ShadowField, Report)> {
+    ) -> Result<(ShadowField, BakeReport)> {
         header.validate()?;
         self.fits(&header)?;
         let started = Instant::now();
@@ -188,7 +188,7 @@ impl Baker {
         header: &FieldHeader,
         values: &[f32],
         sources: &Sources,
-        report: &mut Report,
+        report: &mut BakeReport,
     ) -> Result<Vec<u8>> {
         let (device, bytes) = (&self.device, header.payload_bytes());
         let assembly = Assembly {
@@ -210,7 +210,7 @@ impl Baker {
     ///
     /// # Errors
     /// As [`Baker::field`].
-    pub fn transfer(&self, mesh: &Mesh, options: &Options, progress: Progress<'_>) -> Result<(Vec<f32>, Report)> {
+    pub fn transfer(&self, mesh: &Mesh, options: &Options, progress: Progress<'_>) -> Result<(Vec<f32>, BakeReport)> {
         self.transfer_from(&Partial::new(None), mesh, options, progress)
     }
 
@@ -224,7 +224,7 @@ impl Baker {
         mesh: &Mesh,
         options: &Options,
         progress: Progress<'_>,
-    ) -> Result<(Vec<f32>, Report)> {
+    ) -> Result<(Vec<f32>, BakeReport)> {
         let started = Instant::now();
         triangles::tell_repeated(mesh);
         let Options { bands, face_px, shortcuts, .. } = *options;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 /// Where the time of a bake went.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Report {
+pub struct BakeReport {
     /// Samples that stand at their own place.
     pub samples: u32,
     /// Of these, samples that were not captured but turned from others (see [`super::symmetric_samples`]).
@@ -24,7 +24,7 @@ pub struct Report {
     pub total: Duration,
 }
 
-impl Report {
+impl BakeReport {
     pub(super) fn add(&mut self, timings: &[crate::gpu::Timing]) {
         for timing in timings {
             match timing.pass.as_str() {

@@ -2,7 +2,7 @@
 
 use super::Bench;
 use crate::asset::{Mesh, generate};
-use crate::bake::{self, Report};
+use crate::bake::{self, BakeReport};
 use crate::error::Result;
 use crate::field::{FieldKind, Shortcuts, Storage};
 use crate::text;
@@ -110,7 +110,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Bak
 }
 
 /// An occlusion field in f32.
-fn bake_once(bench: &Bench<'_>, mesh: &Mesh, face_px: u32, shortcuts: Shortcuts) -> Result<(Report, Vec<f32>)> {
+fn bake_once(bench: &Bench<'_>, mesh: &Mesh, face_px: u32, shortcuts: Shortcuts) -> Result<(BakeReport, Vec<f32>)> {
     let lattice = LATTICE.parse().expect("a lattice");
     let options = bake::Options { lattice, storage: Storage::F32, face_px, shortcuts, ..Default::default() };
     let header = bake::header(mesh, FieldKind::Occlusion, &options);

@@ -280,7 +280,7 @@ pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(Row, Vec<f
     // Two shells: the inner one alone may lie inside the solid, where nothing is seen.
     let small = bake::Options { lattice: "cube:2x1".parse().expect("a lattice"), ..options };
     let mut times: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
-    let field = |kind: FieldKind, options: &bake::Options| -> Result<bake::Report> {
+    let field = |kind: FieldKind, options: &bake::Options| -> Result<bake::BakeReport> {
         Ok(bench.baker.field(mesh, bake::header(mesh, kind, options), &|_, _| ())?.1)
     };
     for kind in [FieldKind::Occlusion, FieldKind::Radiance] {

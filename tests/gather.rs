@@ -51,7 +51,7 @@ fn the_tree_leaves_every_list_as_it_is() {
         for ((bounds, expected), most) in clusters.iter().zip(&lists).zip(crowded.expected(2.0 * SLACK)) {
             let scope = Scope::new(scene_bounds, entity, bounds, SLACK);
             let mut found = Vec::new();
-            gather::reference(&scope, &group, &mut found);
+            gather::twin(&scope, &group, &mut found);
             assert_eq!(found, *expected, "round {round}");
             listed += expected.len();
             // An occluder may stand there by its field and as a cap.

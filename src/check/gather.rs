@@ -107,7 +107,7 @@ impl Crowded {
         let everything = Candidates::all(&self.scene_bounds, self.receiver);
         let of = |bounds| {
             let mut entries = Vec::new();
-            gather::reference(&Scope::new(&self.scene_bounds, &self.entity, bounds, slack), &everything, &mut entries);
+            gather::twin(&Scope::new(&self.scene_bounds, &self.entity, bounds, slack), &everything, &mut entries);
             entries
         };
         self.clusters.iter().map(of).collect()

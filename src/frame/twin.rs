@@ -164,7 +164,7 @@ fn listed(state: &State, receiver: usize, device_mesh: &DeviceMesh) -> Listed {
     let of_cluster = |bounds| {
         let mut entries = Vec::new();
         let scope = Scope::new(scene_bounds, entity, bounds, SLACK);
-        gather::reference(&scope, &candidates, &mut entries);
+        gather::twin(&scope, &candidates, &mut entries);
         entries.into_iter().map(|entry| ListEntry::entities(entry).into()).collect()
     };
     (cluster_of, device_mesh.clusters.iter().map(of_cluster).collect())

@@ -102,7 +102,7 @@ impl Candidates {
 }
 
 /// The CPU twin of the pass for one cluster: appends its entries. `candidates` are those of a group that the cluster belongs to, or all.
-pub fn reference(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) {
+pub fn twin(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) {
     walk(scope, candidates, out, |_, _| ());
 }
 

@@ -216,7 +216,7 @@ impl ClusterLists {
             let (mut ends, mut entries) = (Vec::with_capacity(dirty.clusters.len()), Vec::new());
             for &cluster in &dirty.clusters {
                 let scope = Scope::new(&now.scene_bounds, entity, &self.bounds[cluster], SLACK);
-                gather::reference(&scope, &candidates, &mut entries);
+                gather::twin(&scope, &candidates, &mut entries);
                 ends.push(entries.len());
             }
             (ends, entries)
@@ -273,7 +273,7 @@ impl ClusterLists {
             let candidates = Candidates::of_group(&state.scene_bounds, receiver as u32, entity, &group.bounds);
             for bounds in &self.bounds[group.clusters.clone()] {
                 let scope = Scope::new(&state.scene_bounds, entity, bounds, SLACK);
-                gather::reference(&scope, &candidates, &mut entries);
+                gather::twin(&scope, &candidates, &mut entries);
             }
         }
         entries.into_iter().map(|entry| ListEntry::entities(entry)[0] as usize).collect()

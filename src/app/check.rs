@@ -17,8 +17,9 @@ pub struct Arguments {
 /// Compares, prints the table, and fails where a comparison did.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let context = Context::new(global)?;
-    let told =
-        |row: &check::Row| output::note(global, format!("{} {}", if row.passed { "good" } else { "BAD " }, row.line()));
+    let told = |row: &check::CheckRow| {
+        output::note(global, format!("{} {}", if row.passed { "good" } else { "BAD " }, row.line()))
+    };
     let all = check::PASSES.map(|(name, _)| name);
     let wanted = |name: &&str| arguments.passes.is_empty() || arguments.passes.iter().any(|pass| pass == name);
     let passes: Vec<&str> = all.into_iter().filter(wanted).collect();

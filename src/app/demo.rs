@@ -91,7 +91,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "4 samples",
         "1 sample",
     ];
-    output::table(&header, &rows.iter().map(Row::cells).collect::<Vec<_>>());
+    output::table(&header, &rows.iter().map(DemoRow::cells).collect::<Vec<_>>());
     let first = rows.first().map_or(0.0, |row| row.first_picture_s);
     output::say(format!("first picture after {first:.2} s, all after {:.1} s", started.elapsed().as_secs_f64()));
     for path in written {
@@ -102,7 +102,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
 
 /// One line of the table.
 #[derive(serde::Serialize)]
-struct Row {
+struct DemoRow {
     scene: &'static str,
     vertices: usize,
     entities: usize,
@@ -118,7 +118,7 @@ struct Row {
     variant: &'static str,
 }
 
-impl Row {
+impl DemoRow {
     fn cells(&self) -> Vec<String> {
         let bake = if self.bake_s > 0.0 { format!("{:.2}", self.bake_s) } else { "cached".into() };
         vec![
@@ -160,7 +160,7 @@ fn still(
     scene: &Scene,
     written: &mut Vec<PathBuf>,
     started: Instant,
-) -> Result<Row> {
+) -> Result<DemoRow> {
     let options = options(arguments, scene);
     let mut frame = context.frame(scene, options)?;
     let path = arguments.output.join(format!("{name}.png"));
@@ -186,7 +186,7 @@ fn still(
         }
     }
     let [(_, times), (_, samples), (_, single)] = &timed;
-    Ok(Row {
+    Ok(DemoRow {
         scene: name,
         vertices: frame.receiver_vertex_count(),
         entities: scene.entities.len(),

@@ -5,7 +5,7 @@ use super::{Global, output};
 use crate::asset::Mesh;
 use crate::bench::Bench;
 use crate::bench::ceilings::{self, Ceilings};
-use crate::bench::profile::{self, Contender, Row, Start, Tenths};
+use crate::bench::profile::{self, Contender, ProfileRow, Start, Tenths};
 use crate::error::Result;
 use crate::gpu::{self, Device, Validation};
 use crate::merge::calibrate;
@@ -97,7 +97,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             ratios.push((format!("{}: {} over {}", a.case, a.variant, b.variant), Tenths::new(&each)));
         }
     }
-    let rows: Vec<Row> = cases.into_iter().flatten().map(|(row, _)| row).collect();
+    let rows: Vec<ProfileRow> = cases.into_iter().flatten().map(|(row, _)| row).collect();
     if arguments.variant.is_none() && arguments.compare.is_none() && arguments.bake.is_none() {
         context.learn(global)?;
     }
@@ -133,7 +133,7 @@ fn print(
     global: &Global,
     document: &Value,
     at_best: &Ceilings,
-    rows: &[Row],
+    rows: &[ProfileRow],
     ratios: &[(String, Tenths)],
     starts: &[Start],
 ) {
@@ -153,7 +153,7 @@ fn print(
     ));
     let number = |value: Option<f64>, digits: usize| value.map_or_else(String::new, |v| format!("{v:.digits$}"));
     let percent = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{:.0} %", 100.0 * v));
-    let cells = |row: &Row| {
+    let cells = |row: &ProfileRow| {
         let count = |f: fn(&profile::Work) -> u32| row.work.as_ref().map_or_else(String::new, |w| f(w).to_string());
         let mut cells = vec![format!("{} {} {}", row.case, row.pass, row.variant)];
         cells.extend([row.ms.median, row.ms.p10, row.ms.p90].map(|ms| format!("{ms:.2}")));

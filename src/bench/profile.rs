@@ -88,7 +88,7 @@ pub struct Work {
 
 /// One variant of one pass.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct ProfileRow {
     /// Scene, or vertices and occluders of the made-up merge.
     pub case: String,
     /// A pass of a frame, or "frame": from placements to the picture on the device, by the host's clock.
@@ -136,7 +136,7 @@ fn row(
     permutation: &MergePermutation,
     census: &Census,
     at_best: &Ceilings,
-) -> Row {
+) -> ProfileRow {
     let ms = Tenths::new(times);
     let work = work(permutation, census);
     // Per nanosecond is 10^9 a second.
@@ -150,7 +150,7 @@ fn row(
     let reads = f64::from(field) / field_rate + other + f64::from(loaded) / 8.0 / at_best.storage_giga;
     // A scene of a few vertices tells nothing of rates.
     let rate = |value: f64| (at_best.resolve(ms.median) && pairs > 0).then_some(value);
-    Row {
+    ProfileRow {
         case: case.to_owned(),
         pass: "merge".into(),
         variant: name.to_owned(),
@@ -174,7 +174,7 @@ pub fn made_up(
     chosen: &[Contender],
     runs: u32,
     at_best: &Ceilings,
-) -> Result<Vec<(Row, Vec<f64>)>> {
+) -> Result<Vec<(ProfileRow, Vec<f64>)>> {
     let (device, library) = (bench.baker.device(), bench.baker.library());
     let mut ready = Vec::new();
     for contender in chosen {
@@ -211,7 +211,7 @@ pub fn scene(
     chosen: &[Contender],
     runs: u32,
     at_best: &Ceilings,
-) -> Result<Vec<(Row, Vec<f64>)>> {
+) -> Result<Vec<(ProfileRow, Vec<f64>)>> {
     let library = bench.baker.library();
     let mut rows = Vec::new();
     let mut frames = Vec::new();
@@ -275,7 +275,7 @@ pub fn scene(
 ///
 /// # Errors
 /// As [`crate::bake::Baker::field`].
-pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(Row, Vec<f64>)>> {
+pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(ProfileRow, Vec<f64>)>> {
     let options = bake::Options::default();
     // Two shells: the inner one alone may lie inside the solid, where nothing is seen.
     let small = bake::Options { lattice: "cube:2x1".parse().expect("a lattice"), ..options };
@@ -308,8 +308,8 @@ pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(Row, Vec<f
 }
 
 /// A row of a pass of which nothing but its time is known.
-fn plain(case: &str, pass: &str, variant: &str, times: &[f64]) -> Row {
-    Row {
+fn plain(case: &str, pass: &str, variant: &str, times: &[f64]) -> ProfileRow {
+    ProfileRow {
         case: case.to_owned(),
         pass: pass.to_owned(),
         variant: variant.to_owned(),

@@ -38,7 +38,7 @@ pub struct Side {
 
 /// One skip in one case.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct SkipCost {
     /// Scene.
     pub case: String,
     /// Name of the skip.
@@ -72,7 +72,7 @@ fn left_off(name: &str, counts: &Counts) -> Option<u64> {
 ///
 /// # Errors
 /// `Failed` when the folder cannot be written; else as [`frame::Frame::new`].
-pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Row>> {
+pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<SkipCost>> {
     crate::text::make_folder(folder)?;
     let mut rows = Vec::new();
     for case in all(bench.quick)? {
@@ -93,14 +93,14 @@ pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Ro
 }
 
 /// Time and error of every skip, off and on.
-fn plot(rows: &[Row]) -> Rows {
+fn plot(rows: &[SkipCost]) -> Rows {
     let mut cases: Vec<&str> = rows.iter().map(|row| row.case.as_str()).collect();
     cases.dedup();
     let group = |case: &&str| RowGroup {
         heading: (*case).to_owned(),
         rows: rows.iter().filter(|row| row.case == *case).map(|row| row.skip.clone()).collect(),
     };
-    let column = |x_label: &str, value: &dyn Fn(&Row) -> [Option<f64>; 2]| PlotColumn {
+    let column = |x_label: &str, value: &dyn Fn(&SkipCost) -> [Option<f64>; 2]| PlotColumn {
         x_label: x_label.into(),
         scale: AxisScale::Log,
         limit: None,
@@ -153,7 +153,7 @@ fn house() -> Result<Case> {
     Ok(Case { name: "house".into(), light, scene, time_s: 0.0, distant: Distant::Exact })
 }
 
-fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<Row>> {
+fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<SkipCost>> {
     (bench.progress)(&format!("{}: casting rays", case.name));
     let placements = case.scene.at(case.time_s);
     let shapes = RayMeshes::new(&case.scene);
@@ -209,7 +209,7 @@ impl Judge {
         [name, what]: [&str; 2],
         [off, on]: [frame::Options; 2],
         timed: BenchCase,
-    ) -> Result<Row> {
+    ) -> Result<SkipCost> {
         let mut frames = [bench.frame(&case.scene, off)?, bench.frame(&case.scene, on)?];
         let entities = &case.scene.entities;
         let mut movers: Vec<usize> = (0..entities.len()).filter(|&i| entities[i].occludes).collect();
@@ -255,7 +255,7 @@ impl Judge {
         let (off, on) = (side(0), side(1));
         let counts = frames[1].counts(placements);
         (bench.progress)(&format!("{}: {what} measured", case.name));
-        Ok(Row {
+        Ok(SkipCost {
             case: case.name.clone(),
             skip: what.to_owned(),
             vertices: frames[0].receiver_vertex_count(),

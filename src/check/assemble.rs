@@ -1,6 +1,6 @@
 //! "assemble" against its twin in f64.
 
-use super::Row;
+use super::CheckRow;
 use super::project::F32;
 use crate::bake::Baker;
 use crate::bake::assemble::{self, Assemble, Sources};
@@ -72,13 +72,13 @@ pub fn compare(
 ///
 /// # Errors
 /// As [`Assemble::new`].
-pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     for (storage, tolerance) in [(Storage::F32, F32), (Storage::F16, F16)] {
         for (text, bands, channels) in CASES {
             let lattice: Lattice = text.parse().expect("a lattice in the table");
             let worst = compare(baker, (&lattice, bands, channels), storage, 3)?;
             let what = format!("{}, {lattice}", format!("{storage:?}").to_lowercase());
-            add(Row::new("assemble", what, "of 1 + coefficient", worst, tolerance));
+            add(CheckRow::new("assemble", what, "of 1 + coefficient", worst, tolerance));
         }
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! "capture" against rays cast through the centres of its texels.
 
-use super::Row;
+use super::CheckRow;
 use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
 use crate::bake::capture::{self, Capture, Model, NO_SLOT, Slots, unit_positions};
@@ -193,15 +193,15 @@ pub fn eyes_outside() -> Vec<Vec3> {
 ///
 /// # Errors
 /// As [`Capture::new`].
-pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let (measure, limit) = ("share of texels", differing_limit(baker.device()));
     for mesh in [generate::sphere(0.5, 3), generate::torus(1.0, 0.3, 32, 16)] {
         let found = coverage(baker, &mesh, &eyes_outside(), 32)?;
-        add(Row::new("capture", format!("coverage, {}", mesh.name), measure, found.error(), limit));
+        add(CheckRow::new("capture", format!("coverage, {}", mesh.name), measure, found.error(), limit));
     }
     let mesh = generate::torus_two_colour(0.5, 0.15, 32, 16);
     let found = colors(baker, &mesh, &eyes_outside(), 32)?;
     // Silhouettes and the seams where two colours meet count here too.
-    add(Row::new("capture", format!("radiance, {}", mesh.name), measure, found, 2.0 * limit));
+    add(CheckRow::new("capture", format!("radiance, {}", mesh.name), measure, found, 2.0 * limit));
     Ok(())
 }

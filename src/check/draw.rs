@@ -1,6 +1,6 @@
 //! "draw" against its twin, which casts a ray through every sample of a picture.
 
-use super::Row;
+use super::CheckRow;
 use super::capture::snapping;
 use super::merge::{MIXED, options, scene};
 use crate::bake::Baker;
@@ -36,7 +36,12 @@ pub fn against_twin(frame: &mut Frame, placements: &[Placement], white: f32) -> 
 }
 
 /// Compares pictures with one kind of antialiasing, at a white and without one. Rows are those of `pass`.
-pub(super) fn compare(baker: &Baker, pass: &'static str, antialias: Antialias, add: &mut dyn FnMut(Row)) -> Result<()> {
+pub(super) fn compare(
+    baker: &Baker,
+    pass: &'static str,
+    antialias: Antialias,
+    add: &mut dyn FnMut(CheckRow),
+) -> Result<()> {
     let scene = scene(MIXED)?;
     let placements = scene.at(0.0);
     let mut options = Options { size: [96, 64], antialias, ..options() };
@@ -48,7 +53,7 @@ pub(super) fn compare(baker: &Baker, pass: &'static str, antialias: Antialias, a
         let what = format!("{} sample{plural} a pixel, white {white}", frame.samples());
         // Across an outline a pixel takes from its neighbour, so that a sample which differs shows in both.
         let pixels = if antialias == Antialias::Outlines { 2.0 } else { 1.0 };
-        add(Row::new(pass, what, "share of pixels", worst, pixels * EDGES * snapping(baker.device())));
+        add(CheckRow::new(pass, what, "share of pixels", worst, pixels * EDGES * snapping(baker.device())));
     }
     Ok(())
 }
@@ -57,7 +62,7 @@ pub(super) fn compare(baker: &Baker, pass: &'static str, antialias: Antialias, a
 ///
 /// # Errors
 /// As [`Frame::new`] and [`Frame::render`].
-pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     compare(baker, "draw", Antialias::None, add)?;
     compare(baker, "draw", Antialias::Samples, add)
 }

@@ -1,7 +1,7 @@
 //! "gather" against its twin on the host: lists of random crowds that the device makes, held against the rule of
 //! [`crate::lists::scope`] without slack and with twice the slack.
 
-use super::Row;
+use super::CheckRow;
 use crate::bake::Baker;
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
@@ -181,7 +181,7 @@ impl Crowded {
 ///
 /// # Errors
 /// As [`Crowded::on_device`].
-pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let mut compare = |what: &str, texel: bool, many: bool| -> Result<()> {
         let mut rng = fastrand::Rng::with_seed(4);
         let mut all = ListAgreement::default();
@@ -205,7 +205,7 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
             all.entries += found.entries;
         }
         let worst = if all.entries > 1000 { all.wrong_lists as f64 } else { f64::INFINITY };
-        add(Row::new("gather", what, "lists beyond the slack", worst, 0.0));
+        add(CheckRow::new("gather", what, "lists beyond the slack", worst, 0.0));
         Ok(())
     };
     compare("crowds, storage buffers", false, false)?;

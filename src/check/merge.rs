@@ -1,7 +1,7 @@
 //! "merge" against its twin in f64, which reads the same stored numbers: every variant, lookup, skip, number format and kind
 //! of lattice.
 
-use super::Row;
+use super::CheckRow;
 use crate::asset::embedded;
 use crate::bake::cache::Cache;
 use crate::bake::{self, Baker};
@@ -141,7 +141,7 @@ pub const LATTICES: [(&str, f64); 5] = [
 ///
 /// # Errors
 /// As [`Frame::new`] and [`Frame::render`].
-pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let scene = scene(MIXED)?;
     let placements = scene.at(0.0);
     // Fields are baked once for all rows, by the device under test; nothing is read from disk.
@@ -162,10 +162,10 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
             crate::field::lattice::Directions::Cube { .. } => (ARITHMETIC, options.lookup == Lookup::Trilinear),
         };
         add(if near {
-            Row::new("merge", what, "of 1 + brightest", found.worst, tolerance)
+            CheckRow::new("merge", what, "of 1 + brightest", found.worst, tolerance)
         } else {
             let off = if found.worst.is_finite() { found.off } else { f64::INFINITY };
-            Row::new("merge", what, "share of vertices", off, TIES)
+            CheckRow::new("merge", what, "share of vertices", off, TIES)
         });
         Ok(())
     };

@@ -1,6 +1,6 @@
 //! Every pass held against its CPU twin on one device: what `check` prints and what the tests of the passes assert.
 //!
-//! A comparison answers with a [`Row`]: its worst error beside the tolerance and the reason for it. Nothing is read but the
+//! A comparison answers with a [`CheckRow`]: its worst error beside the tolerance and the reason for it. Nothing is read but the
 //! embedded scenes and shaders (or those that replace them), and fields are baked anew.
 
 pub mod assemble;
@@ -17,7 +17,7 @@ use serde::Serialize;
 
 /// One comparison.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct CheckRow {
     /// Pass, by the one word that names it everywhere.
     pub pass: &'static str,
     /// What it was given.
@@ -38,11 +38,11 @@ fn finite_or_text<S: serde::Serializer>(value: &f64, to: S) -> std::result::Resu
     if value.is_finite() { to.serialize_f64(*value) } else { to.serialize_str("infinite") }
 }
 
-impl Row {
+impl CheckRow {
     /// A comparison's outcome. An error that is no number does not pass.
     pub fn new(pass: &'static str, what: impl Into<String>, measure: &'static str, worst: f64, tolerance: f64) -> Self {
         let worst = if worst.is_nan() { f64::INFINITY } else { worst };
-        Row { pass, what: what.into(), measure, worst, tolerance, passed: worst <= tolerance }
+        CheckRow { pass, what: what.into(), measure, worst, tolerance, passed: worst <= tolerance }
     }
 
     /// The row as a line for people.
@@ -52,7 +52,7 @@ impl Row {
 }
 
 /// The comparisons of one pass, each told as it comes.
-type Part = fn(&Baker, &mut dyn FnMut(Row)) -> Result<()>;
+type Part = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
 /// Every pass, by the one word that names it everywhere.
 pub const PASSES: [(&str, Part); 7] = [
@@ -69,7 +69,7 @@ pub const PASSES: [(&str, Part); 7] = [
 ///
 /// # Errors
 /// What a pass returns when it cannot be run at all: a shader that does not compile, a lost device.
-pub fn run(baker: &Baker, passes: &[&str], told: &dyn Fn(&Row)) -> Result<Vec<Row>> {
+pub fn run(baker: &Baker, passes: &[&str], told: &dyn Fn(&CheckRow)) -> Result<Vec<CheckRow>> {
     let mut rows = Vec::new();
     for (_, part) in PASSES.iter().filter(|(name, _)| passes.contains(name)) {
         part(baker, &mut |row| {
@@ -86,10 +86,10 @@ mod tests {
 
     #[test]
     fn only_numbers_within_the_tolerance_pass() {
-        let passed = |worst| Row::new("merge", "", "", worst, 1e-3).passed;
+        let passed = |worst| CheckRow::new("merge", "", "", worst, 1e-3).passed;
         assert!(passed(0.0) && passed(1e-3));
         assert!(!passed(1.1e-3) && !passed(f64::NAN) && !passed(f64::INFINITY));
-        let json = serde_json::to_string(&Row::new("merge", "", "", f64::NAN, 1e-3)).unwrap();
+        let json = serde_json::to_string(&CheckRow::new("merge", "", "", f64::NAN, 1e-3)).unwrap();
         assert!(json.contains("\"infinite\"") && json.contains("false"), "{json}");
     }
 }

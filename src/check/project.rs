@@ -1,6 +1,6 @@
 //! "project" against its twin, which projects the same captured texels in f64.
 
-use super::Row;
+use super::CheckRow;
 use super::capture::{atlas, texel_index};
 use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
@@ -147,7 +147,7 @@ pub const EYES: [Vec3; 3] = [Vec3::new(0.9, 0.6, -0.5), Vec3::new(-0.4, 1.3, 2.0
 ///
 /// # Errors
 /// As [`Project::new`].
-pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let black = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &EYES, (32, false, true))?;
     let bright = Content::new(baker, &generate::torus_two_colour(0.5, 0.15, 32, 16), &EYES, (32, true, true))?;
     for bands in [4, 7] {
@@ -157,7 +157,7 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(Row)) -> Result<()> {
             let (worst, largest) = compare(content, bands, projection)?;
             let worst = if largest > 0.01 { worst } else { f64::INFINITY };
             let what = format!("{}, {bands} bands", format!("{projection:?}").to_lowercase());
-            add(Row::new("project", what, "of 1 + coefficient", worst, F32));
+            add(CheckRow::new("project", what, "of 1 + coefficient", worst, F32));
         }
     }
     Ok(())

@@ -29,7 +29,7 @@ pub enum BenchCase {
 
 /// One skip.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub struct SkipRow {
     /// Name on the command line, and the field of [`Skip`]; without a switch it is always on.
     pub name: &'static str,
     /// What it does to the numbers.
@@ -76,10 +76,10 @@ macro_rules! skips {
         }
 
         /// Every skip: first those with a switch, then those that are always on.
-        pub const TABLE: &[Row] = &[
-            $(Row { name: stringify!($name), kind: Kind::$kind, host: $host, glsl: $glsl,
+        pub const TABLE: &[SkipRow] = &[
+            $(SkipRow { name: stringify!($name), kind: Kind::$kind, host: $host, glsl: $glsl,
                 in_merge: $in_merge, counter: $counter, bench: Some(BenchCase::$bench) },)*
-            $(Row { name: stringify!($always), kind: Kind::$always_kind, host: $always_host, glsl: None,
+            $(SkipRow { name: stringify!($always), kind: Kind::$always_kind, host: $always_host, glsl: None,
                 in_merge: false, counter: Some($always_counter), bench: None },)*
         ];
     };
@@ -114,12 +114,12 @@ skips! {
 }
 
 /// The rows with a switch.
-pub fn switches() -> impl Iterator<Item = &'static Row> {
+pub fn switches() -> impl Iterator<Item = &'static SkipRow> {
     TABLE.iter().filter(|row| row.bench.is_some())
 }
 
 /// The row of that name.
-pub fn row(name: &str) -> Option<&'static Row> {
+pub fn row(name: &str) -> Option<&'static SkipRow> {
     TABLE.iter().find(|row| row.name == name)
 }
 

@@ -30,11 +30,11 @@ struct Cli {
     #[command(flatten)]
     global: Global,
     #[command(subcommand)]
-    command: Command,
+    command: Subcommands,
 }
 
 #[derive(Subcommand)]
-enum Command {
+enum Subcommands {
     /// Bake and render the built-in scenes into a folder and print a table of times
     Demo(demo::Arguments),
     /// Render a scene file to a picture, an animation or a table of vertices
@@ -78,16 +78,16 @@ fn refuse(error: clap::Error) -> ! {
 
 fn run(cli: &Cli) -> Result<()> {
     match &cli.command {
-        Command::Demo(arguments) => demo::run(&cli.global, arguments),
-        Command::Render(arguments) => render::run(&cli.global, arguments),
-        Command::Bake(arguments) => bake::run(&cli.global, arguments),
-        Command::Inspect(arguments) => inspect::run(&cli.global, arguments),
-        Command::Bench(arguments) => bench::run(&cli.global, arguments),
-        Command::Check(arguments) => check::run(&cli.global, arguments),
-        Command::Profile(arguments) => profile::run(&cli.global, arguments),
+        Subcommands::Demo(arguments) => demo::run(&cli.global, arguments),
+        Subcommands::Render(arguments) => render::run(&cli.global, arguments),
+        Subcommands::Bake(arguments) => bake::run(&cli.global, arguments),
+        Subcommands::Inspect(arguments) => inspect::run(&cli.global, arguments),
+        Subcommands::Bench(arguments) => bench::run(&cli.global, arguments),
+        Subcommands::Check(arguments) => check::run(&cli.global, arguments),
+        Subcommands::Profile(arguments) => profile::run(&cli.global, arguments),
         #[cfg(feature = "view")]
-        Command::View(arguments) => view::run(&cli.global, arguments),
-        Command::Devices(arguments) => devices::run(&cli.global, arguments),
+        Subcommands::View(arguments) => view::run(&cli.global, arguments),
+        Subcommands::Devices(arguments) => devices::run(&cli.global, arguments),
     }
 }
 

@@ -92,13 +92,13 @@ mod tests {
     use clap::{CommandFactory, Parser};
 
     #[derive(Parser)]
-    struct Line {
+    struct CommandLine {
         #[command(flatten)]
         bake: BakeArguments,
     }
 
     fn parsed(words: &[&str]) -> bake::Options {
-        Line::try_parse_from([&["line"], words].concat()).unwrap().bake.options()
+        CommandLine::try_parse_from([&["line"], words].concat()).unwrap().bake.options()
     }
 
     #[test]
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn help_has_the_single_switches_under_a_heading_of_their_own() {
-        let help = Line::command().render_help().to_string();
+        let help = CommandLine::command().render_help().to_string();
         let [before, after] = help.split("Baking, each part of --quality by itself:").collect::<Vec<_>>()[..] else {
             panic!("one heading in {help}")
         };

@@ -23,7 +23,7 @@ pub(super) struct Captures<'c> {
 
 /// A sample to capture: from where, and what is made of what is seen.
 #[derive(Clone, Copy)]
-pub(super) struct Target {
+pub(super) struct CaptureTarget {
     /// In r.
     pub eye: Vec3,
     pub job: Job,
@@ -57,7 +57,7 @@ impl Captures<'_> {
     pub fn run(
         &self,
         baker: &Baker,
-        targets: &[Target],
+        targets: &[CaptureTarget],
         values: &mut [f32],
         progress: Progress<'_>,
     ) -> Result<BakeReport> {
@@ -101,10 +101,10 @@ impl Batches {
     /// Captures and projects as many of the targets as fit into one atlas, and returns the others.
     fn run_next<'t>(
         &mut self,
-        targets: &'t [Target],
+        targets: &'t [CaptureTarget],
         values: &mut [f32],
         report: &mut BakeReport,
-    ) -> Result<&'t [Target]> {
+    ) -> Result<&'t [CaptureTarget]> {
         let eyes: Vec<Vec3> = targets.iter().map(|target| target.eye).collect();
         let slots = self.capture.plan(&self.model, &eyes);
         let (now, rest) = targets.split_at(slots.len());

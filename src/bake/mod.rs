@@ -34,7 +34,7 @@ use crate::gpu::memory::TexelView;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
-use batches::{Batch, Batches, Captures, Target};
+use batches::{Batch, Batches, CaptureTarget, Captures};
 use capture::unit_positions;
 pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, is_seen, needs};
 pub use header::{Options, first_shell, hash_text, header};
@@ -230,11 +230,12 @@ impl Baker {
         let Options { bands, face_px, shortcuts, .. } = *options;
         let turned = turned_vertices(mesh, face_px, shortcuts.symmetry);
         let vertices = unit_positions(mesh).into_iter().zip(&mesh.normals).enumerate();
-        let target = |(vertex, (position, normal)): (usize, (glam::Vec3, &glam::Vec3))| Target {
+        let target = |(vertex, (position, normal)): (usize, (glam::Vec3, &glam::Vec3))| CaptureTarget {
             eye: position + TRANSFER_OFFSET * normal,
             job: Job { normal: normal.extend(0.0).to_array(), slots: [0; 6], target: vertex as u32, scale: 1.0 },
         };
-        let targets: Vec<Target> = vertices.filter(|(vertex, _)| turned[*vertex].is_none()).map(target).collect();
+        let targets: Vec<CaptureTarget> =
+            vertices.filter(|(vertex, _)| turned[*vertex].is_none()).map(target).collect();
         let captures = Captures { mesh, bands, projection: Projection::Transfer, face_px, shortcuts, partial };
         let mut transfer = vec![0.0_f32; mesh.positions.len() * channel_stride(bands)];
         let mut report = captures.run(self, &targets, &mut transfer, progress)?;

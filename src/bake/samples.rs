@@ -2,7 +2,7 @@
 
 use super::TRANSFER_OFFSET;
 use super::assemble::Sources;
-use super::batches::Target;
+use super::batches::CaptureTarget;
 use super::capture::unit_positions;
 use super::inside;
 use super::project::Job;
@@ -18,7 +18,7 @@ use glam::DVec3;
 /// The samples of one field.
 pub(super) struct FieldSamples {
     /// Samples that are captured, with the eye of each.
-    pub targets: Vec<Target>,
+    pub targets: Vec<CaptureTarget>,
     /// What is turned from what is captured.
     pub plan: SymmetricPlan,
     /// What every stored sample is assembled from.
@@ -55,7 +55,7 @@ impl FieldSamples {
             let eye = pushed[sample].unwrap_or(*position);
             let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
             let job = Job { normal: [0.0; 4], slots: [0; 6], target: sample as u32, scale };
-            targets.push(Target { eye: eye.as_vec3(), job });
+            targets.push(CaptureTarget { eye: eye.as_vec3(), job });
         }
         Ok(FieldSamples { targets, plan, sources })
     }

@@ -20,7 +20,7 @@ const FAR: f64 = 5.0;
 const INSIDE: f64 = 0.5;
 
 /// Neighbouring triangles with the sphere around them.
-struct Node {
+struct SurfaceNode {
     triangles: Range<usize>,
     centre: DVec3,
     radius: f64,
@@ -33,7 +33,7 @@ struct Node {
 /// Triangles in a tree.
 pub struct Surface {
     triangles: Vec<[DVec3; 3]>,
-    nodes: Vec<Node>,
+    nodes: Vec<SurfaceNode>,
     low: DVec3,
     high: DVec3,
 }
@@ -59,7 +59,7 @@ impl Surface {
         let radius = within.iter().flatten().map(|p| p.distance(centre)).fold(0.0, f64::max);
         let dipole = within.iter().map(|[a, b, c]| (b - a).cross(c - a) / 2.0).sum();
         let node = self.nodes.len();
-        self.nodes.push(Node { triangles: range.clone(), centre, radius, dipole, second: 0 });
+        self.nodes.push(SurfaceNode { triangles: range.clone(), centre, radius, dipole, second: 0 });
         if range.len() > LEAF_TRIANGLES {
             let middle = range.start + range.len() / 2;
             self.build(range.start..middle);

@@ -17,7 +17,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// A scene that tries the merge.
-pub struct Case {
+pub struct TrialCase {
     /// What is odd about it.
     pub name: String,
     /// The scene.
@@ -108,9 +108,9 @@ pub(super) fn entity(mesh: &str, more: &str) -> String {
 ///
 /// # Errors
 /// None that a test does not show.
-pub fn cases(longest: usize) -> Result<Vec<Case>> {
+pub fn cases(longest: usize) -> Result<Vec<TrialCase>> {
     let mut out = Vec::new();
-    let mut add = |name: String, scene: Scene| out.push(Case { name, scene });
+    let mut add = |name: String, scene: Scene| out.push(TrialCase { name, scene });
     for (name, places) in TRIALS {
         let balls: String = places.split(';').map(|place| entity("ball", place.trim())).collect();
         add((*name).to_owned(), scene(40, GRADIENT, &format!("{FLOOR}{balls}"))?);
@@ -216,7 +216,7 @@ pub fn bound(scene: &Scene, bands: usize) -> f64 {
 ///
 /// # Errors
 /// As [`Frame::render`].
-pub fn run(case: &Case, mut frame: Frame, storage: Storage) -> Result<Trial> {
+pub fn run(case: &TrialCase, mut frame: Frame, storage: Storage) -> Result<Trial> {
     let placements = case.scene.at(0.0);
     let vertices = receiver_vertices(&case.scene);
     frame.render(&placements, None)?;

@@ -14,7 +14,7 @@ const FOUR: [DVec2; 4] =
 const ONE: [DVec2; 1] = [DVec2::new(0.5, 0.5)];
 
 /// A triangle on its way to the screen.
-struct Corners {
+struct ScreenTriangle {
     /// From (x, y, 1) in clip space, before the division, to the corners' weights over w.
     weights: DMat3,
     /// Radiance at the corners: emission and radiosity.
@@ -62,7 +62,7 @@ impl Frame {
             let corner = DVec2::new(f64::from(pixel % width), f64::from(pixel / width));
             let clip =
                 |at: DVec2| DVec3::new(2.0 * at.x / f64::from(width) - 1.0, 2.0 * at.y / f64::from(height) - 1.0, 1.0);
-            let near: Vec<&Corners> = triangles.iter().filter(|t| t.may_touch(corner)).collect();
+            let near: Vec<&ScreenTriangle> = triangles.iter().filter(|t| t.may_touch(corner)).collect();
             let mut texel = Texel { color: DVec3::ZERO, depth: 0.0, tag: 1.0 };
             for sample in samples {
                 let at = clip(corner + *sample);
@@ -90,7 +90,7 @@ impl Frame {
     }
 
     /// Every triangle of the scene.
-    fn triangles(&self, placements: &[Placement]) -> Result<Vec<Corners>> {
+    fn triangles(&self, placements: &[Placement]) -> Result<Vec<ScreenTriangle>> {
         let [width, height] = self.options.size.map(f64::from);
         let clip_from_world = camera::clip_from_world(&self.scene.data.camera, width / height);
         let mut out = Vec::new();
@@ -111,8 +111,8 @@ impl Frame {
             for triangle in &mesh.triangles {
                 let [a, b, c] = [corner(&triangle[0]), corner(&triangle[1]), corner(&triangle[2])];
                 out.extend(
-                    Corners::new([a.0, b.0, c.0], [a.1, b.1, c.1], [width, height], smooth::tag(index))
-                        .map(|corners| Corners { grid, ..corners }),
+                    ScreenTriangle::new([a.0, b.0, c.0], [a.1, b.1, c.1], [width, height], smooth::tag(index))
+                        .map(|corners| ScreenTriangle { grid, ..corners }),
                 );
             }
         }
@@ -126,7 +126,7 @@ fn shown(radiance: DVec3, white: f64) -> DVec3 {
     if shown.max_element() > white { shown * (white / shown.max_element()) } else { shown }
 }
 
-impl Corners {
+impl ScreenTriangle {
     /// `None` for a triangle that is seen from its edge.
     fn new(clip: [DVec4; 3], radiance: [DVec3; 3], size: [f64; 2], tag: f32) -> Option<Self> {
         let matrix = DMat3::from_cols_array_2d(&clip.map(|c| [c.x, c.y, c.w]));
@@ -145,7 +145,7 @@ impl Corners {
                 whole
             }
         };
-        Some(Corners { weights, radiance, tag, grid: None, pixels: [range(0), range(1)] })
+        Some(ScreenTriangle { weights, radiance, tag, grid: None, pixels: [range(0), range(1)] })
     }
 
     /// Whether it may cover any of the pixel whose corner is given.

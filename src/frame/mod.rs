@@ -40,11 +40,11 @@ use ash::vk;
 use permutation::{CompiledMerge, permutation, usable};
 use picture::Picture;
 use radiosity::Radiosity;
-use sky::Sky;
+use sky::SkyLight;
 use std::sync::Arc;
 use work::ClusterWork;
 
-pub use record::{MergeWork, PictureWork, Target, record};
+pub use record::{FrameTarget, MergeWork, PictureWork, record};
 pub use viewport::{RadiositySource, Viewport};
 
 /// What decides a frame besides the scene.
@@ -81,7 +81,7 @@ pub struct Frame {
     pub buffers: SceneBuffers,
     merge: CompiledMerge,
     work: ClusterWork,
-    sky: Sky,
+    sky: SkyLight,
     radiosity: Radiosity,
     picture: Picture,
 }
@@ -119,7 +119,7 @@ impl Frame {
         let gathers = place == Place::Device && !lists.clusters.is_empty();
         let gathering = gathers.then(|| Gathering::new(device, library, &lists, entity_count)).transpose()?;
         let entity_room = entity_count.max(merge.permutation.entity_limit as usize);
-        let mut sky = Sky::new(device, options.bake.bands)?;
+        let mut sky = SkyLight::new(device, options.bake.bands)?;
         sky.write(scene, options.bake.bands)?;
         Ok(Frame {
             device: device.clone(),
@@ -207,8 +207,8 @@ impl Frame {
         picture: Option<&PictureWork<'f>>,
         reads: bool,
     ) -> Result<Vec<Timing>> {
-        let host = Target::Host { picture: self.shown(), readback: &self.picture.readback };
-        let target = if reads && picture.is_some() { host } else { Target::Device };
+        let host = FrameTarget::Host { picture: self.shown(), readback: &self.picture.readback };
+        let target = if reads && picture.is_some() { host } else { FrameTarget::Device };
         let mut commands = Commands::new(&self.device, "frame")?;
         record(&mut commands, merge, picture, target)?;
         commands.submit()

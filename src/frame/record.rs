@@ -33,7 +33,7 @@ pub struct PictureWork<'f> {
 }
 
 /// Where the picture goes once it is drawn.
-pub enum Target<'t, 'f> {
+pub enum FrameTarget<'t, 'f> {
     /// It stays on the device, where a fragment shader may read it.
     Device,
     /// Into a buffer that the host reads.
@@ -68,9 +68,9 @@ pub fn record<'f>(
     commands: &mut Commands<'f>,
     merge: Option<&MergeWork<'f>>,
     picture: Option<&PictureWork<'f>>,
-    target: Target<'_, 'f>,
+    target: FrameTarget<'_, 'f>,
 ) -> Result<()> {
-    if matches!(target, Target::Screen { .. }) {
+    if matches!(target, FrameTarget::Screen { .. }) {
         // The frame before may be under way, and uses the same buffers and images.
         commands.after_flights();
     }
@@ -101,19 +101,20 @@ pub fn record<'f>(
             commands.image_barrier(&smooth.picture, None, Access::TransferWrite);
             commands.pass("smooth", |c| smooth.record(c, (&draw.picture, &draw.depth), lines, viewports))?;
         }
-        let reader = if matches!(target, Target::Host { .. }) { Access::TransferRead } else { Access::FragmentSampled };
+        let reader =
+            if matches!(target, FrameTarget::Host { .. }) { Access::TransferRead } else { Access::FragmentSampled };
         commands.image_barrier(draw.finished(), Some(Access::ColorWrite), reader);
     }
     match target {
-        Target::Device => {}
-        Target::Host { picture, readback } => {
+        FrameTarget::Device => {}
+        FrameTarget::Host { picture, readback } => {
             commands.pass("read back", |c| {
                 c.copy_image(picture, readback);
                 Ok(())
             })?;
             commands.barrier(Access::TransferWrite, Access::HostRead);
         }
-        Target::Screen { image, clear, show, next } => {
+        FrameTarget::Screen { image, clear, show, next } => {
             commands.image_barrier(image, None, Access::ColorWrite);
             let color = gpu::Target { color: image, clear: Some(clear), depth: None, resolve: None };
             commands.pass("show", |c| c.render(&color, show))?;

@@ -10,7 +10,7 @@ use glam::Vec3;
 use std::sync::Arc;
 
 /// The sky's projection on SH.
-pub(super) struct Sky {
+pub(super) struct SkyLight {
     /// For the merge: coefficients of one colour after the other, [`channel_stride`] floats apart.
     pub coefficients: Upload,
     /// Its largest radiance of any colour.
@@ -19,14 +19,14 @@ pub(super) struct Sky {
     pub background: Vec3,
 }
 
-impl Sky {
+impl SkyLight {
     /// A sky that has still to be written.
     ///
     /// # Errors
     /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, bands: usize) -> Result<Self> {
         let coefficients = Upload::new(device, "sky", 12 * channel_stride(bands) as u64)?;
-        Ok(Sky { coefficients, brightest: 0.0, background: Vec3::ZERO })
+        Ok(SkyLight { coefficients, brightest: 0.0, background: Vec3::ZERO })
     }
 
     /// Takes over a scene's environment.

@@ -67,10 +67,10 @@ impl Frame {
     }
 
     /// The camera for a viewport of `size` pixels.
-    fn camera(&self, size: [u32; 2]) -> sight::Camera {
+    fn camera(&self, size: [u32; 2]) -> sight::SightCamera {
         let camera = &self.scene.data.camera;
         let aspect = f64::from(size[0]) / f64::from(size[1].max(1));
-        sight::Camera {
+        sight::SightCamera {
             clip_from_world: camera::clip_from_world(camera, aspect),
             eye: camera.eye.as_dvec3(),
             near_m: camera::near_corner_m(camera, aspect),
@@ -80,7 +80,7 @@ impl Frame {
     }
 
     /// How an entity is seen.
-    fn sight(&self, camera: &sight::Camera, index: usize, placement: &Placement) -> Sight {
+    fn sight(&self, camera: &sight::SightCamera, index: usize, placement: &Placement) -> Sight {
         let mesh = self.scene.entities[index].mesh;
         let device_mesh = &self.buffers.meshes[mesh];
         let world_from_object = camera::world_from_centred(placement, device_mesh.centre_m);

@@ -28,7 +28,7 @@ pub(crate) struct State {
 }
 
 /// Neighbouring clusters of one receiver.
-struct Group {
+struct WatchedGroup {
     receiver: usize,
     clusters: Range<usize>,
     bounds: Bounds,
@@ -64,7 +64,7 @@ pub(crate) struct ClusterLists {
     pub clusters: Vec<layout::Cluster>,
     bounds: Vec<Bounds>,
     faces: Vec<Faces>,
-    groups: Vec<Group>,
+    groups: Vec<WatchedGroup>,
     now: Option<State>,
     /// Every cluster has changed since the last update by something that no [`State`] holds.
     renewed: bool,
@@ -98,7 +98,7 @@ impl ClusterLists {
                 end += 1;
             }
             let clusters = first + start..first + end;
-            self.groups.push(Group { receiver, clusters, bounds: Bounds::union(&all[start..end]) });
+            self.groups.push(WatchedGroup { receiver, clusters, bounds: Bounds::union(&all[start..end]) });
             start = end;
         }
         for Member { cluster, bounds, faces } in clusters {
@@ -251,7 +251,7 @@ impl ClusterLists {
 
     /// What all lists of a moment leave off, and why.
     pub fn counts(&self, state: &State) -> Counts {
-        let of_group = |group: &Group| {
+        let of_group = |group: &WatchedGroup| {
             let entity = &state.entities[group.receiver];
             let clusters = self.bounds[group.clusters.clone()].iter();
             clusters.fold(Counts::default(), |mut counts, bounds| {

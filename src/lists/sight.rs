@@ -134,7 +134,7 @@ struct Plane {
 
 /// The camera of a part of the picture.
 #[derive(Clone, Copy, Debug)]
-pub struct Camera {
+pub struct SightCamera {
     /// World to clip space.
     pub clip_from_world: DMat4,
     /// Where it stands, metres.
@@ -149,7 +149,7 @@ pub struct Camera {
 
 impl Sight {
     /// Of an entity whose mesh is `solid` or not, with a bounding radius in its own frame.
-    pub fn new(camera: &Camera, world_from_object: DMat4, radius_m: f64, solid: bool) -> Self {
+    pub fn new(camera: &SightCamera, world_from_object: DMat4, radius_m: f64, solid: bool) -> Self {
         // As the vertex shader has it.
         let clip = (camera.clip_from_world * world_from_object).as_mat4();
         let [x, y, w] = [clip.row(0), clip.row(1), clip.row(3)].map(|row| row.as_dvec4());
@@ -228,7 +228,7 @@ mod tests {
                 let near = 1e-3 * eye.distance(target);
                 let clip_from_world =
                     vulkan::perspective_infinite_reverse(0.5, 1.5, near) * view::look_at_mat4(eye, target, DVec3::Y);
-                let camera = Camera { clip_from_world, eye, near_m: 2.0 * near, size: [300, 200], samples: false };
+                let camera = SightCamera { clip_from_world, eye, near_m: 2.0 * near, size: [300, 200], samples: false };
                 let sight = Sight::new(&camera, DMat4::IDENTITY, radius_m.into(), mesh.is_solid());
                 for (run, faces) in faces.iter().enumerate() {
                     all += 1;

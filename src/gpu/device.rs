@@ -32,6 +32,46 @@ pub(super) struct Instance {
     messages: Box<Messages>,
 }
 
+/// Checks that the loader has Vulkan 1.3, the validation layer if it is asked for, and the extensions in `surface`, which a window
+/// needs. Answers whether the loader has debug utils, which name objects in captures.
+///
+/// # Errors
+/// `Unsupported` with what is missing.
+fn check_loader(entry: &ash::Entry, validation: Validation, surface: &[&'static CStr]) -> Result<bool> {
+    // SAFETY: this and the two enumerations below are plain queries on a live entry.
+    let version = unsafe { entry.try_enumerate_instance_version() }
+        .checked("vkEnumerateInstanceVersion", "instance")?
+        .unwrap_or(vk::API_VERSION_1_0);
+    if version < vk::API_VERSION_1_3 {
+        return Err(Error::Unsupported(format!(
+            "the Vulkan loader supports version {}, but 1.3 is needed",
+            version_text(version)
+        )));
+    }
+    // SAFETY: as above.
+    let layers = unsafe { entry.enumerate_instance_layer_properties() }
+        .checked("vkEnumerateInstanceLayerProperties", "instance")?;
+    let has_layer = layers.iter().any(|l| l.layer_name_as_c_str() == Ok(LAYER));
+    if validation != Validation::Off && !has_layer {
+        return Err(Error::Unsupported(
+            "the Khronos validation layer is not installed (Debian's package is vulkan-validationlayers)".into(),
+        ));
+    }
+    // SAFETY: as above.
+    let extensions = match unsafe { entry.enumerate_instance_extension_properties(None) } {
+        Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = manifest::broken() => return Err(broken),
+        other => other.checked("vkEnumerateInstanceExtensionProperties", "instance")?,
+    };
+    let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+    if let Some(missing) = surface.iter().find(|name| !has(name)) {
+        let missing = missing.to_string_lossy();
+        return Err(Error::Unsupported(format!(
+            "the Vulkan driver opens no windows here (it lacks {missing}); `shadow-fields render` needs none"
+        )));
+    }
+    Ok(has(ash::ext::debug_utils::NAME))
+}
+
 impl Instance {
     /// `surface` lists the extensions that a window needs.
     fn new(validation: Validation, surface: &[&'static CStr]) -> Result<Self> {
@@ -39,44 +79,11 @@ impl Instance {
         let entry = unsafe { ash::Entry::load() }.map_err(|error| {
             Error::Unsupported(format!("no Vulkan loader found ({error}); Debian's package is libvulkan1"))
         })?;
-        // SAFETY: for the two enumerations, plain queries on a live entry.
-        let version = unsafe { entry.try_enumerate_instance_version() }
-            .checked("vkEnumerateInstanceVersion", "instance")?
-            .unwrap_or(vk::API_VERSION_1_0);
-        if version < vk::API_VERSION_1_3 {
-            return Err(Error::Unsupported(format!(
-                "the Vulkan loader supports version {}, but 1.3 is needed",
-                version_text(version)
-            )));
-        }
-        // SAFETY: as above.
-        let layers = unsafe { entry.enumerate_instance_layer_properties() }
-            .checked("vkEnumerateInstanceLayerProperties", "instance")?;
-        let has_layer = layers.iter().any(|l| l.layer_name_as_c_str() == Ok(LAYER));
-        if validation != Validation::Off && !has_layer {
-            return Err(Error::Unsupported(
-                "the Khronos validation layer is not installed (Debian's package is vulkan-validationlayers)".into(),
-            ));
-        }
-        // SAFETY: as above.
-        let extensions = match unsafe { entry.enumerate_instance_extension_properties(None) } {
-            Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = manifest::broken() => return Err(broken),
-            other => other.checked("vkEnumerateInstanceExtensionProperties", "instance")?,
-        };
-        let has_debug_utils = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
-
+        let has_debug_utils = check_loader(&entry, validation, surface)?;
         let application = vk::ApplicationInfo::default()
             .application_name(c"shadow-fields")
             .engine_name(c"shadow-fields")
             .api_version(vk::API_VERSION_1_3);
-        if let Some(missing) =
-            surface.iter().find(|name| !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(*name)))
-        {
-            let missing = missing.to_string_lossy();
-            return Err(Error::Unsupported(format!(
-                "the Vulkan driver opens no windows here (it lacks {missing}); `shadow-fields render` needs none"
-            )));
-        }
         let mut layer_names = Vec::new();
         let mut extension_names: Vec<_> = surface.iter().map(|name| name.as_ptr()).collect();
         if has_debug_utils {

@@ -5,8 +5,9 @@ pub mod clusters;
 mod field_atlas;
 pub mod limits;
 
+use crate::asset::Mesh;
 use crate::bake::ensure::Baked;
-use crate::bake::{self, BakedScene};
+use crate::bake::{self, BakedMesh, BakedScene};
 use crate::draw::DrawnMesh;
 use crate::error::Result;
 use crate::field::ShadowField;
@@ -78,6 +79,74 @@ pub struct SceneBuffers {
     pub field_bands: usize,
 }
 
+/// Vertices and transfer vectors of a scene on their way into its buffers.
+struct Packing {
+    /// Two quads a vertex: its position about the centre of the mesh's bounding sphere, and its normal.
+    vertices: Vec<[f32; 4]>,
+    transfers: Vec<f32>,
+    /// First quad of the transfer vectors of each distinct mesh, by the hash of its content. Equal meshes share theirs.
+    transfer_of: HashMap<[u8; 32], u32>,
+    /// Floats of one transfer vector.
+    stride: usize,
+    /// Number of vertices of all entities.
+    drawn: usize,
+}
+
+impl Packing {
+    fn new(scene: &Scene, stride: usize) -> Self {
+        // The vertices are reserved at once. Growing by halves would hold up to three times as much.
+        let quads = 2 * scene.meshes.iter().map(|mesh| mesh.positions.len()).sum::<usize>();
+        let drawn = scene.entities.iter().map(|entity| scene.meshes[entity.mesh].positions.len()).sum();
+        Packing {
+            vertices: Vec::with_capacity(quads),
+            transfers: Vec::new(),
+            transfer_of: HashMap::new(),
+            stride,
+            drawn,
+        }
+    }
+
+    /// Adds one mesh in the order of its clusters.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    fn add(
+        &mut self,
+        device: &Arc<Device>,
+        mesh: &Mesh,
+        [blocked, radiance]: [Option<FieldSlot>; 2],
+        baked: &BakedMesh,
+    ) -> Result<DeviceMesh> {
+        let Packing { vertices, transfers, transfer_of, stride, drawn } = self;
+        let (centre, radius_m) = mesh.bounding_sphere();
+        let vertex_first = vertices.len() as u32;
+        let order = clusters::order(mesh);
+        for &v in &order {
+            vertices.push((mesh.positions[v as usize] - centre).extend(0.0).to_array());
+            vertices.push(mesh.normals[v as usize].extend(0.0).to_array());
+        }
+        let transfer_first = baked.transfer.as_ref().map_or(NONE, |floats| {
+            *transfer_of.entry(mesh.content_hash()).or_insert_with(|| {
+                let first = (transfers.len() / 4) as u32;
+                transfers.extend(order.iter().flat_map(|&v| &floats[v as usize * *stride..][..*stride]));
+                first
+            })
+        });
+        Ok(DeviceMesh {
+            vertices: vertex_first / 2..vertices.len() as u32 / 2,
+            clusters: clusters::bounds(mesh, &order),
+            faces: Faces::around(mesh, &order, CLUSTER_VERTICES as usize),
+            transfer_first,
+            blocked,
+            radiance,
+            drawn: DrawnMesh::new(device, mesh, &order, *drawn)?,
+            order,
+            centre_m: centre.as_dvec3(),
+            radius_m: f64::from(radius_m),
+        })
+    }
+}
+
 impl SceneBuffers {
     /// Uploads what was baked of a scene with `options`, and its meshes.
     ///
@@ -85,41 +154,13 @@ impl SceneBuffers {
     /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, scene: &Scene, options: &bake::Options, baked: BakedScene) -> Result<Self> {
         let (fields, slots) = field_atlas::field_atlas(device, scene, &baked.meshes, options)?;
-        let stride = channel_stride(options.bands);
-        // All at once: growing by halves would hold up to three times as much.
-        let quads = 2 * scene.meshes.iter().map(|mesh| mesh.positions.len()).sum::<usize>();
-        let mut vertices = Vec::<[f32; 4]>::with_capacity(quads);
-        let (mut transfers, mut meshes) = (Vec::new(), Vec::new());
-        let mut transfer_of = HashMap::<[u8; 32], u32>::new();
-        let drawn = scene.entities.iter().map(|entity| scene.meshes[entity.mesh].positions.len()).sum();
-        for ((mesh, [blocked, radiance]), baked) in scene.meshes.iter().zip(slots).zip(baked.meshes) {
-            let (centre, radius_m) = mesh.bounding_sphere();
-            let vertex_first = vertices.len() as u32;
-            let order = clusters::order(mesh);
-            for &v in &order {
-                vertices.push((mesh.positions[v as usize] - centre).extend(0.0).to_array());
-                vertices.push(mesh.normals[v as usize].extend(0.0).to_array());
-            }
-            let transfer_first = baked.transfer.map_or(NONE, |floats| {
-                *transfer_of.entry(mesh.content_hash()).or_insert_with(|| {
-                    let first = (transfers.len() / 4) as u32;
-                    transfers.extend(order.iter().flat_map(|&v| &floats[v as usize * stride..][..stride]));
-                    first
-                })
-            });
-            meshes.push(DeviceMesh {
-                vertices: vertex_first / 2..vertices.len() as u32 / 2,
-                clusters: clusters::bounds(mesh, &order),
-                faces: Faces::around(mesh, &order, CLUSTER_VERTICES as usize),
-                transfer_first,
-                blocked,
-                radiance,
-                drawn: DrawnMesh::new(device, mesh, &order, drawn)?,
-                order,
-                centre_m: centre.as_dvec3(),
-                radius_m: f64::from(radius_m),
-            });
+        let mut packing = Packing::new(scene, channel_stride(options.bands));
+        let mut meshes = Vec::new();
+        for ((mesh, slots), baked) in scene.meshes.iter().zip(slots).zip(baked.meshes) {
+            meshes.push(packing.add(device, mesh, slots, &baked)?);
         }
+        let Packing { vertices, mut transfers, .. } = packing;
+        // A buffer may not be empty.
         if transfers.is_empty() {
             transfers.resize(4, 0.0);
         }

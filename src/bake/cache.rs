@@ -229,7 +229,7 @@ mod tests {
         let all = [true; 3];
         let flipped: Vec<(&str, Options, [bool; 3])> = vec![
             ("bands", Options { bands: bands + 1, ..base }, all),
-            ("field_bands", Options { field_bands: Some(bands + 1), ..base }, [true, false, false]),
+            ("field_bands", Options { field_bands: Some(bands + 2), ..base }, [true, false, false]),
             ("storage", Options { storage: Storage::F32, ..base }, [true, true, false]),
             ("lattice", Options { lattice: "cube:4x3".parse().unwrap(), ..base }, [true, true, false]),
             ("face_px", Options { face_px: face_px / 2, ..base }, all),

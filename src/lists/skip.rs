@@ -105,7 +105,7 @@ skips! {
         /// Lights whose radiance field is zero on the side of a cluster.
         facing: Exact, "lists/scope.rs light_result", "facing_away";
         /// Entities whose field holds nothing but zeros.
-        empty: Exact, "frame/pose.rs body", "empty";
+        empty: Exact, "frame/pose.rs entity_bounds", "empty";
         /// Entities that nothing but themselves is lit by: their fields are not baked.
         unseen: Bake, "bake/ensure.rs needs", "unseen";
         /// Light and shadow that is bounded below `--eps`.

@@ -1,4 +1,4 @@
-//! `shadow-fields bake`
+//! `shadow-fields bake` bakes the field of one mesh.
 
 use super::context::{Context, on_or_off};
 use super::quality::BakeArguments;
@@ -15,32 +15,34 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `bake`.
 #[derive(Args)]
+#[command(after_help = "Examples:\n  shadow-fields bake assets/meshes/teapot.obj -o teapot.sf\n  \
+    shadow-fields bake lamp.obj -o lamp.sf --radiance 4,3,2 --quality high")]
 pub struct Arguments {
-    /// Mesh, Wavefront OBJ
+    /// Mesh to bake, a Wavefront OBJ file with lengths in metres
     mesh: PathBuf,
     /// Field file to write
     #[arg(short, long, value_name = "F.sf")]
     output: PathBuf,
-    /// Bake a radiance field of a surface that shines with this colour (times the mesh's own colours, if it has them)
-    /// instead of an occlusion field
+    /// Bake a radiance field instead of an occlusion field. The surface shines with this linear RGB radiance, times the mesh's own
+    /// colours if it has them. Example: 4,3,2
     #[arg(long, value_name = "R,G,B", value_parser = color, allow_hyphen_values = true)]
     radiance: Option<Vec3>,
-    /// Capture only one of samples that turns and mirrors of the mesh carry into one another, and turn its coefficients for the
-    /// rest: symmetric meshes, bodies of revolution, spheres; at most a quarter of a texel off
+    /// Capture only one of the samples that a symmetry of the mesh carries into one another, and turn its coefficients for the
+    /// others. This serves symmetric meshes, bodies of revolution and spheres. What is seen moves by at most 0.25 texels
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
     symmetry: bool,
-    /// Draw only cube faces that the object reaches, of these only what reaches into them, and of closed meshes no backs
+    /// Draw only cube faces that the object reaches, with only the triangles that reach into them, and without backs of closed meshes
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
     faces: bool,
-    /// Capture samples inside the solid off its nearest surface, or fill them from their neighbours, rather than see all dark where
-    /// they stand
+    /// Capture samples inside the solid off its nearest surface, or fill them from their neighbours. With "off" they are captured
+    /// where they stand, and see all dark
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
     inside: bool,
     #[command(flatten)]
     bake: BakeArguments,
 }
 
-/// Three numbers with commas.
+/// Parses three numbers with commas between them.
 pub(super) fn color(text: &str) -> std::result::Result<Vec3, String> {
     let numbers: Vec<f32> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
     match numbers[..] {
@@ -53,7 +55,7 @@ pub(super) fn color(text: &str) -> std::result::Result<Vec3, String> {
     }
 }
 
-/// A mesh whose surface shines: its own colours, or white, times `radiance`.
+/// A mesh whose surface shines. Its colours are its own, or white, times `radiance`.
 ///
 /// # Errors
 /// `Input` that names the file when a colour becomes too bright.
@@ -67,7 +69,7 @@ pub(super) fn shining(mesh: Mesh, radiance: Vec3, path: &Path) -> Result<Mesh> {
     Mesh::new(mesh.name, mesh.positions, mesh.normals, Some(colors), mesh.triangles)
 }
 
-/// Bakes one field. The result does not depend on the cache, which is not used.
+/// Bakes one field, without the cache.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     output::check_folder(&arguments.output)?;
     output::check_ending(&arguments.output, "sf", "a field file")?;

@@ -1,4 +1,4 @@
-//! `shadow-fields inspect`
+//! `shadow-fields inspect` shows what is in a field file.
 
 use super::bake::{color, shining};
 use super::context::Context;
@@ -18,22 +18,26 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `inspect`.
 #[derive(Args)]
+#[command(
+    after_help = "Examples:\n  shadow-fields inspect teapot.sf\n  shadow-fields inspect teapot.sf --at 0,1.5,2\n  \
+    shadow-fields inspect teapot.sf --faces sheet.png --mesh assets/meshes/teapot.obj"
+)]
 pub struct Arguments {
-    /// Field file
+    /// Field file to show, as `bake` writes it
     field: PathBuf,
-    /// Look the field up at this place in the mesh's frame, metres
+    /// Print the field's coefficients at this place, in metres in the mesh's frame. Example: 0,1.5,2
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     at: Option<DVec3>,
-    /// Write contact sheets of cube faces over latitude, longitude and distance
+    /// Write a picture of the cube faces that the coefficients describe, over latitude, longitude and distance
     #[arg(long, value_name = "OUT.png")]
     faces: Option<PathBuf>,
-    /// With --faces: capture this mesh anew beside what the field's coefficients say
+    /// With --faces: capture this mesh anew, and show its faces beside those from the coefficients
     #[arg(long, value_name = "MESH.obj", requires = "faces")]
     mesh: Option<PathBuf>,
-    /// With --mesh: the colour that a radiance field was baked with
+    /// With --mesh: the linear RGB radiance that a radiance field was baked with. The default is 1,1,1
     #[arg(long, value_name = "R,G,B", requires = "mesh", value_parser = color, allow_hyphen_values = true)]
     radiance: Option<Vec3>,
-    /// With --at: samples that the lookup takes
+    /// With --at: the samples that the lookup takes
     #[arg(long, default_value = "trilinear", value_name = "LOOKUP")]
     lookup: Lookup,
 }
@@ -114,7 +118,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// The mesh that a field was baked from, with the colours that it was baked with.
+/// The mesh that a field was baked from, with the colours that it had then.
 fn baked_mesh(header: &FieldHeader, path: &Path, radiance: Option<Vec3>) -> Result<Mesh> {
     let mut mesh = Mesh::load(path)?;
     if header.kind == FieldKind::Radiance {
@@ -138,7 +142,7 @@ fn baked_mesh(header: &FieldHeader, path: &Path, radiance: Option<Vec3>) -> Resu
     Err(Error::input(path, format!("is not the mesh {} that the field was baked from ({why})", header.mesh)))
 }
 
-/// Coefficients at a place in the mesh's frame, metres.
+/// The coefficients at a place in the mesh's frame, in metres.
 fn lookup(field: &ShadowField, position_m: DVec3, lookup: Lookup) -> serde_json::Value {
     let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
     let position = (position_m - centre) / f64::from(field.header.radius_m);
@@ -186,8 +190,8 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
             rows.push((format!("{latitude_deg:+.0} deg, {distance:.2} r"), cells));
         }
     }
-    // Visibility has one white for the whole sheet. What coefficients say of radiance falls with the square of the distance, so
-    // each row has its own; what is captured keeps the surface's radiance and is cut at that white.
+    // Visibility has one white for the whole sheet. The radiance from the coefficients falls with the square of the distance, so each
+    // row has a white of its own. Captured faces keep the surface's radiance and are cut at that white.
     let brightest = |rows: &[(String, Vec<Cell>)], least: f32| {
         rows.iter().flat_map(|(_, cells)| cells.iter().flatten()).fold(least, |m, c| m.max(*c))
     };
@@ -223,7 +227,7 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
     Ok(())
 }
 
-/// Six faces of what the field's coefficients say is seen from a place (in r): visibility, or radiance in linear RGB.
+/// The six faces that the field's coefficients describe at a place (in r): visibility, or radiance in linear RGB.
 fn reconstruct(field: &ShadowField, position: DVec3) -> Cell {
     let bands = field.header.bands;
     let count = coefficient_count(bands);

@@ -1,5 +1,6 @@
-//! Pass "assemble": captured samples to the field as stored: fitted to being interpolated, cube borders copied from neighbouring
-//! faces, samples that see nothing filled from valid ones around them, halves where wanted.
+//! Pass "assemble" makes the stored field from captured samples. It lowers them by their curvature, which suits interpolation. It
+//! copies the borders of cube faces from neighbouring faces, and it fills samples that see nothing from valid ones around them.
+//! It rounds to f16 where the field is stored so.
 //!
 //! Input: `captured`, floats of one sample after another. Output: the field's payload at a byte offset of `field`.
 
@@ -13,37 +14,37 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A captured sample and its share in a stored one.
+/// A captured sample and its share in a stored sample.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Source {
     /// Captured sample.
     pub sample: u32,
-    /// Share; those of a stored sample sum to 1.
+    /// The share. The shares in a stored sample sum to 1.
     pub weight: f32,
 }
 
-/// For every stored sample the captured ones whose weighted sum it is, as offsets into a list.
+/// Every stored sample is a weighted sum of captured samples. This lists those of all stored samples, one list after another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sources {
-    /// Where each stored sample's list begins; one more than there are samples.
+    /// Where each stored sample's list begins, and at last where the last list ends.
     pub offsets: Vec<u32>,
     /// Captured samples.
     pub list: Vec<Source>,
 }
 
-/// What a straight line through samples is too high by between them, on average, in units of their second difference: where
-/// f'' is constant, the chord over a step h errs by f'' t (h - t) / 2, whose mean is f'' h^2 / 12. Lowering every sample by that
-/// makes the interpolant the best one in the mean square: its error falls from .0913 to .0373 h^2 f''.
+/// The mean height of the chord between two samples above the function, in units of the second difference. Where f'' is constant,
+/// the chord over a step h is too high by f'' t (h - t) / 2 at t, and the mean of that is f'' h^2 / 12. If every sample is lowered
+/// by the mean, the mean square error is least: its root falls from 0.0913 to 0.0373 h^2 f''.
 const SAG: f64 = 1.0 / 12.0;
 
 impl Sources {
     /// Plans the assembly of a lattice of which `unseen` marks the captured samples that may not be used.
     ///
-    /// An unusable sample is replaced by the mean of the usable ones that are fewest steps away, a step leading to the next
-    /// shell or the next direction. `inside` marks samples that stand for others (see [`super::inside::pushed_out`]): no second
-    /// difference is taken across them. Every other sample is lowered by `SAG` of its second differences, along shells and
-    /// along both directions.
+    /// An unusable sample is replaced by the mean of the usable samples that are fewest steps away. A step leads to the next shell or
+    /// to the next direction. `inside` marks samples that were captured elsewhere (see [`super::inside::pushed_out`]); no second
+    /// difference is taken across them. Every other sample is lowered by `SAG` of its second differences along shells and along
+    /// both directions.
     ///
     /// # Errors
     /// `Input` when no sample is usable.
@@ -94,11 +95,11 @@ fn fit(lattice: &Lattice, inside: &[bool], sample: u32) -> BTreeMap<u32, f64> {
     out
 }
 
-/// Fewest shells, and cells along a face's edge, whose second differences tell of curvature: fewer are too far apart.
+/// Fewest shells, and fewest cells along a face's edge, whose second differences measure curvature. Fewer are too far apart.
 const FEWEST: u32 = 4;
 
-/// Pairs of samples between which a sample lies: the shells below and above, and the directions on both sides in both
-/// directions of a cube's grid. Grids of latitudes and longitudes have none: they stand for how others sample.
+/// Pairs of samples between which a sample lies: the shells below and above, and the neighbours on both sides along both axes of
+/// a cube's grid. Grids of latitudes and longitudes are lowered by nothing, since they exist to compare with earlier work.
 fn opposite(lattice: &Lattice, sample: u32) -> Vec<[u32; 2]> {
     let Directions::Cube { cells } = lattice.directions else { return Vec::new() };
     let directions = lattice.direction_count();
@@ -207,7 +208,7 @@ impl Assemble {
     }
 }
 
-/// The CPU twin, before rounding to the storage format.
+/// The CPU twin of the pass, before values are rounded to the storage format.
 pub fn twin(captured: &[f32], sources: &Sources, sample_stride: usize, factor: f32) -> Vec<f64> {
     let lists = sources.offsets.windows(2).map(|w| &sources.list[w[0] as usize..w[1] as usize]);
     lists

@@ -1,4 +1,4 @@
-//! Captures of one bake, an atlas at a time: the resources that batches share, and the loop over them.
+//! The captures of one bake. A batch fills the atlas once. This holds the resources that batches share, and the loop over them.
 
 use super::capture::{Capture, Model, NO_SLOT, Slots};
 use super::partial::Partial;
@@ -21,10 +21,10 @@ pub(super) struct Captures<'c> {
     pub partial: &'c Partial,
 }
 
-/// A sample to capture: from where, and what is made of what is seen.
+/// A sample to capture: the place of its eye, and how its faces are projected.
 #[derive(Clone, Copy)]
 pub(super) struct CaptureTarget {
-    /// In r.
+    /// The place of the eye, in r.
     pub eye: Vec3,
     pub job: Job,
 }
@@ -35,11 +35,11 @@ pub(super) struct Batches {
     pub project: Project,
     pub model: Model,
     pub jobs: Buffer,
-    /// Whether backs of closed meshes are left out, which only an eye inside sees.
+    /// Whether backs of closed meshes are left out. Only an eye inside the solid would see them.
     pub culls: bool,
     /// Projected samples of one batch on the device.
     pub samples: Buffer,
-    /// The same on their way to the host.
+    /// The projected samples on their way to the host.
     pub results: Buffer,
     /// Floats of a projected sample.
     pub sample_floats: usize,
@@ -52,7 +52,7 @@ pub(super) struct Batch {
 }
 
 impl Captures<'_> {
-    /// Captures every target and puts what is projected into `values`, samples in the order of their numbers. Goes on from what a
+    /// Captures every target and puts the projected samples into `values`, in the order of their numbers. It goes on from what a
     /// cancelled bake has kept.
     pub fn run(
         &self,

@@ -1,4 +1,5 @@
-//! Baked fields and transfers, found again by the content of the mesh and everything else that decides them.
+//! The cache of baked fields and transfer vectors. Their names are hashes of the mesh's content and of everything else that decides
+//! them.
 
 use super::partial::Partial;
 use super::{BakeReport, Baker, Options, Progress, TRANSFER_OFFSET};
@@ -12,8 +13,8 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A folder of baked fields and transfers. What cannot be kept on disk, for want of a folder or of room, is kept in memory as long
-/// as any clone of the cache is there, so that nothing is baked twice.
+/// A folder of baked fields and transfer vectors. Where there is no folder or no room on disk, they are kept in memory as long as any
+/// clone of the cache exists. Nothing is baked twice.
 #[derive(Clone, Default)]
 pub struct Cache {
     folder: Option<PathBuf>,
@@ -27,7 +28,7 @@ struct InMemory {
     transfers: HashMap<String, Arc<Vec<f32>>>,
 }
 
-/// FieldHeader of a cached transfer file: everything that decides transfer vectors.
+/// The header of a cached transfer file: everything that decides transfer vectors.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct TransferHeader {
     mesh_hash: String,
@@ -57,7 +58,7 @@ fn key(header: &impl Serialize) -> String {
     blake3::Hasher::new().update(&VERSION.to_le_bytes()).update(&text).finalize().to_hex()[..32].to_owned()
 }
 
-/// What decides a field: the header without the name for people and without what only the bake finds out.
+/// What decides a field: its header without the mesh's name and without what only the bake finds out.
 fn identity(header: &FieldHeader) -> FieldHeader {
     FieldHeader {
         mesh: String::new(),
@@ -69,13 +70,13 @@ fn identity(header: &FieldHeader) -> FieldHeader {
     }
 }
 
-/// Name of a field: the same for all that come out the same.
+/// The name of a field in the cache. Fields with equal content have equal names.
 pub fn field_name(header: &FieldHeader) -> String {
     key(&identity(header))
 }
 
 impl Cache {
-    /// A cache below `folder`; without one, in memory.
+    /// A cache below `folder`, or in memory if there is none.
     pub fn new(folder: Option<&Path>) -> Self {
         Cache { folder: folder.map(|f| f.join("fields")), memory: Arc::default() }
     }
@@ -104,7 +105,7 @@ impl Cache {
         self.memory().transfers.contains_key(&key) || self.exists(&key, "transfer")
     }
 
-    /// The field that `header` describes, and the report of its bake, `None` where it was there.
+    /// The field that `header` describes, and the report of its bake, which is `None` if the cache held the field.
     ///
     /// # Errors
     /// As [`Baker::field`]. A damaged or unreadable cache file is baked anew.
@@ -132,7 +133,7 @@ impl Cache {
         Ok((field, Some(report)))
     }
 
-    /// The transfer vectors of a mesh, and the report of their bake, `None` where they were there.
+    /// The transfer vectors of a mesh, and the report of their bake, which is `None` if the cache held them.
     ///
     /// # Errors
     /// As [`Baker::transfer`]. A damaged or unreadable cache file is baked anew.
@@ -163,7 +164,7 @@ impl Cache {
     }
 }
 
-/// Writes to a path, if there is one; whether it is on disk now.
+/// Writes to a path, if there is one. Answers whether the content is on disk now.
 fn is_kept(path: Option<&Path>, write: impl FnOnce(&Path) -> Result<()>) -> bool {
     let Some(path) = path else { return false };
     match write(path) {
@@ -175,7 +176,7 @@ fn is_kept(path: Option<&Path>, write: impl FnOnce(&Path) -> Result<()>) -> bool
     }
 }
 
-/// The field of a file, under the mesh's present name; `None` where it is missing, damaged or another one.
+/// The field in a file, with the mesh's present name. `None` if the file is missing or damaged or holds another field.
 fn read_field(path: &Path, header: &FieldHeader) -> Option<ShadowField> {
     match path.exists().then(|| ShadowField::read(path))? {
         Ok(found) if identity(&found.header) == identity(header) => {
@@ -186,7 +187,7 @@ fn read_field(path: &Path, header: &FieldHeader) -> Option<ShadowField> {
     }
 }
 
-/// The transfer vectors of a file; `None` where it is missing, damaged or another one.
+/// The transfer vectors in a file. `None` if the file is missing or damaged or holds others.
 fn read_transfer(path: &Path, header: &TransferHeader) -> Option<Vec<f32>> {
     let bytes = 4 * header.vertex_count * channel_stride(header.bands);
     match path.exists().then(|| file::read::<TransferHeader>(path, TRANSFER_MAGIC))? {
@@ -216,7 +217,7 @@ mod tests {
         [field(FieldKind::Occlusion), field(FieldKind::Radiance), key(&TransferHeader::new(mesh, options))]
     }
 
-    /// Flips each option: what it decides is kept under another name, and the rest under the same.
+    /// Each option that is flipped changes the names of what it decides, and no other names.
     #[test]
     fn every_option_is_part_of_the_names_that_it_decides() {
         let mesh = generate::torus_two_colour(1.0, 0.3, 12, 6);
@@ -249,7 +250,7 @@ mod tests {
         }
     }
 
-    /// What was baked before shortcuts had a place in headers is still found: all of them on leaves the name as it was.
+    /// Fields that were baked before shortcuts had a place in headers are still found: with all shortcuts on, the name is the old one.
     #[test]
     fn headers_leave_out_shortcuts_that_are_all_on() {
         let header = crate::bake::header(&generate::sphere(1.0, 1), FieldKind::Occlusion, &Options::default());

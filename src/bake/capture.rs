@@ -1,10 +1,10 @@
-//! Pass "capture": an object seen from sample points, six cube faces a point, many points a render pass.
+//! Pass "capture" draws an object as seen from sample points: six cube faces for each point, many points in one render pass.
 //!
 //! Inputs: the mesh in units of its bounding radius around its centre; eyes in the same frame. Output: an atlas of square
 //! faces. Occlusion: R8, white background, black object, no depth. Radiance: RGBA32F, black background, the mesh's colours,
-//! with depth. A face that the object's bounding sphere does not reach is not drawn and gets no place in the atlas; of the
-//! rest only the chunks of neighbouring triangles are drawn whose bounding spheres reach into the face, and of a closed mesh only
-//! those that may show a front.
+//! with depth. A face that the object's bounding sphere does not reach is not drawn and gets no place in the atlas. The other faces
+//! are drawn in chunks of neighbouring triangles. A chunk is left out if its bounding sphere does not reach into the face, or if
+//! the mesh is closed and the eye sees only backs of the chunk.
 
 use super::chunk::{Chunk, Chunked, chunk, joined, reaches};
 use super::triangles::distinct;
@@ -20,14 +20,14 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Edge of the atlas in texels, where the device allows it: 1 024 faces of 64 px, 4 MB of coverage.
+/// Edge of the atlas in texels, where the device allows it. It holds 1 024 faces of 64 px, in 4 MB for occlusion.
 const ATLAS_PX: u32 = 2048;
 /// Nearest distance that a radiance capture sees, in r.
 const NEAR: f32 = 1e-4;
-/// Mark of a face that is not in the atlas.
+/// The slot of a face that is not in the atlas.
 pub const NO_SLOT: u32 = u32::MAX;
 
-/// A mesh on the device, centred and scaled to bounding radius 1, its triangles in chunks.
+/// A mesh on the device, centred and scaled to bounding radius 1, with its triangles in chunks.
 pub struct Model {
     positions: Buffer,
     colors: Option<Buffer>,
@@ -37,7 +37,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Uploads a mesh; `with_colors` for a radiance capture (white where the mesh has none).
+    /// Uploads a mesh. `with_colors` is for a radiance capture; a mesh without colours is white.
     ///
     /// # Errors
     /// `Device` when memory ran out.
@@ -99,7 +99,7 @@ impl Capture {
     /// Faces in a row of the atlas.
     pub fn columns(device: &Device, face_px: u32, radiance: bool) -> u32 {
         let atlas_px = ATLAS_PX.min(device.limits.max_image_dimension2_d);
-        // Radiance texels are 20 times as large; six faces always fit.
+        // The texels of a radiance capture, with depth, are 20 times as large. Six faces always fit.
         (if radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3)
     }
 
@@ -123,7 +123,7 @@ impl Capture {
         };
         Ok(Capture {
             open: pipeline(vk::CullModeFlags::NONE)?,
-            // A cube face is a mirror image, which turns every triangle over: FRONT takes the object's back faces away.
+            // A cube face is a mirror image, which turns every triangle over, so FRONT removes the object's back faces.
             closed: pipeline(vk::CullModeFlags::FRONT)?,
             atlas: Image::new(device, "capture atlas", shape)?,
             depth: depth
@@ -141,13 +141,13 @@ impl Capture {
         self.columns * self.columns
     }
 
-    /// Gives faces of the next eyes places in the atlas, until it is full. Returns a slot table for every eye that fitted,
-    /// at least one.
+    /// Gives the faces of the next eyes their places in the atlas until it is full. Returns a slot table for every eye that fits;
+    /// at least one does.
     pub fn plan(&self, model: &Model, eyes: &[Vec3]) -> Vec<Slots> {
         let mut used = 0;
         let mut out = Vec::new();
         for &eye in eyes {
-            // An eye that sees nothing has no face, but a job all the same.
+            // An eye that sees nothing has no face, but it still has a job.
             if used.max(out.len() as u32) + FACE_COUNT as u32 > self.capacity() {
                 break;
             }
@@ -226,15 +226,15 @@ fn face_axes(face: usize) -> (Vec3, Vec3, Vec3) {
     (forward.as_vec3(), right.as_vec3(), down.as_vec3())
 }
 
-/// The CPU twin, by another method: casts a ray through every texel centre of one face. Row-major, true where the object
-/// is hit. Slow; positions are those of [`unit_positions`].
+/// The CPU twin of an occlusion capture, by another method: it casts a ray through every texel centre of one face. The result is
+/// row-major and true where a ray hits the object. Positions are those of [`unit_positions`].
 pub fn twin(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: usize, face_px: u32) -> Vec<bool> {
     let mut covered = vec![false; (face_px * face_px) as usize];
     rays(positions, triangles, eye, face, face_px, |texel, _, _| covered[texel] = true);
     covered
 }
 
-/// The same for a radiance capture: the colour of the nearest thing that each ray meets, black where there is none.
+/// The CPU twin of a radiance capture: the colour of the nearest triangle that each ray meets, or black where it meets none.
 pub fn twin_colors(
     (positions, colors): (&[Vec3], &[Vec3]),
     triangles: &[[u32; 3]],
@@ -252,8 +252,8 @@ pub fn twin_colors(
     nearest.into_iter().map(|(_, color)| color).collect()
 }
 
-/// Tells of every texel's ray and triangle that meet: how far away in units of the ray's (s, t, 1), and where among the
-/// triangle's corners.
+/// Calls a function for every ray and triangle that meet: with the distance in units of the ray's (s, t, 1), and with the point's
+/// weights among the triangle's corners.
 fn rays(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
@@ -265,7 +265,7 @@ fn rays(
     let (forward, right, down) = face_basis(face);
     let px = face_px as usize;
     for triangle in triangles {
-        // The triangle in the face's frame; a ray direction is (s, t, 1).
+        // The triangle stands in the face's frame, where the direction of a ray is (s, t, 1).
         let [a, b, c] = triangle.map(|i| {
             let q = positions[i as usize].as_dvec3() - eye;
             DVec3::new(q.dot(right), q.dot(down), q.dot(forward))

@@ -1,13 +1,13 @@
-//! Chunks: runs of neighbouring triangles that are drawn or left out together, with what tells which.
+//! Chunks are runs of neighbouring triangles that are drawn or left out together. Each has the bounds that decide it.
 
 use crate::error::{Error, Result};
 use glam::{DVec3, Vec3};
 use meshopt::{VertexDataAdapter, build_meshlets};
 use std::ops::Range;
 
-/// Triangles in a chunk: small enough to be culled on its own, large enough that a draw call costs little beside it.
+/// Triangles in a chunk. It is small enough to be culled on its own, and large enough that its draw call costs little.
 const CHUNK_TRIANGLES: usize = 128;
-/// How much likeness of normals counts against nearness where chunks are made.
+/// Weight of the distance between normals against the distance between places, when chunks are made.
 const CONE_WEIGHT: f32 = 0.5;
 /// A run of triangles with the sphere around them, in r, and the cone around their normals.
 #[derive(Clone, Debug)]
@@ -16,12 +16,12 @@ pub(super) struct Chunk {
     pub centre: Vec3,
     pub radius: f32,
     axis: Vec3,
-    /// Sine of the half-angle; 2 where normals point everywhere.
+    /// Sine of the cone's half-angle, or 2 where normals point everywhere.
     sine: f32,
 }
 
 impl Chunk {
-    /// Of triangles given by their corners.
+    /// The chunk of triangles that are given by their corners.
     fn new(indices: Range<u32>, triangles: &[[Vec3; 3]]) -> Self {
         let corners = || triangles.iter().flatten();
         let (low, high) = corners().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
@@ -35,11 +35,11 @@ impl Chunk {
         Chunk { indices, centre, radius, axis: axis.as_vec3(), sine }
     }
 
-    /// Whether only backs are seen from `eye`; never true where a front is.
+    /// Whether only backs are seen from `eye`. It is never true where a front is seen.
     ///
-    /// The direction to any of its points is within asin(radius / distance) of that to the centre, its normal within the cone of
-    /// the axis: all backs where these two and the angle between the directions stay below a right angle together. The bound
-    /// a . q >= sine |q| + radius implies that.
+    /// The direction to any of its points is within asin(radius / distance) of the direction to the centre, and any normal is within
+    /// the cone around the axis. If these two angles and the one between centre and axis sum to less than a right angle, all
+    /// triangles show their backs. The bound a . q >= sine |q| + radius implies that.
     pub fn turned_away(&self, eye: Vec3) -> bool {
         let q = self.centre - eye;
         // The margin covers rounding.
@@ -47,14 +47,14 @@ impl Chunk {
     }
 }
 
-/// Sorts triangles along a space-filling curve; positions within the unit sphere.
+/// Sorts triangles along a space-filling curve. Positions lie within the unit sphere.
 pub fn sort_spatially(positions: &[Vec3], triangles: &mut [[u32; 3]]) {
     triangles.sort_by_cached_key(|t| morton(t.iter().map(|i| positions[*i as usize]).sum::<Vec3>() / 3.0));
 }
 
 /// A mesh cut into chunks, one after another along a space-filling curve.
 pub(super) struct Chunked {
-    /// Which vertices, chunk by chunk, so that a chunk's lie together; those on its rim come again in its neighbours.
+    /// The vertices of one chunk after another. A vertex on the rim of a chunk comes again in the neighbouring chunks.
     pub vertices: Vec<u32>,
     pub triangles: Vec<[u32; 3]>,
     pub chunks: Vec<Chunk>,
@@ -83,7 +83,7 @@ pub(super) fn chunk(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Chunke
     Ok(out)
 }
 
-/// Interleaved bits of a point in [-1, 1]^3, ten an axis.
+/// The interleaved bits of a point in [-1, 1]^3, ten bits for each axis.
 pub fn morton(p: Vec3) -> u32 {
     let spread = |x: f32| {
         let cell = ((x + 1.0) * 512.0).clamp(0.0, 1023.0) as u32;
@@ -92,7 +92,7 @@ pub fn morton(p: Vec3) -> u32 {
     spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
 }
 
-/// Whether a sphere reaches into the pyramid of a cube face seen from `eye`; never false for one that does.
+/// Whether a sphere reaches into the pyramid of a cube face seen from `eye`. It is never false for a sphere that does.
 pub(super) fn reaches(eye: Vec3, centre: Vec3, radius: f32, forward: Vec3, right: Vec3, down: Vec3) -> bool {
     let q = centre - eye;
     // Planes through the eye at 45 degrees: their unit normals are (forward +- side) / sqrt 2. The margin covers rounding.
@@ -101,7 +101,7 @@ pub(super) fn reaches(eye: Vec3, centre: Vec3, radius: f32, forward: Vec3, right
     f + r >= reach && f - r >= reach && f + d >= reach && f - d >= reach && f >= -1.0001 * radius - 1e-6
 }
 
-/// Joins ranges that follow on one another.
+/// Joins ranges where one begins at the end of another.
 pub(super) fn joined(ranges: impl Iterator<Item = Range<u32>>) -> Vec<Range<u32>> {
     let mut out: Vec<Range<u32>> = Vec::new();
     for range in ranges {

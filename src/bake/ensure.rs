@@ -1,4 +1,4 @@
-//! The way in for everything that shows a scene: bakes or finds every field and transfer that the scene needs.
+//! Bakes or finds in the cache every field and transfer vector that a scene needs. Everything that shows a scene calls [`ensure()`].
 
 use super::cache::{Cache, field_name};
 use super::{BakeReport, Baker, Options, header};
@@ -9,13 +9,13 @@ use crate::scene::{Entity, Scene};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// Told what is being baked and how far it is: name, samples done, samples in all.
+/// A function that is told the name of what is being baked, the samples that are done, and the samples in all.
 pub type SceneProgress<'p> = &'p dyn Fn(&str, u32, u32);
 
 /// What one bake cost.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Baked {
-    /// Mesh and kind.
+    /// Name of the mesh, and the kind of field.
     pub what: String,
     /// What the bake did, and where its time went.
     pub report: BakeReport,
@@ -28,7 +28,7 @@ pub struct BakedMesh {
     pub blocked: Option<Arc<ShadowField>>,
     /// Radiance field.
     pub radiance: Option<Arc<ShadowField>>,
-    /// Transfer vectors in the mesh's order of vertices; none where the cosine of the normal is exact.
+    /// Transfer vectors in the mesh's order of vertices, or `None` where the cosine lobe of the normal is exact.
     pub transfer: Option<Arc<Vec<f32>>>,
 }
 
@@ -51,7 +51,7 @@ pub struct SceneNeeds {
 }
 
 impl SceneNeeds {
-    /// Of a scene whose fields and transfers are baked with `options`. No field is baked that nothing sees.
+    /// The needs of a scene whose fields and transfers are baked with `options`. A field that nothing sees is not needed.
     pub fn of(scene: &Scene, options: &Options) -> Self {
         let fields = |index: usize| {
             let kinds = needs(scene, index);
@@ -65,7 +65,7 @@ impl SceneNeeds {
         }
     }
 
-    /// Bytes of the fields, each rounded up to a multiple of `alignment`; equal fields count once.
+    /// Bytes of the fields, each rounded up to a multiple of `alignment`. Equal fields count once.
     pub fn field_bytes(&self, alignment: u64) -> u64 {
         let mut known = HashSet::new();
         let headers = self.fields.iter().flatten().flatten();
@@ -73,7 +73,7 @@ impl SceneNeeds {
         distinct.map(|header| header.payload_bytes().next_multiple_of(alignment)).sum()
     }
 
-    /// Whether all of it is in the cache, so that [`ensure()`] takes no time.
+    /// Whether everything is in the cache, so that [`ensure()`] bakes nothing.
     pub fn are_cached(&self, scene: &Scene, cache: &Cache) -> bool {
         let mut fields = self.fields.iter().flatten().flatten();
         let mut transfers = scene.meshes.iter().zip(&self.transfers).filter(|(_, needed)| **needed);
@@ -82,8 +82,8 @@ impl SceneNeeds {
     }
 }
 
-/// Which fields the entities of a mesh need: none for what only receives or what nothing else can see, none for shadows where
-/// there is no light, no radiance field for a light of one colour.
+/// Which fields the entities of a mesh need. An entity that only receives, or that nothing else can see, needs none. Without light
+/// no shadows are needed, and a light of one colour needs no radiance field.
 pub fn needs(scene: &Scene, mesh: usize) -> [Option<FieldKind>; 2] {
     let entities = || scene.entities.iter().filter(|e| e.mesh == mesh && is_seen(scene, e));
     let coloured = scene.meshes[mesh].colors.is_some();
@@ -93,12 +93,12 @@ pub fn needs(scene: &Scene, mesh: usize) -> [Option<FieldKind>; 2] {
     [blocked.then_some(FieldKind::Occlusion), radiance.then_some(FieldKind::Radiance)]
 }
 
-/// Whether anything but itself is lit, so that its shadow or light can fall on it.
+/// Whether the shadow or light of an entity can fall on another entity, because one other at least is lit.
 pub fn is_seen(scene: &Scene, entity: &Entity) -> bool {
     scene.entities.iter().filter(|e| e.receives).count() > usize::from(entity.receives)
 }
 
-/// Whether a mesh can shadow itself; if not, its transfer is the cosine of the normal.
+/// Whether a mesh can shadow itself. If it cannot, its transfer is the cosine lobe of the normal.
 pub fn bakes_transfer(mesh: &Mesh) -> bool {
     !mesh.is_flat() && !mesh.is_convex()
 }

@@ -1,4 +1,4 @@
-//! What decides a bake: the options, and the header of the field that comes of them and a mesh.
+//! What decides a bake: its options, and the header of the field, which follows from the options and a mesh.
 
 use super::capture::unit_positions;
 use super::surface::Surface;
@@ -18,7 +18,7 @@ pub struct Options {
     pub field_bands: Option<usize>,
     /// Number format of fields.
     pub storage: Storage,
-    /// Sample points; the first shell may be left to the bake.
+    /// Sample points. The first shell may be left to the bake.
     pub lattice: Lattice,
     /// Edge of a captured face in texels.
     pub face_px: u32,
@@ -28,7 +28,7 @@ pub struct Options {
 
 impl Default for Options {
     /// 4 bands, f16, the default lattice, 64 px, all shortcuts. On faces of 64 px the coefficients of a binary cap are wrong by
-    /// 0.0033 (relative root mean square); 32 px leave 0.0093, 16 px 0.028.
+    /// 0.0033 (relative root mean square). With 32 px they are wrong by 0.0093, and with 16 px by 0.028.
     fn default() -> Self {
         Options {
             bands: 4,
@@ -53,8 +53,9 @@ impl Options {
     }
 }
 
-/// First shell that an object needs, in the lattice's space: just off a ball if the object fills one; the distance of its surface
-/// from the centre if the centre is inside the solid, since no receiver comes nearer; else well inside.
+/// The first shell that an object needs, in the lattice's space. It lies just off an object that fills a ball. If the centre is inside
+/// another solid, it lies at the distance of the surface from the centre, since no receiver comes nearer. Otherwise it is
+/// [`ROOMY_INNER`].
 pub fn first_shell(fit: &Fit, positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
     let placed: Vec<Vec3> = positions.iter().map(|p| fit.apply(p.as_dvec3()).as_vec3()).collect();
     let surface = Surface::new(&placed, triangles);
@@ -63,16 +64,16 @@ pub fn first_shell(fit: &Fit, positions: &[Vec3], triangles: &[[u32; 3]]) -> f64
     }
     let nearest = surface.distance(DVec3::ZERO);
     let farthest = placed.iter().map(|p| f64::from(p.length())).fold(0.0, f64::max);
-    // A tessellated sphere's facets lie a few percent inside it.
+    // The facets of a tessellated sphere lie a few percent inside the sphere.
     if nearest > 0.93 * farthest { OUTSIDE_INNER * farthest.max(1.0) } else { nearest.max(ROOMY_INNER) }
 }
 
-/// Share of its bounding box above which a solid counts as a box.
+/// A solid counts as a box if it fills at least this share of its bounding box.
 const BOXED: f64 = 0.9;
 
-/// Whether samples on the edges of a cube's faces serve a solid. They serve most, but not one that fills its box: its edges lie
-/// where those samples are, and a sample below an edge is captured off one of two sides at random, which serves neither side.
-/// (The field of a cube over a floor is wrong by 0.034 with such samples and by 0.023 without.)
+/// Whether samples on the edges of a cube's faces serve a solid. They serve most solids, but none that fills its box. The edges of a
+/// box lie where those samples are. A sample below an edge is captured off one of two sides at random, which serves neither side.
+/// The field of a cube over a floor has an error of 0.034 with such samples and of 0.023 without (relative root mean square).
 fn is_served_by_edges(positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
     let (low, high) = positions.iter().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
     let boxed = (high - low).as_dvec3().element_product();
@@ -81,12 +82,12 @@ fn is_served_by_edges(positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
     volume.abs() < BOXED * boxed
 }
 
-/// The hash of a mesh's contents as headers hold it.
+/// The hash of a mesh's content as headers hold it.
 pub fn hash_text(mesh: &Mesh) -> String {
     mesh.content_hash().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// FieldHeader of the field that a bake of `mesh` makes. What only the bake finds out is empty or 0.
+/// The header of the field that a bake of `mesh` makes. What only the bake finds out is empty or 0.
 pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
     let (centre, radius_m) = mesh.bounding_sphere();
     let positions = unit_positions(mesh);

@@ -1,4 +1,4 @@
-//! Which sample points lie inside the solid, by generalised winding number.
+//! Finds the sample points that lie inside the solid, by their generalised winding number.
 //!
 //! A point counts as inside where the winding number is above one half (Jacobson, Kavan, Sorkine-Hornung, *Robust Inside-Outside
 //! Segmentation using Generalized Winding Numbers*, SIGGRAPH 2013).
@@ -8,16 +8,16 @@ use super::surface::Surface;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Marks the points inside the mesh; positions and points in the same frame.
+/// Marks the points inside the mesh. Surface and points are in the same frame.
 pub fn inside(surface: &Surface, points: &[DVec3]) -> Vec<bool> {
     points.par_iter().map(|&point| surface.encloses(point)).collect()
 }
 
-/// For every marked point the place nearest to it that stands off the surface by [`TRANSFER_OFFSET`], where something can be seen; `None` where that lies
-/// inside as well (parts of the mesh that run into each other), and for points that are not marked.
+/// For every marked point the nearest place that stands off the surface by [`TRANSFER_OFFSET`], from where something can be seen. It is
+/// `None` for points that are not marked, and where that place lies inside as well because parts of the mesh run into each other.
 ///
-/// What is interpolated between such a sample and one outside has the surface's own value at the surface, so receivers in a
-/// narrow gap find what is seen there.
+/// An interpolation between such a sample and one outside takes the surface's own value at the surface. Receivers in a narrow gap
+/// therefore find what is seen there.
 pub fn pushed_out(surface: &Surface, points: &[DVec3], inside: &[bool]) -> Vec<Option<DVec3>> {
     let place = |(&point, &inside): (&DVec3, &bool)| {
         let on_surface = inside.then(|| surface.nearest(point)).flatten()?;

@@ -1,4 +1,4 @@
-//! The bake: from a mesh to its field and to its transfer vectors. [`ensure()`] is the way in for everything that shows a scene.
+//! The bake makes the field and the transfer vectors of a mesh. Everything that shows a scene calls [`ensure()`].
 //!
 //! ```text
 //! sample points -> capture -> project -> host (all batches) -> turned samples -> assemble -> field
@@ -48,11 +48,11 @@ use std::time::Instant;
 use symmetric_samples::Turned;
 use symmetry::Symmetry;
 
-/// Where the eye of a transfer capture stands: this share of r off the surface, along the normal. It is large enough that the
-/// surface's own facets stay below the horizon, and small enough that contact shadows do not move visibly.
+/// Distance of a transfer capture's eye from the surface along the normal, in r. It is large enough that the surface's own facets
+/// stay below the horizon, and small enough that contact shadows do not move visibly.
 pub const TRANSFER_OFFSET: f32 = 2e-3;
 
-/// Told how many of how many samples are done.
+/// A function that is told how many samples are done, and how many there are.
 pub type Progress<'p> = &'p dyn Fn(u32, u32);
 
 /// Bytes of the samples of a field before they are put into its stored order and number format.
@@ -60,7 +60,8 @@ fn captured_bytes(header: &FieldHeader) -> u64 {
     4 * u64::from(header.lattice.sample_count()) * header.sample_stride() as u64
 }
 
-/// Records one batch of a field's or a transfer's bake: captures the eyes, projects their faces, copies the samples to the host.
+/// Records one batch of the bake of a field or of transfer vectors: captures the eyes, projects their faces, and copies the samples
+/// to the host.
 fn record_batch<'r>(
     commands: &mut Commands<'r>,
     batches: &'r Batches,
@@ -82,7 +83,7 @@ fn record_batch<'r>(
     Ok(())
 }
 
-/// Buffers of the end of a field's bake.
+/// The pass and buffers that end the bake of a field.
 struct Assembly {
     assemble: Assemble,
     captured: Buffer,
@@ -90,12 +91,12 @@ struct Assembly {
     list: Buffer,
     /// The field's payload on the device.
     field: Buffer,
-    /// The same on its way to the host.
+    /// The payload on its way to the host.
     payload: Buffer,
 }
 
-/// Records the end of a field's bake, once all samples are on the host and back: puts them into the stored order and number
-/// format, and copies the payload to the host.
+/// Records the end of a field's bake. All samples have been on the host by then and are back on the device. They are put into the
+/// stored order and number format, and the payload is copied to the host.
 fn record_assembly<'r>(commands: &mut Commands<'r>, assembly: &'r Assembly, header: &FieldHeader) -> Result<()> {
     let Assembly { assemble, captured, offsets, list, field, payload } = assembly;
     let bytes = 0..header.payload_bytes();
@@ -109,7 +110,7 @@ fn record_assembly<'r>(commands: &mut Commands<'r>, assembly: &'r Assembly, head
     Ok(())
 }
 
-/// Bakes on one device. It has no options: what decides a stored number stands in [`Options`].
+/// Bakes on one device. A baker has no options of its own: everything that decides a stored number stands in [`Options`].
 pub struct Baker {
     device: Arc<Device>,
     library: Library,
@@ -121,10 +122,10 @@ impl Baker {
         Baker { device: device.clone(), library: library.clone() }
     }
 
-    /// Checks that the device can bind the field that `header` describes, and what it is baked from.
+    /// Checks that the device can bind the field that `header` describes, and the samples that it is baked from.
     ///
     /// # Errors
-    /// `Input` with both numbers of bytes.
+    /// `Input` with the bytes that are needed and the bytes that the device can bind.
     pub fn fits(&self, header: &FieldHeader) -> Result<()> {
         let (needed, most) = (
             header.payload_bytes().max(captured_bytes(header)),
@@ -147,7 +148,7 @@ impl Baker {
         self.field_from(&Partial::new(None), mesh, header, progress)
     }
 
-    /// As [`Baker::field`], going on from what a cancelled bake of the same field has kept.
+    /// As [`Baker::field`], but goes on from what a cancelled bake of the same field has kept.
     ///
     /// # Errors
     /// As [`Baker::field`].
@@ -206,7 +207,7 @@ impl Baker {
     }
 
     /// Bakes the transfer vector of every vertex: `channel_stride(bands)` floats each, in the object's frame. A flat or convex mesh
-    /// needs none: there the cosine lobe of the normal is exact.
+    /// needs none, since the cosine lobe of the normal is exact there.
     ///
     /// # Errors
     /// As [`Baker::field`].
@@ -214,7 +215,7 @@ impl Baker {
         self.transfer_from(&Partial::new(None), mesh, options, progress)
     }
 
-    /// As [`Baker::transfer`], going on from what a cancelled bake of the same transfer has kept.
+    /// As [`Baker::transfer`], but goes on from what a cancelled bake of the same transfer has kept.
     ///
     /// # Errors
     /// As [`Baker::field`].
@@ -257,7 +258,7 @@ impl Baker {
     }
 }
 
-/// Which vertices' transfer vectors are turned from which others'.
+/// For every vertex the one whose transfer vector is turned for it, or `None` where its own is captured.
 fn turned_vertices(mesh: &Mesh, face_px: u32, symmetry: bool) -> Vec<Option<Turned>> {
     if !symmetry {
         return vec![None; mesh.positions.len()];

@@ -1,5 +1,5 @@
-//! What a bake has done so far, kept on disk every few seconds: one that is cancelled, by Ctrl-C or a power cut, goes on from
-//! there. The file is replaced whole, so it is never half-written, and goes once the bake is done.
+//! The samples that a bake has done so far. They are kept on disk every few seconds, so that a bake that was cancelled, by Ctrl-C or
+//! by a power cut, goes on from there. The file is replaced whole, so it is never half-written. It is removed when the bake is done.
 
 use crate::field::file;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 const MAGIC: [u8; 8] = *b"SHPART\n\0";
-/// Time between two savings: what a cancelled bake loses at most; a saving takes milliseconds.
+/// Time between two savings, which a cancelled bake loses at most. A saving takes milliseconds.
 const INTERVAL: Duration = Duration::from_secs(2);
 
 /// Samples of one bake, in the order of capture.
@@ -20,26 +20,25 @@ pub struct Partial {
 
 #[derive(Serialize, Deserialize)]
 struct Header {
-    /// Targets that are captured.
+    /// Number of targets that are captured.
     done: u32,
-    /// Targets in all.
+    /// Number of targets in all.
     all: u32,
     floats: usize,
 }
 
 impl Partial {
-    /// Kept at `path`, which is named by everything that decides the samples; without one, nothing is kept.
+    /// Samples are kept at `path`, whose name is a hash of everything that decides them. Without a path nothing is kept.
     pub fn new(path: Option<PathBuf>) -> Self {
         Partial { path, saved: Mutex::new(Instant::now()), interval: INTERVAL }
     }
 
-    /// As [`Partial::new`], saving whenever it can.
+    /// As [`Partial::new`], but saves after every batch.
     pub fn eager(path: PathBuf) -> Self {
         Partial { interval: Duration::ZERO, ..Self::new(Some(path)) }
     }
 
-    /// Puts what was kept into `values`; returns how many of `all` targets that holds. A file that does not fit is as good as
-    /// none.
+    /// Puts what was kept into `values` and returns how many of `all` targets it holds. A file that does not fit counts as none.
     pub fn load(&self, values: &mut [f32], all: u32) -> u32 {
         let Some(path) = self.path.as_ref().filter(|path| path.exists()) else { return 0 };
         match file::read::<Header>(path, MAGIC) {
@@ -60,7 +59,7 @@ impl Partial {
         }
     }
 
-    /// Keeps the samples after `done` of `all` targets, if it is time.
+    /// Keeps the samples after `done` of `all` targets if the last saving is long enough ago.
     pub fn save(&self, values: &[f32], done: u32, all: u32) {
         let mut saved = self.saved.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(path) = self.path.as_ref().filter(|_| done < all && saved.elapsed() >= self.interval) else { return };
@@ -71,7 +70,7 @@ impl Partial {
         }
     }
 
-    /// The bake is done.
+    /// Removes the file, since the bake is done.
     pub fn remove(&self) {
         if let Some(path) = self.path.as_ref().filter(|path| path.exists())
             && let Err(error) = std::fs::remove_file(path)

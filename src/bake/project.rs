@@ -1,8 +1,8 @@
-//! Pass "project": captured cube faces to SH coefficients, one workgroup a sample.
+//! Pass "project" makes SH coefficients of captured cube faces, with one workgroup for each sample.
 //!
-//! Inputs: the atlas of [`super::capture`], a [`Job`] a sample, the texel table. Output: `samples[target]` of `channels` x
-//! `channel_stride(bands)` floats: the blocked part (1 - texel), the radiance, or for transfer the clamped cosine of the
-//! normal less the part that the object's own geometry takes of it.
+//! Inputs: the atlas of [`super::capture`], a [`Job`] for each sample, and the texel table. Output: `samples[target]` of `channels` x
+//! `channel_stride(bands)` floats. They hold the blocked part (1 - texel), the radiance, or for transfer the clamped cosine of
+//! the normal less the part that the object itself blocks.
 
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use super::capture::Slots;
 
-/// What is made of the faces.
+/// What a projection makes of the faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
     /// Blocked part of an occlusion capture, one channel.
@@ -47,15 +47,15 @@ pub struct Job {
     pub slots: Slots,
     /// Index of the sample that is written.
     pub target: u32,
-    /// Factor before storing.
+    /// Factor by which the coefficients are multiplied.
     pub scale: f32,
 }
 
 /// Bytes of shared memory that every device has (Vulkan 1.3, "Required Limits": maxComputeSharedMemorySize).
 const SHARED_BYTES: usize = 16_384;
 
-/// Invocations that share a sample's texels: one wave of the widest GPUs, fewer where their sums (a float a coefficient
-/// and channel each) would not fit [`SHARED_BYTES`]: 32 from 5 bands of radiance on, 16 for 7.
+/// Number of invocations that share a sample's texels. It is one wave of the widest GPUs, or fewer where their sums (one float for each
+/// coefficient and channel) would not fit [`SHARED_BYTES`]: 32 from 5 bands of radiance on, and 16 for 7 bands.
 fn workgroup(bands: usize, projection: Projection) -> u32 {
     let sums = 4 * coefficient_count(bands) * projection.channels();
     [64, 32].into_iter().find(|count| count * sums <= SHARED_BYTES).unwrap_or(16) as u32
@@ -74,7 +74,7 @@ pub struct Project {
     texels: Buffer,
     /// SH bands.
     pub bands: usize,
-    /// What is made of the faces.
+    /// What the projection makes of the faces.
     pub projection: Projection,
     face_px: u32,
     columns: u32,
@@ -149,7 +149,7 @@ impl Project {
 
 const TEXEL_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
-/// Per texel of a face: direction along right, down and forward, and solid angle.
+/// For every texel of a face its direction along right, down and forward, and its solid angle.
 fn texel_table(face_px: usize) -> Vec<[f32; 4]> {
     let weights = solid_angle(face_px);
     (0..face_px * face_px)
@@ -161,8 +161,8 @@ fn texel_table(face_px: usize) -> Vec<[f32; 4]> {
         .collect()
 }
 
-/// The CPU twin: `texel(face, x, y)` is what was captured, per channel. Coefficients by channel, `channel_stride(bands)`
-/// apart.
+/// The CPU twin of the pass. `texel(face, x, y)` is what was captured, by channel. The result holds the coefficients of one channel
+/// after another, `channel_stride(bands)` apart.
 pub fn twin(
     bands: usize,
     projection: Projection,

@@ -6,19 +6,19 @@ use std::time::Duration;
 /// Where the time of a bake went.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct BakeReport {
-    /// Samples that stand at their own place.
+    /// Number of samples that stand at their own place.
     pub samples: u32,
-    /// Of these, samples that were not captured but turned from others (see [`super::symmetric_samples`]).
+    /// Number of these that were not captured but turned from others (see [`super::symmetric_samples`]).
     pub turned: u32,
-    /// Cube faces that were drawn; six a captured sample where none is left out.
+    /// Number of cube faces that were drawn: six for each captured sample where none is left out.
     pub faces: u32,
-    /// Samples inside the solid, captured off the nearest surface or, where that sees nothing, filled from neighbours.
+    /// Number of samples inside the solid. They were captured off the nearest surface or, if that sees nothing, filled from neighbours.
     pub filled: u32,
-    /// Device time in capture passes.
+    /// Device time in capture passes, in ms.
     pub capture_ms: f64,
-    /// Device time in project passes.
+    /// Device time in project passes, in ms.
     pub project_ms: f64,
-    /// Device time in the assemble pass.
+    /// Device time in the assemble pass, in ms.
     pub assemble_ms: f64,
     /// Wall time of the whole bake.
     pub total: Duration,

@@ -1,4 +1,4 @@
-//! Which samples of a field are captured, from where, and how the others are made of them.
+//! Decides which samples of a field are captured and from where, and how the others are made of them.
 
 use super::TRANSFER_OFFSET;
 use super::assemble::Sources;
@@ -19,9 +19,9 @@ use glam::DVec3;
 pub(super) struct FieldSamples {
     /// Samples that are captured, with the eye of each.
     pub targets: Vec<CaptureTarget>,
-    /// What is turned from what is captured.
+    /// Which samples are turned from which captured ones.
     pub plan: SymmetricPlan,
-    /// What every stored sample is assembled from.
+    /// The captured samples that each stored sample is assembled from.
     pub sources: Sources,
 }
 
@@ -61,7 +61,7 @@ impl FieldSamples {
     }
 }
 
-/// Which samples are turned from which others. Says in the header by what symmetries.
+/// Plans which samples are turned from which others, and names the symmetries in the header.
 fn symmetry_plan(mesh: &Mesh, header: &mut FieldHeader, surface: &Surface, inside: &[bool]) -> SymmetricPlan {
     if !header.shortcuts.symmetry {
         header.symmetry = "off".to_owned();

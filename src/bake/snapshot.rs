@@ -8,7 +8,7 @@ use crate::shaders::Library;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Captures six faces from every eye (in r) and brings them to the host: RGB triples, faces +X -X +Y -Y +Z -Z in rows of
+/// Captures six faces from every eye (in r) and brings them to the host as RGB triples: faces +X -X +Y -Y +Z -Z, each in rows of
 /// `face_px`. Occlusion captures are white where nothing is hit.
 ///
 /// # Errors

@@ -1,9 +1,9 @@
-//! A mesh's surface, ready to be asked how near it is and whether it encloses a point: a tree of neighbouring triangles, so that
-//! most are judged together.
+//! The surface of a mesh, which answers how near it is to a point and whether it encloses a point. It is a tree of neighbouring
+//! triangles, so that most of them are judged together.
 //!
-//! Winding number: the mesh's signed solid angle over 4 pi (Van Oosterom, Strackee 1983, equation 8, a triangle). A node that is
-//! far against its size counts as a dipole, its area normals added up at its middle, after Barill, Dickson, Schmidt, Levin,
-//! Jacobson, *Fast Winding Numbers for Soups and Clouds*, SIGGRAPH 2018, equation 11.
+//! The winding number is the mesh's signed solid angle over 4 pi (for a triangle: Van Oosterom, Strackee 1983, equation 8). A node
+//! whose distance is large against its size counts as a dipole: the sum of its area normals at its middle. This follows Barill,
+//! Dickson, Schmidt, Levin, Jacobson, *Fast Winding Numbers for Soups and Clouds*, SIGGRAPH 2018, equation 11.
 
 use super::chunk::sort_spatially;
 use super::inside::nearest_on_triangle;
@@ -13,10 +13,10 @@ use std::ops::Range;
 
 /// Most triangles in a leaf.
 const LEAF_TRIANGLES: usize = 8;
-/// A node is a dipole from this many of its radii on: what is left out is of second order, a hundredth of its share. What is
-/// asked is whether the sum is nearer to 0 or to 1.
+/// A node counts as a dipole from this many of its radii on. What that leaves out is of second order, about a hundredth of its share,
+/// and the question is only whether the sum is nearer to 0 or to 1.
 const FAR: f64 = 5.0;
-/// Above this a winding number is that of a point inside.
+/// A point lies inside if its winding number is above this.
 const INSIDE: f64 = 0.5;
 
 /// Neighbouring triangles with the sphere around them.
@@ -26,7 +26,7 @@ struct SurfaceNode {
     radius: f64,
     /// Sum of normals as long as the triangles' areas.
     dipole: DVec3,
-    /// The first child comes next, the second here; 0 for a leaf.
+    /// Index of the second child; the first child comes next. It is 0 for a leaf.
     second: usize,
 }
 
@@ -39,7 +39,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The surface of a mesh; positions within the unit sphere (see [`super::capture::unit_positions`]).
+    /// The surface of a mesh whose positions lie within the unit sphere (see [`super::capture::unit_positions`]).
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let mut order = triangles.to_vec();
         sort_spatially(positions, &mut order);
@@ -68,7 +68,7 @@ impl Surface {
         }
     }
 
-    /// The point of the surface nearest to `point`; `None` without any.
+    /// The point of the surface nearest to `point`, or `None` if there are no triangles.
     pub fn nearest(&self, point: DVec3) -> Option<DVec3> {
         let mut best = (f64::INFINITY, DVec3::ZERO);
         let bound = |node: usize| point.distance(self.nodes[node].centre) - self.nodes[node].radius;
@@ -97,7 +97,7 @@ impl Surface {
         (best.0 < f64::INFINITY).then_some(best.1)
     }
 
-    /// Distance of the surface from `point`; infinite without any.
+    /// Distance of the surface from `point`. It is infinite if there are no triangles.
     pub fn distance(&self, point: DVec3) -> f64 {
         self.nearest(point).map_or(f64::INFINITY, |near| near.distance(point))
     }
@@ -108,7 +108,8 @@ impl Surface {
         boxed && self.winding_number(point) > INSIDE
     }
 
-    /// Generalised winding number around a point: 1 inside and 0 outside a closed mesh, in between near the holes of an open one.
+    /// The generalised winding number around a point. It is 1 inside and 0 outside a closed mesh, and in between near the holes of an
+    /// open mesh.
     pub fn winding_number(&self, point: DVec3) -> f64 {
         let (mut total, mut index) = (0.0, 0);
         let mut open = Vec::with_capacity(64);
@@ -136,7 +137,7 @@ fn bounds(triangles: &[[DVec3; 3]]) -> (DVec3, DVec3) {
     triangles.iter().flatten().fold((DVec3::MAX, DVec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)))
 }
 
-/// Signed solid angle of a triangle seen from the origin, positive where its back is seen.
+/// Signed solid angle of a triangle seen from the origin. It is positive if the back is seen.
 fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;

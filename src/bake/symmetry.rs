@@ -1,10 +1,10 @@
 //! What leaves an object as it is: the 48 turns and mirrors of a cube, of which the lattice of a cube is made too; turns by any
-//! angle about x, y or z; every turn.
+//! angle about x, y or z; and every turn.
 //!
-//! A mesh is seldom exactly as symmetric as what it stands for: facets turn with it, and squares are cut along one diagonal. So
-//! each symmetry has a deviation: no point of the moved surface is farther than this from the surface, in r. The first kind is
-//! found by matching vertices, its deviation measured where the matched triangles differ; a turn by any angle is tried at a few
-//! odd ones; a sphere's deviation is the depth of its facets.
+//! A mesh is seldom exactly as symmetric as what it stands for: facets turn with it, and squares are cut along one diagonal. Each
+//! symmetry therefore has a deviation, in r: no point of the moved surface is farther from the surface. Symmetries of the first kind
+//! are found by matching vertices, and their deviation is measured where the matched triangles differ. Turns by any angle are tried
+//! at a few odd angles. The deviation of a sphere is the depth of its facets.
 
 use super::capture::unit_positions;
 use super::inside::nearest_on_triangle;
@@ -15,26 +15,26 @@ use glam::{DMat3, DVec3, IVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 
-/// Farthest that a vertex may lie from where a symmetry wants it, in r: what files with six digits leave.
+/// Farthest that a vertex may lie from where a symmetry wants it, in r. Files with six digits are as exact as this.
 const MATCH: f64 = 2e-5;
-/// A deviation beyond this, in r, is of no use: it would be seen from everywhere.
+/// A deviation beyond this, in r, is of no use, since it would be seen from everywhere.
 const USELESS: f64 = 0.05;
 /// Most comparisons of triangles, for each triangle of a mesh, that finding the deviation of one symmetry may take. Where squares are
 /// cut along one diagonal it takes 72 for each square, and 304 for each triangle at the pole of a sphere of 64 segments. A mesh of
-/// many triangles around one vertex can ask for the square of their number: such a symmetry is not used.
+/// many triangles around one vertex can need the square of their number. Such a symmetry is not used.
 const COMPARISONS_A_TRIANGLE: usize = 1_000;
 /// Most vertices in one cell of the search, and at one place. A mesh with more, all but a few of its vertices in a thousandth of its
 /// radius, is taken for one without symmetries: each search would look at all of them.
 const CROWD: usize = 1_024;
-/// Angles, in radians, at which a body of revolution is tried: no small multiples of parts of a circle.
+/// Angles, in radians, at which a body of revolution is tried. None is a simple fraction of a circle.
 const ANGLES_RAD: [f64; 3] = [0.1234, 0.5077, -1.0609];
-/// Vertices lie between the facets of a turned ring at any place; the angles tried come near the middle, within this.
+/// A turned vertex may lie anywhere between the corners of a facet. The tried angles come near the middle, within this factor.
 const ANGLE_MARGIN: f64 = 1.15;
 
-/// A turn or mirror with how far the surface is from being moved onto itself.
+/// A turn or mirror, and how far the surface is from being moved onto itself.
 #[derive(Clone, Copy, Debug)]
 pub struct Operation {
-    /// Orthogonal: entries 0 and +-1.
+    /// An orthogonal matrix with entries 0 and +-1.
     pub matrix: DMat3,
     /// In r.
     pub deviation: f64,
@@ -43,7 +43,7 @@ pub struct Operation {
 /// The symmetries of an object around its bounding sphere's centre.
 #[derive(Clone, Debug, Default)]
 pub struct Symmetry {
-    /// Turns and mirrors of a cube, the least deviation first; without the identity.
+    /// Turns and mirrors of a cube without the identity. The one with the least deviation comes first.
     pub operations: Vec<Operation>,
     /// Deviation of turns about x, y and z.
     pub revolution: [Option<f64>; 3],
@@ -68,7 +68,7 @@ impl Symmetry {
         Symmetry { revolution, sphere, ..symmetry }
     }
 
-    /// The turns and mirrors alone, of the mesh with the colours of its vertices, if any.
+    /// Finds only the turns and mirrors of a cube, for the mesh with the colours of its vertices if it has any.
     pub fn of_vertices(mesh: &Mesh, colors: Option<&Vec<Vec3>>) -> Self {
         let points = Points::new(mesh, colors);
         let mut operations: Vec<Operation> = cube_group()
@@ -80,7 +80,7 @@ impl Symmetry {
         Symmetry { operations, ..Symmetry::default() }
     }
 
-    /// Those under which the lattice's space stays as it is: only they take samples to samples.
+    /// The symmetries under which the lattice's space stays as it is. Only these take samples to samples.
     pub fn kept_by(mut self, fit: &Fit) -> Self {
         self.operations.retain(|operation| fit.keeps(operation.matrix));
         for (axis, revolution) in DVec3::AXES.into_iter().zip(&mut self.revolution) {
@@ -90,7 +90,7 @@ impl Symmetry {
         self
     }
 
-    /// In words, for headers.
+    /// Names the symmetries in words, for headers.
     pub fn describe(&self) -> String {
         let exact = self.operations.iter().filter(|o| o.deviation < MATCH).count();
         let mut words = vec![];
@@ -120,12 +120,12 @@ pub fn cube_group() -> Vec<DMat3> {
     orders.into_iter().flat_map(of_order).collect()
 }
 
-/// The mesh's vertices, joined where they coincide, to be found by place. Empty where too many of them lie too close together.
+/// The mesh's vertices by place, joined where they coincide. It is empty where too many of them lie too close together.
 #[derive(Default)]
 pub struct Points {
     places: Vec<DVec3>,
     colors: Vec<Vec3>,
-    /// Joined vertex of each of the mesh's.
+    /// The joined vertex of each vertex of the mesh.
     of_vertex: Vec<u32>,
     cells: HashMap<IVec3, Vec<u32>>,
     triangles: Vec<[u32; 3]>,
@@ -135,7 +135,7 @@ pub struct Points {
 }
 
 impl Points {
-    /// Joins vertices that agree in place, and in colour where given.
+    /// Joins vertices that agree in place, and in colour where colours are given.
     pub fn new(mesh: &Mesh, colors: Option<&Vec<Vec3>>) -> Self {
         let unit = unit_positions(mesh);
         let mut points = Points::default();
@@ -189,13 +189,13 @@ impl Points {
         best.map(|(_, index)| index)
     }
 
-    /// Where each joined vertex goes; `None` unless every one has a counterpart.
+    /// Where each joined vertex goes, or `None` unless every one has a counterpart.
     fn image(&self, matrix: DMat3) -> Option<Vec<u32>> {
         self.places.iter().zip(&self.colors).map(|(place, color)| self.find(matrix * *place, *color)).collect()
     }
 
-    /// How far the moved surface is from the surface; `None` where a vertex has no counterpart, where it is too far, and where more
-    /// than [`COMPARISONS_A_TRIANGLE`] would be needed. Counts comparisons of triangles in `compared`.
+    /// How far the moved surface is from the surface. `None` if a vertex has no counterpart, if the surface is too far, or if more than
+    /// [`COMPARISONS_A_TRIANGLE`] would be needed. Counts comparisons of triangles in `compared`.
     fn deviation(&self, matrix: DMat3, compared: &mut usize) -> Option<f64> {
         // Most meshes fail at once.
         let few = self.places.len().div_ceil(50);
@@ -228,7 +228,7 @@ impl Points {
         (worst < USELESS).then_some(worst)
     }
 
-    /// How far the surface turned about an axis through the centre is from the surface; `None` where that is too far.
+    /// How far the surface, turned about an axis through the centre, is from the surface, or `None` where that is too far.
     fn revolution(&self, axis: DVec3, surface: &Surface) -> Option<f64> {
         let farthest = |points: &[DVec3], angle: f64| -> Option<f64> {
             let turn = DMat3::from_axis_angle(axis, angle);
@@ -250,7 +250,7 @@ impl Points {
         Some(ANGLE_MARGIN * worst)
     }
 
-    /// The mesh's vertices to which those of a mesh are moved, where place and normal agree; `None` unless all do.
+    /// The vertices to which those of a mesh are moved, or `None` unless all of them agree in place and normal.
     pub fn vertices(&self, matrix: DMat3, mesh: &Mesh) -> Option<Vec<u32>> {
         let image = self.image(matrix)?;
         let mut at: Vec<Vec<u32>> = vec![Vec::new(); self.places.len()];
@@ -270,7 +270,7 @@ impl Points {
 const NORMAL_MATCH: f64 = 1e-4;
 
 fn cell(place: DVec3) -> IVec3 {
-    // Cells much larger than what is sought: a search looks into one, seldom into two.
+    // Cells are much larger than the distance sought, so that a search looks into one cell and seldom into two.
     (place / (50.0 * MATCH)).floor().as_ivec3()
 }
 

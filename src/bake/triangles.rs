@@ -4,8 +4,8 @@ use crate::asset::Mesh;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
-/// The triangles of a mesh without those that repeat another: corners of the same place and colour, the same way around. What is
-/// seen does not change. A surface tree can part stacked triangles by nothing, so each query would look at every one of them.
+/// The triangles of a mesh without those that repeat another: with corners of the same place and colour, the same way around. What is
+/// seen does not change. A tree cannot divide stacked triangles, so each query of a surface would look at every one of them.
 pub fn distinct(mesh: &Mesh) -> Cow<'_, [[u32; 3]]> {
     let mut first_of = HashMap::with_capacity(mesh.positions.len());
     let first: Vec<u32> = (0..mesh.positions.len())

@@ -1,9 +1,10 @@
 //! Where a field is sampled around its object, and which samples a receiver interpolates.
 //!
-//! Distances are in units of the bounding-sphere radius r, directions in the object's frame, both taken in the space that
-//! [`Fit`] makes of it. A lattice is a product of shells (radii) and directions. Interpolation runs over a *stored* arrangement in which every cube face carries a border
-//! of one cell copied from its neighbours (a corner cell is the mean of the three cells that meet there), so that bilinear
-//! interpolation needs no branch and is continuous across face edges: both faces see the same two rows of cells there.
+//! Distances are in units of the bounding-sphere radius r, and directions are in the object's frame. Both are taken in the space
+//! that [`Fit`] makes of that frame. A lattice is a product of shells (radii) and directions. Interpolation runs over a *stored*
+//! arrangement in which every cube face has a border of one cell, copied from its neighbours. A corner cell is the mean of the
+//! three cells that meet there. With the border, bilinear interpolation needs no branch and is continuous across face edges, since
+//! both faces see the same two rows of cells there.
 
 use super::Fit;
 pub use super::directions::{CELL_WARP, Directions, unwarp, warp};
@@ -11,20 +12,20 @@ use crate::error::{Error, Result};
 use glam::DVec3;
 use std::f64::consts::FRAC_PI_2;
 
-/// Most samples that a lattice may have; refused above (a field of 10^7 samples is some 640 MB).
+/// Most samples that a lattice may have. A field of 4 000 000 samples takes about 256 MB with 4 bands in f32.
 pub const MAX_SAMPLES: u64 = 4_000_000;
 
 /// How shells are spaced: the coordinate in which their steps are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Spacing {
-    /// q = sin(theta / 2), theta being the half-angle under which the bounding sphere is seen: cos theta = c(d) of
-    /// [`cap_cosine`], taken at [`Lattice::reach`]. Nearly equal steps of half-angle, dense around d = 1 where the blocked part varies fastest, and two
-    /// square roots in a shader.
+    /// q = sin(theta / 2), where theta is the half-angle under which the bounding sphere is seen: cos theta = c(d) of
+    /// [`cap_cosine`], taken at [`Lattice::reach`]. The steps of half-angle are nearly equal, and shells are dense around d = 1,
+    /// where the blocked part varies fastest. A shader needs two square roots for it.
     Chord,
     /// ln d.
     Log,
-    /// d itself, as in the paper.
+    /// d itself, as in the paper of Zhou et al. (2005).
     Linear,
 }
 
@@ -34,8 +35,11 @@ pub fn cap_cosine(d: f64) -> f64 {
     if d >= 1.0 { (1.0 - d.powi(-2)).sqrt() } else { -(1.0 - d * d).sqrt() }
 }
 
-/// 1 - c(d): in proportion to the solid angle of the bounding sphere, without cancellation far away. A sphere's blocked
-/// part divided by it is a polynomial of degree l in c for band l (DESIGN's cap formula), which interpolates well.
+/// 1 - c(d), which is proportional to the solid angle of the bounding sphere. The formula does not cancel far away.
+///
+/// The blocked part of a sphere has the zonal coefficients of a cap: sqrt(pi) (1 - c) in band 0, and
+/// sqrt(pi / (2l + 1)) (P_l-1(c) - P_l+1(c)) in band l, with Legendre polynomials P. The bracket has degree l + 1 and is 0 at
+/// c = 1, so band l divided by 1 - c is a polynomial of degree l in c. Such a polynomial interpolates well.
 pub fn cap_height(d: f64) -> f64 {
     let c = cap_cosine(d);
     if d >= 1.0 { d.powi(-2) / (1.0 + c) } else { 1.0 - c }
@@ -48,7 +52,7 @@ pub struct Lattice {
     pub shells: u32,
     /// Radius of the innermost shell, in r.
     pub inner: f64,
-    /// Radius of the outermost shell, in r; beyond it the field falls off as (outer/d)^2.
+    /// Radius of the outermost shell, in r. Beyond it the field falls off as (outer/d)^2.
     pub outer: f64,
     /// Spacing of shells.
     pub spacing: Spacing,
@@ -56,18 +60,19 @@ pub struct Lattice {
     pub directions: Directions,
     /// Whether b / (1 - c) is what is stored and interpolated rather than b itself: [`cap_height`] at [`Lattice::reach`].
     pub scaled: bool,
-    /// Where it lies around the object; `None` leaves that to the bake, and is round until then.
+    /// Where the lattice lies around the object. `None` leaves that to the bake and counts as round until then.
     pub fit: Option<Fit>,
-    /// Of a cube: whether each face has cells + 2 samples along a row, of which the first and last lie on its edges and are those of
-    /// its neighbours, rather than `cells` at cells' centres and copies of its neighbours'. As many bytes, finer steps. `None`
-    /// leaves that to the bake, and is centres until then.
+    /// Whether the samples of a cube's faces reach their edges. If so, each row of a face has cells + 2 samples, and the first and
+    /// last lie on edges and are shared with the neighbours. If not, each row has `cells` samples at the cells' centres, between
+    /// copies of the neighbours' samples. Both take the same bytes; the first has finer steps. `None` leaves that to the bake and
+    /// counts as centres until then.
     #[serde(default)]
     pub edges: Option<bool>,
 }
 
 impl Default for Lattice {
-    /// 18 shells to 8 r, equal steps of sin(half-angle / 2), 6 x 7 x 7 cells of directions, b / (1 - c) interpolated; fit, first
-    /// shell and whether samples lie on the faces' edges are chosen by the object's shape.
+    /// 18 shells to 8 r in equal steps of sin(half-angle / 2), 6 x 7 x 7 cells of directions, and b / (1 - c) is interpolated. The
+    /// object's shape decides the fit, the first shell, and whether samples lie on the faces' edges.
     fn default() -> Self {
         Lattice {
             shells: 18,
@@ -84,9 +89,9 @@ impl Default for Lattice {
 
 /// Value of [`Lattice::inner`] that leaves the choice to the bake (see [`Lattice::starting_at`]).
 pub const AUTOMATIC: f64 = 0.0;
-/// First shell of an object that fills its bounding sphere: just off the surface, so that no sample grazes it.
+/// First shell of an object that fills its bounding sphere. It lies just off the surface, so that no sample grazes it.
 pub const OUTSIDE_INNER: f64 = 1.02;
-/// Smallest first shell: for objects with room up to the centre of their sphere.
+/// Smallest first shell, for objects with room up to the centre of their sphere.
 pub const ROOMY_INNER: f64 = 0.25;
 
 /// Stored samples to interpolate, with weights that are at least 0 and sum to 1.
@@ -157,9 +162,9 @@ impl Lattice {
         }
     }
 
-    /// What is added to squared distances before [`cap_cosine`] is taken, so that it is 0 on the first shell of an object with
-    /// room in its sphere: 1 - inner^2, or 0 where the first shell lies outside the sphere. The cosine proper has a kink at
-    /// d = 1, where nothing happens to such an object.
+    /// What is added to squared distances before [`cap_cosine`] is taken: 1 - inner^2, or 0 where the first shell lies outside the
+    /// sphere. It makes the cosine 0 on the first shell of an object with room in its sphere. The cosine itself has a kink at
+    /// d = 1, where the field of such an object has none.
     fn room(&self) -> f64 {
         (1.0 - self.inner * self.inner).max(0.0)
     }
@@ -182,8 +187,8 @@ impl Lattice {
         self
     }
 
-    /// This lattice around an object, unless that was chosen before: the given fit (with a first shell of its own it is round), and
-    /// the first shell that `first` finds for the fit in force.
+    /// This lattice around an object. A fit and a first shell that were chosen before stay. Otherwise the lattice takes the given fit,
+    /// and the first shell that `first` finds for the fit in force. A lattice with a first shell but no fit is round.
     pub fn fitted(mut self, fit: Fit, first: impl FnOnce(&Fit) -> f64) -> Self {
         let fit = *self.fit.get_or_insert(if self.inner == AUTOMATIC { fit } else { Fit::ROUND });
         if self.inner == AUTOMATIC {
@@ -192,19 +197,19 @@ impl Lattice {
         self
     }
 
-    /// Where it lies around the object.
+    /// Where the lattice lies around the object.
     pub fn fit(&self) -> Fit {
         self.fit.unwrap_or(Fit::ROUND)
     }
 
-    /// For a shader: [`Fit::packed`], and in the bit above its factors whether samples lie on edges.
+    /// The lattice as a shader reads it: [`Fit::packed`], where the bit above the factors says whether samples lie on edges.
     pub fn packed(&self) -> [f32; 4] {
         let [x, y, z, factors] = self.fit().packed();
         [x, y, z, factors + if self.has_edges() { Fit::PACKED_BITS.exp2() } else { 0.0 }]
     }
 
-    /// Distance of a place (object's frame, in r) from the shells' centre in the lattice's space: what all that is said of
-    /// distances here is about.
+    /// Distance of a place (object's frame, in r) from the shells' centre, in the lattice's space. All distances of this module are
+    /// of this kind.
     pub fn distance(&self, position: DVec3) -> f64 {
         self.fit().apply(position).length()
     }
@@ -239,7 +244,7 @@ impl Lattice {
         self.fit().invert(at)
     }
 
-    /// Stored samples around a receiver at `position` (in r, object's frame). Non-negative weights that sum to 1; a
+    /// Stored samples around a receiver at `position` (in r, object's frame). The weights are at least 0 and sum to 1. A
     /// receiver at the very centre takes direction +x.
     pub fn corners(&self, position: DVec3, lookup: Lookup) -> Corners {
         let within = self.fit().apply(position);

@@ -1,18 +1,18 @@
-//! What a bake does in place of capturing every face of every sample.
+//! The shortcuts of a bake, which spare it to capture every face of every sample.
 
 use serde::{Deserialize, Serialize};
 
-/// Shortcuts of a bake, each of them on by default. All of them enter the name under which the cache keeps a field, since each can
-/// change stored numbers: even a face that is left out moves the next ones to other places in the atlas, where a silhouette that
-/// runs through a texel's centre may round to the other side.
+/// The shortcuts of a bake. All of them are on by default. They enter the name under which the cache keeps a field, since each can change
+/// stored numbers: even a face that is left out moves the next faces to other places in the atlas, where a silhouette that runs
+/// through a texel's centre may round to the other side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shortcuts {
-    /// Of samples that a symmetry of the mesh carries into one another only one is captured, and turned for the others.
+    /// Of samples that a symmetry of the mesh carries into one another only one is captured. It is turned for the others.
     pub symmetry: bool,
-    /// Only faces that the object reaches are drawn, of these only what reaches into them, and of closed meshes no backs.
+    /// Only faces that the object reaches are drawn, with only the triangles that reach into them, and without backs of closed meshes.
     pub faces: bool,
     /// Samples inside a solid are captured off its nearest surface, or are filled from their neighbours where nothing is seen from
-    /// there either. If not, they are captured where they stand, from where both sides of every face are drawn: all dark.
+    /// there either. With this shortcut off they are captured where they stand, with both sides of every triangle, and see all dark.
     pub inside: bool,
 }
 

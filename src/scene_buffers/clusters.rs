@@ -1,8 +1,9 @@
-//! Clusters: the order of a mesh's vertices in which every run of [`CLUSTER_VERTICES`] is small and faces one way, and its bounds.
+//! Clusters are runs of [`CLUSTER_VERTICES`] vertices. This finds the order of a mesh's vertices in which every cluster is small and
+//! faces one way, and the bounds of each.
 //!
-//! Vertices are halved, and each half again, across the longest edge of the box around their places and normals, at a multiple of
-//! what makes a cluster. So a cluster is as compact as its neighbourhood lets it be: a space-filling curve, cut where it happens to
-//! be after so many vertices, leaps within clusters, and one that spans a leap has half the mesh on its list.
+//! The vertices are halved, and each half again, across the longest edge of the box around their places and normals. Each cut lies
+//! at a whole number of clusters, so a cluster is as compact as its neighbourhood lets it be. A space-filling curve would do worse:
+//! it leaps within some clusters, and a cluster that spans a leap has half of the scene on its list.
 
 use crate::asset::mesh::Mesh;
 use crate::bake::capture::unit_positions;
@@ -10,18 +11,19 @@ use crate::layout::CLUSTER_VERTICES;
 use crate::lists::gather::{Bounds, GROUP_CLUSTERS};
 use glam::Vec3;
 
-/// Bounding radii of distance that a normal's length counts as: a little more than the edge of a cube of that radius (1.15), so that
-/// its sides come apart first. Weights from 1/4 to 5 change the sum of all lists by a tenth at most.
+/// The distance, in bounding radii, that the length of a normal counts as. It is a little more than the edge of a cube with that radius
+/// (1.15), so that the sides of a cube come apart first. Weights from 0.25 to 5 change the sum of all lists by 10 % at most.
 const NORMAL_WEIGHT: f32 = 1.25;
-/// Sizes of the runs that stay whole: groups that are gathered together, clusters, and neighbours within one, for caches.
+/// Sizes of the runs that stay whole: groups whose lists are gathered together, clusters, and neighbours within a cluster, which
+/// share lines of the cache.
 const RUNS: [usize; 3] = [GROUP_CLUSTERS * CLUSTER_VERTICES as usize, CLUSTER_VERTICES as usize, 8];
-/// Vertices below which another thread costs more than it takes over.
+/// Below this number of vertices another thread costs more than it saves.
 const ALONE: usize = 1 << 14;
 
-/// A vertex: place in bounding radii and normal, and its index.
+/// A vertex: its place in bounding radii and its weighted normal, and its index.
 type Point = ([f32; 6], u32);
 
-/// Which vertex of the mesh stands at each place.
+/// The order of the mesh's vertices: which of them stands at each place.
 pub(crate) fn order(mesh: &Mesh) -> Vec<u32> {
     let point = |(v, p): (usize, Vec3)| {
         let n = NORMAL_WEIGHT * mesh.normals[v];
@@ -79,7 +81,7 @@ mod tests {
         order
     }
 
-    /// However many vertices a floor has, no cluster is much larger than a square of as many.
+    /// No cluster of a floor is much larger than a square of as many vertices, for any number of vertices.
     #[test]
     fn clusters_of_a_floor_span_no_leap() {
         for cells in [1, 7, 31, 80, 256, 331] {
@@ -91,7 +93,7 @@ mod tests {
         }
     }
 
-    /// Of a box each cluster lies on one side, but for those that take what is left of several.
+    /// Each cluster of a box lies on one side.
     #[test]
     fn clusters_face_one_way() {
         let mesh = generate::cuboid(Vec3::ONE, 31);
@@ -100,7 +102,7 @@ mod tests {
         assert_eq!((bounds.len(), mixed), (96, 0));
     }
 
-    /// Two floors far from each other: one cluster at most lies on both.
+    /// Of two floors far from each other, at most one cluster lies on both.
     #[test]
     fn parts_lie_apart() {
         let part = generate::plane(1.0, 30);

@@ -16,15 +16,15 @@ use std::sync::Arc;
 /// The place of a field in the atlas, and what a merge has to know of the field.
 #[derive(Clone)]
 pub struct FieldSlot {
-    /// Its parameters.
+    /// The parameters of the field.
     pub header: FieldHeader,
-    /// Its bytes in the atlas.
+    /// The bytes of the field in the atlas.
     pub bytes: Range<u64>,
-    /// Number of its first channel among those of all fields, as they stand in an image.
+    /// Index of its first channel among the channels of all fields, as they stand in an image.
     pub channel: u32,
-    /// Directions in which it is not zero.
+    /// Directions in which the field is not zero.
     pub extent: Extent,
-    /// What its object covers from afar, if it is an occlusion field.
+    /// The area that its object covers from afar, if this is an occlusion field.
     pub area: Area,
 }
 
@@ -35,7 +35,8 @@ impl FieldSlot {
     }
 }
 
-/// Puts the fields of a scene's meshes into one buffer. Meshes that share a field share its place: occlusion and radiance by mesh.
+/// Puts the fields of a scene's meshes into one buffer. Returns the places of each mesh's occlusion and radiance fields. Meshes that
+/// share a field share its place.
 ///
 /// # Errors
 /// `Device` when memory ran out.
@@ -65,7 +66,7 @@ pub(super) fn field_atlas(
         [&baked.blocked, &baked.radiance].map(|field| field.as_ref().map(|field| slot(field, &mesh.name)))
     });
     let slots = slots.collect();
-    // Where bands differ, the shader reads as much of any sample as the larger kind has: at the end, past the last.
+    // Where bands differ, the shader reads as much of any sample as the kind with more bands has. After the last sample it reads on.
     let overrun = if options.field_bands.is_some() { 8 * channel_stride(options.most_bands()) as u64 } else { 0 };
     let mut fields = Buffer::new(device, "fields", BufferKind::Device, total.max(ALIGNMENT) + overrun)?;
     for (field, first) in distinct {
@@ -82,7 +83,7 @@ pub(super) fn download(fields: &Buffer, slot: &FieldSlot) -> Result<ShadowField>
     Ok(ShadowField { header: slot.header.clone(), payload: fields.download_range(slot.bytes.clone())? })
 }
 
-/// Fields as one image; `None` where the device or their shape rules that out.
+/// The fields as one image, or `None` if the device or their shape rules that out.
 ///
 /// # Errors
 /// `Device` when memory ran out.

@@ -1,4 +1,4 @@
-//! Whether a scene fits a device, asked before anything is baked.
+//! Checks whether a scene fits a device, before anything is baked.
 
 use super::ALIGNMENT;
 use crate::bake::{SceneNeeds, bakes_transfer};
@@ -23,18 +23,18 @@ pub fn check(device: &Device, scene: &Scene, baked: &SceneNeeds) -> Result<()> {
 pub struct Needs {
     /// Fields of all meshes.
     pub fields: u64,
-    /// Transfer vectors of the meshes that can shadow themselves, as far as they are lit.
+    /// Transfer vectors of the lit meshes that can shadow themselves.
     pub transfers: u64,
     /// Positions and normals of all meshes.
     pub vertices: u64,
     /// Light on the vertices of all entities.
     pub radiosity: u64,
-    /// Meshes as they are drawn. Bound by no shader.
+    /// Meshes as they are drawn. No shader binds them.
     pub drawables: u64,
 }
 
 impl Needs {
-    /// Of a scene whose fields take `fields` bytes.
+    /// The needs of a scene whose fields take `fields` bytes.
     pub fn of(scene: &Scene, fields: u64, bands: usize) -> Self {
         let vertices = |mesh: usize| scene.meshes[mesh].positions.len() as u64;
         let lit = |mesh: usize| scene.entities.iter().any(|e| e.mesh == mesh && e.receives);
@@ -76,7 +76,7 @@ impl Needs {
     }
 }
 
-/// Refuses a list of entries that a software device would leave off midway.
+/// Refuses a list of entries that is longer than a software device goes through.
 ///
 /// # Errors
 /// `Input` with how long it is, the limit, and what would help.

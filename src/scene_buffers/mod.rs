@@ -1,5 +1,5 @@
-//! What a scene keeps on the device from frame to frame: fields, transfer vectors, vertices, drawables. Only what its entities need
-//! is uploaded.
+//! The data that a scene keeps on the device from frame to frame: fields, transfer vectors, vertices, and meshes to draw. Only what
+//! its entities need is uploaded.
 
 pub mod clusters;
 mod field_atlas;
@@ -24,26 +24,26 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Alignment of everything that a pass may bind as a range: the largest that Vulkan lets a device ask for.
+/// Alignment, in bytes, of everything that a pass may bind as a range. It is the largest that Vulkan lets a device ask for.
 pub const ALIGNMENT: u64 = 256;
 
 /// One mesh of the scene: where its vertices, transfer vectors and fields lie, and how it is drawn.
 pub struct DeviceMesh {
-    /// Its vertices in the vertex buffer.
+    /// The range of its vertices in the vertex buffer.
     pub vertices: Range<u32>,
-    /// Which vertex of the mesh stands at each place of that range: neighbours stand together.
+    /// Which vertex of the mesh stands at each place of that range. Neighbours stand together.
     pub order: Vec<u32>,
-    /// Bounds of every run of [`crate::layout::CLUSTER_VERTICES`] of them.
+    /// Bounds of every cluster of [`crate::layout::CLUSTER_VERTICES`] vertices.
     pub clusters: Vec<Bounds>,
-    /// What each of these runs is seen by.
+    /// The faces around each cluster, which decide whether a camera sees it.
     pub faces: Vec<Faces>,
-    /// First quad of its transfer vectors, or [`NONE`] where the cosine of the normal is exact.
+    /// First quad of its transfer vectors, or [`NONE`] where the cosine lobe of the normal is exact.
     pub transfer_first: u32,
     /// Occlusion field, if an entity needs one.
     pub blocked: Option<FieldSlot>,
     /// Radiance field, if an entity needs one.
     pub radiance: Option<FieldSlot>,
-    /// For drawing.
+    /// The mesh as it is drawn.
     pub drawn: DrawnMesh,
     /// Centre of the bounding sphere, metres.
     pub centre_m: DVec3,
@@ -52,24 +52,24 @@ pub struct DeviceMesh {
 }
 
 impl DeviceMesh {
-    /// Whether the field that an entity casts shadows with, or shines with, is there and holds nothing but zeros.
+    /// Whether the mesh has the field with which an entity shades or shines, and that field holds only zeros.
     pub fn is_empty(&self, emits: bool) -> bool {
         let source = if emits && self.radiance.is_some() { &self.radiance } else { &self.blocked };
         source.as_ref().is_some_and(|slot| slot.extent == Extent::Nothing)
     }
 }
 
-/// Device-resident data of a scene.
+/// The data of a scene on the device.
 pub struct SceneBuffers {
     /// All fields.
     pub fields: Buffer,
     /// Transfer vectors of all receivers' meshes.
     pub transfers: Buffer,
-    /// Position and normal of all meshes, a quad each.
+    /// Positions and normals of all meshes, one quad for each.
     pub vertices: Buffer,
     /// The scene's meshes.
     pub meshes: Vec<DeviceMesh>,
-    /// Bakes that were not found in the cache.
+    /// The bakes that were not found in the cache.
     pub baked: Vec<Baked>,
     /// Number format of the fields.
     pub storage: Storage,
@@ -176,7 +176,7 @@ impl SceneBuffers {
         })
     }
 
-    /// Whether every field that `scene` needs is here; it has the meshes that these were made for.
+    /// Whether every field that `scene` needs is here. The scene must have the meshes that these buffers were made for.
     pub fn covers(&self, scene: &Scene) -> bool {
         self.meshes.iter().enumerate().all(|(mesh, device_mesh)| {
             let [blocked, radiance] = bake::needs(scene, mesh).map(|kind| kind.is_some());
@@ -192,7 +192,7 @@ impl SceneBuffers {
         field_atlas::download(&self.fields, slot)
     }
 
-    /// All fields as one image; `None` where the device or their shape rules that out.
+    /// All fields as one image, or `None` if the device or their shape rules that out.
     ///
     /// # Errors
     /// `Device` when memory ran out.
@@ -203,7 +203,7 @@ impl SceneBuffers {
         field_atlas::image(device, &fields, self.bands)
     }
 
-    /// A copy of a mesh's transfer vectors in the mesh's order of vertices: floats and their stride.
+    /// A copy of a mesh's transfer vectors, in the mesh's order of vertices, and the floats of each.
     ///
     /// # Errors
     /// `Device` when memory ran out.

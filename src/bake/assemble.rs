@@ -1,4 +1,4 @@
-//! Pass "assemble" makes the stored field from captured samples. It lowers them by their curvature, which suits interpolation. It
+//! Pass "assemble": makes the stored field from captured samples. It lowers them by their curvature, which suits interpolation. It
 //! copies the borders of cube faces from neighbouring faces, and it fills samples that see nothing from valid ones around them.
 //! It rounds to f16 where the field is stored so.
 //!

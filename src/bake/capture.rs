@@ -1,4 +1,4 @@
-//! Pass "capture" draws an object as seen from sample points: six cube faces for each point, many points in one render pass.
+//! Pass "capture": draws an object as seen from sample points: six cube faces for each point, many points in one render pass.
 //!
 //! Inputs: the mesh in units of its bounding radius around its centre; eyes in the same frame. Output: an atlas of square
 //! faces. Occlusion: R8, white background, black object, no depth. Radiance: RGBA32F, black background, the mesh's colours,

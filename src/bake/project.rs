@@ -1,4 +1,4 @@
-//! Pass "project" makes SH coefficients of captured cube faces, with one workgroup for each sample.
+//! Pass "project": makes SH coefficients of captured cube faces, with one workgroup for each sample.
 //!
 //! Inputs: the atlas of [`super::capture`], a [`Job`] for each sample, and the texel table. Output: `samples[target]` of `channels` x
 //! `channel_stride(bands)` floats. They hold the blocked part (1 - texel), the radiance, or for transfer the clamped cosine of

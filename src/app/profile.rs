@@ -14,7 +14,7 @@ use crate::scene::Scene;
 use crate::text;
 use clap::Args;
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `profile`.
 #[derive(Args)]
@@ -55,21 +55,12 @@ pub struct Arguments {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let context = Context::new(global)?;
     for folder in [&arguments.spirv, &arguments.out].into_iter().flatten() {
-        crate::text::make_folder(folder)?;
+        text::make_folder(folder)?;
     }
     let chosen: Vec<Contender> = match (&arguments.variant, &arguments.compare) {
         (Some(name), _) => vec![profile::named(&context.device, name)?],
         (_, Some(names)) => names.iter().map(|name| profile::named(&context.device, name)).collect::<Result<_>>()?,
         _ => profile::contenders(&context.device),
-    };
-    let show = |what: &str| output::note(global, what);
-    let bench = Bench {
-        baker: &context.baker,
-        cache: &context.cache,
-        progress: &show,
-        quick: false,
-        seed: global.seed,
-        origin: context.origin(global),
     };
     let library = context.baker.library();
     let small = Workload::new(&context.device, 64, 1)?;
@@ -77,26 +68,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         profile::write_spirv(folder, library, &small, &chosen)?;
     }
     let at_best = ceilings::measure(&context.device, library, small.field_bytes())?;
-    let mut cases = Vec::new();
-    if let Some(path) = &arguments.bake {
-        cases.push(profile::bake(&bench, &Mesh::load(path)?, arguments.runs)?);
-    } else if let Some(path) = &arguments.scene {
-        let scene = Scene::load(path)?;
-        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        cases.push(profile::scene(&bench, &name, &scene, arguments.size, &chosen, arguments.runs, &at_best)?);
-    } else {
-        for &occluders in &arguments.occluders {
-            let workload = Workload::new(&context.device, arguments.grid, occluders)?;
-            cases.push(profile::made_up(&bench, &workload, &chosen, arguments.runs, &at_best)?);
-        }
-    }
-    let mut ratios = Vec::new();
-    for case in cases.iter().filter(|_| arguments.compare.is_some()) {
-        if let [(a, first), (b, second), ..] = &case[..] {
-            let each: Vec<f64> = first.iter().zip(second).map(|(a, b)| a / b).collect();
-            ratios.push((format!("{}: {} over {}", a.case, a.variant, b.variant), Tenths::new(&each)));
-        }
-    }
+    let cases = time_cases(global, arguments, &context, &chosen, &at_best)?;
+    let ratios = if arguments.compare.is_some() { ratios(&cases) } else { Vec::new() };
     let rows: Vec<ProfileRow> = cases.into_iter().flatten().map(|(row, _)| row).collect();
     if arguments.variant.is_none() && arguments.compare.is_none() && arguments.bake.is_none() {
         context.learn(global)?;
@@ -109,7 +82,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     })?;
     let starts = if arguments.bake.is_some() { Vec::new() } else { profile::starts(&fresh, library, &chosen)? };
     let document = json!({
-        "origin": bench.origin,
+        "origin": context.origin(global),
         "ceilings": at_best,
         "passes": rows,
         "ratios": ratios.iter().map(|(what, ratio)| json!({ "what": what, "ratio": ratio })).collect::<Vec<_>>(),
@@ -117,30 +90,74 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "usual_variant": usual,
     });
     if let Some(folder) = &arguments.out {
-        let lines = |key: &str| document[key].as_array().cloned().unwrap_or_default();
-        text::write(&folder.join("profile.csv"), &text::csv(&bench.origin, &lines("passes")))?;
-        text::write(&folder.join("starts.csv"), &text::csv(&bench.origin, &lines("starts")))?;
-        text::write(&folder.join("profile.json"), &format!("{document:#}\n"))?;
+        write(folder, &document)?;
     }
-    print(global, &document, &at_best, &rows, &ratios, &starts);
-    if !global.json {
+    if global.json {
+        output::say(document.to_string());
+    } else {
+        print_passes(&at_best, &rows, &ratios);
+        print_starts(&starts);
         output::say(format!("\nwithout --variant this device merges with \"{usual}\""));
     }
     context.finish()
 }
 
-fn print(
+/// Rows with all of their times.
+type Case = Vec<(ProfileRow, Vec<f64>)>;
+
+/// Times what is asked for: a bake, a scene, or made-up merges.
+fn time_cases(
     global: &Global,
-    document: &Value,
+    arguments: &Arguments,
+    context: &Context,
+    chosen: &[Contender],
     at_best: &Ceilings,
-    rows: &[ProfileRow],
-    ratios: &[(String, Tenths)],
-    starts: &[Start],
-) {
-    if global.json {
-        output::say(document.to_string());
-        return;
+) -> Result<Vec<Case>> {
+    let show = |what: &str| output::note(global, what);
+    let bench = Bench {
+        baker: &context.baker,
+        cache: &context.cache,
+        progress: &show,
+        quick: false,
+        seed: global.seed,
+        origin: context.origin(global),
+    };
+    if let Some(path) = &arguments.bake {
+        return Ok(vec![profile::bake(&bench, &Mesh::load(path)?, arguments.runs)?]);
     }
+    if let Some(path) = &arguments.scene {
+        let scene = Scene::load(path)?;
+        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let case = profile::scene(&bench, &name, &scene, arguments.size, chosen, arguments.runs, at_best)?;
+        return Ok(vec![case]);
+    }
+    let made_up = |&occluders: &u32| {
+        let workload = Workload::new(&context.device, arguments.grid, occluders)?;
+        profile::made_up(&bench, &workload, chosen, arguments.runs, at_best)
+    };
+    arguments.occluders.iter().map(made_up).collect()
+}
+
+/// Time of the first row over that of the second, run by run, of each case.
+fn ratios(cases: &[Case]) -> Vec<(String, Tenths)> {
+    let ratio = |case: &Case| {
+        let [(a, first), (b, second), ..] = &case[..] else { return None };
+        let each: Vec<f64> = first.iter().zip(second).map(|(a, b)| a / b).collect();
+        Some((format!("{}: {} over {}", a.case, a.variant, b.variant), Tenths::new(&each)))
+    };
+    cases.iter().filter_map(ratio).collect()
+}
+
+/// Writes profile.csv, starts.csv and profile.json.
+fn write(folder: &Path, document: &Value) -> Result<()> {
+    for (file, key) in [("profile.csv", "passes"), ("starts.csv", "starts")] {
+        let lines = document[key].as_array().cloned().unwrap_or_default();
+        text::write(&folder.join(file), text::csv(&document["origin"], &lines))?;
+    }
+    text::write(&folder.join("profile.json"), format!("{document:#}\n"))
+}
+
+fn print_passes(at_best: &Ceilings, rows: &[ProfileRow], ratios: &[(String, Tenths)]) {
     output::say(format!(
         "at best: {:.0} GFLOP/s; {:.2} G texels/s of four halves, {:.2} of 16 bytes; {:.2} G filtered samples/s; {:.2} G storage \
          reads/s of 8 bytes; triad {:.1} GB/s",
@@ -151,23 +168,6 @@ fn print(
         at_best.storage_giga,
         at_best.triad_gb_s
     ));
-    let number = |value: Option<f64>, digits: usize| value.map_or_else(String::new, |v| format!("{v:.digits$}"));
-    let percent = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{:.0} %", 100.0 * v));
-    let cells = |row: &ProfileRow| {
-        let count = |f: fn(&profile::Work) -> u32| row.work.as_ref().map_or_else(String::new, |w| f(w).to_string());
-        let mut cells = vec![format!("{} {} {}", row.case, row.pass, row.variant)];
-        cells.extend([row.ms.median, row.ms.p10, row.ms.p90].map(|ms| format!("{ms:.2}")));
-        cells.extend([number(row.ns_a_pair, 1), count(|w| w.flops), count(|w| w.fetches), count(|w| w.bytes)]);
-        cells.extend([
-            number(row.gflops, 0),
-            number(row.gb_s, 1),
-            percent(row.arithmetic_share),
-            percent(row.read_share),
-        ]);
-        let both = row.arithmetic_share.zip(row.read_share).map(|(a, r)| a + r);
-        cells.push(percent(both));
-        cells
-    };
     let header = [
         "pass",
         "ms",
@@ -194,6 +194,23 @@ fn print(
     for (what, ratio) in ratios {
         output::say(format!("{what}: {:.3} ({:.3} - {:.3})", ratio.median, ratio.p10, ratio.p90));
     }
+}
+
+/// Cells of a pass: times, work of a pair, rates and shares of the ceilings, empty where nothing is known.
+fn cells(row: &ProfileRow) -> Vec<String> {
+    let number = |value: Option<f64>, digits: usize| value.map_or_else(String::new, |v| format!("{v:.digits$}"));
+    let percent = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{:.0} %", 100.0 * v));
+    let count = |f: fn(&profile::Work) -> u32| row.work.as_ref().map_or_else(String::new, |w| f(w).to_string());
+    let both = row.arithmetic_share.zip(row.read_share).map(|(a, r)| a + r);
+    let mut cells = vec![format!("{} {} {}", row.case, row.pass, row.variant)];
+    cells.extend([row.ms.median, row.ms.p10, row.ms.p90].map(|ms| format!("{ms:.2}")));
+    cells.extend([number(row.ns_a_pair, 1), count(|w| w.flops), count(|w| w.fetches), count(|w| w.bytes)]);
+    cells.extend([number(row.gflops, 0), number(row.gb_s, 1)]);
+    cells.extend([row.arithmetic_share, row.read_share, both].map(percent));
+    cells
+}
+
+fn print_starts(starts: &[Start]) {
     if starts.is_empty() {
         return;
     }

@@ -7,15 +7,16 @@ use crate::asset::false_color::Scheme;
 use crate::asset::picture;
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
-use crate::frame::Frame;
-use crate::scene::{Scene, values::NUMBER_LIMIT};
+use crate::frame::{self, Frame};
+use crate::gpu::Timing;
+use crate::scene::{Placement, Scene, values::NUMBER_LIMIT};
 use crate::text;
 use crate::truth::{self, ErrorMap, error_map, raycast::RayCast};
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Arguments of `render`.
 #[derive(Args)]
@@ -73,136 +74,207 @@ pub struct Arguments {
 
 /// Renders a scene.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let numbered = Numbered::new(&arguments.output, "png")?;
-    let others = [&arguments.exr, &arguments.vertices, &arguments.stats, &arguments.error];
-    for path in others.into_iter().flatten().chain([&arguments.output]) {
-        output::check_folder(path)?;
-    }
-    let numbered_exr = arguments.exr.as_deref().map(|path| Numbered::new(path, "exr")).transpose()?.flatten();
+    let names = PictureNames::new(arguments)?;
     let scene = Scene::load(&arguments.scene)?;
     let context = Context::new(global)?;
-    let started = Instant::now();
-    let shape = &scene.data.output;
-    let first_s = arguments.time.unwrap_or(shape.time_s);
-    let size = arguments.size.unwrap_or([shape.width, shape.height]);
-    let options = arguments.merge.options(arguments.bake.options(), size, arguments.antialias);
-    let mut frame = context.frame(&scene, options).map_err(|error| match error {
-        Error::Input(_) => error.context(arguments.scene.display()),
-        other => other,
-    })?;
-    let prepared = started.elapsed();
-
-    let [width, height] = options.size;
-    let mut timings = Vec::new();
-    let mut worst_error = 0.0_f64;
-    let mut draw = |index: u32| {
-        let time_s = first_s + f64::from(index) / f64::from(arguments.fps);
-        let placements = scene.at(time_s);
-        let start = Instant::now();
-        let passes = if arguments.reference {
-            worst_error = light_by_rays(&mut frame, &placements, arguments.rays, global.seed)?.max(worst_error);
-            frame.redraw(&placements, shape.white())?
-        } else {
-            frame.render(&placements, Some(shape.white()))?
-        };
-        timings.push((time_s, start.elapsed(), passes));
-        let rgb = frame.picture();
-        let last = arguments.exr.as_ref().filter(|_| index + 1 == arguments.frames).cloned();
-        if let Some(path) = numbered_exr.as_ref().map(|numbered| numbered.path(index)).or(last) {
-            frame.redraw(&placements, f32::INFINITY)?;
-            picture::write_exr(&path, width, height, &frame.picture())?;
-        }
-        context.progress.pictures(index + 1, arguments.frames);
-        Ok(rgb)
-    };
-    if numbered.is_none() && arguments.frames > 1 {
-        let frames = (0..arguments.frames).map(|index| Ok(picture::encode_srgb(&draw(index)?, shape.exposure_ev)));
-        picture::write_apng(&arguments.output, width, height, frames, arguments.fps)?;
-    } else {
-        for index in 0..arguments.frames {
-            let path = numbered.as_ref().map_or_else(|| arguments.output.clone(), |numbered| numbered.path(index));
-            picture::write_png(&path, width, height, &draw(index)?, shape.exposure_ev)?;
-        }
-    }
-    let last_frame = frame.merged();
-    let last = scene.at(timings.last().map_or(first_s, |(time_s, ..)| *time_s));
-    if let Some(path) = &arguments.vertices {
-        if !arguments.reference {
-            // What no picture showed is lit for this.
-            frame.render(&last, None)?;
-        }
-        text::write(path, &vertex_table(&frame, &last)?)?;
-    }
-
-    let error = arguments.error.as_ref().map(|path| {
-        frame.render(&last, None)?;
-        let cast = RayCast { rays: arguments.rays, seed: global.seed, ..Default::default() };
-        let (reference, noise) = truth::picture(&scene, &last, &cast);
-        let map = ErrorMap::new(&error_map::radiosity(&frame)?, &reference, arguments.error_scheme);
-        map.write(path, &mut frame, &last, arguments.error_limit, noise)
-    });
-    let error = error.transpose()?;
-
-    let frames: Vec<_> = timings
-        .iter()
-        .map(|(time_s, wall, passes)| {
-            let passes: serde_json::Map<_, _> =
-                passes.iter().map(|t| (format!("{}_ms", t.pass.replace(' ', "_")), json!(t.milliseconds))).collect();
-            json!({ "time_s": time_s, "frame_ms": wall.as_secs_f64() * 1e3, "passes": passes })
-        })
-        .collect();
-    let report = json!({
-        "origin": context.origin(global),
-        "scene": arguments.scene.display().to_string(),
-        "entities": scene.entities.len(),
-        "receiver_vertices": frame.receiver_vertex_count(),
-        "variant": frame.variant().name,
-        "lookups": frame.counts(&last),
-        "last_frame": last_frame,
-        "memory_bytes": frame.memory(),
-        "device_bytes": frame.memory().device(),
-        "reference_standard_error": arguments.reference.then_some(worst_error),
-        "error": error,
-        "options": {
-            "bake": options.bake, "lattice": options.bake.lattice.to_string(), "skip": options.skip,
-            "eps": options.eps,
-            "size": options.size, "antialias": options.antialias,
-        },
-        "prepare_ms": prepared.as_secs_f64() * 1e3,
-        "baked": frame.buffers.baked,
-        "frames": frames,
-    });
+    let mut rendering = Rendering::new(global, arguments, &context, &scene)?;
+    rendering.write_pictures(&names)?;
+    let last_frame = json!(rendering.frame.merged());
+    rendering.write_vertices()?;
+    let error = rendering.write_error()?;
+    let report = rendering.report(&last_frame, &error);
     if let Some(path) = &arguments.stats {
-        text::write(path, &format!("{report:#}\n"))?;
+        text::write(path, format!("{report:#}\n"))?;
     }
-    if global.json {
-        output::say(report.to_string());
-    } else {
-        let walls: Vec<f64> = timings.iter().map(|(_, wall, _)| wall.as_secs_f64() * 1e3).collect();
-        output::say(format!(
-            "{}: {} entities, {} lit vertices, prepared in {:.0} ms, {} in {:.1} ms (median), variant {}",
-            output::shown(&arguments.output),
-            scene.entities.len(),
-            frame.receiver_vertex_count(),
-            prepared.as_secs_f64() * 1e3,
-            if arguments.frames == 1 { "a frame".into() } else { format!("{} frames, each", arguments.frames) },
-            output::median(&walls),
-            if arguments.reference {
-                format!("none: {} rays, relative standard error {worst_error:.1e}", arguments.rays)
-            } else {
-                frame.variant().name.into()
-            }
-        ));
-    }
-    drop(frame);
+    output::say(if global.json { report.to_string() } else { rendering.summary() });
+    drop(rendering);
     if arguments.merge.variant.is_none() {
         context.learn(global)?;
     }
     context.finish()
 }
 
+/// Names of pictures, all of them in folders that exist.
+struct PictureNames {
+    numbered: Option<Numbered>,
+    numbered_exr: Option<Numbered>,
+}
+
+impl PictureNames {
+    fn new(arguments: &Arguments) -> Result<Self> {
+        let numbered = Numbered::new(&arguments.output, "png")?;
+        let others = [&arguments.exr, &arguments.vertices, &arguments.stats, &arguments.error];
+        for path in others.into_iter().flatten().chain([&arguments.output]) {
+            output::check_folder(path)?;
+        }
+        let numbered_exr = arguments.exr.as_deref().map(|path| Numbered::new(path, "exr")).transpose()?.flatten();
+        Ok(PictureNames { numbered, numbered_exr })
+    }
+}
+
+/// A scene that is being rendered.
+struct Rendering<'a> {
+    global: &'a Global,
+    arguments: &'a Arguments,
+    context: &'a Context,
+    scene: &'a Scene,
+    options: frame::Options,
+    frame: Frame,
+    prepared: Duration,
+    /// Scene time of each picture in seconds, its wall time and its passes.
+    timings: Vec<(f64, Duration, Vec<Timing>)>,
+    /// Largest relative standard error of ray casting.
+    worst_error: f64,
+}
+
+impl<'a> Rendering<'a> {
+    fn new(global: &'a Global, arguments: &'a Arguments, context: &'a Context, scene: &'a Scene) -> Result<Self> {
+        let started = Instant::now();
+        let shape = &scene.data.output;
+        let size = arguments.size.unwrap_or([shape.width, shape.height]);
+        let options = arguments.merge.options(arguments.bake.options(), size, arguments.antialias);
+        let frame = context.frame(scene, options).map_err(|error| match error {
+            Error::Input(_) => error.context(arguments.scene.display()),
+            other => other,
+        })?;
+        let prepared = started.elapsed();
+        Ok(Rendering {
+            global,
+            arguments,
+            context,
+            scene,
+            options,
+            frame,
+            prepared,
+            timings: Vec::new(),
+            worst_error: 0.0,
+        })
+    }
+
+    /// Lights and draws one picture; also writes it as EXR where that is asked for.
+    fn draw(&mut self, index: u32, names: &PictureNames) -> Result<Vec<f32>> {
+        let (arguments, white) = (self.arguments, self.scene.data.output.white());
+        let first_s = arguments.time.unwrap_or(self.scene.data.output.time_s);
+        let time_s = first_s + f64::from(index) / f64::from(arguments.fps);
+        let placements = self.scene.at(time_s);
+        let start = Instant::now();
+        let passes = if arguments.reference {
+            let error = light_by_rays(&mut self.frame, &placements, arguments.rays, self.global.seed)?;
+            self.worst_error = error.max(self.worst_error);
+            self.frame.redraw(&placements, white)?
+        } else {
+            self.frame.render(&placements, Some(white))?
+        };
+        self.timings.push((time_s, start.elapsed(), passes));
+        let rgb = self.frame.picture();
+        let last = arguments.exr.as_ref().filter(|_| index + 1 == arguments.frames).cloned();
+        if let Some(path) = names.numbered_exr.as_ref().map(|numbered| numbered.path(index)).or(last) {
+            self.frame.redraw(&placements, f32::INFINITY)?;
+            let [width, height] = self.options.size;
+            picture::write_exr(&path, width, height, &self.frame.picture())?;
+        }
+        self.context.progress.pictures(index + 1, arguments.frames);
+        Ok(rgb)
+    }
+
+    /// Writes all pictures: one file, an animated PNG, or numbered files.
+    fn write_pictures(&mut self, names: &PictureNames) -> Result<()> {
+        let (arguments, [width, height]) = (self.arguments, self.options.size);
+        let exposure_ev = self.scene.data.output.exposure_ev;
+        if names.numbered.is_none() && arguments.frames > 1 {
+            let frames =
+                (0..arguments.frames).map(|index| Ok(picture::encode_srgb(&self.draw(index, names)?, exposure_ev)));
+            return picture::write_apng(&arguments.output, width, height, frames, arguments.fps);
+        }
+        for index in 0..arguments.frames {
+            let numbered = names.numbered.as_ref();
+            let path = numbered.map_or_else(|| arguments.output.clone(), |numbered| numbered.path(index));
+            picture::write_png(&path, width, height, &self.draw(index, names)?, exposure_ev)?;
+        }
+        Ok(())
+    }
+
+    /// Where everything stands in the last picture.
+    fn last(&self) -> Vec<Placement> {
+        let (time_s, ..) = self.timings.last().expect("at least one picture");
+        self.scene.at(*time_s)
+    }
+
+    fn write_vertices(&mut self) -> Result<()> {
+        let Some(path) = &self.arguments.vertices else { return Ok(()) };
+        let last = self.last();
+        if !self.arguments.reference {
+            // What no picture showed is lit for this.
+            self.frame.render(&last, None)?;
+        }
+        text::write(path, vertex_table(&self.frame, &last)?)
+    }
+
+    /// Compares the last picture's vertices with ray casting, where that is asked for.
+    fn write_error(&mut self) -> Result<Value> {
+        let Some(path) = &self.arguments.error else { return Ok(Value::Null) };
+        let last = self.last();
+        self.frame.render(&last, None)?;
+        let cast = RayCast { rays: self.arguments.rays, seed: self.global.seed, ..Default::default() };
+        let (reference, noise) = truth::picture(self.scene, &last, &cast);
+        let map = ErrorMap::new(&error_map::radiosity(&self.frame)?, &reference, self.arguments.error_scheme);
+        Ok(json!(map.write(path, &mut self.frame, &last, self.arguments.error_limit, noise)?))
+    }
+
+    /// What `--stats` and `--json` have.
+    fn report(&self, last_frame: &Value, error: &Value) -> Value {
+        let (frame, options) = (&self.frame, &self.options);
+        let pictures = self.timings.iter().map(|(time_s, wall, passes)| {
+            let named = |t: &Timing| (format!("{}_ms", t.pass.replace(' ', "_")), json!(t.milliseconds));
+            let passes: serde_json::Map<_, _> = passes.iter().map(named).collect();
+            json!({ "time_s": time_s, "frame_ms": wall.as_secs_f64() * 1e3, "passes": passes })
+        });
+        json!({
+            "origin": self.context.origin(self.global),
+            "scene": self.arguments.scene.display().to_string(),
+            "entities": self.scene.entities.len(),
+            "receiver_vertices": frame.receiver_vertex_count(),
+            "variant": frame.variant().name,
+            "lookups": frame.counts(&self.last()),
+            "last_frame": last_frame,
+            "memory_bytes": frame.memory(),
+            "device_bytes": frame.memory().device(),
+            "reference_standard_error": self.arguments.reference.then_some(self.worst_error),
+            "error": error,
+            "options": {
+                "bake": options.bake, "lattice": options.bake.lattice.to_string(), "skip": options.skip,
+                "eps": options.eps,
+                "size": options.size, "antialias": options.antialias,
+            },
+            "prepare_ms": self.prepared.as_secs_f64() * 1e3,
+            "baked": frame.buffers.baked,
+            "frames": pictures.collect::<Vec<_>>(),
+        })
+    }
+
+    /// One line for people.
+    fn summary(&self) -> String {
+        let arguments = self.arguments;
+        let walls: Vec<f64> = self.timings.iter().map(|(_, wall, _)| wall.as_secs_f64() * 1e3).collect();
+        format!(
+            "{}: {} entities, {} lit vertices, prepared in {:.0} ms, {} in {:.1} ms (median), variant {}",
+            output::shown(&arguments.output),
+            self.scene.entities.len(),
+            self.frame.receiver_vertex_count(),
+            self.prepared.as_secs_f64() * 1e3,
+            if arguments.frames == 1 { "a frame".into() } else { format!("{} frames, each", arguments.frames) },
+            output::median(&walls),
+            if arguments.reference {
+                format!("none: {} rays, relative standard error {:.1e}", arguments.rays, self.worst_error)
+            } else {
+                self.frame.variant().name.into()
+            }
+        )
+    }
+}
+
 /// Replaces what the merge would find by what rays find. Returns the relative standard error.
-fn light_by_rays(frame: &mut Frame, placements: &[crate::scene::Placement], rays: u32, seed: u64) -> Result<f64> {
+fn light_by_rays(frame: &mut Frame, placements: &[Placement], rays: u32, seed: u64) -> Result<f64> {
     let cast = RayCast { rays, seed, ..Default::default() };
     let (lit, error) = truth::picture(frame.scene(), placements, &cast);
     for (entity, radiosity) in lit {
@@ -254,7 +326,7 @@ impl Numbered {
 }
 
 /// A row a vertex of every receiver, world frame.
-fn vertex_table(frame: &Frame, placements: &[crate::scene::Placement]) -> Result<String> {
+fn vertex_table(frame: &Frame, placements: &[Placement]) -> Result<String> {
     let mut text = String::from("entity,x,y,z,nx,ny,nz,r,g,b\n");
     for (index, entity) in frame.scene().entities.iter().enumerate().filter(|(_, e)| e.receives) {
         let mesh = &frame.scene().meshes[entity.mesh];

@@ -24,17 +24,22 @@ pub struct Arguments {
 
 /// Measures and prints a row a scene and skip.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let (context, rows) = start(global, arguments.quick, |bench| {
+    let (context, (rows, bakes)) = start(global, arguments.quick, |bench| {
         Ok((
             skips::run(bench, &arguments.out, &arguments.case)?,
             bake_skips::run(bench, &arguments.out, &arguments.case)?,
         ))
     })?;
-    let (rows, bakes) = rows;
     if global.json {
         output::say(serde_json::json!({ "frames": rows, "bakes": bakes }).to_string());
-        return context.finish();
+    } else {
+        print_frames(&rows);
+        print_bakes(&bakes);
     }
+    context.finish()
+}
+
+fn print_frames(rows: &[skips::SkipCost]) {
     output::say(
         "Frame without drawing (of \"hidden\" with it, 1280x720), the skip off and on in turns; what it left off (a cluster of 64 \
          vertices, chain, entity;\nof \"hidden\" clusters); lookups listed (one for a cluster); RMS error against ray casting and the most that a vertex changes, both in units of the RMS \
@@ -65,6 +70,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "on KiB",
     ];
     output::table(&header, &cells.collect::<Vec<_>>());
+}
+
+fn print_bakes(bakes: &[bake_skips::BakeSkipRow]) {
     output::say(
         "\nBakes, nothing left out and this skip alone; the field against one of faces of 128 px. Filled: samples inside the solid, captured off its surface or filled",
     );
@@ -92,5 +100,4 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "on error",
     ];
     output::table(&header, &cells.collect::<Vec<_>>());
-    context.finish()
 }

@@ -20,6 +20,13 @@ pub struct Case {
     pub distant: Distant,
 }
 
+impl Case {
+    /// A scene at time 0.
+    pub fn at_start(name: String, scene: Scene, distant: Distant) -> Self {
+        Case { name, light: light(&scene), scene, time_s: 0.0, distant }
+    }
+}
+
 /// Direction of the key light and of the sphere lights.
 const TOWARD: [f64; 3] = [0.5, 0.707, 0.5];
 /// Gap between floor and teapot, in bounding radii.
@@ -60,7 +67,7 @@ pub fn scenes() -> Result<Vec<Case>> {
 pub fn scene(name: &str) -> Result<Case> {
     let path = Path::new(embedded::ROOT).join("scenes").join(format!("{name}.toml"));
     let scene = Scene::load(&path)?;
-    Ok(Case { name: name.to_owned(), light: light(&scene), scene, time_s: 0.0, distant: Distant::Exact })
+    Ok(Case::at_start(name.to_owned(), scene, Distant::Exact))
 }
 
 /// Description of a scene's light: its distant light and the number of local lights.
@@ -159,7 +166,7 @@ pub fn floor(cells: usize) -> Result<Vec<Case>> {
     let case = |(name, light, distant): (&str, String, Distant)| {
         let path = Path::new("assets/scenes/teapot_over_plane.toml");
         let scene = Scene::parse(&format!("{head}{light}"), path, &embedded::read)?;
-        Ok(Case { name: name.to_owned(), light: self::light(&scene), scene, time_s: 0.0, distant })
+        Ok(Case::at_start(name.to_owned(), scene, distant))
     };
     lights.into_iter().map(case).collect()
 }

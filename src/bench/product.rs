@@ -38,7 +38,7 @@ pub struct Timed {
     pub gflops: f64,
     /// Largest difference to the twin in f64 after one product, in units of the largest coefficient.
     pub error: f64,
-    /// Irradiance behind 64 caps of 30 degrees at one place, f64 (truth: .77).
+    /// Irradiance behind 64 caps of 30 degrees at one place, f64 (truth: 0.77).
     pub identical_64: f64,
 }
 
@@ -48,6 +48,31 @@ pub struct Timed {
 /// As [`Products::new`]; `Device` when the device was lost.
 pub fn measure(bench: &Bench<'_>) -> Result<Vec<Timed>> {
     let (device, library) = (bench.baker.device(), bench.baker.library());
+    let chains = Chains::new(bench)?;
+    let mut passes = Vec::new();
+    for (name, shape) in shapes() {
+        let pass = Products::new(device, library, shape, true)?;
+        let empty = Products::new(device, library, shape, false)?;
+        chains.run(&empty, shape.field_bands, 1)?;
+        chains.run(&pass, shape.field_bands, 1)?;
+        let found: Vec<f32> = chains.products.download(chains.transfers.len())?;
+        let error = error_of(shape, &chains.transfers, &chains.factors[shape.field_bands - BANDS], &found);
+        passes.push((name, shape, pass, empty, error, Vec::new()));
+        (bench.progress)(&format!("{name}, {} bands, guard {} compiled", shape.field_bands, shape.chain.guard));
+    }
+    for round in 0..if bench.quick { 6 } else { 16 } {
+        for (_, shape, pass, empty, _, times) in &mut passes {
+            let took = chains.run(pass, shape.field_bands, STEPS)? - chains.run(empty, shape.field_bands, STEPS)?;
+            if round > 0 {
+                times.push(took * 1e6 / (f64::from(chains.count) * f64::from(STEPS)));
+            }
+        }
+    }
+    Ok(passes.into_iter().map(|(name, shape, _, _, error, times)| timed(name, shape, error, &times)).collect())
+}
+
+/// The forms with their names.
+fn shapes() -> Vec<(&'static str, Shape)> {
     let mut shapes = Vec::new();
     for guard in [false, true] {
         for &(name, product) in PRODUCTS {
@@ -58,76 +83,81 @@ pub fn measure(bench: &Bench<'_>) -> Result<Vec<Timed>> {
         let chain = Chain { product: Product::Matrix, guard: false };
         shapes.push(("matrix", Shape { chain, bands: BANDS, field_bands }));
     }
-    let count: u32 = if bench.quick { 16_384 } else { 65_536 };
-    let mut rng = fastrand::Rng::with_seed(bench.seed);
-    let transfers: Vec<f64> = (0..count).flat_map(|_| clamped_cosine(BANDS, direction(&mut rng))).collect();
-    let narrow = |of: &[f64]| of.iter().map(|c| *c as f32).collect::<Vec<f32>>();
-    let transfer_buffer = Buffer::with_data(device, "transfers", &narrow(&transfers))?;
-    let products = Buffer::new(device, "products", BufferKind::Device, 4 * transfers.len() as u64)?;
-    let factors: Vec<Vec<f64>> = (BANDS..=7)
-        .map(|bands| {
+    shapes
+}
+
+/// Random transfer vectors, and a cap for each as factors of 4 to 7 bands, here and on the device.
+struct Chains<'b> {
+    bench: &'b Bench<'b>,
+    count: u32,
+    transfers: Vec<f64>,
+    factors: Vec<Vec<f64>>,
+    transfer_buffer: Buffer,
+    factor_buffers: Vec<Buffer>,
+    products: Buffer,
+}
+
+impl<'b> Chains<'b> {
+    fn new(bench: &'b Bench<'b>) -> Result<Self> {
+        let device = bench.baker.device();
+        let count: u32 = if bench.quick { 16_384 } else { 65_536 };
+        let mut rng = fastrand::Rng::with_seed(bench.seed);
+        let transfers: Vec<f64> = (0..count).flat_map(|_| clamped_cosine(BANDS, direction(&mut rng))).collect();
+        let mut factors_of = |bands: usize| -> Vec<f64> {
             let cap = |rng: &mut fastrand::Rng| cap(bands, direction(rng), (5.0 + 30.0 * rng.f64()).to_radians());
             (0..count).flat_map(|_| cap(&mut rng)).collect()
+        };
+        let factors: Vec<Vec<f64>> = (BANDS..=7).map(&mut factors_of).collect();
+        let upload = |name: &str, of: &[f64]| {
+            Buffer::with_data(device, name, &of.iter().map(|c| *c as f32).collect::<Vec<f32>>())
+        };
+        Ok(Chains {
+            bench,
+            count,
+            transfer_buffer: upload("transfers", &transfers)?,
+            factor_buffers: factors.iter().map(|f| upload("factors", f)).collect::<Result<_>>()?,
+            products: Buffer::new(device, "products", BufferKind::Device, 4 * transfers.len() as u64)?,
+            transfers,
+            factors,
         })
-        .collect();
-    let factor_buffers =
-        factors.iter().map(|f| Buffer::with_data(device, "factors", &narrow(f))).collect::<Result<Vec<_>>>()?;
-    let run = |pass: &Products, field_bands: usize, steps: u32| -> Result<f64> {
-        let mut commands = Commands::new(device, "product")?;
-        let push = Push { count, steps, fade: 0.97 };
-        let buffers = [&transfer_buffer, &factor_buffers[field_bands - BANDS], &products];
+    }
+
+    /// Device time of so many products a chain, milliseconds.
+    fn run(&self, pass: &Products, field_bands: usize, steps: u32) -> Result<f64> {
+        let mut commands = Commands::new(self.bench.baker.device(), "product")?;
+        let push = Push { count: self.count, steps, fade: 0.97 };
+        let buffers = [&self.transfer_buffer, &self.factor_buffers[field_bands - BANDS], &self.products];
         commands.pass("product", |c| pass.record(c, buffers, push))?;
         Ok(commands.submit()?[0].milliseconds)
+    }
+}
+
+/// What was measured of a form, with its cost and what it makes of 64 identical caps.
+fn timed(product: &'static str, shape: Shape, error: f64, times: &[f64]) -> Timed {
+    let cost = if shape.chain.product.stays_at_points() {
+        let mut cost = points::evaluate_program(BANDS).cost();
+        cost.fma_count += points::COUNT;
+        cost.multiply_count += points::COUNT;
+        cost.add_count += points::COUNT;
+        cost
+    } else {
+        let style = shape.chain.product.style(BANDS, shape.field_bands);
+        styled_program(style, BANDS, shape.field_bands, ProductOperation::Subtract).cost()
     };
-    let mut passes = Vec::new();
-    for (name, shape) in &shapes {
-        let pass = Products::new(device, library, *shape, true)?;
-        let empty = Products::new(device, library, *shape, false)?;
-        run(&empty, shape.field_bands, 1)?;
-        run(&pass, shape.field_bands, 1)?;
-        let found: Vec<f32> = products.download(transfers.len())?;
-        let error = error_of(*shape, &transfers, &factors[shape.field_bands - BANDS], &found);
-        passes.push((*name, *shape, pass, empty, error, Vec::new()));
-        (bench.progress)(&format!("{name}, {} bands, guard {} compiled", shape.field_bands, shape.chain.guard));
+    let ns_per_product = spread(times);
+    let caps = cap(shape.field_bands, DVec3::new(0.5, 0.75_f64.sqrt(), 0.0), 30_f64.to_radians());
+    let start = clamped_cosine(BANDS, DVec3::Y);
+    let push = Push { count: 1, steps: 64, fade: 1.0 };
+    Timed {
+        product,
+        guard: shape.chain.guard,
+        field_bands: shape.field_bands,
+        multiply_adds: cost.fma_count,
+        gflops: (cost.multiply_count + cost.add_count) as f64 / ns_per_product.median,
+        ns_per_product,
+        error,
+        identical_64: twin(shape, &start, &caps, push)[0] / start[0],
     }
-    for round in 0..if bench.quick { 6 } else { 16 } {
-        for (_, shape, pass, empty, _, times) in &mut passes {
-            let took = run(pass, shape.field_bands, STEPS)? - run(empty, shape.field_bands, STEPS)?;
-            if round > 0 {
-                times.push(took * 1e6 / (f64::from(count) * f64::from(STEPS)));
-            }
-        }
-    }
-    let rows = passes.into_iter().map(|(product, shape, _, _, error, times)| {
-        let cost = match shape.chain.product.stays_at_points() {
-            true => {
-                let mut cost = points::evaluate_program(BANDS).cost();
-                cost.fma_count += points::COUNT;
-                cost.multiply_count += points::COUNT;
-                cost.add_count += points::COUNT;
-                cost
-            }
-            false => {
-                let style = shape.chain.product.style(BANDS, shape.field_bands);
-                styled_program(style, BANDS, shape.field_bands, ProductOperation::Subtract).cost()
-            }
-        };
-        let ns_per_product = spread(&times);
-        let caps = cap(shape.field_bands, DVec3::new(0.5, 0.75_f64.sqrt(), 0.0), 30_f64.to_radians());
-        let push = Push { count: 1, steps: 64, fade: 1.0 };
-        let start = clamped_cosine(BANDS, DVec3::Y);
-        Timed {
-            product,
-            guard: shape.chain.guard,
-            field_bands: shape.field_bands,
-            multiply_adds: cost.fma_count,
-            gflops: (cost.multiply_count + cost.add_count) as f64 / ns_per_product.median,
-            ns_per_product,
-            error,
-            identical_64: twin(shape, &start, &caps, push)[0] / start[0],
-        }
-    });
-    Ok(rows.collect())
 }
 
 fn direction(rng: &mut fastrand::Rng) -> DVec3 {

@@ -9,10 +9,10 @@ use super::town::{Town, moved};
 use super::{Bench, default_options, house};
 use crate::draw::Antialias;
 use crate::error::Result;
-use crate::frame;
+use crate::frame::{self, Frame};
 use crate::lists::gather::Counts;
 use crate::lists::skip::{self, BenchCase, EPS, Skip};
-use crate::scene::Placement;
+use crate::scene::{Placement, Scene};
 use crate::truth::raycast::{Distant, relative_error};
 use crate::truth::{RayCast, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
@@ -71,7 +71,7 @@ fn left_off(name: &str, counts: &Counts) -> Option<u64> {
 /// texts in their names.
 ///
 /// # Errors
-/// `Failed` when the folder cannot be written; else as [`frame::Frame::new`].
+/// `Failed` when the folder cannot be written; else as [`Frame::new`].
 pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<SkipCost>> {
     crate::text::make_folder(folder)?;
     let mut rows = Vec::new();
@@ -126,31 +126,17 @@ fn plot(rows: &[SkipCost]) -> Rows {
 fn all(quick: bool) -> Result<Vec<Case>> {
     let town = |things, lights, cells| -> Result<Case> {
         let scene = Town { things, lights, cells, receive: true }.scene()?;
-        let light = cases::light(&scene);
-        Ok(Case {
-            name: format!("town of {things}, {lights} lights"),
-            light,
-            scene,
-            time_s: 0.0,
-            distant: Distant::Exact,
-        })
+        Ok(Case::at_start(format!("town of {things}, {lights} lights"), scene, Distant::Exact))
     };
+    // A storey of a house: a floor with things on it below a ceiling, flat lamps between that shine down, of which most are out, and
+    // an attic full of things.
+    let house = Case::at_start("house".into(), house::scene()?, Distant::Exact);
     if quick {
-        return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?, house()?]);
+        return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?, house]);
     }
     let mut cases = cases::scenes()?;
-    cases.push(town(64, 4, 160)?);
-    cases.push(town(256, 8, 160)?);
-    cases.extend([house()?]);
+    cases.extend([town(64, 4, 160)?, town(256, 8, 160)?, house]);
     Ok(cases)
-}
-
-/// A storey of a house: a floor with things on it below a ceiling, flat lamps between that shine down, of which most are out, and an
-/// attic full of things.
-fn house() -> Result<Case> {
-    let scene = house::scene()?;
-    let light = cases::light(&scene);
-    Ok(Case { name: "house".into(), light, scene, time_s: 0.0, distant: Distant::Exact })
 }
 
 fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<SkipCost>> {
@@ -192,6 +178,49 @@ fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<SkipCost>> {
 /// Size of the pictures where they are timed.
 const PICTURE: [u32; 2] = [1280, 720];
 
+/// The entities that move.
+fn movers(scene: &Scene, timed: BenchCase) -> Vec<usize> {
+    let entities = &scene.entities;
+    let occluders = (0..entities.len()).filter(|&i| entities[i].occludes);
+    let lights = (0..entities.len()).filter(|&i| entities[i].emits && !entities[i].occludes);
+    match timed {
+        BenchCase::AtRest => Vec::new(),
+        BenchCase::OneMoves => occluders.take(1).collect(),
+        BenchCase::AllMove => occluders.chain(lights).collect(),
+    }
+}
+
+/// Times of a frame and of its merge in milliseconds, by side and round.
+type Times = ([Vec<f64>; 2], [Vec<f64>; 2]);
+
+/// Times both sides in turns.
+fn in_turns(
+    frames: &mut [Frame; 2],
+    movers: &[usize],
+    placements: &[Placement],
+    rounds: u32,
+    timed: BenchCase,
+) -> Result<Times> {
+    let (mut walls, mut merges) = ([Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
+    for round in 0..rounds + 2 {
+        let mut now = placements.to_vec();
+        for &mover in movers {
+            now[mover] = moved(&placements[mover], 0.2 * f64::from(round));
+        }
+        for (side, frame) in frames.iter_mut().enumerate() {
+            let started = Instant::now();
+            let passes = if timed == BenchCase::AllMove { frame.show(&now, 1.0)? } else { frame.render(&now, None)? };
+            let merge = merge_ms(&passes);
+            // The first frames compile.
+            if round >= 2 {
+                walls[side].push(started.elapsed().as_secs_f64() * 1e3);
+                merges[side].push(merge);
+            }
+        }
+    }
+    Ok((walls, merges))
+}
+
 /// What results are held against.
 struct Judge {
     unit: f64,
@@ -211,34 +240,8 @@ impl Judge {
         timed: BenchCase,
     ) -> Result<SkipCost> {
         let mut frames = [bench.frame(&case.scene, off)?, bench.frame(&case.scene, on)?];
-        let entities = &case.scene.entities;
-        let mut movers: Vec<usize> = (0..entities.len()).filter(|&i| entities[i].occludes).collect();
-        match timed {
-            BenchCase::AtRest => movers.clear(),
-            BenchCase::OneMoves => movers.truncate(1),
-            BenchCase::AllMove => {
-                movers.extend((0..entities.len()).filter(|&i| entities[i].emits && !entities[i].occludes))
-            }
-        }
-        let (mut walls, mut merges) = ([Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
         let rounds = if bench.quick { 5 } else { 11 };
-        for round in 0..rounds + 2 {
-            let mut now = placements.to_vec();
-            for &mover in &movers {
-                now[mover] = moved(&placements[mover], 0.2 * f64::from(round));
-            }
-            for (side, frame) in frames.iter_mut().enumerate() {
-                let started = Instant::now();
-                let passes =
-                    if timed == BenchCase::AllMove { frame.show(&now, 1.0)? } else { frame.render(&now, None)? };
-                let merge = merge_ms(&passes);
-                // The first frames compile.
-                if round >= 2 {
-                    walls[side].push(started.elapsed().as_secs_f64() * 1e3);
-                    merges[side].push(merge);
-                }
-            }
-        }
+        let (walls, merges) = in_turns(&mut frames, &movers(&case.scene, timed), placements, rounds, timed)?;
         let entries = [frames[0].merged().merged_entries, frames[1].merged().merged_entries];
         let mut found = Vec::new();
         for frame in &mut frames {

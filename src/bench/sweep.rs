@@ -5,7 +5,7 @@ use super::cases::Case;
 use super::figures::{Difference, Radiosity, Spread, difference, spread};
 use super::{Bench, default_options};
 use crate::error::Result;
-use crate::field::{Lookup, Storage};
+use crate::field::{Lattice, Lookup, Storage};
 use crate::frame::{self, Frame};
 use crate::gpu::Timing;
 use crate::scene::Placement;
@@ -53,6 +53,30 @@ pub struct Point {
     pub below_bands: Difference,
 }
 
+/// The lattices that are swept; a quick sweep takes the first three.
+const LATTICES: [(&str, &str); 20] = [
+    ("lattice", "latlon:8x4x4,linear,raw,inner=0.2"),
+    ("lattice", "cube:8x4"),
+    ("lattice", "cube:16x4,linear,raw,inner=0.2"),
+    ("lattice", "cube:16x4"),
+    ("lattice", "latlon:20x16x16,linear,raw,inner=0.2"),
+    ("lattice", "cube:8x8"),
+    ("lattice", "cube:12x6"),
+    ("lattice", "cube:16x8"),
+    ("lattice", "cube:20x7,edges=auto"),
+    ("lattice", "cube:22x9,edges=auto"),
+    ("lattice", "cube:16x12"),
+    ("lattice", "cube:24x10"),
+    ("lattice", "cube:32x8"),
+    ("lattice", "cube:32x12"),
+    ("spacing", "cube:18x7,chord,raw,edges=auto"),
+    ("spacing", "cube:18x7,chord,scaled,edges=auto"),
+    ("spacing", "cube:18x7,log,scaled,edges=auto"),
+    ("spacing", "cube:18x7,log,raw,edges=auto"),
+    ("spacing", "cube:18x7,linear,scaled,edges=auto"),
+    ("spacing", "cube:18x7,linear,raw,edges=auto"),
+];
+
 /// The settings, the default first.
 pub fn variations(quick: bool) -> Vec<Variation> {
     let base = default_options();
@@ -65,32 +89,9 @@ pub fn variations(quick: bool) -> Vec<Variation> {
     add("lookup", "nearest", &|o| o.lookup = Lookup::Nearest);
     add("lookup", "radial", &|o| o.lookup = Lookup::Radial);
     add("storage", "f32", &|o| o.bake.storage = Storage::F32);
-    let lattices: &[(&'static str, &str)] = &[
-        ("lattice", "latlon:8x4x4,linear,raw,inner=0.2"),
-        ("lattice", "cube:8x4"),
-        ("lattice", "cube:16x4,linear,raw,inner=0.2"),
-        ("lattice", "cube:16x4"),
-        ("lattice", "latlon:20x16x16,linear,raw,inner=0.2"),
-        ("lattice", "cube:8x8"),
-        ("lattice", "cube:12x6"),
-        ("lattice", "cube:16x8"),
-        ("lattice", "cube:20x7,edges=auto"),
-        ("lattice", "cube:22x9,edges=auto"),
-        ("lattice", "cube:16x12"),
-        ("lattice", "cube:24x10"),
-        ("lattice", "cube:32x8"),
-        ("lattice", "cube:32x12"),
-        ("spacing", "cube:18x7,chord,raw,edges=auto"),
-        ("spacing", "cube:18x7,chord,scaled,edges=auto"),
-        ("spacing", "cube:18x7,log,scaled,edges=auto"),
-        ("spacing", "cube:18x7,log,raw,edges=auto"),
-        ("spacing", "cube:18x7,linear,scaled,edges=auto"),
-        ("spacing", "cube:18x7,linear,raw,edges=auto"),
-    ];
-    for (axis, text) in &lattices[..if quick { 3 } else { lattices.len() }] {
-        let lattice = text.parse().expect("a lattice in the table");
-        if lattice != base.bake.lattice {
-            add(axis, text, &|o| o.bake.lattice = lattice);
+    for (axis, text) in &LATTICES[..if quick { 3 } else { LATTICES.len() }] {
+        if lattice(text) != base.bake.lattice {
+            add(axis, text, &|o| o.bake.lattice = lattice(text));
         }
     }
     add("guard", "off", &|o| o.guard = false);
@@ -99,32 +100,45 @@ pub fn variations(quick: bool) -> Vec<Variation> {
         add("face", &format!("{face_px} px"), &|o| o.bake.face_px = face_px);
     }
     if !quick {
-        for bands in [3, 5, 6] {
-            add("bands", &format!("{bands} bands"), &|o| o.bake.bands = bands);
-        }
-        for bands in [5, 6, 7] {
-            add("stored bands", &format!("{bands} of visibility"), &|o| o.bake.field_bands = Some(bands));
-        }
-        add("stored bands", "7 of visibility, no guard", &|o| {
-            (o.bake.field_bands, o.guard) = (Some(7), false);
-        });
-        add("stored bands", "3 of transfer, 4 of visibility", &|o| (o.bake.bands, o.bake.field_bands) = (3, Some(4)));
-        let student = "latlon:8x4x4,linear,raw,inner=0.2".parse().expect("a lattice");
-        add("together", "student: 8x4x4, nearest, f32, 32 px", &|o| {
-            (o.bake.lattice, o.bake.storage, o.bake.face_px, o.lookup) = (student, Storage::F32, 32, Lookup::Nearest);
-        });
-        let small = "cube:8x4".parse().expect("a lattice");
-        add("together", "small: cube:8x4, 16 px", &|o| (o.bake.lattice, o.bake.face_px) = (small, 16));
-        let paper = "cube:16x4,linear,raw,inner=0.2".parse().expect("a lattice");
-        add("together", "paper: 16 linear shells x 96, radial, f32", &|o| {
-            (o.bake.lattice, o.bake.storage, o.lookup) = (paper, Storage::F32, Lookup::Radial);
-        });
-        let fine = "cube:24x10".parse().expect("a lattice");
-        add("together", "fine: cube:24x10, f32, 128 px", &|o| {
-            (o.bake.lattice, o.bake.storage, o.bake.face_px) = (fine, Storage::F32, 128);
-        });
+        add_bands(&mut add);
+        add_sets(&mut add);
     }
     all
+}
+
+/// Takes an axis, a name, and the change from the default.
+type Add<'a> = dyn FnMut(&'static str, &str, &dyn Fn(&mut frame::Options)) + 'a;
+
+fn lattice(text: &str) -> Lattice {
+    text.parse().expect("a lattice in the table")
+}
+
+/// Other numbers of bands, of everything and of stored visibility alone.
+fn add_bands(add: &mut Add<'_>) {
+    for bands in [3, 5, 6] {
+        add("bands", &format!("{bands} bands"), &|o| o.bake.bands = bands);
+    }
+    for bands in [5, 6, 7] {
+        add("stored bands", &format!("{bands} of visibility"), &|o| o.bake.field_bands = Some(bands));
+    }
+    add("stored bands", "7 of visibility, no guard", &|o| (o.bake.field_bands, o.guard) = (Some(7), false));
+    add("stored bands", "3 of transfer, 4 of visibility", &|o| (o.bake.bands, o.bake.field_bands) = (3, Some(4)));
+}
+
+/// Settings that change together.
+fn add_sets(add: &mut Add<'_>) {
+    add("together", "student: 8x4x4, nearest, f32, 32 px", &|o| {
+        o.bake.lattice = lattice("latlon:8x4x4,linear,raw,inner=0.2");
+        (o.bake.storage, o.bake.face_px, o.lookup) = (Storage::F32, 32, Lookup::Nearest);
+    });
+    add("together", "small: cube:8x4, 16 px", &|o| (o.bake.lattice, o.bake.face_px) = (lattice("cube:8x4"), 16));
+    add("together", "paper: 16 linear shells x 96, radial, f32", &|o| {
+        o.bake.lattice = lattice("cube:16x4,linear,raw,inner=0.2");
+        (o.bake.storage, o.lookup) = (Storage::F32, Lookup::Radial);
+    });
+    add("together", "fine: cube:24x10, f32, 128 px", &|o| {
+        (o.bake.lattice, o.bake.storage, o.bake.face_px) = (lattice("cube:24x10"), Storage::F32, 128);
+    });
 }
 
 /// Device time of the merge in milliseconds.

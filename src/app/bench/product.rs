@@ -26,7 +26,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(serde_json::to_value(&timed).expect("results are plain data").to_string());
         return context.finish();
     }
-    output::say("One product of a chain of 4 bands, on the whole device (64 identical caps: truth .77)");
+    output::say("One product of a chain of 4 bands, on the whole device (64 identical caps: truth 0.77)");
     let rows: Vec<Vec<String>> = timed
         .iter()
         .map(|t| {

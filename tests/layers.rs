@@ -257,6 +257,7 @@ const PASSES: &[(&str, &str)] = &[
     ("capture", "src/bake/capture.rs"),
     ("project", "src/bake/project.rs"),
     ("assemble", "src/bake/assemble.rs"),
+    ("silhouette", "src/bake/silhouette.rs"),
     ("gather", "src/lists/gather.rs"),
     ("merge", "src/merge/mod.rs"),
     ("draw", "src/draw/mod.rs"),

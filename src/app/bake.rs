@@ -2,7 +2,7 @@
 
 use super::context::{Context, on_or_off};
 use super::quality::BakeArguments;
-use super::{Global, output};
+use super::{Global, output, silhouette};
 use crate::asset::Mesh;
 use crate::asset::environment::RADIANCE_LIMIT;
 use crate::bake;
@@ -27,6 +27,10 @@ pub struct Arguments {
     /// colours if it has them. Example: 4,3,2
     #[arg(long, value_name = "R,G,B", value_parser = color, allow_hyphen_values = true)]
     radiance: Option<Vec3>,
+    /// Bake a silhouette field instead: outlines from many directions, for lights that are too small for SH bands. It takes
+    /// --quality of the baking options, for 98, 389 or 1 542 KiB
+    #[arg(long, conflicts_with_all = ["radiance", "symmetry", "faces", "inside"])]
+    silhouette: bool,
     /// Capture only one of the samples that a symmetry of the mesh carries into one another, and turn its coefficients for the
     /// others. This serves symmetric meshes, bodies of revolution and spheres. What is seen moves by at most 0.25 texels
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
@@ -73,6 +77,9 @@ pub(super) fn shining(mesh: Mesh, radiance: Vec3, path: &Path) -> Result<Mesh> {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     output::check_folder(&arguments.output)?;
     output::check_ending(&arguments.output, "sf", "a field file")?;
+    if arguments.silhouette {
+        return silhouette::bake(global, &arguments.mesh, &arguments.output, arguments.bake.quality);
+    }
     let mut mesh = Mesh::load(&arguments.mesh)?;
     let kind = if arguments.radiance.is_some() { FieldKind::Radiance } else { FieldKind::Occlusion };
     if let Some(radiance) = arguments.radiance {

@@ -3,10 +3,12 @@
 use super::bake::{color, shining};
 use super::context::Context;
 use super::sheet::{self, Cell};
-use super::{Global, output};
+use super::{Global, output, silhouette};
 use crate::asset::Mesh;
 use crate::bake::{self, snapshot::snapshot};
 use crate::error::{Error, Result, one_line};
+use crate::field::file;
+use crate::field::silhouette::SILHOUETTE_MAGIC;
 use crate::field::{FieldHeader, FieldKind, Lookup, ShadowField, growth};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
@@ -28,6 +30,9 @@ pub struct Arguments {
     /// Print the field's coefficients at this place, in metres in the mesh's frame. Example: 0,1.5,2
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     at: Option<DVec3>,
+    /// With --at: follow the ray from there in this direction, in the mesh's frame. A silhouette field needs it
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true, requires = "at")]
+    toward: Option<DVec3>,
     /// Write a picture of the cube faces that the coefficients describe, over latitude, longitude and distance
     #[arg(long, value_name = "OUT.png")]
     faces: Option<PathBuf>,
@@ -55,11 +60,31 @@ fn place(text: &str) -> std::result::Result<DVec3, String> {
     }
 }
 
+fn direction(text: &str) -> std::result::Result<DVec3, String> {
+    let toward = place(text)?;
+    if toward.length() > 1e-6 { Ok(toward) } else { Err(format!("expected a direction like 0,1,0.5, got \"{text}\"")) }
+}
+
+/// What to show of a silhouette field: a ray needs a place and a direction.
+fn silhouette(global: &Global, arguments: &Arguments) -> Result<()> {
+    let ray = match (arguments.at, arguments.toward) {
+        (Some(_), None) => return Err(Error::Usage("--at needs --toward X,Y,Z for a silhouette field".into())),
+        (at, toward) => at.zip(toward),
+    };
+    silhouette::inspect(global, &arguments.field, ray, arguments.faces.as_deref())
+}
+
 /// Shows a field.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.faces {
         output::check_folder(path)?;
         output::check_ending(path, "png", "a picture")?;
+    }
+    if file::has_magic(&arguments.field, SILHOUETTE_MAGIC) {
+        return silhouette(global, arguments);
+    }
+    if arguments.toward.is_some() {
+        return Err(Error::Usage("--toward goes with a silhouette field".into()));
     }
     let field = ShadowField::read(&arguments.field)?;
     let header = &field.header;

@@ -12,6 +12,7 @@ mod profile;
 mod quality;
 mod render;
 mod sheet;
+mod silhouette;
 #[cfg(feature = "view")]
 mod view;
 

@@ -118,7 +118,7 @@ impl Capture {
         let [vertex, fragment] = Self::rows(radiance);
         let (vertex, fragment) = (library.shader(&vertex)?, library.shader(&fragment)?);
         let pipeline = |cull| {
-            let state = GraphicsState { color, depth, samples: 1, cull };
+            let state = GraphicsState { color, depth, samples: 1, cull, keeps_largest: false };
             GraphicsPipeline::new(device, "capture", &vertex, &fragment, state)
         };
         Ok(Capture {

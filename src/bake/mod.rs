@@ -20,6 +20,7 @@ pub mod partial;
 pub mod project;
 pub mod report;
 mod samples;
+pub mod silhouette;
 pub mod snapshot;
 pub mod surface;
 pub mod symmetric_samples;

@@ -9,6 +9,7 @@ pub mod draw;
 pub mod gather;
 pub mod merge;
 pub mod project;
+pub mod silhouette;
 pub mod smooth;
 
 use crate::bake::Baker;
@@ -55,10 +56,11 @@ impl CheckRow {
 type Part = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
 /// Every pass, by the one word that names it everywhere.
-pub const PASSES: [(&str, Part); 7] = [
+pub const PASSES: [(&str, Part); 8] = [
     ("capture", capture::rows),
     ("project", project::rows),
     ("assemble", assemble::rows),
+    ("silhouette", silhouette::rows),
     ("gather", gather::rows),
     ("merge", merge::rows),
     ("draw", draw::rows),

@@ -235,7 +235,8 @@ impl Draw {
             if antialias == Antialias::Samples && offered.contains(vk::SampleCountFlags::TYPE_4) { 4 } else { 1 };
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
         let shape = ImageShape { format: color, width, height, samples: 1 };
-        let state = GraphicsState { color, depth: Some(DEPTH), samples, cull: vk::CullModeFlags::NONE };
+        let state =
+            GraphicsState { color, depth: Some(DEPTH), samples, cull: vk::CullModeFlags::NONE, keeps_largest: false };
         let vertex = library.shader(&ShaderPermutation::new("draw.vert", 4))?;
         let fragment =
             library.shader(&ShaderPermutation::new("draw.frag", 4).define("DISPLAY", finish == Finish::Display))?;

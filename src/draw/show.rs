@@ -29,7 +29,13 @@ impl Show {
     /// # Errors
     /// `Failed` when a shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, format: vk::Format, encodes_srgb: bool) -> Result<Self> {
-        let state = GraphicsState { color: format, depth: None, samples: 1, cull: vk::CullModeFlags::NONE };
+        let state = GraphicsState {
+            color: format,
+            depth: None,
+            samples: 1,
+            cull: vk::CullModeFlags::NONE,
+            keeps_largest: false,
+        };
         let vertex = library.shader(&ShaderPermutation::new("show.vert", 4))?;
         let fragment = library.shader(&ShaderPermutation::new("show.frag", 4))?;
         let pipeline = GraphicsPipeline::new(device, "show", &vertex, &fragment, state)?;

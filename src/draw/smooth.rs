@@ -155,7 +155,13 @@ impl Smooth {
     /// # Errors
     /// `Failed` when a shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, shape: ImageShape, display: bool) -> Result<Self> {
-        let state = GraphicsState { color: shape.format, depth: None, samples: 1, cull: vk::CullModeFlags::NONE };
+        let state = GraphicsState {
+            color: shape.format,
+            depth: None,
+            samples: 1,
+            cull: vk::CullModeFlags::NONE,
+            keeps_largest: false,
+        };
         let vertex = library.shader(&ShaderPermutation::new("smooth.vert", 4))?;
         let fragment = library.shader(&Self::fragment(display))?;
         Ok(Smooth {

@@ -9,6 +9,9 @@ pub mod growth;
 pub mod lattice;
 pub mod quantity;
 pub mod shortcuts;
+pub mod silhouette;
+pub mod silhouette_nodes;
+pub mod sub_light;
 mod text;
 
 pub use area::Area;

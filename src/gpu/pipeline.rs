@@ -190,7 +190,7 @@ impl ComputePipeline {
     }
 }
 
-/// Fixed-function state that differs between graphics pipelines. All have filled triangles, no blending, counter-clockwise
+/// Fixed-function state that differs between graphics pipelines. All have filled triangles, counter-clockwise
 /// front faces, and dynamic viewport and scissor.
 #[derive(Clone, Copy, Debug)]
 pub struct GraphicsState {
@@ -202,6 +202,8 @@ pub struct GraphicsState {
     pub samples: u32,
     /// Faces that are not drawn.
     pub cull: vk::CullModeFlags,
+    /// Whether a pixel keeps the largest value that was drawn, channel by channel, rather than the last.
+    pub keeps_largest: bool,
 }
 
 /// A vertex and a fragment shader, ready to draw indexed triangles. Vertex input `location` reads tightly packed floats
@@ -253,8 +255,7 @@ impl GraphicsPipeline {
             .depth_test_enable(state.depth.is_some())
             .depth_write_enable(state.depth.is_some())
             .depth_compare_op(vk::CompareOp::GREATER);
-        let blend_attachments =
-            [vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)];
+        let blend_attachments = [color_blend(state.keeps_largest)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend_attachments);
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
@@ -304,6 +305,15 @@ fn vertex_layout(
         offset: 0,
     };
     (inputs.iter().map(binding).collect(), inputs.iter().map(attribute).collect())
+}
+
+/// How what is drawn meets what the attachment holds: the larger of the two, channel by channel, or the new in place of the old.
+fn color_blend(keeps_largest: bool) -> vk::PipelineColorBlendAttachmentState {
+    vk::PipelineColorBlendAttachmentState::default()
+        .color_write_mask(vk::ColorComponentFlags::RGBA)
+        .blend_enable(keeps_largest)
+        .color_blend_op(vk::BlendOp::MAX)
+        .alpha_blend_op(vk::BlendOp::MAX)
 }
 
 fn attribute_format(components: u32) -> vk::Format {

@@ -1,0 +1,329 @@
+//! Pass "silhouette": an object as parallel light sees it from every node of a grid, reduced to maps of distance and depth.
+//!
+//! Inputs: the mesh in units of its bounding radius around its centre; a [`Frame`] for each map. Output: two bytes a texel and
+//! map, see [`crate::field::silhouette`]. Views of `view_px` are drawn side by side into an atlas of the farthest and the nearest
+//! depth a pixel; two dispatches reduce every view to its map.
+
+use super::capture::unit_positions;
+use super::{Progress, hash_text};
+use crate::asset::mesh::Mesh;
+use crate::error::{Error, Result};
+use crate::field::silhouette::{Frame, REACH, SilhouetteField, SilhouetteHeader, encode};
+use crate::field::silhouette_nodes::NodeGrid;
+use crate::gpu::{
+    Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, GraphicsPipeline, GraphicsState, Image,
+    ImageShape, Target, Timing,
+};
+use crate::shaders::{Library, ShaderPermutation};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec2, DVec3, Vec4};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Edge of the atlas in pixels: 256 views of 128 px, 16 MB.
+const ATLAS_PX: u32 = 2048;
+/// Depth that stands for an uncovered pixel; every depth is above -1.
+const CLEAR: f32 = -4.0;
+/// Invocations of a workgroup: a wave of the widest GPUs.
+const WORKGROUP: u32 = 64;
+
+/// What decides a silhouette field besides the mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SilhouetteOptions {
+    /// Cells along an edge of a cube face of the node grid.
+    pub cells: u32,
+    /// Texels along an edge of a map.
+    pub map_px: u32,
+    /// Pixels along an edge of the view that a map is reduced from.
+    pub view_px: u32,
+}
+
+impl Default for SilhouetteOptions {
+    /// 193 maps of 32 x 32 texels: 392 KiB.
+    fn default() -> Self {
+        SilhouetteOptions { cells: 8, map_px: 32, view_px: 128 }
+    }
+}
+
+/// Header of the silhouette field that a bake of `mesh` would make.
+pub fn silhouette_header(mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteHeader {
+    let (centre, radius_m) = mesh.bounding_sphere();
+    SilhouetteHeader {
+        cells: options.cells,
+        map_px: options.map_px,
+        view_px: options.view_px,
+        centre_m: centre.to_array(),
+        radius_m,
+        mesh: mesh.name.clone(),
+        mesh_hash: hash_text(mesh),
+    }
+}
+
+/// Frames of all maps of a field.
+pub fn frames(mesh: &Mesh, cells: u32) -> Vec<Frame> {
+    let positions: Vec<DVec3> = unit_positions(mesh).iter().map(|p| p.as_dvec3()).collect();
+    let nodes = NodeGrid::new(cells);
+    let maps = (0..NodeGrid::map_count(cells)).into_par_iter();
+    maps.map(|map| Frame::around(nodes.map_direction(map), &positions)).collect()
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct ViewPush {
+    across: [f32; 4],
+    down: [f32; 4],
+    direction: [f32; 4],
+}
+
+impl ViewPush {
+    fn new(frame: &Frame) -> Self {
+        let row = |axis: DVec3, centre: f64, half: f64| (axis / half).extend(-centre / half).as_vec4().to_array();
+        let [a, b] = frame.axes;
+        ViewPush {
+            across: row(a, frame.centre.x, frame.half.x),
+            down: row(b, frame.centre.y, frame.half.y),
+            direction: Vec4::from((frame.direction.as_vec3(), 0.0)).to_array(),
+        }
+    }
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct ReducePush {
+    map_first: u32,
+    map_count: u32,
+}
+
+/// The pipelines, the atlas and the buffers between the steps.
+pub struct Silhouette {
+    view: GraphicsPipeline,
+    columns: ComputePipeline,
+    rows: ComputePipeline,
+    atlas: Image,
+    nearest: Buffer,
+    atlas_columns: u32,
+    map_px: u32,
+    view_px: u32,
+}
+
+/// What the pass reads and writes: the mesh, half edges of all rectangles, and all maps.
+pub struct SilhouetteBuffers {
+    positions: Buffer,
+    indices: Buffer,
+    index_count: u32,
+    halves: Buffer,
+    maps: Buffer,
+}
+
+impl SilhouetteBuffers {
+    /// Uploads a mesh and the rectangles of its maps.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn new(device: &Arc<Device>, mesh: &Mesh, frames: &[Frame], map_px: u32) -> Result<Self> {
+        let positions: Vec<[f32; 3]> = unit_positions(mesh).iter().map(|p| p.to_array()).collect();
+        let halves: Vec<[f32; 2]> = frames.iter().map(|frame| frame.half.as_vec2().to_array()).collect();
+        let bytes = 2 * u64::from(map_px * map_px) * frames.len() as u64;
+        Ok(SilhouetteBuffers {
+            positions: Buffer::with_data(device, "silhouette positions", &positions)?,
+            indices: Buffer::with_data(device, "silhouette indices", &mesh.triangles)?,
+            index_count: 3 * mesh.triangles.len() as u32,
+            halves: Buffer::with_data(device, "silhouette halves", &halves)?,
+            maps: Buffer::new(device, "silhouette maps", BufferKind::Device, bytes)?,
+        })
+    }
+}
+
+impl Silhouette {
+    /// The permutations: vertex, fragment, and the two steps of the reduction.
+    pub fn permutations(map_px: u32, view_px: u32, atlas_columns: u32) -> [ShaderPermutation; 4] {
+        let reduce = |columns: bool| {
+            ShaderPermutation::new("silhouette.comp", 4)
+                .define("COLUMNS", columns)
+                .define("WORKGROUP", WORKGROUP)
+                .define("MAP", map_px)
+                .define("VIEW", view_px)
+                .define("ATLAS_COLUMNS", atlas_columns)
+                .number("CLEAR", CLEAR.into())
+                .number("REACH", REACH)
+        };
+        [
+            ShaderPermutation::new("silhouette.vert", 4),
+            ShaderPermutation::new("silhouette.frag", 4),
+            reduce(true),
+            reduce(false),
+        ]
+    }
+
+    /// The pipelines for maps and views of these edges.
+    ///
+    /// # Errors
+    /// `Input` when a view is larger than the device's images; `Failed` when a shader does not compile.
+    pub fn new(device: &Arc<Device>, library: &Library, map_px: u32, view_px: u32) -> Result<Self> {
+        let most = device.limits.max_image_dimension2_d;
+        if view_px > most {
+            return Err(Error::Input(format!("views of {view_px} px are larger than the device's images ({most} px)")));
+        }
+        let atlas_columns = (ATLAS_PX.min(most) / view_px).max(1);
+        let edge = atlas_columns * view_px;
+        let shape = ImageShape { format: vk::Format::R16G16_SFLOAT, width: edge, height: edge, samples: 1 };
+        let [vertex, fragment, columns, rows] = Self::permutations(map_px, view_px, atlas_columns);
+        let state = GraphicsState {
+            color: shape.format,
+            depth: None,
+            samples: 1,
+            cull: vk::CullModeFlags::NONE,
+            keeps_largest: true,
+        };
+        let (vertex, fragment) = (library.shader(&vertex)?, library.shader(&fragment)?);
+        let reduce = |name, row| ComputePipeline::new(device, name, &library.shader(row)?, &[]);
+        let bytes = 4 * u64::from(atlas_columns * atlas_columns) * u64::from(map_px) * u64::from(2 * view_px - 1);
+        Ok(Silhouette {
+            view: GraphicsPipeline::new(device, "silhouette", &vertex, &fragment, state)?,
+            columns: reduce("silhouette columns", &columns)?,
+            rows: reduce("silhouette rows", &rows)?,
+            atlas: Image::new(device, "silhouette atlas", shape)?,
+            nearest: Buffer::new(device, "silhouette nearest", BufferKind::Device, bytes)?,
+            atlas_columns,
+            map_px,
+            view_px,
+        })
+    }
+
+    /// Views that one render pass holds.
+    pub fn capacity(&self) -> usize {
+        (self.atlas_columns * self.atlas_columns) as usize
+    }
+
+    /// Draws and reduces the maps from `map_first` on, one for each frame, at most [`Silhouette::capacity`]. Between its own steps
+    /// it places its own barriers.
+    ///
+    /// # Errors
+    /// What recording returns.
+    pub fn record<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        buffers: &'r SilhouetteBuffers,
+        frames: &[Frame],
+        map_first: usize,
+    ) -> Result<()> {
+        assert!(frames.len() <= self.capacity(), "{} views in an atlas of {}", frames.len(), self.capacity());
+        let target = Target { color: &self.atlas, clear: Some([CLEAR; 4]), depth: None, resolve: None };
+        commands.image_barrier(&self.atlas, None, Access::ColorWrite);
+        commands.render(&target, |drawing| {
+            drawing.bind(&self.view, &[(&buffers.positions, 0)], &buffers.indices);
+            for (view, frame) in frames.iter().enumerate() {
+                let (view, px) = (view as u32, self.view_px);
+                drawing.area(view % self.atlas_columns * px, view / self.atlas_columns * px, px, px);
+                drawing.push(&ViewPush::new(frame));
+                drawing.indexed(0..buffers.index_count);
+            }
+            Ok(())
+        })?;
+        commands.image_barrier(&self.atlas, Some(Access::ColorWrite), Access::ComputeSampled);
+        let count = frames.len() as u32;
+        let push = ReducePush { map_first: map_first as u32, map_count: count };
+        let resources = [Bind::Image(&self.atlas), Bind::Buffer(&self.nearest)];
+        commands.dispatch(&self.columns, &resources, &push, [count * (2 * self.view_px - 1), 1, 1])?;
+        commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+        let [atlas, nearest] = resources;
+        let resources = [atlas, nearest, Bind::Buffer(&buffers.halves), Bind::Buffer(&buffers.maps)];
+        commands.dispatch(&self.rows, &resources, &push, [count * self.map_px * self.map_px / 2, 1, 1])
+    }
+}
+
+/// Bakes the silhouette field of a mesh on the device; `progress` hears of maps. Returns each batch's timing of the pass too.
+///
+/// # Errors
+/// `Input` when the options are out of range or a view does not fit the device; `Device` when memory ran out.
+pub fn bake_silhouette(
+    (device, library): (&Arc<Device>, &Library),
+    mesh: &Mesh,
+    options: SilhouetteOptions,
+    progress: Progress<'_>,
+) -> Result<(SilhouetteField, Vec<Timing>)> {
+    let header = silhouette_header(mesh, options);
+    header.validate()?;
+    let frames = frames(mesh, options.cells);
+    let pass = Silhouette::new(device, library, options.map_px, options.view_px)?;
+    let buffers = SilhouetteBuffers::new(device, mesh, &frames, options.map_px)?;
+    let (mut done, mut timings) = (0, Vec::new());
+    for batch in frames.chunks(pass.capacity()) {
+        let mut commands = Commands::new(device, "silhouette bake")?;
+        commands.pass("silhouette", |c| pass.record(c, &buffers, batch, done))?;
+        timings.extend(commands.submit()?);
+        done += batch.len();
+        progress(done as u32, frames.len() as u32);
+    }
+    let texels: Vec<u8> = buffers.maps.download(2 * frames.len() * (options.map_px * options.map_px) as usize)?;
+    Ok((SilhouetteField::new(header, joined(&frames, &texels))?, timings))
+}
+
+/// The payload of a field: each map's rectangle before its texels.
+fn joined(frames: &[Frame], texels: &[u8]) -> Vec<u8> {
+    let maps = texels.chunks_exact(texels.len() / frames.len());
+    let rectangle = |frame: &Frame| [frame.centre.x, frame.centre.y, frame.half.x, frame.half.y].map(|n| n as f32);
+    let map = |(frame, texels): (&Frame, &[u8])| {
+        let numbers = rectangle(frame).into_iter().flat_map(f32::to_le_bytes);
+        numbers.chain(texels.iter().copied()).collect::<Vec<u8>>()
+    };
+    frames.iter().zip(maps).flat_map(map).collect()
+}
+
+/// The CPU twin of the pass for one map, in f64 and by plain search: bytes of distance and depth, row by row.
+pub fn silhouette_twin(mesh: &Mesh, frame: &Frame, map_px: u32, view_px: u32) -> Vec<[u8; 2]> {
+    let view = drawn(mesh, frame, view_px as usize);
+    let px = view_px as usize;
+    let pixel = 2.0 * frame.half / px as f64;
+    let mut points = Vec::new();
+    for (y, x) in (0..px).flat_map(|y| (0..px).map(move |x| (y, x))) {
+        for (i, j) in [(1, 0), (0, 1)] {
+            if x + i < px && y + j < px {
+                let (a, b) = (view[y * px + x], view[(y + j) * px + x + i]);
+                let Some((low, high)) = a.xor(b) else { continue };
+                let place = DVec2::new((x + 1) as f64 - 0.5 * j as f64, (y + 1) as f64 - 0.5 * i as f64);
+                points.push((place, (low + high) / 2.0));
+            }
+        }
+    }
+    let texel = |i: u32| {
+        let at = |i: u32| (f64::from(i) + 0.5) * f64::from(view_px) / f64::from(map_px);
+        let place = DVec2::new(at(i % map_px), at(i / map_px));
+        let squared = |p: &DVec2| ((*p - place) * pixel).length_squared();
+        let nearest = points.iter().min_by(|a, b| squared(&a.0).total_cmp(&squared(&b.0)));
+        let around =
+            [-0.25, 0.25].map(|dy| [-0.25, 0.25].map(|dx| (place + DVec2::new(dx, dy)).floor().as_usizevec2()));
+        let inside: i32 = around.iter().flatten().map(|p| if view[p.y * px + p.x].is_some() { 1 } else { -1 }).sum();
+        let distance = nearest.map_or(f64::MAX, |(p, _)| squared(p).sqrt()) * f64::from(inside.signum());
+        [encode(distance, REACH), encode(nearest.map_or(0.0, |(_, depth)| *depth), 1.0)]
+    };
+    (0..map_px * map_px).into_par_iter().map(texel).collect()
+}
+
+/// Nearest and farthest depth of every covered pixel.
+fn drawn(mesh: &Mesh, frame: &Frame, px: usize) -> Vec<Option<(f64, f64)>> {
+    let positions: Vec<DVec3> = unit_positions(mesh).iter().map(|p| p.as_dvec3()).collect();
+    let mut view: Vec<Option<(f64, f64)>> = vec![None; px * px];
+    for triangle in &mesh.triangles {
+        let corners = triangle.map(|i| {
+            let p = positions[i as usize];
+            ((frame.place(p) + 1.0) * 0.5 * px as f64, p.dot(frame.direction))
+        });
+        let [a, b, c] = corners.map(|(place, _)| place);
+        let area = (b - a).perp_dot(c - a);
+        let low = a.min(b).min(c).floor().max(DVec2::ZERO).as_usizevec2();
+        let high = a.max(b).max(c).ceil().min(DVec2::splat(px as f64)).as_usizevec2();
+        for (y, x) in (low.y..high.y).flat_map(|y| (low.x..high.x).map(move |x| (y, x))) {
+            let p = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+            let weights = [(b - p).perp_dot(c - p), (c - p).perp_dot(a - p), (a - p).perp_dot(b - p)].map(|w| w / area);
+            if weights.iter().all(|w| *w >= 0.0) {
+                let depth = corners.iter().zip(weights).map(|((_, depth), w)| depth * w).sum::<f64>();
+                let (least, most) = view[y * px + x].unwrap_or((depth, depth));
+                view[y * px + x] = Some((least.min(depth), most.max(depth)));
+            }
+        }
+    }
+    view
+}

@@ -1,0 +1,279 @@
+//! Silhouette fields: what an object blocks along any ray that passes it, for lights too small for four SH bands.
+//!
+//! Outside an object, what a ray meets depends on the ray alone: on its direction and on its offset from the object's centre. So a
+//! silhouette field has no shells. It holds one map for each direction of a [`NodeGrid`]: the object's outline as parallel light of
+//! that direction sees it. A texel holds the signed distance to the outline, positive inside, and the depth of the outline's nearest
+//! point along the direction. Both are in units of the bounding radius r about the sphere's centre, as all lengths in this file.
+//!
+//! A lookup ([`SilhouetteField::outline`]) blends the four maps around a direction. Each sees an outline point that lies off the
+//! centre's plane at another place, so the depth is read first and the place corrected by it (parallax). How much of a small round
+//! light the outline leaves ([`blocked_share`]) follows from the distance and from how far away the outline's point is.
+
+use super::file;
+use super::silhouette_nodes::NodeGrid;
+use super::sub_light;
+use crate::error::{Error, Result};
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// First bytes of a silhouette field's file.
+pub const SILHOUETTE_MAGIC: [u8; 8] = *b"SHOUTLN\n";
+/// Largest distance from the outline that a map holds, inside or outside, in r.
+pub const REACH: f64 = 0.5;
+/// Room that a map leaves around the object's outline, in r: distances just outside it are met by most lookups.
+pub const MARGIN: f64 = 0.08;
+/// Least distance of an outline from a receiver that a penumbra is computed for, in r.
+const NEAREST: f64 = 0.02;
+
+/// Everything about a silhouette field but its maps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SilhouetteHeader {
+    /// Cells along an edge of a cube face of the [`NodeGrid`], 1 to 64.
+    pub cells: u32,
+    /// Texels along an edge of a map: a power of two, 8 to 256.
+    pub map_px: u32,
+    /// Pixels along an edge of the view that a map is reduced from, a multiple of `map_px`.
+    pub view_px: u32,
+    /// Centre of the bounding sphere in the mesh's own frame, metres.
+    pub centre_m: [f32; 3],
+    /// Radius of the bounding sphere, metres.
+    pub radius_m: f32,
+    /// Name of the mesh, for people.
+    pub mesh: String,
+    /// Content hash of the mesh, hexadecimal.
+    pub mesh_hash: String,
+}
+
+impl SilhouetteHeader {
+    /// Maps that are stored: one for each pair of opposite nodes.
+    pub fn map_count(&self) -> usize {
+        NodeGrid::map_count(self.cells)
+    }
+
+    /// Bytes of one map: four floats of its [`Frame`]'s rectangle, then two bytes a texel.
+    pub fn map_bytes(&self) -> usize {
+        16 + 2 * (self.map_px * self.map_px) as usize
+    }
+
+    /// Bytes of all maps.
+    pub fn payload_bytes(&self) -> usize {
+        self.map_count() * self.map_bytes()
+    }
+
+    /// Checks every number against its range.
+    ///
+    /// # Errors
+    /// `Input` naming the number.
+    pub fn validate(&self) -> Result<()> {
+        let bad = |what: String| Err(Error::Input(what));
+        if !(1..=64).contains(&self.cells) {
+            return bad(format!("{} cells a face, a silhouette field has 1 to 64", self.cells));
+        }
+        if !(8..=256).contains(&self.map_px) || !self.map_px.is_power_of_two() {
+            return bad(format!("maps of {} px, a silhouette field has a power of two from 8 to 256", self.map_px));
+        }
+        if !(self.map_px..=1024).contains(&self.view_px) || !self.view_px.is_multiple_of(self.map_px) {
+            return bad(format!("views of {} px for maps of {} px", self.view_px, self.map_px));
+        }
+        let usable = self.centre_m.iter().all(|c| c.is_finite()) && self.radius_m > 0.0 && self.radius_m.is_finite();
+        if usable { Ok(()) } else { bad("centre or radius is not a usable number".into()) }
+    }
+}
+
+/// Where a map lies: the plane through the sphere's centre at right angles to its direction, and a rectangle in that plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Unit direction of the parallel light.
+    pub direction: DVec3,
+    /// Unit axes of the plane; with the direction a right-handed frame.
+    pub axes: [DVec3; 2],
+    /// Centre of the rectangle along the axes.
+    pub centre: DVec2,
+    /// Half its edges.
+    pub half: DVec2,
+}
+
+impl Frame {
+    /// The frame of a direction whose rectangle encloses all positions, with [`MARGIN`].
+    pub fn around(direction: DVec3, positions: &[DVec3]) -> Self {
+        let axes = Self::axes_of(direction);
+        let places = positions.iter().map(|p| DVec2::new(p.dot(axes[0]), p.dot(axes[1])));
+        let (low, high) = places.fold((DVec2::MAX, DVec2::MIN), |(low, high), p| (low.min(p), high.max(p)));
+        // What is stored is f32, and what was captured must be what is looked up.
+        let stored = |v: DVec2| v.as_vec2().as_dvec2();
+        Frame { direction, axes, centre: stored((low + high) / 2.0), half: stored((high - low) / 2.0 + MARGIN) }
+    }
+
+    fn axes_of(direction: DVec3) -> [DVec3; 2] {
+        let (a, b) = direction.any_orthonormal_pair();
+        [a, b]
+    }
+
+    /// Place of a point on the map, -1 to 1 from edge to edge of the rectangle.
+    pub fn place(&self, point: DVec3) -> DVec2 {
+        (DVec2::new(point.dot(self.axes[0]), point.dot(self.axes[1])) - self.centre) / self.half
+    }
+}
+
+/// What a lookup finds along a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outline {
+    /// Signed distance of the ray from the outline, in r: positive where the ray meets the object.
+    pub distance: f64,
+    /// Depth along the ray's direction of the outline's nearest point, in r from the sphere's centre.
+    pub depth: f64,
+}
+
+/// A silhouette field in host memory.
+#[derive(Clone, Debug)]
+pub struct SilhouetteField {
+    /// Parameters.
+    pub header: SilhouetteHeader,
+    nodes: NodeGrid,
+    frames: Vec<Frame>,
+    payload: Vec<u8>,
+}
+
+/// The byte of a number that lies between -`most` and `most`, rounded to nearest.
+pub fn encode(value: f64, most: f64) -> u8 {
+    ((value / most).clamp(-1.0, 1.0) * 127.0).round() as i8 as u8
+}
+
+/// Inverse of [`encode`].
+pub fn decode(byte: u8, most: f64) -> f64 {
+    f64::from(byte as i8).max(-127.0) / 127.0 * most
+}
+
+impl SilhouetteField {
+    /// A field from its stored bytes: maps in the order of [`NodeGrid::map_direction`], each a rectangle (centre x, y, half x, y as
+    /// little-endian f32) and then texels row by row, a signed byte of distance and one of depth.
+    ///
+    /// # Errors
+    /// `Input` when a number is out of range or the payload has another length.
+    pub fn new(header: SilhouetteHeader, payload: Vec<u8>) -> Result<Self> {
+        header.validate()?;
+        if payload.len() != header.payload_bytes() {
+            let (claimed, found) = (header.payload_bytes(), payload.len());
+            return Err(Error::Input(format!("the header claims {claimed} bytes of maps, {found} are there")));
+        }
+        let nodes = NodeGrid::new(header.cells);
+        let mut frames = Vec::with_capacity(header.map_count());
+        for (index, map) in payload.chunks_exact(header.map_bytes()).enumerate() {
+            let number =
+                |i: usize| f64::from(f32::from_le_bytes(map[4 * i..4 * i + 4].try_into().expect("four bytes")));
+            let (centre, half) = (DVec2::new(number(0), number(1)), DVec2::new(number(2), number(3)));
+            if !(centre.is_finite() && half.is_finite() && half.min_element() > 0.0 && half.max_element() < 4.0) {
+                return Err(Error::Input(format!("the rectangle of map {index} is not usable")));
+            }
+            let direction = nodes.map_direction(index);
+            frames.push(Frame { direction, axes: Frame::axes_of(direction), centre, half });
+        }
+        Ok(SilhouetteField { header, nodes, frames, payload })
+    }
+
+    /// Stored bytes, as [`SilhouetteField::new`] takes them.
+    pub fn payload(&self) -> &[u8] {
+        &self.payload
+    }
+
+    /// Where each map lies.
+    pub fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// Writes the field to an `.sf` file.
+    ///
+    /// # Errors
+    /// As [`file::write()`].
+    pub fn write(&self, path: &Path) -> Result<()> {
+        file::write(path, SILHOUETTE_MAGIC, &self.header, &self.payload)
+    }
+
+    /// Reads an `.sf` file.
+    ///
+    /// # Errors
+    /// As [`file::read`] and [`SilhouetteField::new`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let (header, payload) = file::read(path, SILHOUETTE_MAGIC)?;
+        Self::new(header, payload).map_err(|error| Error::input(path, error))
+    }
+
+    /// Distance and depth of a texel.
+    pub fn texel(&self, map: usize, x: usize, y: usize) -> [f64; 2] {
+        let at = map * self.header.map_bytes() + 16 + 2 * (y * self.header.map_px as usize + x);
+        [decode(self.payload[at], REACH), decode(self.payload[at + 1], 1.0)]
+    }
+
+    /// Distance and depth of a map at a point of the plane, between four texels. Beyond the rectangle, the distance at its rim less
+    /// the way to it.
+    fn sample(&self, map: usize, point: DVec3) -> [f64; 2] {
+        let frame = &self.frames[map];
+        let place = frame.place(point);
+        let within = place.clamp(DVec2::NEG_ONE, DVec2::ONE);
+        let px = self.header.map_px as usize;
+        let at = ((within + 1.0) / 2.0 * px as f64 - 0.5).clamp(DVec2::ZERO, DVec2::splat((px - 1) as f64));
+        let (x, y) = ((at.x as usize).min(px - 2), (at.y as usize).min(px - 2));
+        let (u, v) = (at.x - x as f64, at.y - y as f64);
+        let corner = |i, j| DVec2::from_array(self.texel(map, x + i, y + j));
+        let low = corner(0, 0).lerp(corner(1, 0), u);
+        let high = corner(0, 1).lerp(corner(1, 1), u);
+        let found = low.lerp(high, v);
+        [found.x - ((place - within) * frame.half).length(), found.y]
+    }
+
+    /// The outline near the ray through `point` along the unit vector `direction` (object's frame).
+    pub fn outline(&self, point: DVec3, direction: DVec3) -> Outline {
+        let across = point - point.dot(direction) * direction;
+        let mut found = Outline { distance: 0.0, depth: 0.0 };
+        for corner in self.nodes.around(direction) {
+            let sign = if corner.mirrored { -1.0 } else { 1.0 };
+            let depth = sign * self.sample(corner.map, across)[1];
+            let [distance, depth] = self.sample(corner.map, across + depth * direction);
+            found.distance += corner.weight * distance;
+            found.depth += corner.weight * sign * depth;
+        }
+        found
+    }
+
+    /// Share of a round light that the object blocks, weighed by the cosine to `normal`, as seen from `point`; the light is cut into
+    /// parts as [`sub_light::parts`] says. Arguments as in [`SilhouetteField::blocked`]. Returns what is blocked and the whole.
+    pub fn blocked_light(&self, point: DVec3, normal: DVec3, light: DVec3, angle_rad: f64) -> [f64; 2] {
+        let (direction, distance) = (light.normalize(), light.length());
+        let (a, b) = direction.any_orthonormal_pair();
+        let spread = angle_rad.tan();
+        let mut sums = [0.0, 0.0];
+        for (count, weight) in sub_light::parts(angle_rad).into_iter().filter(|(_, weight)| *weight > 0.0) {
+            for place in sub_light::centres(count) {
+                let toward = (direction + spread * (place.x * a + place.y * b)).normalize();
+                let cosine = weight * toward.dot(normal).max(0.0) / count as f64;
+                sums[0] += cosine * self.blocked(point, toward, distance, angle_rad / (count as f64).sqrt());
+                sums[1] += cosine;
+            }
+        }
+        sums
+    }
+
+    /// Share of a round light that the object blocks, as seen from `point` (object's frame): the light's centre lies in that unit
+    /// direction, `distance` away (in r, infinite for distant light), and its radius spans `angle_rad`.
+    pub fn blocked(&self, point: DVec3, direction: DVec3, distance: f64, angle_rad: f64) -> f64 {
+        let outline = self.outline(point, direction);
+        let away = outline.depth - point.dot(direction);
+        let before_light = fade(distance - away);
+        // An outline behind the receiver blocks nothing.
+        fade(away) * before_light * blocked_share(outline.distance / (away.max(NEAREST) * angle_rad.tan()))
+    }
+}
+
+/// 1 where a length (in r) is positive and 0 where it is negative, with a ramp between that hides the depth's own steps.
+fn fade(length: f64) -> f64 {
+    (length / NEAREST + 0.5).clamp(0.0, 1.0)
+}
+
+/// Area of a unit disc on one side of a straight edge, over pi: `x` is the signed distance of the disc's centre from the edge in
+/// radii, positive on the side that counts.
+pub fn blocked_share(x: f64) -> f64 {
+    let x = x.clamp(-1.0, 1.0);
+    0.5 + (x * (1.0 - x * x).sqrt() + x.asin()) / PI
+}

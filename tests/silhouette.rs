@@ -1,0 +1,198 @@
+//! Silhouette fields: the pass against its twin, a ball against the overlap of two discs, and whole meshes against rays.
+
+#[path = "common/cli.rs"]
+mod cli;
+mod common;
+
+use common::{Gpu, gpu, pot, report};
+use glam::DVec3;
+use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
+use shadow_fields::check::silhouette as check;
+use shadow_fields::field::silhouette::SilhouetteField;
+use shadow_fields::truth::ray_mesh::RayMesh;
+
+fn bake(gpu: &Gpu, mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteField {
+    bake_silhouette((&gpu.device, &gpu.library), mesh, options, &|_, _| ()).unwrap().0
+}
+
+#[test]
+fn maps_are_those_of_the_twin() {
+    let Some(gpu) = gpu() else { return };
+    for mesh in [generate::torus(1.0, 0.3, 24, 12), pot(2), generate::sphere(0.5, 2)] {
+        let share = check::compare(&gpu.baker(), &mesh).unwrap();
+        report(&format!("{}: {share:.5} of the texels are off by more than two steps", mesh.name));
+        assert!(share <= check::OFF_SHARE, "{}: {share}", mesh.name);
+    }
+}
+
+/// Directions over a round light, equal shares of its solid angle.
+fn light_rays(direction: DVec3, angle: f64, count: usize) -> Vec<DVec3> {
+    let (a, b) = direction.any_orthonormal_pair();
+    let place = |i: usize| {
+        let cosine = 1.0 - (1.0 - angle.cos()) * (i as f64 + 0.5) / count as f64;
+        let turn = 2.399963229728653 * i as f64;
+        let sine = (1.0 - cosine * cosine).sqrt();
+        sine * turn.cos() * a + sine * turn.sin() * b + cosine * direction
+    };
+    (0..count).map(place).collect()
+}
+
+#[test]
+fn a_ball_blocks_what_two_discs_have_in_common() {
+    let Some(gpu) = gpu() else { return };
+    let field = bake(&gpu, &generate::sphere(0.5, 5), SilhouetteOptions::default());
+    let mut rng = fastrand::Rng::with_seed(3);
+    for angle_deg in [1.0_f64, 3.0, 8.0, 15.0, 30.0] {
+        let (mut square, mut worst) = (0.0, 0.0_f64);
+        for _ in 0..200 {
+            let axis = DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0)).normalize();
+            let distance = 1.1 + 5.0 * rng.f64();
+            let point = -distance * axis;
+            let (a, _) = axis.any_orthonormal_pair();
+            let ball = (1.0 / distance).asin();
+            let angle = angle_deg.to_radians();
+            let off = (ball + angle) * rng.f64();
+            let toward = (axis * off.cos() + a * off.sin()).normalize();
+            let rays = light_rays(toward, angle, 1000);
+            let exact = rays.iter().filter(|ray| ray.angle_between(axis) < ball).count() as f64 / 1000.0;
+            let [blocked, whole] = field.blocked_light(point, toward, 1e6 * toward, angle);
+            let error = (blocked / whole - exact).abs();
+            square += error * error / 200.0;
+            worst = worst.max(error);
+        }
+        report(&format!("ball, light of {angle_deg} deg: rms {:.4}, worst {worst:.3}", square.sqrt()));
+        // Three sources: maps of 0.07 r a texel under the smallest light, and for the wider ones an outline that is a circle where
+        // a part of the light takes it for a straight line.
+        assert!(square.sqrt() < 0.04 && worst < 0.15, "{angle_deg} deg: rms {:.4}, worst {worst:.3}", square.sqrt());
+    }
+}
+
+/// Share of a light that rays find blocked, weighed by the cosine to +y.
+fn blocked_by_rays(shape: &RayMesh, point: DVec3, toward: DVec3, angle: f64) -> f64 {
+    let (mut blocked, mut whole) = (0.0, 0.0);
+    for ray in light_rays(toward, angle, 256) {
+        let cosine = ray.y.max(0.0);
+        whole += cosine;
+        blocked += if shape.blocks(point.as_vec3().into(), ray.as_vec3().into()) { cosine } else { 0.0 };
+    }
+    blocked / whole
+}
+
+#[test]
+fn shadows_on_a_floor_are_those_of_rays() {
+    const ACROSS: usize = 48;
+    let Some(gpu) = gpu() else { return };
+    for mesh in [pot(4), generate::torus(1.0, 0.3, 48, 24)] {
+        let field = bake(&gpu, &mesh, SilhouetteOptions::default());
+        let shape = RayMesh::new(&mesh);
+        let (centre, radius_m) = mesh.bounding_sphere();
+        let low = mesh.positions.iter().map(|p| p.y).fold(f32::MAX, f32::min);
+        let floor = f64::from((low - centre.y) / radius_m) - 0.02;
+        // Half the SH path's error or less: 0.10, 0.09, 0.074, 0.056 at 1, 3, 8 and 15 degrees.
+        for (angle_deg, limit) in [(1.0_f64, 0.05), (3.0, 0.03), (8.0, 0.02), (15.0, 0.02), (30.0, 0.03)] {
+            let angle = angle_deg.to_radians();
+            let light = DVec3::new(1.5, 3.0, 1.0);
+            let errors = (0..ACROSS * ACROSS).map(|i| {
+                let at = |i: usize| 4.4 * (i as f64 + 0.5) / ACROSS as f64 - 2.2;
+                let point = DVec3::new(at(i % ACROSS), floor, at(i / ACROSS));
+                let [blocked, whole] = field.blocked_light(point, DVec3::Y, light - point, angle);
+                blocked / whole - blocked_by_rays(&shape, point, (light - point).normalize(), angle)
+            });
+            let rms = (errors.map(|e| e * e).sum::<f64>() / (ACROSS * ACROSS) as f64).sqrt();
+            report(&format!("{} over a floor, light of {angle_deg} deg: rms {rms:.4}", mesh.name));
+            assert!(rms < limit, "{} under {angle_deg} deg: {rms}", mesh.name);
+        }
+    }
+}
+
+#[test]
+fn what_lies_behind_the_receiver_or_the_light_blocks_nothing() {
+    let Some(gpu) = gpu() else { return };
+    let field = bake(&gpu, &generate::sphere(0.5, 4), SilhouetteOptions { cells: 4, map_px: 16, view_px: 64 });
+    let toward = DVec3::new(0.3, 0.9, 0.2).normalize();
+    let angle = 2.0_f64.to_radians();
+    let blocked = |from: f64, light: f64| field.blocked(from * toward, toward, light, angle);
+    assert_eq!(blocked(-3.0, 10.0), 1.0, "the ball stands before the light");
+    assert_eq!(blocked(3.0, 10.0), 0.0, "the ball stands behind the receiver");
+    assert_eq!(blocked(-3.0, 1.5), 0.0, "the ball stands behind the light");
+    // As the light passes the outline's plane, what is blocked changes without a step.
+    let mut before = blocked(-3.0, 2.9);
+    for i in 1..=200 {
+        let now = blocked(-3.0, 2.9 + 1e-3 * f64::from(i));
+        assert!((now - before).abs() < 0.1, "a step of {} at {i}", now - before);
+        before = now;
+    }
+    assert_eq!(before, 1.0);
+}
+
+#[test]
+fn a_file_keeps_everything_and_damage_is_told() {
+    let Some(gpu) = gpu() else { return };
+    let field = bake(&gpu, &pot(2), SilhouetteOptions { cells: 2, map_px: 8, view_px: 32 });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pot.sf");
+    field.write(&path).unwrap();
+    let read = SilhouetteField::read(&path).unwrap();
+    assert_eq!((&read.header, read.payload()), (&field.header, field.payload()));
+    assert_eq!(read.frames(), field.frames());
+    let bytes = std::fs::read(&path).unwrap();
+    for (what, damaged) in [
+        ("cut", bytes[..bytes.len() - 7].to_vec()),
+        ("altered", bytes.iter().enumerate().map(|(i, b)| if i == bytes.len() / 2 { b ^ 1 } else { *b }).collect()),
+        ("empty", Vec::new()),
+    ] {
+        std::fs::write(&path, &damaged).unwrap();
+        let error = SilhouetteField::read(&path).unwrap_err();
+        assert_eq!(error.exit_code(), 4, "{what}: {error}");
+    }
+    let mut header = field.header.clone();
+    header.cells = 3;
+    assert!(SilhouetteField::new(header.clone(), field.payload().to_vec()).is_err(), "maps are missing");
+    header.cells = u32::MAX;
+    assert!(SilhouetteField::new(header, field.payload().to_vec()).is_err(), "cells are out of range");
+}
+
+#[test]
+fn odd_meshes_give_finite_fields() {
+    let Some(gpu) = gpu() else { return };
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(glam::Vec3::from_array).to_vec();
+    let triangle = Mesh::new("triangle", corners, Vec::new(), None, vec![[0, 1, 2]]).unwrap();
+    for mesh in [triangle, generate::plane(1.0, 1)] {
+        let field = bake(&gpu, &mesh, SilhouetteOptions { cells: 3, map_px: 8, view_px: 32 });
+        let mut rng = fastrand::Rng::with_seed(1);
+        for _ in 0..2000 {
+            let mut point = || DVec3::from_array([0; 3].map(|_| 6.0 * rng.f64() - 3.0));
+            let (from, light) = (point(), 3.0 * point());
+            let angle = rng.f64() * 1.2;
+            let [blocked, whole] = field.blocked_light(from, DVec3::Y, light, angle);
+            assert!(blocked.is_finite() && blocked >= 0.0 && blocked <= whole + 1e-12, "{blocked} of {whole}");
+        }
+    }
+}
+
+#[test]
+fn the_program_bakes_and_shows_silhouettes() {
+    if !cli::has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("t.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+        .unwrap();
+    let ran = cli::good(folder, &["bake", "t.obj", "-o", "t.sf", "--silhouette", "--quality", "draft"]);
+    assert!(ran.stdout.starts_with("t.sf: 49 maps of 32x32, 4 triangles, "), "{}", ran.stdout);
+    let ray = ["inspect", "t.sf", "--json", "--at", "0.1,0.1,-2", "--toward", "0,0,1", "--faces", "maps.png"];
+    let shown: serde_json::Value = serde_json::from_str(&cli::good(folder, &ray).stdout).unwrap();
+    let number = |name: &str| shown["at"][name].as_f64().unwrap();
+    // The ray passes 0.1 m inside the two edges that meet in the corner at the origin.
+    assert!((number("outline_distance_m") - 0.1).abs() < 0.03, "{shown}");
+    assert!((number("outline_along_ray_m") - 2.0).abs() < 0.2, "{shown}");
+    assert_eq!(shown["maps"], 49);
+    assert!(std::fs::read(folder.join("maps.png")).unwrap().starts_with(b"\x89PNG"));
+    let bad = [(vec!["--at", "0,0,0"], "--toward"), (vec!["--toward", "0,0,1"], "--at")];
+    for (more, named) in bad {
+        let ran = cli::finish(&mut cli::command(folder, &[&["inspect", "t.sf"][..], &more].concat()));
+        assert!(ran.code == 2 && ran.stderr.contains(named), "{more:?}: {} {}", ran.code, ran.stderr);
+    }
+}

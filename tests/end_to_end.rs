@@ -345,8 +345,8 @@ fn errors_are_shown_in_false_colour() {
     assert!(blurred["rms"].as_f64().unwrap() > 1.2 * rms, "{blurred} against {rms}");
     for (arguments, words) in [
         (&["--error", "e.png", "--reference"][..], "cannot be used with"),
-        (&["--error", "e.png", "--error-limit", "0"], "no number above 0"),
-        (&["--error", "e.png", "--error-scheme", "loud"], "signed or absolute"),
+        (&["--error", "e.png", "--error-limit", "0"], "expected a number above 0"),
+        (&["--error", "e.png", "--error-scheme", "loud"], "possible values: signed, absolute"),
     ] {
         let ran = finish(&mut command(folder, &small(&[&["render", SCENE, "-o", "q.png"], arguments].concat())));
         assert!(ran.code == 2 && ran.stderr.contains(words), "{arguments:?}: {}", ran.stderr);

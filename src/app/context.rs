@@ -27,25 +27,25 @@ pub struct Global {
     /// Run under the Khronos validation layer; any message makes the run fail
     #[arg(long, global = true, default_value = "off", value_name = "MODE")]
     pub validation: Validation,
-    /// Seed of everything random
+    /// Seed of all random numbers
     #[arg(long, global = true, default_value_t = 1)]
     pub seed: u64,
     /// Print results as JSON
     #[arg(long, global = true)]
     pub json: bool,
-    /// Nothing on stderr but errors
+    /// Print nothing but errors on stderr
     #[arg(short, long, global = true)]
     pub quiet: bool,
-    /// More log lines on stderr; twice for all
+    /// Print more log lines on stderr; give it twice for all
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// No progress bars
+    /// Show no progress bars
     #[arg(long, global = true)]
     pub no_progress: bool,
     /// Folder for baked fields and compiled shaders; default: shadow-fields in the XDG cache folder
     #[arg(long, global = true, value_name = "DIR")]
     pub cache_dir: Option<PathBuf>,
-    /// Keep and use nothing on disk
+    /// Neither read nor write a cache on disk
     #[arg(long, global = true)]
     pub no_cache: bool,
     /// Folder whose shader files are used instead of the built-in ones of the same name
@@ -57,7 +57,8 @@ pub struct Global {
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "Merging")]
 pub struct MergeArguments {
-    /// Shader variant: storage, storage-uniform, texel, texel-packed or texel-shifted, or image, whose sampler interpolates less exactly; default: of the former what was measured to be the device's fastest, after a first run
+    /// Variant of the merge shader: storage, storage-uniform, texel, texel-packed, texel-shifted or image. All compute the same, but
+    /// the sampler of image interpolates less exactly. Default: the fastest of the others on this device, as the first run measures
     #[arg(long, value_name = "NAME", value_parser = Variant::named)]
     pub variant: Option<Variant>,
     /// Work to leave out: all, none, or a list of horizon, cones, behind, caps, unmoved, hidden. Horizon and cones leave out what
@@ -66,14 +67,14 @@ pub struct MergeArguments {
     /// The others change nothing that is shown: hidden leaves unlit what the camera cannot see while things move
     #[arg(long, default_value = "all", value_name = "all|none|LIST")]
     pub skip: Skip,
-    /// Leave out light and shadow that is bounded below this share of white, a vertex and entity; 0 leaves none out
+    /// Leave out an entity's light or shadow on a vertex where it is bounded below this share of white; 0 leaves out nothing
     #[arg(long, default_value_t = EPS, value_name = "SHARE", value_parser = eps, allow_negative_numbers = true)]
     pub eps: f32,
-    /// Where the lists of what concerns each cluster of vertices are made, with the same outcome; default: device, but host
-    /// for fewer than 128 entities on a software device
+    /// Where the lists of the entities that concern each cluster of vertices are made. Default: device, but host for fewer than 128
+    /// entities on a software device
     #[arg(long, value_name = "WHERE")]
     pub lists: Option<Place>,
-    /// Whether a chain of occluders is kept from growing
+    /// Whether a product with an occluder is kept from making the transfer vector longer
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
     pub guard: bool,
 }

@@ -31,16 +31,16 @@ pub struct Arguments {
     /// Vertices of the made-up merge
     #[arg(long, default_value_t = 65_536, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=4_194_304))]
     grid: u32,
-    /// Turned occluders that each of its vertices meets; several numbers with commas
+    /// Occluders that each vertex of the made-up merge meets; several numbers with commas
     #[arg(long, default_value = "4,16", value_delimiter = ',', value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     occluders: Vec<u32>,
-    /// Time one variant only; an unknown name lists them
+    /// Time only this variant of the merge shader; an unknown name lists them
     #[arg(long, value_name = "NAME", conflicts_with = "compare")]
     variant: Option<String>,
-    /// Time two variants in turns, and their ratio
+    /// Time two variants in turns, and print the ratio of their times
     #[arg(long, num_args = 2, value_names = ["A", "B"])]
     compare: Option<Vec<String>>,
-    /// Timed runs of each, after one to warm up
+    /// Number of timed runs of each, after one that warms up
     #[arg(long, default_value_t = 15, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
     /// Write the variants' SPIR-V into this folder, as words and as text

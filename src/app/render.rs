@@ -29,10 +29,10 @@ pub struct Arguments {
     /// Also write linear f32 radiance: of every picture when the name has a run of #, else of the last
     #[arg(long, value_name = "P.exr")]
     exr: Option<PathBuf>,
-    /// Pictures of an animation
+    /// Number of pictures
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
-    /// Pictures a second of scene time; what is shown depends on the time alone, not on this
+    /// Pictures per second of scene time
     #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
     fps: u16,
     /// Scene time of the first picture, seconds; default: the scene's, which is 0 unless it says otherwise
@@ -41,29 +41,29 @@ pub struct Arguments {
     /// Size of the picture; default: the scene's
     #[arg(long, value_parser = size, value_name = "WxH")]
     size: Option<[u32; 2]>,
-    /// Also write a row a lit vertex: entity, position, normal (world), linear radiosity without emission
+    /// Also write one row for each lit vertex: entity, position (m) and normal in the world, linear radiosity without emission
     #[arg(long, value_name = "V.csv")]
     vertices: Option<PathBuf>,
-    /// Also write times and counts
+    /// Also write times (ms) and counts
     #[arg(long, value_name = "S.json")]
     stats: Option<PathBuf>,
-    /// Light by ray casting instead of shadow fields: slow, and what the fields are judged by
+    /// Light by ray casting instead of shadow fields. This is slow, and it is the truth that errors are measured against
     #[arg(long, group = "judge")]
     reference: bool,
     /// Also write the error of the last picture's vertices against ray casting in false colour, with a scale bar
     #[arg(long, value_name = "E.png", group = "judge", conflicts_with = "reference")]
     error: Option<PathBuf>,
-    /// With --error: blue too dark and red too bright, or dark right and light wrong
+    /// Colours of --error: signed shows too dark in blue and too bright in red, absolute shows the size of the error
     #[arg(long, default_value = "signed", value_name = "SCHEME", requires = "error")]
     error_scheme: Scheme,
     /// With --error: the error with the last colour, relative to the root mean square of the radiosity; default: the 99th
     /// percentile, rounded up
     #[arg(long, value_name = "X", value_parser = positive, requires = "error", allow_negative_numbers = true)]
     error_limit: Option<f64>,
-    /// With --reference or --error: rays a vertex for the sky and for each light
+    /// With --reference or --error: rays per vertex for the sky and for each light
     #[arg(long, default_value_t = 1024, value_name = "N", requires = "judge", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
     rays: u32,
-    /// How stairs along edges are smoothed: four samples a pixel, outlines and creases alone (quick on a software device), or not
+    /// How edges are smoothed: by four samples a pixel, by redrawing outlines and creases (faster on a software device), or not at all
     #[arg(long, default_value = "samples", value_name = "HOW")]
     antialias: Antialias,
     #[command(flatten)]

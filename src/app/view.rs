@@ -39,11 +39,11 @@ pub struct Arguments {
     /// Size of the window in pixels; default: the scene's
     #[arg(long, value_parser = size, value_name = "WxH")]
     size: Option<[u32; 2]>,
-    /// When finished frames are shown
+    /// Vulkan present mode: when a finished frame is shown
     #[arg(long, default_value = "fifo", value_name = "MODE")]
     present_mode: PresentMode,
-    /// How stairs along edges are smoothed: four samples a pixel (default on a GPU), outlines and creases alone (default on a
-    /// software device), or not
+    /// How edges are smoothed: by four samples a pixel (default on a GPU), by redrawing outlines and creases (default on a software
+    /// device), or not at all
     #[arg(long, value_name = "HOW")]
     antialias: Option<Antialias>,
     /// Start with the motion paused

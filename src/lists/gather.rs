@@ -59,8 +59,8 @@ pub enum Place {
 }
 
 impl Place {
-    /// Where lists are made unless somebody says otherwise. On software the device makes them from 128 entities on, where it takes
-    /// less time than the host's cores.
+    /// Where lists are made by default: on the device, but on the host for fewer than 128 entities on a software device, which takes
+    /// longer than the host's cores to make so few (`bench scaling --axis entities`).
     pub fn quicker(device: &Device, entity_count: usize) -> Self {
         if device.info.is_software() && entity_count < 128 { Place::Host } else { Place::Device }
     }

@@ -17,7 +17,7 @@ use ash::vk;
 pub struct Variant {
     /// Name on the command line.
     pub name: &'static str,
-    /// Everything but steps and clusters is read through texel views rather than storage blocks.
+    /// Everything but list entries and clusters is read through texel views rather than storage blocks.
     pub texel: bool,
     /// Entities are a uniform block; otherwise a storage block or texels like the rest.
     pub uniform: bool,
@@ -30,9 +30,9 @@ pub struct Variant {
     pub image: bool,
 }
 
-/// Every variant, each because it is the fastest of a driver or what a scene falls back to: storage blocks for GPUs, with a uniform block
-/// where the entities fit; texels and their packed and shifted halves for llvmpipe and SwiftShader; the image took 0.88 of the time of
-/// texel-packed on Mesa 25. `bench/MEASURED.md` has what lost.
+/// Every variant. A GPU reads storage blocks, and a uniform block where the entities fit into one. llvmpipe and SwiftShader read texels
+/// faster, and halves best where they are packed or decoded by shifts; which is best depends on the version. The image is the fastest
+/// on Mesa 25, at the cost of the sampler's precision. `bench/MEASURED.md` has the times.
 pub const VARIANTS: &[Variant] = &[
     Variant { name: "storage", ..STORAGE },
     Variant { name: "storage-uniform", uniform: true, ..STORAGE },

@@ -169,21 +169,6 @@ fn pair_up(entries: &[Entry]) -> (Vec<Pair>, Vec<(u8, f64)>) {
 
 /// Eigenvalues, ascending, of a symmetric row-major matrix, by cyclic Jacobi rotations (to about 1e-14 of the largest).
 pub fn eigenvalues(matrix: &[f64]) -> Vec<f64> {
-    let mut values = diagonalise(matrix, &mut []);
-    values.sort_by(f64::total_cmp);
-    values
-}
-
-/// Eigenvalues of a symmetric row-major matrix as [`eigenvalues`], in no order, and its eigenvectors, of unit length: vector k is
-/// column k of a row-major matrix.
-pub fn eigenvectors(matrix: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let n = matrix.len().isqrt();
-    let mut vectors: Vec<f64> = (0..n * n).map(|i| f64::from(u8::from(i / n == i % n))).collect();
-    (diagonalise(matrix, &mut vectors), vectors)
-}
-
-/// The diagonal after Jacobi rotations; the rotations are multiplied into `vectors`, of as many columns, from the right.
-fn diagonalise(matrix: &[f64], vectors: &mut [f64]) -> Vec<f64> {
     let n = matrix.len().isqrt();
     assert_eq!(n * n, matrix.len(), "the matrix must be square");
     let mut a = matrix.to_vec();
@@ -196,15 +181,17 @@ fn diagonalise(matrix: &[f64], vectors: &mut [f64]) -> Vec<f64> {
         }
         for p in 0..n {
             for q in p + 1..n {
-                rotate_away(&mut a, n, [p, q], vectors);
+                rotate_away(&mut a, n, [p, q]);
             }
         }
     }
-    (0..n).map(|i| a[i * n + i]).collect()
+    let mut values: Vec<f64> = (0..n).map(|i| a[i * n + i]).collect();
+    values.sort_by(f64::total_cmp);
+    values
 }
 
 /// One Jacobi rotation: makes a_pq zero.
-fn rotate_away(a: &mut [f64], n: usize, [p, q]: [usize; 2], vectors: &mut [f64]) {
+fn rotate_away(a: &mut [f64], n: usize, [p, q]: [usize; 2]) {
     let off = a[p * n + q];
     if off == 0.0 {
         return;
@@ -213,13 +200,9 @@ fn rotate_away(a: &mut [f64], n: usize, [p, q]: [usize; 2], vectors: &mut [f64])
     let tan = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
     let cos = 1.0 / (tan * tan + 1.0).sqrt();
     let sin = tan * cos;
-    let columns = |of: &mut [f64]| {
-        for row in of.chunks_exact_mut(n) {
-            (row[p], row[q]) = (cos * row[p] - sin * row[q], sin * row[p] + cos * row[q]);
-        }
-    };
-    columns(a);
-    columns(vectors);
+    for row in a.chunks_exact_mut(n) {
+        (row[p], row[q]) = (cos * row[p] - sin * row[q], sin * row[p] + cos * row[q]);
+    }
     for k in 0..n {
         let (pk, qk) = (a[p * n + k], a[q * n + k]);
         (a[p * n + k], a[q * n + k]) = (cos * pk - sin * qk, sin * pk + cos * qk);

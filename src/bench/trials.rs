@@ -107,7 +107,7 @@ pub(super) fn entity(mesh: &str, more: &str) -> String {
 /// All trials; chains of occluders of up to `longest`.
 ///
 /// # Errors
-/// None that a test does not show.
+/// `Input` when a scene of this function is malformed; tests run it.
 pub fn cases(longest: usize) -> Result<Vec<TrialCase>> {
     let mut out = Vec::new();
     let mut add = |name: String, scene: Scene| out.push(TrialCase { name, scene });

@@ -154,7 +154,7 @@ impl SceneBounds {
     }
 
     /// The key by which the occluders of a receiver are ordered, near to far from the centre of its bounding sphere: products
-    /// truncated in another order differ (by up to .006 over twelve occluders), which would show as seams, so there is one order
+    /// truncated in another order differ (by up to 0.006 over twelve occluders), which would show as seams, so there is one order
     /// for a whole receiver. Equal distances go by index.
     pub fn order(&self, receiver: u32, occluder: u32) -> (u32, u32) {
         let [[x, y, z, _], [cx, cy, cz, _]] = [occluder, receiver].map(|i| self.spheres[i as usize]);

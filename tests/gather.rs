@@ -8,7 +8,7 @@ mod stage;
 
 use common::report;
 use shadow_fields::check::gather::Crowded;
-use shadow_fields::frame::{FrameTarget, Options, record};
+use shadow_fields::frame::{Options, PictureTarget, record};
 use shadow_fields::gpu::{Commands, FLIGHTS};
 use shadow_fields::layout::{Cluster, ENTRY_ENTITIES, ListEntry};
 use shadow_fields::lists::gather::{
@@ -260,7 +260,7 @@ fn a_crowd_is_gathered_in_a_window() {
         frame.prepare_light(&placements, &[]).unwrap();
         let mut commands = Commands::new(device, "frame").unwrap();
         commands.after_flights();
-        record(&mut commands, frame.merge_work().unwrap().as_ref(), None, FrameTarget::Device).unwrap();
+        record(&mut commands, frame.merge_work().unwrap().as_ref(), None, PictureTarget::Device).unwrap();
         flights.push_back(commands.launch().unwrap());
         device.settle();
         let light = frame.radiosity(100).unwrap();

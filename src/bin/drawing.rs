@@ -121,7 +121,7 @@ fn drawing() -> Result<String> {
     let subject = Subject::new()?;
     let corners = subject.corners();
     let sample = &corners[0].captured;
-    let mut svg = Drawing::new(960, 620);
+    let mut svg = Figure::new(960, 620);
     stage(&mut svg, &subject, &corners);
     cube_map(&mut svg, sample);
 
@@ -148,7 +148,7 @@ fn drawing() -> Result<String> {
 }
 
 /// The left part: shells, sample points, object, floor and receiver.
-fn stage(svg: &mut Drawing, subject: &Subject, corners: &[Corner]) {
+fn stage(svg: &mut Figure, subject: &Subject, corners: &[Corner]) {
     let [left, top, width, height] = STAGE;
     svg.text([20.0, 40.0], "h", "1  Sample points on shells around an object");
     svg.line(&format!(r#"<clipPath id="c"><rect x="{left}" y="{top}" width="{width}" height="{height}"/></clipPath>"#));
@@ -199,7 +199,7 @@ fn stage(svg: &mut Drawing, subject: &Subject, corners: &[Corner]) {
 }
 
 /// The triangles that face the viewer, shaded by how much they do; far ones first.
-fn teapot(svg: &mut Drawing, subject: &Subject) {
+fn teapot(svg: &mut Figure, subject: &Subject) {
     let mut facing: Vec<(f64, usize, [DVec2; 3])> = Vec::new();
     for triangle in &subject.triangles {
         let [a, b, c] = triangle.map(|i| subject.positions[i as usize].as_dvec3());
@@ -224,7 +224,7 @@ fn teapot(svg: &mut Drawing, subject: &Subject) {
 }
 
 /// The sample points that lie in the plane of the drawing, as one path of round dots.
-fn samples(svg: &mut Drawing, lattice: &Lattice) {
+fn samples(svg: &mut Figure, lattice: &Lattice) {
     let [left, top, width, height] = STAGE;
     let mut path = String::new();
     for sample in 0..lattice.sample_count() {
@@ -242,7 +242,7 @@ fn samples(svg: &mut Drawing, lattice: &Lattice) {
 }
 
 /// Six faces unfolded to a cross; covered texels dark.
-fn cube_map(svg: &mut Drawing, captured: &Captured) {
+fn cube_map(svg: &mut Figure, captured: &Captured) {
     const FACE: f64 = 80.0;
     let places = [(2.0, 1.0), (0.0, 1.0), (1.0, 0.0), (1.0, 2.0), (1.0, 1.0), (3.0, 1.0)];
     let names = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
@@ -282,15 +282,15 @@ fn at(position: DVec3) -> DVec2 {
 }
 
 /// The file as it is written.
-struct Drawing(String);
+struct Figure(String);
 
 /// Step from bar to bar and height of a coefficient of 1, px.
 const BAR_STEP: f64 = 20.0;
 const BAR_UNIT: f64 = 190.0;
 
-impl Drawing {
+impl Figure {
     fn new(width: u32, height: u32) -> Self {
-        let mut svg = Drawing(String::new());
+        let mut svg = Figure(String::new());
         svg.line(&format!(
             r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="system-ui, 'Segoe UI', Helvetica, Arial, 'DejaVu Sans', sans-serif">"#
         ));

@@ -44,7 +44,7 @@ use sky::SkyLight;
 use std::sync::Arc;
 use work::ClusterWork;
 
-pub use record::{FrameTarget, MergeWork, PictureWork, record};
+pub use record::{MergeWork, PictureTarget, PictureWork, record};
 pub use viewport::{RadiositySource, Viewport};
 
 /// What decides a frame besides the scene.
@@ -207,8 +207,8 @@ impl Frame {
         picture: Option<&PictureWork<'f>>,
         reads: bool,
     ) -> Result<Vec<Timing>> {
-        let host = FrameTarget::Host { picture: self.shown(), readback: &self.picture.readback };
-        let target = if reads && picture.is_some() { host } else { FrameTarget::Device };
+        let host = PictureTarget::Host { picture: self.shown(), readback: &self.picture.readback };
+        let target = if reads && picture.is_some() { host } else { PictureTarget::Device };
         let mut commands = Commands::new(&self.device, "frame")?;
         record(&mut commands, merge, picture, target)?;
         commands.submit()

@@ -33,7 +33,7 @@ pub struct PictureWork<'f> {
 }
 
 /// Where the picture goes once it is drawn.
-pub enum FrameTarget<'t, 'f> {
+pub enum PictureTarget<'t, 'f> {
     /// It stays on the device, where a fragment shader may read it.
     Device,
     /// Into a buffer that the host reads.
@@ -68,9 +68,9 @@ pub fn record<'f>(
     commands: &mut Commands<'f>,
     merge: Option<&MergeWork<'f>>,
     picture: Option<&PictureWork<'f>>,
-    target: FrameTarget<'_, 'f>,
+    target: PictureTarget<'_, 'f>,
 ) -> Result<()> {
-    if matches!(target, FrameTarget::Screen { .. }) {
+    if matches!(target, PictureTarget::Screen { .. }) {
         // The frame before may be under way, and uses the same buffers and images.
         commands.after_flights();
     }
@@ -102,19 +102,19 @@ pub fn record<'f>(
             commands.pass("smooth", |c| smooth.record(c, (&draw.picture, &draw.depth), lines, viewports))?;
         }
         let reader =
-            if matches!(target, FrameTarget::Host { .. }) { Access::TransferRead } else { Access::FragmentSampled };
+            if matches!(target, PictureTarget::Host { .. }) { Access::TransferRead } else { Access::FragmentSampled };
         commands.image_barrier(draw.finished(), Some(Access::ColorWrite), reader);
     }
     match target {
-        FrameTarget::Device => {}
-        FrameTarget::Host { picture, readback } => {
+        PictureTarget::Device => {}
+        PictureTarget::Host { picture, readback } => {
             commands.pass("read back", |c| {
                 c.copy_image(picture, readback);
                 Ok(())
             })?;
             commands.barrier(Access::TransferWrite, Access::HostRead);
         }
-        FrameTarget::Screen { image, clear, show, next } => {
+        PictureTarget::Screen { image, clear, show, next } => {
             commands.image_barrier(image, None, Access::ColorWrite);
             let color = gpu::Target { color: image, clear: Some(clear), depth: None, resolve: None };
             commands.pass("show", |c| c.render(&color, show))?;

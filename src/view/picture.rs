@@ -84,7 +84,7 @@ impl Viewer {
         let merge = frame.filter(|_| light).map_or(Ok(None), |frame| frame.merge_work())?;
         let picture = frame.filter(|_| draws).map(|frame| frame.picture_work(&placements, white));
         let mut overlay = Some(overlay);
-        let screen = frame::FrameTarget::Screen {
+        let screen = frame::PictureTarget::Screen {
             image: target,
             clear: [0.02, 0.02, 0.025, 1.0],
             show: &mut |drawing| {

@@ -65,8 +65,9 @@ impl Shader {
     /// `Failed` with the compiler's messages, or when an include is missing.
     pub fn compile(source: &ShaderSource<'_>, cache_dir: Option<&Path>) -> Result<Self> {
         let includes = gather(source)?;
-        let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{}.spv", key(source, &includes))));
-        let cached = path.as_ref().and_then(|path| std::fs::read(path).ok()).and_then(|bytes| words(&bytes));
+        let key = key(source, &includes);
+        let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{key}.spv")));
+        let cached = path.as_ref().and_then(|path| std::fs::read(path).ok()).and_then(|bytes| words(&key, &bytes));
         let shader = |spirv: Vec<u32>| -> Result<Self> {
             let reflection = Reflection::new(&spirv).map_err(|error| error.context(source.name))?;
             Ok(Shader { name: source.name.to_owned(), stage: source.stage, spirv, reflection })
@@ -77,7 +78,7 @@ impl Shader {
         }
         let spirv = compile(source, &includes)?;
         if let Some(path) = path
-            && let Err(error) = crate::files::replace(&path, &seal(&spirv))
+            && let Err(error) = crate::files::replace(&path, &seal(&key, &spirv))
         {
             log::warn!("{}: the compiled shader was not saved: {error}", path.display());
         }
@@ -170,18 +171,25 @@ fn compile(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> Re
     Ok(artifact.as_binary().to_vec())
 }
 
-/// Content of a cache file: a hash, then the words, so that a damaged file never reaches a driver.
-fn seal(spirv: &[u32]) -> Vec<u8> {
+/// Content of a cache file: a hash of the key and the words, then the words. Neither a damaged file nor one that was copied over
+/// another reaches a driver.
+fn seal(key: &str, spirv: &[u32]) -> Vec<u8> {
     let bytes: &[u8] = bytemuck::cast_slice(spirv);
-    let mut out = blake3::hash(bytes).as_bytes().to_vec();
+    let mut out = hash(key, bytes).as_bytes().to_vec();
     out.extend_from_slice(bytes);
     out
 }
 
-fn words(sealed: &[u8]) -> Option<Vec<u32>> {
-    let (hash, bytes) = sealed.split_at_checked(32)?;
-    (blake3::hash(bytes).as_bytes() == hash && bytes.len() % 4 == 0)
+/// The words of a cache file; `None` if it was not sealed with this key.
+fn words(key: &str, sealed: &[u8]) -> Option<Vec<u32>> {
+    let (sealed_hash, bytes) = sealed.split_at_checked(32)?;
+    (hash(key, bytes).as_bytes() == sealed_hash && bytes.len() % 4 == 0)
         .then(|| bytes.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes"))).collect())
+}
+
+/// All keys have the same length, so that no other key and words give the same hash.
+fn hash(key: &str, bytes: &[u8]) -> blake3::Hash {
+    blake3::Hasher::new().update(key.as_bytes()).update(bytes).finalize()
 }
 
 #[cfg(test)]
@@ -220,6 +228,26 @@ mod tests {
             std::fs::write(&file, bytes).unwrap();
         }
         assert_eq!(compile(&one, &b("3")), first, "a damaged entry is not used");
+    }
+
+    #[test]
+    fn cache_files_that_were_swapped_are_compiled_anew_and_healed() {
+        let folder = tempfile::tempdir().unwrap();
+        let include = |_: &str| Some("const float A = 1.0;\n".to_owned());
+        let compile = |value: &str| {
+            let defines = [("B".to_owned(), value.to_owned())];
+            Shader::compile(&source(&include, &defines), Some(folder.path())).unwrap().spirv
+        };
+        let compiled = ["3", "4"].map(compile);
+        assert_ne!(compiled[0], compiled[1]);
+        let files = std::fs::read_dir(folder.path().join("spirv")).unwrap().map(|file| file.unwrap().path());
+        let [one, two] = files.collect::<Vec<_>>().try_into().unwrap();
+        let read = || [&one, &two].map(|path| std::fs::read(path).unwrap());
+        let good = read();
+        std::fs::write(&one, &good[1]).unwrap();
+        std::fs::write(&two, &good[0]).unwrap();
+        assert_eq!(["3", "4"].map(compile), compiled, "a swapped entry is not used");
+        assert_eq!(read(), good, "it is replaced");
     }
 
     #[test]

@@ -14,13 +14,16 @@ use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::draw::Antialias;
 use shadow_fields::frame::{Frame, Options};
-use shadow_fields::gpu::{self, Access, Buffer, BufferKind, Commands, FLIGHTS, Image, ImageShape, Validation};
+use shadow_fields::gpu::{
+    self, Access, Buffer, BufferKind, Commands, Device, FLIGHTS, Image, ImageShape, Overlay, Paint, Target, Validation,
+};
 use shadow_fields::scene::Scene;
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
 use shadow_fields::view::{Editor, FrameTarget, Setup, Viewer};
 use stage::small;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 const SIZE: [u32; 2] = [320, 240];
@@ -326,4 +329,48 @@ fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
     write("merge_layout.glsl", &cone);
     stand.until("a good include", |viewer| viewer.shader_error().is_none());
     assert_eq!(apart(&plain, &stand.shown()), 0);
+}
+
+/// Two frames of an overlay, the second with more in it.
+fn draw_overlay(device: &Arc<Device>) -> shadow_fields::Result<()> {
+    let [width, height] = SIZE;
+    let image = Image::new(device, "window", ImageShape { format: FORMAT, width, height, samples: 1 })?;
+    let mut overlay = Overlay::new(device, FORMAT, true)?;
+    let context = egui::Context::default();
+    let size = egui::vec2(width as f32, height as f32);
+    for lines in [1, 9] {
+        let screen_rect = Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size));
+        let output = context.run_ui(egui::RawInput { screen_rect, ..Default::default() }, |ui| {
+            (0..lines).for_each(|line| drop(ui.label(format!("line {line}"))));
+        });
+        let paint = Paint { primitives: context.tessellate(output.shapes, 1.0), pixels_per_point: 1.0 };
+        overlay.update(output.textures_delta)?;
+        let mut commands = Commands::new(device, "overlay")?;
+        commands.image_barrier(&image, None, Access::ColorWrite);
+        let target = Target { color: &image, clear: Some([0.0; 4]), depth: None, resolve: None };
+        commands.render(&target, |drawing| drawing.overlay(&mut overlay, &image, &paint))?;
+        commands.submit()?;
+    }
+    Ok(())
+}
+
+/// Each Vulkan call that the overlay makes fails once. The validation layer counts what is left when the device goes.
+#[test]
+fn an_overlay_that_fails_leaves_no_object() {
+    let Some(_turn) = gpu() else { return };
+    let device = common::open().unwrap();
+    let mut failed = 0;
+    loop {
+        Overlay::fail_call(Some(failed));
+        match draw_overlay(&device) {
+            Ok(()) => break,
+            Err(error) => assert!(error.to_string().contains("ERROR_OUT_OF_DEVICE_MEMORY"), "call {failed}: {error}"),
+        }
+        failed += 1;
+    }
+    Overlay::fail_call(None);
+    assert!(failed > 40, "{failed} calls were made to fail");
+    let messages = device.validation_messages();
+    drop(device);
+    assert_eq!(messages.take(), [""; 0]);
 }

@@ -28,8 +28,8 @@ pub(super) struct Instance {
     pub(super) handle: ash::Instance,
     debug: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     has_debug_utils: bool,
-    /// Boxed: the messenger holds its address.
-    messages: Box<Messages>,
+    /// Shared, with an address that stays: the messenger holds it.
+    messages: Arc<Messages>,
 }
 
 /// Checks that the loader has Vulkan 1.3, the validation layer if it is asked for, and the extensions in `surface`, which a window
@@ -108,7 +108,7 @@ impl Instance {
             Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = manifest::broken() => return Err(broken),
             other => other.checked("vkCreateInstance", "instance")?,
         };
-        let mut instance = Instance { entry, handle, debug: None, has_debug_utils, messages: Box::default() };
+        let mut instance = Instance { entry, handle, debug: None, has_debug_utils, messages: Arc::default() };
         if validation != Validation::Off {
             instance.listen()?;
         }
@@ -128,7 +128,7 @@ impl Instance {
             )
             .pfn_user_callback(Some(on_message))
             .user_data((&raw const *self.messages).cast_mut().cast());
-        // SAFETY: `messages` is boxed and dropped after the messenger (see `Drop`).
+        // SAFETY: `messages` does not move and is dropped after the messenger (see `Drop`).
         let messenger = unsafe { loader.create_debug_utils_messenger(&create, None) }
             .checked("vkCreateDebugUtilsMessengerEXT", "instance")?;
         self.debug = Some((loader, messenger));
@@ -273,6 +273,11 @@ impl Device {
     /// Messages of the validation layer since the last call.
     pub fn take_validation_messages(&self) -> Vec<String> {
         self.instance.messages.take()
+    }
+
+    /// Where the validation layer's messages arrive, to read what it says when the device is destroyed.
+    pub fn validation_messages(&self) -> Arc<Messages> {
+        self.instance.messages.clone()
     }
 
     /// Makes every recording omit its `index`-th barrier, counted from 0, so that a test can show that the tracker reports it;

@@ -13,6 +13,8 @@ pub mod drawing;
 pub mod flight;
 mod heap;
 pub mod image;
+#[cfg(feature = "view")]
+mod ledger;
 mod manifest;
 pub mod memory;
 #[cfg(feature = "view")]

@@ -2,6 +2,7 @@
 
 use super::device::Device;
 use super::drawing::Drawing;
+use super::ledger::{self, Ledgered};
 use super::{Checked, FLIGHTS, Image};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -22,7 +23,8 @@ pub struct Paint {
 
 /// Draws egui into images of one format.
 pub struct Overlay {
-    renderer: Renderer<DefaultAllocator>,
+    /// The library forgets what it made when one of its calls fails.
+    renderer: Ledgered<Renderer<DefaultAllocator>>,
     pool: CommandPool,
     /// The current content of every texture. A partial change is uploaded as the whole texture, because the renderer's partial
     /// update starts from an undefined layout and so discards the rest of the image.
@@ -35,7 +37,7 @@ struct CommandPool(Arc<Device>, vk::CommandPool);
 
 impl Drop for CommandPool {
     fn drop(&mut self) {
-        // SAFETY: the renderer waits for each of its uploads.
+        // SAFETY: the renderer, which goes first, waits for its uploads.
         unsafe { self.0.handle.destroy_command_pool(self.1, None) };
     }
 }
@@ -72,10 +74,15 @@ impl Overlay {
             ..Default::default()
         };
         let mode = RenderMode::DynamicRendering(target);
-        let renderer =
-            Renderer::with_allocator(DefaultAllocator::new(device.memory), device.handle.clone(), mode, options)
-                .map_err(failed)?;
+        let make = |noting| Renderer::with_allocator(DefaultAllocator::new(device.memory), noting, mode, options);
+        let renderer = Ledgered::new(device, make).map_err(failed)?;
         Ok(Overlay { renderer, pool, textures: HashMap::new(), retired: Vec::new() })
+    }
+
+    /// Makes the `index`-th fallible Vulkan call of overlays on this thread, counted from 0, fail once, so that a test can show what
+    /// follows; `None` restores normal calls.
+    pub fn fail_call(index: Option<usize>) {
+        ledger::fail_call(index);
     }
 
     /// Applies changes of textures; call it before the frame that needs them is drawn.
@@ -89,7 +96,7 @@ impl Overlay {
         let device = self.pool.0.clone();
         device.settle();
         for id in self.retired.drain(..) {
-            self.renderer.free_texture(id).map_err(failed)?;
+            self.renderer.call(|renderer| renderer.free_texture(id)).map_err(failed)?;
             self.textures.remove(&id);
         }
         for (id, changes) in delta.set.drain() {
@@ -108,7 +115,8 @@ impl Overlay {
                 }
                 let whole = ImageDelta::full(self.textures[&id].clone(), options);
                 let queue = device.queue();
-                self.renderer.set_texture(*queue, self.pool.1, id, &whole).map_err(failed)?;
+                let pool = self.pool.1;
+                self.renderer.call(|renderer| renderer.set_texture(*queue, pool, id, &whole)).map_err(failed)?;
             }
         }
         // egui still draws with these textures in the coming frame, so they are freed after it.
@@ -131,6 +139,8 @@ impl<'r> Drawing<'_, 'r> {
     pub fn overlay(&mut self, overlay: &'r mut Overlay, image: &Image, paint: &Paint) -> Result<()> {
         let extent = vk::Extent2D { width: image.shape.width, height: image.shape.height };
         let buffer = self.raw();
-        overlay.renderer.cmd_draw(buffer, extent, paint.pixels_per_point, &paint.primitives).map_err(failed)
+        let draw =
+            |renderer: &mut Renderer<_>| renderer.cmd_draw(buffer, extent, paint.pixels_per_point, &paint.primitives);
+        overlay.renderer.call(draw).map_err(failed)
     }
 }

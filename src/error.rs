@@ -57,14 +57,22 @@ impl Error {
 
     /// Puts the place of the error in front of its message and keeps its kind.
     pub fn context(self, place: impl std::fmt::Display) -> Self {
-        let join = |message: String| format!("{place}: {message}");
+        self.map(|message| format!("{place}: {message}"))
+    }
+
+    /// Adds to the message what follows from the error, and keeps its kind.
+    pub fn followed_by(self, what: impl std::fmt::Display) -> Self {
+        self.map(|message| format!("{message}; {what}"))
+    }
+
+    fn map(self, change: impl FnOnce(String) -> String) -> Self {
         match self {
-            Error::Failed(m) => Error::Failed(join(m)),
-            Error::Shader(m) => Error::Shader(join(m)),
-            Error::Usage(m) => Error::Usage(join(m)),
-            Error::Unsupported(m) => Error::Unsupported(join(m)),
-            Error::Input(m) => Error::Input(join(m)),
-            Error::Device(m) => Error::Device(join(m)),
+            Error::Failed(m) => Error::Failed(change(m)),
+            Error::Shader(m) => Error::Shader(change(m)),
+            Error::Usage(m) => Error::Usage(change(m)),
+            Error::Unsupported(m) => Error::Unsupported(change(m)),
+            Error::Input(m) => Error::Input(change(m)),
+            Error::Device(m) => Error::Device(change(m)),
         }
     }
 }

@@ -13,6 +13,7 @@ use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::draw::Antialias;
+use shadow_fields::error::Error;
 use shadow_fields::frame::{Frame, Options};
 use shadow_fields::gpu::{
     self, Access, Buffer, BufferKind, Commands, Device, FLIGHTS, Image, ImageShape, Overlay, Paint, Target, Validation,
@@ -373,4 +374,29 @@ fn an_overlay_that_fails_leaves_no_object() {
     let messages = device.validation_messages();
     drop(device);
     assert_eq!(messages.take(), [""; 0]);
+}
+
+/// Whatever ends the window, edits are written first, to a file that did not exist, and the message says where.
+#[test]
+fn a_window_that_fails_saves_edits_first() {
+    let Some(mut stand) = Stand::new("rescue", None) else { return };
+    let lost = || Error::Device("vkQueueSubmit2 (frame): ERROR_DEVICE_LOST".into());
+    stand.viewer.apply(Command::Orbit([30.0, 10.0])).unwrap();
+    let quiet = stand.viewer.rescued(lost());
+    assert_eq!(quiet.to_string(), lost().to_string(), "nothing was edited");
+    assert!(!stand.cache.join("scene-edited.toml").exists());
+
+    for (name, key) in [("scene-edited.toml", 'l'), ("scene-edited-2.toml", 'o')] {
+        stand.letter('q');
+        stand.letter(key);
+        let told = stand.viewer.rescued(lost());
+        let path = stand.cache.join(name);
+        assert_eq!(told.exit_code(), 5);
+        assert_eq!(told.to_string(), format!("{}; the edited scene was saved as {}", lost(), path.display()));
+        let saved = Scene::load(&path).unwrap();
+        assert_eq!(saved.data.entities, stand.viewer.editor().scene().data.entities, "{name}");
+        assert_eq!(&saved.data.camera, stand.viewer.editor().camera(), "{name}");
+        assert_eq!([saved.data.output.width, saved.data.output.height], SIZE);
+        assert_eq!(stand.viewer.rescued(lost()).to_string(), lost().to_string(), "it is saved now");
+    }
 }

@@ -1,8 +1,8 @@
 //! `shadow-fields view`
 
-use super::Global;
 use super::context::{Context, MergeArguments, size};
 use super::quality::BakeArguments;
+use super::{Global, output};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::gpu::{self, Device, PresentMode, Window};
@@ -12,6 +12,7 @@ use crate::view::input::{Button, Event, Key};
 use crate::view::{Editor, FrameTarget, Setup, Viewer};
 use clap::Args;
 use raw_window_handle::HasDisplayHandle;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -79,13 +80,32 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             shown: None,
             outcome: Ok(()),
         };
-        let ran = events.run_app(&mut app).map_err(|error| Error::Failed(format!("the window system: {error}")));
+        // Whatever is broken after a panic, the edited scene is data that can be saved.
+        let ran = catch_unwind(AssertUnwindSafe(|| events.run_app(&mut app)));
         let App { shown, outcome, .. } = app;
-        let ended = shown.map_or(Ok(()), Shown::close);
-        outcome.and(ran).and(ended)
+        match ran {
+            Ok(ran) => {
+                let ran = ran.map_err(|error| Error::Failed(format!("the window system: {error}")));
+                close(shown, outcome.and(ran))
+            }
+            Err(panic) => {
+                if let Err(error) = close(shown, Err(Error::Failed("the window failed".into()))) {
+                    output::complain(&error);
+                }
+                resume_unwind(panic);
+            }
+        }
     };
     let finished = context.finish();
     outcome.and(finished)
+}
+
+/// Ends the window after `outcome`. If that or the end itself is an error, edits are saved first.
+fn close(shown: Option<Shown>, outcome: Result<()>) -> Result<()> {
+    let Some(mut shown) = shown else { return outcome };
+    // A device that was lost would be waited for in vain.
+    let outcome = outcome.and_then(|()| shown.viewer.settle());
+    outcome.map_err(|error| shown.viewer.rescued(error))
 }
 
 fn no_display(error: impl std::fmt::Display) -> Error {
@@ -129,12 +149,6 @@ struct Shown {
     hidden: bool,
     /// When it was tried.
     tried: Instant,
-}
-
-impl Shown {
-    fn close(mut self) -> Result<()> {
-        self.viewer.settle()
-    }
 }
 
 struct App<'a> {

@@ -10,7 +10,7 @@ use crate::asset::sky::Sky;
 use crate::bake;
 use crate::error::Result;
 use crate::field::quantity;
-use crate::scene::{Camera, Placement, Scene};
+use crate::scene::{Camera, Data, Placement, Scene};
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -35,8 +35,10 @@ pub struct Editor {
     pub(super) drag: Option<EntityDrag>,
     /// Files that were written since the start, for any scene.
     pub(super) saved: HashSet<PathBuf>,
+    /// The scene as it was opened or saved last.
+    pub(super) kept: Data,
     /// The previous scene, if it was changed.
-    former: Option<Box<Editor>>,
+    pub(super) former: Option<Box<Editor>>,
 }
 
 impl Editor {
@@ -64,6 +66,7 @@ impl Editor {
             picker: Picker::new(scene.meshes.len()),
             drag: None,
             saved: HashSet::new(),
+            kept: scene.data.clone(),
             former: None,
             path: path.to_owned(),
             scene,

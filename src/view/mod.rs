@@ -27,6 +27,7 @@ pub mod pick;
 mod picture;
 pub mod reference;
 pub mod reload;
+mod rescue;
 mod save;
 #[cfg(feature = "view")]
 pub mod status;

@@ -15,19 +15,36 @@ impl Editor {
     /// scene. If another program wrote such a file, the name gets the next free number. An edited scene that was opened is
     /// overwritten.
     pub fn save_path(&self) -> PathBuf {
-        let own = self.path().exists();
-        let folder = if own { self.path().parent() } else { None }.unwrap_or(Path::new(""));
-        let stem = self.path().file_stem().unwrap_or_default().to_string_lossy();
-        let name = unedited(&stem);
-        if own && name != stem {
-            return folder.join(format!("{stem}.toml"));
+        let stem = self.stem();
+        if self.path().exists() && unedited(&stem) != stem {
+            return self.folder().join(format!("{stem}.toml"));
         }
-        let numbered = |number: u32| match number {
+        self.numbered(&self.folder(), |path| self.saved.contains(path) || !path.exists())
+    }
+
+    /// Path of a file in `folder` that does not exist yet, named as [`Editor::save_path`] does.
+    pub(super) fn unused_path(&self, folder: &Path) -> PathBuf {
+        self.numbered(folder, |path| !path.exists())
+    }
+
+    /// The folder of [`Editor::save_path`].
+    pub(super) fn folder(&self) -> PathBuf {
+        if self.path().exists() { self.path().parent().unwrap_or(Path::new("")).to_owned() } else { PathBuf::new() }
+    }
+
+    fn stem(&self) -> String {
+        self.path().file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// `NAME-edited.toml` in `folder`, or the first with a number that is `usable`.
+    fn numbered(&self, folder: &Path, usable: impl Fn(&PathBuf) -> bool) -> PathBuf {
+        let stem = self.stem();
+        let name = unedited(&stem);
+        let path = |number: u32| match number {
             1 => folder.join(format!("{name}{SUFFIX}.toml")),
             _ => folder.join(format!("{name}{SUFFIX}-{number}.toml")),
         };
-        let usable = |path: &PathBuf| self.saved.contains(path) || !path.exists();
-        (1..).map(numbered).find(usable).expect("numbers do not end")
+        (1..).map(path).find(usable).expect("numbers do not end")
     }
 
     /// The current state as scene data for a file in `folder`, so that its first picture is the one shown now. Paths in it are
@@ -64,6 +81,7 @@ impl Editor {
             Error::Failed(format!("{}: cannot be written: {error}", path.display()))
         })?;
         self.saved.insert(path.to_owned());
+        self.kept = self.scene().data.clone();
         Ok(())
     }
 }

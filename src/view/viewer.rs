@@ -140,6 +140,13 @@ impl Viewer {
         &self.editor
     }
 
+    /// As [`Editor::rescued`].
+    pub fn rescued(&mut self, error: Error) -> Error {
+        // The saved picture has the size of the window.
+        self.editor.apply(Command::Resize(self.size));
+        self.editor.rescued(error)
+    }
+
     /// The frame, once its fields are baked.
     pub fn frame(&self) -> Option<&Frame> {
         self.frame.as_ref()

@@ -184,3 +184,38 @@ fn what_an_earlier_session_saved_is_kept() {
     editor.apply(Command::Undo);
     assert_eq!((editor.path(), editor.save_path()), (&*at("s.toml"), at("s-edited-4.toml")));
 }
+
+#[test]
+fn edits_that_would_be_lost_are_saved_beside_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("small.toml");
+    std::fs::write(&path, SMALL).unwrap();
+    let mut editor = Editor::new(Scene::load(&path).unwrap(), &path);
+    assert!(!editor.is_edited());
+    editor.apply(Command::Zoom(2.0));
+    editor.apply(Command::SelectNext);
+    assert_eq!((editor.is_edited(), editor.rescue().unwrap().len()), (false, 0), "a look is no edit");
+    editor.apply(step(Step::Left));
+    assert!(editor.is_edited());
+    editor.apply(Command::Undo);
+    assert!(!editor.is_edited(), "what was taken back is no edit");
+    editor.apply(Command::SetExposure(1.5));
+    // The scene before this one can be returned to, so it is saved as well.
+    editor.apply(Command::NextScene);
+    assert_eq!(editor.rescue().unwrap(), [folder.path().join("small-edited.toml")]);
+    assert_eq!(Scene::load(&folder.path().join("small-edited.toml")).unwrap().data.output.exposure_ev, 1.5);
+    assert_eq!(editor.rescue().unwrap().len(), 0, "once is enough");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn edits_are_saved_elsewhere_where_the_folder_cannot_be_written() {
+    // A file in a folder in which nobody can make files.
+    let path = Path::new("/proc/version");
+    let mut editor = Editor::new(from_text(SMALL).scene().clone(), path);
+    editor.apply(step(Step::Left));
+    let said = editor.rescued(shadow_fields::Error::Failed("gone".into())).to_string();
+    let saved = said.strip_prefix("gone; the edited scene was saved as ").unwrap();
+    assert!(Scene::load(Path::new(saved)).is_ok(), "{said}");
+    std::fs::remove_file(saved).unwrap();
+}

@@ -7,7 +7,7 @@ mod stage;
 use common::report;
 use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::draw::{Antialias, Finish};
-use shadow_fields::frame::Options;
+use shadow_fields::frame::{Options, PictureMemory};
 use shadow_fields::scene::{Placement, Scene};
 use stage::{at, scene, small, stage};
 
@@ -286,4 +286,15 @@ fn screens_are_shown_the_same() {
     // A frame that is only shown stays on the device; here nothing receives, so nothing is merged either.
     let passes: Vec<_> = frame.show(&placements, white).unwrap().into_iter().map(|t| t.pass).collect();
     assert_eq!(passes, ["draw"]);
+}
+
+#[test]
+fn what_is_said_of_memory_is_what_is_taken() {
+    let Some(stage) = stage() else { return };
+    for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {
+        let options = options(antialias);
+        let said = PictureMemory::new(&stage.gpu.device, &options);
+        let frame = stage.frame(&balls("", &[[1.0; 3]]), options);
+        assert_eq!(said.device, frame.memory().pictures, "{antialias:?}");
+    }
 }

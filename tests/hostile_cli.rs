@@ -160,6 +160,27 @@ fn a_limit_on_file_sizes_is_an_error() {
     assert_eq!(names(folder.path()), ["m.obj"]);
 }
 
+/// What memory a picture takes is compared with what there is before anything is baked for it.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_picture_larger_than_memory_is_refused_with_numbers() {
+    let folder = folder();
+    // Four million KiB of address space: less than 20 bytes for each of 2^28 pixels.
+    let limited = |arguments: &[&str]| {
+        let mut limited = Command::new("sh");
+        limited.current_dir(folder.path()).args(["-c", "ulimit -v 4000000; exec \"$@\"", "sh"]);
+        finish(limited.arg(env!("CARGO_BIN_EXE_shadow-fields")).args(arguments).args(["--cache-dir", "cache"]))
+    };
+    if limited(&["devices"]).code != 0 {
+        return common::skip("no device opens in 4 GB of addresses");
+    }
+    let ran = limited(&["render", "sphere_over_plane", "--size", "16384x16384", "-o", "p.png"]);
+    assert_eq!(ran.code, 4, "{}", ran.stderr);
+    let line = ran.stderr.lines().last().unwrap();
+    assert!(line.contains("a picture of 16384x16384 pixels takes ") && line.ends_with(" GB left"), "{line}");
+    assert!(!folder.path().join("cache/fields").exists() && !folder.path().join("p.png").exists());
+}
+
 /// What killed runs left is gone after the next run, in the folder of results and in the cache.
 #[test]
 fn leftovers_of_killed_runs_are_swept() {

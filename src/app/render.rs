@@ -7,7 +7,7 @@ use crate::asset::false_color::Scheme;
 use crate::asset::picture;
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
-use crate::frame::{self, Frame};
+use crate::frame::{self, Frame, PictureMemory};
 use crate::gpu::Timing;
 use crate::scene::{Placement, Scene, values::NUMBER_LIMIT};
 use crate::text;
@@ -17,6 +17,9 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+
+/// A picture that takes more memory than this is told in a line.
+const ANNOUNCED_BYTES: u64 = 1_000_000_000;
 
 /// Arguments of `render`.
 #[derive(Args)]
@@ -133,6 +136,7 @@ impl<'a> Rendering<'a> {
         let shape = &scene.data.output;
         let size = arguments.size.unwrap_or([shape.width, shape.height]);
         let options = arguments.merge.options(arguments.bake.options(), size, arguments.antialias);
+        announce(global, context, &options)?;
         let frame = context.frame(scene, options).map_err(|error| match error {
             Error::Input(_) => error.context(arguments.scene.display()),
             other => other,
@@ -271,6 +275,19 @@ impl<'a> Rendering<'a> {
             }
         )
     }
+}
+
+/// Says what memory a large picture takes, before any work is done for it.
+///
+/// # Errors
+/// `Input` where it is more than there is.
+fn announce(global: &Global, context: &Context, options: &frame::Options) -> Result<()> {
+    let picture = PictureMemory::new(&context.device, options);
+    picture.check(&context.device)?;
+    if picture.all() >= ANNOUNCED_BYTES {
+        output::note(global, format!("note: {picture}"));
+    }
+    Ok(())
 }
 
 /// Replaces what the merge would find by what rays find. Returns the relative standard error.

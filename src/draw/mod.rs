@@ -61,6 +61,13 @@ impl Antialias {
     pub fn usual(device: &Device) -> Self {
         if device.info.is_software() { Antialias::Outlines } else { Antialias::Samples }
     }
+
+    /// Samples a pixel on a device.
+    fn samples(self, device: &Device) -> u32 {
+        let limits = &device.limits;
+        let offered = limits.framebuffer_color_sample_counts & limits.framebuffer_depth_sample_counts;
+        if self == Antialias::Samples && offered.contains(vk::SampleCountFlags::TYPE_4) { 4 } else { 1 }
+    }
 }
 
 /// A mesh as it is drawn.
@@ -229,10 +236,7 @@ impl Draw {
         antialias: Antialias,
         finish: Finish,
     ) -> Result<Self> {
-        let limits = &device.limits;
-        let offered = limits.framebuffer_color_sample_counts & limits.framebuffer_depth_sample_counts;
-        let samples =
-            if antialias == Antialias::Samples && offered.contains(vk::SampleCountFlags::TYPE_4) { 4 } else { 1 };
+        let samples = antialias.samples(device);
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
         let shape = ImageShape { format: color, width, height, samples: 1 };
         let state =
@@ -260,6 +264,13 @@ impl Draw {
                 .then(|| Smooth::new(device, library, shape, finish == Finish::Display))
                 .transpose()?,
         })
+    }
+
+    /// Device memory of a pixel in the images of [`Draw::new`], bytes, as [`Draw::size_bytes`] counts it.
+    pub fn pixel_bytes(device: &Device, antialias: Antialias, finish: Finish) -> u64 {
+        let (samples, color) = (u64::from(antialias.samples(device)), if finish == Finish::Linear { 8 } else { 4 });
+        let colors = 1 + u64::from(antialias == Antialias::Outlines) + if samples > 1 { samples } else { 0 };
+        colors * color + samples * 4
     }
 
     /// What its pictures are made for.

@@ -14,6 +14,7 @@ mod picture;
 mod pose;
 mod radiosity;
 mod record;
+mod room;
 mod sky;
 mod twin;
 mod viewport;
@@ -45,6 +46,7 @@ use std::sync::Arc;
 use work::ClusterWork;
 
 pub use record::{MergeWork, PictureTarget, PictureWork, record};
+pub use room::PictureMemory;
 pub use viewport::{RadiositySource, Viewport};
 
 /// What decides a frame besides the scene.
@@ -91,7 +93,7 @@ impl Frame {
     ///
     /// # Errors
     /// As [`bake::ensure()`], [`crate::merge::Merge::new`] and [`crate::draw::Draw::new`]; `Input` where the device cannot hold
-    /// the scene.
+    /// the scene or its picture.
     pub fn new(
         baker: &Baker,
         cache: &Cache,
@@ -102,6 +104,7 @@ impl Frame {
         let (device, library) = (baker.device(), baker.library());
         let needs = SceneNeeds::of(scene, &options.bake);
         limits::check(device, scene, &needs)?;
+        PictureMemory::new(device, &options).check(device)?;
         let baked = bake::ensure(baker, cache, scene, &needs, progress)?;
         let buffers = SceneBuffers::new(device, scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();

@@ -1,6 +1,7 @@
 //! Pictures of a frame: prepared, drawn into images of one size, read back.
 
 use super::record::PictureWork;
+use super::room::READBACK_PIXEL_BYTES;
 use super::viewport::Viewport;
 use super::{Frame, Options};
 use crate::asset::edges::Edges;
@@ -57,9 +58,9 @@ impl Picture {
     }
 }
 
-/// Room for a picture of either finish: at most 8 bytes a pixel.
+/// Room for a picture of either finish.
 fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
-    Buffer::new(device, "readback", BufferKind::Readback, 8 * u64::from(width) * u64::from(height))
+    Buffer::new(device, "readback", BufferKind::Readback, READBACK_PIXEL_BYTES * u64::from(width) * u64::from(height))
 }
 
 impl Frame {

@@ -181,6 +181,33 @@ fn a_picture_larger_than_memory_is_refused_with_numbers() {
     assert!(!folder.path().join("cache/fields").exists() && !folder.path().join("p.png").exists());
 }
 
+/// A shader of many bands takes long to compile: the terminal says so, unless it is to be left alone.
+#[test]
+fn a_terminal_is_told_what_is_compiled() {
+    if !has_device() {
+        return;
+    }
+    let terminal = |more: &str| {
+        let folder = folder();
+        let program = env!("CARGO_BIN_EXE_shadow-fields");
+        let small = SMALL.join(" ");
+        let line = format!(
+            "'{program}' render sphere_over_plane -o p.png --size 8x8 --antialias none --variant storage --bands 5 {small} \
+             --cache-dir cache {more}"
+        );
+        // `script` runs a command on a terminal of its own and prints what that shows.
+        let mut script = Command::new("script");
+        let ran = script.current_dir(folder.path()).env("TERM", "xterm").args(["-qec", &line, "/dev/null"]).output();
+        ran.ok().map(|ran| (ran.status.success(), String::from_utf8_lossy(&ran.stdout).into_owned()))
+    };
+    let Some((good, shown)) = terminal("") else { return common::skip("no script (Debian's package is bsdutils)") };
+    assert!(good && shown.contains("compiling shader merge.comp, "), "{shown}");
+    for more in ["--quiet", "--no-progress"] {
+        let (good, shown) = terminal(more).unwrap();
+        assert!(good && !shown.contains("compiling"), "{shown}");
+    }
+}
+
 /// What killed runs left is gone after the next run, in the folder of results and in the cache.
 #[test]
 fn leftovers_of_killed_runs_are_swept() {

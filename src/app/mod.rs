@@ -3,6 +3,7 @@
 mod bake;
 mod bench;
 mod check;
+mod compiling;
 mod context;
 mod demo;
 mod devices;

@@ -1,10 +1,11 @@
 //! What the program says: results, logs, errors, progress bars, tables.
 
 use super::Global;
+use super::compiling::CompilingLine;
 use crate::error::{Error, Result, one_line};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::cell::RefCell;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
@@ -97,16 +98,21 @@ pub fn start_log(global: &Global) {
     let _ = env_logger::Builder::from_env(environment).format(line).try_init();
 }
 
-/// A progress bar for one piece of work after another; nothing where stderr is no terminal or bars are not wanted.
+/// A progress bar for one piece of work after another, and a line for what is being compiled; nothing where stderr is no terminal or bars are not wanted.
 pub struct Progress {
     hidden: bool,
+    bars: MultiProgress,
+    _compiling: Option<CompilingLine>,
     current: RefCell<Option<(String, ProgressBar)>>,
 }
 
 impl Progress {
     /// A bar as the global options want it.
     pub fn new(global: &Global) -> Self {
-        Progress { hidden: global.no_progress || global.quiet, current: RefCell::new(None) }
+        let hidden = global.no_progress || global.quiet || !std::io::stderr().is_terminal();
+        let bars = MultiProgress::with_draw_target(ProgressDrawTarget::stderr());
+        let compiling = (!hidden).then(|| CompilingLine::new(bars.clone()));
+        Progress { hidden, bars, _compiling: compiling, current: RefCell::new(None) }
     }
 
     /// Shows that `done` of `all` samples of `what` are baked.
@@ -127,7 +133,7 @@ impl Progress {
         }
         let mut current = self.current.borrow_mut();
         if current.as_ref().is_none_or(|(name, _)| name != what) {
-            let bar = ProgressBar::with_draw_target(Some(all.into()), ProgressDrawTarget::stderr());
+            let bar = self.bars.add(ProgressBar::new(all.into()));
             let style = ProgressStyle::with_template(template);
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
             bar.set_message(one_line(what));

@@ -7,6 +7,7 @@ pub mod access;
 mod bind;
 pub mod census;
 pub mod commands;
+pub mod compiling;
 pub mod descriptors;
 pub mod device;
 pub mod drawing;

@@ -1,6 +1,7 @@
 //! Pipelines and their layouts, built from the reflection of their shaders.
 
 use super::Checked;
+use super::compiling::Compiling;
 use super::device::Device;
 use super::reflect::{Binding, BindingKind, VertexInput};
 use super::shader::{Shader, Stage};
@@ -177,6 +178,7 @@ impl ComputePipeline {
             .name(c"main")
             .specialization_info(&specialization);
         let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline);
+        let _compiling = Compiling::new("pipeline", name);
         // SAFETY: everything that `create` points to outlives the call; destroyed by `PipelineHandle`.
         let handle = unsafe { device.handle.create_compute_pipelines(device.pipeline_cache, &[create], None) }
             .map_err(|(_, code)| code)
@@ -275,6 +277,7 @@ impl GraphicsPipeline {
             .dynamic_state(&dynamic)
             .layout(layout.pipeline)
             .push_next(&mut rendering);
+        let _compiling = Compiling::new("pipeline", name);
         // SAFETY: everything that `create` points to outlives the call; destroyed by `PipelineHandle`.
         let handle = unsafe { device.handle.create_graphics_pipelines(device.pipeline_cache, &[create], None) }
             .map_err(|(_, code)| code)

@@ -5,7 +5,7 @@
 //! vertices      -> capture -> project -> host (all batches) -> turned vertices -> transfer vectors
 //! ```
 //!
-//! [`record_batch`] and [`record_assembly`] hold every pass and every barrier of a bake in order.
+//! `record_batch` and `record_assembly` hold every pass and every barrier of a bake in order.
 
 pub mod assemble;
 mod batches;

@@ -21,7 +21,7 @@ pub struct Bounds {
     pub radius_m: f32,
     /// Unit axis of a cone around the normals.
     pub axis: [f32; 3],
-    /// Cosine of its half-angle with [`CONE_ROUNDING_RAD`]; -1 where it bounds nothing.
+    /// Cosine of its half-angle with `CONE_ROUNDING_RAD`; -1 where it bounds nothing.
     pub cosine: f32,
 }
 
@@ -90,7 +90,7 @@ pub struct EntityBounds {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Light {
-    /// Axis (world) and cosine of the half-angle, with [`CONE_ROUNDING_RAD`], of a cone of directions outside of which its radiance
+    /// Axis (world) and cosine of the half-angle, with `CONE_ROUNDING_RAD`, of a cone of directions outside of which its radiance
     /// field is zero; cosine -2 where it shines all round.
     pub facing: [f32; 4],
     /// Largest radiance that it shines with, of any colour.

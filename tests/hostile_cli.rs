@@ -43,7 +43,7 @@ fn paths_are_bytes() {
     }
     let folder = folder();
     let name = |text: &'static [u8]| OsStr::from_bytes(text);
-    let ran = finish(bake(&folder, &["--json", "-o"]).arg(name(b"x\xff.sf")));
+    let ran = finish(bake(&folder, &["--json"]).arg("-o").arg(name(b"x\xff.sf")));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(folder.path().join(name(b"x\xff.sf")).is_file());
 
@@ -54,14 +54,14 @@ fn paths_are_bytes() {
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(folder.path().join("y.sf").is_file() && folder.path().join(name(b"cache\xff")).is_dir());
 
-    let render = ["render", "sphere_over_plane", "--size", "8x8", "-o"];
+    let render = ["render", "sphere_over_plane", "--size", "8x8"];
     let mut picture = command(folder.path(), &SMALL);
-    let ran = finish(picture.args(render).arg(name(b"p\xff.png")));
+    let ran = finish(picture.args(render).arg("-o").arg(name(b"p\xff.png")));
     assert_eq!(ran.code, 2, "options of a subcommand stand behind it: {}", ran.stderr);
-    let ran = finish(command(folder.path(), &render).arg(name(b"p\xff.png")).args(SMALL));
+    let ran = finish(command(folder.path(), &render).arg("-o").arg(name(b"p\xff.png")).args(SMALL));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(folder.path().join(name(b"p\xff.png")).is_file());
-    let ran = finish(command(folder.path(), &render).arg(name(b"p\xff##.png")).args(SMALL));
+    let ran = finish(command(folder.path(), &render).arg("-o").arg(name(b"p\xff##.png")).args(SMALL));
     assert_eq!(ran.code, 2, "{}", ran.stderr);
 }
 

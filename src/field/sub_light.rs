@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 /// Most parts of a light.
 pub const MOST: usize = 16;
-/// Angular radii in radians up to which a light is 1 part and 7 parts; larger ones are [`MOST`].
+/// Angular radii in radians, 1 and 15 degrees, up to which a light is 1 part and 7 parts; larger ones are [`MOST`].
 const LIMITS_RAD: [f64; 2] = [1.0 * TAU / 360.0, 15.0 * TAU / 360.0];
 /// A light whose radius lies this much above a limit has the finer parts alone; between them, both by shares.
 const BLEND: f64 = 1.25;
@@ -59,8 +59,9 @@ mod tests {
     #[test]
     fn weights_add_up_and_change_without_a_step() {
         let mut before = parts(0.0);
-        for i in 0..=6000 {
-            let now = parts(f64::from(i) * 1e-4);
+        // The first ramp is 0.25 degrees wide: 436 of these steps.
+        for i in 0..=60_000 {
+            let now = parts(f64::from(i) * 1e-5);
             assert!((now[0].1 + now[1].1 - 1.0).abs() < 1e-12);
             let of = |parts: [(usize, f64); 2], n| parts.iter().filter(|p| p.0 == n).map(|p| p.1).sum::<f64>();
             for n in [1, 7, MOST] {

@@ -109,7 +109,7 @@ skips! {
         /// Entities that nothing but themselves is lit by: their fields are not baked.
         unseen: Bake, "bake/ensure.rs needs", "unseen";
         /// Light and shadow that is bounded below `--eps`.
-        eps: Approximate, "lists/scope.rs negligible", "below_eps";
+        eps: Approximate, "lists/scope.rs of_weight", "below_eps";
     }
 }
 

@@ -1,11 +1,12 @@
 //! Silhouette fields on the command line: `bake --silhouette`, and `inspect` of what it wrote.
 
+use super::bake::unwritten;
 use super::context::Context;
 use super::quality::Quality;
 use super::{Global, output};
 use crate::asset::{Mesh, lettering, picture};
 use crate::bake::silhouette::{SilhouetteOptions, bake_silhouette};
-use crate::error::{Error, Result, one_line};
+use crate::error::{Result, one_line};
 use crate::field::silhouette::{REACH, SilhouetteField};
 use glam::DVec3;
 use serde_json::json;
@@ -38,10 +39,7 @@ pub fn bake(global: &Global, mesh_file: &Path, out: &Path, quality: Quality) -> 
     });
     // A field that the validation layer objected to is not written.
     context.finish()?;
-    field.write(out).map_err(|error| match error {
-        Error::Input(message) => Error::Failed(message),
-        other => other,
-    })?;
+    field.write(out).map_err(unwritten)?;
     if global.json {
         output::say(result.to_string());
     } else {

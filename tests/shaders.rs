@@ -6,6 +6,7 @@ use common::{library, skip};
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::{Project, Projection};
+use shadow_fields::bake::silhouette::Silhouette;
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::lists::gather::Gather;
@@ -24,7 +25,7 @@ fn baking() -> Vec<ShaderPermutation> {
     let project = BANDS.flat_map(|bands| PROJECTIONS.map(|projection| Project::row(bands, projection)));
     let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
     let capture = [false, true].into_iter().flat_map(Capture::rows);
-    project.chain(assemble).chain(capture).collect()
+    project.chain(assemble).chain(capture).chain(Silhouette::permutations(32, 128, 16)).collect()
 }
 
 fn drawing() -> Vec<ShaderPermutation> {

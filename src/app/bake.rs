@@ -73,14 +73,6 @@ pub(super) fn shining(mesh: Mesh, radiance: Vec3, path: &Path) -> Result<Mesh> {
     Mesh::new(mesh.name, mesh.positions, mesh.normals, Some(colors), mesh.triangles)
 }
 
-/// A field that cannot be written is a run that failed, not bad input.
-pub(super) fn unwritten(error: Error) -> Error {
-    match error {
-        Error::Input(message) => Error::Failed(message),
-        other => other,
-    }
-}
-
 /// Bakes one field, without the cache.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     output::check_folder(&arguments.output)?;
@@ -106,7 +98,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     });
     // A field that the validation layer objected to is not written.
     context.finish()?;
-    field.write(&arguments.output).map_err(unwritten)?;
+    field.write(&arguments.output).map_err(output::unwritten)?;
     if global.json {
         output::say(result.to_string());
     } else {

@@ -50,6 +50,14 @@ pub fn note(global: &Global, line: impl AsRef<str>) {
     }
 }
 
+/// A field that cannot be written is a run that failed, not bad input.
+pub fn unwritten(error: Error) -> Error {
+    match error {
+        Error::Input(message) => Error::Failed(message),
+        other => other,
+    }
+}
+
 /// Fails where a file could not be written because its folder is missing or it is a folder itself: told before work is done,
 /// not after.
 ///

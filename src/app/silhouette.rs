@@ -1,6 +1,5 @@
 //! Silhouette fields on the command line: `bake --silhouette`, and `inspect` of what it wrote.
 
-use super::bake::unwritten;
 use super::context::Context;
 use super::quality::Quality;
 use super::{Global, output};
@@ -39,7 +38,7 @@ pub fn bake(global: &Global, mesh_file: &Path, out: &Path, quality: Quality) -> 
     });
     // A field that the validation layer objected to is not written.
     context.finish()?;
-    field.write(out).map_err(unwritten)?;
+    field.write(out).map_err(output::unwritten)?;
     if global.json {
         output::say(result.to_string());
     } else {

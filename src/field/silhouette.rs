@@ -262,7 +262,9 @@ impl SilhouetteField {
         let away = outline.depth - point.dot(direction);
         let before_light = fade(distance - away);
         // An outline behind the receiver blocks nothing.
-        fade(away) * before_light * blocked_share(outline.distance / (away.max(NEAREST) * angle_rad.tan()))
+        fade(away)
+            * before_light
+            * blocked_share(outline.distance / (away.max(NEAREST) * angle_rad.tan()).max(f64::MIN_POSITIVE))
     }
 }
 

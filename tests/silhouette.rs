@@ -74,7 +74,7 @@ fn blocked_by_rays(shape: &RayMesh, point: DVec3, toward: DVec3, angle: f64) -> 
     for ray in light_rays(toward, angle, 256) {
         let cosine = ray.y.max(0.0);
         whole += cosine;
-        blocked += if shape.blocks(point.as_vec3().into(), ray.as_vec3().into()) { cosine } else { 0.0 };
+        blocked += if shape.blocks(point.as_vec3().into(), ray.as_vec3().into(), f32::INFINITY) { cosine } else { 0.0 };
     }
     blocked / whole
 }

@@ -6,7 +6,7 @@ use super::figures::{Difference, Radiosity, difference, rms};
 use crate::error::Result;
 use crate::field::Storage;
 use crate::frame::{self, Frame};
-use crate::truth::raycast::{RayCast, relative_error};
+use crate::truth::raycast::{Order, RayCast, relative_error};
 use crate::truth::{ExactChain, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
 
@@ -35,7 +35,7 @@ impl Effort {
     }
 }
 
-/// T0 and T1 of a case, which do not depend on options of bake or merge.
+/// T0, T0c and T1 of a case, which do not depend on options of bake or merge.
 pub struct Truth {
     /// The compared vertices.
     pub vertices: Vec<Vertex>,
@@ -43,6 +43,8 @@ pub struct Truth {
     pub t0: Vec<Radiosity>,
     /// Relative standard error of `t0`.
     pub t0_error: f64,
+    /// Radiosity of T0c, by the same rays with the merge's order of centres.
+    pub t0c: Vec<Radiosity>,
     /// Radiosity of T1: exact factors, band-limited chain.
     pub t1: Vec<Radiosity>,
     /// Relative standard error of `t1`, from two halves of its rays.
@@ -54,7 +56,7 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// Computes T0 and T1.
+    /// Computes T0, T0c and T1.
     pub fn new(case: &Case, effort: Effort, seed: u64) -> Self {
         let placements = case.scene.at(case.time_s);
         let shapes = RayMeshes::new(&case.scene);
@@ -62,13 +64,14 @@ impl Truth {
         let vertices = sample_vertices(&case.scene, effort.vertices, seed);
         let cast = RayCast { rays: effort.t0_rays, seed, distant: case.distant, ..Default::default() };
         let lit = cast.run(&world, &vertices);
+        let t0: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
         let open = RayCast { rays: 256, runs: 1, shadows: false, ..cast }.run(&world, &vertices);
         let half = |half| ExactChain { rays: effort.t1_rays / 2, seed: seed ^ half, ..Default::default() };
         let (first, second) = (half(1 << 32).run(&world, &vertices), half(2 << 32).run(&world, &vertices));
-        let t0: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
         let unit = rms(&t0).max(f64::MIN_POSITIVE);
         Truth {
             unit,
+            t0c: by_centres(&cast, &world, &vertices, &t0),
             t0,
             t0_error: relative_error(&lit),
             t1_error: difference(&first, &second, unit).rms / 2.0,
@@ -82,6 +85,16 @@ impl Truth {
     pub fn error(&self, of: &[Radiosity]) -> Difference {
         difference(of, &self.t0, self.unit)
     }
+}
+
+/// T0c from T0: only the vertices where the order matters are cast again.
+fn by_centres(cast: &RayCast, world: &World<'_>, vertices: &[Vertex], t0: &[Radiosity]) -> Vec<Radiosity> {
+    let mut out = t0.to_vec();
+    let differ: Vec<usize> = (0..vertices.len()).filter(|&i| RayCast::order_matters(world, vertices[i])).collect();
+    let again: Vec<Vertex> = differ.iter().map(|&i| vertices[i]).collect();
+    let lit = RayCast { order: Order::Centres, ..*cast }.run(world, &again);
+    differ.into_iter().zip(lit).for_each(|(i, e)| out[i] = e.radiosity);
+    out
 }
 
 /// Values of the compared vertices, from values of all vertices by entity.
@@ -117,7 +130,9 @@ pub struct Budget {
     /// T1's own relative standard error.
     #[serde(rename = "t1_error_relative")]
     pub t1_error: f64,
-    /// T0 to T1.
+    /// T0 to T0c: what the merge's order of centres costs.
+    pub centre_rule: Difference,
+    /// T0c to T1.
     pub bands: Difference,
     /// T1 to T2.
     pub sampling: Difference,
@@ -149,7 +164,8 @@ pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Opt
         vertices: truth.vertices.len(),
         t0_error: truth.t0_error,
         t1_error: truth.t1_error,
-        bands: between(&truth.t0, &truth.t1),
+        centre_rule: between(&truth.t0, &truth.t0c),
+        bands: between(&truth.t0c, &truth.t1),
         sampling: between(&truth.t1, &t2),
         arithmetic_and_storage: between(&t2, &t3),
         below_bands: between(&truth.t1, &t3),

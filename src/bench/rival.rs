@@ -2,6 +2,7 @@
 //!
 //! The rival is [`RayCast`] in one run. It uses an 8-wide hierarchy per mesh behind a bounding sphere test, scrambled Sobol points,
 //! cosine sampling of the sky and cone sampling of local lights, and leaves out occluders that cannot lie between vertex and light.
+//! Rays stop at the light's surface; where along a ray that is, is asked only where an occluder lies beside the light.
 //! Its hierarchies are built beforehand, as fields are baked beforehand.
 
 use super::Bench;
@@ -101,7 +102,7 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparis
             if round >= 3 && rays > 256 {
                 continue;
             }
-            let cast = RayCast { rays, runs: 1, seed: bench.seed + 77, distant: case.distant, shadows: true };
+            let cast = RayCast { rays, runs: 1, seed: bench.seed + 77, distant: case.distant, ..Default::default() };
             let started = Instant::now();
             let world = World::new(&case.scene, &shapes, &placements);
             let lit = cast.run(&world, &truth.vertices);

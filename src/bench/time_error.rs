@@ -108,7 +108,7 @@ fn error_picture(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<ErrorP
     let share = PICTURE_RAYS[usize::from(!bench.quick)] / frame.receiver_vertex_count().max(1);
     let lights = 1 + case.scene.entities.iter().filter(|e| e.emits).count();
     let rays = ((share / lights).clamp(64, 4096) as u32).next_power_of_two();
-    let cast = RayCast { rays, runs: 2, seed: bench.seed, distant: case.distant, shadows: true };
+    let cast = RayCast { rays, runs: 2, seed: bench.seed, distant: case.distant, ..Default::default() };
     let (reference, noise) = truth::picture(&case.scene, &placements, &cast);
     let map = ErrorMap::new(&error_map::radiosity(&frame)?, &reference, Scheme::Signed);
     let words: Vec<&str> = case.name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty()).collect();

@@ -231,12 +231,12 @@ pub fn budgets(budgets: &[Budget]) -> String {
     let mut text = format!(
         "What a picture's error is made of\n(relative to the root mean square of the ray-cast radiosity T0; of each cause: root \
          mean square over vertices, what 99 of 100\nvertices stay below, the worst vertex)\n  {:<wide$}  {:^22}  {:^22}  {:^22}  \
-         {:^22}  {:>7}\n",
-        "", "four bands", "sampling", "arithmetic, storage", "total", "T0's own"
+         {:^22}  {:^22}  {:>7}\n",
+        "", "centre rule", "four bands", "sampling", "arithmetic, storage", "total", "T0's own"
     );
     for b in budgets {
         let _ = write!(text, "  {:<wide$}", b.case);
-        for rung in [b.bands, b.sampling, b.arithmetic_and_storage, b.total] {
+        for rung in [b.centre_rule, b.bands, b.sampling, b.arithmetic_and_storage, b.total] {
             text += "  ";
             for value in [rung.rms, rung.p99, rung.max] {
                 let _ = write!(text, "{:>7} ", short(value));

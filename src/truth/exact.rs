@@ -115,7 +115,7 @@ impl ExactChain {
         let (axes, mut basis) = (Axes::new(view.normal), [0.0; MAX_COEFFICIENTS]);
         for ray in 0..self.rays {
             let direction = axes.cosine(points.point(ray));
-            if !world.blocks_itself(view, direction) {
+            if !world.blocks_itself(view, direction, f64::INFINITY) {
                 evaluate(self.bands, direction, &mut basis);
                 out.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += y);
             }
@@ -128,7 +128,7 @@ impl ExactChain {
         let (mut out, mut basis) = ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
         for ray in 0..self.rays {
             let direction = cone.axes.cone(points.point(ray), cone.height);
-            if world.blocks(occluder, direction) {
+            if world.blocks(occluder, direction, f64::INFINITY) {
                 evaluate(self.visibility_bands, direction, &mut basis);
                 out.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += y);
             }

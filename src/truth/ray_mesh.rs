@@ -61,10 +61,18 @@ impl RayMesh {
         }
     }
 
-    /// Whether a ray meets the mesh.
-    pub fn blocks(&self, origin: Vec3A, direction: Vec3A) -> bool {
-        let ray = Ray::new_inf(origin, direction);
-        !self.hierarchy.ray_traverse_miss(ray, |ray, id| self.triangles[id].intersect_embree(ray))
+    /// Whether a ray (unit direction) meets the mesh nearer than `limit` bounding radii; infinity is no limit. The first
+    /// triangle found ends the search.
+    pub fn blocks(&self, origin: Vec3A, direction: Vec3A, limit: f32) -> bool {
+        if limit <= 0.0 {
+            return false;
+        }
+        let ray = Ray::new(origin, direction, 0.0, limit);
+        // The distance that `intersect_embree` returns has a scale that depends on the triangle, but its test of the limit has not.
+        let met = |ray: &Ray, id: usize| {
+            if self.triangles[id].intersect_embree(ray).is_finite() { 0.0 } else { f32::INFINITY }
+        };
+        !self.hierarchy.ray_traverse_miss(ray, met)
     }
 
     /// Distance along a ray to its first intersection with the mesh.
@@ -86,7 +94,7 @@ impl RayMesh {
     /// Emission pattern at a ray's first intersection: 1 for a mesh without colours, `None` if the ray misses.
     pub fn emission(&self, origin: Vec3A, direction: Vec3A) -> Option<Vec3> {
         let Some(colors) = &self.colors else {
-            return self.blocks(origin, direction).then_some(Vec3::ONE);
+            return self.blocks(origin, direction, f32::INFINITY).then_some(Vec3::ONE);
         };
         let hit = self.nearest(origin, direction)?;
         let triangle = &self.triangles[hit.primitive_id as usize];

@@ -22,6 +22,16 @@ pub enum Distant {
     Bands(usize),
 }
 
+/// What counts as lying before a local light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// What a ray meets before the light's surface.
+    Surfaces,
+    /// The merge's rule for SH fields, [`EntityView::precedes`]: an occluder counts as a whole or not at all, by the centres of
+    /// the bounding spheres, and the receiver shadows itself from what lies beyond the light too.
+    Centres,
+}
+
 /// Parameters of ray casting.
 #[derive(Clone, Copy, Debug)]
 pub struct RayCast {
@@ -36,12 +46,14 @@ pub struct RayCast {
     pub distant: Distant,
     /// Whether occluders block rays; if not, the result is the unoccluded value.
     pub shadows: bool,
+    /// What counts as lying before a local light.
+    pub order: Order,
 }
 
 impl Default for RayCast {
-    /// 4096 rays in 8 runs.
+    /// 4096 rays in 8 runs, which stop at what they meet.
     fn default() -> Self {
-        RayCast { rays: 4096, runs: 8, seed: 1, distant: Distant::Exact, shadows: true }
+        RayCast { rays: 4096, runs: 8, seed: 1, distant: Distant::Exact, shadows: true, order: Order::Surfaces }
     }
 }
 
@@ -104,14 +116,11 @@ impl RayCast {
         if !self.shadows {
             occluders.clear();
         }
-        let lights: Vec<(EntityView, Vec<EntityView>)> = world
+        let lights: Vec<Shadowed> = world
             .lights(&view)
             .into_iter()
             .filter(|light| light.rises_above(view.normal))
-            .map(|light| {
-                let between = occluders.iter().filter(|o| o.precedes(&light) && o.overlaps(&light));
-                (light, between.copied().collect())
-            })
+            .map(|light| Shadowed::new(world, &view, light, &occluders, self.order))
             .collect();
 
         let albedo = world.scene.entities[vertex.entity].albedo.as_dvec3();
@@ -124,8 +133,8 @@ impl RayCast {
                 )
             };
             let mut found = self.sky(world, &view, &occluders, radiance, sequence(0));
-            for (stream, (light, between)) in lights.iter().enumerate() {
-                found += self.light(world, &view, light, between, sequence(1 + stream));
+            for (stream, light) in lights.iter().enumerate() {
+                found += self.light(world, &view, light, sequence(1 + stream));
             }
             found *= albedo / PI;
             sum += found;
@@ -157,22 +166,19 @@ impl RayCast {
         let mut sum = DVec3::ZERO;
         for ray in 0..self.rays_a_run() {
             let direction = axes.cosine(points.point(ray));
-            if !self.blocked(world, view, occluders, direction) {
+            let blocked = self.shadows
+                && (occluders.iter().any(|occluder| world.blocks(occluder, direction, f64::INFINITY))
+                    || world.blocks_itself(view, direction, f64::INFINITY));
+            if !blocked {
                 sum += radiance.at(direction);
             }
         }
         sum * (COSINE_INTEGRAL / f64::from(self.rays_a_run()))
     }
 
-    /// Irradiance of a local light behind the occluders that precede it.
-    fn light(
-        &self,
-        world: &World<'_>,
-        view: &VertexView,
-        light: &EntityView,
-        between: &[EntityView],
-        points: Sequence,
-    ) -> DVec3 {
+    /// Irradiance of a local light behind what lies before it.
+    fn light(&self, world: &World<'_>, view: &VertexView, shadowed: &Shadowed, points: Sequence) -> DVec3 {
+        let light = &shadowed.light;
         let cone = light.cone();
         let mut sum = DVec3::ZERO;
         for ray in 0..self.rays_a_run() {
@@ -180,7 +186,7 @@ impl RayCast {
             let cosine = direction.dot(view.normal);
             if cosine > 0.0
                 && let Some(pattern) = world.emission(light, direction)
-                && !self.blocked(world, view, between, direction)
+                && !(self.shadows && shadowed.hidden(world, view, direction))
             {
                 sum += cosine * pattern;
             }
@@ -189,9 +195,63 @@ impl RayCast {
         sum * emission * (cone_solid_angle(cone.height) / f64::from(self.rays_a_run()))
     }
 
-    fn blocked(&self, world: &World<'_>, view: &VertexView, occluders: &[EntityView], direction: DVec3) -> bool {
-        self.shadows
-            && (occluders.iter().any(|occluder| world.blocks(occluder, direction))
-                || world.blocks_itself(view, direction))
+    /// Whether the orders can differ at a vertex: whether what might shadow a light there, the receiver itself included, lies
+    /// neither wholly before nor wholly beyond it.
+    pub fn order_matters(world: &World<'_>, vertex: Vertex) -> bool {
+        let view = world.view(vertex);
+        let occluders = world.occluders(&view);
+        world.lights(&view).into_iter().filter(|light| light.rises_above(view.normal)).any(|light| {
+            let shadowed = Shadowed::new(world, &view, light, &occluders, Order::Surfaces);
+            shadowed.limits_itself || !shadowed.beside.is_empty()
+        })
+    }
+}
+
+/// Distances along a ray that differ by less than this share are equal: rays are cast in f32, each in units of its mesh. Where
+/// two surfaces coincide, the light's counts as the nearer one.
+const TIE: f64 = 1e-5;
+
+/// A local light as seen from a vertex, and what may hide it there.
+struct Shadowed {
+    light: EntityView,
+    /// Occluders that lie wholly before it, or all that count in [`Order::Centres`].
+    before: Vec<EntityView>,
+    /// Occluders that a ray may meet before the light or beyond it.
+    beside: Vec<EntityView>,
+    /// Whether the receiver's own mesh reaches beyond the light.
+    limits_itself: bool,
+}
+
+impl Shadowed {
+    fn new(world: &World<'_>, view: &VertexView, light: EntityView, occluders: &[EntityView], order: Order) -> Self {
+        let [near, far] = world.range_m(&light);
+        let cross = occluders.iter().filter(|o| o.entity != light.entity && o.overlaps(&light)).copied();
+        let (before, beside) = match order {
+            Order::Centres => (cross.filter(|o| o.precedes(&light)).collect(), Vec::new()),
+            Order::Surfaces => {
+                let nearer = cross.filter(|o| world.range_m(o)[0] < far);
+                nearer.partition(|o| world.range_m(o)[1] <= near)
+            }
+        };
+        let limits_itself = order == Order::Surfaces && view.own().is_some_and(|own| world.range_m(own)[1] > near);
+        Shadowed { light, before, beside, limits_itself }
+    }
+
+    /// Whether a ray that meets the light is blocked before it. Only a ray that meets what lies beside the light is asked where
+    /// it meets the light.
+    fn hidden(&self, world: &World<'_>, view: &VertexView, direction: DVec3) -> bool {
+        let anywhere = f64::INFINITY;
+        if self.before.iter().any(|occluder| world.blocks(occluder, direction, anywhere))
+            || (!self.limits_itself && world.blocks_itself(view, direction, anywhere))
+        {
+            return true;
+        }
+        let met = |limit_m: f64| {
+            self.beside.iter().any(|occluder| world.blocks(occluder, direction, limit_m))
+                || (self.limits_itself && world.blocks_itself(view, direction, limit_m))
+        };
+        // A ray that slips between two triangles of the light ends at its centre.
+        let surface_m = || world.first_hit_m(&self.light, direction).unwrap_or(self.light.distance_m);
+        met(world.range_m(&self.light)[1]) && met(surface_m() * (1.0 - TIE))
     }
 }

@@ -139,32 +139,45 @@ impl<'s> World<'s> {
         others.map(|&j| self.sight(j, view.position)).collect()
     }
 
-    /// Whether the entity blocks a ray (unit direction).
-    pub fn blocks(&self, sight: &EntityView, direction: DVec3) -> bool {
+    /// Whether the entity blocks a ray (unit direction) nearer than `limit_m` metres; infinity is no limit.
+    pub fn blocks(&self, sight: &EntityView, direction: DVec3, limit_m: f64) -> bool {
         let direction = direction.as_vec3a();
-        if !sight.meets_sphere(direction) {
-            return false;
-        }
-        let mesh = self.entities[sight.entity].mesh;
-        sight.meets_inner(direction, mesh.inner_radius) || mesh.blocks(sight.origin, sight.to_object * direction)
+        let placed = &self.entities[sight.entity];
+        let limit = (limit_m / placed.radius_m) as f32;
+        sight.entry(direction, 1.0).is_some_and(|sphere| sphere < limit)
+            && (sight.entry(direction, placed.mesh.inner_radius).is_some_and(|inner| inner > 0.0 && inner < limit)
+                || placed.mesh.blocks(sight.origin, sight.to_object * direction, limit))
     }
 
-    /// Whether the receiver's own mesh blocks a ray.
-    pub fn blocks_itself(&self, view: &VertexView, direction: DVec3) -> bool {
+    /// Whether the receiver's own mesh blocks a ray (unit direction) nearer than `limit_m` metres.
+    pub fn blocks_itself(&self, view: &VertexView, direction: DVec3, limit_m: f64) -> bool {
         view.own.as_ref().is_some_and(|own| {
+            let placed = &self.entities[own.entity];
             let local = own.to_object * direction.as_vec3a();
-            self.entities[own.entity].mesh.blocks(own.origin, local)
+            placed.mesh.blocks(own.origin, local, (limit_m / placed.radius_m) as f32)
         })
+    }
+
+    /// Distance in metres at which a ray (unit direction) meets the entity first; `None` if it misses.
+    pub fn first_hit_m(&self, sight: &EntityView, direction: DVec3) -> Option<f64> {
+        let placed = &self.entities[sight.entity];
+        let found = placed.mesh.first_hit(sight.origin, sight.to_object * direction.as_vec3a())?;
+        Some(f64::from(found) * placed.radius_m)
+    }
+
+    /// Distances in metres between which all of an entity lies: those of its bounding sphere, of which the first is
+    /// negative within it.
+    pub fn range_m(&self, sight: &EntityView) -> [f64; 2] {
+        let radius_m = self.entities[sight.entity].radius_m;
+        [sight.distance_m - radius_m, sight.distance_m + radius_m]
     }
 
     /// Emission pattern of an entity along a ray, without the entity's emission factor; `None` if the ray misses.
     pub fn emission(&self, sight: &EntityView, direction: DVec3) -> Option<DVec3> {
         let direction = direction.as_vec3a();
-        if !sight.meets_sphere(direction) {
-            return None;
-        }
+        sight.entry(direction, 1.0)?;
         let mesh = self.entities[sight.entity].mesh;
-        if mesh.is_plain() && sight.meets_inner(direction, mesh.inner_radius) {
+        if mesh.is_plain() && sight.entry(direction, mesh.inner_radius).is_some_and(|inner| inner > 0.0) {
             return Some(DVec3::ONE);
         }
         mesh.emission(sight.origin, sight.to_object * direction).map(|color| color.as_dvec3())
@@ -175,6 +188,11 @@ impl VertexView {
     /// Whether the receiver can shadow itself.
     pub fn shadows_itself(&self) -> bool {
         self.own.is_some()
+    }
+
+    /// The receiver itself as seen from just off its surface, where it can shadow itself.
+    pub fn own(&self) -> Option<&EntityView> {
+        self.own.as_ref()
     }
 }
 
@@ -209,15 +227,14 @@ impl EntityView {
         self.toward.as_dvec3().angle_between(other.toward.as_dvec3()) < half_angle(self) + half_angle(other)
     }
 
-    fn meets_sphere(&self, direction: Vec3A) -> bool {
+    /// Distance (in bounding radii) at which a ray enters a sphere of that radius (in bounding radii) around the centre: 0 or
+    /// less from within the sphere, `None` if it misses. What lies around a sphere within a convex mesh is met before that.
+    fn entry(&self, direction: Vec3A, radius: f32) -> Option<f32> {
         let along = self.toward.dot(direction);
-        self.beyond <= 0.0 || (along > 0.0 && along * along >= self.beyond)
-    }
-
-    /// Whether a ray meets a sphere of that radius (in bounding radii) around the centre, and so the convex mesh around it.
-    fn meets_inner(&self, direction: Vec3A, radius: f32) -> bool {
-        let along = self.toward.dot(direction);
-        let beyond = self.beyond + 1.0 - radius * radius;
-        radius > 0.0 && beyond > 0.0 && along > 0.0 && along * along > beyond
+        // Half the chord, squared. The distance from the axis is taken from the vector, because far away the difference of two
+        // squares keeps no digits.
+        let half = radius * radius - (self.toward - along * direction).length_squared();
+        let within = self.beyond + 1.0 <= radius * radius;
+        (within || (along > 0.0 && half > 0.0)).then(|| if within { 0.0 } else { along - half.sqrt() })
     }
 }

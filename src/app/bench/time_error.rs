@@ -41,12 +41,14 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         .iter()
         .map(|b| {
             let mut row = vec![b.case.clone()];
-            row.extend([b.bands.rms, b.sampling.rms, b.arithmetic_and_storage.rms, b.total.rms].map(three));
+            row.extend(
+                [b.centre_rule.rms, b.bands.rms, b.sampling.rms, b.arithmetic_and_storage.rms, b.total.rms].map(three),
+            );
             row.extend([b.total.p99, b.total.max, b.t0_error].map(three));
             row
         })
         .collect();
-    output::table(&["scene", "bands", "sampling", "storage", "total", "p99", "max", "T0 error"], &rows);
+    output::table(&["scene", "centre rule", "bands", "sampling", "storage", "total", "p99", "max", "T0 error"], &rows);
     output::say("\nFrame against ray casting with as many threads");
     let rows: Vec<Vec<String>> = outcome
         .comparisons

@@ -9,38 +9,13 @@
 
 layout(local_size_x = WORKGROUP) in;
 
-struct Job {
-    vec4 normal;   // COSINE: unit surface normal
-    uint slots[6]; // place of each face in the atlas; NONE where the object does not reach
-    uint target;   // sample that is written
-    float scale;   // factor before storing
-};
+#include "captured.glsl"
 
-layout(binding = 0) uniform texture2D atlas;
-layout(std430, binding = 1) readonly buffer Jobs { Job jobs[]; };
 // For each texel of a face: unit direction as components along (right, down, forward), and solid angle in steradians.
 layout(binding = 2) uniform textureBuffer texels;
 layout(std430, binding = 3) writeonly buffer Samples { float samples[]; };
 
-layout(push_constant) uniform Push {
-    uint face_px;
-    uint atlas_columns;
-} push;
-
-const uint NONE = 0xffffffffu;
-
 shared float shares[COEFFICIENTS * CHANNELS][WORKGROUP];
-
-vec3 to_object(uint face, vec3 d) {
-    switch (face) {
-        case 0: return vec3(d.z, -d.y, -d.x);
-        case 1: return vec3(-d.z, -d.y, d.x);
-        case 2: return vec3(d.x, d.z, d.y);
-        case 3: return vec3(d.x, -d.z, -d.y);
-        case 4: return vec3(d.x, -d.y, d.z);
-        default: return vec3(-d.x, -d.y, -d.z);
-    }
-}
 
 void main() {
     uint job = gl_WorkGroupID.x;
@@ -55,7 +30,7 @@ void main() {
         if (slot == NONE) {
             continue;
         }
-        ivec2 origin = ivec2(slot % push.atlas_columns, slot / push.atlas_columns) * int(push.face_px);
+        ivec2 origin = slot_origin(slot);
         for (uint i = lane; i < texel_count; i += WORKGROUP) {
             vec4 captured = texelFetch(atlas, origin + ivec2(i % push.face_px, i / push.face_px), 0);
 #if CHANNELS == 3

@@ -3,6 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
+use crate::field::self_visibility;
 use crate::gpu::shader::ShaderSource;
 use crate::gpu::{Shader, Stage};
 use crate::sh;
@@ -19,8 +20,10 @@ macro_rules! embedded {
 
 embedded!(
     "assemble.comp",
+    "blocked_share.glsl",
     "capture.frag",
     "capture.vert",
+    "captured.glsl",
     "ceiling.comp",
     "draw.frag",
     "draw.vert",
@@ -41,6 +44,9 @@ embedded!(
     "product.comp",
     "product_points.glsl",
     "project.comp",
+    "self_frame.glsl",
+    "self_visibility.comp",
+    "self_visibility.glsl",
     "show.frag",
     "show.vert",
     "silhouette.comp",
@@ -80,6 +86,13 @@ impl ShaderPermutation {
     pub fn define(mut self, name: &'static str, value: impl Into<u32>) -> Self {
         self.defines.push((name, value.into().to_string()));
         self
+    }
+
+    /// Adds the macros of `self_frame.glsl` and `self_visibility.glsl`.
+    pub fn self_visibility(self) -> Self {
+        self.define("SELF_SIDE", self_visibility::SIDE as u32)
+            .number("SELF_RIM", self_visibility::RIM)
+            .number("SELF_LIMIT", self_visibility::LIMIT_RAD)
     }
 
     /// Adds a macro whose value is an f32.

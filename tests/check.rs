@@ -9,7 +9,8 @@ use serde_json::Value;
 use shadow_fields::shaders::FILES;
 use std::path::Path;
 
-const PASSES: [&str; 7] = ["capture", "project", "assemble", "gather", "merge", "draw", "smooth"];
+const PASSES: [&str; 9] =
+    ["capture", "project", "self_visibility", "assemble", "silhouette", "gather", "merge", "draw", "smooth"];
 
 fn check(folder: &Path, pass: Option<&str>, shaders: Option<&Path>) -> (i32, Value, String) {
     let mut command = command(folder, &["check", "--json", "--no-progress"]);
@@ -54,6 +55,7 @@ fn a_wrong_shader_is_found() {
     let wrong = [
         ("capture.vert", "vec3 q = position - push.eye.xyz;", "vec3 q = position - push.eye.xyz + 0.02;", "capture"),
         ("project.comp", "total *= jobs[job].scale;", "total *= 1.0001 * jobs[job].scale;", "project"),
+        ("self_visibility.comp", "inverse * sqrt(inverse)", "1.5 * inverse * sqrt(inverse)", "self_visibility"),
         ("assemble.comp", "sum *= push.factor;", "sum *= 1.01 * push.factor;", "assemble"),
         ("merge.comp", "float weight = above_horizon", "float weight = 0.999 * above_horizon", "merge"),
         ("draw.frag", "finish(radiance,", "1.01 * finish(radiance,", "draw"),

@@ -256,6 +256,7 @@ fn every_shader_file_is_embedded() {
 const PASSES: &[(&str, &str)] = &[
     ("capture", "src/bake/capture.rs"),
     ("project", "src/bake/project.rs"),
+    ("self_visibility", "src/bake/self_visibility.rs"),
     ("assemble", "src/bake/assemble.rs"),
     ("silhouette", "src/bake/silhouette.rs"),
     ("gather", "src/lists/gather.rs"),
@@ -298,7 +299,7 @@ fn each_pass_is_found_by_one_word() {
         let source = text(path);
         assert!(source.starts_with(&format!("//! Pass \"{word}\":")), "{file} begins with its pass");
         let code = code(&source);
-        let type_name = word[..1].to_uppercase() + &word[1..];
+        let type_name: String = word.split('_').map(|part| part[..1].to_uppercase() + &part[1..]).collect();
         assert!(code.contains(&format!("pub struct {type_name} {{")), "{file}: no struct {type_name}");
         assert!(code.contains(&format!("\"{word}\"")), "{file}: no pipeline has the debug name \"{word}\"");
         let own: Vec<_> = shaders.iter().filter(|shader| stem(shader) == *word).collect();

@@ -5,6 +5,7 @@ mod common;
 use bytemuck::Zeroable;
 use common::library;
 use shadow_fields::bake::project::{Job, Project, Projection};
+use shadow_fields::bake::self_visibility::SelfVisibility;
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::gpu::reflect::Reflection;
 use shadow_fields::layout::{Cluster, Entity};
@@ -99,12 +100,15 @@ fn structs_of_the_gather() {
 }
 
 #[test]
-fn jobs_of_the_projection() {
+fn jobs_of_captured_faces() {
     for projection in [Projection::Blocked, Projection::Radiance, Projection::Transfer] {
         let reflection = library().shader(&Project::row(4, projection)).unwrap().reflection;
         same_layout!(reflection, Job { normal, slots, target, scale });
         assert_eq!(reflection.strides.get("Job"), Some(&(size_of::<Job>() as u32)));
     }
+    let reflection = library().shader(&SelfVisibility::row()).unwrap().reflection;
+    same_layout!(reflection, Job { normal, slots, target, scale });
+    assert_eq!(reflection.strides.get("Job"), Some(&(size_of::<Job>() as u32)));
 }
 
 #[test]

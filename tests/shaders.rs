@@ -6,6 +6,7 @@ use common::{library, skip};
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::{Project, Projection};
+use shadow_fields::bake::self_visibility::SelfVisibility;
 use shadow_fields::bake::silhouette::Silhouette;
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::field::{Lattice, Lookup, Storage};
@@ -25,7 +26,8 @@ fn baking() -> Vec<ShaderPermutation> {
     let project = BANDS.flat_map(|bands| PROJECTIONS.map(|projection| Project::row(bands, projection)));
     let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
     let capture = [false, true].into_iter().flat_map(Capture::rows);
-    project.chain(assemble).chain(capture).chain(Silhouette::permutations(32, 128, 16)).collect()
+    let own = [SelfVisibility::row()];
+    project.chain(own).chain(assemble).chain(capture).chain(Silhouette::permutations(32, 128, 16)).collect()
 }
 
 fn drawing() -> Vec<ShaderPermutation> {

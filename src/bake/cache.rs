@@ -1,19 +1,20 @@
-//! The cache of baked fields and transfer vectors. Their names are hashes of the mesh's content and of everything else that decides
-//! them.
+//! The cache of what is baked: fields, transfer vectors and self-visibility. Names are hashes of the mesh's content and of everything
+//! else that decides the numbers. One function, [`Cache::find`], serves all kinds; a [`Shelf`] says where one kind is kept.
 
 use super::partial::Partial;
 use super::{BakeReport, Baker, Options, Progress, TRANSFER_OFFSET};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
-use crate::field::file::{self, TRANSFER_MAGIC, VERSION};
+use crate::field::file::{self, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC, VERSION};
 use crate::field::quantity::channel_stride;
-use crate::field::{FieldHeader, ShadowField, Shortcuts};
+use crate::field::{FieldHeader, ShadowField, Shortcuts, self_visibility};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A folder of baked fields and transfer vectors. Where there is no folder or no room on disk, they are kept in memory as long as any
+/// A folder of what is baked. Where there is no folder or no room on disk, they are kept in memory as long as any
 /// clone of the cache exists. Nothing is baked twice.
 #[derive(Clone, Default)]
 pub struct Cache {
@@ -26,7 +27,24 @@ pub struct Cache {
 struct InMemory {
     fields: HashMap<String, Arc<ShadowField>>,
     transfers: HashMap<String, Arc<Vec<f32>>>,
+    self_visibility: HashMap<String, Arc<Vec<u8>>>,
 }
+
+/// Where one kind of content is kept.
+struct Shelf<T> {
+    /// Ending of its files, and of those of a bake that is not done.
+    endings: [&'static str; 2],
+    /// Its place in memory.
+    memory: fn(&mut InMemory) -> &mut HashMap<String, Arc<T>>,
+}
+
+const FIELDS: Shelf<ShadowField> = Shelf { endings: ["sf", "part"], memory: |all| &mut all.fields };
+const TRANSFERS: Shelf<Vec<f32>> = Shelf { endings: ["transfer", "transfer-part"], memory: |all| &mut all.transfers };
+const SELF_VISIBILITY: Shelf<Vec<u8>> =
+    Shelf { endings: ["selfvis", "selfvis-part"], memory: |all| &mut all.self_visibility };
+
+/// What the cache held or a bake has made, and the report of the bake, if there was one.
+pub type Found<T> = (Arc<T>, Option<BakeReport>);
 
 /// The header of a cached transfer file: everything that decides transfer vectors.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -48,6 +66,36 @@ impl TransferHeader {
             face_px: options.face_px,
             shortcuts: options.shortcuts,
             offset: TRANSFER_OFFSET,
+            vertex_count: mesh.positions.len(),
+        }
+    }
+}
+
+/// The header of a cached file of self-visibility: everything that decides it.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct SelfVisibilityHeader {
+    mesh_hash: String,
+    face_px: u32,
+    #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
+    shortcuts: Shortcuts,
+    offset: f32,
+    side: usize,
+    rim: f64,
+    limit_rad: f64,
+    vertex_count: usize,
+}
+
+impl SelfVisibilityHeader {
+    fn new(mesh: &Mesh, options: &Options) -> Self {
+        SelfVisibilityHeader {
+            mesh_hash: super::hash_text(mesh),
+            face_px: options.face_px,
+            // Every vertex is captured, whether the mesh has symmetries or not.
+            shortcuts: Shortcuts { symmetry: true, ..options.shortcuts },
+            offset: TRANSFER_OFFSET,
+            side: self_visibility::SIDE,
+            rim: self_visibility::RIM,
+            limit_rad: self_visibility::LIMIT_RAD,
             vertex_count: mesh.positions.len(),
         }
     }
@@ -93,16 +141,50 @@ impl Cache {
         self.memory.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    fn has<T>(&self, shelf: &Shelf<T>, key: &str) -> bool {
+        (shelf.memory)(&mut self.memory()).contains_key(key) || self.exists(key, shelf.endings[0])
+    }
+
+    /// What a shelf holds under `key`, read by `read`; else what `bake` makes, which is kept by `write`, or in memory where it cannot
+    /// be written.
+    fn find<T>(
+        &self,
+        shelf: &Shelf<T>,
+        key: String,
+        read: impl FnOnce(&Path) -> Option<T>,
+        bake: impl FnOnce(&Partial) -> Result<(T, BakeReport)>,
+        write: impl FnOnce(&Path, &T) -> Result<()>,
+    ) -> Result<Found<T>> {
+        let [ending, unfinished] = shelf.endings;
+        let path = self.path(&key, ending);
+        if let Some(found) = (shelf.memory)(&mut self.memory()).get(&key) {
+            return Ok((found.clone(), None));
+        }
+        if let Some(found) = path.as_deref().and_then(read) {
+            return Ok((Arc::new(found), None));
+        }
+        let partial = Partial::new(path.as_ref().map(|path| path.with_extension(unfinished)));
+        let (made, report) = bake(&partial)?;
+        let made = Arc::new(made);
+        if !is_kept(path.as_deref(), |path| write(path, &made)) {
+            (shelf.memory)(&mut self.memory()).insert(key, made.clone());
+        }
+        Ok((made, Some(report)))
+    }
+
     /// Whether the field that `header` describes is there.
     pub fn has_field(&self, header: &FieldHeader) -> bool {
-        let key = field_name(header);
-        self.memory().fields.contains_key(&key) || self.exists(&key, "sf")
+        self.has(&FIELDS, &field_name(header))
     }
 
     /// Whether the transfer vectors of a mesh are there.
     pub fn has_transfer(&self, mesh: &Mesh, options: &Options) -> bool {
-        let key = key(&TransferHeader::new(mesh, options));
-        self.memory().transfers.contains_key(&key) || self.exists(&key, "transfer")
+        self.has(&TRANSFERS, &key(&TransferHeader::new(mesh, options)))
+    }
+
+    /// Whether the self-visibility of a mesh is there.
+    pub fn has_self_visibility(&self, mesh: &Mesh, options: &Options) -> bool {
+        self.has(&SELF_VISIBILITY, &key(&SelfVisibilityHeader::new(mesh, options)))
     }
 
     /// The field that `header` describes, and the report of its bake, which is `None` if the cache held the field.
@@ -115,22 +197,14 @@ impl Cache {
         mesh: &Mesh,
         header: &FieldHeader,
         progress: Progress<'_>,
-    ) -> Result<(Arc<ShadowField>, Option<BakeReport>)> {
-        let key = field_name(header);
-        let path = self.path(&key, "sf");
-        if let Some(found) = self.memory().fields.get(&key) {
-            return Ok((found.clone(), None));
-        }
-        if let Some(found) = path.as_deref().and_then(|path| read_field(path, header)) {
-            return Ok((Arc::new(found), None));
-        }
-        let partial = Partial::new(path.as_ref().map(|path| path.with_extension("part")));
-        let (field, report) = baker.field_from(&partial, mesh, header.clone(), progress)?;
-        let field = Arc::new(field);
-        if !is_kept(path.as_deref(), |path| field.write(path)) {
-            self.memory().fields.insert(key, field.clone());
-        }
-        Ok((field, Some(report)))
+    ) -> Result<Found<ShadowField>> {
+        self.find(
+            &FIELDS,
+            field_name(header),
+            |path| read_field(path, header),
+            |partial| baker.field_from(partial, mesh, header.clone(), progress),
+            |path, field| field.write(path),
+        )
     }
 
     /// The transfer vectors of a mesh, and the report of their bake, which is `None` if the cache held them.
@@ -143,24 +217,42 @@ impl Cache {
         mesh: &Mesh,
         options: &Options,
         progress: Progress<'_>,
-    ) -> Result<(Arc<Vec<f32>>, Option<BakeReport>)> {
+    ) -> Result<Found<Vec<f32>>> {
         let header = TransferHeader::new(mesh, options);
-        let key = key(&header);
-        let path = self.path(&key, "transfer");
-        if let Some(found) = self.memory().transfers.get(&key) {
-            return Ok((found.clone(), None));
-        }
-        if let Some(found) = path.as_deref().and_then(|path| read_transfer(path, &header)) {
-            return Ok((Arc::new(found), None));
-        }
-        let partial = Partial::new(path.as_ref().map(|path| path.with_extension("transfer-part")));
-        let (transfer, report) = baker.transfer_from(&partial, mesh, options, progress)?;
-        let transfer = Arc::new(transfer);
-        let write = |path: &Path| file::write(path, TRANSFER_MAGIC, &header, bytemuck::cast_slice(&transfer));
-        if !is_kept(path.as_deref(), write) {
-            self.memory().transfers.insert(key, transfer.clone());
-        }
-        Ok((transfer, Some(report)))
+        let bytes = 4 * header.vertex_count * channel_stride(header.bands);
+        let floats = |payload: Vec<u8>| {
+            payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes"))).collect()
+        };
+        self.find(
+            &TRANSFERS,
+            key(&header),
+            |path| read_payload(path, TRANSFER_MAGIC, &header, bytes).map(floats),
+            |partial| baker.transfer_from(partial, mesh, options, progress),
+            |path, transfer| file::write(path, TRANSFER_MAGIC, &header, bytemuck::cast_slice(transfer)),
+        )
+    }
+
+    /// The self-visibility of a mesh (see [`Baker::self_visibility_from`]), and the report of its bake, which is `None` if the cache
+    /// held it.
+    ///
+    /// # Errors
+    /// As [`Baker::field`]. A damaged or unreadable cache file is baked anew.
+    pub fn self_visibility(
+        &self,
+        baker: &Baker,
+        mesh: &Mesh,
+        options: &Options,
+        progress: Progress<'_>,
+    ) -> Result<Found<Vec<u8>>> {
+        let header = SelfVisibilityHeader::new(mesh, options);
+        let bytes = header.vertex_count * self_visibility::NODES;
+        self.find(
+            &SELF_VISIBILITY,
+            key(&header),
+            |path| read_payload(path, SELF_VISIBILITY_MAGIC, &header, bytes),
+            |partial| baker.self_visibility_from(partial, mesh, options, progress),
+            |path, maps| file::write(path, SELF_VISIBILITY_MAGIC, &header, maps),
+        )
     }
 }
 
@@ -187,13 +279,15 @@ fn read_field(path: &Path, header: &FieldHeader) -> Option<ShadowField> {
     }
 }
 
-/// The transfer vectors in a file. `None` if the file is missing or damaged or holds others.
-fn read_transfer(path: &Path, header: &TransferHeader) -> Option<Vec<f32>> {
-    let bytes = 4 * header.vertex_count * channel_stride(header.bands);
-    match path.exists().then(|| file::read::<TransferHeader>(path, TRANSFER_MAGIC))? {
-        Ok((found, payload)) if found == *header && payload.len() == bytes => {
-            Some(payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes"))).collect())
-        }
+/// The payload of a file. `None` if the file is missing or damaged, or if its header or length is another.
+fn read_payload<H: PartialEq + DeserializeOwned>(
+    path: &Path,
+    magic: [u8; 8],
+    header: &H,
+    bytes: usize,
+) -> Option<Vec<u8>> {
+    match path.exists().then(|| file::read::<H>(path, magic))? {
+        Ok((found, payload)) if found == *header && payload.len() == bytes => Some(payload),
         Ok(_) => doubt(path, &"it does not fit its name"),
         Err(error) => doubt(path, &error),
     }
@@ -211,10 +305,12 @@ mod tests {
     use crate::field::{FieldKind, Storage};
     use std::collections::BTreeSet;
 
-    /// Names of occlusion field, radiance field and transfer vectors.
-    fn names(mesh: &Mesh, options: &Options) -> [String; 3] {
+    /// Names of occlusion field, radiance field, transfer vectors and self-visibility.
+    fn names(mesh: &Mesh, options: &Options) -> [String; 4] {
         let field = |kind| field_name(&crate::bake::header(mesh, kind, options));
-        [field(FieldKind::Occlusion), field(FieldKind::Radiance), key(&TransferHeader::new(mesh, options))]
+        let own = [key(&TransferHeader::new(mesh, options)), key(&SelfVisibilityHeader::new(mesh, options))];
+        let [transfer, self_visibility] = own;
+        [field(FieldKind::Occlusion), field(FieldKind::Radiance), transfer, self_visibility]
     }
 
     /// Each option that is flipped changes the names of what it decides, and no other names.
@@ -227,14 +323,14 @@ mod tests {
         let Shortcuts { symmetry, faces, inside } = shortcuts;
         assert!(field_bands.is_none() && storage == Storage::F16);
         let shortcuts = |shortcuts| Options { shortcuts, ..base };
-        let all = [true; 3];
-        let flipped: Vec<(&str, Options, [bool; 3])> = vec![
-            ("bands", Options { bands: bands + 1, ..base }, all),
-            ("field_bands", Options { field_bands: Some(bands + 2), ..base }, [true, false, false]),
-            ("storage", Options { storage: Storage::F32, ..base }, [true, true, false]),
-            ("lattice", Options { lattice: "cube:4x3".parse().unwrap(), ..base }, [true, true, false]),
+        let all = [true; 4];
+        let flipped: Vec<(&str, Options, [bool; 4])> = vec![
+            ("bands", Options { bands: bands + 1, ..base }, [true, true, true, false]),
+            ("field_bands", Options { field_bands: Some(bands + 2), ..base }, [true, false, false, false]),
+            ("storage", Options { storage: Storage::F32, ..base }, [true, true, false, false]),
+            ("lattice", Options { lattice: "cube:4x3".parse().unwrap(), ..base }, [true, true, false, false]),
             ("face_px", Options { face_px: face_px / 2, ..base }, all),
-            ("symmetry", shortcuts(Shortcuts { symmetry: !symmetry, faces, inside }), all),
+            ("symmetry", shortcuts(Shortcuts { symmetry: !symmetry, faces, inside }), [true, true, true, false]),
             ("faces", shortcuts(Shortcuts { symmetry, faces: !faces, inside }), all),
             ("inside", shortcuts(Shortcuts { symmetry, faces, inside: !inside }), all),
         ];

@@ -2,6 +2,7 @@
 //! by a power cut, goes on from there. The file is replaced whole, so it is never half-written. It is removed when the bake is done.
 
 use crate::field::file;
+use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -24,7 +25,8 @@ struct Header {
     done: u32,
     /// Number of targets in all.
     all: u32,
-    floats: usize,
+    /// Numbers of all samples.
+    numbers: usize,
 }
 
 impl Partial {
@@ -39,15 +41,15 @@ impl Partial {
     }
 
     /// Puts what was kept into `values` and returns how many of `all` targets it holds. A file that does not fit counts as none.
-    pub fn load(&self, values: &mut [f32], all: u32) -> u32 {
+    pub fn load<T: Pod>(&self, values: &mut [T], all: u32) -> u32 {
         let Some(path) = self.path.as_ref().filter(|path| path.exists()) else { return 0 };
         match file::read::<Header>(path, MAGIC) {
             Ok((header, payload))
-                if (header.all, header.floats) == (all, values.len())
+                if (header.all, header.numbers) == (all, values.len())
                     && header.done <= all
                     && payload.len() == size_of_val(values) =>
             {
-                bytemuck::cast_slice_mut(values).copy_from_slice(&payload);
+                bytemuck::cast_slice_mut::<T, u8>(values).copy_from_slice(&payload);
                 log::info!("{}: going on after {} of {all} samples", path.display(), header.done);
                 header.done
             }
@@ -60,11 +62,11 @@ impl Partial {
     }
 
     /// Keeps the samples after `done` of `all` targets if the last saving is long enough ago.
-    pub fn save(&self, values: &[f32], done: u32, all: u32) {
+    pub fn save<T: Pod>(&self, values: &[T], done: u32, all: u32) {
         let mut saved = self.saved.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(path) = self.path.as_ref().filter(|_| done < all && saved.elapsed() >= self.interval) else { return };
         *saved = Instant::now();
-        let header = Header { done, all, floats: values.len() };
+        let header = Header { done, all, numbers: values.len() };
         if let Err(error) = file::write(path, MAGIC, &header, bytemuck::cast_slice(values)) {
             log::warn!("{error}; a cancelled bake would start anew");
         }

@@ -37,17 +37,17 @@ impl Projection {
     }
 }
 
-/// One sample to project.
+/// One sample whose faces are reduced.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Job {
-    /// Unit surface normal, for transfer.
+    /// Unit surface normal, for transfer and self-visibility.
     pub normal: [f32; 4],
     /// Place of each face in the atlas.
     pub slots: Slots,
     /// Index of the sample that is written.
     pub target: u32,
-    /// Factor by which the coefficients are multiplied.
+    /// Factor by which coefficients are multiplied.
     pub scale: f32,
 }
 
@@ -61,11 +61,14 @@ fn workgroup(bands: usize, projection: Projection) -> u32 {
     [64, 32].into_iter().find(|count| count * sums <= SHARED_BYTES).unwrap_or(16) as u32
 }
 
+/// Constants of the passes that reduce captured faces.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-struct Push {
-    face_px: u32,
-    atlas_columns: u32,
+pub(super) struct Push {
+    /// Edge of a face in texels.
+    pub face_px: u32,
+    /// Faces in a row of the atlas.
+    pub atlas_columns: u32,
 }
 
 /// The pipeline with its texel table.

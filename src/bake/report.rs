@@ -16,7 +16,7 @@ pub struct BakeReport {
     pub filled: u32,
     /// Device time in capture passes, in ms.
     pub capture_ms: f64,
-    /// Device time in project passes, in ms.
+    /// Device time in the passes that reduce faces, project or self_visibility, in ms.
     pub project_ms: f64,
     /// Device time in the assemble pass, in ms.
     pub assemble_ms: f64,
@@ -29,7 +29,7 @@ impl BakeReport {
         for timing in timings {
             match timing.pass.as_str() {
                 "capture" => self.capture_ms += timing.milliseconds,
-                "project" => self.project_ms += timing.milliseconds,
+                "project" | "self_visibility" => self.project_ms += timing.milliseconds,
                 _ => self.assemble_ms += timing.milliseconds,
             }
         }

@@ -9,6 +9,7 @@ pub mod draw;
 pub mod gather;
 pub mod merge;
 pub mod project;
+pub mod self_visibility;
 pub mod silhouette;
 pub mod smooth;
 
@@ -56,9 +57,10 @@ impl CheckRow {
 type Part = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
 /// Every pass, by the one word that names it everywhere.
-pub const PASSES: [(&str, Part); 8] = [
+pub const PASSES: [(&str, Part); 9] = [
     ("capture", capture::rows),
     ("project", project::rows),
+    ("self_visibility", self_visibility::rows),
     ("assemble", assemble::rows),
     ("silhouette", silhouette::rows),
     ("gather", gather::rows),

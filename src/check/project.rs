@@ -6,8 +6,10 @@ use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
 use crate::bake::capture::{Capture, Model, NO_SLOT, Slots};
 use crate::bake::project::{self, Job, Project, Projection};
+use crate::bake::self_visibility::SelfVisibility;
 use crate::error::Result;
 use crate::field::quantity::channel_stride;
+use crate::field::self_visibility::NODES;
 use crate::gpu::{Access, Buffer, Commands};
 use glam::Vec3;
 
@@ -54,13 +56,25 @@ impl<'b> Content<'b> {
         Ok(Content { baker, capture, model, eyes: eyes.to_vec(), plan, cull, texels })
     }
 
-    fn texel(&self, eye: usize, face: usize, x: usize, y: usize, projection: Projection) -> [f32; 3] {
+    /// What was captured at a texel.
+    pub fn texel(&self, eye: usize, face: usize, x: usize, y: usize, projection: Projection) -> [f32; 3] {
         match self.plan[eye][face] {
             // What is not in the atlas shows the background.
             NO_SLOT if projection == Projection::Radiance => [0.0; 3],
             NO_SLOT => [1.0, 0.0, 0.0],
             slot => self.texels[texel_index(&self.capture, slot, x, y)],
         }
+    }
+
+    /// A job for every eye, with its normal.
+    pub fn vertex_jobs(&self, normals: &[Vec3]) -> Vec<Job> {
+        let numbered = self.plan.iter().zip(normals).enumerate();
+        numbered
+            .map(|(i, (slots, normal))| {
+                let normal = normal.extend(0.0).to_array();
+                Job { normal, slots: *slots, target: i as u32, scale: 1.0 }
+            })
+            .collect()
     }
 
     /// Jobs in another order than their targets, at different scales and normals.
@@ -98,18 +112,41 @@ impl<'b> Content<'b> {
         let mut job_buffer = Project::job_buffer(device, jobs.len() as u32)?;
         job_buffer.write(0, jobs);
         let texels = project.texel_view()?;
+        let mut commands = self.captured()?;
+        let count = jobs.len() as u32;
+        commands.pass("project", |c| project.record(c, &self.capture.atlas, &job_buffer, &texels, &samples, count))?;
+        commands.submit()?;
+        samples.download(jobs.len() * stride)
+    }
+
+    /// As [`Content::run`], for maps of self-visibility.
+    ///
+    /// # Errors
+    /// As [`SelfVisibility::record`].
+    pub fn run_self_visibility(&self, jobs: &[Job]) -> Result<Vec<u8>> {
+        let (device, library) = (self.baker.device(), self.baker.library());
+        let pass = SelfVisibility::new(device, library, self.capture.face_px, self.capture.columns)?;
+        let maps = Buffer::with_data(device, "maps", &vec![0_u8; jobs.len() * NODES])?;
+        let mut job_buffer = Project::job_buffer(device, jobs.len() as u32)?;
+        job_buffer.write(0, jobs);
+        let mut commands = self.captured()?;
+        let (atlas, count) = (&self.capture.atlas, jobs.len() as u32);
+        commands.pass("self_visibility", |c| pass.record(c, atlas, &job_buffer, &maps, count))?;
+        commands.submit()?;
+        maps.download(jobs.len() * NODES)
+    }
+
+    /// Commands that capture the faces for a compute pass that follows.
+    fn captured(&self) -> Result<Commands<'_>> {
         let Content { capture, model, eyes, plan, cull, .. } = self;
-        let mut commands = Commands::new(device, "project check")?;
+        let mut commands = Commands::new(self.baker.device(), "check of captured faces")?;
         commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
         if let Some(depth) = capture.depth() {
             commands.image_barrier(depth, None, Access::DepthWrite);
         }
         commands.pass("capture", |c| capture.record(c, model, eyes, plan, *cull))?;
         commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::ComputeSampled);
-        let count = jobs.len() as u32;
-        commands.pass("project", |c| project.record(c, &capture.atlas, &job_buffer, &texels, &samples, count))?;
-        commands.submit()?;
-        samples.download(jobs.len() * stride)
+        Ok(commands)
     }
 }
 

@@ -22,6 +22,8 @@ use std::path::Path;
 pub const FIELD_MAGIC: [u8; 8] = *b"SHFIELD\n";
 /// First bytes of a cached transfer file.
 pub const TRANSFER_MAGIC: [u8; 8] = *b"SHTRANS\n";
+/// First bytes of a cached file of self-visibility.
+pub const SELF_VISIBILITY_MAGIC: [u8; 8] = *b"SHSELFV\n";
 /// Version that this program writes and reads. It increases whenever the meaning of header or payload changes.
 pub const VERSION: u32 = 6;
 /// Longest header that is read.

@@ -8,6 +8,7 @@ pub mod fit;
 pub mod growth;
 pub mod lattice;
 pub mod quantity;
+pub mod self_visibility;
 pub mod shortcuts;
 pub mod silhouette;
 pub mod silhouette_nodes;

@@ -1,0 +1,161 @@
+#version 460
+#extension GL_EXT_samplerless_texture_functions : require
+// Cube faces around a vertex to its map of signed angles, one workgroup per vertex and one invocation per node. The nearest texel of
+// the other state has a neighbour that is not of it. So a face becomes a bit a texel, the bits beside an edge are found a word at a
+// time, and the nodes measure to those alone. Texels below the horizon are no part of what the vertex sees.
+
+layout(local_size_x = NODES) in;
+
+#include "captured.glsl"
+#include "self_frame.glsl"
+
+layout(std430, binding = 2) writeonly buffer Maps { uint maps[]; }; // four nodes a word
+
+shared uint words[WORDS]; // rows of texels, 32 a word, a bit for each that is free
+shared uint edges[WORDS]; // a bit for each texel beside an edge
+shared int angles[NODES]; // as whole steps
+
+bool free_at(uint slot, ivec2 at) {
+    return slot == NONE || texelFetch(atlas, slot_origin(slot) + at, 0).r > 0.5;
+}
+
+// Whether the texel that a direction (any length) meets is free.
+bool free_toward(uint job, vec3 d) {
+    vec3 a = abs(d);
+    uint face = a.z >= a.x && a.z >= a.y ? (d.z < 0.0 ? 5 : 4) : a.y >= a.x ? (d.y < 0.0 ? 3 : 2) : (d.x < 0.0 ? 1 : 0);
+    vec3 right = to_object(face, vec3(1.0, 0.0, 0.0));
+    vec3 down = to_object(face, vec3(0.0, 1.0, 0.0));
+    vec2 st = vec2(dot(d, right), dot(d, down)) / max(a.x, max(a.y, a.z));
+    int px = int(push.face_px);
+    ivec2 at = clamp(ivec2((st + 1.0) * 0.5 * float(px)), ivec2(0), ivec2(px - 1));
+    return free_at(jobs[job].slots[face], at);
+}
+
+// Point of a texel's centre on its face: s and t.
+vec2 face_point(ivec2 at) {
+    return vec2(2 * at + 1) / float(push.face_px) - 1.0;
+}
+
+uint load_word(uint slot, ivec2 first) {
+    uint count = slot == NONE ? 0 : min(32, push.face_px - uint(first.x));
+    uint word = slot == NONE ? 0xffffffffu : 0;
+    for (uint bit = 0; bit < count; bit++) {
+        word |= uint(free_at(slot, first + ivec2(bit, 0))) << bit;
+    }
+    return word;
+}
+
+// Texels of word i that have a neighbour of the other state, among rows of `across` words of which `count` are there.
+uint edge_word(uint i, uint across, uint count) {
+    uint column = i % across;
+    bool last = column == across - 1;
+    uint valid = 0xffffffffu >> (last ? 32 * across - push.face_px : 0);
+    uint word = words[i];
+    uint left = word << 1 | (column > 0 ? words[i - 1] >> 31 : word & 1);
+    uint right = word >> 1 | (last ? 0 : words[i + 1] << 31);
+    uint above = i >= across ? words[i - across] : word;
+    uint below = i + across < count ? words[i + across] : word;
+    uint beside = (word ^ right) & (last ? valid >> 1 : valid);
+    return (beside | (word ^ left) | (word ^ above) | (word ^ below)) & valid;
+}
+
+// Adds texels on the rim of a face whose neighbour on another face is of the other state: number k of all four sides.
+void add_rim(uint job, uint face, uint k, int row_first, int row_end) {
+    int px = int(push.face_px);
+    uint side = k / push.face_px;
+    int along = int(k % push.face_px);
+    int end = side % 2 == 0 ? 0 : px - 1;
+    ivec2 at = side < 2 ? ivec2(end, along) : ivec2(along, end);
+    int outward = side % 2 == 0 ? -1 : 1;
+    ivec2 beyond = at + (side < 2 ? ivec2(outward, 0) : ivec2(0, outward));
+    if (at.y < row_first || at.y >= row_end) {
+        return;
+    }
+    uint across = (push.face_px + 31) / 32;
+    uint i = uint(at.y - row_first) * across + uint(at.x) / 32;
+    bool free = (words[i] >> (at.x & 31) & 1) == 1;
+    if (free_toward(job, to_object(face, vec3(face_point(beyond), 1.0))) != free) {
+        atomicOr(edges[i], 1u << (at.x & 31));
+    }
+}
+
+// Of each state the nearest texel so far: cosine to the node, and half its width in radians.
+struct Nearest {
+    vec2 free;
+    vec2 blocked;
+};
+
+// Measures to every texel beside an edge; `normal` and the node's direction `toward` along the face's axes.
+void measure(uint count, int row_first, vec3 normal, vec3 toward, inout Nearest nearest) {
+    uint across = (push.face_px + 31) / 32;
+    for (uint i = 0; i < count; i++) {
+        for (uint bits = edges[i]; bits != 0; bits &= bits - 1) {
+            int bit = findLSB(bits);
+            vec3 point = vec3(face_point(ivec2(32 * (i % across) + bit, row_first + int(i / across))), 1.0);
+            float inverse = inversesqrt(dot(point, point));
+            // A texel's solid angle is its area on the face times the third power of this inverse.
+            vec2 found = vec2(dot(point, toward) * inverse, inverse * sqrt(inverse) / float(push.face_px));
+            found.x = dot(point, normal) > 0.0 ? found.x : -2.0;
+            if ((words[i] >> bit & 1) == 1) {
+                nearest.free = found.x > nearest.free.x ? found : nearest.free;
+            } else {
+                nearest.blocked = found.x > nearest.blocked.x ? found : nearest.blocked;
+            }
+        }
+    }
+}
+
+// Angle from the node to the centre of the nearest texel; without one, more than any angle.
+float angle_to(vec2 nearest) {
+    return nearest.x < -1.5 ? 1e9 : acos(clamp(nearest.x, -1.0, 1.0));
+}
+
+void main() {
+    uint job = gl_WorkGroupID.x;
+    uint node = gl_LocalInvocationID.x;
+    vec3 normal = jobs[job].normal.xyz;
+    vec3 toward = self_frame(normal) * self_node(node);
+    Nearest nearest = Nearest(vec2(-2.0, 0.0), vec2(-2.0, 0.0));
+    int px = int(push.face_px);
+    uint across = (push.face_px + 31) / 32;
+    int rows = int(WORDS / across) - 2; // and one on either side, whose other neighbours the next rows have
+    for (uint face = 0; face < 6; face++) {
+        mat3 axes = mat3(to_object(face, vec3(1.0, 0.0, 0.0)), to_object(face, vec3(0.0, 1.0, 0.0)),
+            to_object(face, vec3(0.0, 0.0, 1.0)));
+        vec3 up = normal * axes;
+        bool rises = abs(up.x) + abs(up.y) + up.z > 0.0;
+        uint slot = jobs[job].slots[face];
+        for (int first = 0; first < (rises ? px : 0); first += rows) {
+            int row_first = max(first - 1, 0);
+            int row_end = min(first + rows + 1, px);
+            uint count = uint(row_end - row_first) * across;
+            for (uint i = node; i < count; i += NODES) {
+                words[i] = load_word(slot, ivec2(32 * (i % across), row_first + int(i / across)));
+            }
+            barrier();
+            for (uint i = node; i < count; i += NODES) {
+                edges[i] = edge_word(i, across, count);
+            }
+            barrier();
+            for (uint k = node; k < 4 * push.face_px; k += NODES) {
+                add_rim(job, face, k, row_first, row_end);
+            }
+            barrier();
+            measure(count, row_first, up, toward * axes, nearest);
+            barrier();
+        }
+    }
+    float to_free = angle_to(nearest.free);
+    float to_blocked = angle_to(nearest.blocked);
+    bool free = to_free == to_blocked ? free_toward(job, normal) : to_blocked > to_free;
+    float angle = free ? max(to_blocked - nearest.blocked.y, 0.0) : -max(to_free - nearest.free.y, 0.0);
+    angles[node] = int(roundEven(clamp(angle / SELF_LIMIT, -1.0, 1.0) * 127.0));
+    barrier();
+    if (node < NODES / 4) {
+        uint word = 0;
+        for (uint k = 0; k < 4; k++) {
+            word |= uint(angles[4 * node + k] & 0xff) << 8 * k;
+        }
+        maps[jobs[job].target * (NODES / 4) + node] = word;
+    }
+}

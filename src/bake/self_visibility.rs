@@ -1,0 +1,96 @@
+//! Pass "self_visibility": makes a map of signed angles of the captured cube faces around a vertex, with one workgroup for each.
+//!
+//! Inputs: the atlas of [`super::capture`], and a [`Job`](super::project::Job) for each vertex. Output: `maps[target]` of [`NODES`]
+//! bytes, as [`crate::field::self_visibility`] reads them. A node holds the angle from its direction to the nearest
+//! texel of the other state that lies above the horizon, less half that texel's width: there is the edge.
+
+use super::project::Push;
+use crate::error::Result;
+use crate::field::self_visibility::{NODES, encode_angle, frame, node_direction};
+use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, Image};
+use crate::sh::cube::{FACE_COUNT, direction, face_st, solid_angle, texel_st};
+use crate::shaders::{Library, ShaderPermutation};
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+/// Words of 32 texels that a workgroup looks at together, with as many for their edges: 12 KB of the 16 KB of shared memory that every
+/// device has. Faces of up to 217 px fit as a whole.
+const WORDS: u32 = 1536;
+
+/// The pipeline.
+pub struct SelfVisibility {
+    pipeline: ComputePipeline,
+    face_px: u32,
+    columns: u32,
+}
+
+impl SelfVisibility {
+    /// The row of the shader table.
+    pub fn row() -> ShaderPermutation {
+        ShaderPermutation::new("self_visibility.comp", 4)
+            .define("NODES", NODES as u32)
+            .define("WORDS", WORDS)
+            .self_visibility()
+    }
+
+    /// A pipeline for faces of `face_px` in an atlas of `columns`.
+    ///
+    /// # Errors
+    /// `Failed` when the shader does not compile.
+    pub fn new(device: &Arc<Device>, library: &Library, face_px: u32, columns: u32) -> Result<Self> {
+        let pipeline = ComputePipeline::new(device, "self_visibility", &library.shader(&Self::row())?, &[])?;
+        Ok(SelfVisibility { pipeline, face_px, columns })
+    }
+
+    /// Makes the maps of the first `job_count` jobs.
+    ///
+    /// # Errors
+    /// What recording returns.
+    pub fn record<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        atlas: &'r Image,
+        jobs: &'r Buffer,
+        maps: &'r Buffer,
+        job_count: u32,
+    ) -> Result<()> {
+        let push = Push { face_px: self.face_px, atlas_columns: self.columns };
+        let resources = [Bind::Image(atlas), Bind::Buffer(jobs), Bind::Buffer(maps)];
+        commands.dispatch(&self.pipeline, &resources, &push, [job_count * self.pipeline.local_size[0], 1, 1])
+    }
+}
+
+/// The CPU twin of the pass for one vertex, in f64 and by plain search through all texels. `free(face, x, y)` is what was captured.
+pub fn twin(face_px: usize, normal: Vec3, free: impl Fn(usize, usize, usize) -> bool) -> [u8; NODES] {
+    let normal = normal.as_dvec3();
+    let widths: Vec<f64> = solid_angle(face_px).iter().map(|area| area.sqrt()).collect();
+    let mut above: Vec<(DVec3, f64, bool)> = Vec::new();
+    for (face, i) in (0..FACE_COUNT).flat_map(|face| (0..face_px * face_px).map(move |i| (face, i))) {
+        let (x, y) = (i % face_px, i / face_px);
+        let toward = direction(face, texel_st(x, face_px), texel_st(y, face_px));
+        if toward.dot(normal) > 0.0 {
+            above.push((toward, widths[i] / 2.0, free(face, x, y)));
+        }
+    }
+    let along_normal = || {
+        let (face, s, t) = face_st(normal);
+        let at = |st: f64| (((st + 1.0) * 0.5 * face_px as f64) as usize).min(face_px - 1);
+        free(face, at(s), at(t))
+    };
+    let axes = frame(normal);
+    std::array::from_fn(|node| {
+        let node = axes * node_direction(node);
+        // Angle to the centre of the nearest texel of a state, and to its rim.
+        let nearest = |state: bool| {
+            let texels = above.iter().filter(|texel| texel.2 == state);
+            let nearest = texels.max_by(|a, b| a.0.dot(node).total_cmp(&b.0.dot(node)));
+            nearest.map_or((f64::MAX, f64::MAX), |texel| {
+                let angle = node.angle_between(texel.0);
+                (angle, (angle - texel.1).max(0.0))
+            })
+        };
+        let [to_free, to_blocked] = [nearest(true), nearest(false)];
+        let free = if to_free.0 == to_blocked.0 { along_normal() } else { to_blocked.0 > to_free.0 };
+        encode_angle(if free { to_blocked.1 } else { -to_free.1 })
+    })
+}

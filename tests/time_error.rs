@@ -75,3 +75,107 @@ fn unknown_cases_and_axes_are_listed() {
         assert!(!folder.path().join("out").exists(), "nothing is written");
     }
 }
+
+/// A floor and a ring that moves over it, under `light`.
+fn own_scene(light: &str) -> String {
+    format!(
+        r#"
+        [camera]
+        eye = [0, 2, 4]
+        target = [0, 0.3, 0]
+        [output]
+        time_s = 0.5
+        exposure_ev = -0.5
+        [[mesh]]
+        name = "floor"
+        plane = {{ size_m = 4, cells = 16 }}
+        [[mesh]]
+        name = "ring"
+        torus = {{ major_m = 0.5, minor_m = 0.15, segments = 24, sides = 8 }}
+        [[mesh]]
+        name = "ball"
+        sphere = {{ radius_m = 0.2, subdivisions = 2 }}
+        [[entity]]
+        mesh = "floor"
+        [[entity]]
+        mesh = "ring"
+        position = [0, 0.6, 0]
+        motion = [{{ spin = {{ axis = [1, 0, 0], period_s = 4 }} }}]
+        {light}"#
+    )
+}
+
+const LIGHT: &str =
+    "[[entity]]\nmesh = \"ball\"\nposition = [0.6, 2, 0.3]\nemission = [60, 50, 40]\nreceives = false\n";
+
+#[test]
+fn a_scene_of_ones_own() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("my ring.toml"), own_scene(LIGHT)).unwrap();
+    let asked = ["bench", "time-error", "my ring.toml", "--quick", "--axis", "lookup", "--out", "out", "--json"];
+    let outcome: Value = serde_json::from_str(&good(folder.path(), &asked).stdout).unwrap();
+    for part in ["budgets", "pictures", "comparisons"] {
+        assert_eq!(outcome[part].as_array().unwrap().len(), 1, "{part}");
+        assert_eq!(outcome[part][0]["case"], "my ring");
+    }
+    assert_eq!(outcome["points"].as_array().unwrap().len(), 3, "it is swept");
+    assert_eq!(outcome["comparisons"][0]["light"], "1 local light");
+    let total = rms(&outcome["budgets"][0]["total"]);
+    assert!(total > 0.01 && total < 0.3, "four bands below a small light: {total}");
+    let flip = outcome["pictures"][0]["mean_flip_ratio"].as_f64().unwrap();
+    assert!(flip > 0.002 && flip < 0.3, "{flip}");
+    let out = folder.path().join("out");
+    let written = names(&out);
+    for name in ["beside-my-ring.png", "error-my-ring.png", "time-error-1.svg"] {
+        assert!(written.iter().any(|found| found == name), "{name} among {written:?}");
+    }
+    let picture =
+        png::Decoder::new(std::io::BufReader::new(std::fs::File::open(out.join("beside-my-ring.png")).unwrap()));
+    assert_eq!(picture.read_info().unwrap().info().size(), (1440, 480));
+    let page = std::fs::read_to_string(out.join("time-error.txt")).unwrap();
+    assert!(page.contains("Only my ring was swept") && page.contains("mean FLIP"), "{page}");
+    let document: Value = serde_json::from_str(&std::fs::read_to_string(out.join("time-error.json")).unwrap()).unwrap();
+    assert_eq!(document["origin"]["selection"]["scene"], "my ring.toml");
+}
+
+#[test]
+fn a_scene_that_cannot_be_judged_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let buried = LIGHT.replace("2, 0.3", "-2, 0.3");
+    let unlit = own_scene(LIGHT).replace("mesh = \"floor\"\n        [[", "mesh = \"floor\"\nreceives = false\n[[");
+    let unlit = unlit.replace("position = [0, 0.6, 0]", "receives = false");
+    let scenes = [
+        ("torn.toml", "[camera]\neye = [0, 2".to_owned(), "torn.toml:2"),
+        ("dark.toml", own_scene(""), "nothing shines"),
+        ("unlit.toml", unlit, "no entity receives light"),
+        ("meshless.toml", own_scene("[[entity]]\nmesh = \"horse\"\n"), "there is no mesh \"horse\""),
+    ];
+    let ask = |name: &str| {
+        finish(&mut command(
+            folder.path(),
+            &["bench", "time-error", name, "--quick", "--axis", "lookup", "--out", "out"],
+        ))
+    };
+    for (name, text, expected) in scenes {
+        std::fs::write(folder.path().join(name), text).unwrap();
+        let ran = ask(name);
+        assert_eq!(ran.code, 4, "{name}: {}", ran.stderr);
+        assert!(ran.stderr.contains(name) && ran.stderr.contains(expected), "{name}: {}", ran.stderr);
+        assert!(!folder.path().join("out").exists(), "nothing is written");
+    }
+    assert_eq!(ask("absent.toml").code, 4);
+    let both = ["bench", "time-error", "dark.toml", "--case", "torus", "--out", "out"];
+    assert_eq!(finish(&mut command(folder.path(), &both)).code, 2, "a scene or cases");
+    if !has_device() {
+        return;
+    }
+    // The floor is not lit from below, and only the ring's underside would see it: it does not receive here.
+    let buried = own_scene(&buried).replace("position = [0, 0.6, 0]", "position = [0, 0.6, 0]\nreceives = false");
+    std::fs::write(folder.path().join("buried.toml"), buried).unwrap();
+    let ran = ask("buried.toml");
+    assert_eq!(ran.code, 4, "{}", ran.stderr);
+    assert!(ran.stderr.contains("no light reaches any of the 289 judged vertices"), "{}", ran.stderr);
+}

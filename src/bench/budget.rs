@@ -3,12 +3,13 @@
 use super::Bench;
 use super::cases::Case;
 use super::figures::{Difference, Radiosity, difference, rms};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::field::Storage;
 use crate::frame::{self, Frame};
 use crate::truth::raycast::{Order, RayCast, relative_error};
 use crate::truth::{ExactChain, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
+use std::time::{Duration, Instant};
 
 /// Number of vertices that are compared per scene.
 pub const VERTICES: usize = 1500;
@@ -56,22 +57,26 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// Computes T0, T0c and T1.
-    pub fn new(case: &Case, effort: Effort, seed: u64) -> Self {
+    /// Computes T0, T0c and T1; `progress` is told now and then how far it is.
+    pub fn new(case: &Case, effort: Effort, seed: u64, progress: &dyn Fn(&str)) -> Self {
         let placements = case.scene.at(case.time_s);
         let shapes = RayMeshes::new(&case.scene);
         let world = World::new(&case.scene, &shapes, &placements);
         let vertices = sample_vertices(&case.scene, effort.vertices, seed);
         let cast = RayCast { rays: effort.t0_rays, seed, distant: case.distant, ..Default::default() };
-        let lit = cast.run(&world, &vertices);
+        let lit = in_parts(case, "T0", progress, &vertices, |part| cast.run(&world, part));
         let t0: Vec<Radiosity> = lit.iter().map(|e| e.radiosity).collect();
         let open = RayCast { rays: 256, runs: 1, shadows: false, ..cast }.run(&world, &vertices);
+        let t0c = by_centres(&cast, &world, &vertices, &t0);
         let half = |half| ExactChain { rays: effort.t1_rays / 2, seed: seed ^ half, ..Default::default() };
-        let (first, second) = (half(1 << 32).run(&world, &vertices), half(2 << 32).run(&world, &vertices));
+        let [first, second] = [(1 << 32, "T1, first half"), (2 << 32, "T1, second half")].map(|(seed, what)| {
+            let chain = half(seed);
+            in_parts(case, what, progress, &vertices, |part| chain.run(&world, part))
+        });
         let unit = rms(&t0).max(f64::MIN_POSITIVE);
         Truth {
             unit,
-            t0c: by_centres(&cast, &world, &vertices, &t0),
+            t0c,
             t0,
             t0_error: relative_error(&lit),
             t1_error: difference(&first, &second, unit).rms / 2.0,
@@ -81,10 +86,49 @@ impl Truth {
         }
     }
 
+    /// Whether there is anything to compare.
+    ///
+    /// # Errors
+    /// `Input` when no light reaches any of the vertices.
+    pub fn check(&self, case: &Case) -> Result<()> {
+        if self.t0.as_flattened().iter().any(|c| *c > 0.0) {
+            return Ok(());
+        }
+        let what = format!(
+            "no light reaches any of the {} judged vertices, so there is nothing to compare",
+            self.vertices.len()
+        );
+        Err(Error::Input(format!("{}: {what}", case.name)))
+    }
+
     /// Difference to T0 relative to its root mean square.
     pub fn error(&self, of: &[Radiosity]) -> Difference {
         difference(of, &self.t0, self.unit)
     }
+}
+
+/// Vertices between two looks at the clock.
+const PART: usize = 100;
+/// Time between two words of progress.
+const SILENCE: Duration = Duration::from_secs(5);
+
+/// Computes a value a vertex, part by part, and says how far it is.
+fn in_parts<T>(
+    case: &Case,
+    what: &str,
+    progress: &dyn Fn(&str),
+    vertices: &[Vertex],
+    run: impl Fn(&[Vertex]) -> Vec<T>,
+) -> Vec<T> {
+    let (mut out, mut told) = (Vec::with_capacity(vertices.len()), Instant::now());
+    for part in vertices.chunks(PART) {
+        out.extend(run(part));
+        if told.elapsed() >= SILENCE {
+            progress(&format!("{}: {what}, {} of {} vertices", case.name, out.len(), vertices.len()));
+            told = Instant::now();
+        }
+    }
+    out
 }
 
 /// T0c from T0: only the vertices where the order matters are cast again.

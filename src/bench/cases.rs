@@ -25,16 +25,35 @@ impl Case {
     pub fn at_start(name: String, scene: Scene, distant: Distant) -> Self {
         Case { name, light: light(&scene), scene, time_s: 0.0, distant }
     }
+
+    /// A scene file at the time of its first picture, named after the file. Built-in scenes go by name or path.
+    ///
+    /// # Errors
+    /// As [`Scene::load`], and `Input` when nothing in the scene shines, or nothing is lit.
+    pub fn of_file(path: &Path) -> Result<Self> {
+        let scene = Scene::load(path)?;
+        let missing = if !scene.entities.iter().any(|e| e.receives) {
+            "no entity receives light"
+        } else if scene.environment.is_none() && !scene.entities.iter().any(|e| e.emits) {
+            "nothing shines: there is no [environment], and no entity emits"
+        } else {
+            let name =
+                path.file_stem().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
+            let time_s = scene.data.output.time_s;
+            return Ok(Case { time_s, ..Case::at_start(name, scene, Distant::Exact) });
+        };
+        Err(Error::input(path, format!("{missing}, so there is no radiosity to judge")))
+    }
 }
 
 /// Direction of the key light and of the sphere lights.
 const TOWARD: [f64; 3] = [0.5, 0.707, 0.5];
-/// Gap between floor and teapot, in bounding radii.
+/// Gap between floor and object, in bounding radii.
 const GAP: f64 = 0.02;
-/// Distance of the sphere lights from the teapot's centre, in bounding radii.
-const LIGHT_DISTANCE: f64 = 5.0;
-/// Distance of a disc in the sky, in bounding radii: its direction changes by 0.25 degrees over the floor.
-const FAR: f64 = 1000.0;
+/// Distance of the near sphere lights from the object's centre, in bounding radii.
+pub const NEAR: f64 = 5.0;
+/// Distance of a disc in the sky, or of a distant sphere light, in bounding radii: its direction changes by 0.25 degrees over the floor.
+pub const FAR: f64 = 1000.0;
 
 /// The items whose name contains any of the texts, in their order; all if there is no text.
 ///
@@ -90,7 +109,7 @@ pub fn light(scene: &Scene) -> String {
 }
 
 /// Cells along a side of the floor of [`teapot_lights`]: as many vertices as the floors of the embedded scenes have.
-const FINE_CELLS: usize = 112;
+pub const FINE_CELLS: usize = 112;
 
 /// Teapot of bounding radius 1 over a floor of 113 x 113 vertices and 6 x 6 m that alone is lit, under one light at a time:
 /// (a) a uniform sky, (b) a sky that brightens upwards, (c) a soft key light that is defined by its 4 bands, (d) a sphere
@@ -109,47 +128,8 @@ pub fn teapot_lights() -> Result<Vec<Case>> {
 /// `Input` when the embedded mesh or a scene of this function is malformed; tests run it.
 pub fn floor(cells: usize) -> Result<Vec<Case>> {
     let mesh = Mesh::parse(&embedded::read(Path::new("assets/meshes/teapot.obj"))?, Path::new("teapot.obj"))?;
-    let (centre, radius_m) = mesh.bounding_sphere();
-    let (centre, scale) = (centre.as_dvec3(), 1.0 / f64::from(radius_m));
-    let lowest = mesh.positions.iter().map(|p| f64::from(p.y)).fold(f64::INFINITY, f64::min);
-    let place = [-centre.x * scale, GAP - lowest * scale, -centre.z * scale];
-    let middle_y = place[1] + centre.y * scale;
-    let head = format!(
-        r#"
-        [camera]
-        eye = [0, 3, 6]
-        target = [0, 0.5, 0]
-        [[mesh]]
-        name = "floor"
-        plane = {{ size_m = 6, cells = {cells} }}
-        [[mesh]]
-        name = "teapot"
-        file = "../meshes/teapot.obj"
-        [[mesh]]
-        name = "bulb"
-        sphere = {{ radius_m = 1, subdivisions = 4 }}
-        [[entity]]
-        mesh = "floor"
-        [[entity]]
-        mesh = "teapot"
-        position = {place:?}
-        scale = {scale}
-        receives = false
-        "#
-    );
-    let bulb = |half_angle_deg: f64, distance: f64| {
-        let length = TOWARD.iter().map(|c| c * c).sum::<f64>().sqrt();
-        let at = TOWARD.map(|c| c * distance / length);
-        let scale = distance * half_angle_deg.to_radians().sin();
-        // Radiance that gives a facing surface at the centre the irradiance pi.
-        let radiance = half_angle_deg.to_radians().sin().powi(-2);
-        format!(
-            "[[entity]]\nmesh = \"bulb\"\nreceives = false\nscale = {scale}\nposition = [{}, {}, {}]\nemission = [{radiance}, {radiance}, {radiance}]",
-            at[0],
-            at[1] + middle_y,
-            at[2]
-        )
-    };
+    let (head, middle_y) = over_floor(&mesh, "teapot", cells);
+    let bulb = |half_angle_deg, distance| bulb(half_angle_deg, distance, middle_y);
     let lights = [
         ("teapot, (a) uniform sky", "[environment]\nuniform = [1, 1, 1]".to_owned(), Distant::Exact),
         ("teapot, (b) sky gradient", "[environment]\ngradient = { radiance = [1, 1, 1] }".to_owned(), Distant::Exact),
@@ -158,15 +138,64 @@ pub fn floor(cells: usize) -> Result<Vec<Case>> {
             format!("[environment]\nkey = {{ radiance = [1, 1, 1], toward = {TOWARD:?}, sharpness = 4 }}"),
             Distant::Bands(4),
         ),
-        ("teapot, (d) sphere light of 15 degrees", bulb(15.0, LIGHT_DISTANCE), Distant::Exact),
-        ("teapot, (d) sphere light of 7.5 degrees", bulb(7.5, LIGHT_DISTANCE), Distant::Exact),
+        ("teapot, (d) sphere light of 15 degrees", bulb(15.0, NEAR), Distant::Exact),
+        ("teapot, (d) sphere light of 7.5 degrees", bulb(7.5, NEAR), Distant::Exact),
         ("teapot, disc of half-angle 30 degrees", bulb(30.0, FAR), Distant::Exact),
         ("teapot, disc of half-angle 15 degrees", bulb(15.0, FAR), Distant::Exact),
     ];
     let case = |(name, light, distant): (&str, String, Distant)| {
-        let path = Path::new("assets/scenes/teapot_over_plane.toml");
-        let scene = Scene::parse(&format!("{head}{light}"), path, &embedded::read)?;
+        let scene = Scene::parse(&format!("{head}{light}"), Path::new(PLACE), &embedded::read)?;
         Ok(Case::at_start(name.to_owned(), scene, distant))
     };
     lights.into_iter().map(case).collect()
+}
+
+/// Path under which the texts of these scenes are read, so that they find `../meshes`.
+pub const PLACE: &str = "assets/scenes/over_floor.toml";
+
+/// Text of a scene without light: a floor of 6 x 6 m with `cells` squares along a side, which alone is lit, and the mesh of
+/// `../meshes/FILE.obj` scaled to a bounding radius of 1 m at a small distance above its middle. A mesh "bulb", a ball of radius 1 m,
+/// stands ready. And the height of the object's centre, metres.
+pub fn over_floor(mesh: &Mesh, file: &str, cells: usize) -> (String, f64) {
+    let (centre, radius_m) = mesh.bounding_sphere();
+    let (centre, scale) = (centre.as_dvec3(), 1.0 / f64::from(radius_m));
+    let lowest = mesh.positions.iter().map(|p| f64::from(p.y)).fold(f64::INFINITY, f64::min);
+    let place = [-centre.x * scale, GAP - lowest * scale, -centre.z * scale];
+    let text = format!(
+        r#"
+        [camera]
+        eye = [0, 3, 6]
+        target = [0, 0.5, 0]
+        [[mesh]]
+        name = "floor"
+        plane = {{ size_m = 6, cells = {cells} }}
+        [[mesh]]
+        name = "{file}"
+        file = "../meshes/{file}.obj"
+        [[mesh]]
+        name = "bulb"
+        sphere = {{ radius_m = 1, subdivisions = 4 }}
+        [[entity]]
+        mesh = "floor"
+        [[entity]]
+        mesh = "{file}"
+        position = {place:?}
+        scale = {scale}
+        receives = false
+        "#
+    );
+    (text, place[1] + centre.y * scale)
+}
+
+/// Text of a sphere light that is seen under a half angle from the centre of the object of [`over_floor`], `distance` bounding radii
+/// away. A surface there that faces it receives the irradiance pi.
+pub fn bulb(half_angle_deg: f64, distance: f64, middle_y: f64) -> String {
+    let length = TOWARD.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let [x, y, z] = TOWARD.map(|c| c * distance / length);
+    let scale = distance * half_angle_deg.to_radians().sin();
+    let radiance = half_angle_deg.to_radians().sin().powi(-2);
+    format!(
+        "[[entity]]\nmesh = \"bulb\"\nreceives = false\nscale = {scale}\nposition = [{x}, {}, {z}]\nemission = [{radiance}, {radiance}, {radiance}]",
+        y + middle_y,
+    )
 }

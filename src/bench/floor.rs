@@ -94,7 +94,7 @@ pub fn run(
     let mut rows = Vec::new();
     for (case, independent) in chosen {
         (bench.progress)(&format!("{}: casting rays", case.name));
-        let truth = Truth::new(&case, effort, bench.seed);
+        let truth = Truth::new(&case, effort, bench.seed, bench.progress);
         rows.push(FloorRow::new(budget(bench, &case, &truth, options)?, independent));
     }
     let origin = json!({

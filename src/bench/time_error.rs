@@ -2,26 +2,25 @@
 
 use super::budget::{Budget, Effort, Truth, budget};
 use super::cases::{self, Case};
+use super::pictures::{CasePicture, pictures};
 use super::plot::{AxisScale, Curve, Dot, Gap, Panel, Plot, PlotColumn, RowGroup, Rows};
 use super::rival::{Comparison, compare};
+use super::small_lights::SmallLight;
 use super::sweep::{Point, Variation, pareto, sweep, variations};
 use super::{Bench, default_options, verdict};
-use crate::asset::false_color::Scheme;
-use crate::draw::Antialias;
 use crate::error::{Error, Result};
-use crate::frame::Options;
 use crate::text::{csv, three, write};
-use crate::truth::error_map::ErrorPicture;
-use crate::truth::{self, ErrorMap, RayCast, error_map};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The selected cases and axes; an empty list selects all.
+/// The selected cases and axes; an empty list selects all, but for cases that run only when they are named.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Selection {
+    /// A scene file, which is then the only case.
+    pub scene: Option<PathBuf>,
     /// Parts of the names of cases; named cases are also swept.
     pub cases: Vec<String>,
     /// Axes of the sweep.
@@ -34,7 +33,7 @@ pub struct TimeErrorOutcome {
     /// One row per scene and light.
     pub budgets: Vec<Budget>,
     /// One picture per scene and light.
-    pub pictures: Vec<ErrorPicture>,
+    pub pictures: Vec<CasePicture>,
     /// One row per case and variation.
     pub points: Vec<Point>,
     /// One row per case.
@@ -51,14 +50,15 @@ impl TimeErrorOutcome {
     }
 }
 
-/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, `time-error.txt`, an error picture
-/// per case, a plot per swept case, and a plot of the comparison with ray casting.
+/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, `time-error.txt`, two pictures per
+/// case, a plot per swept case, and a plot of the comparison with ray casting. `own` is the case of the selected scene file.
 ///
 /// # Errors
-/// `Usage` when a case or axis does not exist, `Failed` when the folder cannot be written; else as
-/// [`crate::frame::Frame::new`].
-pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection) -> Result<TimeErrorOutcome> {
-    let cases = chosen(bench.quick, &selection.cases)?;
+/// `Usage` when a case or axis does not exist, `Failed` when the folder cannot be written, `Input` when no light reaches any of the
+/// judged vertices; else as [`crate::frame::Frame::new`].
+pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection, own: Option<Case>) -> Result<TimeErrorOutcome> {
+    let sweeps_all = own.is_some() || !selection.cases.is_empty();
+    let cases = own.map_or_else(|| chosen(bench.quick, &selection.cases), |case| Ok(vec![case]))?;
     let all = variations_of(bench.quick, &selection.axes)?;
     crate::text::make_folder(folder)?;
     let mut outcome = TimeErrorOutcome {
@@ -76,15 +76,16 @@ pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection) -> Result<Ti
             *outcome.seconds.entry(part).or_default() += started.elapsed().as_secs_f64();
             started = Instant::now();
         };
-        let truth = Truth::new(case, effort, bench.seed);
+        let truth = Truth::new(case, effort, bench.seed, bench.progress);
+        truth.check(case)?;
         took(&mut outcome, "casting the truth's rays");
         outcome.budgets.push(budget(bench, case, &truth, default_options())?);
         took(&mut outcome, "baking and budgets");
-        outcome.pictures.push(error_picture(bench, case, folder)?);
-        took(&mut outcome, "error pictures");
+        outcome.pictures.push(pictures(bench, case, folder)?);
+        took(&mut outcome, "pictures");
         outcome.comparisons.push(compare(bench, case, &truth)?);
         took(&mut outcome, "the rival");
-        if is_swept(case) || !selection.cases.is_empty() {
+        if is_swept(case) || sweeps_all {
             outcome.points.extend(sweep(bench, case, &truth, &all)?);
             took(&mut outcome, "sweeps with their bakes");
         }
@@ -93,37 +94,40 @@ pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection) -> Result<Ti
     Ok(outcome)
 }
 
-/// Rays of an error picture in a quick and in a thorough run, a few seconds on two cores. Vertices and lights share them, so a
-/// scene with fewer vertices gets more rays per vertex.
-const PICTURE_RAYS: [usize; 2] = [8_000_000, 32_000_000];
-/// Size of the error pictures in pixels, without their scale bars.
-const PICTURE_SIZE: [u32; 2] = [720, 480];
-
-/// Writes the error of every lit vertex in false colour, as `error-CASE.png`.
-fn error_picture(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<ErrorPicture> {
-    let placements = case.scene.at(case.time_s);
-    let options = Options { size: PICTURE_SIZE, antialias: Antialias::Samples, ..default_options() };
-    let mut frame = bench.frame(&case.scene, options)?;
-    frame.render(&placements, None)?;
-    let share = PICTURE_RAYS[usize::from(!bench.quick)] / frame.receiver_vertex_count().max(1);
-    let lights = 1 + case.scene.entities.iter().filter(|e| e.emits).count();
-    let rays = ((share / lights).clamp(64, 4096) as u32).next_power_of_two();
-    let cast = RayCast { rays, runs: 2, seed: bench.seed, distant: case.distant, ..Default::default() };
-    let (reference, noise) = truth::picture(&case.scene, &placements, &cast);
-    let map = ErrorMap::new(&error_map::radiosity(&frame)?, &reference, Scheme::Signed);
-    let words: Vec<&str> = case.name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty()).collect();
-    map.write(&folder.join(format!("error-{}.png", words.join("-"))), &mut frame, &placements, None, noise)
+/// A case that can be named; one of small lights is made only when it is.
+enum Nameable {
+    Made(Box<Case>),
+    Small(SmallLight, String),
 }
 
-/// The named cases, or all. A quick run leaves out cases that take ten seconds or more to bake on two cores, and uses the teapot
-/// under one light only.
+impl Nameable {
+    fn name(&self) -> &str {
+        match self {
+            Nameable::Made(case) => &case.name,
+            Nameable::Small(_, name) => name,
+        }
+    }
+
+    fn case(self) -> Result<Case> {
+        match self {
+            Nameable::Made(case) => Ok(*case),
+            Nameable::Small(which, _) => which.case(),
+        }
+    }
+}
+
+/// The named cases, or all but those of small lights. A quick run without names leaves out cases that take ten seconds or more to
+/// bake on two cores, and uses the teapot under one light only.
 fn chosen(quick: bool, named: &[String]) -> Result<Vec<Case>> {
     let mut all: Vec<Case> = cases::teapot_lights()?.into_iter().chain(cases::scenes()?).collect();
     if named.is_empty() {
         let cheap = |name: &str| ["sphere_over_plane", "torus_over_plane"].contains(&name) || name.contains("(b)");
         all.retain(|case| !quick || cheap(&case.name));
+        return Ok(all);
     }
-    cases::named(all, named, |case| &case.name)
+    let small = SmallLight::all().into_iter().map(|which| Nameable::Small(which, which.name()));
+    let all: Vec<Nameable> = all.into_iter().map(|case| Nameable::Made(Box::new(case))).chain(small).collect();
+    cases::named(all, named, Nameable::name)?.into_iter().map(Nameable::case).collect()
 }
 
 /// The default, and the settings of the named axes, or of all axes.
@@ -167,6 +171,7 @@ fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &
         verdict::defaults(&outcome.points),
         verdict::rivals(&outcome.comparisons),
         verdict::budgets(&outcome.budgets),
+        verdict::pictures(&outcome.pictures),
         format!("This run took {}.\n", outcome.took()),
     ];
     write(&folder.join("time-error.txt"), &page.join("\n"))

@@ -2,6 +2,7 @@
 //! ray casting.
 
 use super::budget::Budget;
+use super::pictures::CasePicture;
 use super::rival::Comparison;
 use super::sweep::Point;
 use crate::text::three;
@@ -244,6 +245,20 @@ pub fn budgets(budgets: &[Budget]) -> String {
             text.pop();
         }
         let _ = writeln!(text, "  {:>8}", short(b.t0_error));
+    }
+    text
+}
+
+/// Table of what a person sees of the errors.
+pub fn pictures(pictures: &[CasePicture]) -> String {
+    let wide = pictures.iter().map(|p| p.case.len()).max().unwrap_or(0);
+    let mut text = "What a person sees of it\n(mean FLIP between the picture of the merge and that of rays cast to the same vertices: 0 is \
+                    none, 1 the most; over all lit\nvertices the relative root mean square error, and that of the rays themselves)\n"
+        .to_owned();
+    let _ = writeln!(text, "  {:<wide$}  {:>9}  {:>9}  {:>9}", "", "mean FLIP", "RMS error", "rays' own");
+    for p in pictures {
+        let numbers = [p.mean_flip, p.errors.rms, p.errors.reference_error].map(short);
+        let _ = writeln!(text, "  {:<wide$}  {:>9}  {:>9}  {:>9}", p.case, numbers[0], numbers[1], numbers[2]);
     }
     text
 }

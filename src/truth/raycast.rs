@@ -120,7 +120,7 @@ impl RayCast {
             .lights(&view)
             .into_iter()
             .filter(|light| light.rises_above(view.normal))
-            .map(|light| Shadowed::new(world, &view, light, &occluders, self.order))
+            .map(|light| Shadowed::new(&view, light, &occluders, self.order))
             .collect();
 
         let albedo = world.scene.entities[vertex.entity].albedo.as_dvec3();
@@ -201,7 +201,7 @@ impl RayCast {
         let view = world.view(vertex);
         let occluders = world.occluders(&view);
         world.lights(&view).into_iter().filter(|light| light.rises_above(view.normal)).any(|light| {
-            let shadowed = Shadowed::new(world, &view, light, &occluders, Order::Surfaces);
+            let shadowed = Shadowed::new(&view, light, &occluders, Order::Surfaces);
             shadowed.limits_itself || !shadowed.beside.is_empty()
         })
     }
@@ -223,17 +223,19 @@ struct Shadowed {
 }
 
 impl Shadowed {
-    fn new(world: &World<'_>, view: &VertexView, light: EntityView, occluders: &[EntityView], order: Order) -> Self {
-        let [near, far] = world.range_m(&light);
-        let cross = occluders.iter().filter(|o| o.entity != light.entity && o.overlaps(&light)).copied();
-        let (before, beside) = match order {
-            Order::Centres => (cross.filter(|o| o.precedes(&light)).collect(), Vec::new()),
-            Order::Surfaces => {
-                let nearer = cross.filter(|o| world.range_m(o)[0] < far);
-                nearer.partition(|o| world.range_m(o)[1] <= near)
-            }
+    fn new(view: &VertexView, light: EntityView, occluders: &[EntityView], order: Order) -> Self {
+        let [near, far] = light.range_m();
+        // The comparison of distances comes first, because that of cones costs an arc cosine.
+        let nearer = |o: &&EntityView| match order {
+            Order::Surfaces => o.entity != light.entity && o.range_m()[0] < far && o.overlaps(&light),
+            Order::Centres => o.precedes(&light) && o.overlaps(&light),
         };
-        let limits_itself = order == Order::Surfaces && view.own().is_some_and(|own| world.range_m(own)[1] > near);
+        let (mut before, mut beside) = (Vec::new(), Vec::new());
+        for occluder in occluders.iter().filter(nearer) {
+            let wholly = order == Order::Centres || occluder.range_m()[1] <= near;
+            if wholly { &mut before } else { &mut beside }.push(*occluder);
+        }
+        let limits_itself = order == Order::Surfaces && view.own().is_some_and(|own| own.range_m()[1] > near);
         Shadowed { light, before, beside, limits_itself }
     }
 
@@ -252,6 +254,6 @@ impl Shadowed {
         };
         // A ray that slips between two triangles of the light ends at its centre.
         let surface_m = || world.first_hit_m(&self.light, direction).unwrap_or(self.light.distance_m);
-        met(world.range_m(&self.light)[1]) && met(surface_m() * (1.0 - TIE))
+        met(self.light.range_m()[1]) && met(surface_m() * (1.0 - TIE))
     }
 }

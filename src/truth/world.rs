@@ -51,6 +51,8 @@ pub struct EntityView {
     pub entity: usize,
     /// Distance of the sphere's centre, metres.
     pub distance_m: f64,
+    /// Its radius, metres.
+    radius_m: f64,
     /// Vector to the sphere's centre, in bounding radii.
     toward: Vec3A,
     beyond: f32,
@@ -120,6 +122,7 @@ impl<'s> World<'s> {
         EntityView {
             entity,
             distance_m: placed.centre.distance(from),
+            radius_m: placed.radius_m,
             toward: toward.as_vec3a(),
             beyond: (toward.length_squared() - 1.0) as f32,
             origin: placed.to_object * (-toward).as_vec3a(),
@@ -165,13 +168,6 @@ impl<'s> World<'s> {
         Some(f64::from(found) * placed.radius_m)
     }
 
-    /// Distances in metres between which all of an entity lies: those of its bounding sphere, of which the first is
-    /// negative within it.
-    pub fn range_m(&self, sight: &EntityView) -> [f64; 2] {
-        let radius_m = self.entities[sight.entity].radius_m;
-        [sight.distance_m - radius_m, sight.distance_m + radius_m]
-    }
-
     /// Emission pattern of an entity along a ray, without the entity's emission factor; `None` if the ray misses.
     pub fn emission(&self, sight: &EntityView, direction: DVec3) -> Option<DVec3> {
         let direction = direction.as_vec3a();
@@ -200,6 +196,12 @@ impl EntityView {
     /// Whether this occluder precedes a light in the merge's order.
     pub fn precedes(&self, light: &EntityView) -> bool {
         (self.distance_m, self.entity) < (light.distance_m, light.entity)
+    }
+
+    /// Distances in metres between which all of the entity lies: those of its bounding sphere, of which the first is negative
+    /// within it.
+    pub fn range_m(&self) -> [f64; 2] {
+        [self.distance_m - self.radius_m, self.distance_m + self.radius_m]
     }
 
     /// Whether a part of the bounding sphere lies above the plane through the point with this normal.

@@ -2,7 +2,8 @@
 #extension GL_EXT_samplerless_texture_functions : require
 // Cube faces around a vertex to its map of signed angles, one workgroup per vertex and one invocation per node. The nearest texel of
 // the other state has a neighbour that is not of it. So a face becomes a bit a texel, the bits beside an edge are found a word at a
-// time, and the nodes measure to those alone. Texels below the horizon are no part of what the vertex sees.
+// time, and the nodes measure to those alone. Texels below the horizon are no part of what the vertex sees, so that nothing is
+// measured to the edge between the sky and the vertex's own surface.
 
 layout(local_size_x = NODES) in;
 
@@ -12,7 +13,9 @@ layout(local_size_x = NODES) in;
 layout(std430, binding = 2) writeonly buffer Maps { uint maps[]; }; // four nodes a word
 
 shared uint words[WORDS]; // rows of texels, 32 a word, a bit for each that is free
+shared uint risen[WORDS]; // a bit for each texel above the horizon
 shared uint edges[WORDS]; // a bit for each texel beside an edge
+shared uint busy[WORDS / 32]; // a bit for each word with an edge
 shared int angles[NODES]; // as whole steps
 
 bool free_at(uint slot, ivec2 at) {
@@ -36,31 +39,41 @@ vec2 face_point(ivec2 at) {
     return vec2(2 * at + 1) / float(push.face_px) - 1.0;
 }
 
-uint load_word(uint slot, ivec2 first) {
-    uint count = slot == NONE ? 0 : min(32, push.face_px - uint(first.x));
-    uint word = slot == NONE ? 0xffffffffu : 0;
+// Fills word i with the texels from `first` on; `up` is the normal along the face's axes.
+void load_word(uint i, uint slot, ivec2 first, vec3 up) {
+    uint count = min(32, push.face_px - uint(first.x));
+    vec2 point = face_point(first);
+    float height = dot(vec3(point, 1.0), up);
+    float rise = 2.0 / float(push.face_px) * up.x;
+    uint above = 0;
     for (uint bit = 0; bit < count; bit++) {
+        above |= uint(height + float(bit) * rise > 0.0) << bit;
+    }
+    uint word = slot == NONE ? 0xffffffffu : 0;
+    for (uint bit = 0; bit < (slot == NONE || above == 0 ? 0 : count); bit++) {
         word |= uint(free_at(slot, first + ivec2(bit, 0))) << bit;
     }
-    return word;
+    words[i] = word;
+    risen[i] = above;
 }
 
-// Texels of word i that have a neighbour of the other state, among rows of `across` words of which `count` are there.
+// Texels of word i that have a neighbour of the other state above the horizon, among rows of `across` words of which `count` are
+// there.
 uint edge_word(uint i, uint across, uint count) {
     uint column = i % across;
-    bool last = column == across - 1;
-    uint valid = 0xffffffffu >> (last ? 32 * across - push.face_px : 0);
     uint word = words[i];
-    uint left = word << 1 | (column > 0 ? words[i - 1] >> 31 : word & 1);
-    uint right = word >> 1 | (last ? 0 : words[i + 1] << 31);
-    uint above = i >= across ? words[i - across] : word;
-    uint below = i + across < count ? words[i + across] : word;
-    uint beside = (word ^ right) & (last ? valid >> 1 : valid);
-    return (beside | (word ^ left) | (word ^ above) | (word ^ below)) & valid;
+    uvec2 left = column > 0 ? uvec2(words[i - 1], risen[i - 1]) >> 31 : uvec2(0);
+    uvec2 right = column < across - 1 ? uvec2(words[i + 1], risen[i + 1]) << 31 : uvec2(0);
+    uvec2 above = i >= across ? uvec2(words[i - across], risen[i - across]) : uvec2(0);
+    uvec2 below = i + across < count ? uvec2(words[i + across], risen[i + across]) : uvec2(0);
+    left |= uvec2(word, risen[i]) << 1;
+    right |= uvec2(word, risen[i]) >> 1;
+    return risen[i] & ((word ^ left.x) & left.y | (word ^ right.x) & right.y | (word ^ above.x) & above.y
+        | (word ^ below.x) & below.y);
 }
 
 // Adds texels on the rim of a face whose neighbour on another face is of the other state: number k of all four sides.
-void add_rim(uint job, uint face, uint k, int row_first, int row_end) {
+void add_rim(uint job, uint face, uint k, int row_first, int row_end, vec3 up) {
     int px = int(push.face_px);
     uint side = k / push.face_px;
     int along = int(k % push.face_px);
@@ -68,14 +81,15 @@ void add_rim(uint job, uint face, uint k, int row_first, int row_end) {
     ivec2 at = side < 2 ? ivec2(end, along) : ivec2(along, end);
     int outward = side % 2 == 0 ? -1 : 1;
     ivec2 beyond = at + (side < 2 ? ivec2(outward, 0) : ivec2(0, outward));
-    if (at.y < row_first || at.y >= row_end) {
+    vec3 toward = vec3(face_point(beyond), 1.0);
+    if (at.y < row_first || at.y >= row_end || dot(toward, up) <= 0.0) {
         return;
     }
     uint across = (push.face_px + 31) / 32;
     uint i = uint(at.y - row_first) * across + uint(at.x) / 32;
-    bool free = (words[i] >> (at.x & 31) & 1) == 1;
-    if (free_toward(job, to_object(face, vec3(face_point(beyond), 1.0))) != free) {
-        atomicOr(edges[i], 1u << (at.x & 31));
+    uint bit = 1u << (at.x & 31);
+    if ((risen[i] & bit) != 0 && free_toward(job, to_object(face, toward)) != ((words[i] & bit) != 0)) {
+        atomicOr(edges[i], bit);
     }
 }
 
@@ -85,21 +99,27 @@ struct Nearest {
     vec2 blocked;
 };
 
-// Measures to every texel beside an edge; `normal` and the node's direction `toward` along the face's axes.
-void measure(uint count, int row_first, vec3 normal, vec3 toward, inout Nearest nearest) {
+// Measures to every texel beside an edge; the node's direction `toward` along the face's axes. Words without an edge are jumped over,
+// and rows are counted by a product: a step of a loop and a division cost more than measuring does.
+void measure(uint count, int row_first, vec3 toward, inout Nearest nearest) {
     uint across = (push.face_px + 31) / 32;
-    for (uint i = 0; i < count; i++) {
-        for (uint bits = edges[i]; bits != 0; bits &= bits - 1) {
-            int bit = findLSB(bits);
-            vec3 point = vec3(face_point(ivec2(32 * (i % across) + bit, row_first + int(i / across))), 1.0);
-            float inverse = inversesqrt(dot(point, point));
-            // A texel's solid angle is its area on the face times the third power of this inverse.
-            vec2 found = vec2(dot(point, toward) * inverse, inverse * sqrt(inverse) / float(push.face_px));
-            found.x = dot(point, normal) > 0.0 ? found.x : -2.0;
-            if ((words[i] >> bit & 1) == 1) {
-                nearest.free = found.x > nearest.free.x ? found : nearest.free;
-            } else {
-                nearest.blocked = found.x > nearest.blocked.x ? found : nearest.blocked;
+    float rows = 1.0 / float(across);
+    float texel = 2.0 / float(push.face_px);
+    for (uint group = 0; group < count; group += 32) {
+        for (uint some = busy[group / 32]; some != 0; some &= some - 1) {
+            uint i = group + uint(findLSB(some));
+            uint row = uint((float(i) + 0.5) * rows);
+            uint state = words[i];
+            vec2 first = (vec2(32 * (i - row * across), row_first + int(row)) + 0.5) * texel - 1.0;
+            for (uint bits = edges[i]; bits != 0; bits &= bits - 1) {
+                int bit = findLSB(bits);
+                vec3 point = vec3(first.x + float(bit) * texel, first.y, 1.0);
+                float inverse = inversesqrt(dot(point, point));
+                // A texel's solid angle is its area on the face times the third power of this inverse.
+                vec2 found = vec2(dot(point, toward) * inverse, 0.5 * texel * inverse * sqrt(inverse));
+                bool free = (state >> bit & 1) == 1;
+                nearest.free = free && found.x > nearest.free.x ? found : nearest.free;
+                nearest.blocked = !free && found.x > nearest.blocked.x ? found : nearest.blocked;
             }
         }
     }
@@ -130,7 +150,10 @@ void main() {
             int row_end = min(first + rows + 1, px);
             uint count = uint(row_end - row_first) * across;
             for (uint i = node; i < count; i += NODES) {
-                words[i] = load_word(slot, ivec2(32 * (i % across), row_first + int(i / across)));
+                load_word(i, slot, ivec2(32 * (i % across), row_first + int(i / across)), up);
+            }
+            for (uint i = node; i < WORDS / 32; i += NODES) {
+                busy[i] = 0;
             }
             barrier();
             for (uint i = node; i < count; i += NODES) {
@@ -138,10 +161,14 @@ void main() {
             }
             barrier();
             for (uint k = node; k < 4 * push.face_px; k += NODES) {
-                add_rim(job, face, k, row_first, row_end);
+                add_rim(job, face, k, row_first, row_end, up);
             }
             barrier();
-            measure(count, row_first, up, toward * axes, nearest);
+            for (uint i = node; i < count; i += NODES) {
+                atomicOr(busy[i / 32], uint(edges[i] != 0) << i % 32);
+            }
+            barrier();
+            measure(count, row_first, toward * axes, nearest);
             barrier();
         }
     }

@@ -13,9 +13,9 @@ use crate::shaders::{Library, ShaderPermutation};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Words of 32 texels that a workgroup looks at together, with as many for their edges: 12 KB of the 16 KB of shared memory that every
-/// device has. Faces of up to 217 px fit as a whole.
-const WORDS: u32 = 1536;
+/// Words of 32 texels that a workgroup looks at together; it keeps three bits a texel, 12 KB of the 16 KB of shared memory that every
+/// device has. Faces of up to 170 px fit as a whole.
+const WORDS: u32 = 1024;
 
 /// The pipeline.
 pub struct SelfVisibility {

@@ -3,18 +3,19 @@
 use super::CheckRow;
 use super::project::Content;
 use crate::asset::{Mesh, generate};
-use crate::bake::capture::unit_positions;
+use crate::bake::capture::{Capture, unit_positions};
 use crate::bake::project::Projection;
 use crate::bake::self_visibility::twin;
 use crate::bake::{Baker, TRANSFER_OFFSET};
 use crate::error::Result;
 use crate::field::self_visibility::NODES;
+use crate::sh::cube::FACE_COUNT;
 use rayon::prelude::*;
 
 /// Largest difference in steps of 0.35 degrees: two texels that f32 cannot tell apart differ in width by less.
 pub const STEPS: f64 = 1.0;
 
-/// Vertices that are compared.
+/// Vertices that are compared, or fewer where their faces are too large for one atlas.
 const VERTICES: usize = 48;
 
 /// The largest difference in steps over some vertices of a mesh, and the number of nodes that hold neither limit.
@@ -23,7 +24,8 @@ const VERTICES: usize = 48;
 /// As [`Content::new`].
 pub fn compare(baker: &Baker, mesh: &Mesh, face_px: u32) -> Result<(f64, usize)> {
     let positions = unit_positions(mesh);
-    let chosen: Vec<usize> = (0..positions.len()).step_by(positions.len().div_ceil(VERTICES)).collect();
+    let room = Capture::columns(baker.device(), face_px, false).pow(2) as usize / FACE_COUNT;
+    let chosen: Vec<usize> = (0..positions.len()).step_by(positions.len().div_ceil(VERTICES.min(room))).collect();
     let normals: Vec<_> = chosen.iter().map(|&v| mesh.normals[v]).collect();
     let eyes: Vec<_> =
         chosen.iter().zip(&normals).map(|(&v, normal)| positions[v] + TRANSFER_OFFSET * *normal).collect();

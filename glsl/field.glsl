@@ -23,35 +23,16 @@ struct FieldPlace {
     float weight[CORNERS]; // includes the factors that undo the stored scale and FIELD_UNIT
 };
 
-float field_warp(float s) {
-    float q = s * s;
-    return s * (WARP_0 + q * (WARP_1 + q * WARP_2));
-}
+#include "cube.glsl"
 
 // Base of the face's stored cells, and coordinates among them (samples at whole numbers, border included). A row's ends are samples
 // (edges 1), or half a step beyond the last that is the face's own (edges 0).
 void field_plane_cube(vec3 p, float edges, out uint base, out vec2 cell) {
-    vec3 a = abs(p);
-    vec2 st;
-    float major;
-    uint face;
-    if (a.x >= a.y && a.x >= a.z) {
-        face = p.x >= 0.0 ? 0 : 1;
-        st = vec2(p.x >= 0.0 ? -p.z : p.z, -p.y);
-        major = a.x;
-    } else if (a.y >= a.z) {
-        face = p.y >= 0.0 ? 2 : 3;
-        st = vec2(p.x, p.y >= 0.0 ? p.z : -p.z);
-        major = a.y;
-    } else {
-        face = p.z >= 0.0 ? 4 : 5;
-        st = vec2(p.z >= 0.0 ? p.x : -p.x, -p.y);
-        major = a.z;
-    }
+    uint face = cube_face(p);
     // At the very centre any direction will do; it must only be a number.
-    st /= max(major, 1e-30);
+    vec2 warped = cube_warped(face, p, 1e-30);
     base = face * (CELLS + 2) * (CELLS + 2);
-    cell = vec2(field_warp(st.x), field_warp(st.y)) * (0.5 * CELLS + 0.5 * edges) + (0.5 * CELLS + 0.5);
+    cell = warped * (0.5 * CELLS + 0.5 * edges) + (0.5 * CELLS + 0.5);
 }
 
 void field_plane_latlon(vec3 p, out vec2 cell) {

@@ -197,13 +197,14 @@ void order(uint count, uint lane) {
 // One cluster: its entries.
 void walk(uint at, Entity receiver, uint receiver_index, uint count) {
     Scope scope = scope_of(receiver, bounds[clusters[at].bounds], SLACK);
-    uint first = at * capacity, made = 0;
+    uint first = at * capacity, made = 0, sharp_made = 0;
     uint chains = light_count + uint(sky >= 0.0);
     for (uint l = 0; l < chains; l++) {
         bool of_sky = l == light_count;
         vec4 facing = scene_quad(of_sky ? 0 : light_first + 2 * l);
         vec4 numbers = scene_quad(of_sky ? 0 : light_first + 2 * l + 1);
         uint light_index = floatBitsToUint(numbers.y);
+        bool sharp = !of_sky && floatBitsToUint(numbers.w) != 0;
         // The sky has no place; any will do to keep the read in bounds.
         View light = view_of(scope, scene_quad(of_sky ? 0 : light_index));
         if (!of_sky && (light_index == receiver_index || !light_listed(scope, facing, numbers.x, light))) {
@@ -214,14 +215,14 @@ void walk(uint at, Entity receiver, uint receiver_index, uint count) {
             uint e = ORDERED(k);
             View view = view_of(scope, scene_quad(e));
             bool needed = of_sky ? occluder_listed(scope, view, sky)
-                                 : e != light_index && occluder_listed(scope, view, light, numbers.x);
-            if (needed && view.whole) {
+                                 : e != light_index && occluder_listed(scope, view, light, sharp, numbers.x);
+            if (needed && (view.whole || sharp)) {
                 if (made < capacity) {
                     entries[first + made] = e | chain;
                 }
                 made++;
             }
-            if (needed && view.cap) {
+            if (needed && view.cap && !sharp) {
                 if (made < capacity) {
                     entries[first + made] = e | chain | ENTRY_CAP;
                 }
@@ -238,8 +239,10 @@ void walk(uint at, Entity receiver, uint receiver_index, uint count) {
                 made++;
             }
         }
+        sharp_made = sharp ? made : sharp_made;
     }
     clusters[at].entry_first = first;
+    clusters[at].sharp_count = min(sharp_made, capacity);
     clusters[at].entry_count = min(made, capacity);
     if (made > capacity) {
         clusters[at].vertex_count = 0;

@@ -52,6 +52,7 @@ struct View {
     vec3 toward;
     float nearest;
     float farthest;
+    float radius; // of the sphere
     vec2 spread;
     vec2 turn;
     bool outside;
@@ -69,6 +70,7 @@ View view_of(Scope scope, vec4 sphere) {
     view.toward = to / distance;
     view.nearest = distance - radius;
     view.farthest = distance + radius;
+    view.radius = sphere.w;
     vec2 from_axis = angle_of_cosine(dot(view.toward, scope.axis));
     view.turn = angle_of_sine(radius / distance);
     float highest = distance * cosine_less(from_axis, scope.spread) + radius;
@@ -90,15 +92,16 @@ bool light_listed(Scope scope, vec4 facing, float radiance, View light) {
     return !light.below && !elsewhere && !negligible(scope, radiance * light.weight);
 }
 
-bool apart(View a, View b) {
-    vec2 reach = plus(a.spread, plus(b.spread, vec2(FADE_COSINE, FADE_SINE)));
+bool apart(View a, View b, vec2 fade) {
+    vec2 reach = plus(a.spread, plus(b.spread, fade));
     return a.outside && b.outside && dot(a.toward, b.toward) < reach.x;
 }
 
 // Of a chain with a light.
-bool occluder_listed(Scope scope, View view, View light, float radiance) {
-    bool behind = (switches & SKIP_BEHIND) != 0 && view.nearest > light.farthest;
-    bool aside = (switches & SKIP_CONES) != 0 && apart(view, light);
+bool occluder_listed(Scope scope, View view, View light, bool sharp, float radiance) {
+    bool behind = (switches & SKIP_BEHIND) != 0 && view.nearest - (sharp ? view.radius : 0.0) > light.farthest;
+    vec2 fade = sharp ? vec2(1.0, 0.0) : vec2(FADE_COSINE, FADE_SINE);
+    bool aside = (switches & SKIP_CONES) != 0 && apart(view, light, fade);
     return !view.below && !behind && !aside && !negligible(scope, radiance * min(view.weight, light.weight));
 }
 

@@ -15,25 +15,7 @@ layout(std430, binding = 1) readonly buffer Entries { uint entries[]; };
 layout(std430, binding = 2) readonly buffer Clusters { Cluster clusters[]; };
 const uint NONE = 0xffffffffu;
 
-// Entities and sky are the same for a whole workgroup: uniform or storage blocks on a GPU, which loads them once; on
-// a processor, which loads lane by lane, texel reads bring four numbers at a time.
-#if UNIFORM
-layout(std140, binding = 0) uniform Entities { Entity entities[ENTITY_LIMIT]; };
-#define ENTITY(e) entities[e]
-#elif TEXEL
-layout(binding = 0) uniform textureBuffer entities;
-Entity entity_at(uint e) {
-    int at = int(e) * 10;
-    vec4 third = texelFetch(entities, at + 2);
-    return Entity(texelFetch(entities, at), texelFetch(entities, at + 1), third.xy, floatBitsToUint(third.z),
-        floatBitsToUint(third.w), texelFetch(entities, at + 3), texelFetch(entities, at + 4), texelFetch(entities, at + 5), texelFetch(entities, at + 6),
-        texelFetch(entities, at + 7), texelFetch(entities, at + 8), texelFetch(entities, at + 9));
-}
-#define ENTITY(e) entity_at(e)
-#else
-layout(std430, binding = 0) readonly buffer Entities { Entity entities[]; };
-#define ENTITY(e) entities[e]
-#endif
+#include "entities.glsl"
 #define FIELD_BINDING 3
 #include "field.glsl"
 #if TEXEL
@@ -163,6 +145,9 @@ void main() {
     if (v >= cluster.vertex_count) {
         return;
     }
+    // The chains of sharp lights are another pass's.
+    cluster.entry_first += cluster.sharp_count;
+    cluster.entry_count -= cluster.sharp_count;
     Entity receiver = ENTITY(cluster.receiver);
     uint at = 2 * (cluster.vertex_first + v);
     vec3 position = vertex_quad(at).xyz; // object frame, metres, from the bounding sphere's centre

@@ -13,6 +13,7 @@ struct Entity {
     vec4 area_x;       // first axis of its projected area, world; w = the constant term
     vec4 area_y;       // second axis, world; w = factor of u
     vec4 area_terms;   // factors of v, u u, v v, u v
+    vec4 sharp;        // first node of its silhouette field (bits); as a light: share of its disc, 0: it has its own outline
 };
 
 // The rotation that a cosine and sine stand for, applied to two coordinates, and its inverse.
@@ -58,6 +59,8 @@ struct Cluster {
     uint entry_first;
     uint entry_count;      // at least 1
     uint bounds;          // for the gather
+    uint sharp_count;     // of the entries, the first: chains of sharp lights
+    uint self_first;      // word of its first vertex's self-visibility; NONE: it cannot shadow itself
 };
 
 // An entry: what one lookup is for, as ListEntry::pack puts it together. The first ENTRY_BITS bits: entity. As many more: the light

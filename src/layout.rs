@@ -30,6 +30,9 @@ pub struct Entity {
     pub area_y: [f32; 4],
     /// Factors of v (the square of the cosine to the second axis), u u, v v and u v.
     pub area_terms: [f32; 4],
+    /// For sharp lights: the bits of the first node of its silhouette field, 0 without one; of a light that is a ball the share of its
+    /// sphere's disc that the mesh covers, and 0 for one with an outline of its own; two that are not in use.
+    pub sharp: [f32; 4],
 }
 
 /// A workgroup's worth of neighbouring vertices of one receiver.
@@ -52,6 +55,10 @@ pub struct Cluster {
     pub entry_count: u32,
     /// Index of its bounds for the gather on the device.
     pub bounds: u32,
+    /// Of the entries, those at the front that are chains of sharp lights.
+    pub sharp_count: u32,
+    /// First word of its first vertex's self-visibility, or [`NONE`] where the mesh cannot shadow itself.
+    pub self_first: u32,
 }
 
 /// The index that means "none".

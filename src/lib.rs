@@ -40,6 +40,7 @@
 //! | [`bake`] | capture, project, assemble: fields and transfer vectors of a mesh, and their cache |
 //! | [`lists`] | which entities concern which cluster of vertices, and which clusters have to be merged again |
 //! | [`merge`] | the merge pass, its permutations, its CPU twin and its calibration |
+//! | [`sharp`] | the pass of lights whose shadows have edges, and its CPU twin |
 //! | [`draw`] | camera, rasterisation, smoothed outlines, tone and encoding |
 //! | [`scene_buffers`] | what a scene keeps on the device, and whether it fits |
 //! | [`frame`] | the sequence of passes with all barriers |
@@ -83,6 +84,7 @@ pub mod scene;
 pub mod scene_buffers;
 pub mod sh;
 pub mod shaders;
+pub mod sharp;
 pub mod text;
 pub mod truth;
 pub mod view;

@@ -85,7 +85,7 @@ fn the_same_mesh_under_two_names_is_baked_once() {
     let baker = Baker::new(&gpu.device, &gpu.library);
     let options = bake::Options { lattice: "cube:3x3".parse().unwrap(), face_px: 16, ..Default::default() };
     let buffers = |scene: &Scene| {
-        let needs = SceneNeeds::of(scene, &options);
+        let needs = SceneNeeds::of(scene, &options, shadow_fields::scene::Lights::Sh);
         let baked = bake::ensure(&baker, &Cache::new(None), scene, &needs, &|_, _, _| ()).unwrap();
         assert_eq!(baked.meshes.len(), 2);
         SceneBuffers::new(&gpu.device, scene, &options, baked).unwrap()

@@ -9,8 +9,8 @@ use serde_json::Value;
 use shadow_fields::shaders::FILES;
 use std::path::Path;
 
-const PASSES: [&str; 9] =
-    ["capture", "project", "self_visibility", "assemble", "silhouette", "gather", "merge", "draw", "smooth"];
+const PASSES: [&str; 10] =
+    ["capture", "project", "self_visibility", "assemble", "silhouette", "gather", "merge", "sharp", "draw", "smooth"];
 
 fn check(folder: &Path, pass: Option<&str>, shaders: Option<&Path>) -> (i32, Value, String) {
     let mut command = command(folder, &["check", "--json", "--no-progress"]);
@@ -57,6 +57,8 @@ fn a_wrong_shader_is_found() {
         ("project.comp", "total *= jobs[job].scale;", "total *= 1.0001 * jobs[job].scale;", "project"),
         ("self_visibility.comp", "inverse * sqrt(inverse)", "1.5 * inverse * sqrt(inverse)", "self_visibility"),
         ("assemble.comp", "sum *= push.factor;", "sum *= 1.01 * push.factor;", "assemble"),
+        ("silhouette_field.glsl", "near.depth - offset", "0.9 * near.depth - offset", "sharp"),
+        ("sub_light.glsl", "0.25 * (1.0 - fine)", "0.2499 * (1.0 - fine)", "sharp"),
         ("merge.comp", "float weight = above_horizon", "float weight = 0.999 * above_horizon", "merge"),
         ("draw.frag", "finish(radiance,", "1.01 * finish(radiance,", "draw"),
         ("grid.frag", "push.emission_white.rgb + light", "1.01 * light", "draw"),

@@ -349,7 +349,7 @@ fn a_field_lands_at_its_place_in_a_scene() {
     ];
     let read = &shadow_fields::asset::embedded::read;
     let scene = Scene::parse(&text.concat(), Path::new("test.toml"), read).unwrap();
-    let needs = SceneNeeds::of(&scene, &options);
+    let needs = SceneNeeds::of(&scene, &options, shadow_fields::scene::Lights::Sh);
     let baker = Baker::new(&gpu.device, &gpu.library);
     let baked = bake::ensure(&baker, &Cache::new(None), &scene, &needs, &|_, _, _| ()).unwrap();
     let buffers = SceneBuffers::new(&gpu.device, &scene, &options, baked).unwrap();

@@ -21,6 +21,7 @@ const ORDER: &[&str] = &[
     "bake",
     "lists",
     "merge",
+    "sharp",
     "draw",
     "scene_buffers",
     "frame",
@@ -261,6 +262,7 @@ const PASSES: &[(&str, &str)] = &[
     ("silhouette", "src/bake/silhouette.rs"),
     ("gather", "src/lists/gather.rs"),
     ("merge", "src/merge/mod.rs"),
+    ("sharp", "src/sharp/mod.rs"),
     ("draw", "src/draw/mod.rs"),
     ("smooth", "src/draw/smooth.rs"),
     ("show", "src/draw/show.rs"),
@@ -327,7 +329,8 @@ const BARRIERS: &[&str] = &["src/draw/mod.rs", "src/draw/smooth.rs", "src/frame/
 
 #[test]
 fn barriers_of_a_frame_stand_in_its_sequence() {
-    let rooms = ["src/draw", "src/frame", "src/lists", "src/merge", "src/scene_buffers", "src/view", "src/app"];
+    let rooms =
+        ["src/draw", "src/frame", "src/lists", "src/merge", "src/sharp", "src/scene_buffers", "src/view", "src/app"];
     let found: Vec<PathBuf> = rooms
         .iter()
         .flat_map(|room| files(room, &["rs"]))
@@ -337,7 +340,7 @@ fn barriers_of_a_frame_stand_in_its_sequence() {
     found.sort_unstable();
     assert_eq!(found, BARRIERS);
     let sequence = code(&text(Path::new("src/frame/record.rs")));
-    for pass in ["gather", "merge", "draw", "smooth", "read back", "show"] {
+    for pass in ["gather", "merge", "sharp", "draw", "smooth", "read back", "show"] {
         assert!(sequence.contains(&format!(".pass(\"{pass}\"")), "the sequence does not record \"{pass}\"");
     }
 }

@@ -56,6 +56,8 @@ fn entities_and_clusters_of_the_merge() {
                 entry_first,
                 entry_count,
                 bounds,
+                sharp_count,
+                self_first,
             }
         );
         assert_eq!(reflection.strides.get("Cluster"), Some(&(size_of::<Cluster>() as u32)));
@@ -78,6 +80,7 @@ fn entities_and_clusters_of_the_merge() {
                 area_x,
                 area_y,
                 area_terms,
+                sharp,
             }
         );
         assert_eq!(entity.len(), 12);

@@ -165,6 +165,7 @@ fn two_occluders_about_as_far_as_a_light() {
 #[test]
 fn equal_keys_go_by_index() {
     let entity = |x: f64| EntityBounds {
+        sharp: false,
         centre: DVec3::new(x, 2.0, 3.0),
         radius_m: 0.5,
         occludes: true,

@@ -13,7 +13,7 @@ use shadow_fields::field::quantity::channel_stride;
 use shadow_fields::field::self_visibility::{
     CELLS, LIMIT_RAD, NODES, cells, decode_angle, encode_angle, frame, node_direction, visible,
 };
-use shadow_fields::field::sub_light;
+use shadow_fields::field::sub_light::{Part, SeenLight};
 use shadow_fields::gpu::{Bind, Buffer, Commands, ComputePipeline};
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::sh::lobe;
@@ -175,13 +175,10 @@ fn light_rays(direction: DVec3, angle: f64, count: usize, turned: f64) -> impl I
 
 /// Direct light of a round light of unit radiance over its solid angle, by a map and sub-lights.
 fn by_map(map: &[u8], normal: DVec3, toward: DVec3, angle: f64) -> f64 {
-    let (a, b) = toward.any_orthonormal_pair();
-    let part = |place: glam::DVec2, count: usize| {
-        let part = (toward + angle.tan() * (place.x * a + place.y * b)).normalize();
-        part.dot(normal).max(0.0) * visible(map, normal, part, angle / (count as f64).sqrt()) / count as f64
-    };
-    let parts = sub_light::parts(angle);
-    parts.iter().map(|&(n, weight)| weight * sub_light::centres(n).iter().map(|&at| part(at, n)).sum::<f64>()).sum()
+    let blocks = SeenLight::new(1e6 * toward, 1e6 * angle.sin()).blocks();
+    let parts = blocks.iter().flat_map(|(_, parts)| parts);
+    let sees = |part: &Part| visible(map, normal, part.toward, part.sine);
+    parts.map(|part| part.weight * part.cosine(normal) / part.tilt * sees(part)).sum()
 }
 
 /// Its figures stand in `src/field/self_visibility.rs`.

@@ -7,7 +7,7 @@ use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::bake::self_visibility::SelfVisibility;
-use shadow_fields::bake::silhouette::Silhouette;
+use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::lists::gather::Gather;
@@ -16,6 +16,7 @@ use shadow_fields::merge::chain::{Chain, PRODUCTS};
 use shadow_fields::merge::product::{Products, Shape};
 use shadow_fields::merge::variant::{MergePermutation, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, ShaderPermutation};
+use shadow_fields::sharp::SharpPermutation;
 use std::collections::BTreeSet;
 use std::process::Command;
 
@@ -28,6 +29,17 @@ fn baking() -> Vec<ShaderPermutation> {
     let capture = [false, true].into_iter().flat_map(Capture::rows);
     let own = [SelfVisibility::row()];
     project.chain(own).chain(assemble).chain(capture).chain(Silhouette::permutations(32, 128, 16)).collect()
+}
+
+/// Every way of the pass of sharp lights.
+fn sharp() -> Vec<ShaderPermutation> {
+    let way = |bits: u32| {
+        let on = |bit: u32| bits >> bit & 1 == 1;
+        let silhouette = SilhouetteOptions::default();
+        let (texel, uniform, outlines, self_shadows) = (on(0), on(1), on(2), on(3));
+        SharpPermutation { texel, uniform, entity_limit: 48, silhouette, outlines, self_shadows }.row()
+    };
+    (0..16).map(way).collect()
 }
 
 fn drawing() -> Vec<ShaderPermutation> {
@@ -176,6 +188,7 @@ fn multiplying_shaders_are_valid() {
 #[test]
 fn drawing_shaders_are_valid() {
     check(drawing());
+    check(sharp());
 }
 
 #[test]
@@ -197,7 +210,7 @@ fn merge_of_seven_bands_is_valid() {
 
 #[test]
 fn every_entry_point_is_among_the_rows() {
-    let compiled: BTreeSet<&str> = [baking(), drawing(), gathering(), measuring(), merging(), multiplying()]
+    let compiled: BTreeSet<&str> = [baking(), drawing(), gathering(), measuring(), merging(), multiplying(), sharp()]
         .concat()
         .iter()
         .map(|row| row.file)

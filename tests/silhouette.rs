@@ -10,6 +10,7 @@ use shadow_fields::asset::{Mesh, generate};
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
 use shadow_fields::check::silhouette as check;
 use shadow_fields::field::silhouette::SilhouetteField;
+use shadow_fields::field::sub_light::SeenLight;
 use shadow_fields::truth::ray_mesh::RayMesh;
 
 fn bake(gpu: &Gpu, mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteField {
@@ -56,7 +57,7 @@ fn a_ball_blocks_what_two_discs_have_in_common() {
             let toward = (axis * off.cos() + a * off.sin()).normalize();
             let rays = light_rays(toward, angle, 1000);
             let exact = rays.iter().filter(|ray| ray.angle_between(axis) < ball).count() as f64 / 1000.0;
-            let [blocked, whole] = field.blocked_light(point, toward, 1e6 * toward, angle);
+            let [blocked, whole] = field.blocked_light(point, toward, &SeenLight::new(1e6 * toward, 1e6 * angle.sin()));
             let error = (blocked / whole - exact).abs();
             square += error * error / 200.0;
             worst = worst.max(error);
@@ -96,7 +97,11 @@ fn shadows_on_a_floor_are_those_of_rays() {
             let errors = (0..ACROSS * ACROSS).map(|i| {
                 let at = |i: usize| 4.4 * (i as f64 + 0.5) / ACROSS as f64 - 2.2;
                 let point = DVec3::new(at(i % ACROSS), floor, at(i / ACROSS));
-                let [blocked, whole] = field.blocked_light(point, DVec3::Y, light - point, angle);
+                let [blocked, whole] = field.blocked_light(
+                    point,
+                    DVec3::Y,
+                    &SeenLight::new(light - point, (light - point).length() * angle.sin()),
+                );
                 blocked / whole - blocked_by_rays(&shape, point, (light - point).normalize(), angle)
             });
             let rms = (errors.map(|e| e * e).sum::<f64>() / (ACROSS * ACROSS) as f64).sqrt();
@@ -112,7 +117,7 @@ fn what_lies_behind_the_receiver_or_the_light_blocks_nothing() {
     let field = bake(&gpu, &generate::sphere(0.5, 4), SilhouetteOptions { cells: 4, map_px: 16, view_px: 64 });
     let toward = DVec3::new(0.3, 0.9, 0.2).normalize();
     let angle = 2.0_f64.to_radians();
-    let blocked = |from: f64, light: f64| field.blocked(from * toward, toward, light, angle);
+    let blocked = |from: f64, light: f64| field.blocked(&field.near(from * toward, toward), toward, light, angle.tan());
     assert_eq!(blocked(-3.0, 10.0), 1.0, "the ball stands before the light");
     assert_eq!(blocked(3.0, 10.0), 0.0, "the ball stands behind the receiver");
     assert_eq!(blocked(-3.0, 1.5), 0.0, "the ball stands behind the light");
@@ -165,7 +170,8 @@ fn odd_meshes_give_finite_fields() {
             let mut point = || DVec3::from_array([0; 3].map(|_| 6.0 * rng.f64() - 3.0));
             let (from, light) = (point(), 3.0 * point());
             let angle = rng.f64() * 1.2;
-            let [blocked, whole] = field.blocked_light(from, DVec3::Y, light, angle);
+            let [blocked, whole] =
+                field.blocked_light(from, DVec3::Y, &SeenLight::new(light, light.length() * angle.sin()));
             assert!(blocked.is_finite() && blocked >= 0.0 && blocked <= whole + 1e-12, "{blocked} of {whole}");
         }
     }

@@ -11,7 +11,7 @@ use crate::gpu::{self, Device, Validation};
 use crate::lists::gather::Place;
 use crate::lists::skip::{EPS, Skip};
 use crate::merge::{Variant, calibrate};
-use crate::scene::Scene;
+use crate::scene::{Lights, Scene};
 use crate::shaders::Library;
 use clap::Args;
 use std::path::PathBuf;
@@ -70,6 +70,10 @@ pub struct MergeArguments {
     /// Leave out an entity's light or shadow on a vertex where it is bounded below this share of white; 0 leaves out nothing
     #[arg(long, default_value_t = EPS, value_name = "SHARE", value_parser = eps, allow_negative_numbers = true)]
     pub eps: f32,
+    /// Lights that are computed as sharp lights, whose shadows have edges: every entity that glows in one colour, or none (sh: four
+    /// bands of spherical harmonics, as for skies and for lights whose colour varies over their surface)
+    #[arg(long, value_enum, default_value = "sharp", value_name = "sh|sharp")]
+    pub lights: Lights,
     /// Where the lists of the entities that concern each cluster of vertices are made. Default: device, but host for fewer than 128
     /// entities on a software device
     #[arg(long, value_name = "WHERE")]
@@ -84,7 +88,7 @@ impl MergeArguments {
     pub fn options(&self, bake: bake::Options, size: [u32; 2], antialias: Antialias) -> frame::Options {
         let (lookup, guard) = (Lookup::Trilinear, self.guard);
         let (variant, skip, eps, lists) = (self.variant, self.skip, self.eps, self.lists);
-        frame::Options { bake, lookup, variant, skip, guard, eps, lists, size, antialias }
+        frame::Options { bake, lights: self.lights, lookup, variant, skip, guard, eps, lists, size, antialias }
     }
 }
 

@@ -12,6 +12,7 @@
 //! --error e.png --quality Q`, and the same for `glowing_torus`). Lights of few degrees are cut to few bands, which more samples do not mend.
 
 use crate::bake;
+use crate::bake::silhouette::SilhouetteOptions;
 use crate::field::{Lattice, Storage};
 use clap::{Args, ValueEnum};
 
@@ -32,11 +33,28 @@ impl Quality {
         let normal = bake::Options::default();
         let lattice = |text: &str| text.parse().expect("a lattice of the table");
         match self {
-            Quality::Draft => bake::Options { lattice: lattice("cube:8x4"), face_px: 32, bands: 3, ..normal },
+            Quality::Draft => bake::Options {
+                lattice: lattice("cube:8x4"),
+                face_px: 32,
+                bands: 3,
+                silhouette: silhouettes(4),
+                ..normal
+            },
             Quality::Normal => normal,
-            Quality::High => bake::Options { lattice: lattice("cube:24x10"), face_px: 128, bands: 5, ..normal },
+            Quality::High => bake::Options {
+                lattice: lattice("cube:24x10"),
+                face_px: 128,
+                bands: 5,
+                silhouette: silhouettes(16),
+                ..normal
+            },
         }
     }
+}
+
+/// 98, 389 and 1 542 KiB of silhouettes a mesh with 4, 8 and 16 cells along a cube's face.
+fn silhouettes(cells: u32) -> SilhouetteOptions {
+    SilhouetteOptions { cells, ..Default::default() }
 }
 
 /// Options of a bake.

@@ -4,37 +4,25 @@ use super::context::Context;
 use super::quality::Quality;
 use super::{Global, output};
 use crate::asset::{Mesh, lettering, picture};
-use crate::bake::silhouette::{SilhouetteOptions, bake_silhouette};
+use crate::bake::silhouette::bake_silhouette;
 use crate::error::{Result, one_line};
 use crate::field::silhouette::{REACH, SilhouetteField};
 use glam::DVec3;
 use serde_json::json;
 use std::path::Path;
-use std::time::Instant;
-
-/// What a quality stands for: 98, 389 and 1 542 KiB a mesh.
-pub fn options(quality: Quality) -> SilhouetteOptions {
-    let cells = match quality {
-        Quality::Draft => 4,
-        Quality::Normal => 8,
-        Quality::High => 16,
-    };
-    SilhouetteOptions { cells, ..Default::default() }
-}
 
 /// Bakes the silhouette field of a mesh and writes it.
 pub fn bake(global: &Global, mesh_file: &Path, out: &Path, quality: Quality) -> Result<()> {
     let mesh = Mesh::load(mesh_file)?;
     let context = Context::new(global)?;
-    let started = Instant::now();
     let told = |done, all| context.progress.show(&mesh.name, done, all);
     let (device, library) = (context.baker.device(), context.baker.library());
-    let (field, timings) = bake_silhouette((device, library), &mesh, options(quality), &told)
+    let (field, report) = bake_silhouette((device, library), &mesh, quality.options().silhouette, &told)
         .map_err(|error| error.context(mesh_file.display()))?;
-    let seconds = started.elapsed().as_secs_f64();
+    let seconds = report.total.as_secs_f64();
     let result = json!({
         "origin": context.origin(global), "file": out.display().to_string(), "triangles": mesh.triangles.len(),
-        "pass_ms": timings.iter().map(|t| t.milliseconds).sum::<f64>(), "total_s": seconds, "header": field.header,
+        "report": report, "header": field.header,
     });
     // A field that the validation layer objected to is not written.
     context.finish()?;
@@ -96,8 +84,9 @@ fn lookup(field: &SilhouetteField, (position_m, toward): Ray) -> serde_json::Val
     let radius_m = f64::from(field.header.radius_m);
     let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
     let (point, direction) = ((position_m - centre) / radius_m, toward.normalize());
-    let outline = field.outline(point, direction);
-    let blocked = |angle_deg: f64| field.blocked(point, direction, f64::INFINITY, angle_deg.to_radians());
+    let near = field.near(point, direction);
+    let outline = field.outline(&near, direction);
+    let blocked = |angle_deg: f64| field.blocked(&near, direction, f64::INFINITY, angle_deg.to_radians().tan());
     json!({
         "position_m": position_m.to_array(), "direction": direction.to_array(),
         "outline_distance_m": outline.distance * radius_m,

@@ -114,6 +114,18 @@ impl Mesh {
         area_m2(&self.positions, &self.triangles)
     }
 
+    /// Mean over all directions of the share of its bounding sphere's disc that the mesh covers, if it is a ball: convex, with every face
+    /// at least 0.9 r from the centre. Of a convex body that mean is its area over four (Cauchy 1841).
+    pub fn ball_share(&self) -> Option<f64> {
+        let radius = f64::from(self.radius_m);
+        let depth = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|v| (self.positions[v as usize] - self.centre).as_dvec3());
+            (b - a).cross(c - a).try_normalize().map_or(radius, |normal| normal.dot(a).abs())
+        };
+        let is_ball = self.is_convex() && radius > 0.0 && self.triangles.iter().all(|t| depth(t) >= 0.9 * radius);
+        is_ball.then(|| self.area_m2() / (4.0 * std::f64::consts::PI * radius * radius))
+    }
+
     /// Signed volume in cubic metres, positive for a closed mesh wound outwards; of no meaning for an open one.
     pub fn volume_m3(&self) -> f64 {
         topology::volume_m3(&self.positions, &self.triangles, self.centre)

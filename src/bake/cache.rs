@@ -1,12 +1,14 @@
-//! The cache of what is baked: fields, transfer vectors and self-visibility. Names are hashes of the mesh's content and of everything
+//! The cache of what is baked: fields, silhouette fields, transfer vectors and self-visibility. Names are hashes of the mesh's content and of everything
 //! else that decides the numbers. One function, [`Cache::find`], serves all kinds; a [`Shelf`] says where one kind is kept.
 
 use super::partial::Partial;
+use super::silhouette::{bake_silhouette, silhouette_header};
 use super::{BakeReport, Baker, Options, Progress, TRANSFER_OFFSET};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
 use crate::field::file::{self, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC, VERSION};
 use crate::field::quantity::channel_stride;
+use crate::field::silhouette::{SilhouetteField, SilhouetteHeader};
 use crate::field::{FieldHeader, ShadowField, Shortcuts, self_visibility};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -26,6 +28,7 @@ pub struct Cache {
 #[derive(Default)]
 struct InMemory {
     fields: HashMap<String, Arc<ShadowField>>,
+    silhouettes: HashMap<String, Arc<SilhouetteField>>,
     transfers: HashMap<String, Arc<Vec<f32>>>,
     self_visibility: HashMap<String, Arc<Vec<u8>>>,
 }
@@ -39,6 +42,8 @@ struct Shelf<T> {
 }
 
 const FIELDS: Shelf<ShadowField> = Shelf { endings: ["sf", "part"], memory: |all| &mut all.fields };
+const SILHOUETTES: Shelf<SilhouetteField> =
+    Shelf { endings: ["outlines", "outlines-part"], memory: |all| &mut all.silhouettes };
 const TRANSFERS: Shelf<Vec<f32>> = Shelf { endings: ["transfer", "transfer-part"], memory: |all| &mut all.transfers };
 const SELF_VISIBILITY: Shelf<Vec<u8>> =
     Shelf { endings: ["selfvis", "selfvis-part"], memory: |all| &mut all.self_visibility };
@@ -123,6 +128,11 @@ pub fn field_name(header: &FieldHeader) -> String {
     key(&identity(header))
 }
 
+/// What decides a silhouette field: its header without the mesh's name.
+fn silhouette_identity(header: &SilhouetteHeader) -> SilhouetteHeader {
+    SilhouetteHeader { mesh: String::new(), ..header.clone() }
+}
+
 impl Cache {
     /// A cache below `folder`, or in memory if there is none.
     pub fn new(folder: Option<&Path>) -> Self {
@@ -177,6 +187,11 @@ impl Cache {
         self.has(&FIELDS, &field_name(header))
     }
 
+    /// Whether the silhouette field of a mesh is there.
+    pub fn has_silhouette(&self, mesh: &Mesh, options: &Options) -> bool {
+        self.has(&SILHOUETTES, &key(&silhouette_identity(&silhouette_header(mesh, options.silhouette))))
+    }
+
     /// Whether the transfer vectors of a mesh are there.
     pub fn has_transfer(&self, mesh: &Mesh, options: &Options) -> bool {
         self.has(&TRANSFERS, &key(&TransferHeader::new(mesh, options)))
@@ -203,6 +218,27 @@ impl Cache {
             field_name(header),
             |path| read_field(path, header),
             |partial| baker.field_from(partial, mesh, header.clone(), progress),
+            |path, field| field.write(path),
+        )
+    }
+
+    /// The silhouette field of a mesh, and the report of its bake, which is `None` if the cache held it.
+    ///
+    /// # Errors
+    /// As [`bake_silhouette`]. A damaged or unreadable cache file is baked anew.
+    pub fn silhouette(
+        &self,
+        baker: &Baker,
+        mesh: &Mesh,
+        options: &Options,
+        progress: Progress<'_>,
+    ) -> Result<Found<SilhouetteField>> {
+        let header = silhouette_header(mesh, options.silhouette);
+        self.find(
+            &SILHOUETTES,
+            key(&silhouette_identity(&header)),
+            |path| read_silhouette(path, &header),
+            |_| bake_silhouette((baker.device(), baker.library()), mesh, options.silhouette, progress),
             |path, field| field.write(path),
         )
     }
@@ -279,6 +315,18 @@ fn read_field(path: &Path, header: &FieldHeader) -> Option<ShadowField> {
     }
 }
 
+/// The silhouette field in a file, with the mesh's present name. `None` if the file is missing or damaged or holds another field.
+fn read_silhouette(path: &Path, header: &SilhouetteHeader) -> Option<SilhouetteField> {
+    match path.exists().then(|| SilhouetteField::read(path))? {
+        Ok(mut found) if silhouette_identity(&found.header) == silhouette_identity(header) => {
+            found.header.mesh.clone_from(&header.mesh);
+            Some(found)
+        }
+        Ok(_) => doubt(path, &"it does not fit its name"),
+        Err(error) => doubt(path, &error),
+    }
+}
+
 /// The payload of a file. `None` if the file is missing or damaged, or if its header or length is another.
 fn read_payload<H: PartialEq + DeserializeOwned>(
     path: &Path,
@@ -302,15 +350,17 @@ fn doubt<T>(path: &Path, why: &dyn std::fmt::Display) -> Option<T> {
 mod tests {
     use super::*;
     use crate::asset::generate;
+    use crate::bake::silhouette::SilhouetteOptions;
     use crate::field::{FieldKind, Storage};
     use std::collections::BTreeSet;
 
-    /// Names of occlusion field, radiance field, transfer vectors and self-visibility.
-    fn names(mesh: &Mesh, options: &Options) -> [String; 4] {
+    /// Names of occlusion field, radiance field, transfer vectors, self-visibility and silhouette field.
+    fn names(mesh: &Mesh, options: &Options) -> [String; 5] {
         let field = |kind| field_name(&crate::bake::header(mesh, kind, options));
         let own = [key(&TransferHeader::new(mesh, options)), key(&SelfVisibilityHeader::new(mesh, options))];
         let [transfer, self_visibility] = own;
-        [field(FieldKind::Occlusion), field(FieldKind::Radiance), transfer, self_visibility]
+        let outlines = key(&silhouette_identity(&silhouette_header(mesh, options.silhouette)));
+        [field(FieldKind::Occlusion), field(FieldKind::Radiance), transfer, self_visibility, outlines]
     }
 
     /// Each option that is flipped changes the names of what it decides, and no other names.
@@ -319,20 +369,26 @@ mod tests {
         let mesh = generate::torus_two_colour(1.0, 0.3, 12, 6);
         let base = Options::default();
         // A new option does not compile here until it has a row below.
-        let Options { bands, field_bands, storage, lattice, face_px, shortcuts } = base;
+        let Options { bands, field_bands, storage, lattice, face_px, shortcuts, silhouette } = base;
         let Shortcuts { symmetry, faces, inside } = shortcuts;
         assert!(field_bands.is_none() && storage == Storage::F16);
         let shortcuts = |shortcuts| Options { shortcuts, ..base };
-        let all = [true; 4];
-        let flipped: Vec<(&str, Options, [bool; 4])> = vec![
-            ("bands", Options { bands: bands + 1, ..base }, [true, true, true, false]),
-            ("field_bands", Options { field_bands: Some(bands + 2), ..base }, [true, false, false, false]),
-            ("storage", Options { storage: Storage::F32, ..base }, [true, true, false, false]),
-            ("lattice", Options { lattice: "cube:4x3".parse().unwrap(), ..base }, [true, true, false, false]),
+        let all = [true, true, true, true, false];
+        let silhouettes = |silhouette| Options { silhouette, ..base };
+        let SilhouetteOptions { cells, map_px, view_px } = silhouette;
+        let outlines = [false, false, false, false, true];
+        let flipped: Vec<(&str, Options, [bool; 5])> = vec![
+            ("bands", Options { bands: bands + 1, ..base }, [true, true, true, false, false]),
+            ("field_bands", Options { field_bands: Some(bands + 2), ..base }, [true, false, false, false, false]),
+            ("storage", Options { storage: Storage::F32, ..base }, [true, true, false, false, false]),
+            ("lattice", Options { lattice: "cube:4x3".parse().unwrap(), ..base }, [true, true, false, false, false]),
             ("face_px", Options { face_px: face_px / 2, ..base }, all),
-            ("symmetry", shortcuts(Shortcuts { symmetry: !symmetry, faces, inside }), [true, true, true, false]),
+            ("symmetry", shortcuts(Shortcuts { symmetry: !symmetry, faces, inside }), [true, true, true, false, false]),
             ("faces", shortcuts(Shortcuts { symmetry, faces: !faces, inside }), all),
             ("inside", shortcuts(Shortcuts { symmetry, faces, inside: !inside }), all),
+            ("cells", silhouettes(SilhouetteOptions { cells: 2 * cells, ..silhouette }), outlines),
+            ("map_px", silhouettes(SilhouetteOptions { map_px: 2 * map_px, ..silhouette }), outlines),
+            ("view_px", silhouettes(SilhouetteOptions { view_px: 2 * view_px, ..silhouette }), outlines),
         ];
         assert_ne!(lattice, flipped[3].1.lattice);
         let usual = names(&mesh, &base);

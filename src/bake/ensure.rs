@@ -4,7 +4,9 @@ use super::cache::{Cache, field_name};
 use super::{BakeReport, Baker, Options, header};
 use crate::asset::Mesh;
 use crate::error::Result;
+use crate::field::silhouette::SilhouetteField;
 use crate::field::{FieldHeader, FieldKind, ShadowField};
+use crate::scene::light::{self, LightForm, Lights};
 use crate::scene::{Entity, Scene};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -28,6 +30,10 @@ pub struct BakedMesh {
     pub blocked: Option<Arc<ShadowField>>,
     /// Radiance field.
     pub radiance: Option<Arc<ShadowField>>,
+    /// Silhouette field.
+    pub silhouette: Option<Arc<SilhouetteField>>,
+    /// Self-visibility of every vertex for sharp lights, [`self_visibility::NODES`] bytes each in the mesh's order of vertices.
+    pub self_visibility: Option<Arc<Vec<u8>>>,
     /// Transfer vectors in the mesh's order of vertices, or `None` where the cosine lobe of the normal is exact.
     pub transfer: Option<Arc<Vec<f32>>>,
 }
@@ -44,6 +50,10 @@ pub struct BakedScene {
 pub struct SceneNeeds {
     /// For every mesh of the scene: headers of its occlusion and radiance fields.
     fields: Vec<[Option<FieldHeader>; 2]>,
+    /// For every mesh of the scene: whether it needs a silhouette field.
+    silhouettes: Vec<bool>,
+    /// For every mesh of the scene: whether it needs self-visibility.
+    self_visibility: Vec<bool>,
     /// For every mesh of the scene: whether it needs transfer vectors.
     transfers: Vec<bool>,
     /// Options of the bakes.
@@ -52,15 +62,16 @@ pub struct SceneNeeds {
 
 impl SceneNeeds {
     /// The needs of a scene whose fields and transfers are baked with `options`. A field that nothing sees is not needed.
-    pub fn of(scene: &Scene, options: &Options) -> Self {
-        let fields = |index: usize| {
-            let kinds = needs(scene, index);
-            kinds.map(|kind| kind.map(|kind| header(&scene.meshes[index], kind, options)))
+    pub fn of(scene: &Scene, options: &Options, lights: Lights) -> Self {
+        let needs: Vec<Needed> = (0..scene.meshes.len()).map(|index| needs(scene, index, lights)).collect();
+        let fields = |(index, needed): (usize, &Needed)| {
+            needed.fields.map(|kind| kind.map(|kind| header(&scene.meshes[index], kind, options)))
         };
-        let receives = |index: usize| scene.entities.iter().any(|e| e.mesh == index && e.receives);
         SceneNeeds {
-            fields: (0..scene.meshes.len()).map(fields).collect(),
-            transfers: scene.meshes.iter().enumerate().map(|(i, mesh)| receives(i) && bakes_transfer(mesh)).collect(),
+            fields: needs.iter().enumerate().map(fields).collect(),
+            silhouettes: needs.iter().map(|needed| needed.silhouette).collect(),
+            self_visibility: needs.iter().map(|needed| needed.self_visibility).collect(),
+            transfers: needs.iter().map(|needed| needed.transfer).collect(),
             options: *options,
         }
     }
@@ -76,21 +87,48 @@ impl SceneNeeds {
     /// Whether everything is in the cache, so that [`ensure()`] bakes nothing.
     pub fn are_cached(&self, scene: &Scene, cache: &Cache) -> bool {
         let mut fields = self.fields.iter().flatten().flatten();
-        let mut transfers = scene.meshes.iter().zip(&self.transfers).filter(|(_, needed)| **needed);
+        let needing = |needed: &'_ [bool]| scene.meshes.iter().zip(needed.to_vec()).filter(|(_, needed)| *needed);
+        let (mut silhouettes, mut transfers) = (needing(&self.silhouettes), needing(&self.transfers));
+        let mut self_visibility = needing(&self.self_visibility);
         fields.all(|header| cache.has_field(header))
+            && silhouettes.all(|(mesh, _)| cache.has_silhouette(mesh, &self.options))
+            && self_visibility.all(|(mesh, _)| cache.has_self_visibility(mesh, &self.options))
             && transfers.all(|(mesh, _)| cache.has_transfer(mesh, &self.options))
     }
 }
 
-/// Which fields the entities of a mesh need. An entity that only receives, or that nothing else can see, needs none. Without light
-/// no shadows are needed, and a light of one colour needs no radiance field.
-pub fn needs(scene: &Scene, mesh: usize) -> [Option<FieldKind>; 2] {
-    let entities = || scene.entities.iter().filter(|e| e.mesh == mesh && is_seen(scene, e));
+/// What the entities of a mesh need to have baked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Needed {
+    /// Occlusion and radiance field.
+    pub fields: [Option<FieldKind>; 2],
+    /// Silhouette field.
+    pub silhouette: bool,
+    /// Self-visibility for sharp lights.
+    pub self_visibility: bool,
+    /// Transfer vectors.
+    pub transfer: bool,
+}
+
+/// What the entities of a mesh need. An entity that only receives, or that nothing else can see, needs no field. Without light
+/// no shadows are needed, without light in spherical harmonics no occlusion field, without sharp lights no silhouettes. A light of
+/// one colour needs no radiance field.
+pub fn needs(scene: &Scene, mesh: usize, lights: Lights) -> Needed {
+    let entities = || (0..scene.entities.len()).filter(|&i| scene.entities[i].mesh == mesh);
+    let seen = || entities().map(|i| (i, &scene.entities[i])).filter(|(_, e)| is_seen(scene, e));
+    let form = |entity| LightForm::of(scene, entity, lights);
     let coloured = scene.meshes[mesh].colors.is_some();
-    let light = !scene.environment.is_none() || scene.entities.iter().any(|e| e.emits);
-    let blocked = entities().any(|e| (e.occludes && light) || (e.emits && !coloured));
-    let radiance = coloured && entities().any(|e| e.emits);
-    [blocked.then_some(FieldKind::Occlusion), radiance.then_some(FieldKind::Radiance)]
+    let (harmonics, sharp) = (light::has_harmonics(scene, lights), light::has_sharp(scene, lights));
+    let shines = |wanted: LightForm| seen().any(|(i, e)| e.emits && form(i) == wanted);
+    let blocked = seen().any(|(_, e)| e.occludes && harmonics) || (shines(LightForm::Harmonics) && !coloured);
+    let radiance = coloured && shines(LightForm::Harmonics);
+    let shades_itself = bakes_transfer(&scene.meshes[mesh]) && entities().any(|i| scene.entities[i].receives);
+    Needed {
+        fields: [blocked.then_some(FieldKind::Occlusion), radiance.then_some(FieldKind::Radiance)],
+        silhouette: seen().any(|(_, e)| e.occludes && sharp) || shines(LightForm::Outline),
+        self_visibility: sharp && shades_itself,
+        transfer: harmonics && shades_itself,
+    }
 }
 
 /// Whether the shadow or light of an entity can fall on another entity, because one other at least is lit.
@@ -131,6 +169,34 @@ pub fn ensure(
             }
             *to = known.get(&name).cloned();
         }
+    }
+    let mut known = HashMap::<[u8; 32], Arc<SilhouetteField>>::new();
+    for ((mesh, needed), to) in scene.meshes.iter().zip(&needs.silhouettes).zip(&mut out.meshes) {
+        if !needed {
+            continue;
+        }
+        if !known.contains_key(&mesh.content_hash()) {
+            let what = format!("{} silhouette", mesh.name);
+            let done = |now, all| progress(&what, now, all);
+            let (field, report) = cache.silhouette(baker, mesh, &needs.options, &done)?;
+            out.baked.extend(report.map(|report| Baked { what, report }));
+            known.insert(mesh.content_hash(), field);
+        }
+        to.silhouette = known.get(&mesh.content_hash()).cloned();
+    }
+    let mut known = HashMap::<[u8; 32], Arc<Vec<u8>>>::new();
+    for ((mesh, needed), to) in scene.meshes.iter().zip(&needs.self_visibility).zip(&mut out.meshes) {
+        if !needed {
+            continue;
+        }
+        if !known.contains_key(&mesh.content_hash()) {
+            let what = format!("{} self-visibility", mesh.name);
+            let done = |now, all| progress(&what, now, all);
+            let (maps, report) = cache.self_visibility(baker, mesh, &needs.options, &done)?;
+            out.baked.extend(report.map(|report| Baked { what, report }));
+            known.insert(mesh.content_hash(), maps);
+        }
+        to.self_visibility = known.get(&mesh.content_hash()).cloned();
     }
     let mut known = HashMap::<[u8; 32], Arc<Vec<f32>>>::new();
     for ((mesh, needed), to) in scene.meshes.iter().zip(&needs.transfers).zip(&mut out.meshes) {

@@ -1,6 +1,7 @@
 //! What decides a bake: its options, and the header of the field, which follows from the options and a mesh.
 
 use super::capture::unit_positions;
+use super::silhouette::SilhouetteOptions;
 use super::surface::Surface;
 use crate::asset::mesh::Mesh;
 use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
@@ -24,6 +25,8 @@ pub struct Options {
     pub face_px: u32,
     /// What is done in place of capturing every face of every sample.
     pub shortcuts: Shortcuts,
+    /// Silhouette fields.
+    pub silhouette: SilhouetteOptions,
 }
 
 impl Default for Options {
@@ -37,6 +40,7 @@ impl Default for Options {
             lattice: Lattice::default(),
             face_px: 64,
             shortcuts: Shortcuts::default(),
+            silhouette: SilhouetteOptions::default(),
         }
     }
 }

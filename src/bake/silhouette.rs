@@ -5,14 +5,14 @@
 //! depth a pixel; two dispatches reduce every view to its map.
 
 use super::capture::unit_positions;
-use super::{Progress, hash_text};
+use super::{BakeReport, Progress, hash_text};
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::field::silhouette::{Frame, REACH, SilhouetteField, SilhouetteHeader, encode};
 use crate::field::silhouette_nodes::NodeGrid;
 use crate::gpu::{
     Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, GraphicsPipeline, GraphicsState, Image,
-    ImageShape, Target, Timing,
+    ImageShape, Target,
 };
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -21,6 +21,7 @@ use glam::{DVec2, DVec3, Vec4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Edge of the atlas in pixels: 256 views of 128 px, 16 MB.
 const ATLAS_PX: u32 = 2048;
@@ -234,7 +235,7 @@ impl Silhouette {
     }
 }
 
-/// Bakes the silhouette field of a mesh on the device; `progress` hears of maps. Returns each batch's timing of the pass too.
+/// Bakes the silhouette field of a mesh on the device; `progress` hears of maps. Returns the report of the bake too.
 ///
 /// # Errors
 /// `Input` when the options are out of range or a view does not fit the device; `Device` when memory ran out.
@@ -243,22 +244,25 @@ pub fn bake_silhouette(
     mesh: &Mesh,
     options: SilhouetteOptions,
     progress: Progress<'_>,
-) -> Result<(SilhouetteField, Vec<Timing>)> {
+) -> Result<(SilhouetteField, BakeReport)> {
+    let started = Instant::now();
     let header = silhouette_header(mesh, options);
     header.validate()?;
     let frames = frames(mesh, options.cells);
     let pass = Silhouette::new(device, library, options.map_px, options.view_px)?;
     let buffers = SilhouetteBuffers::new(device, mesh, &frames, options.map_px)?;
-    let (mut done, mut timings) = (0, Vec::new());
+    let (mut done, mut report) = (0, BakeReport::default());
     for batch in frames.chunks(pass.capacity()) {
         let mut commands = Commands::new(device, "silhouette bake")?;
         commands.pass("silhouette", |c| pass.record(c, &buffers, batch, done))?;
-        timings.extend(commands.submit()?);
+        report.add(&commands.submit()?);
         done += batch.len();
         progress(done as u32, frames.len() as u32);
     }
     let texels: Vec<u8> = buffers.maps.download(2 * frames.len() * (options.map_px * options.map_px) as usize)?;
-    Ok((SilhouetteField::new(header, joined(&frames, &texels))?, timings))
+    report.samples = frames.len() as u32;
+    report.total = started.elapsed();
+    Ok((SilhouetteField::new(header, joined(&frames, &texels))?, report))
 }
 
 /// The payload of a field: each map's rectangle before its texels.

@@ -68,6 +68,7 @@ impl Bench<'_> {
 pub fn default_options() -> frame::Options {
     frame::Options {
         bake: crate::bake::Options::default(),
+        lights: crate::scene::Lights::default(),
         lookup: crate::field::Lookup::default(),
         guard: true,
         // Frames are timed at rest: each must merge everything.

@@ -58,6 +58,7 @@ fn is_within(part: &[u32], whole: &[u32]) -> bool {
 fn random_entities(rng: &mut fastrand::Rng, count: usize, spread_m: f64, corner: DVec3) -> Vec<EntityBounds> {
     (0..count)
         .map(|i| EntityBounds {
+            sharp: false,
             centre: corner + DVec3::new(rng.f64() - 0.5, 0.1 * rng.f64(), rng.f64() - 0.5) * spread_m,
             radius_m: 0.1 + 0.4 * rng.f64(),
             occludes: i % 5 != 0,

@@ -13,7 +13,7 @@ use crate::lists::gather::Place;
 use crate::lists::skip::Skip;
 use crate::merge::Variant;
 use crate::merge::variant::VARIANTS;
-use crate::scene::{Placement, Scene};
+use crate::scene::{Lights, Placement, Scene};
 use std::path::Path;
 
 /// Differences of f32 arithmetic between device and twin: some 20 products and rotations of numbers around the brightest
@@ -80,6 +80,7 @@ pub fn options() -> Options {
     let lattice = "cube:6x4".parse().expect("a lattice");
     Options {
         bake: bake::Options { storage: Storage::F32, lattice, face_px: 16, ..Default::default() },
+        lights: Lights::Sh,
         lookup: Lookup::Trilinear,
         variant: Some(Variant::named("texel").expect("a variant")),
         skip: Skip::ALL,

@@ -10,6 +10,7 @@ pub mod gather;
 pub mod merge;
 pub mod project;
 pub mod self_visibility;
+pub mod sharp;
 pub mod silhouette;
 pub mod smooth;
 
@@ -57,7 +58,7 @@ impl CheckRow {
 type Part = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
 /// Every pass, by the one word that names it everywhere.
-pub const PASSES: [(&str, Part); 9] = [
+pub const PASSES: [(&str, Part); 10] = [
     ("capture", capture::rows),
     ("project", project::rows),
     ("self_visibility", self_visibility::rows),
@@ -65,6 +66,7 @@ pub const PASSES: [(&str, Part); 9] = [
     ("silhouette", silhouette::rows),
     ("gather", gather::rows),
     ("merge", merge::rows),
+    ("sharp", sharp::rows),
     ("draw", draw::rows),
     ("smooth", smooth::rows),
 ];

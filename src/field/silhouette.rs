@@ -10,8 +10,8 @@
 //! light the outline leaves ([`blocked_share`]) follows from the distance and from how far away the outline's point is.
 
 use super::file;
-use super::silhouette_nodes::NodeGrid;
-use super::sub_light;
+use super::silhouette_nodes::{Cell, NodeGrid};
+use super::sub_light::SeenLight;
 use crate::error::{Error, Result};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,9 @@ pub const REACH: f64 = 0.5;
 /// Room that a map leaves around the object's outline, in r: distances just outside it are met by most lookups.
 pub const MARGIN: f64 = 0.08;
 /// Least distance of an outline from a receiver that a penumbra is computed for, in r.
-const NEAREST: f64 = 0.02;
+pub const NEAREST: f64 = 0.02;
+/// Least half-width of a penumbra, in r: it keeps a light of no size from dividing by nothing.
+pub const LEAST_PENUMBRA: f64 = 1e-9;
 
 /// Everything about a silhouette field but its maps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -126,6 +128,36 @@ pub struct Outline {
     pub depth: f64,
 }
 
+/// What a field knows of rays through one point in directions near one another.
+#[derive(Clone, Copy, Debug)]
+pub struct Near {
+    /// The point, in the object's frame.
+    point: DVec3,
+    cell: Cell,
+    maps: [NearMap; 4],
+}
+
+/// One of the four maps around a direction, as it concerns rays through one point.
+#[derive(Clone, Copy, Debug)]
+struct NearMap {
+    map: usize,
+    /// -1 where the map is seen from behind.
+    sign: f64,
+    /// Steps on the map, -1 to 1 from edge to edge, per r of the object's frame.
+    rows: [DVec3; 2],
+    /// Place of the point on the map.
+    place: DVec2,
+    /// Depth along the direction of the outline's nearest point, in r from the sphere's centre.
+    depth: f64,
+}
+
+impl NearMap {
+    /// Place on the map of what lies that far from the point along a direction.
+    fn along(&self, direction: DVec3, way: f64) -> DVec2 {
+        self.place + way * DVec2::new(self.rows[0].dot(direction), self.rows[1].dot(direction))
+    }
+}
+
 /// A silhouette field in host memory.
 #[derive(Clone, Debug)]
 pub struct SilhouetteField {
@@ -183,6 +215,34 @@ impl SilhouetteField {
         &self.frames
     }
 
+    /// The nodes as `glsl/silhouette_field.glsl` reads them, three quads each; the cells of the field's maps begin at `first_cell`.
+    pub fn node_quads(&self, first_cell: u32) -> Vec<[f32; 4]> {
+        let map_cells = (self.header.map_px - 1).pow(2);
+        let node = |&(map, mirrored): &(usize, bool)| {
+            let Frame { axes, centre, half, .. } = self.frames[map];
+            let row = |i: usize| (axes[i] / half[i]).extend(-centre[i] / half[i]).as_vec4().to_array();
+            let cells = f32::from_bits(first_cell + map as u32 * map_cells);
+            [row(0), row(1), [half.x as f32, half.y as f32, cells, if mirrored { -1.0 } else { 1.0 }]]
+        };
+        self.nodes.nodes().iter().flat_map(node).collect()
+    }
+
+    /// The cells of all maps, row by row: the signed bytes of four neighbouring distances, and of their depths. The first byte of each
+    /// word is the corner nearest to the map's first texel, the second is its neighbour in the row.
+    pub fn cells(&self) -> Vec<[u32; 2]> {
+        let px = self.header.map_px as usize;
+        let map = |map: usize| {
+            let texels = &self.payload[map * self.header.map_bytes() + 16..][..2 * px * px];
+            let word = move |x: usize, y: usize, i: usize| {
+                let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
+                u32::from_le_bytes(corners.map(|(dx, dy)| texels[2 * ((y + dy) * px + x + dx) + i]))
+            };
+            let places = (0..px - 1).flat_map(move |y| (0..px - 1).map(move |x| (x, y)));
+            places.map(move |(x, y)| [word(x, y, 0), word(x, y, 1)])
+        };
+        (0..self.frames.len()).flat_map(map).collect()
+    }
+
     /// Writes the field to an `.sf` file.
     ///
     /// # Errors
@@ -208,9 +268,8 @@ impl SilhouetteField {
 
     /// Distance and depth of a map at a point of the plane, between four texels. Beyond the rectangle, the distance at its rim less
     /// the way to it.
-    fn sample(&self, map: usize, point: DVec3) -> [f64; 2] {
+    fn sample(&self, map: usize, place: DVec2) -> [f64; 2] {
         let frame = &self.frames[map];
-        let place = frame.place(point);
         let within = place.clamp(DVec2::NEG_ONE, DVec2::ONE);
         let px = self.header.map_px as usize;
         let at = ((within + 1.0) / 2.0 * px as f64 - 0.5).clamp(DVec2::ZERO, DVec2::splat((px - 1) as f64));
@@ -223,48 +282,57 @@ impl SilhouetteField {
         [found.x - ((place - within) * frame.half).length(), found.y]
     }
 
-    /// The outline near the ray through `point` along the unit vector `direction` (object's frame).
-    pub fn outline(&self, point: DVec3, direction: DVec3) -> Outline {
-        let across = point - point.dot(direction) * direction;
+    /// What the field knows of rays through `point` (object's frame, in r) in directions near `toward`.
+    pub fn near(&self, point: DVec3, toward: DVec3) -> Near {
+        let cell = self.nodes.cell(toward);
+        let along = point.dot(toward);
+        let maps = cell.nodes.map(|(map, mirrored)| {
+            let frame = &self.frames[map];
+            let rows = [0, 1].map(|i| frame.axes[i] / frame.half[i]);
+            let sign = if mirrored { -1.0 } else { 1.0 };
+            let mut near = NearMap { map, sign, rows, place: frame.place(point), depth: 0.0 };
+            near.depth = sign * self.sample(map, near.along(toward, -along))[1];
+            near
+        });
+        Near { point, cell, maps }
+    }
+
+    /// The outline near the ray along the unit vector `direction`.
+    pub fn outline(&self, near: &Near, direction: DVec3) -> Outline {
+        let along = near.point.dot(direction);
         let mut found = Outline { distance: 0.0, depth: 0.0 };
-        for corner in self.nodes.around(direction) {
-            let sign = if corner.mirrored { -1.0 } else { 1.0 };
-            let depth = sign * self.sample(corner.map, across)[1];
-            let [distance, depth] = self.sample(corner.map, across + depth * direction);
-            found.distance += corner.weight * distance;
-            found.depth += corner.weight * sign * depth;
+        for (map, weight) in near.maps.iter().zip(self.nodes.weights(&near.cell, direction)) {
+            let [distance, depth] = self.sample(map.map, map.along(direction, map.depth - along));
+            found.distance += weight * distance;
+            found.depth += weight * map.sign * depth;
         }
         found
     }
 
-    /// Share of a round light that the object blocks, weighed by the cosine to `normal`, as seen from `point`; the light is cut into
-    /// parts as [`sub_light::parts`] says. Arguments as in [`SilhouetteField::blocked`]. Returns what is blocked and the whole.
-    pub fn blocked_light(&self, point: DVec3, normal: DVec3, light: DVec3, angle_rad: f64) -> [f64; 2] {
-        let (direction, distance) = (light.normalize(), light.length());
-        let (a, b) = direction.any_orthonormal_pair();
-        let spread = angle_rad.tan();
+    /// Light of a round light of radiance 1 that the object blocks: irradiance at `point` (object's frame) on a surface with
+    /// `normal`, and what it is without the object. The light's centre is at `to` from the point, in r.
+    pub fn blocked_light(&self, point: DVec3, normal: DVec3, light: &SeenLight) -> [f64; 2] {
         let mut sums = [0.0, 0.0];
-        for (count, weight) in sub_light::parts(angle_rad).into_iter().filter(|(_, weight)| *weight > 0.0) {
-            for place in sub_light::centres(count) {
-                let toward = (direction + spread * (place.x * a + place.y * b)).normalize();
-                let cosine = weight * toward.dot(normal).max(0.0) / count as f64;
-                sums[0] += cosine * self.blocked(point, toward, distance, angle_rad / (count as f64).sqrt());
-                sums[1] += cosine;
+        for (toward, parts) in light.blocks() {
+            let near = self.near(point, toward);
+            for part in parts {
+                let share = light.share(&part, normal);
+                sums[0] += share * self.blocked(&near, part.toward, part.distance, part.tangent());
+                sums[1] += share;
             }
         }
         sums
     }
 
-    /// Share of a round light that the object blocks, as seen from `point` (object's frame): the light's centre lies in that unit
-    /// direction, `distance` away (in r, infinite for distant light), and its radius spans `angle_rad`.
-    pub fn blocked(&self, point: DVec3, direction: DVec3, distance: f64, angle_rad: f64) -> f64 {
-        let outline = self.outline(point, direction);
-        let away = outline.depth - point.dot(direction);
-        let before_light = fade(distance - away);
-        // An outline behind the receiver blocks nothing.
+    /// Share of a small round light that the object blocks, as seen from the point of `near`: the light's middle lies in that
+    /// unit direction, `distance` away (in r, infinite for distant light), and `tangent` is that of its angular radius.
+    pub fn blocked(&self, near: &Near, direction: DVec3, distance: f64, tangent: f64) -> f64 {
+        let outline = self.outline(near, direction);
+        let away = outline.depth - near.point.dot(direction);
+        // An outline behind the receiver or behind the light blocks nothing.
         fade(away)
-            * before_light
-            * blocked_share(outline.distance / (away.max(NEAREST) * angle_rad.tan()).max(f64::MIN_POSITIVE))
+            * fade(distance - away)
+            * blocked_share(outline.distance / (away.max(NEAREST) * tangent).max(LEAST_PENUMBRA))
     }
 }
 

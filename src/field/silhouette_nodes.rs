@@ -1,8 +1,8 @@
 //! The directions for which a silhouette field has maps: corners of square cells on the faces of a cube.
 
 use super::directions::{unwarp, warp};
-use crate::sh::cube::{FACE_COUNT, direction, face_st};
-use glam::DVec3;
+use crate::sh::cube::{FACE_COUNT, direction, face_basis, face_st};
+use glam::{DVec2, DVec3};
 use std::collections::HashMap;
 
 /// Nodes at the corners of `cells` x `cells` cells of almost equal angles on every cube face, edges and corners shared. Opposite
@@ -15,16 +15,20 @@ pub struct NodeGrid {
     directions: Vec<DVec3>,
 }
 
-/// A node near a direction.
+/// Four neighbouring nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Corner {
-    /// Its map.
-    pub map: usize,
-    /// Whether the map's own direction is opposite to the node's, so that depths change sign.
-    pub mirrored: bool,
-    /// Bilinear weight; the four add up to 1.
-    pub weight: f64,
+pub struct Cell {
+    face: usize,
+    low: DVec2,
+    /// Map of each node, and whether the map's own direction is opposite to the node's, so that depths change sign.
+    pub nodes: [(usize, bool); 4],
 }
+
+/// How far beyond a cell its nodes are extrapolated, in cells. Shadows of a torus under 15 degrees err by 0.008 with this, by 0.013
+/// with twice as much, and by 0.034 with none.
+pub const BEYOND: f64 = 0.25;
+/// Least part of a direction along the face's own, against directions that leave the face's half of the sphere.
+pub const LEAST_AHEAD: f64 = 0.1;
 
 impl NodeGrid {
     /// Maps of a grid: the 6 n^2 + 2 corners of n x n cells a face, in pairs.
@@ -68,20 +72,29 @@ impl NodeGrid {
         &self.nodes
     }
 
-    /// The four nodes around a direction of any length but 0.
-    pub fn around(&self, toward: DVec3) -> [Corner; 4] {
+    /// The cell around a direction of any length but 0.
+    pub fn cell(&self, toward: DVec3) -> Cell {
         let (face, s, t) = face_st(toward);
+        let last = f64::from(self.cells - 1);
+        let low = DVec2::new(self.along(s), self.along(t)).floor().clamp(DVec2::ZERO, DVec2::splat(last));
         let columns = self.cells as usize + 1;
-        let at = |s: f64| ((warp(s) + 1.0) / 2.0 * f64::from(self.cells)).clamp(0.0, f64::from(self.cells));
-        let (u, v) = (at(s), at(t));
-        let last = self.cells as usize - 1;
-        let (x, y) = ((u as usize).min(last), (v as usize).min(last));
-        let (u, v) = (u - x as f64, v - y as f64);
-        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| {
-            let (map, mirrored) = self.nodes[(face * columns + y + j) * columns + x + i];
-            let weight = (if i == 0 { 1.0 - u } else { u }) * (if j == 0 { 1.0 - v } else { v });
-            Corner { map, mirrored, weight }
-        })
+        let node = |i, j| self.nodes[(face * columns + low.y as usize + j) * columns + low.x as usize + i];
+        Cell { face, low, nodes: [node(0, 0), node(1, 0), node(0, 1), node(1, 1)] }
+    }
+
+    /// Bilinear weights of a cell's nodes for a direction in the cell or around it. They add up to 1. Beyond the cell they extrapolate
+    /// as far as [`BEYOND`].
+    pub fn weights(&self, cell: &Cell, toward: DVec3) -> [f64; 4] {
+        let (forward, right, down) = face_basis(cell.face);
+        let ahead = toward.dot(forward).max(LEAST_AHEAD);
+        let at = DVec2::new(self.along(toward.dot(right) / ahead), self.along(toward.dot(down) / ahead));
+        let DVec2 { x: u, y: v } = (at - cell.low).clamp(DVec2::splat(-BEYOND), DVec2::splat(1.0 + BEYOND));
+        [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v]
+    }
+
+    /// Place among the cells of a face's row or column.
+    fn along(&self, s: f64) -> f64 {
+        (warp(s) + 1.0) / 2.0 * f64::from(self.cells)
     }
 }
 
@@ -98,13 +111,11 @@ mod tests {
             let mut rng = fastrand::Rng::with_seed(7);
             for _ in 0..500 {
                 let toward = DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0)).normalize();
-                let around = grid.around(toward);
-                let total: f64 = around.iter().map(|corner| corner.weight).sum();
-                assert!((total - 1.0).abs() < 1e-12);
-                let mean: DVec3 = around
-                    .iter()
-                    .map(|c| c.weight * if c.mirrored { -1.0 } else { 1.0 } * grid.map_direction(c.map))
-                    .sum();
+                let cell = grid.cell(toward);
+                let weights = grid.weights(&cell, toward);
+                assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+                let node = |(map, mirrored)| if mirrored { -grid.map_direction(map) } else { grid.map_direction(map) };
+                let mean: DVec3 = cell.nodes.into_iter().zip(weights).map(|(n, weight)| weight * node(n)).sum();
                 // The mean of a cell's corners lies in the cell: at most half its diagonal from any direction in it.
                 let cell = std::f64::consts::FRAC_PI_2 / f64::from(cells);
                 assert!(mean.angle_between(toward) < 0.3 * cell, "{toward} {mean} at {cells} cells");
@@ -117,10 +128,12 @@ mod tests {
         let grid = NodeGrid::new(4);
         for map in 0..NodeGrid::map_count(4) {
             for sign in [1.0, -1.0] {
-                let around = grid.around(sign * grid.map_direction(map));
-                let weight: f64 = around.iter().filter(|c| c.map == map).map(|c| c.weight).sum();
-                assert!(weight > 1.0 - 1e-6, "map {map}: {around:?}");
-                assert!(around.iter().filter(|c| c.weight > 0.5).all(|c| c.mirrored == (sign < 0.0)));
+                let toward = sign * grid.map_direction(map);
+                let cell = grid.cell(toward);
+                let around = || cell.nodes.into_iter().zip(grid.weights(&cell, toward));
+                let weight: f64 = around().filter(|(node, _)| node.0 == map).map(|(_, weight)| weight).sum();
+                assert!(weight > 1.0 - 1e-6, "map {map}: {cell:?}");
+                assert!(around().filter(|(_, weight)| *weight > 0.5).all(|(node, _)| node.1 == (sign < 0.0)));
             }
         }
     }

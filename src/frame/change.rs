@@ -1,17 +1,18 @@
 //! What may change from frame to frame: the scene's lights and camera, the merge's variant, and shader files.
 
 use super::permutation::{CompiledMerge, usable};
-use super::{Frame, Options};
+use super::{Frame, Options, forms};
 use crate::draw::Draw;
 use crate::error::Result;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{Camera, Scene};
+use crate::sharp::Sharp;
 
 impl Frame {
     /// Whether the fields that `scene` needs are here; it has the meshes and entities that this frame was made for.
     pub fn covers(&self, scene: &Scene) -> bool {
-        self.buffers.covers(scene)
+        self.buffers.covers(scene, self.options.lights)
     }
 
     /// Takes over lights, switches, sky and camera of a scene that has the meshes and receivers that this frame was made for.
@@ -26,6 +27,7 @@ impl Frame {
         assert_eq!(receivers(scene), receivers(&self.scene), "another scene needs another frame");
         let sky = scene.data.environment != self.scene.data.environment;
         self.scene = scene.clone();
+        self.forms = forms(scene, self.options.lights);
         if sky {
             self.work.lists.renew();
             self.sky.write(scene, self.options.bake.bands)?;
@@ -72,6 +74,12 @@ impl Frame {
         }
         if gathers {
             self.work.rebuild(&self.library, self.scene.entities.len())?;
+        }
+        if uses("sharp.comp")
+            && let Some(sharp) = &mut self.sharp
+        {
+            *sharp = Sharp::new(&self.device, &self.library, sharp.permutation)?;
+            self.forget();
         }
         if merges {
             self.merge.rebuild(&self.device, &self.library)?;

@@ -34,9 +34,10 @@ use crate::lists::skip::Skip;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
 use crate::merge::{Inputs, Readable};
-use crate::scene::{Placement, Scene};
+use crate::scene::{LightForm, Lights, Placement, Scene};
 use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
+use crate::sharp::{self, Sharp};
 use ash::vk;
 use permutation::{CompiledMerge, permutation, usable};
 use picture::Picture;
@@ -54,6 +55,8 @@ pub use viewport::{RadiositySource, Viewport};
 pub struct Options {
     /// Fields and transfers.
     pub bake: bake::Options,
+    /// Which lights are sharp.
+    pub lights: Lights,
     /// Which samples a lookup takes.
     pub lookup: Lookup,
     /// How the merge is done; `None` takes what was measured to be the device's fastest.
@@ -73,15 +76,24 @@ pub struct Options {
     pub antialias: Antialias,
 }
 
+/// How the light of each entity of a scene is computed.
+fn forms(scene: &Scene, lights: Lights) -> Vec<LightForm> {
+    (0..scene.entities.len()).map(|entity| LightForm::of(scene, entity, lights)).collect()
+}
+
 /// A scene on a device, ready to be lit and drawn at any time.
 pub struct Frame {
     device: Arc<Device>,
     library: Library,
     scene: Scene,
+    /// How the light of each entity is computed.
+    forms: Vec<LightForm>,
     options: Options,
     /// Baked and uploaded data.
     pub buffers: SceneBuffers,
     merge: CompiledMerge,
+    /// The pass of sharp lights, if the scene has any.
+    sharp: Option<Sharp>,
     work: ClusterWork,
     sky: SkyLight,
     radiosity: Radiosity,
@@ -102,7 +114,7 @@ impl Frame {
         progress: SceneProgress<'_>,
     ) -> Result<Self> {
         let (device, library) = (baker.device(), baker.library());
-        let needs = SceneNeeds::of(scene, &options.bake);
+        let needs = SceneNeeds::of(scene, &options.bake, options.lights);
         limits::check(device, scene, &needs)?;
         PictureMemory::new(device, &options).check(device)?;
         let baked = bake::ensure(baker, cache, scene, &needs, progress)?;
@@ -112,6 +124,11 @@ impl Frame {
         let wanted = permutation(&options, wanted, uniform_entities(device));
         let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted)?)?;
 
+        let forms = forms(scene, options.lights);
+        let sharp = permutation::sharp(&options, &merge.permutation, &forms, scene, &buffers)
+            .map(|wanted| wanted.fitting(device, buffers.sharp()))
+            .map(|permutation| Sharp::new(device, library, permutation))
+            .transpose()?;
         let radiosity = Radiosity::new(device, scene, &buffers)?;
         let mut lists = ClusterLists::default();
         for (index, entity) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
@@ -128,6 +145,8 @@ impl Frame {
             device: device.clone(),
             library: library.clone(),
             scene: scene.clone(),
+            forms,
+            sharp,
             options,
             merge,
             work: ClusterWork::new(device, lists, gathering, entity_room)?,
@@ -245,8 +264,21 @@ impl Frame {
             cluster_count,
             inputs: self.inputs()?,
             merge: &self.merge.pass,
+            sharp: self.sharp.as_ref().map(|sharp| (sharp, self.sharp_inputs())),
             radiosity: &self.radiosity.merged,
         }))
+    }
+
+    fn sharp_inputs(&self) -> sharp::Inputs<'_> {
+        sharp::Inputs {
+            entities: &self.work.entities,
+            entries: self.work.entries(),
+            clusters: &self.work.clusters,
+            nodes: &self.buffers.silhouettes.nodes,
+            cells: &self.buffers.silhouettes.cells,
+            vertices: &self.buffers.vertices,
+            self_cells: &self.buffers.self_cells,
+        }
     }
 
     fn inputs(&self) -> Result<Inputs<'_>> {

@@ -3,10 +3,13 @@
 use super::Options;
 use crate::error::Result;
 use crate::gpu::{Device, TexelView, Volume};
+use crate::layout::NONE;
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Variant};
+use crate::scene::{LightForm, Scene};
 use crate::scene_buffers::SceneBuffers;
 use crate::shaders::Library;
+use crate::sharp::SharpPermutation;
 use ash::vk;
 use std::sync::Arc;
 
@@ -64,6 +67,27 @@ pub(super) fn usable(
         );
     }
     Ok((MergePermutation { variant, ..permutation }, image.filter(|_| variant.image)))
+}
+
+/// The permutation of the pass of sharp lights beside that merge; `None` where no light is sharp.
+pub(super) fn sharp(
+    options: &Options,
+    merge: &MergePermutation,
+    forms: &[LightForm],
+    scene: &Scene,
+    buffers: &SceneBuffers,
+) -> Option<SharpPermutation> {
+    let emits = |wanted: &dyn Fn(LightForm) -> bool| {
+        scene.entities.iter().zip(forms).any(|(entity, form)| entity.emits && wanted(*form))
+    };
+    emits(&LightForm::is_sharp).then(|| SharpPermutation {
+        texel: merge.variant.texel,
+        uniform: merge.variant.uniform,
+        entity_limit: merge.entity_limit,
+        silhouette: options.bake.silhouette,
+        outlines: emits(&|form| form == LightForm::Outline),
+        self_shadows: buffers.meshes.iter().any(|device_mesh| device_mesh.self_first != NONE),
+    })
 }
 
 /// The permutation of the merge shader.

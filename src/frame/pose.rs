@@ -3,12 +3,13 @@
 use super::Frame;
 use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
+use crate::field::self_visibility;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
 use crate::lists::gather::{Bounds, EntityBounds, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::Faces;
-use crate::scene::Placement;
+use crate::scene::{LightForm, Placement};
 use crate::scene_buffers::{self, FieldSlot};
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use crate::sh::cube::{self, FACE_COUNT, texel_st};
@@ -37,9 +38,10 @@ impl Frame {
         // A field that nobody needs was not baked, and one of zeros changes nothing.
         let holds = |slot: &Option<FieldSlot>| slot.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing);
         let coloured = device_mesh.radiance.is_some() && entity.emits;
+        let sharp = entity.emits && self.light_form(index).is_sharp();
         let source = if coloured { &device_mesh.radiance } else { &device_mesh.blocked };
         let rotation = placement.turn();
-        let facing = source.as_ref().and_then(|slot| match slot.extent {
+        let facing = source.as_ref().filter(|_| !sharp).and_then(|slot| match slot.extent {
             Extent::Cone { axis, half_angle_rad } => Some((rotation * axis, half_angle_rad)),
             Extent::Nothing | Extent::All => None,
         });
@@ -47,8 +49,9 @@ impl Frame {
         EntityBounds {
             centre: self.centre(index, placement),
             radius_m: device_mesh.radius_m * f64::from(placement.scale),
-            occludes: entity.occludes && holds(&device_mesh.blocked),
-            emits: entity.emits && holds(source),
+            occludes: entity.occludes && (holds(&device_mesh.blocked) || device_mesh.silhouette.is_some()),
+            emits: entity.emits && (sharp || holds(source)),
+            sharp,
             coloured,
             radiance: f64::from(entity.emission.max_element()) * f64::from(brightest),
             facing,
@@ -77,6 +80,10 @@ impl Frame {
         let area = device_mesh.blocked.as_ref().map_or(Area::default(), |slot| slot.area);
         let [area_x, area_y] = area.axes.map(|axis| (rotation * axis).as_vec3());
         let terms = area.terms.map(|term| term as f32);
+        let share = match self.light_form(index) {
+            LightForm::Ball(share) => share,
+            LightForm::Harmonics | LightForm::Outline => 0.0,
+        };
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());
         layout::Entity {
             centre: centre.extend((1.0 / radius_m) as f32).to_array(),
@@ -89,6 +96,12 @@ impl Frame {
             area_x: area_x.extend(terms[0]).to_array(),
             area_y: area_y.extend(terms[1]).to_array(),
             area_terms: [terms[2], terms[3], terms[4], terms[5]],
+            sharp: [
+                f32::from_bits(device_mesh.silhouette.as_ref().map_or(0, |slot| slot.first_node)),
+                share as f32,
+                0.0,
+                0.0,
+            ],
             blocked_base: device_mesh.blocked.as_ref().map_or(0, base),
             radiance_base: device_mesh.radiance.as_ref().map_or(0, base),
         }
@@ -101,10 +114,16 @@ impl Frame {
         placement.position.as_dvec3() + rotation * (centre_m * f64::from(placement.scale))
     }
 
+    /// How the light of an entity is computed.
+    pub fn light_form(&self, index: usize) -> LightForm {
+        self.forms[index]
+    }
+
     /// Whether an entity occludes and something sees it.
     fn occludes(&self, index: usize) -> bool {
         let entity = &self.scene.entities[index];
-        entity.occludes && self.buffers.meshes[entity.mesh].blocked.is_some()
+        let device_mesh = &self.buffers.meshes[entity.mesh];
+        entity.occludes && (device_mesh.blocked.is_some() || device_mesh.silhouette.is_some())
     }
 
     /// Occluders of a receiver in their order, [`SceneBounds::order`]; itself left out.
@@ -135,6 +154,10 @@ pub(super) fn clusters(
                 quad => quad + first * transfer_quads,
             },
             radiosity_first: radiosity_first as u32 + first,
+            self_first: match device_mesh.self_first {
+                NONE => NONE,
+                word => word + first * self_visibility::CELLS as u32,
+            },
             ..Default::default()
         };
         Member { cluster, bounds: *bounds, faces: *faces }

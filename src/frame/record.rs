@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::gpu::{self, Access, Buffer, Commands, Drawing, Image};
 use crate::lists::gathering::Gathering;
 use crate::merge::{Inputs, Merge};
+use crate::sharp::{self, Sharp};
 use glam::Vec3;
 
 /// The clusters to light, and all that lights them.
@@ -20,6 +21,8 @@ pub struct MergeWork<'f> {
     pub(super) cluster_count: u32,
     pub(super) inputs: Inputs<'f>,
     pub(super) merge: &'f Merge,
+    /// The pass of sharp lights with what it reads; `None` where the scene has none.
+    pub(super) sharp: Option<(&'f Sharp, sharp::Inputs<'f>)>,
     pub(super) radiosity: &'f Buffer,
 }
 
@@ -82,6 +85,12 @@ pub fn record<'f>(
             commands.barrier(Access::ComputeWrite, Access::HostRead);
         }
         commands.pass("merge", |c| work.merge.record(c, &work.inputs, work.radiosity, work.cluster_count))?;
+        if let Some((sharp, inputs)) = &work.sharp {
+            // The pass adds to what the merge has written.
+            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+            commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
+            commands.pass("sharp", |c| sharp.record(c, inputs, work.radiosity, work.cluster_count))?;
+        }
     }
     if merge.is_some() && picture.is_some() {
         // Triangles read the radiosity as a vertex attribute, grids look it up in the fragment shader.

@@ -7,9 +7,10 @@ use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
 use crate::lists::gather::{self, Candidates, Counts, SLACK, Scope};
 use crate::lists::incremental::State;
 use crate::merge::twin::{Object, Task};
-use crate::scene::{Entity, Placement, Scene};
+use crate::scene::{Entity, LightForm, Placement, Scene};
 use crate::scene_buffers;
 use crate::scene_buffers::DeviceMesh;
+use crate::sharp::twin::{self as sharp, SharpLight, SurfacePoint};
 use glam::DVec3;
 use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
@@ -40,6 +41,12 @@ impl Frame {
     /// `Device` when memory ran out.
     pub fn twin(&self, placements: &[Placement]) -> Result<Vec<(usize, Vec<[f64; 3]>)>> {
         Ok(self.merge_twin(placements)?.run())
+    }
+
+    /// Lights whose form is wanted.
+    fn lights(&self, wanted: impl Fn(LightForm) -> bool) -> Vec<usize> {
+        let emits = |&index: &usize| self.scene.entities[index].emits && wanted(self.light_form(index));
+        (0..self.scene.entities.len()).filter(emits).collect()
     }
 
     /// Everything that the CPU twin of a merge reads.
@@ -78,7 +85,8 @@ impl Frame {
             placements,
             fields,
             receivers,
-            lights: indices(&self.scene, |e| e.emits),
+            lights: self.lights(|form| !form.is_sharp()),
+            sharp_lights: self.lights(LightForm::is_sharp),
             sky: self.scene.environment.coefficients(self.options.bake.bands),
         })
     }
@@ -92,6 +100,7 @@ struct MergeTwin<'f> {
     fields: Vec<[Option<ShadowField>; 2]>,
     receivers: Vec<Receiver>,
     lights: Vec<usize>,
+    sharp_lights: Vec<usize>,
     sky: [Vec<f64>; 3],
 }
 
@@ -125,15 +134,18 @@ impl MergeTwin<'_> {
             }
         };
         let objects: Vec<Object<'_>> = self.placements.iter().enumerate().map(object).collect();
+        let outlines: Vec<sharp::Object<'_>> = objects.iter().enumerate().map(|o| self.outline(o)).collect();
         let lit = |receiver: &Receiver| {
             let leaves = |v: usize, j: usize, light: Option<usize>| {
                 let Some((cluster_of, listed)) = &receiver.listed else { return false };
                 !listed[cluster_of[v]].contains(&(j as u32, light.map_or(ENTRY_ENTITIES, |l| l as u32)))
             };
+            let with_field = |j: &usize| objects[*j].blocked.is_some();
+            let occluders: Vec<usize> = receiver.occluders.iter().copied().filter(with_field).collect();
             let task = Task {
                 objects: &objects,
                 receiver: receiver.index,
-                occluders: &receiver.occluders,
+                occluders: &occluders,
                 lights: &self.lights,
                 sky: (!scene.environment.is_none()).then_some(&self.sky),
                 positions: &receiver.positions,
@@ -145,9 +157,66 @@ impl MergeTwin<'_> {
                 guard: options.guard,
                 leaves: &leaves,
             };
-            (receiver.index, task.run())
+            let mut lit = task.run();
+            self.add_sharp(receiver, &objects[receiver.index], &outlines, &leaves, &mut lit);
+            (receiver.index, lit)
         };
         self.receivers.iter().map(lit).collect()
+    }
+}
+
+impl MergeTwin<'_> {
+    /// An object as the pass of sharp lights sees it.
+    fn outline<'o>(&'o self, (index, object): (usize, &Object<'o>)) -> sharp::Object<'o> {
+        let device_mesh = &self.frame.buffers.meshes[self.frame.scene.entities[index].mesh];
+        sharp::Object {
+            centre: object.centre,
+            rotation: object.rotation,
+            radius_m: object.radius_m,
+            silhouette: device_mesh.silhouette.as_ref().map(|slot| &*slot.field),
+        }
+    }
+
+    /// Adds the light of sharp lights.
+    fn add_sharp(
+        &self,
+        receiver: &Receiver,
+        object: &Object<'_>,
+        outlines: &[sharp::Object<'_>],
+        leaves: &(dyn Fn(usize, usize, Option<usize>) -> bool + Sync),
+        lit: &mut [[f64; 3]],
+    ) {
+        let light = |&entity: &usize| SharpLight {
+            entity,
+            emission: self.frame.scene.entities[entity].emission.as_dvec3(),
+            ball_share: match self.frame.light_form(entity) {
+                LightForm::Ball(share) => Some(share),
+                LightForm::Harmonics | LightForm::Outline => None,
+            },
+        };
+        let lights: Vec<SharpLight> = self.sharp_lights.iter().filter(|l| **l != receiver.index).map(light).collect();
+        let occluders: Vec<usize> =
+            receiver.occluders.iter().copied().filter(|j| outlines[*j].silhouette.is_some()).collect();
+        let mesh = self.frame.scene.entities[receiver.index].mesh;
+        let self_maps = &self.frame.buffers.meshes[mesh].self_maps;
+        let task = sharp::Task {
+            objects: outlines,
+            occluders: &occluders,
+            rotation: object.rotation,
+            self_maps: self_maps.as_deref().map(|maps| &maps[..]),
+            lights: &lights,
+            leaves: &|v, j, light| leaves(v, j, Some(light)),
+        };
+        let point = |(position, normal): (&DVec3, &DVec3)| SurfacePoint {
+            position: object.centre + object.rotation * (*position * object.scale),
+            normal: object.rotation * *normal,
+            own_normal: *normal,
+        };
+        let points: Vec<SurfacePoint> = receiver.positions.iter().zip(&receiver.normals).map(point).collect();
+        let albedo = self.frame.scene.entities[receiver.index].albedo.as_dvec3();
+        for (to, from) in lit.iter_mut().zip(task.run(&points)) {
+            *to = (DVec3::from_array(*to) + albedo * from).to_array();
+        }
     }
 }
 

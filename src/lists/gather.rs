@@ -102,8 +102,9 @@ impl Candidates {
 }
 
 /// The CPU twin of the pass for one cluster: appends its entries. `candidates` are those of a group that the cluster belongs to, or all.
-pub fn twin(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) {
-    walk(scope, candidates, out, |_, _| ());
+/// Returns how many of them, at the front, are chains of sharp lights.
+pub fn twin(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) -> usize {
+    walk(scope, candidates, out, |_, _| ())
 }
 
 /// What of all that exists is left off the list of one cluster, and why.
@@ -129,30 +130,41 @@ pub fn counts(scope: &Scope<'_>, receiver: u32) -> Counts {
 
 /// Goes through all chains of a cluster, light by light and at last the sky: appends what is listed, and tells of every entity and
 /// channel what becomes of it.
-fn walk(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>, mut tell: impl FnMut(CullResult, u64)) {
+fn walk(
+    scope: &Scope<'_>,
+    candidates: &Candidates,
+    out: &mut Vec<u32>,
+    mut tell: impl FnMut(CullResult, u64),
+) -> usize {
+    let (first, mut sharp_count) = (out.len(), 0);
     let spheres = &scope.scene().spheres;
     let views: Vec<View> = candidates.occluders.iter().map(|&j| scope.view(spheres[j as usize])).collect();
-    let occlude = |light: Option<(u32, &View)>, radiance: f32, out: &mut Vec<u32>, tell: &mut dyn FnMut(_, _)| {
-        let (light, light_view) = light.unzip();
-        for (&entity, view) in candidates.occluders.iter().zip(&views).filter(|(j, _)| light != Some(**j)) {
-            let result = scope.occluder_result(view, light_view, radiance);
-            let listed = result == CullResult::Listed;
-            tell(if listed && !view.whole { CullResult::Cap } else { result }, 1);
-            out.extend((listed && view.whole).then(|| ListEntry::Occlude { entity, light }.pack()));
-            out.extend((listed && view.cap).then(|| ListEntry::Cap { entity, light }.pack()));
-        }
-    };
+    let occlude =
+        |light: Option<(u32, &View)>, sharp, radiance: f32, out: &mut Vec<u32>, tell: &mut dyn FnMut(_, _)| {
+            let (light, light_view) = light.unzip();
+            for (&entity, view) in candidates.occluders.iter().zip(&views).filter(|(j, _)| light != Some(**j)) {
+                let result = scope.occluder_result(view, light_view, sharp, radiance);
+                let listed = result == CullResult::Listed;
+                let (whole, cap) = (view.whole || sharp, view.cap && !sharp);
+                tell(if listed && !whole { CullResult::Cap } else { result }, 1);
+                out.extend((listed && whole).then(|| ListEntry::Occlude { entity, light }.pack()));
+                out.extend((listed && cap).then(|| ListEntry::Cap { entity, light }.pack()));
+            }
+        };
     for light in &candidates.lights {
         let (entity, view) = (light.entity, scope.view(spheres[light.entity as usize]));
-        let channels = if light.coloured == 0 { 1 } else { 3 };
+        let (channels, sharp) = (if light.coloured == 0 { 1 } else { 3 }, light.sharp != 0);
         let result = scope.light_result(light, &view);
         tell(result, channels.into());
         if result == CullResult::Listed {
-            occlude(Some((entity, &view)), light.radiance, out, &mut tell);
+            occlude(Some((entity, &view)), sharp, light.radiance, out, &mut tell);
             out.extend((0..channels).map(|channel| {
                 let last = channel + 1 == channels;
                 ListEntry::Shine { entity, channel: (light.coloured != 0).then_some(channel), last }.pack()
             }));
+            if sharp {
+                sharp_count = out.len() - first;
+            }
         } else {
             // Its occluders go with it; the bound of what is left off counts once.
             let others = candidates.occluders.iter().filter(|&&j| j != entity).count();
@@ -160,8 +172,9 @@ fn walk(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>, mut tell
         }
     }
     if let Some(sky) = scope.scene().sky {
-        occlude(None, sky, out, &mut tell);
+        occlude(None, false, sky, out, &mut tell);
     }
+    sharp_count
 }
 
 /// Whether clusters are as near one another as neighbours on a surface are, so that they make a group: a space-filling curve leaps
@@ -237,7 +250,12 @@ impl Packed {
         quads.extend(members.chunks(4).map(member));
         let light_first = quads.len();
         for light in &scene.lights {
-            let numbers = [light.radiance, f32::from_bits(light.entity), f32::from_bits(light.coloured), 0.0];
+            let numbers = [
+                light.radiance,
+                f32::from_bits(light.entity),
+                f32::from_bits(light.coloured),
+                f32::from_bits(light.sharp),
+            ];
             quads.extend([light.facing, numbers]);
         }
         Packed {

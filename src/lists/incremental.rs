@@ -216,18 +216,18 @@ impl ClusterLists {
             let (mut ends, mut entries) = (Vec::with_capacity(dirty.clusters.len()), Vec::new());
             for &cluster in &dirty.clusters {
                 let scope = Scope::new(&now.scene_bounds, entity, &self.bounds[cluster], SLACK);
-                gather::twin(&scope, &candidates, &mut entries);
-                ends.push(entries.len());
+                let sharp = gather::twin(&scope, &candidates, &mut entries);
+                ends.push((entries.len(), sharp as u32));
             }
             (ends, entries)
         };
-        let found: Vec<(Vec<usize>, Vec<u32>)> = dirty.par_iter().map(of_group).collect();
+        let found: Vec<(Vec<(usize, u32)>, Vec<u32>)> = dirty.par_iter().map(of_group).collect();
         let (mut clusters, mut all) = (Vec::new(), Vec::with_capacity(found.iter().map(|(_, s)| s.len()).sum()));
         for (dirty, (ends, entries)) in dirty.iter().zip(found) {
             let mut start = 0;
-            for (&cluster, end) in dirty.clusters.iter().zip(ends) {
+            for (&cluster, (end, sharp_count)) in dirty.clusters.iter().zip(ends) {
                 let (entry_first, entry_count) = ((all.len() + start) as u32, (end - start) as u32);
-                clusters.push(layout::Cluster { entry_first, entry_count, ..self.clusters[cluster] });
+                clusters.push(layout::Cluster { entry_first, entry_count, sharp_count, ..self.clusters[cluster] });
                 start = end;
             }
             all.extend(entries);

@@ -78,6 +78,8 @@ pub struct EntityBounds {
     pub occludes: bool,
     /// Whether it shines.
     pub emits: bool,
+    /// Whether its light is sharp.
+    pub sharp: bool,
     /// Whether it shines through a radiance field of its own rather than through its occlusion field.
     pub coloured: bool,
     /// Largest radiance that it shines with, of any colour.
@@ -99,8 +101,8 @@ pub struct Light {
     pub entity: u32,
     /// 1 where it shines through a radiance field of three channels, else 0.
     pub coloured: u32,
-    /// Not in use.
-    pub spare: u32,
+    /// 1 where its light is sharp, else 0.
+    pub sharp: u32,
 }
 
 /// What the lists are made from at one moment.
@@ -113,7 +115,7 @@ pub struct SceneBounds {
     pub tree: Tree,
     /// Indices of those that occlude.
     pub occluders: Vec<u32>,
-    /// Those that shine, in the order of entities.
+    /// Those that shine, the sharp ones first, each in the order of entities.
     pub lights: Vec<Light>,
     /// Largest radiance of distant light, if there is any.
     pub sky: Option<f32>,
@@ -138,9 +140,11 @@ impl SceneBounds {
             radiance: entity.radiance as f32,
             entity: j as u32,
             coloured: u32::from(entity.coloured),
-            spare: 0,
+            sharp: u32::from(entity.sharp),
         });
-        let lights: Vec<Light> = lights.collect();
+        // The chains of sharp lights come first on every list.
+        let (sharp, others): (Vec<Light>, Vec<Light>) = lights.partition(|light| light.sharp != 0);
+        let lights = [sharp, others].concat();
         let sky = sky.map(|sky| sky as f32);
         let brightest = lights.iter().map(|light| light.radiance).fold(sky.unwrap_or(0.0), f32::max);
         let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));

@@ -86,6 +86,8 @@ pub struct View {
     /// Least and largest distance of the sphere's centre from a vertex, metres.
     nearest: f64,
     farthest: f64,
+    /// Radius of the sphere, metres.
+    radius: f64,
     /// Its half-angle at most, with the turn; `None` when a vertex may be inside.
     spread: Option<Angle>,
     /// The angle between the directions from the cluster's centre and from a vertex, at most.
@@ -169,7 +171,7 @@ impl<'m> Scope<'m> {
             .map_or(EVERYTHING, |(half, spread)| weight(half, from_axis.cosine_less(self.spread.plus(spread))));
         let whole = !skip.caps || sphere_radius > CAP_SINES[0] * nearest;
         let cap = skip.caps && sphere_radius < CAP_SINES[1] * farthest;
-        View { toward, nearest, farthest, spread, turn, below, weight, whole, cap }
+        View { toward, nearest, farthest, radius: sphere_radius, spread, turn, below, weight, whole, cap }
     }
 
     /// What becomes of a light.
@@ -194,16 +196,21 @@ impl<'m> Scope<'m> {
 
     /// What becomes of an occluder in the chain of a light (`None`: of the sky). It takes at most what comes from its part of the view,
     /// and at most what the light brings.
-    pub fn occluder_result(&self, view: &View, light: Option<&View>, radiance: f32) -> CullResult {
+    ///
+    /// Before a sharp light an occluder counts where any part of it may be nearer than any part of the light's middle plane, and
+    /// where their cones meet, without the fade that bands need.
+    pub fn occluder_result(&self, view: &View, light: Option<&View>, sharp: bool, radiance: f32) -> CullResult {
         let radiance = f64::from(radiance);
         if view.below {
             return CullResult::BelowHorizon;
         }
         let Some(light) = light else { return self.of_weight(radiance * view.weight) };
-        if self.scene.skip.behind && view.nearest > light.farthest {
+        let reach = if sharp { view.radius } else { 0.0 };
+        if self.scene.skip.behind && view.nearest - reach > light.farthest {
             return CullResult::BehindLight;
         }
-        if self.scene.skip.cones && apart(view, light) {
+        let fade = if sharp { 0.0 } else { SKIP_FADE_RAD };
+        if self.scene.skip.cones && apart(view, light, fade) {
             return CullResult::Apart;
         }
         self.of_weight(radiance * view.weight.min(light.weight))
@@ -240,23 +247,23 @@ impl<'m> Scope<'m> {
     pub fn lists(&self, index: usize, receiver: u32) -> bool {
         let scene = self.scene;
         let view = scene.entities[index].occludes.then(|| self.view(scene.spheres[index]));
-        let blocks = |light: Option<&View>, radiance: f32| {
-            view.as_ref().is_some_and(|view| self.occluder_result(view, light, radiance) == CullResult::Listed)
+        let blocks = |light: Option<&View>, sharp, radiance: f32| {
+            view.as_ref().is_some_and(|view| self.occluder_result(view, light, sharp, radiance) == CullResult::Listed)
         };
         let mut lights = scene.lights.iter().filter(|light| light.entity != receiver);
-        scene.sky.is_some_and(|sky| blocks(None, sky))
+        scene.sky.is_some_and(|sky| blocks(None, false, sky))
             || lights.any(|light| {
                 let light_view = self.view(scene.spheres[light.entity as usize]);
                 self.light_result(light, &light_view) == CullResult::Listed
-                    && (light.entity as usize == index || blocks(Some(&light_view), light.radiance))
+                    && (light.entity as usize == index || blocks(Some(&light_view), light.sharp != 0, light.radiance))
             })
     }
 }
 
-/// Whether no vertex sees the two spheres within the fade of one another.
-fn apart(a: &View, b: &View) -> bool {
+/// Whether no vertex sees the two spheres within that angle of one another.
+fn apart(a: &View, b: &View, fade_rad: f64) -> bool {
     let (Some(spread_a), Some(spread_b)) = (a.spread, b.spread) else { return false };
-    let (sine, cosine) = SKIP_FADE_RAD.sin_cos();
+    let (sine, cosine) = fade_rad.sin_cos();
     a.toward.dot(b.toward) < spread_a.plus(spread_b.plus(Angle { cosine, sine })).cosine
 }
 

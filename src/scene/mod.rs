@@ -3,6 +3,7 @@
 //! [`Data`] has the content of the file and can be written as TOML; [`Scene`] adds derived data.
 
 pub mod data;
+pub mod light;
 pub mod motion;
 pub mod values;
 
@@ -17,6 +18,7 @@ use crate::asset::environment::{Environment, EnvironmentData};
 use crate::asset::{Mesh, embedded, obj, read_file};
 use crate::error::{Error, Result};
 pub use data::{Camera, Data, EntityData, MeshData, Output};
+pub use light::{LightForm, Lights};
 pub use motion::{Motion, Placement};
 
 /// Largest number of entities in a scene.

@@ -4,6 +4,7 @@
 pub mod clusters;
 mod field_atlas;
 pub mod limits;
+pub mod silhouettes;
 
 use crate::asset::Mesh;
 use crate::bake::ensure::Baked;
@@ -13,13 +14,15 @@ use crate::error::Result;
 use crate::field::ShadowField;
 use crate::field::extent::Extent;
 use crate::field::quantity::{Storage, channel_stride};
+use crate::field::self_visibility::{self, NODES};
 use crate::gpu::{Buffer, Device, Volume};
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::Bounds;
 use crate::lists::sight::Faces;
-use crate::scene::Scene;
+use crate::scene::{Lights, Scene};
 pub use field_atlas::FieldSlot;
 use glam::DVec3;
+pub use silhouettes::{SilhouetteSlot, Silhouettes};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -43,6 +46,12 @@ pub struct DeviceMesh {
     pub blocked: Option<FieldSlot>,
     /// Radiance field, if an entity needs one.
     pub radiance: Option<FieldSlot>,
+    /// First word of its self-visibility, or [`NONE`] where it needs none.
+    pub self_first: u32,
+    /// Self-visibility in the mesh's order of vertices, if it needs any.
+    pub self_maps: Option<Arc<Vec<u8>>>,
+    /// Silhouette field, if an entity needs one.
+    pub silhouette: Option<SilhouetteSlot>,
     /// The mesh as it is drawn.
     pub drawn: DrawnMesh,
     /// Centre of the bounding sphere, metres.
@@ -63,6 +72,10 @@ impl DeviceMesh {
 pub struct SceneBuffers {
     /// All fields.
     pub fields: Buffer,
+    /// All silhouette fields.
+    pub silhouettes: Silhouettes,
+    /// Cells of self-visibility, [`self_visibility::CELLS`] words a vertex of the lit meshes that can shadow themselves.
+    pub self_cells: Buffer,
     /// Transfer vectors of all receivers' meshes.
     pub transfers: Buffer,
     /// Positions and normals of all meshes, one quad for each.
@@ -86,6 +99,9 @@ struct Packing {
     transfers: Vec<f32>,
     /// First quad of the transfer vectors of each distinct mesh, by the hash of its content. Equal meshes share theirs.
     transfer_of: HashMap<[u8; 32], u32>,
+    self_cells: Vec<u32>,
+    /// First word of the self-visibility of each distinct mesh.
+    self_of: HashMap<[u8; 32], u32>,
     /// Floats of one transfer vector.
     stride: usize,
     /// Number of vertices of all entities.
@@ -101,6 +117,8 @@ impl Packing {
             vertices: Vec::with_capacity(quads),
             transfers: Vec::new(),
             transfer_of: HashMap::new(),
+            self_cells: Vec::new(),
+            self_of: HashMap::new(),
             stride,
             drawn,
         }
@@ -115,9 +133,10 @@ impl Packing {
         device: &Arc<Device>,
         mesh: &Mesh,
         [blocked, radiance]: [Option<FieldSlot>; 2],
+        silhouette: Option<SilhouetteSlot>,
         baked: &BakedMesh,
     ) -> Result<DeviceMesh> {
-        let Packing { vertices, transfers, transfer_of, stride, drawn } = self;
+        let Packing { vertices, transfers, transfer_of, self_cells, self_of, stride, drawn } = self;
         let (centre, radius_m) = mesh.bounding_sphere();
         let vertex_first = vertices.len() as u32;
         let order = clusters::order(mesh);
@@ -132,13 +151,24 @@ impl Packing {
                 first
             })
         });
+        let self_first = baked.self_visibility.as_ref().map_or(NONE, |maps| {
+            *self_of.entry(mesh.content_hash()).or_insert_with(|| {
+                let first = self_cells.len() as u32;
+                let map = |&v: &u32| self_visibility::cells(&maps[v as usize * NODES..][..NODES]);
+                self_cells.extend(order.iter().flat_map(map));
+                first
+            })
+        });
         Ok(DeviceMesh {
+            self_first,
+            self_maps: baked.self_visibility.clone(),
             vertices: vertex_first / 2..vertices.len() as u32 / 2,
             clusters: clusters::bounds(mesh, &order),
             faces: Faces::around(mesh, &order, CLUSTER_VERTICES as usize),
             transfer_first,
             blocked,
             radiance,
+            silhouette,
             drawn: DrawnMesh::new(device, mesh, &order, *drawn)?,
             order,
             centre_m: centre.as_dvec3(),
@@ -156,16 +186,20 @@ impl SceneBuffers {
         let (fields, slots) = field_atlas::field_atlas(device, scene, &baked.meshes, options)?;
         let mut packing = Packing::new(scene, channel_stride(options.bands));
         let mut meshes = Vec::new();
-        for ((mesh, slots), baked) in scene.meshes.iter().zip(slots).zip(baked.meshes) {
-            meshes.push(packing.add(device, mesh, slots, &baked)?);
+        let (silhouettes, outlines) = Silhouettes::new(device, &baked.meshes)?;
+        for (((mesh, slots), silhouette), baked) in scene.meshes.iter().zip(slots).zip(outlines).zip(baked.meshes) {
+            meshes.push(packing.add(device, mesh, slots, silhouette, &baked)?);
         }
-        let Packing { vertices, mut transfers, .. } = packing;
+        let Packing { vertices, mut transfers, mut self_cells, .. } = packing;
+        self_cells.resize(self_cells.len().max(4), 0);
         // A buffer may not be empty.
         if transfers.is_empty() {
             transfers.resize(4, 0.0);
         }
         Ok(SceneBuffers {
             fields,
+            silhouettes,
+            self_cells: Buffer::with_data(device, "self-visibility", &self_cells)?,
             transfers: Buffer::with_data(device, "transfers", &transfers)?,
             vertices: Buffer::with_data(device, "vertices", &vertices)?,
             meshes,
@@ -176,11 +210,21 @@ impl SceneBuffers {
         })
     }
 
+    /// What the pass of sharp lights reads: nodes and cells of silhouettes, and cells of self-visibility.
+    pub fn sharp(&self) -> [&Buffer; 3] {
+        [&self.silhouettes.nodes, &self.silhouettes.cells, &self.self_cells]
+    }
+
     /// Whether every field that `scene` needs is here. The scene must have the meshes that these buffers were made for.
-    pub fn covers(&self, scene: &Scene) -> bool {
+    pub fn covers(&self, scene: &Scene, lights: Lights) -> bool {
         self.meshes.iter().enumerate().all(|(mesh, device_mesh)| {
-            let [blocked, radiance] = bake::needs(scene, mesh).map(|kind| kind.is_some());
-            (device_mesh.blocked.is_some() || !blocked) && (device_mesh.radiance.is_some() || !radiance)
+            let needed = bake::needs(scene, mesh, lights);
+            let [blocked, radiance] = needed.fields.map(|kind| kind.is_some());
+            (device_mesh.blocked.is_some() || !blocked)
+                && (device_mesh.radiance.is_some() || !radiance)
+                && (device_mesh.silhouette.is_some() || !needed.silhouette)
+                && (device_mesh.self_first != NONE || !needed.self_visibility)
+                && (device_mesh.transfer_first != NONE || !needed.transfer)
         })
     }
 

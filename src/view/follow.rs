@@ -55,7 +55,7 @@ impl Viewer {
     pub(super) fn prepare(&mut self) -> Result<()> {
         self.bake = None;
         let (cache, scene) = (self.setup.cache.clone(), self.editor.scene().clone());
-        let needs = SceneNeeds::of(&scene, &self.setup.frame.bake);
+        let needs = SceneNeeds::of(&scene, &self.setup.frame.bake, self.setup.frame.lights);
         if needs.are_cached(&scene, &cache) {
             return self.build();
         }

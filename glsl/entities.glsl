@@ -1,0 +1,20 @@
+// All entities, as binding 0. They are the same for a whole workgroup: uniform or storage blocks on a GPU, which loads them once; on
+// a processor, which loads lane by lane, texel reads bring four numbers at a time.
+#if UNIFORM
+layout(std140, binding = 0) uniform Entities { Entity entities[ENTITY_LIMIT]; };
+#define ENTITY(e) entities[e]
+#elif TEXEL
+layout(binding = 0) uniform textureBuffer entities;
+Entity entity_at(uint e) {
+    int at = int(e) * 11;
+    vec4 third = texelFetch(entities, at + 2);
+    return Entity(texelFetch(entities, at), texelFetch(entities, at + 1), third.xy, floatBitsToUint(third.z),
+        floatBitsToUint(third.w), texelFetch(entities, at + 3), texelFetch(entities, at + 4), texelFetch(entities, at + 5),
+        texelFetch(entities, at + 6), texelFetch(entities, at + 7), texelFetch(entities, at + 8), texelFetch(entities, at + 9),
+        texelFetch(entities, at + 10));
+}
+#define ENTITY(e) entity_at(e)
+#else
+layout(std430, binding = 0) readonly buffer Entities { Entity entities[]; };
+#define ENTITY(e) entities[e]
+#endif

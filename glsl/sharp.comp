@@ -1,0 +1,65 @@
+#version 460
+#extension GL_EXT_control_flow_attributes : require
+// Light of sharp lights on receivers, a cluster of neighbouring vertices a workgroup, added to what the merge has written. A chain is
+// what may stand between the cluster and one light: every occluder's silhouette field takes its share out of every part of the light.
+#include "merge_layout.glsl"
+
+layout(local_size_x = WORKGROUP) in;
+
+const uint NONE = 0xffffffffu;
+#include "entities.glsl"
+layout(std430, binding = 1) readonly buffer Entries { uint entries[]; };
+layout(std430, binding = 2) readonly buffer Clusters { Cluster clusters[]; };
+#define NODE_BINDING 3
+#include "silhouette_field.glsl"
+#if TEXEL
+layout(binding = 5) uniform textureBuffer vertices;
+vec4 vertex_quad(uint i) {
+    return texelFetch(vertices, int(i));
+}
+#else
+layout(std430, binding = 5) readonly buffer Vertices { vec4 vertices[]; };
+vec4 vertex_quad(uint i) {
+    return vertices[i];
+}
+#endif
+layout(std430, binding = 6) buffer Radiosity { vec4 radiosity[]; };
+#if SELF
+#if TEXEL
+layout(binding = 7) uniform utextureBuffer self_cells;
+uint self_cell(uint i) {
+    return texelFetch(self_cells, int(i)).x;
+}
+#else
+layout(std430, binding = 7) readonly buffer SelfCells { uint self_cells[]; };
+uint self_cell(uint i) {
+    return self_cells[i];
+}
+#endif
+#include "self_frame.glsl"
+#include "self_visibility.glsl"
+#endif
+#include "sharp_light.glsl"
+
+void main() {
+    Cluster cluster = clusters[gl_WorkGroupID.x];
+    uint v = gl_LocalInvocationID.x;
+    if (v >= cluster.vertex_count || cluster.sharp_count == 0) {
+        return;
+    }
+    Entity receiver = ENTITY(cluster.receiver);
+    uint at = 2 * (cluster.vertex_first + v);
+    // World axes, but from the receiver's centre, as in the merge.
+    Surface surface;
+    surface.position = receiver.albedo.w * to_world(receiver, vertex_quad(at).xyz);
+    vec3 normal = vertex_quad(at + 1).xyz;
+    surface.normal = to_world(receiver, normal);
+    surface.origin = receiver.centre.xyz;
+#if SELF
+    surface.self_first = cluster.self_first == NONE ? NONE : cluster.self_first + v * ((SELF_SIDE - 1) * (SELF_SIDE - 1));
+    mat3 frame = self_frame(normal);
+    surface.self_frame = mat3(to_world(receiver, frame[0]), to_world(receiver, frame[1]), surface.normal);
+#endif
+    vec3 sum = sharp_sum(surface, cluster.entry_first, cluster.sharp_count);
+    radiosity[cluster.radiosity_first + v].rgb += sum * receiver.albedo.rgb;
+}

@@ -1,0 +1,114 @@
+// A lookup in a silhouette field: what an object blocks of a small round light. The twin is src/field/silhouette.rs, with the same names.
+// NODE_CELLS: cells along a face of the node grid; MAP: texels along a map.
+//
+// Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the map, and half edges of the map's
+// rectangle, its first cell, and -1 where the map is seen from behind. Cells are the four texels around a point between them.
+#if TEXEL
+layout(binding = NODE_BINDING) uniform textureBuffer nodes;
+vec4 node_quad(uint i) {
+    return texelFetch(nodes, int(i));
+}
+layout(binding = NODE_BINDING + 1) uniform utextureBuffer cells;
+uvec2 cell_at(uint i) {
+    return texelFetch(cells, int(i)).xy;
+}
+#else
+layout(std430, binding = NODE_BINDING) readonly buffer Nodes { vec4 nodes[]; };
+vec4 node_quad(uint i) {
+    return nodes[i];
+}
+layout(std430, binding = NODE_BINDING + 1) readonly buffer Cells { uvec2 cells[]; };
+uvec2 cell_at(uint i) {
+    return cells[i];
+}
+#endif
+#include "cube.glsl"
+#include "blocked_share.glsl"
+
+// The cell around a place on a map (-1 to 1 from edge to edge), and the weights of its corners.
+uvec2 around(vec2 place, uint first, out vec4 weights) {
+    vec2 at = clamp(0.5 * (place + 1.0) * MAP - 0.5, 0.0, MAP - 1.0);
+    vec2 low = min(floor(at), MAP - 2.0);
+    vec2 f = at - low;
+    weights = vec4(1.0 - f.x, f.x, 1.0 - f.x, f.x) * vec4(1.0 - f.yy, f.yy);
+    return cell_at(first + uint(low.y) * (MAP - 1) + uint(low.x));
+}
+
+// A cell of the node grid, for directions near one another.
+struct NodeCell {
+    uint face;
+    vec2 low;
+    uint first; // quad of its first node
+};
+
+// Place of a direction among the cells of a face.
+vec2 among_cells(uint face, vec3 toward) {
+    return (cube_warped(face, toward, LEAST_AHEAD) + 1.0) * (0.5 * NODE_CELLS);
+}
+
+NodeCell node_cell(uint first_node, vec3 toward) {
+    NodeCell cell;
+    cell.face = cube_face(toward);
+    cell.low = clamp(floor(among_cells(cell.face, toward)), 0.0, NODE_CELLS - 1.0);
+    cell.first = first_node + 3 * ((cell.face * (NODE_CELLS + 1) + uint(cell.low.y)) * (NODE_CELLS + 1) + uint(cell.low.x));
+    return cell;
+}
+
+// Bilinear weights of a cell's nodes for a direction in the cell or around it.
+vec4 node_weights(NodeCell cell, vec3 toward) {
+    vec2 f = clamp(among_cells(cell.face, toward) - cell.low, -BEYOND, 1.0 + BEYOND);
+    return vec4(1.0 - f.x, f.x, 1.0 - f.x, f.x) * vec4(1.0 - f.yy, f.yy);
+}
+
+// One of the four maps of a cell, as it concerns rays through one point.
+struct NearMap {
+    float sign;      // -1 where the map is seen from behind
+    uint first_cell;
+    vec2 half_edges; // of its rectangle, in r
+    vec2 place;      // of the point
+    mat3x2 steps;    // on the map, along each of the axes that directions are given in, for a way of r
+    float depth;     // of the outline along the direction in the middle
+};
+
+// The map at corner k of a cell. `axes`: those that directions are given in, in the object's frame, in which `point` is too, in r;
+// `middle`: direction by those axes, `offset`: of the point along it.
+NearMap near_map(NodeCell cell, uint k, vec3 point, mat3 axes, vec3 middle, float offset) {
+    uint quad = cell.first + 3 * ((k >> 1) * (NODE_CELLS + 1) + (k & 1));
+    vec4 right = node_quad(quad), down = node_quad(quad + 1), map = node_quad(quad + 2);
+    NearMap near;
+    near.sign = map.w;
+    near.first_cell = floatBitsToUint(map.z);
+    near.half_edges = map.xy;
+    near.place = vec2(dot(right.xyz, point) + right.w, dot(down.xyz, point) + down.w);
+    near.steps[0] = vec2(dot(right.xyz, axes[0]), dot(down.xyz, axes[0]));
+    near.steps[1] = vec2(dot(right.xyz, axes[1]), dot(down.xyz, axes[1]));
+    near.steps[2] = vec2(dot(right.xyz, axes[2]), dot(down.xyz, axes[2]));
+    // The outline lies off the centre's plane, at this depth: so the map sees it elsewhere.
+    vec4 weights;
+    uvec2 around_it = around(near.place - offset * (near.steps * middle), near.first_cell, weights);
+    near.depth = near.sign * dot(unpackSnorm4x8(around_it.y), weights);
+    return near;
+}
+
+// What one map knows of the outline near the ray in direction `along` (by the axes), the point's own place along it being `offset`.
+// x: signed distance of the ray from the outline, positive where it meets the object; y: depth along the ray of the outline's nearest
+// point. Object's frame, in r.
+vec2 outline(NearMap near, vec3 along, float offset) {
+    vec2 place = near.place + (near.depth - offset) * (near.steps * along);
+    vec2 beyond = (place - clamp(place, -1.0, 1.0)) * near.half_edges;
+    vec4 weights;
+    uvec2 cell = around(place, near.first_cell, weights);
+    float distance = REACH * dot(unpackSnorm4x8(cell.x), weights) - length(beyond);
+    return vec2(distance, near.sign * dot(unpackSnorm4x8(cell.y), weights));
+}
+
+// 1 where a length (in r) is positive and 0 where it is negative, with a ramp between.
+float fade(float l) {
+    return clamp(l / NEAREST + 0.5, 0.0, 1.0);
+}
+
+// Share of a small round light that is blocked by an object with that outline; `away` is how far the outline lies from the point,
+// `limit` how far the light, in r.
+float blocked(float distance, float away, float limit, float tangent) {
+    return fade(away) * fade(limit - away) * blocked_share(distance / max(max(away, NEAREST) * tangent, LEAST_PENUMBRA));
+}

@@ -1,0 +1,71 @@
+//! "sharp" against its twin in f64, which reads the same stored numbers.
+
+use super::CheckRow;
+use super::merge::{MIXED, against_twin, options, scene};
+use crate::bake::Baker;
+use crate::bake::cache::Cache;
+use crate::bake::silhouette::SilhouetteOptions;
+use crate::error::Result;
+use crate::frame::{Frame, Options};
+use crate::lists::gather::Place;
+use crate::lists::skip::Skip;
+use crate::merge::Variant;
+use crate::scene::Lights;
+
+/// Differences of f32 arithmetic: a place on a map is off by some 1e-6 of its edge, and the distance found there is divided by the
+/// half-width of a penumbra, which near an outline is a thousandth of the object's radius.
+pub const PENUMBRA: f64 = 1e-4;
+
+/// What [`MIXED`] has besides: a light with an outline of its own, a small light, and a ball that stands beyond it.
+const MORE: &str = r#"
+[[entity]]
+mesh = "ring"
+position = [-1.313, 1.917, -0.491]
+rotation = { axis = [0.7, 0.1, 0.5], angle_deg = 73 }
+scale = 0.6
+emission = [6, 5, 9]
+[[entity]]
+mesh = "ball"
+position = [0.171, 1.913, -1.537]
+scale = 0.05
+emission = [900, 700, 500]
+[[entity]]
+mesh = "ball"
+position = [0.211, 2.613, -2.037]
+scale = 0.7
+"#;
+
+/// A small frame with sharp lights.
+pub fn sharp_options() -> Options {
+    let base = options();
+    let silhouette = SilhouetteOptions { cells: 4, map_px: 16, view_px: 64 };
+    Options { lights: Lights::Sharp, bake: crate::bake::Options { silhouette, ..base.bake }, ..base }
+}
+
+/// The text of the scene that the rows light.
+pub fn scene_text() -> String {
+    format!("{MIXED}{MORE}")
+}
+
+/// The comparisons of `check`.
+///
+/// # Errors
+/// As [`Frame::new`] and [`Frame::render`].
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
+    let scene = scene(&scene_text())?;
+    let placements = scene.at(0.0);
+    let (cache, base) = (Cache::new(None), sharp_options());
+    let named = |name: &str| Some(Variant::named(name).expect("a variant"));
+    for (what, options) in [
+        ("texel", base),
+        ("storage", Options { variant: named("storage"), ..base }),
+        ("storage-uniform", Options { variant: named("storage-uniform"), ..base }),
+        ("no skip", Options { skip: Skip::NONE, ..base }),
+        ("lists made on the device", Options { lists: Some(Place::Device), ..base }),
+    ] {
+        let mut frame = Frame::new(baker, &cache, &scene, options, &|_, _, _| ())?;
+        let found = against_twin(&mut frame, &placements)?;
+        add(CheckRow::new("sharp", what, "of 1 + brightest", found.worst, PENUMBRA));
+    }
+    Ok(())
+}

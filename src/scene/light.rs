@@ -1,0 +1,65 @@
+//! How a scene's lights are computed: by spherical harmonics, or as sharp lights whose shadows have edges.
+
+use super::Scene;
+use serde::{Deserialize, Serialize};
+
+/// Which lights are sharp.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Lights {
+    /// None: every light goes through its field of spherical harmonics.
+    Sh,
+    /// Every entity that glows in one colour. What has colours of its own, and the distant light, stay in spherical harmonics.
+    #[default]
+    Sharp,
+}
+
+/// How one light is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightForm {
+    /// By its field of spherical harmonics.
+    Harmonics,
+    /// As a sharp light that is a ball; its mesh covers this share of its bounding sphere's disc, on average over all directions.
+    Ball(f64),
+    /// As a sharp light of the mesh's own outline.
+    Outline,
+}
+
+impl LightForm {
+    /// How the light of an entity is computed; of no meaning for one that does not emit.
+    pub fn of(scene: &Scene, entity: usize, lights: Lights) -> Self {
+        let mesh = &scene.meshes[scene.entities[entity].mesh];
+        if lights == Lights::Sh || mesh.colors.is_some() {
+            return LightForm::Harmonics;
+        }
+        mesh.ball_share().map_or(LightForm::Outline, LightForm::Ball)
+    }
+
+    /// Whether its shadows have edges.
+    pub fn is_sharp(self) -> bool {
+        self != LightForm::Harmonics
+    }
+
+    /// What people read.
+    pub fn name(self) -> &'static str {
+        match self {
+            LightForm::Harmonics => "spherical harmonics",
+            LightForm::Ball(_) => "sharp, a ball",
+            LightForm::Outline => "sharp, the mesh's outline",
+        }
+    }
+}
+
+/// Whether any light of a scene is sharp.
+pub fn has_sharp(scene: &Scene, lights: Lights) -> bool {
+    emitters(scene).any(|entity| LightForm::of(scene, entity, lights).is_sharp())
+}
+
+/// Whether any light of a scene, local or distant, goes through spherical harmonics.
+pub fn has_harmonics(scene: &Scene, lights: Lights) -> bool {
+    !scene.environment.is_none() || emitters(scene).any(|entity| !LightForm::of(scene, entity, lights).is_sharp())
+}
+
+fn emitters(scene: &Scene) -> impl Iterator<Item = usize> + '_ {
+    (0..scene.entities.len()).filter(|&entity| scene.entities[entity].emits)
+}

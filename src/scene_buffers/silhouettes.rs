@@ -1,0 +1,56 @@
+//! All silhouette fields of a scene in two buffers, and where each begins.
+
+use super::ALIGNMENT;
+use crate::bake::BakedMesh;
+use crate::error::Result;
+use crate::field::silhouette::SilhouetteField;
+use crate::gpu::{Buffer, Device};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// The silhouette fields of a scene. Where it has none, the buffers hold a little of nothing.
+pub struct Silhouettes {
+    /// Three quads a node, see `glsl/silhouette_field.glsl`.
+    pub nodes: Buffer,
+    /// Two words a cell.
+    pub cells: Buffer,
+}
+
+/// The silhouette field of a mesh.
+#[derive(Clone)]
+pub struct SilhouetteSlot {
+    /// First quad of its nodes.
+    pub first_node: u32,
+    /// The field, for the twin.
+    pub field: Arc<SilhouetteField>,
+}
+
+impl Silhouettes {
+    /// Uploads the fields of a scene's meshes, and returns each mesh's place. Meshes that share a field share its place.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn new(device: &Arc<Device>, baked: &[BakedMesh]) -> Result<(Self, Vec<Option<SilhouetteSlot>>)> {
+        let (mut nodes, mut cells) = (Vec::<[f32; 4]>::new(), Vec::<[u32; 2]>::new());
+        let mut known = HashMap::<*const SilhouetteField, u32>::new();
+        let mut slot = |field: &Arc<SilhouetteField>| {
+            let first_node = *known.entry(Arc::as_ptr(field)).or_insert_with(|| {
+                let first = nodes.len() as u32;
+                nodes.extend(field.node_quads(cells.len() as u32));
+                cells.extend(field.cells());
+                first
+            });
+            SilhouetteSlot { first_node, field: field.clone() }
+        };
+        let slots = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
+        nodes.resize(nodes.len().max(ALIGNMENT as usize / 16), [0.0; 4]);
+        cells.resize(cells.len().max(ALIGNMENT as usize / 8), [0; 2]);
+        let nodes = Buffer::with_data(device, "silhouette nodes", &nodes)?;
+        Ok((Silhouettes { nodes, cells: Buffer::with_data(device, "silhouette cells", &cells)? }, slots))
+    }
+
+    /// Bytes on the device.
+    pub fn size_bytes(&self) -> u64 {
+        self.nodes.size_bytes + self.cells.size_bytes
+    }
+}

@@ -1,0 +1,147 @@
+//! Pass "sharp": light of sharp lights on every vertex of every receiver, added to what the merge has written.
+//!
+//! Inputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and vertices (position and
+//! normal, object frame, two quads each). A light is cut into parts ([`crate::field::sub_light`]); in each part the visibilities past
+//! all occluders are multiplied. Output: `radiosity` as [`crate::merge`] has it, to which albedo / pi times the irradiance is added.
+
+pub mod twin;
+
+use crate::bake::silhouette::SilhouetteOptions;
+use crate::error::Result;
+use crate::field::lattice::CELL_WARP;
+use crate::field::silhouette::{LEAST_PENUMBRA, NEAREST, REACH};
+use crate::field::silhouette_nodes::{BEYOND, LEAST_AHEAD};
+use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, TURNED_BY};
+use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
+use crate::layout::{CLUSTER_VERTICES, ENTRY_BITS};
+use crate::shaders::{Library, ShaderPermutation};
+use ash::vk;
+use std::sync::Arc;
+
+/// What the shader is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SharpPermutation {
+    /// Whether everything but list entries and clusters is read through texel views rather than storage blocks.
+    pub texel: bool,
+    /// Whether entities are a uniform block.
+    pub uniform: bool,
+    /// Entities that the uniform block holds.
+    pub entity_limit: u32,
+    /// Sizes of the silhouette fields.
+    pub silhouette: SilhouetteOptions,
+    /// Whether the scene has a sharp light with an outline of its own.
+    pub outlines: bool,
+    /// Whether any lit mesh can shadow itself.
+    pub self_shadows: bool,
+}
+
+impl SharpPermutation {
+    /// The row of the shader table.
+    pub fn row(&self) -> ShaderPermutation {
+        self.shared(ShaderPermutation::new("sharp.comp", 4)).define("WORKGROUP", CLUSTER_VERTICES)
+    }
+
+    /// The macros of every shader that evaluates sharp lights.
+    fn shared(&self, row: ShaderPermutation) -> ShaderPermutation {
+        let row = row
+            .define("TEXEL", self.texel)
+            .define("UNIFORM", self.uniform)
+            .define("ENTITY_LIMIT", self.entity_limit)
+            .define("ENTRY_BITS", ENTRY_BITS)
+            .define("OUTLINES", self.outlines)
+            .define("SELF", self.self_shadows)
+            .define("NODE_CELLS", self.silhouette.cells)
+            .define("MAP", self.silhouette.map_px);
+        let numbers = [
+            ("REACH", REACH),
+            ("NEAREST", NEAREST),
+            ("LEAST_PENUMBRA", LEAST_PENUMBRA),
+            ("MOST_SINE", MOST_SINE),
+            ("LIMIT_SINE", LIMIT_SINE),
+            ("BLEND", BLEND),
+            ("CORNER", CORNER),
+            ("BEYOND", BEYOND),
+            ("LEAST_AHEAD", LEAST_AHEAD),
+            ("TURNED_X", TURNED_BY[0]),
+            ("TURNED_Y", TURNED_BY[1]),
+            ("TURNED_Z", TURNED_BY[2]),
+            ("WARP_0", CELL_WARP[0]),
+            ("WARP_1", CELL_WARP[1]),
+            ("WARP_2", CELL_WARP[2]),
+        ];
+        numbers.into_iter().fold(row, |row, (name, value)| row.number(name, value)).self_visibility()
+    }
+
+    /// The permutation, with storage blocks where the device's texel views cannot hold the scene's buffers.
+    pub fn fitting(self, device: &Device, [nodes, cells, self_cells]: [&Buffer; 3]) -> Self {
+        let fits = TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, nodes.size_bytes)
+            && TexelView::fits(device, vk::Format::R32G32_UINT, cells.size_bytes)
+            && TexelView::fits(device, vk::Format::R32_UINT, self_cells.size_bytes);
+        SharpPermutation { texel: self.texel && fits, ..self }
+    }
+}
+
+/// Everything that the pass reads.
+pub struct Inputs<'b> {
+    /// [`crate::layout::Entity`] of every entity.
+    pub entities: &'b Buffer,
+    /// Entries of all clusters.
+    pub entries: &'b Buffer,
+    /// [`crate::layout::Cluster`] of every cluster.
+    pub clusters: &'b Buffer,
+    /// Nodes of all silhouette fields.
+    pub nodes: &'b Buffer,
+    /// Their cells.
+    pub cells: &'b Buffer,
+    /// Positions and normals.
+    pub vertices: &'b Buffer,
+    /// Cells of self-visibility.
+    pub self_cells: &'b Buffer,
+}
+
+/// The pipeline.
+pub struct Sharp {
+    pipeline: ComputePipeline,
+    /// What it was compiled for.
+    pub permutation: SharpPermutation,
+}
+
+impl Sharp {
+    /// The pipeline of one permutation.
+    ///
+    /// # Errors
+    /// `Failed` when the shader does not compile.
+    pub fn new(device: &Arc<Device>, library: &Library, permutation: SharpPermutation) -> Result<Self> {
+        let pipeline = ComputePipeline::new(device, "sharp", &library.shader(&permutation.row())?, &[])?;
+        Ok(Sharp { pipeline, permutation })
+    }
+
+    /// Adds the sharp lights' light to the first `cluster_count` clusters.
+    ///
+    /// # Errors
+    /// `Input` when a buffer is larger than the device can bind, or the clusters are more than it can dispatch.
+    pub fn record<'r>(
+        &'r self,
+        commands: &mut Commands<'r>,
+        inputs: &Inputs<'r>,
+        radiosity: &'r Buffer,
+        cluster_count: u32,
+    ) -> Result<()> {
+        let SharpPermutation { texel, uniform, self_shadows, .. } = self.permutation;
+        let read = |buffer: &'r Buffer, format, texel: bool| -> Result<Bind<'r>> {
+            Ok(if texel { Bind::Texel(TexelView::new(buffer, format)?) } else { Bind::Buffer(buffer) })
+        };
+        let quads = vk::Format::R32G32B32A32_SFLOAT;
+        let resources = [
+            read(inputs.entities, quads, texel && !uniform)?,
+            Bind::Buffer(inputs.entries),
+            Bind::Buffer(inputs.clusters),
+            read(inputs.nodes, quads, texel)?,
+            read(inputs.cells, vk::Format::R32G32_UINT, texel)?,
+            read(inputs.vertices, quads, texel)?,
+            Bind::Buffer(radiosity),
+            if self_shadows { read(inputs.self_cells, vk::Format::R32_UINT, texel)? } else { Bind::None },
+        ];
+        commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])
+    }
+}

@@ -1,0 +1,106 @@
+//! The CPU twin of "sharp", in f64 and vertex by vertex, from the same stored numbers.
+
+use crate::field::self_visibility::{self, NODES};
+use crate::field::silhouette::{Near, SilhouetteField};
+use crate::field::sub_light::{BLOCK, Part, SeenLight};
+use glam::{DQuat, DVec3};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// One object, as the pass sees it.
+pub struct Object<'f> {
+    /// Centre of the bounding sphere in the world, metres.
+    pub centre: DVec3,
+    /// Rotation to the world.
+    pub rotation: DQuat,
+    /// Bounding radius after scaling, metres.
+    pub radius_m: f64,
+    /// Silhouette field, if it needs one.
+    pub silhouette: Option<&'f SilhouetteField>,
+}
+
+/// A sharp light.
+#[derive(Clone, Copy, Debug)]
+pub struct SharpLight {
+    /// The entity.
+    pub entity: usize,
+    /// Linear RGB radiance.
+    pub emission: DVec3,
+    /// Share of its sphere's disc that it covers if it is a ball; `None` for one with an outline of its own.
+    pub ball_share: Option<f64>,
+}
+
+/// One receiver under all sharp lights.
+pub struct Task<'t> {
+    /// All objects.
+    pub objects: &'t [Object<'t>],
+    /// Those that occlude the receiver.
+    pub occluders: &'t [usize],
+    /// Rotation of the receiver to the world.
+    pub rotation: DQuat,
+    /// Self-visibility of its points, [`NODES`] bytes each, if it can shadow itself.
+    pub self_maps: Option<&'t [u8]>,
+    /// Lights of the receiver.
+    pub lights: &'t [SharpLight],
+    /// Whether a vertex leaves out an occluder before a light, or the light itself where both are the same.
+    pub leaves: &'t (dyn Fn(usize, usize, usize) -> bool + Sync),
+}
+
+/// A vertex in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// Position, metres.
+    pub position: DVec3,
+    /// Unit normal.
+    pub normal: DVec3,
+    /// Unit normal in the receiver's own frame.
+    pub own_normal: DVec3,
+}
+
+impl Task<'_> {
+    /// Irradiance of every vertex over pi: to be multiplied by the albedo.
+    pub fn run(&self, points: &[SurfacePoint]) -> Vec<DVec3> {
+        points.par_iter().enumerate().map(|(v, point)| self.vertex(v, point)).collect()
+    }
+
+    fn vertex(&self, v: usize, point: &SurfacePoint) -> DVec3 {
+        let lit = |light: &SharpLight| light.emission * self.irradiance(v, point, light) / PI;
+        self.lights.iter().filter(|light| !(self.leaves)(v, light.entity, light.entity)).map(lit).sum()
+    }
+
+    /// Irradiance of a light of radiance 1.
+    fn irradiance(&self, v: usize, point: &SurfacePoint, light: &SharpLight) -> f64 {
+        let shining = &self.objects[light.entity];
+        let seen = SeenLight::new(shining.centre - point.position, shining.radius_m);
+        let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
+        let occluders: Vec<&Object<'_>> = self.occluders.iter().filter(between).map(|&j| &self.objects[j]).collect();
+        let near = |object: &Object<'_>, toward: DVec3| {
+            let field = object.silhouette.expect("what blocks or shines by its outline has a silhouette field");
+            let local = |v: DVec3| object.rotation.inverse() * v;
+            field.near(local(point.position - object.centre) / object.radius_m, local(toward))
+        };
+        let blocked = |object: &Object<'_>, near: &Near, part: &Part, distance_m: f64| {
+            let field = object.silhouette.expect("as in `near`");
+            let toward = object.rotation.inverse() * part.toward;
+            field.blocked(near, toward, distance_m / object.radius_m, part.tangent())
+        };
+        let block = |(toward, parts): (DVec3, [Part; BLOCK])| -> f64 {
+            let between: Vec<Near> = occluders.iter().map(|object| near(object, toward)).collect();
+            let own = light.ball_share.is_none().then(|| near(shining, toward));
+            let part = |part: &Part| {
+                let pairs = occluders.iter().zip(&between);
+                let through: f64 =
+                    pairs.map(|(object, near)| 1.0 - blocked(object, near, part, part.distance)).product();
+                let covers = light.ball_share.unwrap_or(0.0)
+                    + own.as_ref().map_or(0.0, |near| blocked(shining, near, part, f64::INFINITY));
+                let sees = self.self_maps.map_or(1.0, |maps| {
+                    let toward = self.rotation.inverse() * part.toward;
+                    self_visibility::visible(&maps[v * NODES..][..NODES], point.own_normal, toward, part.sine)
+                });
+                seen.share(part, point.normal) * sees * covers * through
+            };
+            parts.iter().map(part).sum()
+        };
+        seen.blocks().into_iter().map(block).sum()
+    }
+}

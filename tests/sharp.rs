@@ -1,0 +1,114 @@
+//! Sharp lights: the pass against its twin, and scenes against rays that stop at a light's surface.
+
+mod common;
+
+use common::{gpu, report};
+use shadow_fields::asset::embedded;
+use shadow_fields::bake::cache::Cache;
+use shadow_fields::check::sharp as check;
+use shadow_fields::frame::{Frame, Options};
+use shadow_fields::scene::{LightForm, Lights, Scene};
+use shadow_fields::truth::{RayCast, RayMeshes, World, sample_vertices};
+
+/// Relative root mean square error of the light on vertices against rays.
+fn error(gpu: &common::Gpu, scene: &Scene, options: Options, rays: u32) -> f64 {
+    let placements = scene.at(0.0);
+    let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
+    frame.render(&placements, None).unwrap();
+    let shapes = RayMeshes::new(scene);
+    let vertices = sample_vertices(scene, 800, 3);
+    let world = World::new(scene, &shapes, &placements);
+    let truth = RayCast { rays, runs: 2, ..Default::default() }.run(&world, &vertices);
+    let lit: Vec<Vec<[f32; 3]>> = (0..scene.entities.len())
+        .map(|entity| if scene.entities[entity].receives { frame.radiosity(entity).unwrap() } else { Vec::new() })
+        .collect();
+    let (mut off, mut whole) = (0.0, 0.0);
+    for (vertex, truth) in vertices.iter().zip(&truth) {
+        for (found, exact) in lit[vertex.entity][vertex.index].iter().zip(truth.radiosity) {
+            off += (f64::from(*found) - exact).powi(2);
+            whole += exact * exact;
+        }
+    }
+    (off / whole).sqrt()
+}
+
+fn parse(text: &str) -> Scene {
+    Scene::parse(text, "test.toml".as_ref(), &embedded::read).unwrap()
+}
+
+const HEAD: &str = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n\
+    [[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 60 }\n\
+    [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.5, subdivisions = 4 }\n\
+    [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.7, minor_m = 0.25, segments = 48, sides = 24 }\n\
+    [[entity]]\nmesh = \"floor\"\n";
+
+/// A scene, and what sharp lights may err by in it at most.
+fn scenes() -> Vec<(&'static str, Scene, f64)> {
+    let entity = |mesh: &str, place: [f64; 3], rest: &str| {
+        format!("[[entity]]\nmesh = \"{mesh}\"\nposition = {place:?}\n{rest}\n")
+    };
+    let bulb = |place, scale: f64, radiance: f64| {
+        entity("ball", place, &format!("scale = {scale}\nemission = [{radiance}, {radiance}, {radiance}]"))
+    };
+    let ball = entity("ball", [0.0, 0.6, 0.0], "");
+    let ring = entity("ring", [0.0, 0.9, 0.0], "rotation = { axis = [1, 0.2, 0.1], angle_deg = 65 }");
+    vec![
+        ("a ball", parse(&format!("{HEAD}{ball}{}", bulb([1.2, 2.6, 0.8], 0.3, 90.0))), 0.02),
+        ("a ring", parse(&format!("{HEAD}{ring}{}", bulb([1.2, 2.6, 0.8], 0.3, 90.0))), 0.035),
+        (
+            "an occluder between two lights",
+            parse(&format!("{HEAD}{ball}{}{}", bulb([2.2, 0.9, 0.1], 0.2, 90.0), bulb([-2.2, 0.9, 0.1], 0.2, 90.0))),
+            0.03,
+        ),
+        (
+            "a light in a ring's hole",
+            parse(&format!("{HEAD}{}{}", entity("ring", [0.0, 0.9, 0.0], ""), bulb([0.0, 0.9, 0.0], 0.2, 60.0))),
+            // What stands before a light and what stands behind it have one outline there.
+            f64::INFINITY,
+        ),
+        (
+            "a ring that glows",
+            parse(&format!(
+                "{HEAD}{ball}{}",
+                entity(
+                    "ring",
+                    [0.9, 2.4, 0.4],
+                    "rotation = { axis = [1, 0, 0.3], angle_deg = 20 }\nemission = [9, 9, 9]"
+                )
+            )),
+            0.05,
+        ),
+    ]
+}
+
+#[test]
+fn scenes_are_lit_as_by_rays() {
+    let Some(gpu) = gpu() else { return };
+    let base = check::sharp_options();
+    let bake = shadow_fields::bake::Options { silhouette: Default::default(), face_px: 32, ..base.bake };
+    let sharp = Options { bake, ..base };
+    for (name, scene, limit) in scenes() {
+        let found = error(&gpu, &scene, sharp, 1024);
+        let harmonics = error(&gpu, &scene, Options { lights: Lights::Sh, ..sharp }, 1024);
+        report(&format!("{name}: error {found:.4}, in spherical harmonics {harmonics:.4}"));
+        assert!(
+            found.is_finite() && (limit.is_infinite() || found < limit.min(harmonics)),
+            "{name}: {found}, in spherical harmonics {harmonics}"
+        );
+    }
+}
+
+#[test]
+fn each_light_has_the_form_that_its_mesh_gives_it() {
+    let scene = parse(&format!(
+        "{HEAD}[[mesh]]\nname = \"two\"\ntorus_two_colour = {{ major_m = 0.4, minor_m = 0.1, segments = 16, sides = 8 }}\n\
+        [[entity]]\nmesh = \"ball\"\nemission = [1, 1, 1]\n[[entity]]\nmesh = \"ring\"\nemission = [1, 1, 1]\n\
+        [[entity]]\nmesh = \"two\"\nemission = [1, 1, 1]\n"
+    ));
+    let form = |entity, lights| LightForm::of(&scene, entity, lights);
+    let LightForm::Ball(share) = form(1, Lights::Sharp) else { panic!("a sphere is a ball") };
+    assert!((0.98..1.0).contains(&share), "{share}");
+    assert_eq!(form(2, Lights::Sharp), LightForm::Outline);
+    assert_eq!(form(3, Lights::Sharp), LightForm::Harmonics);
+    assert!((1..4).all(|entity| form(entity, Lights::Sh) == LightForm::Harmonics));
+}

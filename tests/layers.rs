@@ -272,7 +272,7 @@ const PASSES: &[(&str, &str)] = &[
 const COPIES: &[&str] = &["read back"];
 
 /// Shaders that are no pass of their own: the second half of pass "draw", and what only benches run.
-const OTHER_SHADERS: &[&str] = &["grid", "product", "ceiling"];
+const OTHER_SHADERS: &[&str] = &["grid", "product", "ceiling", "shadow_map"];
 
 /// Folders whose files record passes for a test or a bench, outside the sequences.
 const NO_SEQUENCE: &[&str] = &["src/bench", "src/check"];

@@ -8,6 +8,7 @@ use shadow_fields::bake::capture::Capture;
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::bake::self_visibility::SelfVisibility;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
+use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::lists::gather::Gather;
@@ -61,7 +62,8 @@ fn gathering() -> Vec<ShaderPermutation> {
 fn measuring() -> Vec<ShaderPermutation> {
     let kind = |kind: u32| ShaderPermutation::new("ceiling.comp", 4).define("KIND", kind);
     let rate = |n| kind(n).define("READS", 16_u32).define("ROUNDS", 16_u32).define("MASK", 1023_u32);
-    (0..4).map(rate).chain([kind(4), rate(5)]).collect()
+    let maps = [Filter::Hard, Filter::Pcss].into_iter().flat_map(|filter| ShadowMaps::permutations(filter, 512));
+    (0..4).map(rate).chain([kind(4), rate(5)]).chain(maps).collect()
 }
 
 fn lattice(text: &str) -> Lattice {

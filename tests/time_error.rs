@@ -125,6 +125,12 @@ fn a_scene_of_ones_own() {
     assert_eq!(outcome["comparisons"][0]["light"], "1 local light");
     let total = rms(&outcome["budgets"][0]["total"]);
     assert!(total > 0.01 && total < 0.3, "four bands below a small light: {total}");
+    // Shadow maps: a hard edge errs more than a soft one, and each has its time.
+    let maps = outcome["comparisons"][0]["maps"].as_array().unwrap();
+    let kinds: Vec<String> =
+        maps.iter().map(|p| format!("{} {}", p["filter"].as_str().unwrap(), p["map_px"])).collect();
+    assert_eq!(kinds, ["hard 512", "hard 2048", "pcss 512", "pcss 2048"]);
+    assert!(rms(&maps[3]["error"]) < 0.9 * rms(&maps[1]["error"]), "{maps:?}");
     let flip = outcome["pictures"][0]["mean_flip_ratio"].as_f64().unwrap();
     assert!(flip > 0.002 && flip < 0.3, "{flip}");
     let out = folder.path().join("out");

@@ -17,6 +17,7 @@ pub mod profile;
 pub mod refusals;
 pub mod rival;
 pub mod scaling;
+pub mod shadow_map;
 pub mod skips;
 pub mod small_lights;
 pub mod stability;

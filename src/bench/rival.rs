@@ -1,4 +1,5 @@
-//! Comparison with the alternative to shadow fields: soft shadows per vertex by ray casting on all CPU threads.
+//! Comparison with the alternatives to shadow fields: soft shadows per vertex by ray casting on all CPU threads, and, where all
+//! lights are balls, by shadow maps on the same device ([`super::shadow_map`]).
 //!
 //! The rival is [`RayCast`] in one run. It uses an 8-wide hierarchy per mesh behind a bounding sphere test, scrambled Sobol points,
 //! cosine sampling of the sky and cone sampling of local lights, and leaves out occluders that cannot lie between vertex and light.
@@ -10,9 +11,11 @@ use super::budget::{Truth, device_radiosity};
 use super::cases::Case;
 use super::default_options;
 use super::figures::{Difference, Radiosity, Spread, along, crossing, spread};
+use super::shadow_map::{Filter, ShadowMaps, maps_apply};
 use super::sweep;
 use crate::error::Result;
-use crate::truth::{RayCast, RayMeshes, World};
+use crate::scene::Placement;
+use crate::truth::{RayCast, RayMeshes, World, receiver_vertices};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -28,7 +31,27 @@ pub struct RivalPoint {
     pub error: Difference,
 }
 
-/// Merge and ray casting on one case.
+/// Shadow maps of one size. They light from the lamps alone: the sky's part of the truth is given to them.
+#[derive(Clone, Debug, Serialize)]
+pub struct MapPoint {
+    /// One comparison, or percentage-closer soft shadows.
+    pub filter: Filter,
+    /// Texels across a view.
+    pub map_px: u32,
+    /// Wall time of drawing the maps and lighting all vertices, milliseconds.
+    pub wall_ms: Spread,
+    /// Difference to T0.
+    pub error: Difference,
+}
+
+impl MapPoint {
+    /// Name in tables: `hard map 512`.
+    pub fn title(&self) -> String {
+        format!("{} map {}", if self.filter == Filter::Hard { "hard" } else { "PCSS" }, self.map_px)
+    }
+}
+
+/// Merge, ray casting and shadow maps on one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Scene and light.
@@ -52,6 +75,10 @@ pub struct Comparison {
     /// Wall time in which ray casting reaches the merge's root mean square error, milliseconds: interpolated, extrapolated, or the
     /// time of one ray if that already has a smaller error.
     pub rival_ms_at_equal_rms: Option<f64>,
+    /// Shadow maps, hard ones first, with increasing sizes; none where a light is no ball.
+    pub maps: Vec<MapPoint>,
+    /// The shortest wall time in which a shadow map has at most the merge's root mean square error, milliseconds.
+    pub map_ms_at_equal_rms: Option<f64>,
     /// Number of rays at which it reaches that error.
     #[serde(rename = "rays_at_equal_rms_count")]
     pub rays_at_equal_rms: Option<f64>,
@@ -81,6 +108,7 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparis
     let rays: &[u32] = if bench.quick { &[1, 4, 16, 64, 256] } else { &[1, 4, 16, 64, 256, 1024, 4096] };
     let vertices = frame.receiver_vertex_count();
     let share = vertices as f64 / truth.vertices.len() as f64;
+    let mut maps = Maps::new(bench, case, truth);
     let (mut walls, mut merges) = (Vec::new(), Vec::new());
     let mut rival_walls = vec![Vec::new(); rays.len()];
     let mut found: Vec<Vec<Radiosity>> = vec![Vec::new(); rays.len()];
@@ -97,6 +125,7 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparis
                 merges.push(sweep::merge_ms(&timings));
             }
         }
+        maps.round(&placements)?;
         for (index, &rays) in rays.iter().enumerate() {
             // Long runs need fewer repetitions.
             if round >= 3 && rays > 256 {
@@ -116,6 +145,9 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparis
         .enumerate()
         .map(|(i, &rays)| RivalPoint { rays, wall_ms: spread(&rival_walls[i]), error: truth.error(&found[i]) })
         .collect();
+    let maps = maps.points();
+    let as_good = maps.iter().filter(|p| p.error.rms <= merge_error.rms).map(|p| p.wall_ms.median);
+    let map_ms_at_equal_rms = as_good.min_by(f64::total_cmp);
     let rays_at_equal_rms =
         crossing(&rival.iter().map(|p| (f64::from(p.rays), p.error.rms)).collect::<Vec<_>>(), merge_error.rms);
     let (frame_wall_ms, merge_ms) = (spread(&walls), spread(&merges));
@@ -128,6 +160,8 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparis
         vertices,
         threads: rayon::current_num_threads(),
         merge_error,
+        maps,
+        map_ms_at_equal_rms,
         rival_ms_at_equal_rms: rival_ms,
         rays_at_equal_rms,
         speed_up_at_equal_rms: rival_ms.map(|ms| ms / frame_wall_ms.median),
@@ -136,4 +170,72 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparis
         merge_ms,
         rival,
     })
+}
+
+/// Texels across a view that are measured; a quick run takes every other.
+const MAP_PX: [u32; 4] = [256, 512, 1024, 2048];
+/// Rays of the sky's part, which both the truth and the maps have.
+const SKY_RAYS: u32 = 1024;
+
+/// Shadow maps of all sizes, measured round by round.
+struct Maps<'c> {
+    bench: &'c Bench<'c>,
+    case: &'c Case,
+    truth: &'c Truth,
+    /// What the sky gives to the compared vertices.
+    sky: Vec<Radiosity>,
+    /// Filter, size, wall times, and what was found last.
+    measured: Vec<(Filter, u32, Vec<f64>, Vec<Radiosity>)>,
+}
+
+impl<'c> Maps<'c> {
+    fn new(bench: &'c Bench<'c>, case: &'c Case, truth: &'c Truth) -> Self {
+        let sizes = || MAP_PX.into_iter().skip(usize::from(bench.quick)).step_by(1 + usize::from(bench.quick));
+        let all = [Filter::Hard, Filter::Pcss].into_iter().flat_map(|filter| sizes().map(move |px| (filter, px)));
+        let all = all.filter(|_| maps_apply(&case.scene));
+        let measured: Vec<_> = all.map(|(filter, px)| (filter, px, Vec::new(), Vec::new())).collect();
+        let sky = if measured.is_empty() { Vec::new() } else { sky(bench, case, truth) };
+        Maps { bench, case, truth, sky, measured }
+    }
+
+    /// Draws and lights three times with each; the first time warms up.
+    fn round(&mut self, placements: &[Placement]) -> Result<()> {
+        let gpu = (self.bench.baker.device(), self.bench.baker.library());
+        for (filter, px, walls, found) in &mut self.measured {
+            let maps = ShadowMaps::new(gpu, &self.case.scene, placements, *filter, *px)?;
+            for warm in [false, true, true] {
+                let started = Instant::now();
+                maps.run(&self.case.scene, placements)?;
+                if warm {
+                    walls.push(started.elapsed().as_secs_f64() * 1e3);
+                }
+            }
+            let (all, lamps) = (receiver_vertices(&self.case.scene), maps.radiosity()?);
+            let of = |(vertex, sky): (_, &Radiosity)| {
+                let lamps = lamps[all.binary_search(vertex).expect("it is lit")];
+                std::array::from_fn(|c| sky[c] + lamps[c])
+            };
+            *found = self.truth.vertices.iter().zip(&self.sky).map(of).collect();
+        }
+        Ok(())
+    }
+
+    fn points(self) -> Vec<MapPoint> {
+        let point = |(filter, map_px, walls, found): &(Filter, u32, Vec<f64>, Vec<Radiosity>)| MapPoint {
+            filter: *filter,
+            map_px: *map_px,
+            wall_ms: spread(walls),
+            error: self.truth.error(found),
+        };
+        self.measured.iter().map(point).collect()
+    }
+}
+
+/// What the sky alone gives to the compared vertices.
+fn sky(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Vec<Radiosity> {
+    let shapes = RayMeshes::new(&case.scene);
+    let mut world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
+    world.lights.clear();
+    let cast = RayCast { rays: SKY_RAYS, runs: 1, seed: bench.seed, distant: case.distant, ..Default::default() };
+    cast.run(&world, &truth.vertices).iter().map(|e| e.radiosity).collect()
 }

@@ -5,6 +5,7 @@ use super::cases::{self, Case};
 use super::pictures::{CasePicture, pictures};
 use super::plot::{AxisScale, Curve, Dot, Gap, Panel, Plot, PlotColumn, RowGroup, Rows};
 use super::rival::{Comparison, compare};
+use super::shadow_map::Filter;
 use super::small_lights::SmallLight;
 use super::sweep::{Point, Variation, pareto, sweep, variations};
 use super::{Bench, default_options, verdict};
@@ -177,7 +178,7 @@ fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &
     write(&folder.join("time-error.txt"), &page.join("\n"))
 }
 
-/// One row for the merge, and one for each number of rays.
+/// One row for the merge, and one for each number of rays and each shadow map.
 fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     let row = |what: String, wall_ms: f64, error| {
         json!({
@@ -189,7 +190,8 @@ fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     };
     let merge = row("merge".into(), comparison.frame_wall_ms.median, comparison.merge_error);
     let cast = comparison.rival.iter().map(|p| row(format!("{} rays", p.rays), p.wall_ms.median, p.error));
-    std::iter::once(merge).chain(cast).collect()
+    let maps = comparison.maps.iter().map(|p| row(p.title(), p.wall_ms.median, p.error));
+    std::iter::once(merge).chain(cast).chain(maps).collect()
 }
 
 /// Plot of the settings of a case with their Pareto front, and of that front beside ray casting.
@@ -213,11 +215,11 @@ fn plot(case: &str, outcome: &TimeErrorOutcome) -> Plot {
     };
     let rival = outcome.comparisons.iter().find(|c| c.case == case);
     let beside = Panel {
-        title: "Beside ray casting on all threads".into(),
-        x_label: "milliseconds (median); numbers: rays a vertex and light".into(),
+        title: "Beside its rivals".into(),
+        x_label: "milliseconds (median); numbers: rays a vertex and light, texels across a map".into(),
         dots: own.dots.iter().cloned().map(|dot| Dot { x_range: None, ..dot }).collect(),
         numbered: false,
-        curves: rival.map(rival_curve).into_iter().collect(),
+        curves: rival.map(rival_curves).unwrap_or_default(),
         gap: rival.and_then(|c| {
             let lead = c.speed_up_at_equal_rms?;
             let (from, to, y) = (c.frame_wall_ms.median, c.rival_ms_at_equal_rms?, c.merge_error.rms);
@@ -230,12 +232,23 @@ fn plot(case: &str, outcome: &TimeErrorOutcome) -> Plot {
     Plot { title: format!("{case}: time against error"), panels: vec![own, beside] }
 }
 
-fn rival_curve(c: &Comparison) -> Curve {
-    Curve {
+/// Ray casting, and shadow maps of either filter where there are any.
+fn rival_curves(c: &Comparison) -> Vec<Curve> {
+    let rays = Curve {
         label: format!("ray casting, {} threads", c.threads),
         points: c.rival.iter().map(|p| (p.wall_ms.median, p.error.rms)).collect(),
         notes: c.rival.iter().map(|p| p.rays.to_string()).collect(),
-    }
+    };
+    let maps = |(filter, label): (Filter, &str)| {
+        let of = || c.maps.iter().filter(move |p| p.filter == filter);
+        Curve {
+            label: label.into(),
+            points: of().map(|p| (p.wall_ms.median, p.error.rms)).collect(),
+            notes: of().map(|p| p.map_px.to_string()).collect(),
+        }
+    };
+    let maps = [(Filter::Hard, "shadow maps, hard"), (Filter::Pcss, "shadow maps, PCSS")].map(maps);
+    std::iter::once(rays).chain(maps.into_iter().filter(|curve| !curve.points.is_empty())).collect()
 }
 
 /// Plot of every case's times at equal error.

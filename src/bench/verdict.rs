@@ -185,7 +185,7 @@ pub fn defaults(points: &[Point]) -> String {
 /// One line per case with the speed-up at equal error, then the cases where it is below ten or below one.
 pub fn rivals(comparisons: &[Comparison]) -> String {
     let mut text = String::from(
-        "How many times faster the merge is than ray casting on all threads at equal error\n\
+        "How many times faster the merge is than ray casting on all threads at equal error, and shadow maps on the same device\n\
          (a frame without drawing, everything merged, against the rays a vertex and light that err as little; sky and lights \
          sampled\ndirectly, hierarchies built beforehand)\n",
     );
@@ -207,6 +207,7 @@ pub fn rivals(comparisons: &[Comparison]) -> String {
             three(c.rival_ms_at_equal_rms.unwrap_or(f64::NAN)),
             three(c.merge_speed_up_at_equal_rms.unwrap_or(f64::NAN)),
         );
+        text += &maps(c);
         if times < 1.0 {
             losses.push(c.title());
         } else if times < 10.0 {
@@ -224,6 +225,21 @@ pub fn rivals(comparisons: &[Comparison]) -> String {
                  error.\n";
     }
     text
+}
+
+/// A line on shadow maps: what the best of them errs, and the quickest that errs no more than the merge.
+fn maps(c: &Comparison) -> String {
+    let Some(best) = c.maps.iter().min_by(|a, b| a.error.rms.total_cmp(&b.error.rms)) else { return String::new() };
+    let at_equal = match c.map_ms_at_equal_rms {
+        Some(ms) => format!(
+            "one that errs no more takes {} ms, {} times a frame",
+            three(ms),
+            three(ms / c.frame_wall_ms.median)
+        ),
+        None => "none errs as little".into(),
+    };
+    let (error, ms) = (three(best.error.rms), three(best.wall_ms.median));
+    format!("    shadow maps: {at_equal}; the best, {}, errs {error} in {ms} ms\n", best.title())
 }
 
 /// Table of the rungs: root mean square, 99th percentile and maximum of each.

@@ -117,14 +117,21 @@ fn a_scene_of_ones_own() {
     std::fs::write(folder.path().join("my ring.toml"), own_scene(LIGHT)).unwrap();
     let asked = ["bench", "time-error", "my ring.toml", "--quick", "--axis", "lookup", "--out", "out", "--json"];
     let outcome: Value = serde_json::from_str(&good(folder.path(), &asked).stdout).unwrap();
-    for part in ["budgets", "pictures", "comparisons"] {
-        assert_eq!(outcome[part].as_array().unwrap().len(), 1, "{part}");
+    for (part, count) in [("budgets", 1), ("pictures", 1), ("comparisons", 2)] {
+        assert_eq!(outcome[part].as_array().unwrap().len(), count, "{part}");
         assert_eq!(outcome[part][0]["case"], "my ring");
     }
     assert_eq!(outcome["points"].as_array().unwrap().len(), 3, "it is swept");
     assert_eq!(outcome["comparisons"][0]["light"], "1 local light");
     let total = rms(&outcome["budgets"][0]["total"]);
     assert!(total > 0.01 && total < 0.3, "four bands below a small light: {total}");
+    // Sharp lights beside lights in SH, against the same rivals.
+    let comparisons = outcome["comparisons"].as_array().unwrap();
+    assert_eq!([&comparisons[0]["lights"], &comparisons[1]["lights"]], ["sharp", "sh"]);
+    assert_eq!(comparisons[0]["rival"], comparisons[1]["rival"]);
+    let [sharp, sh] = [0, 1].map(|i| rms(&comparisons[i]["merge_error"]));
+    assert!(sharp < 0.5 * sh && (sh / total - 1.0).abs() < 1e-6, "{sharp} and {sh} of {total}");
+    assert!((rms(&outcome["budgets"][0]["sharp_total"]) / sharp - 1.0).abs() < 1e-6);
     // Shadow maps: a hard edge errs more than a soft one, and each has its time.
     let maps = outcome["comparisons"][0]["maps"].as_array().unwrap();
     let kinds: Vec<String> =

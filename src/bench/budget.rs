@@ -1,11 +1,12 @@
 //! The error of a picture, split into its causes by the rungs of [`crate::truth`].
 
-use super::Bench;
 use super::cases::Case;
 use super::figures::{Difference, Radiosity, difference, rms};
+use super::{Bench, has_sharp_lights};
 use crate::error::{Error, Result};
 use crate::field::Storage;
 use crate::frame::{self, Frame};
+use crate::scene::Lights;
 use crate::truth::raycast::{Order, RayCast, relative_error};
 use crate::truth::{ExactChain, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
@@ -186,22 +187,33 @@ pub struct Budget {
     pub below_bands: Difference,
     /// T0 to T3.
     pub total: Difference,
+    /// T0 to the merge on the device with sharp lights, which the rungs are not about; none where no light can be sharp.
+    pub sharp_total: Option<Difference>,
     /// T0's root mean square over that of the unoccluded value, which converts errors to the unit of the unoccluded value.
     #[serde(rename = "t0_per_unoccluded_ratio")]
     pub t0_per_unoccluded: f64,
 }
 
-/// Computes T2 and T3 with fields and a merge of the given options, and compares all rungs.
+/// Computes T2 and T3 with fields and a merge of the given options, all lights in SH, and compares all rungs; then the same merge
+/// with sharp lights.
 ///
 /// # Errors
 /// As [`Frame::new`].
 pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Options) -> Result<Budget> {
     let placements = case.scene.at(case.time_s);
+    let options = frame::Options { lights: Lights::Sh, ..options };
     let wide = frame::Options { bake: crate::bake::Options { storage: Storage::F32, ..options.bake }, ..options };
     let t2 = select(&bench.frame(&case.scene, wide)?.twin(&placements)?, &truth.vertices);
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, None)?;
     let t3 = device_radiosity(&frame, &truth.vertices)?;
+    let sharp_total = if has_sharp_lights(&case.scene) {
+        let mut frame = bench.frame(&case.scene, frame::Options { lights: Lights::Sharp, ..options })?;
+        frame.render(&placements, None)?;
+        Some(truth.error(&device_radiosity(&frame, &truth.vertices)?))
+    } else {
+        None
+    };
     let between = |a: &[Radiosity], b: &[Radiosity]| difference(a, b, truth.unit);
     Ok(Budget {
         case: case.name.clone(),
@@ -214,6 +226,7 @@ pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Opt
         arithmetic_and_storage: between(&t2, &t3),
         below_bands: between(&truth.t1, &t3),
         total: between(&truth.t0, &t3),
+        sharp_total,
         t0_per_unoccluded: truth.unit / truth.unoccluded.max(f64::MIN_POSITIVE),
     })
 }

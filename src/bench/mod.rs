@@ -31,7 +31,7 @@ use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::error::Result;
 use crate::frame::{self, Frame};
-use crate::scene::Scene;
+use crate::scene::{LightForm, Lights, Scene};
 use serde_json::Value;
 
 /// What every measurement needs.
@@ -65,11 +65,17 @@ impl Bench<'_> {
     }
 }
 
+/// Whether any light of a scene can be sharp.
+pub fn has_sharp_lights(scene: &Scene) -> bool {
+    let is_sharp = |j: usize| scene.entities[j].emits && LightForm::of(scene, j, Lights::Sharp).is_sharp();
+    (0..scene.entities.len()).any(is_sharp)
+}
+
 /// The options that sweeps vary: the program's defaults, with a picture so small that drawing costs nothing.
 pub fn default_options() -> frame::Options {
     frame::Options {
         bake: crate::bake::Options::default(),
-        lights: crate::scene::Lights::default(),
+        lights: Lights::default(),
         lookup: crate::field::Lookup::default(),
         guard: true,
         // Frames are timed at rest: each must merge everything.

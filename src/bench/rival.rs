@@ -6,15 +6,15 @@
 //! Rays stop at the light's surface; where along a ray that is, is asked only where an occluder lies beside the light.
 //! Its hierarchies are built beforehand, as fields are baked beforehand.
 
-use super::Bench;
 use super::budget::{Truth, device_radiosity};
 use super::cases::Case;
-use super::default_options;
 use super::figures::{Difference, Radiosity, Spread, along, crossing, spread};
 use super::shadow_map::{Filter, ShadowMaps, maps_apply};
 use super::sweep;
+use super::{Bench, default_options, has_sharp_lights};
 use crate::error::Result;
-use crate::scene::Placement;
+use crate::frame::{self, Frame};
+use crate::scene::{Lights, Placement};
 use crate::truth::{RayCast, RayMeshes, World, receiver_vertices};
 use serde::Serialize;
 use std::time::Instant;
@@ -64,9 +64,11 @@ pub struct Comparison {
     /// Threads of the ray caster.
     #[serde(rename = "thread_count")]
     pub threads: usize,
+    /// How the merge takes the lights; none where no light can be sharp.
+    pub lights: Option<Lights>,
     /// Wall time of a frame of the merge without drawing, milliseconds.
     pub frame_wall_ms: Spread,
-    /// Device time of the merge in it, milliseconds.
+    /// Device time of the merge and of sharp lights in it, milliseconds.
     pub merge_ms: Spread,
     /// Error of the merge against T0.
     pub merge_error: Difference,
@@ -91,40 +93,94 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Name of the case with its light, unless the name contains it.
+    /// Name of the case with its light, unless the name contains it, and with how lights are taken.
     pub fn title(&self) -> String {
-        if self.case.contains(", (") { self.case.clone() } else { format!("{} ({})", self.case, self.light) }
+        let light = if self.case.contains(", (") { String::new() } else { format!(" ({})", self.light) };
+        let lights = if self.lights == Some(Lights::Sh) { ", lights in SH" } else { "" };
+        format!("{}{light}{lights}", self.case)
     }
 }
 
-/// Measures merge and ray casting in turns.
-///
-/// # Errors
-/// As [`crate::frame::Frame::new`] and [`crate::frame::Frame::render`].
-pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparison> {
-    let placements = case.scene.at(case.time_s);
-    let mut frame = bench.frame(&case.scene, default_options())?;
-    let shapes = RayMeshes::new(&case.scene);
-    let rays: &[u32] = if bench.quick { &[1, 4, 16, 64, 256] } else { &[1, 4, 16, 64, 256, 1024, 4096] };
-    let vertices = frame.receiver_vertex_count();
-    let share = vertices as f64 / truth.vertices.len() as f64;
-    let mut maps = Maps::new(bench, case, truth);
-    let (mut walls, mut merges) = (Vec::new(), Vec::new());
-    let mut rival_walls = vec![Vec::new(); rays.len()];
-    let mut found: Vec<Vec<Radiosity>> = vec![Vec::new(); rays.len()];
-    frame.render(&placements, None)?;
-    for round in 0..if bench.quick { 3 } else { 7 } {
+/// The merge with one way to take the lights, and its times in milliseconds, round by round.
+struct Merged {
+    lights: Option<Lights>,
+    frame: Frame,
+    walls: Vec<f64>,
+    merges: Vec<f64>,
+}
+
+impl Merged {
+    /// With sharp lights and without, where a light can be sharp.
+    fn all(bench: &Bench<'_>, case: &Case) -> Result<Vec<Self>> {
+        let both: &[Option<Lights>] = &[Some(Lights::Sharp), Some(Lights::Sh)];
+        let ways = if has_sharp_lights(&case.scene) { both } else { &[None] };
+        let merged = |lights: &Option<Lights>| {
+            let options = frame::Options { lights: lights.unwrap_or_default(), ..default_options() };
+            let frame = bench.frame(&case.scene, options)?;
+            Ok(Merged { lights: *lights, frame, walls: Vec::new(), merges: Vec::new() })
+        };
+        ways.iter().map(merged).collect()
+    }
+
+    fn round(&mut self, placements: &[Placement]) -> Result<()> {
         // The first frame after ray casting warms up threads and caches.
         for warm in [false, true, true, true] {
             // Everything is merged, as if all entities had moved.
-            frame.forget();
+            self.frame.forget();
             let started = Instant::now();
-            let timings = frame.render(&placements, None)?;
+            let timings = self.frame.render(placements, None)?;
             if warm {
-                walls.push(started.elapsed().as_secs_f64() * 1e3);
-                merges.push(sweep::merge_ms(&timings));
+                self.walls.push(started.elapsed().as_secs_f64() * 1e3);
+                self.merges.push(sweep::merge_ms(&timings));
             }
         }
+        Ok(())
+    }
+
+    fn comparison(&self, case: &Case, truth: &Truth, rival: &[RivalPoint], maps: &[MapPoint]) -> Result<Comparison> {
+        let merge_error = truth.error(&device_radiosity(&self.frame, &truth.vertices)?);
+        let as_good = maps.iter().filter(|p| p.error.rms <= merge_error.rms).map(|p| p.wall_ms.median);
+        let errors: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.error.rms)).collect();
+        let times: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.wall_ms.median)).collect();
+        let rays_at_equal_rms = crossing(&errors, merge_error.rms);
+        let rival_ms = rays_at_equal_rms.map(|rays| along(&times, rays));
+        let (frame_wall_ms, merge_ms) = (spread(&self.walls), spread(&self.merges));
+        Ok(Comparison {
+            case: case.name.clone(),
+            light: case.light.clone(),
+            vertices: self.frame.receiver_vertex_count(),
+            threads: rayon::current_num_threads(),
+            lights: self.lights,
+            merge_error,
+            map_ms_at_equal_rms: as_good.min_by(f64::total_cmp),
+            maps: maps.to_vec(),
+            rival_ms_at_equal_rms: rival_ms,
+            rays_at_equal_rms,
+            speed_up_at_equal_rms: rival_ms.map(|ms| ms / frame_wall_ms.median),
+            merge_speed_up_at_equal_rms: rival_ms.map(|ms| ms / merge_ms.median),
+            frame_wall_ms,
+            merge_ms,
+            rival: rival.to_vec(),
+        })
+    }
+}
+
+/// Measures merge, shadow maps and ray casting in turns: a comparison with sharp lights and one with lights in SH, or one where no
+/// light can be sharp.
+///
+/// # Errors
+/// As [`Frame::new`] and [`Frame::render`].
+pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Vec<Comparison>> {
+    let placements = case.scene.at(case.time_s);
+    let mut merged = Merged::all(bench, case)?;
+    let shapes = RayMeshes::new(&case.scene);
+    let rays: &[u32] = if bench.quick { &[1, 4, 16, 64, 256] } else { &[1, 4, 16, 64, 256, 1024, 4096] };
+    let share = merged[0].frame.receiver_vertex_count() as f64 / truth.vertices.len() as f64;
+    let mut maps = Maps::new(bench, case, truth);
+    let mut rival_walls = vec![Vec::new(); rays.len()];
+    let mut found: Vec<Vec<Radiosity>> = vec![Vec::new(); rays.len()];
+    for round in 0..if bench.quick { 3 } else { 7 } {
+        merged.iter_mut().try_for_each(|merged| merged.round(&placements))?;
         maps.round(&placements)?;
         for (index, &rays) in rays.iter().enumerate() {
             // Long runs need fewer repetitions.
@@ -139,37 +195,14 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Comparis
             found[index] = lit.iter().map(|e| e.radiosity).collect();
         }
     }
-    let merge_error = truth.error(&device_radiosity(&frame, &truth.vertices)?);
     let rival: Vec<RivalPoint> = rays
         .iter()
         .enumerate()
         .map(|(i, &rays)| RivalPoint { rays, wall_ms: spread(&rival_walls[i]), error: truth.error(&found[i]) })
         .collect();
     let maps = maps.points();
-    let as_good = maps.iter().filter(|p| p.error.rms <= merge_error.rms).map(|p| p.wall_ms.median);
-    let map_ms_at_equal_rms = as_good.min_by(f64::total_cmp);
-    let rays_at_equal_rms =
-        crossing(&rival.iter().map(|p| (f64::from(p.rays), p.error.rms)).collect::<Vec<_>>(), merge_error.rms);
-    let (frame_wall_ms, merge_ms) = (spread(&walls), spread(&merges));
-    let times: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.wall_ms.median)).collect();
-    let rival_ms = rays_at_equal_rms.map(|rays| along(&times, rays));
     (bench.progress)(&format!("{}: merge against ray casting measured", case.name));
-    Ok(Comparison {
-        case: case.name.clone(),
-        light: case.light.clone(),
-        vertices,
-        threads: rayon::current_num_threads(),
-        merge_error,
-        maps,
-        map_ms_at_equal_rms,
-        rival_ms_at_equal_rms: rival_ms,
-        rays_at_equal_rms,
-        speed_up_at_equal_rms: rival_ms.map(|ms| ms / frame_wall_ms.median),
-        merge_speed_up_at_equal_rms: rival_ms.map(|ms| ms / merge_ms.median),
-        frame_wall_ms,
-        merge_ms,
-        rival,
-    })
+    merged.iter().map(|merged| merged.comparison(case, truth, &rival, &maps)).collect()
 }
 
 /// Texels across a view that are measured; a quick run takes every other.

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::field::{Lattice, Lookup, Storage};
 use crate::frame::{self, Frame};
 use crate::gpu::Timing;
-use crate::scene::Placement;
+use crate::scene::{Lights, Placement};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -86,6 +86,7 @@ pub fn variations(quick: bool) -> Vec<Variation> {
         change(&mut options);
         all.push(Variation { axis, name: name.to_owned(), options });
     };
+    add("lights", "sh", &|o| o.lights = Lights::Sh);
     add("lookup", "nearest", &|o| o.lookup = Lookup::Nearest);
     add("lookup", "radial", &|o| o.lookup = Lookup::Radial);
     add("storage", "f32", &|o| o.bake.storage = Storage::F32);
@@ -141,9 +142,9 @@ fn add_sets(add: &mut Add<'_>) {
     });
 }
 
-/// Device time of the merge in milliseconds.
+/// Device time of the merge in milliseconds, sharp lights included.
 pub fn merge_ms(timings: &[Timing]) -> f64 {
-    timings.iter().filter(|t| t.pass == "merge").map(|t| t.milliseconds).sum()
+    timings.iter().filter(|t| ["merge", "sharp"].contains(&t.pass.as_str())).map(|t| t.milliseconds).sum()
 }
 
 /// Renders one frame after another in rounds, so that whatever else the machine does meets all alike: merge times in

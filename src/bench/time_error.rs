@@ -10,6 +10,7 @@ use super::small_lights::SmallLight;
 use super::sweep::{Point, Variation, pareto, sweep, variations};
 use super::{Bench, default_options, verdict};
 use crate::error::{Error, Result};
+use crate::scene::Lights;
 use crate::text::{csv, three, write};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -37,7 +38,7 @@ pub struct TimeErrorOutcome {
     pub pictures: Vec<CasePicture>,
     /// One row per case and variation.
     pub points: Vec<Point>,
-    /// One row per case.
+    /// One row per case, and a second with lights in SH where lights can be sharp.
     pub comparisons: Vec<Comparison>,
     /// Wall time of the parts of the run, in seconds over all cases.
     pub seconds: BTreeMap<&'static str, f64>,
@@ -84,7 +85,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection, own: Option<
         took(&mut outcome, "baking and budgets");
         outcome.pictures.push(pictures(bench, case, folder)?);
         took(&mut outcome, "pictures");
-        outcome.comparisons.push(compare(bench, case, &truth)?);
+        outcome.comparisons.extend(compare(bench, case, &truth)?);
         took(&mut outcome, "the rival");
         if is_swept(case) || sweeps_all {
             outcome.points.extend(sweep(bench, case, &truth, &all)?);
@@ -188,10 +189,13 @@ fn rival_rows(comparison: &Comparison) -> Vec<Value> {
             "merge_speed_up_at_equal_rms_ratio": comparison.merge_speed_up_at_equal_rms, "rays_at_equal_rms_count": comparison.rays_at_equal_rms,
         })
     };
-    let merge = row("merge".into(), comparison.frame_wall_ms.median, comparison.merge_error);
+    let lights = comparison.lights.map_or(String::new(), |lights| format!(", lights {lights:?}").to_lowercase());
+    let merge = row(format!("merge{lights}"), comparison.frame_wall_ms.median, comparison.merge_error);
     let cast = comparison.rival.iter().map(|p| row(format!("{} rays", p.rays), p.wall_ms.median, p.error));
     let maps = comparison.maps.iter().map(|p| row(p.title(), p.wall_ms.median, p.error));
-    std::iter::once(merge).chain(cast).chain(maps).collect()
+    // A second comparison of a case is with the same rivals.
+    let rivals = cast.chain(maps).filter(|_| comparison.lights != Some(Lights::Sh));
+    std::iter::once(merge).chain(rivals).collect()
 }
 
 /// Plot of the settings of a case with their Pareto front, and of that front beside ray casting.

@@ -76,7 +76,8 @@ fn default_in_words() -> String {
     let options = super::default_options();
     let bake = options.bake;
     format!(
-        "lattice {}, {} lookup, {}, {} px a face, {} bands of transfer and {} of visibility{}",
+        "lights {}, lattice {}, {} lookup, {}, {} px a face, {} bands of transfer and {} of visibility{}",
+        format!("{:?}", options.lights).to_lowercase(),
         bake.lattice,
         format!("{:?}", options.lookup).to_lowercase(),
         format!("{:?}", bake.storage).to_lowercase(),
@@ -248,8 +249,8 @@ pub fn budgets(budgets: &[Budget]) -> String {
     let mut text = format!(
         "What a picture's error is made of\n(relative to the root mean square of the ray-cast radiosity T0; of each cause: root \
          mean square over vertices, what 99 of 100\nvertices stay below, the worst vertex)\n  {:<wide$}  {:^22}  {:^22}  {:^22}  \
-         {:^22}  {:^22}  {:>7}\n",
-        "", "centre rule", "four bands", "sampling", "arithmetic, storage", "total", "T0's own"
+         {:^22}  {:^22}  {:^22}  {:>7}\n",
+        "", "centre rule", "four bands", "sampling", "arithmetic, storage", "total in SH", "sharp lights", "T0's own"
     );
     for b in budgets {
         let _ = write!(text, "  {:<wide$}", b.case);
@@ -260,6 +261,9 @@ pub fn budgets(budgets: &[Budget]) -> String {
             }
             text.pop();
         }
+        let sharp =
+            b.sharp_total.map(|d| [d.rms, d.p99, d.max].map(short)).unwrap_or_else(|| ["-"; 3].map(String::from));
+        let _ = write!(text, "   {:>7} {:>7} {:>7}", sharp[0], sharp[1], sharp[2]);
         let _ = writeln!(text, "  {:>8}", short(b.t0_error));
     }
     text

@@ -60,12 +60,25 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             row.extend(
                 [b.centre_rule.rms, b.bands.rms, b.sampling.rms, b.arithmetic_and_storage.rms, b.total.rms].map(three),
             );
+            row.push(b.sharp_total.map_or("-".into(), |d| three(d.rms)));
             row.extend([b.total.p99, b.total.max, b.t0_error, p.mean_flip].map(three));
             row
         })
         .collect();
     output::table(
-        &["scene", "centre rule", "bands", "sampling", "storage", "total", "p99", "max", "T0 error", "mean FLIP"],
+        &[
+            "scene",
+            "centre rule",
+            "bands",
+            "sampling",
+            "storage",
+            "total in SH",
+            "sharp lights",
+            "p99",
+            "max",
+            "T0 error",
+            "mean FLIP",
+        ],
         &rows,
     );
     output::say(
@@ -76,7 +89,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         .iter()
         .map(|c| {
             let or_none = |x: Option<f64>| x.map_or("-".into(), three);
-            let mut row = vec![c.case.clone(), c.light.clone()];
+            let mut row = vec![c.title()];
             row.extend([c.frame_wall_ms.median, c.merge_error.rms].map(three));
             row.extend([c.rays_at_equal_rms, c.rival_ms_at_equal_rms].map(or_none));
             row.extend([c.speed_up_at_equal_rms, c.merge_speed_up_at_equal_rms].map(or_none));
@@ -86,18 +99,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         })
         .collect();
     output::table(
-        &[
-            "scene",
-            "light",
-            "frame ms",
-            "error",
-            "rays",
-            "rays ms",
-            "times faster",
-            "merge alone",
-            "map ms",
-            "best map error",
-        ],
+        &["scene", "frame ms", "error", "rays", "rays ms", "times faster", "merge alone", "map ms", "best map error"],
         &rows,
     );
     let folder = output::shown(&arguments.out);

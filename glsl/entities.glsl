@@ -1,10 +1,10 @@
-// All entities, as binding 0. They are the same for a whole workgroup: uniform or storage blocks on a GPU, which loads them once; on
+// All entities, at ENTITY_BINDING. They are the same for a whole workgroup: uniform or storage blocks on a GPU, which loads them once; on
 // a processor, which loads lane by lane, texel reads bring four numbers at a time.
 #if UNIFORM
-layout(std140, binding = 0) uniform Entities { Entity entities[ENTITY_LIMIT]; };
+layout(std140, binding = ENTITY_BINDING) uniform Entities { Entity entities[ENTITY_LIMIT]; };
 #define ENTITY(e) entities[e]
 #elif TEXEL
-layout(binding = 0) uniform textureBuffer entities;
+layout(binding = ENTITY_BINDING) uniform textureBuffer entities;
 Entity entity_at(uint e) {
     int at = int(e) * 11;
     vec4 third = texelFetch(entities, at + 2);
@@ -15,6 +15,6 @@ Entity entity_at(uint e) {
 }
 #define ENTITY(e) entity_at(e)
 #else
-layout(std430, binding = 0) readonly buffer Entities { Entity entities[]; };
+layout(std430, binding = ENTITY_BINDING) readonly buffer Entities { Entity entities[]; };
 #define ENTITY(e) entities[e]
 #endif

@@ -5,6 +5,7 @@
 layout(binding = 0) uniform utextureBuffer corners;  // vertices of each cell; see asset::grid
 layout(binding = 1) uniform textureBuffer radiosity; // of every vertex of the scene
 layout(location = 0) in vec2 place;
+layout(location = 1) in vec3 at_object; // object's frame, metres
 layout(location = 0) out vec4 color; // alpha: the entity's tag
 
 layout(push_constant) uniform Push {
@@ -13,7 +14,37 @@ layout(push_constant) uniform Push {
     float tag;
     uint first;  // its first vertex in the radiosity buffer
     uvec2 cells; // in a row, and rows
+    uint receiver;      // the entity
+    uint cluster_first; // its first cluster among those whose chains are known
+    vec4 normal;        // object's frame
 } push;
+
+#if PIXEL
+// Where a cluster's chains of sharp lights hold an occluder, every pixel evaluates the lights itself: vertices carry no edge that is finer
+// than their cells.
+#extension GL_EXT_control_flow_attributes : require
+#include "merge_layout.glsl"
+#define ENTITY_BINDING 2
+#include "entities.glsl"
+#define NODE_BINDING 3
+#include "silhouette_field.glsl"
+layout(binding = 5) uniform utextureBuffer entries;
+uint entry_at(uint i) {
+    return texelFetch(entries, int(i)).x;
+}
+layout(binding = 6) uniform utextureBuffer chains; // of every cluster: first entry, and how many
+layout(binding = 7) uniform textureBuffer soft;    // light on vertices without that of sharp lights
+#include "sharp_light.glsl"
+
+vec3 pixel_light(uvec2 chain) {
+    Entity receiver = ENTITY(push.receiver);
+    Surface surface;
+    surface.position = receiver.albedo.w * to_world(receiver, at_object);
+    surface.normal = to_world(receiver, push.normal.xyz);
+    surface.origin = receiver.centre.xyz;
+    return sharp_sum(surface, chain.x, chain.y) * receiver.albedo.rgb;
+}
+#endif
 
 void main() {
     uvec2 cell = uvec2(clamp(ivec2(floor(place)), ivec2(0), ivec2(push.cells) - 1));
@@ -31,9 +62,17 @@ void main() {
     } else {
         weight = far ? vec3(1.0 - at.y, 1.0 - at.x, at.x + at.y - 1.0) : vec3(at.x, at.y, 1.0 - at.x - at.y);
     }
+    uint first = min(triangle.x, min(triangle.y, triangle.z));
     triangle += push.first;
     vec3 light = weight.x * texelFetch(radiosity, int(triangle.x)).rgb
                + weight.y * texelFetch(radiosity, int(triangle.y)).rgb
                + weight.z * texelFetch(radiosity, int(triangle.z)).rgb;
+#if PIXEL
+    uvec2 chain = texelFetch(chains, int(push.cluster_first + first / WORKGROUP)).xy;
+    if (chain.y > 0) {
+        light = weight.x * texelFetch(soft, int(triangle.x)).rgb + weight.y * texelFetch(soft, int(triangle.y)).rgb
+              + weight.z * texelFetch(soft, int(triangle.z)).rgb + pixel_light(chain);
+    }
+#endif
     color = vec4(finish(push.emission_white.rgb + light, push.emission_white.w), push.tag);
 }

@@ -15,6 +15,7 @@ layout(std430, binding = 1) readonly buffer Entries { uint entries[]; };
 layout(std430, binding = 2) readonly buffer Clusters { Cluster clusters[]; };
 const uint NONE = 0xffffffffu;
 
+#define ENTITY_BINDING 0
 #include "entities.glsl"
 #define FIELD_BINDING 3
 #include "field.glsl"

@@ -7,8 +7,12 @@
 layout(local_size_x = WORKGROUP) in;
 
 const uint NONE = 0xffffffffu;
+#define ENTITY_BINDING 0
 #include "entities.glsl"
 layout(std430, binding = 1) readonly buffer Entries { uint entries[]; };
+uint entry_at(uint i) {
+    return entries[i];
+}
 layout(std430, binding = 2) readonly buffer Clusters { Cluster clusters[]; };
 #define NODE_BINDING 3
 #include "silhouette_field.glsl"
@@ -23,7 +27,8 @@ vec4 vertex_quad(uint i) {
     return vertices[i];
 }
 #endif
-layout(std430, binding = 6) buffer Radiosity { vec4 radiosity[]; };
+layout(std430, binding = 6) writeonly buffer Radiosity { vec4 radiosity[]; };
+layout(std430, binding = 8) readonly buffer Soft { vec4 soft[]; }; // what the merge has written
 #if SELF
 #if TEXEL
 layout(binding = 7) uniform utextureBuffer self_cells;
@@ -44,7 +49,7 @@ uint self_cell(uint i) {
 void main() {
     Cluster cluster = clusters[gl_WorkGroupID.x];
     uint v = gl_LocalInvocationID.x;
-    if (v >= cluster.vertex_count || cluster.sharp_count == 0) {
+    if (v >= cluster.vertex_count) {
         return;
     }
     Entity receiver = ENTITY(cluster.receiver);
@@ -60,6 +65,9 @@ void main() {
     mat3 frame = self_frame(normal);
     surface.self_frame = mat3(to_world(receiver, frame[0]), to_world(receiver, frame[1]), surface.normal);
 #endif
-    vec3 sum = sharp_sum(surface, cluster.entry_first, cluster.sharp_count);
-    radiosity[cluster.radiosity_first + v].rgb += sum * receiver.albedo.rgb;
+    vec4 sum = soft[cluster.radiosity_first + v];
+    if (cluster.sharp_count > 0) {
+        sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo.rgb;
+    }
+    radiosity[cluster.radiosity_first + v] = sum;
 }

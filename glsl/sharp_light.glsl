@@ -75,7 +75,7 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
     uint i = 0;
     // Loops are tested at their ends, as in the merge.
     do {
-        Entity shining = ENTITY(chain_light(entries[first + i]));
+        Entity shining = ENTITY(chain_light(entry_at(first + i)));
         SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, 1.0 / shining.centre.w);
         float fine = fine_share(light);
         uint b = fine >= 1.0 ? 1 : 0;
@@ -86,12 +86,12 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
             Block block = block_of(light, b);
             vec4 share = part_shares(surface, light, block);
             j = i;
-            uint packed = entries[first + j];
+            uint packed = entry_at(first + j);
             do {
                 if ((packed & ENTRY_LIGHT) == 0) {
                     share *= let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
                     j++;
-                    packed = entries[first + j];
+                    packed = entry_at(first + j);
                 }
             } while ((packed & ENTRY_LIGHT) == 0);
 #if OUTLINES

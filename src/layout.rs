@@ -107,6 +107,11 @@ impl ListEntry {
         [packed & ENTRY_ENTITIES, packed >> ENTRY_BITS & ENTRY_ENTITIES]
     }
 
+    /// Whether packed bits meet a light.
+    pub fn is_light(packed: u32) -> bool {
+        packed >> (2 * ENTRY_BITS) & 1 == 1
+    }
+
     /// The 32 bits that `merge_layout.glsl` takes apart.
     pub fn pack(self) -> u32 {
         match self {

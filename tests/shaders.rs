@@ -9,6 +9,7 @@ use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::bake::self_visibility::SelfVisibility;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
 use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
+use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::lists::gather::Gather;
@@ -44,8 +45,19 @@ fn sharp() -> Vec<ShaderPermutation> {
 }
 
 fn drawing() -> Vec<ShaderPermutation> {
-    let finished = |file| [false, true].map(|display| ShaderPermutation::new(file, 4).define("DISPLAY", display));
-    let fragments = ["draw.frag", "grid.frag"].into_iter().flat_map(finished);
+    let flat = [false, true].map(|display| ShaderPermutation::new("draw.frag", 4).define("DISPLAY", display));
+    let silhouette = SilhouetteOptions::default();
+    let sharp = [false, true].map(|outlines| SharpPermutation {
+        texel: true,
+        uniform: false,
+        entity_limit: 48,
+        silhouette,
+        outlines,
+        self_shadows: true,
+    });
+    let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
+    let grids = [false, true].into_iter().flat_map(|display| ways.map(|sharp| DrawGrid::row(display, sharp)));
+    let fragments = flat.into_iter().chain(grids);
     fragments
         .chain([false, true].map(Smooth::fragment))
         .chain(

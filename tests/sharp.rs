@@ -6,6 +6,7 @@ use common::{gpu, report};
 use shadow_fields::asset::embedded;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::check::sharp as check;
+use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::frame::{Frame, Options};
 use shadow_fields::scene::{LightForm, Lights, Scene};
 use shadow_fields::truth::{RayCast, RayMeshes, World, sample_vertices};
@@ -111,4 +112,32 @@ fn each_light_has_the_form_that_its_mesh_gives_it() {
     assert_eq!(form(2, Lights::Sharp), LightForm::Outline);
     assert_eq!(form(3, Lights::Sharp), LightForm::Harmonics);
     assert!((1..4).all(|entity| form(entity, Lights::Sh) == LightForm::Harmonics));
+}
+
+/// A picture of a ball over a floor of so many cells, linear RGB.
+fn picture(gpu: &common::Gpu, cells: usize, shading: Shading) -> Vec<f32> {
+    let head = HEAD.replace("cells = 60", &format!("cells = {cells}"));
+    let scene = parse(&format!(
+        "{head}[[entity]]\nmesh = \"ball\"\nposition = [0, 0.6, 0]\n\
+        [[entity]]\nmesh = \"ball\"\nposition = [1.2, 2.6, 0.8]\nscale = 0.1\nemission = [900, 900, 900]\n"
+    ));
+    let options = Options { shading, size: [160, 120], antialias: Antialias::None, ..check::sharp_options() };
+    let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), &scene, options, &|_, _, _| ()).unwrap();
+    frame.render(&scene.at(0.0), Some(4.0)).unwrap();
+    frame.picture()
+}
+
+/// On a floor of few cells pixels show what the vertices of a fine floor show, and the coarse floor's own vertices do not.
+#[test]
+fn pixels_carry_edges_that_vertices_do_not() {
+    let Some(gpu) = gpu() else { return };
+    let fine = picture(&gpu, 300, Shading::Vertex);
+    let rms = |of: &[f32]| {
+        let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
+        (of.iter().zip(&fine).map(square).sum::<f64>() / fine.len() as f64).sqrt()
+    };
+    let pixels = rms(&picture(&gpu, 12, Shading::Pixel));
+    let vertices = rms(&picture(&gpu, 12, Shading::Vertex));
+    report(&format!("on a floor of 12 cells pixels are off by {pixels:.4}, vertices by {vertices:.4}"));
+    assert!(pixels < 0.2 * vertices && vertices > 0.05, "{pixels} and {vertices}");
 }

@@ -2,7 +2,7 @@
 
 use super::output::{self, Progress};
 use crate::bake::{self, Baker, cache::Cache};
-use crate::draw::Antialias;
+use crate::draw::{Antialias, Shading};
 use crate::error::{Error, Result};
 use crate::field::Lookup;
 use crate::files;
@@ -74,6 +74,10 @@ pub struct MergeArguments {
     /// bands of spherical harmonics, as for skies and for lights whose colour varies over their surface)
     #[arg(long, value_enum, default_value = "sharp", value_name = "sh|sharp")]
     pub lights: Lights,
+    /// Where the light of sharp lights is evaluated for pictures: at the pixels of grids wherever something stands before a light, and
+    /// else at vertices; or at vertices alone
+    #[arg(long, value_enum, default_value = "pixel", value_name = "vertex|pixel")]
+    pub shading: Shading,
     /// Where the lists of the entities that concern each cluster of vertices are made. Default: device, but host for fewer than 128
     /// entities on a software device
     #[arg(long, value_name = "WHERE")]
@@ -88,7 +92,8 @@ impl MergeArguments {
     pub fn options(&self, bake: bake::Options, size: [u32; 2], antialias: Antialias) -> frame::Options {
         let (lookup, guard) = (Lookup::Trilinear, self.guard);
         let (variant, skip, eps, lists) = (self.variant, self.skip, self.eps, self.lists);
-        frame::Options { bake, lights: self.lights, lookup, variant, skip, guard, eps, lists, size, antialias }
+        let (lights, shading) = (self.lights, self.shading);
+        frame::Options { bake, lights, shading, lookup, variant, skip, guard, eps, lists, size, antialias }
     }
 }
 

@@ -5,7 +5,7 @@ use super::CheckRow;
 use crate::asset::embedded;
 use crate::bake::cache::Cache;
 use crate::bake::{self, Baker};
-use crate::draw::Antialias;
+use crate::draw::{Antialias, Shading};
 use crate::error::Result;
 use crate::field::{Lookup, Storage};
 use crate::frame::{Frame, Options};
@@ -81,6 +81,7 @@ pub fn options() -> Options {
     Options {
         bake: bake::Options { storage: Storage::F32, lattice, face_px: 16, ..Default::default() },
         lights: Lights::Sh,
+        shading: Shading::Vertex,
         lookup: Lookup::Trilinear,
         variant: Some(Variant::named("texel").expect("a variant")),
         skip: Skip::ALL,

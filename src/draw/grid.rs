@@ -4,10 +4,11 @@
 //! small triangles than for a large one of the same area. The picture is that of the triangles, except for rounding.
 
 use crate::asset::grid::{Grid, UPWARDS};
-use crate::draw::DrawnEntity;
+use crate::draw::{DrawnEntity, DrawnViewport};
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
 use crate::shaders::{Library, ShaderPermutation};
+use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -24,6 +25,10 @@ pub struct DrawnGrid {
     indices: Buffer,
     corners: Buffer,
     cells: [u32; 2],
+    /// Unit normal.
+    normal: Vec3,
+    /// Diagonal of a cell at most, metres.
+    pub reach_m: f32,
 }
 
 impl DrawnGrid {
@@ -35,7 +40,7 @@ impl DrawnGrid {
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn new(device: &Arc<Device>, grid: &Grid, centre: Vec3, place: &[u32]) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, grid: &Grid, centre: Vec3, normal: Vec3, place: &[u32]) -> Result<Self> {
         let corner = grid.corner - centre;
         let [u, v] = grid.sides;
         let positions = [corner, corner + u, corner + v, corner + u + v].map(|p| p.to_array());
@@ -52,6 +57,8 @@ impl DrawnGrid {
             indices: Buffer::with_data(device, "grid indices", &[[0_u32, 1, 2], [2, 1, 3]])?,
             corners: Buffer::with_data(device, "grid corners", &corners)?,
             cells: grid.cells,
+            normal,
+            reach_m: u.length() / columns + v.length() / rows,
         })
     }
 
@@ -74,11 +81,31 @@ struct Push {
     tag: f32,
     first: u32,
     cells: [u32; 2],
+    receiver: u32,
+    cluster_first: u32,
+    spare: [u32; 2],
+    normal: [f32; 4],
+}
+
+/// What grids read whose pixels evaluate sharp lights themselves.
+pub struct PixelLight<'d> {
+    /// [`crate::layout::Entity`] of every entity.
+    pub entities: &'d Buffer,
+    /// Nodes and cells of all silhouette fields.
+    pub silhouettes: [&'d Buffer; 2],
+    /// Entries of chains.
+    pub entries: &'d Buffer,
+    /// Of every cluster of every grid the first of its entries, and how many they are.
+    pub chains: &'d Buffer,
+    /// Light on vertices without that of sharp lights.
+    pub soft: &'d Buffer,
 }
 
 /// The pipeline.
 pub struct DrawGrid {
     pipeline: GraphicsPipeline,
+    /// The one whose pixels evaluate sharp lights, where the scene has any.
+    pixel: Option<GraphicsPipeline>,
 }
 
 impl DrawGrid {
@@ -86,10 +113,29 @@ impl DrawGrid {
     ///
     /// # Errors
     /// `Failed` when a shader does not compile.
-    pub fn new(device: &Arc<Device>, library: &Library, state: GraphicsState, display: bool) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        state: GraphicsState,
+        display: bool,
+        sharp: Option<&SharpPermutation>,
+    ) -> Result<Self> {
         let vertex = library.shader(&ShaderPermutation::new("grid.vert", 4))?;
-        let fragment = library.shader(&ShaderPermutation::new("grid.frag", 4).define("DISPLAY", display))?;
-        Ok(DrawGrid { pipeline: GraphicsPipeline::new(device, "draw grid", &vertex, &fragment, state)? })
+        let fragment = library.shader(&Self::row(display, None))?;
+        let pixel = |sharp| -> Result<GraphicsPipeline> {
+            let fragment = library.shader(&Self::row(display, Some(sharp)))?;
+            GraphicsPipeline::new(device, "draw grid pixels", &vertex, &fragment, state)
+        };
+        Ok(DrawGrid {
+            pipeline: GraphicsPipeline::new(device, "draw grid", &vertex, &fragment, state)?,
+            pixel: sharp.map(pixel).transpose()?,
+        })
+    }
+
+    /// The row of the fragment shader.
+    pub fn row(display: bool, sharp: Option<&SharpPermutation>) -> ShaderPermutation {
+        let row = ShaderPermutation::new("grid.frag", 4).define("DISPLAY", display).define("PIXEL", sharp.is_some());
+        sharp.map_or(row.clone(), |sharp| sharp.pixel_row(row))
     }
 
     /// Draws a range of one's indices in the area that was set, lit by the radiosity of all vertices.
@@ -101,18 +147,36 @@ impl DrawGrid {
         drawing: &mut Drawing<'_, 'r>,
         (grid, indices): (&'r DrawnGrid, Range<u32>),
         entity: &DrawnEntity<'r>,
-        radiosity: &'r Buffer,
+        viewport: &DrawnViewport<'r>,
         white: f32,
     ) -> Result<()> {
-        drawing.bind(&self.pipeline, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
-        let views = [TexelView::new(&grid.corners, QUADS)?, TexelView::new(radiosity, FLOATS)?];
-        drawing.resources(&views.map(Bind::Texel))?;
+        let pixel = self.pixel.as_ref().zip(viewport.pixel.as_ref()).zip(entity.cluster_first);
+        let pipeline = pixel.map_or(&self.pipeline, |((pipeline, _), _)| pipeline);
+        drawing.bind(pipeline, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
+        let texel = |buffer: &'r Buffer, format| TexelView::new(buffer, format).map(Bind::Texel);
+        let mut resources = vec![texel(&grid.corners, QUADS)?, texel(viewport.radiosity, FLOATS)?];
+        if let Some(((_, light), _)) = &pixel {
+            let [nodes, cells] = light.silhouettes;
+            resources.extend([
+                texel(light.entities, FLOATS)?,
+                texel(nodes, FLOATS)?,
+                texel(cells, vk::Format::R32G32_UINT)?,
+                texel(light.entries, vk::Format::R32_UINT)?,
+                texel(light.chains, vk::Format::R32G32_UINT)?,
+                texel(light.soft, FLOATS)?,
+            ]);
+        }
+        drawing.resources(&resources)?;
         drawing.push(&Push {
             clip_from_object: entity.clip_from_object.to_cols_array(),
             emission_white: entity.emission.extend(white).to_array(),
             tag: entity.tag,
             first: (entity.radiosity_offset / 16) as u32,
             cells: grid.cells,
+            receiver: entity.index,
+            cluster_first: entity.cluster_first.unwrap_or(0),
+            spare: [0; 2],
+            normal: grid.normal.extend(0.0).to_array(),
         });
         drawing.indexed(indices);
         Ok(())

@@ -12,7 +12,7 @@ pub mod smooth;
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
 use crate::asset::picture::srgb_from_linear;
-use crate::draw::grid::{DrawGrid, DrawnGrid};
+use crate::draw::grid::{DrawGrid, DrawnGrid, PixelLight};
 use crate::draw::smooth::Smooth;
 use crate::error::Result;
 use crate::gpu::ImageShape;
@@ -20,6 +20,7 @@ use crate::gpu::Target;
 use crate::gpu::{Access, Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
 use crate::lists::sight::{Faces, Sight};
 use crate::shaders::{Library, ShaderPermutation};
+use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
@@ -70,6 +71,17 @@ impl Antialias {
     }
 }
 
+/// Where the light of sharp lights is evaluated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Shading {
+    /// At vertices; pixels interpolate.
+    Vertex,
+    /// At the pixels of grids where something stands before a light; else at vertices.
+    #[default]
+    Pixel,
+}
+
 /// A mesh as it is drawn.
 pub enum DrawnMesh {
     /// The mesh is drawn by its triangles.
@@ -105,7 +117,7 @@ impl DrawnMesh {
         }
         if let Some(grid) = Grid::find(mesh).filter(|grid| DrawnGrid::fits(device, grid.vertices.len(), vertices)) {
             return Ok(DrawnMesh::Grid(
-                DrawnGrid::new(device, &grid, centre, &place)?,
+                DrawnGrid::new(device, &grid, centre, mesh.normals[0], &place)?,
                 Faces::of(mesh, &mesh.triangles),
             ));
         }
@@ -183,6 +195,10 @@ pub struct DrawnEntity<'d> {
     pub radiosity_offset: u64,
     /// What a picture's alpha holds where the entity is seen.
     pub tag: f32,
+    /// Its number.
+    pub index: u32,
+    /// Of a grid whose pixels evaluate sharp lights: its first cluster in [`PixelLight::chains`].
+    pub cluster_first: Option<u32>,
 }
 
 /// A region of the picture, and what is drawn there.
@@ -193,6 +209,8 @@ pub struct DrawnViewport<'d> {
     pub entities: Vec<DrawnEntity<'d>>,
     /// Radiosity of their vertices.
     pub radiosity: &'d Buffer,
+    /// What grids read whose pixels evaluate sharp lights; `None` where radiosity of vertices is all that is shown.
+    pub pixel: Option<PixelLight<'d>>,
     /// Which of the lines that pass "smooth" reads belong to this region.
     pub lines: Range<u32>,
 }
@@ -225,7 +243,7 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// For pictures of `width` x `height`.
+    /// For pictures of `width` x `height`; `sharp` where the pixels of grids are to evaluate sharp lights.
     ///
     /// # Errors
     /// `Input` when the picture is larger than the device's images.
@@ -235,6 +253,7 @@ impl Draw {
         [width, height]: [u32; 2],
         antialias: Antialias,
         finish: Finish,
+        sharp: Option<&SharpPermutation>,
     ) -> Result<Self> {
         let samples = antialias.samples(device);
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
@@ -253,7 +272,7 @@ impl Draw {
                 &fragment,
                 GraphicsState { cull: vk::CullModeFlags::BACK, ..state },
             )?,
-            grid: DrawGrid::new(device, library, state, finish == Finish::Display)?,
+            grid: DrawGrid::new(device, library, state, finish == Finish::Display, sharp)?,
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))
                 .transpose()?,
@@ -358,7 +377,7 @@ impl Draw {
                     match entity.mesh {
                         DrawnMesh::Triangles { .. } => drawing.indexed(indices),
                         DrawnMesh::Grid(grid, _) => {
-                            self.grid.record(drawing, (grid, indices), entity, viewport.radiosity, white)?;
+                            self.grid.record(drawing, (grid, indices), entity, viewport, white)?;
                         }
                     }
                 }

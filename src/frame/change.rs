@@ -2,7 +2,6 @@
 
 use super::permutation::{CompiledMerge, usable};
 use super::{Frame, Options, forms};
-use crate::draw::Draw;
 use crate::error::Result;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant};
@@ -70,7 +69,7 @@ impl Frame {
         let [draws, gathers, merges] = [drawing.into_iter().any(uses), uses("gather.comp"), uses("merge.comp")];
         if draws {
             let (Options { size, antialias, .. }, finish) = (self.options, self.picture.draw.finish());
-            self.picture.draw = Draw::new(&self.device, &self.library, size, antialias, finish)?;
+            self.picture.draw = self.draw(size, antialias, finish)?;
         }
         if gathers {
             self.work.rebuild(&self.library, self.scene.entities.len())?;

@@ -1,6 +1,7 @@
 //! How much memory a scene takes, on the device and on the host.
 
 use super::Frame;
+use super::pixel::PixelChains;
 use crate::gpu::Volume;
 use serde::Serialize;
 
@@ -39,9 +40,12 @@ impl Frame {
             fields: self.buffers.fields.size_bytes + self.merge.image.as_ref().map_or(0, Volume::size_bytes),
             transfers: self.buffers.transfers.size_bytes,
             vertices: self.buffers.vertices.size_bytes,
-            radiosity: self.radiosity.merged.size_bytes,
+            radiosity: self.radiosity.size_bytes(),
             drawables: self.buffers.meshes.iter().map(|device_mesh| device_mesh.drawn.size_bytes()).sum(),
-            lists: self.work.size_bytes() + self.sky.coefficients.all_bytes() + self.picture.lines.size_bytes(),
+            lists: self.work.size_bytes()
+                + self.sky.coefficients.all_bytes()
+                + self.picture.lines.size_bytes()
+                + self.pixel.as_ref().map_or(0, PixelChains::size_bytes),
             pictures: self.picture.readback.size_bytes + self.picture.draw.size_bytes(),
             host_lists: self.work.lists.size_bytes(),
         }

@@ -11,6 +11,7 @@ mod draw_twin;
 pub mod memory;
 mod permutation;
 mod picture;
+mod pixel;
 mod pose;
 mod radiosity;
 mod record;
@@ -23,7 +24,7 @@ mod work;
 use crate::bake::cache::Cache;
 use crate::bake::ensure::SceneProgress;
 use crate::bake::{self, Baker, SceneNeeds};
-use crate::draw::Antialias;
+use crate::draw::{Antialias, Shading};
 use crate::error::Result;
 use crate::field::Lookup;
 use crate::gpu::{Commands, Device, Timing};
@@ -37,10 +38,11 @@ use crate::merge::{Inputs, Readable};
 use crate::scene::{LightForm, Lights, Placement, Scene};
 use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
-use crate::sharp::{self, Sharp};
+use crate::sharp::{self, Sharp, SharpPermutation};
 use ash::vk;
 use permutation::{CompiledMerge, permutation, usable};
 use picture::Picture;
+use pixel::PixelChains;
 use radiosity::Radiosity;
 use sky::SkyLight;
 use std::sync::Arc;
@@ -57,6 +59,8 @@ pub struct Options {
     pub bake: bake::Options,
     /// Which lights are sharp.
     pub lights: Lights,
+    /// Where their light is evaluated for pictures.
+    pub shading: Shading,
     /// Which samples a lookup takes.
     pub lookup: Lookup,
     /// How the merge is done; `None` takes what was measured to be the device's fastest.
@@ -96,6 +100,8 @@ pub struct Frame {
     sharp: Option<Sharp>,
     work: ClusterWork,
     sky: SkyLight,
+    /// Chains of sharp lights for the pixels of grids.
+    pixel: Option<PixelChains>,
     radiosity: Radiosity,
     picture: Picture,
 }
@@ -129,12 +135,16 @@ impl Frame {
             .map(|wanted| wanted.fitting(device, buffers.sharp()))
             .map(|permutation| Sharp::new(device, library, permutation))
             .transpose()?;
-        let radiosity = Radiosity::new(device, scene, &buffers)?;
+        let radiosity = Radiosity::new(device, scene, &buffers, sharp.is_some())?;
         let mut lists = ClusterLists::default();
         for (index, entity) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
             let device_mesh = &buffers.meshes[entity.mesh];
             lists.add(index, pose::clusters(index, device_mesh, radiosity.offsets[index] / 16, options.bake.bands));
         }
+        let [nodes, cells, _] = buffers.sharp();
+        let by_pixel = options.shading == Shading::Pixel && SharpPermutation::fits_views(device, [nodes, cells]);
+        let by_pixel = sharp.as_ref().map(|sharp| sharp.permutation).filter(|_| by_pixel);
+        let pixel = by_pixel.map(|_| PixelChains::new(device, scene, &buffers)).transpose()?;
         let place = options.lists.unwrap_or_else(|| Place::quicker(device, entity_count));
         let gathers = place == Place::Device && !lists.clusters.is_empty();
         let gathering = gathers.then(|| Gathering::new(device, library, &lists, entity_count)).transpose()?;
@@ -152,7 +162,8 @@ impl Frame {
             work: ClusterWork::new(device, lists, gathering, entity_room)?,
             sky,
             radiosity,
-            picture: Picture::new(device, library, &options)?,
+            picture: Picture::new(device, library, &options, by_pixel)?,
+            pixel,
             buffers,
         })
     }
@@ -208,7 +219,7 @@ impl Frame {
     /// # Errors
     /// As [`Frame::render`].
     pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
-        self.prepare_picture(placements, &[self.whole()])?;
+        self.prepare_picture(placements, &[Viewport { by_vertex: true, ..self.whole() }])?;
         self.run(None, Some(&self.picture_work(placements, white)), true)
     }
 
@@ -217,7 +228,7 @@ impl Frame {
     /// # Errors
     /// As [`Frame::render`].
     pub fn redraw_unlit(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
-        self.prepare_picture(placements, &[Viewport { adds_emission: false, ..self.whole() }])?;
+        self.prepare_picture(placements, &[Viewport { adds_emission: false, by_vertex: true, ..self.whole() }])?;
         let picture = self.picture_work(placements, f32::INFINITY);
         self.run(None, Some(&PictureWork { background: background.into(), ..picture }), true)
     }
@@ -244,7 +255,11 @@ impl Frame {
     /// `Device` when memory ran out.
     pub fn prepare_light(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
         let (state, sights) = (self.state(placements), self.sights(placements, viewports));
-        self.work.prepare(state, sights.as_deref())
+        self.work.prepare(state, sights.as_deref())?;
+        if let Some(pixel) = self.pixel.as_mut().filter(|_| !viewports.is_empty()) {
+            pixel.prepare(&self.work.lists, &self.work.lists.now().entities)?;
+        }
+        Ok(())
     }
 
     /// What [`record()`] needs to do the merge that [`Frame::prepare_light`] has prepared; `None` where no cluster has changed. When
@@ -265,6 +280,7 @@ impl Frame {
             inputs: self.inputs()?,
             merge: &self.merge.pass,
             sharp: self.sharp.as_ref().map(|sharp| (sharp, self.sharp_inputs())),
+            soft: self.radiosity.soft(),
             radiosity: &self.radiosity.merged,
         }))
     }
@@ -278,6 +294,7 @@ impl Frame {
             cells: &self.buffers.silhouettes.cells,
             vertices: &self.buffers.vertices,
             self_cells: &self.buffers.self_cells,
+            soft: self.radiosity.soft(),
         }
     }
 

@@ -2,16 +2,18 @@
 
 use super::record::PictureWork;
 use super::room::READBACK_PIXEL_BYTES;
-use super::viewport::Viewport;
+use super::viewport::{RadiositySource, Viewport};
 use super::{Frame, Options};
 use crate::asset::edges::Edges;
 use crate::asset::picture::linear_from_srgb;
+use crate::draw::grid::PixelLight;
 use crate::draw::smooth::{Lines, Strips};
 use crate::draw::{Antialias, Draw, DrawnViewport, Finish};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image};
 use crate::scene::Placement;
 use crate::shaders::Library;
+use crate::sharp::SharpPermutation;
 use half::f16;
 use std::ops::Range;
 use std::sync::Arc;
@@ -19,6 +21,8 @@ use std::sync::Arc;
 /// What pictures are drawn by and into.
 pub(super) struct Picture {
     pub draw: Draw,
+    /// What the shader of grids is compiled for whose pixels evaluate sharp lights.
+    pub sharp: Option<SharpPermutation>,
     /// Where the host reads a picture.
     pub readback: Buffer,
     /// Outlines and creases of the picture that was prepared last.
@@ -34,9 +38,15 @@ impl Picture {
     ///
     /// # Errors
     /// As [`Draw::new`].
-    pub fn new(device: &Arc<Device>, library: &Library, options: &Options) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        options: &Options,
+        sharp: Option<SharpPermutation>,
+    ) -> Result<Self> {
         Ok(Picture {
-            draw: Draw::new(device, library, options.size, options.antialias, Finish::Linear)?,
+            draw: Draw::new(device, library, options.size, options.antialias, Finish::Linear, sharp.as_ref())?,
+            sharp,
             readback: readback(device, options.size)?,
             lines: Lines::new(device)?,
             prepared: Vec::new(),
@@ -96,6 +106,7 @@ impl Frame {
             area: viewport.area,
             entities: self.drawn_in(placements, viewport),
             radiosity: self.radiosity.source(viewport.radiosity),
+            pixel: self.pixel_light(viewport),
             lines: lines.clone(),
         };
         PictureWork {
@@ -117,6 +128,24 @@ impl Frame {
         self.picture.read()
     }
 
+    /// The pass "draw" for pictures of another kind.
+    pub(super) fn draw(&self, size: [u32; 2], antialias: Antialias, finish: Finish) -> Result<Draw> {
+        Draw::new(&self.device, &self.library, size, antialias, finish, self.picture.sharp.as_ref())
+    }
+
+    /// What the pixels of grids read that evaluate sharp lights in a viewport.
+    fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
+        let pixel = self.pixel.as_ref()?;
+        let shown = viewport.radiosity == RadiositySource::Merged && !viewport.by_vertex;
+        shown.then(|| PixelLight {
+            entities: &pixel.entities,
+            silhouettes: [&self.buffers.silhouettes.nodes, &self.buffers.silhouettes.cells],
+            entries: &pixel.entries,
+            chains: &pixel.chains,
+            soft: self.radiosity.soft(),
+        })
+    }
+
     /// Makes pictures of another size from now on.
     ///
     /// # Errors
@@ -124,7 +153,7 @@ impl Frame {
     pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
         if size != self.options.size {
             let finish = self.picture.draw.finish();
-            self.picture.draw = Draw::new(&self.device, &self.library, size, self.options.antialias, finish)?;
+            self.picture.draw = self.draw(size, self.options.antialias, finish)?;
             self.picture.readback = readback(&self.device, size)?;
             self.options.size = size;
         }
@@ -137,7 +166,7 @@ impl Frame {
     /// `Failed` when a shader does not compile.
     pub fn set_finish(&mut self, finish: Finish, antialias: Antialias) -> Result<()> {
         if (finish, antialias) != (self.picture.draw.finish(), self.options.antialias) {
-            self.picture.draw = Draw::new(&self.device, &self.library, self.options.size, antialias, finish)?;
+            self.picture.draw = self.draw(self.options.size, antialias, finish)?;
             self.options.antialias = antialias;
         }
         Ok(())
@@ -150,7 +179,7 @@ impl Frame {
     /// As [`Frame::render`].
     pub fn still(&mut self, placements: &[Placement], white: f32) -> Result<Vec<f32>> {
         self.device.settle();
-        let fine = Draw::new(&self.device, &self.library, self.options.size, Antialias::Samples, Finish::Linear)?;
+        let fine = self.draw(self.options.size, Antialias::Samples, Finish::Linear)?;
         let usual = std::mem::replace(&mut self.picture.draw, fine);
         let outcome = self.render(placements, Some(white)).map(|_| self.picture());
         self.picture.draw = usual;

@@ -10,8 +10,10 @@ use std::sync::Arc;
 /// Four floats a vertex: linear RGB radiance that leaves the surface, and 0. The vertices of one entity follow those of another, each
 /// in the order of its mesh's [`crate::scene_buffers::DeviceMesh`].
 pub(super) struct Radiosity {
-    /// What the merge writes.
+    /// Light of all lights.
     pub merged: Buffer,
+    /// Light without that of sharp lights, in a scene that has any: what the merge writes then.
+    soft: Option<Buffer>,
     /// The first byte of each entity.
     pub offsets: Vec<u64>,
     comparisons: [Option<Buffer>; 2],
@@ -22,7 +24,7 @@ impl Radiosity {
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers, sharp: bool) -> Result<Self> {
         let (mut offsets, mut size_bytes) = (Vec::new(), 0);
         for entity in &scene.entities {
             offsets.push(size_bytes);
@@ -30,7 +32,18 @@ impl Radiosity {
         }
         let mut merged = Buffer::new(device, "radiosity", BufferKind::Device, size_bytes.max(16))?;
         merged.fill(0, &vec![0.0_f32; merged.size_bytes as usize / 4])?;
-        Ok(Radiosity { merged, offsets, comparisons: Default::default() })
+        let soft = || Buffer::new(device, "soft radiosity", BufferKind::Device, merged.size_bytes);
+        Ok(Radiosity { soft: sharp.then(soft).transpose()?, merged, offsets, comparisons: Default::default() })
+    }
+
+    /// What the merge writes.
+    pub fn soft(&self) -> &Buffer {
+        self.soft.as_ref().unwrap_or(&self.merged)
+    }
+
+    /// Bytes on the device.
+    pub fn size_bytes(&self) -> u64 {
+        self.merged.size_bytes + self.soft.as_ref().map_or(0, |soft| soft.size_bytes)
     }
 
     /// Replaces an entity's values. They come in the mesh's order of vertices, which `order` lists as they are stored.

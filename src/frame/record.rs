@@ -23,6 +23,8 @@ pub struct MergeWork<'f> {
     pub(super) merge: &'f Merge,
     /// The pass of sharp lights with what it reads; `None` where the scene has none.
     pub(super) sharp: Option<(&'f Sharp, sharp::Inputs<'f>)>,
+    /// What the merge writes: all light, or what the pass of sharp lights adds to.
+    pub(super) soft: &'f Buffer,
     pub(super) radiosity: &'f Buffer,
 }
 
@@ -84,11 +86,10 @@ pub fn record<'f>(
             commands.barrier(Access::ComputeWrite, Access::ComputeRead);
             commands.barrier(Access::ComputeWrite, Access::HostRead);
         }
-        commands.pass("merge", |c| work.merge.record(c, &work.inputs, work.radiosity, work.cluster_count))?;
+        commands.pass("merge", |c| work.merge.record(c, &work.inputs, work.soft, work.cluster_count))?;
         if let Some((sharp, inputs)) = &work.sharp {
-            // The pass adds to what the merge has written.
+            // The pass reads what the merge has written.
             commands.barrier(Access::ComputeWrite, Access::ComputeRead);
-            commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
             commands.pass("sharp", |c| sharp.record(c, inputs, work.radiosity, work.cluster_count))?;
         }
     }

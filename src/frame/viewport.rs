@@ -28,12 +28,14 @@ pub struct Viewport {
     pub radiosity: RadiositySource,
     /// Whether what entities emit is added. It is not where radiosity stands for something else, as the colours of an error do.
     pub adds_emission: bool,
+    /// Whether only the radiosity of vertices is shown, and no pixel evaluates a light itself.
+    pub by_vertex: bool,
 }
 
 impl Viewport {
     /// A region that shows what the merge lights.
     pub fn merged(area: [u32; 4]) -> Self {
-        Viewport { area, radiosity: RadiositySource::Merged, adds_emission: true }
+        Viewport { area, radiosity: RadiositySource::Merged, adds_emission: true, by_vertex: false }
     }
 }
 
@@ -103,6 +105,8 @@ impl Frame {
                 emission: entity.emission,
                 radiosity_offset: self.radiosity.offsets[index],
                 tag: smooth::tag(index),
+                index: index as u32,
+                cluster_first: self.pixel.as_ref().and_then(|pixel| pixel.cluster_first(index)),
             };
             let radius_m = device_mesh.radius_m * f64::from(placement.scale);
             let distance_m = self.centre(index, placement).distance(camera.eye) - radius_m;

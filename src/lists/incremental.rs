@@ -235,6 +235,37 @@ impl ClusterLists {
         (clusters, all)
     }
 
+    /// The chains of sharp lights of all clusters of a receiver at the last update's moment, for what lies as far as `margin_m` (mesh's
+    /// frame) around their vertices. For each cluster the first of its entries and how many they are: none where no occluder stands on
+    /// them, so that light changes there no faster than vertices show.
+    pub fn sharp_chains(&self, receiver: usize, margin_m: f32) -> (Vec<[u32; 2]>, Vec<u32>) {
+        let now = self.now();
+        let entity = &now.entities[receiver];
+        let around = |bounds: &Bounds| Bounds { radius_m: bounds.radius_m + margin_m, ..*bounds };
+        let of_group = |group: &&WatchedGroup| {
+            let bounds = around(&group.bounds);
+            let candidates = Candidates::of_group(&now.scene_bounds, receiver as u32, entity, &bounds);
+            let chains = |cluster: usize| {
+                let mut entries = Vec::new();
+                let bounds = around(&self.bounds[cluster]);
+                let scope = Scope::new(&now.scene_bounds, entity, &bounds, SLACK);
+                let sharp = gather::twin(&scope, &candidates, &mut entries);
+                entries.truncate(sharp);
+                let shadowed = entries.iter().any(|&entry| !ListEntry::is_light(entry));
+                if shadowed { entries } else { Vec::new() }
+            };
+            group.clusters.clone().map(chains).collect::<Vec<_>>()
+        };
+        let groups: Vec<&WatchedGroup> = self.groups.iter().filter(|group| group.receiver == receiver).collect();
+        let found: Vec<Vec<Vec<u32>>> = groups.par_iter().map(of_group).collect();
+        let (mut places, mut all) = (Vec::new(), Vec::new());
+        for entries in found.into_iter().flatten() {
+            places.push([all.len() as u32, entries.len() as u32]);
+            all.extend(entries);
+        }
+        (places, all)
+    }
+
     /// Clusters to merge, and groups of them, for the gather on the device.
     pub fn groups(&self, dirty: &[Dirty]) -> (Vec<layout::Cluster>, Vec<gather::Group>) {
         let (mut clusters, mut groups) = (Vec::new(), Vec::new());

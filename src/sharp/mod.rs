@@ -1,8 +1,9 @@
-//! Pass "sharp": light of sharp lights on every vertex of every receiver, added to what the merge has written.
+//! Pass "sharp": light of sharp lights on every vertex of every receiver, with what the merge has written.
 //!
 //! Inputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and vertices (position and
 //! normal, object frame, two quads each). A light is cut into parts ([`crate::field::sub_light`]); in each part the visibilities past
-//! all occluders are multiplied. Output: `radiosity` as [`crate::merge`] has it, to which albedo / pi times the irradiance is added.
+//! all occluders are multiplied. Output: `radiosity`, as
+//! [`crate::merge`] has it, and albedo / pi times the irradiance of sharp lights.
 
 pub mod twin;
 
@@ -41,6 +42,13 @@ impl SharpPermutation {
         self.shared(ShaderPermutation::new("sharp.comp", 4)).define("WORKGROUP", CLUSTER_VERTICES)
     }
 
+    /// A fragment shader of grids that evaluates sharp lights. It reads everything through texel views.
+    pub fn pixel_row(&self, row: ShaderPermutation) -> ShaderPermutation {
+        SharpPermutation { texel: true, uniform: false, self_shadows: false, ..*self }
+            .shared(row)
+            .define("WORKGROUP", CLUSTER_VERTICES)
+    }
+
     /// The macros of every shader that evaluates sharp lights.
     fn shared(&self, row: ShaderPermutation) -> ShaderPermutation {
         let row = row
@@ -74,10 +82,14 @@ impl SharpPermutation {
 
     /// The permutation, with storage blocks where the device's texel views cannot hold the scene's buffers.
     pub fn fitting(self, device: &Device, [nodes, cells, self_cells]: [&Buffer; 3]) -> Self {
-        let fits = TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, nodes.size_bytes)
+        let fits = TexelView::fits(device, vk::Format::R32_UINT, self_cells.size_bytes);
+        SharpPermutation { texel: self.texel && fits && Self::fits_views(device, [nodes, cells]), ..self }
+    }
+
+    /// Whether the device's texel views hold nodes and cells of silhouette fields.
+    pub fn fits_views(device: &Device, [nodes, cells]: [&Buffer; 2]) -> bool {
+        TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, nodes.size_bytes)
             && TexelView::fits(device, vk::Format::R32G32_UINT, cells.size_bytes)
-            && TexelView::fits(device, vk::Format::R32_UINT, self_cells.size_bytes);
-        SharpPermutation { texel: self.texel && fits, ..self }
     }
 }
 
@@ -97,6 +109,8 @@ pub struct Inputs<'b> {
     pub vertices: &'b Buffer,
     /// Cells of self-visibility.
     pub self_cells: &'b Buffer,
+    /// What the merge has written.
+    pub soft: &'b Buffer,
 }
 
 /// The pipeline.
@@ -141,6 +155,7 @@ impl Sharp {
             read(inputs.vertices, quads, texel)?,
             Bind::Buffer(radiosity),
             if self_shadows { read(inputs.self_cells, vk::Format::R32_UINT, texel)? } else { Bind::None },
+            Bind::Buffer(inputs.soft),
         ];
         commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])
     }

@@ -382,3 +382,31 @@ fn a_limited_ray_is_blocked_by_what_lies_before_its_end() {
     }
     assert!(met > 300, "{met}");
 }
+
+#[test]
+fn a_budget_knows_both_orders_at_every_vertex() {
+    use shadow_fields::bench::budget::{Effort, Truth};
+    use shadow_fields::bench::cases::Case;
+    let torus = "[[mesh]]\nname = \"torus\"\ntorus = { major_m = 0.6, minor_m = 0.2, segments = 32, sides = 16 }\n\
+        [[entity]]\nmesh = \"torus\"\nposition = [0, 0.8, 0]\nrotation = { axis = [1, 0, 0], angle_deg = 50 }\n";
+    // A light in the hole, and one far above for which the order does not matter but near the torus.
+    let scene = scene(&format!(
+        "{torus}{}{}{SKY}",
+        bulb(0.1, [0.0, 0.85, 0.05]),
+        bulb(0.2, [1.0, 6.0, 0.5]).replace('9', "30")
+    ));
+    let case = Case::at_start("ring".into(), scene, Distant::Exact);
+    let effort = Effort { vertices: 150, t0_rays: 256, t1_rays: 32 };
+    let truth = Truth::new(&case, effort, 3, &|_| ());
+    truth.check(&case).unwrap();
+    let shapes = RayMeshes::new(&case.scene);
+    let world = World::new(&case.scene, &shapes, &case.scene.at(0.0));
+    let cast = RayCast { rays: 256, seed: 3, ..Default::default() };
+    for (order, found) in [(Order::Surfaces, &truth.t0), (Order::Centres, &truth.t0c)] {
+        let every: Vec<_> =
+            RayCast { order, ..cast }.run(&world, &truth.vertices).iter().map(|e| e.radiosity).collect();
+        assert_eq!(*found, every, "{order:?}");
+    }
+    let differ = truth.t0.iter().zip(&truth.t0c).filter(|(a, b)| a != b).count();
+    assert!(differ > 20 && differ < 150, "{differ} of 150");
+}

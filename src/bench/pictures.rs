@@ -46,7 +46,8 @@ pub fn pictures(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<CasePic
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, None)?;
     let found = error_map::radiosity(&frame)?;
-    frame.render(&placements, Some(case.scene.data.output.white()))?;
+    // By vertex, as the reference below: what pixels evaluate by themselves is not what vertices are judged by.
+    frame.redraw(&placements, case.scene.data.output.white())?;
     let merged = frame.picture();
 
     let share = RAYS[usize::from(!bench.quick)] / frame.receiver_vertex_count().max(1);

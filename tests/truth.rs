@@ -410,3 +410,26 @@ fn a_budget_knows_both_orders_at_every_vertex() {
     let differ = truth.t0.iter().zip(&truth.t0c).filter(|(a, b)| a != b).count();
     assert!(differ > 20 && differ < 150, "{differ} of 150");
 }
+
+#[test]
+fn a_pixel_is_lit_where_its_middle_meets_the_floor() {
+    use shadow_fields::draw::camera::clip_from_world;
+    let light = bulb(0.2, [0.3, 1.5, 0.4]);
+    let scene = scene(&format!("{light}{}", ball(0.3, [-1.0, 0.3, 0.5])));
+    let (size, cast) = ([48, 32], RayCast { rays: 64, runs: 1, ..Default::default() });
+    let lit = shadow_fields::truth::pixels::pixels(&scene, &scene.at(0.0), size, &cast);
+    let to_world = clip_from_world(&scene.data.camera, 1.5).inverse();
+    let eye = scene.data.camera.eye.as_dvec3();
+    let mut near_form = 0;
+    for (pixel, estimate) in &lit {
+        let at = [pixel % 48, pixel / 48].map(|i| i as f64 + 0.5);
+        let toward = to_world.project_point3(DVec3::new(at[0] / 24.0 - 1.0, at[1] / 16.0 - 1.0, 1.0)) - eye;
+        let place = eye - toward * (eye.y / toward.y);
+        let to = DVec3::new(0.3, 1.5, 0.4) - place;
+        let open = 0.6 * 9.0 * 0.04 / to.length_squared() * to.normalize().y;
+        assert!(place.x.abs() < 2.0 && place.z.abs() < 2.0, "the floor alone is lit: {place}");
+        assert!(estimate.radiosity[0] <= open * 1.01, "{estimate:?} at {place}, {open}");
+        near_form += usize::from((estimate.radiosity[0] / open - 1.0).abs() < 0.01);
+    }
+    assert!(lit.len() > 300 && near_form > lit.len() * 8 / 10 && near_form < lit.len(), "{near_form} of {}", lit.len());
+}

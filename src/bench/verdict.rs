@@ -272,13 +272,18 @@ pub fn budgets(budgets: &[Budget]) -> String {
 /// Table of what a person sees of the errors.
 pub fn pictures(pictures: &[CasePicture]) -> String {
     let wide = pictures.iter().map(|p| p.case.len()).max().unwrap_or(0);
-    let mut text = "What a person sees of it\n(mean FLIP between the picture of the merge and that of rays cast to the same vertices: 0 is \
-                    none, 1 the most; over all lit\nvertices the relative root mean square error, and that of the rays themselves)\n"
+    let mut text = "What a person sees of it\n(the picture lit by vertex against that of rays cast to the same vertices: mean FLIP, which \
+                    is 0 where nothing differs and at\nmost 1, the relative root mean square error over all lit vertices, and that of the \
+                    rays themselves; then the program's own\npicture against rays cast from what each pixel shows: mean FLIP, the error of \
+                    linear radiance over lit pixels, the rays' own)\n"
         .to_owned();
-    let _ = writeln!(text, "  {:<wide$}  {:>9}  {:>9}  {:>9}", "", "mean FLIP", "RMS error", "rays' own");
+    let head = ["FLIP", "RMS", "rays'", "pixel FLIP", "pixel RMS", "rays'"].map(|word| format!("{word:>11}"));
+    let _ = writeln!(text, "  {:<wide$}{}", "", head.concat());
     for p in pictures {
-        let numbers = [p.mean_flip, p.errors.rms, p.errors.reference_error].map(short);
-        let _ = writeln!(text, "  {:<wide$}  {:>9}  {:>9}  {:>9}", p.case, numbers[0], numbers[1], numbers[2]);
+        let numbers = [p.mean_flip, p.errors.rms, p.errors.reference_error];
+        let by_pixel = [p.pixels.mean_flip, p.pixels.rms, p.pixels.reference_error];
+        let cells: String = numbers.iter().chain(&by_pixel).map(|value| format!("{:>11}", short(*value))).collect();
+        let _ = writeln!(text, "  {:<wide$}{cells}", p.case);
     }
     text
 }

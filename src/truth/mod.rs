@@ -21,6 +21,7 @@
 pub mod error_map;
 pub mod exact;
 pub mod flip;
+pub mod pixels;
 pub mod ray_mesh;
 pub mod raycast;
 pub mod sequence;

@@ -80,6 +80,22 @@ impl RayMesh {
         self.nearest(origin, direction).map(|hit| hit.t)
     }
 
+    /// A ray's first intersection: its distance, the triangle's number in the mesh, and the weights of the triangle's corners there.
+    pub fn corners_hit(&self, origin: Vec3A, direction: Vec3A) -> Option<(f32, usize, [f32; 3])> {
+        let hit = self.nearest(origin, direction)?;
+        let weights = self.weights(hit.primitive_id as usize, origin + hit.t * direction);
+        Some((hit.t, self.hierarchy.primitive_indices[hit.primitive_id as usize] as usize, weights))
+    }
+
+    /// Areas of the three parts that a point cuts a triangle into, as shares; of a triangle without area, its first corner.
+    fn weights(&self, triangle: usize, at: Vec3A) -> [f32; 3] {
+        let triangle = &self.triangles[triangle];
+        let (a, b, c) = (triangle.v0 - at, triangle.v1 - at, triangle.v2 - at);
+        let areas = [b.cross(c).length(), c.cross(a).length(), a.cross(b).length()];
+        let total: f32 = areas.iter().sum();
+        if total > 0.0 { areas.map(|area| area / total) } else { [1.0, 0.0, 0.0] }
+    }
+
     fn nearest(&self, origin: Vec3A, direction: Vec3A) -> Option<RayHit> {
         let (ray, mut hit) = (Ray::new_inf(origin, direction), RayHit::none());
         // `intersect_embree` is no alternative: its distance has a scale that depends on the triangle.
@@ -97,17 +113,8 @@ impl RayMesh {
             return self.blocks(origin, direction, f32::INFINITY).then_some(Vec3::ONE);
         };
         let hit = self.nearest(origin, direction)?;
-        let triangle = &self.triangles[hit.primitive_id as usize];
-        let at = origin + hit.t * direction;
-        let (a, b, c) = (triangle.v0 - at, triangle.v1 - at, triangle.v2 - at);
-        // Areas of the three parts that the point cuts the triangle into.
-        let weights = [b.cross(c).length(), c.cross(a).length(), a.cross(b).length()];
-        let total: f32 = weights.iter().sum();
+        let weights = self.weights(hit.primitive_id as usize, origin + hit.t * direction);
         let corners = &colors[hit.primitive_id as usize];
-        Some(if total > 0.0 {
-            corners.iter().zip(weights).map(|(color, weight)| *color * (weight / total)).sum()
-        } else {
-            corners[0]
-        })
+        Some(corners.iter().zip(weights).map(|(color, weight)| *color * weight).sum())
     }
 }

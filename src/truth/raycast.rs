@@ -97,19 +97,28 @@ impl Radiance<'_> {
 impl RayCast {
     /// Radiosity of the given vertices.
     pub fn run(&self, world: &World<'_>, vertices: &[Vertex]) -> Vec<Estimate> {
+        let radiance = self.radiance(world);
+        vertices.par_iter().map(|&vertex| self.point(world, &radiance, &world.view(vertex), vertex)).collect()
+    }
+
+    /// Radiosity of points of surfaces. A point's entity reflects, and its index decides the rays.
+    pub fn run_at(&self, world: &World<'_>, points: &[(Vertex, VertexView)]) -> Vec<Estimate> {
+        let radiance = self.radiance(world);
+        points.par_iter().map(|(key, view)| self.point(world, &radiance, view, *key)).collect()
+    }
+
+    fn radiance<'w>(&self, world: &World<'w>) -> Radiance<'w> {
         assert!(self.runs >= 1 && self.rays >= self.runs, "{} rays in {} runs", self.rays, self.runs);
         let environment = &world.scene.environment;
-        let radiance = match self.distant {
+        match self.distant {
             _ if environment.is_none() => Radiance::None,
             Distant::Exact => Radiance::Exact(environment),
             Distant::Bands(bands) => Radiance::Bands(bands, Box::new(environment.coefficients(bands))),
-        };
-        vertices.par_iter().map(|&vertex| self.vertex(world, &radiance, vertex)).collect()
+        }
     }
 
-    fn vertex(&self, world: &World<'_>, radiance: &Radiance<'_>, vertex: Vertex) -> Estimate {
-        let view = world.view(vertex);
-        let mut occluders = world.occluders(&view);
+    fn point(&self, world: &World<'_>, radiance: &Radiance<'_>, view: &VertexView, vertex: Vertex) -> Estimate {
+        let mut occluders = world.occluders(view);
         occluders.retain(|occluder| occluder.rises_above(view.normal));
         // Near occluders come first, because they are the most likely to block a ray.
         occluders.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
@@ -117,10 +126,10 @@ impl RayCast {
             occluders.clear();
         }
         let lights: Vec<Shadowed> = world
-            .lights(&view)
+            .lights(view)
             .into_iter()
             .filter(|light| light.rises_above(view.normal))
-            .map(|light| Shadowed::new(&view, light, &occluders, self.order))
+            .map(|light| Shadowed::new(view, light, &occluders, self.order))
             .collect();
 
         let albedo = world.scene.entities[vertex.entity].albedo.as_dvec3();
@@ -132,9 +141,9 @@ impl RayCast {
                     [u64::from(run), vertex.entity as u64, (vertex.index as u64) << 16 | stream as u64],
                 )
             };
-            let mut found = self.sky(world, &view, &occluders, radiance, sequence(0));
+            let mut found = self.sky(world, view, &occluders, radiance, sequence(0));
             for (stream, light) in lights.iter().enumerate() {
-                found += self.light(world, &view, light, sequence(1 + stream));
+                found += self.light(world, view, light, sequence(1 + stream));
             }
             found *= albedo / PI;
             sum += found;

@@ -97,22 +97,21 @@ impl<'s> World<'s> {
 
     /// A vertex's view of the world.
     pub fn view(&self, vertex: Vertex) -> VertexView {
-        let placed = &self.entities[vertex.entity];
         let mesh = &self.scene.meshes[self.scene.entities[vertex.entity].mesh];
         let (centre, radius_m) = mesh.bounding_sphere();
         let local = (mesh.positions[vertex.index].as_dvec3() - centre.as_dvec3()) / f64::from(radius_m);
-        let normal = mesh.normals[vertex.index].as_dvec3();
+        self.surface(vertex.entity, local, mesh.normals[vertex.index].as_dvec3())
+    }
+
+    /// The view from a point of an entity's surface, given in bounding radii from the centre of its mesh, with the normal there.
+    pub fn surface(&self, entity: usize, local: DVec3, normal: DVec3) -> VertexView {
+        let placed = &self.entities[entity];
         let place = |local: DVec3| placed.centre + placed.rotation * (local * placed.radius_m);
         let own = placed.mesh.self_shadowing.then(|| {
             let eye = local + f64::from(TRANSFER_OFFSET) * normal;
-            EntityView { origin: eye.as_vec3a(), ..self.sight(vertex.entity, place(eye)) }
+            EntityView { origin: eye.as_vec3a(), ..self.sight(entity, place(eye)) }
         });
-        VertexView {
-            position: place(local),
-            normal: (placed.rotation * normal).normalize(),
-            own,
-            entity: vertex.entity,
-        }
+        VertexView { position: place(local), normal: (placed.rotation * normal).normalize(), own, entity }
     }
 
     /// The entity as seen from a point.
@@ -159,6 +158,17 @@ impl<'s> World<'s> {
             let local = own.to_object * direction.as_vec3a();
             placed.mesh.blocks(own.origin, local, (limit_m / placed.radius_m) as f32)
         })
+    }
+
+    /// Where a ray (unit direction) meets the entity first, in bounding radii from the centre of its mesh, and the normal there as
+    /// smooth shading interpolates it; `None` if it misses.
+    pub fn surface_hit(&self, sight: &EntityView, direction: DVec3) -> Option<(DVec3, DVec3)> {
+        let direction = sight.to_object * direction.as_vec3a();
+        let (distance, triangle, weights) = self.entities[sight.entity].mesh.corners_hit(sight.origin, direction)?;
+        let mesh = &self.scene.meshes[self.scene.entities[sight.entity].mesh];
+        let corners = mesh.triangles[triangle].iter().zip(weights);
+        let normal: DVec3 = corners.map(|(i, w)| mesh.normals[*i as usize].as_dvec3() * f64::from(w)).sum();
+        Some(((sight.origin + distance * direction).as_dvec3(), normal.normalize_or(DVec3::Y)))
     }
 
     /// Distance in metres at which a ray (unit direction) meets the entity first; `None` if it misses.

@@ -49,7 +49,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         return context.finish();
     }
     output::say(
-        "Relative RMS error over vertices, by cause (p99 and max of the total); mean FLIP between the picture and its ray-cast twin",
+        "Relative RMS error over vertices, by cause (p99 and max of the total); mean FLIP of the picture lit by vertex; error and mean FLIP at pixels",
     );
     let rows: Vec<Vec<String>> = outcome
         .budgets
@@ -61,7 +61,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
                 [b.centre_rule.rms, b.bands.rms, b.sampling.rms, b.arithmetic_and_storage.rms, b.total.rms].map(three),
             );
             row.push(b.sharp_total.map_or("-".into(), |d| three(d.rms)));
-            row.extend([b.total.p99, b.total.max, b.t0_error, p.mean_flip].map(three));
+            row.extend(
+                [b.total.p99, b.total.max, b.t0_error, p.mean_flip, p.pixels.rms, p.pixels.mean_flip].map(three),
+            );
             row
         })
         .collect();
@@ -78,6 +80,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             "max",
             "T0 error",
             "mean FLIP",
+            "pixel RMS",
+            "pixel FLIP",
         ],
         &rows,
     );

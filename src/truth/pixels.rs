@@ -1,0 +1,47 @@
+//! T0 at pixels: what the middle of each pixel shows of the scene, lit by rays from there.
+
+use super::raycast::{Estimate, RayCast};
+use super::world::{VertexView, World};
+use super::{RayMeshes, Vertex};
+use crate::draw::camera::clip_from_world;
+use crate::scene::{Placement, Scene};
+use glam::{DVec3, DVec4};
+use rayon::prelude::*;
+
+/// Pixels that show a lit surface, and the linear RGB radiance that leaves it, without emission. `cast` decides the rays a pixel.
+/// Pixels are numbered row by row from the top left. What emits or is not lit is left out, as is the sky.
+pub fn pixels(
+    scene: &Scene,
+    placements: &[Placement],
+    [width, height]: [u32; 2],
+    cast: &RayCast,
+) -> Vec<(usize, Estimate)> {
+    let shapes = RayMeshes::new(scene);
+    let world = World::new(scene, &shapes, placements);
+    let camera = &scene.data.camera;
+    let eye = camera.eye.as_dvec3();
+    let to_world = clip_from_world(camera, f64::from(width) / f64::from(height)).inverse();
+    let surface = |pixel: u32| {
+        let at = |place: u32, size: u32| 2.0 * (f64::from(place) + 0.5) / f64::from(size) - 1.0;
+        let near = to_world * DVec4::new(at(pixel % width, width), at(pixel / width, height), 1.0, 1.0);
+        let direction = (near.truncate() / near.w - eye).normalize();
+        let (entity, view) = seen(&world, eye, direction)?;
+        let entity_data = &scene.entities[entity];
+        (entity_data.receives && !entity_data.emits).then_some((Vertex { entity, index: pixel as usize }, view))
+    };
+    let points: Vec<(Vertex, VertexView)> = (0..width * height).into_par_iter().filter_map(surface).collect();
+    let lit = cast.run_at(&world, &points);
+    points.iter().zip(lit).map(|((key, _), estimate)| (key.index, estimate)).collect()
+}
+
+/// The entity that a ray meets first, and the place where it does, with the normal of smooth shading.
+fn seen(world: &World<'_>, eye: DVec3, direction: DVec3) -> Option<(usize, VertexView)> {
+    let all = (0..world.entities.len()).filter_map(|entity| {
+        let sight = world.sight(entity, eye);
+        Some((entity, world.first_hit_m(&sight, direction)?))
+    });
+    let (entity, _) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (local, normal) = world.surface_hit(&world.sight(entity, eye), direction)?;
+    // Seen from behind, a surface is lit as it is drawn: by its normal.
+    Some((entity, world.surface(entity, local, normal)))
+}

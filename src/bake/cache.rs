@@ -1,17 +1,18 @@
 //! The cache of what is baked: fields, silhouette fields, transfer vectors and self-visibility. Names are hashes of the mesh's content and of everything
 //! else that decides the numbers. One function, [`Cache::find`], serves all kinds; a [`Shelf`] says where one kind is kept.
 
+pub use super::names::field_name;
+use super::names::{SelfVisibilityHeader, TransferHeader, identity, key, silhouette_identity, silhouette_name};
 use super::partial::Partial;
 use super::silhouette::{bake_silhouette, silhouette_header};
-use super::{BakeReport, Baker, Options, Progress, TRANSFER_OFFSET};
+use super::{BakeReport, Baker, Options, Progress};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
-use crate::field::file::{self, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC, VERSION};
+use crate::field::file::{self, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC};
 use crate::field::quantity::channel_stride;
 use crate::field::silhouette::{SilhouetteField, SilhouetteHeader};
-use crate::field::{FieldHeader, ShadowField, Shortcuts, self_visibility};
+use crate::field::{FieldHeader, ShadowField, self_visibility};
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -50,88 +51,6 @@ const SELF_VISIBILITY: Shelf<Vec<u8>> =
 
 /// What the cache held or a bake has made, and the report of the bake, if there was one.
 pub type Found<T> = (Arc<T>, Option<BakeReport>);
-
-/// The header of a cached transfer file: everything that decides transfer vectors.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct TransferHeader {
-    mesh_hash: String,
-    bands: usize,
-    face_px: u32,
-    #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
-    shortcuts: Shortcuts,
-    offset: f32,
-    vertex_count: usize,
-}
-
-impl TransferHeader {
-    fn new(mesh: &Mesh, options: &Options) -> Self {
-        TransferHeader {
-            mesh_hash: super::hash_text(mesh),
-            bands: options.bands,
-            face_px: options.face_px,
-            shortcuts: options.shortcuts,
-            offset: TRANSFER_OFFSET,
-            vertex_count: mesh.positions.len(),
-        }
-    }
-}
-
-/// The header of a cached file of self-visibility: everything that decides it.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct SelfVisibilityHeader {
-    mesh_hash: String,
-    face_px: u32,
-    #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
-    shortcuts: Shortcuts,
-    offset: f32,
-    side: usize,
-    rim: f64,
-    limit_rad: f64,
-    vertex_count: usize,
-}
-
-impl SelfVisibilityHeader {
-    fn new(mesh: &Mesh, options: &Options) -> Self {
-        SelfVisibilityHeader {
-            mesh_hash: super::hash_text(mesh),
-            face_px: options.face_px,
-            // Every vertex is captured, whether the mesh has symmetries or not.
-            shortcuts: Shortcuts { symmetry: true, ..options.shortcuts },
-            offset: TRANSFER_OFFSET,
-            side: self_visibility::SIDE,
-            rim: self_visibility::RIM,
-            limit_rad: self_visibility::LIMIT_RAD,
-            vertex_count: mesh.positions.len(),
-        }
-    }
-}
-
-fn key(header: &impl Serialize) -> String {
-    let text = serde_json::to_vec(header).expect("headers are plain data");
-    blake3::Hasher::new().update(&VERSION.to_le_bytes()).update(&text).finalize().to_hex()[..32].to_owned()
-}
-
-/// What decides a field: its header without the mesh's name and without what only the bake finds out.
-fn identity(header: &FieldHeader) -> FieldHeader {
-    FieldHeader {
-        mesh: String::new(),
-        filled_samples: 0,
-        captured_samples: 0,
-        symmetry: String::new(),
-        growth: 0.0,
-        ..header.clone()
-    }
-}
-
-/// The name of a field in the cache. Fields with equal content have equal names.
-pub fn field_name(header: &FieldHeader) -> String {
-    key(&identity(header))
-}
-
-/// What decides a silhouette field: its header without the mesh's name.
-fn silhouette_identity(header: &SilhouetteHeader) -> SilhouetteHeader {
-    SilhouetteHeader { mesh: String::new(), ..header.clone() }
-}
 
 impl Cache {
     /// A cache below `folder`, or in memory if there is none.
@@ -189,7 +108,7 @@ impl Cache {
 
     /// Whether the silhouette field of a mesh is there.
     pub fn has_silhouette(&self, mesh: &Mesh, options: &Options) -> bool {
-        self.has(&SILHOUETTES, &key(&silhouette_identity(&silhouette_header(mesh, options.silhouette))))
+        self.has(&SILHOUETTES, &silhouette_name(mesh, options))
     }
 
     /// Whether the transfer vectors of a mesh are there.
@@ -236,7 +155,7 @@ impl Cache {
         let header = silhouette_header(mesh, options.silhouette);
         self.find(
             &SILHOUETTES,
-            key(&silhouette_identity(&header)),
+            silhouette_name(mesh, options),
             |path| read_silhouette(path, &header),
             |_| bake_silhouette((baker.device(), baker.library()), mesh, options.silhouette, progress),
             |path, field| field.write(path),
@@ -344,74 +263,4 @@ fn read_payload<H: PartialEq + DeserializeOwned>(
 fn doubt<T>(path: &Path, why: &dyn std::fmt::Display) -> Option<T> {
     log::warn!("{}: {why}; baking anew", path.display());
     None
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::asset::generate;
-    use crate::bake::silhouette::SilhouetteOptions;
-    use crate::field::{FieldKind, Storage};
-    use std::collections::BTreeSet;
-
-    /// Names of occlusion field, radiance field, transfer vectors, self-visibility and silhouette field.
-    fn names(mesh: &Mesh, options: &Options) -> [String; 5] {
-        let field = |kind| field_name(&crate::bake::header(mesh, kind, options));
-        let own = [key(&TransferHeader::new(mesh, options)), key(&SelfVisibilityHeader::new(mesh, options))];
-        let [transfer, self_visibility] = own;
-        let outlines = key(&silhouette_identity(&silhouette_header(mesh, options.silhouette)));
-        [field(FieldKind::Occlusion), field(FieldKind::Radiance), transfer, self_visibility, outlines]
-    }
-
-    /// Each option that is flipped changes the names of what it decides, and no other names.
-    #[test]
-    fn every_option_is_part_of_the_names_that_it_decides() {
-        let mesh = generate::torus_two_colour(1.0, 0.3, 12, 6);
-        let base = Options::default();
-        // A new option does not compile here until it has a row below.
-        let Options { bands, field_bands, storage, lattice, face_px, shortcuts, silhouette } = base;
-        let Shortcuts { symmetry, faces, inside } = shortcuts;
-        assert!(field_bands.is_none() && storage == Storage::F16);
-        let shortcuts = |shortcuts| Options { shortcuts, ..base };
-        let all = [true, true, true, true, false];
-        let silhouettes = |silhouette| Options { silhouette, ..base };
-        let SilhouetteOptions { cells, map_px, view_px } = silhouette;
-        let outlines = [false, false, false, false, true];
-        let flipped: Vec<(&str, Options, [bool; 5])> = vec![
-            ("bands", Options { bands: bands + 1, ..base }, [true, true, true, false, false]),
-            ("field_bands", Options { field_bands: Some(bands + 2), ..base }, [true, false, false, false, false]),
-            ("storage", Options { storage: Storage::F32, ..base }, [true, true, false, false, false]),
-            ("lattice", Options { lattice: "cube:4x3".parse().unwrap(), ..base }, [true, true, false, false, false]),
-            ("face_px", Options { face_px: face_px / 2, ..base }, all),
-            ("symmetry", shortcuts(Shortcuts { symmetry: !symmetry, faces, inside }), [true, true, true, false, false]),
-            ("faces", shortcuts(Shortcuts { symmetry, faces: !faces, inside }), all),
-            ("inside", shortcuts(Shortcuts { symmetry, faces, inside: !inside }), all),
-            ("cells", silhouettes(SilhouetteOptions { cells: 2 * cells, ..silhouette }), outlines),
-            ("map_px", silhouettes(SilhouetteOptions { map_px: 2 * map_px, ..silhouette }), outlines),
-            ("view_px", silhouettes(SilhouetteOptions { view_px: 2 * view_px, ..silhouette }), outlines),
-        ];
-        assert_ne!(lattice, flipped[3].1.lattice);
-        let usual = names(&mesh, &base);
-        let mut distinct = BTreeSet::new();
-        for (option, options, decides) in flipped {
-            let found = names(&mesh, &options);
-            for ((name, usual), decides) in found.iter().zip(&usual).zip(decides) {
-                assert_eq!(name != usual, decides, "{option}");
-                assert!(!decides || distinct.insert(name.clone()), "{option}: the name of another option's change");
-            }
-        }
-    }
-
-    /// Fields that were baked before shortcuts had a place in headers are still found: with all shortcuts on, the name is the old one.
-    #[test]
-    fn headers_leave_out_shortcuts_that_are_all_on() {
-        let header = crate::bake::header(&generate::sphere(1.0, 1), FieldKind::Occlusion, &Options::default());
-        let text = serde_json::to_string(&header).unwrap();
-        assert!(!text.contains("shortcuts"), "{text}");
-        assert_eq!(serde_json::from_str::<FieldHeader>(&text).unwrap(), header);
-        let shortcuts = Shortcuts { symmetry: false, ..Shortcuts::default() };
-        let changed = FieldHeader { shortcuts, ..header };
-        let text = serde_json::to_string(&changed).unwrap();
-        assert_eq!(serde_json::from_str::<FieldHeader>(&text).unwrap(), changed);
-    }
 }

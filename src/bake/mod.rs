@@ -16,6 +16,7 @@ pub mod chunk;
 pub mod ensure;
 mod header;
 pub mod inside;
+mod names;
 
 pub mod partial;
 pub mod project;

@@ -1,0 +1,52 @@
+//! What a user chooses of how pictures are drawn.
+
+use crate::gpu::Device;
+use ash::vk;
+
+/// What a picture is made for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Finish {
+    /// Linear radiance in half floats, for files and further work.
+    #[default]
+    Linear,
+    /// 8 bits, sRGB, with white at its brightest, for a screen. Samples are averaged after encoding.
+    Display,
+}
+
+/// How the edges of what is drawn are kept from showing as stairs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Antialias {
+    /// One sample a pixel; edges show as stairs.
+    None,
+    /// One sample a pixel, and outlines and creases smoothed by pass "smooth".
+    Outlines,
+    /// Four samples a pixel where the device can.
+    #[default]
+    Samples,
+}
+
+impl Antialias {
+    /// What a device draws at interactive rates. On a GPU four samples cost little; a software device stores and averages each.
+    pub fn usual(device: &Device) -> Self {
+        if device.info.is_software() { Antialias::Outlines } else { Antialias::Samples }
+    }
+
+    /// Samples a pixel on a device.
+    pub(super) fn samples(self, device: &Device) -> u32 {
+        let limits = &device.limits;
+        let offered = limits.framebuffer_color_sample_counts & limits.framebuffer_depth_sample_counts;
+        if self == Antialias::Samples && offered.contains(vk::SampleCountFlags::TYPE_4) { 4 } else { 1 }
+    }
+}
+
+/// Where the light of sharp lights is evaluated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Shading {
+    /// At vertices; pixels interpolate.
+    Vertex,
+    /// At the pixels of grids where something stands before a light; else at vertices.
+    #[default]
+    Pixel,
+}

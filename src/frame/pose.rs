@@ -6,10 +6,10 @@ use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::lists::gather::{Bounds, EntityBounds, SceneBounds};
+use crate::lists::gather::{Bounds, EntityBounds, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::Faces;
-use crate::scene::{LightForm, Placement};
+use crate::scene::{Entity, LightForm, Placement};
 use crate::scene_buffers::{self, FieldSlot};
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use crate::sh::cube::{self, FACE_COUNT, texel_st};
@@ -27,9 +27,22 @@ impl Frame {
         let eps = f64::from(self.options.eps) * white;
         State {
             entities: placements.iter().enumerate().map(|(index, p)| self.entity(index, p)).collect(),
-            scene_bounds: SceneBounds::new(bounds, sky, self.options.skip, eps),
+            scene_bounds: SceneBounds {
+                outlines: self.outlines_at(placements),
+                ..SceneBounds::new(bounds, sky, self.options.skip, eps)
+            },
             placements: placements.to_vec(),
         }
+    }
+
+    /// Outlines of all entities, if any light is sharp.
+    fn outlines_at(&self, placements: &[Placement]) -> Vec<Option<OutlineView>> {
+        let outline = |(entity, placement): (&Entity, &Placement)| {
+            let slot = self.buffers.meshes[entity.mesh].silhouette.as_ref().filter(|_| entity.occludes)?;
+            Some(OutlineView { field: slot.field.clone(), to_object: placement.turn().inverse() })
+        };
+        let all = || self.scene.entities.iter().zip(placements).map(outline).collect();
+        self.sharp.as_ref().map_or(Vec::new(), |_| all())
     }
 
     fn entity_bounds(&self, index: usize, placement: &Placement) -> EntityBounds {

@@ -18,7 +18,7 @@
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{self, ENTRY_BITS, ListEntry};
-pub use crate::lists::scene_bounds::{Bounds, Counts, EntityBounds, Light, SceneBounds, distance_key};
+pub use crate::lists::scene_bounds::{Bounds, Counts, EntityBounds, Light, OutlineView, SceneBounds, distance_key};
 use crate::lists::scope::{CullResult, View};
 pub use crate::lists::scope::{SLACK, Scope};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD, Skip};
@@ -118,6 +118,7 @@ pub fn counts(scope: &Scope<'_>, receiver: u32) -> Counts {
             CullResult::BelowHorizon => counts.below_horizon += lookups,
             CullResult::BehindLight => counts.behind_light += lookups,
             CullResult::Apart => counts.apart += lookups,
+            CullResult::PassedBy => counts.passed_by += lookups,
             CullResult::FacingAway => counts.facing_away += lookups,
             CullResult::BelowEps(bound) => {
                 counts.below_eps += lookups;
@@ -143,7 +144,11 @@ fn walk(
         |light: Option<(u32, &View)>, sharp, radiance: f32, out: &mut Vec<u32>, tell: &mut dyn FnMut(_, _)| {
             let (light, light_view) = light.unzip();
             for (&entity, view) in candidates.occluders.iter().zip(&views).filter(|(j, _)| light != Some(**j)) {
-                let result = scope.occluder_result(view, light_view, sharp, radiance);
+                let mut result = scope.occluder_result(view, light_view, sharp, radiance);
+                let light_sphere = light.map(|l| spheres[l as usize]).filter(|_| sharp && result == CullResult::Listed);
+                if light_sphere.is_some_and(|sphere| scope.passes_by(entity as usize, sphere)) {
+                    result = CullResult::PassedBy;
+                }
                 let listed = result == CullResult::Listed;
                 let (whole, cap) = (view.whole || sharp, view.cap && !sharp);
                 tell(if listed && !whole { CullResult::Cap } else { result }, 1);

@@ -1,12 +1,14 @@
 //! What cluster lists are made from at one time: bounds of clusters, bounds of entities and lights. And counts of what the lists
 //! leave off.
 
+use crate::field::silhouette::SilhouetteField;
 use crate::lists::skip::Skip;
 use crate::lists::tree::Tree;
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3};
 use serde::Serialize;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Angle by which cones are widened: their cosines are stored in f32, which near 1 tells angles apart by 0.00035 rad only.
 const CONE_ROUNDING_RAD: f64 = 1e-3;
@@ -88,6 +90,15 @@ pub struct EntityBounds {
     pub facing: Option<(DVec3, f64)>,
 }
 
+/// The outline of an occluder at one time.
+#[derive(Clone)]
+pub struct OutlineView {
+    /// Its silhouette field.
+    pub field: Arc<SilhouetteField>,
+    /// Rotation from the world to the object.
+    pub to_object: DQuat,
+}
+
 /// A light as the gather sees it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -111,6 +122,8 @@ pub struct SceneBounds {
     pub entities: Vec<EntityBounds>,
     /// Their bounding spheres: centre in the world and radius, metres.
     pub spheres: Vec<[f32; 4]>,
+    /// Outlines of those that have a silhouette field, by entity; empty where no light is sharp.
+    pub outlines: Vec<Option<OutlineView>>,
     /// Those that occlude.
     pub tree: Tree,
     /// Indices of those that occlude.
@@ -148,7 +161,8 @@ impl SceneBounds {
         let sky = sky.map(|sky| sky as f32);
         let brightest = lights.iter().map(|light| light.radiance).fold(sky.unwrap_or(0.0), f32::max);
         let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));
-        SceneBounds { tree, occluders, lights, sky, brightest, skip, eps: eps as f32, spheres, entities }
+        let outlines = Vec::new();
+        SceneBounds { outlines, tree, occluders, lights, sky, brightest, skip, eps: eps as f32, spheres, entities }
     }
 
     /// Whether lists of the other moment hold here too where no entity has changed.
@@ -190,6 +204,8 @@ pub struct Counts {
     pub facing_away: u64,
     /// Lights and occluders bounded below eps.
     pub below_eps: u64,
+    /// Occluders that every ray from the cluster to a sharp light passes by.
+    pub passed_by: u64,
     /// Occluders that stand on the list as a cap alone.
     pub caps: u64,
     /// Entities that cast shadows or shine by a field of nothing but zeros, and are left off everywhere.
@@ -212,6 +228,7 @@ impl std::ops::AddAssign for Counts {
         self.apart += other.apart;
         self.facing_away += other.facing_away;
         self.below_eps += other.below_eps;
+        self.passed_by += other.passed_by;
         self.caps += other.caps;
         self.empty += other.empty;
         self.unseen += other.unseen;

@@ -104,6 +104,8 @@ skips! {
     always {
         /// Lights whose radiance field is zero on the side of a cluster.
         facing: Exact, "lists/scope.rs light_result", "facing_away";
+        /// Occluders that every ray from a cluster to a sharp light passes by, on lists that the host makes.
+        outlines: Exact, "lists/scope.rs passes_by", "passed_by";
         /// Entities whose field holds nothing but zeros.
         empty: Exact, "frame/pose.rs entity_bounds", "empty";
         /// Entities that nothing but themselves is lit by: their fields are not baked.

@@ -37,9 +37,10 @@ pub struct Arguments {
 }
 
 /// The scenes in the order of the table, and whether each is animated too.
-const SCENES: [(&str, bool); 5] = [
+const SCENES: [(&str, bool); 6] = [
     ("sphere_over_plane", false),
     ("torus_over_plane", true),
+    ("small_lights", false),
     ("teapot_lights", false),
     ("glowing_torus", false),
     ("twelve_instances", true),
@@ -179,7 +180,7 @@ fn still(
             let wall = start.elapsed().as_secs_f64() * 1e3;
             if index >= 2 {
                 let of = |name: &str| passes.iter().find(|t| t.pass == name).map_or(0.0, |t| t.milliseconds);
-                times.merge.push(of("merge"));
+                times.merge.push(of("merge") + of("sharp"));
                 times.draw.push(of("draw") + of("smooth"));
                 times.whole.push(wall);
             }

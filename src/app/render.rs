@@ -9,7 +9,7 @@ use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame, PictureMemory};
 use crate::gpu::Timing;
-use crate::scene::{Placement, Scene, values::NUMBER_LIMIT};
+use crate::scene::{LightForm, Placement, Scene, values::NUMBER_LIMIT};
 use crate::text;
 use crate::truth::{self, ErrorMap, error_map, raycast::RayCast};
 use clap::Args;
@@ -239,6 +239,7 @@ impl<'a> Rendering<'a> {
             "entities": self.scene.entities.len(),
             "receiver_vertices": frame.receiver_vertex_count(),
             "variant": frame.variant().name,
+            "lights": self.lights(),
             "lookups": frame.counts(&self.last()),
             "last_frame": last_frame,
             "memory_bytes": frame.memory(),
@@ -247,13 +248,22 @@ impl<'a> Rendering<'a> {
             "error": error,
             "options": {
                 "bake": options.bake, "lattice": options.bake.lattice.to_string(), "skip": options.skip,
-                "eps": options.eps,
+                "eps": options.eps, "lights": options.lights, "shading": options.shading,
                 "size": options.size, "antialias": options.antialias,
             },
             "prepare_ms": self.prepared.as_secs_f64() * 1e3,
             "baked": frame.buffers.baked,
             "frames": pictures.collect::<Vec<_>>(),
         })
+    }
+
+    /// Every light, and how it is computed.
+    fn lights(&self) -> Vec<serde_json::Value> {
+        let entities = self.scene.entities.iter().enumerate().filter(|(_, entity)| entity.emits);
+        let form = |index| LightForm::of(self.scene, index, self.options.lights).name();
+        let local = entities.map(|(index, entity)| json!({ "entity": entity.name, "form": form(index) }));
+        let distant = (!self.scene.environment.is_none()).then(|| json!({ "form": LightForm::Harmonics.name() }));
+        local.chain(distant.into_iter()).collect()
     }
 
     /// One line for people.

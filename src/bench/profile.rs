@@ -12,7 +12,7 @@ use crate::gpu::census::{Census, disassemble};
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, VARIANTS, Variant};
 use crate::merge::workload::Workload;
-use crate::scene::Scene;
+use crate::scene::{Lights, Scene};
 use crate::shaders::Library;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -219,6 +219,8 @@ pub fn scene(
         let options = crate::frame::Options {
             guard: contender.guard,
             variant: Some(contender.variant),
+            // A pair of the merge is one of harmonics; sharp lights are timed by themselves below.
+            lights: Lights::Sh,
             size,
             ..super::default_options()
         };
@@ -236,6 +238,10 @@ pub fn scene(
             }
             *pairs = 64 * frame.merged().merged_entries as u64;
         }
+    }
+    let sharp = bench.pass_times(scene, crate::frame::Options { size, ..super::default_options() }, "sharp", runs)?;
+    if !sharp.is_empty() {
+        others.insert("sharp".into(), sharp);
     }
     for (contender, frame, times, pairs) in &frames {
         let permutation = frame.permutation();

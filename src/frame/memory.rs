@@ -10,6 +10,8 @@ use serde::Serialize;
 pub struct Memory {
     /// Fields.
     pub fields: u64,
+    /// Silhouette fields and self-visibility, for sharp lights.
+    pub silhouettes: u64,
     /// Transfer vectors.
     pub transfers: u64,
     /// Positions and normals that the merge reads.
@@ -29,7 +31,14 @@ pub struct Memory {
 impl Memory {
     /// All bytes on the device, or visible to it.
     pub fn device(&self) -> u64 {
-        self.fields + self.transfers + self.vertices + self.radiosity + self.drawables + self.lists + self.pictures
+        self.fields
+            + self.silhouettes
+            + self.transfers
+            + self.vertices
+            + self.radiosity
+            + self.drawables
+            + self.lists
+            + self.pictures
     }
 }
 
@@ -38,6 +47,7 @@ impl Frame {
     pub fn memory(&self) -> Memory {
         Memory {
             fields: self.buffers.fields.size_bytes + self.merge.image.as_ref().map_or(0, Volume::size_bytes),
+            silhouettes: self.buffers.sharp().map(|buffer| buffer.size_bytes).iter().sum(),
             transfers: self.buffers.transfers.size_bytes,
             vertices: self.buffers.vertices.size_bytes,
             radiosity: self.radiosity.size_bytes(),

@@ -24,7 +24,7 @@ pub(super) fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
             names.push(&timing.pass);
         }
     }
-    let order = ["merge", "draw", "show"];
+    let order = ["merge", "sharp", "draw", "show"];
     names.sort_by_key(|name| order.iter().position(|o| o == name).unwrap_or(order.len()));
     let total = |frame: &Vec<Timing>| frame.iter().map(|t| t.milliseconds).sum::<f64>();
     // The range leaves out the slowest few frames, because the first frame compiles shaders.

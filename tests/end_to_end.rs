@@ -248,7 +248,8 @@ fn demo_writes_pictures_and_a_table() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let ran = good(folder, &["demo", "--timed-frames", "1", "--no-animations", "--size", "96x64", "-o", "made/out"]);
-    let scenes = ["sphere_over_plane", "torus_over_plane", "teapot_lights", "glowing_torus", "twelve_instances"];
+    let scenes =
+        ["sphere_over_plane", "torus_over_plane", "small_lights", "teapot_lights", "glowing_torus", "twelve_instances"];
     let mut expected: Vec<String> = scenes.iter().map(|s| format!("{s}.png")).collect();
     expected.extend(["nearest", "without_occluder"].map(|s| format!("sphere_over_plane_{s}.png")));
     expected.sort();
@@ -302,7 +303,7 @@ fn shaders_can_be_replaced() {
     let folder = folder.path();
     std::fs::create_dir(folder.join("glsl")).unwrap();
     let source = include_str!("../glsl/merge.comp");
-    let render = |output| small(&["render", SCENE, "--shader-dir", "glsl", "-o", output]);
+    let render = |output| small(&["render", SCENE, "--lights", "sh", "--shader-dir", "glsl", "-o", output]);
     good(folder, &render("plain.png"));
     let last = "sum * receiver.albedo.rgb";
     assert!(source.contains(last));
@@ -331,7 +332,7 @@ fn errors_are_shown_in_false_colour() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let shown = |name: &str, more: &[&str]| {
-        let files = ["render", SCENE, "-o", "p.png", "--error", name, "--rays", "32", "--json"];
+        let files = ["render", SCENE, "-o", "p.png", "--lights", "sh", "--error", name, "--rays", "32", "--json"];
         let ran = good(folder, &[&small(&files)[..], more].concat());
         let report = json(&ran.stdout);
         (image::load_from_memory(&read(folder, name)).unwrap().into_rgb8(), report["error"].clone())

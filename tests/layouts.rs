@@ -83,7 +83,7 @@ fn entities_and_clusters_of_the_merge() {
                 sharp,
             }
         );
-        assert_eq!(entity.len(), 12);
+        assert_eq!(entity.len(), 13);
         assert_eq!(reflection.strides.get("Entity"), Some(&(size_of::<Entity>() as u32)));
     }
 }

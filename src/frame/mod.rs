@@ -219,7 +219,7 @@ impl Frame {
     /// # Errors
     /// As [`Frame::render`].
     pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
-        self.prepare_picture(placements, &[Viewport { by_vertex: true, ..self.whole() }])?;
+        self.prepare_picture(placements, &[Viewport { by_vertex: self.radiosity.replaced, ..self.whole() }])?;
         self.run(None, Some(&self.picture_work(placements, white)), true)
     }
 
@@ -255,6 +255,7 @@ impl Frame {
     /// `Device` when memory ran out.
     pub fn prepare_light(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
         let (state, sights) = (self.state(placements), self.sights(placements, viewports));
+        self.radiosity.replaced = false;
         self.work.prepare(state, sights.as_deref())?;
         if let Some(pixel) = self.pixel.as_mut().filter(|_| !viewports.is_empty()) {
             pixel.prepare(&self.work.lists, &self.work.lists.now().entities)?;

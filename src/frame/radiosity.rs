@@ -14,6 +14,8 @@ pub(super) struct Radiosity {
     pub merged: Buffer,
     /// Light without that of sharp lights, in a scene that has any: what the merge writes then.
     soft: Option<Buffer>,
+    /// Whether any of it was replaced by what was computed elsewhere, and not merged since.
+    pub replaced: bool,
     /// The first byte of each entity.
     pub offsets: Vec<u64>,
     comparisons: [Option<Buffer>; 2],
@@ -33,7 +35,13 @@ impl Radiosity {
         let mut merged = Buffer::new(device, "radiosity", BufferKind::Device, size_bytes.max(16))?;
         merged.fill(0, &vec![0.0_f32; merged.size_bytes as usize / 4])?;
         let soft = || Buffer::new(device, "soft radiosity", BufferKind::Device, merged.size_bytes);
-        Ok(Radiosity { soft: sharp.then(soft).transpose()?, merged, offsets, comparisons: Default::default() })
+        Ok(Radiosity {
+            soft: sharp.then(soft).transpose()?,
+            merged,
+            replaced: false,
+            offsets,
+            comparisons: Default::default(),
+        })
     }
 
     /// What the merge writes.
@@ -52,6 +60,7 @@ impl Radiosity {
     /// `Device` when memory ran out.
     pub fn write(&mut self, entity: usize, order: &[u32], values: &[[f32; 3]]) -> Result<()> {
         assert_eq!(values.len(), order.len(), "radiosity of entity {entity}");
+        self.replaced = true;
         self.merged.fill(self.offsets[entity], &quads(order, values).collect::<Vec<_>>())
     }
 

@@ -17,6 +17,7 @@
 //! | occlusion field | It stores the *blocked* part b = P[1 - V], which is 0 where nothing blocks. A sample inside the solid is captured off the nearest surface. |
 //! | between shells | b / (1 - cos a) is interpolated over sin(a/2), where a is the half-angle of the bounding sphere. Samples are lowered by a twelfth of their second differences. Beyond 8 r the value falls as (8r/d)^2. |
 //! | order | An occluder precedes a light if its bounding sphere's centre is nearer to the vertex than the light's. Entity indices decide ties. |
+//! | sharp lights | An entity that glows in one colour is a sharp light. It is cut into 4 or 16 parts ([`field::sub_light`]); in each, the visibilities past all occluders' outlines ([`field::silhouette`]) and past the receiver's own mesh ([`field::self_visibility`]) are multiplied. What lies beyond the light's surface blocks nothing. All else goes through SH. |
 //! | small occluders | An occluder whose bounding sphere has a half-angle below 12 degrees blocks a point: it takes away the chain's value in its direction times the solid angle of a projected area, which is fitted to its outermost shell ([`field::Area`]). Up to 16 degrees the point and the field share. |
 //! | switches | An emitter does not occlude, flat ground only receives, and everything else does both. Each can be set per entity. |
 //! | scale | Scales are uniform and positive. |

@@ -30,7 +30,10 @@ fn near(a: Placement, position: Vec3, rotation: Quat) {
 fn embedded_scenes_load_and_read_back() {
     let scenes = embedded::scenes();
     let names: Vec<&str> = scenes.iter().map(|s| s.0).collect();
-    assert_eq!(names, ["glowing_torus", "sphere_over_plane", "teapot_lights", "torus_over_plane", "twelve_instances"]);
+    assert_eq!(
+        names,
+        ["glowing_torus", "small_lights", "sphere_over_plane", "teapot_lights", "torus_over_plane", "twelve_instances"]
+    );
     for (name, text) in scenes {
         let path = format!("assets/scenes/{name}.toml");
         let scene = Scene::parse(text, Path::new(&path), &embedded::read).unwrap();

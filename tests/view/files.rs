@@ -55,6 +55,7 @@ fn the_next_scene_comes_round() {
             "torus_over_plane",
             "twelve_instances",
             "glowing_torus",
+            "small_lights",
             "sphere_over_plane"
         ]
     );

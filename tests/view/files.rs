@@ -40,7 +40,7 @@ fn the_next_scene_comes_round() {
     editor.apply(step(Step::Left));
     editor.apply(Command::ToggleRunning);
     let mut names = Vec::new();
-    for _ in 0..6 {
+    for _ in 0..7 {
         let effect = editor.apply(Command::NextScene);
         assert!(effect.changed.scene && effect.message.is_none());
         assert_eq!((editor.size(), editor.undo_count(), editor.selection()), ([300, 200], 0, None));
@@ -50,13 +50,13 @@ fn the_next_scene_comes_round() {
     assert_eq!(
         names,
         [
+            "small_lights",
             "sphere_over_plane",
             "teapot_lights",
             "torus_over_plane",
             "twelve_instances",
             "glowing_torus",
-            "small_lights",
-            "sphere_over_plane"
+            "small_lights"
         ]
     );
     let mut own = from_text(SMALL);
@@ -120,7 +120,7 @@ fn a_saved_scene_reads_back_as_the_state() {
         assert_eq!(Scene::load(&path).unwrap().data, again.scene().data);
     }
     let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert_eq!(left.len(), 5, "nothing but the scenes: {left:?}");
+    assert_eq!(left.len(), 6, "nothing but the scenes: {left:?}");
     let nowhere = folder.path().join("no/such/s.toml");
     let error = built_in("glowing_torus").save(&nowhere).unwrap_err();
     assert_eq!(error.exit_code(), 1);

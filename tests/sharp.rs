@@ -122,7 +122,8 @@ fn picture(gpu: &common::Gpu, cells: usize, shading: Shading) -> Vec<f32> {
         "{head}[[entity]]\nmesh = \"ball\"\nposition = [0, 0.6, 0]\n\
         [[entity]]\nmesh = \"ball\"\nposition = [1.2, 2.6, 0.8]\nscale = 0.1\nemission = [900, 900, 900]\n"
     ));
-    let options = Options { shading, size: [160, 120], antialias: Antialias::None, ..check::sharp_options() };
+    let options =
+        Options { shading: Some(shading), size: [160, 120], antialias: Antialias::None, ..check::sharp_options() };
     let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), &scene, options, &|_, _, _| ()).unwrap();
     frame.render(&scene.at(0.0), Some(4.0)).unwrap();
     frame.picture()

@@ -75,9 +75,9 @@ pub struct MergeArguments {
     #[arg(long, value_enum, default_value = "sharp", value_name = "sh|sharp")]
     pub lights: Lights,
     /// Where the light of sharp lights is evaluated for pictures: at the pixels of grids wherever something stands before a light, and
-    /// else at vertices; or at vertices alone
-    #[arg(long, value_enum, default_value = "pixel", value_name = "vertex|pixel")]
-    pub shading: Shading,
+    /// else at vertices; or at vertices alone. Default: pixel with four samples a pixel, vertex with one
+    #[arg(long, value_enum, value_name = "vertex|pixel")]
+    pub shading: Option<Shading>,
     /// Where the lists of the entities that concern each cluster of vertices are made. Default: device, but host for fewer than 128
     /// entities on a software device
     #[arg(long, value_name = "WHERE")]

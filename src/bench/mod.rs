@@ -91,7 +91,7 @@ pub fn default_options() -> frame::Options {
     frame::Options {
         bake: crate::bake::Options::default(),
         lights: Lights::default(),
-        shading: crate::draw::Shading::default(),
+        shading: None,
         lookup: crate::field::Lookup::default(),
         guard: true,
         // Frames are timed at rest: each must merge everything.

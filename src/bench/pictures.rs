@@ -5,7 +5,7 @@ use super::cases::Case;
 use super::{Bench, default_options};
 use crate::asset::false_color::Scheme;
 use crate::asset::picture;
-use crate::draw::Antialias;
+use crate::draw::{Antialias, Shading};
 use crate::error::Result;
 use crate::frame::Options;
 use crate::truth::error_map::ErrorPicture;
@@ -99,7 +99,8 @@ fn cast(bench: &Bench<'_>, case: &Case, points: usize) -> RayCast {
 /// The program's picture, one sample a pixel, against rays from what each pixel shows.
 fn pixel_error(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<PixelError> {
     let placements = case.scene.at(case.time_s);
-    let options = Options { size: PIXEL_SIZE, antialias: Antialias::None, ..default_options() };
+    let options =
+        Options { size: PIXEL_SIZE, antialias: Antialias::None, shading: Some(Shading::Pixel), ..default_options() };
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, Some(f32::INFINITY))?;
     let found = frame.picture();

@@ -81,7 +81,7 @@ pub fn options() -> Options {
     Options {
         bake: bake::Options { storage: Storage::F32, lattice, face_px: 16, ..Default::default() },
         lights: Lights::Sh,
-        shading: Shading::Vertex,
+        shading: Some(Shading::Vertex),
         lookup: Lookup::Trilinear,
         variant: Some(Variant::named("texel").expect("a variant")),
         skip: Skip::ALL,

@@ -59,8 +59,8 @@ pub struct Options {
     pub bake: bake::Options,
     /// Which lights are sharp.
     pub lights: Lights,
-    /// Where their light is evaluated for pictures.
-    pub shading: Shading,
+    /// Where their light is evaluated for pictures; `None` takes [`Shading::usual`].
+    pub shading: Option<Shading>,
     /// Which samples a lookup takes.
     pub lookup: Lookup,
     /// How the merge is done; `None` takes what was measured to be the device's fastest.
@@ -142,7 +142,7 @@ impl Frame {
             lists.add(index, pose::clusters(index, device_mesh, radiosity.offsets[index] / 16, options.bake.bands));
         }
         let [nodes, cells, _] = buffers.sharp();
-        let by_pixel = options.shading == Shading::Pixel && SharpPermutation::fits_views(device, [nodes, cells]);
+        let by_pixel = options.shading != Some(Shading::Vertex) && SharpPermutation::fits_views(device, [nodes, cells]);
         let by_pixel = sharp.as_ref().map(|sharp| sharp.permutation).filter(|_| by_pixel);
         let pixel = by_pixel.map(|_| PixelChains::new(device, scene, &buffers)).transpose()?;
         let place = options.lists.unwrap_or_else(|| Place::quicker(device, entity_count));
@@ -257,7 +257,8 @@ impl Frame {
         let (state, sights) = (self.state(placements), self.sights(placements, viewports));
         self.radiosity.replaced = false;
         self.work.prepare(state, sights.as_deref())?;
-        if let Some(pixel) = self.pixel.as_mut().filter(|_| !viewports.is_empty()) {
+        let shows = !viewports.is_empty() && self.shading() == Shading::Pixel;
+        if let Some(pixel) = self.pixel.as_mut().filter(|_| shows) {
             pixel.prepare(&self.work.lists, &self.work.lists.now().entities)?;
         }
         Ok(())
@@ -348,6 +349,11 @@ impl Frame {
         let order = |entity: usize| &self.buffers.meshes[self.scene.entities[entity].mesh].order[..];
         let entities = radiosity.iter().map(|(entity, values)| (*entity, order(*entity), &values[..]));
         self.radiosity.compare(place, entities, rest)
+    }
+
+    /// Where pictures evaluate sharp lights.
+    fn shading(&self) -> Shading {
+        self.options.shading.unwrap_or_else(|| Shading::usual(self.options.antialias))
     }
 
     /// The scene that the frame was built for.

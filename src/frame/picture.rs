@@ -8,7 +8,7 @@ use crate::asset::edges::Edges;
 use crate::asset::picture::linear_from_srgb;
 use crate::draw::grid::PixelLight;
 use crate::draw::smooth::{Lines, Strips};
-use crate::draw::{Antialias, Draw, DrawnViewport, Finish};
+use crate::draw::{Antialias, Draw, DrawnViewport, Finish, Shading};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image};
 use crate::scene::Placement;
@@ -136,7 +136,8 @@ impl Frame {
     /// What the pixels of grids read that evaluate sharp lights in a viewport.
     fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
         let pixel = self.pixel.as_ref()?;
-        let shown = viewport.radiosity == RadiositySource::Merged && !viewport.by_vertex;
+        let by_pixel = self.shading() == Shading::Pixel && pixel.is_ready();
+        let shown = by_pixel && viewport.radiosity == RadiositySource::Merged && !viewport.by_vertex;
         shown.then(|| PixelLight {
             entities: &pixel.entities,
             silhouettes: [&self.buffers.silhouettes.nodes, &self.buffers.silhouettes.cells],
@@ -181,8 +182,9 @@ impl Frame {
         self.device.settle();
         let fine = self.draw(self.options.size, Antialias::Samples, Finish::Linear)?;
         let usual = std::mem::replace(&mut self.picture.draw, fine);
+        let antialias = std::mem::replace(&mut self.options.antialias, Antialias::Samples);
         let outcome = self.render(placements, Some(white)).map(|_| self.picture());
-        self.picture.draw = usual;
+        (self.picture.draw, self.options.antialias) = (usual, antialias);
         outcome
     }
 }

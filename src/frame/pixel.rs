@@ -58,6 +58,11 @@ impl PixelChains {
         self.grids[entity].map(|(first, _)| first)
     }
 
+    /// Whether chains have been made.
+    pub fn is_ready(&self) -> bool {
+        !self.known.is_empty()
+    }
+
     /// Makes the chains of this moment.
     ///
     /// # Errors

@@ -93,7 +93,7 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
                     j++;
                     packed = entry_at(first + j);
                 }
-            } while ((packed & ENTRY_LIGHT) == 0);
+            } while ((packed & ENTRY_LIGHT) == 0 && j < count);
 #if OUTLINES
             // Of a light with an outline of its own, as much of each part shines as the outline covers.
             vec4 dark = let_through(shining, surface, light, block, false);

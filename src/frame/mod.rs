@@ -219,6 +219,7 @@ impl Frame {
     /// # Errors
     /// As [`Frame::render`].
     pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
+        self.prepare_pixels()?;
         self.prepare_picture(placements, &[Viewport { by_vertex: self.radiosity.replaced, ..self.whole() }])?;
         self.run(None, Some(&self.picture_work(placements, white)), true)
     }
@@ -257,11 +258,7 @@ impl Frame {
         let (state, sights) = (self.state(placements), self.sights(placements, viewports));
         self.radiosity.replaced = false;
         self.work.prepare(state, sights.as_deref())?;
-        let shows = !viewports.is_empty() && self.shading() == Shading::Pixel;
-        if let Some(pixel) = self.pixel.as_mut().filter(|_| shows) {
-            pixel.prepare(&self.work.lists, &self.work.lists.now().entities)?;
-        }
-        Ok(())
+        if viewports.is_empty() { Ok(()) } else { self.prepare_pixels() }
     }
 
     /// What [`record()`] needs to do the merge that [`Frame::prepare_light`] has prepared; `None` where no cluster has changed. When

@@ -133,6 +133,13 @@ impl Frame {
         Draw::new(&self.device, &self.library, size, antialias, finish, self.picture.sharp.as_ref())
     }
 
+    /// Makes the chains of the moment that was merged last, for pictures whose pixels evaluate sharp lights.
+    pub(super) fn prepare_pixels(&mut self) -> Result<()> {
+        let shows = self.shading() == Shading::Pixel && self.work.lists.is_updated();
+        let Some(pixel) = self.pixel.as_mut().filter(|_| shows) else { return Ok(()) };
+        pixel.prepare(&self.work.lists, &self.work.lists.now().entities)
+    }
+
     /// What the pixels of grids read that evaluate sharp lights in a viewport.
     fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
         let pixel = self.pixel.as_ref()?;

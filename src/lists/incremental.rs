@@ -172,6 +172,11 @@ impl ClusterLists {
         sights[receiver].iter().any(|sight| sight.may_see(&self.faces[cluster]))
     }
 
+    /// Whether there was an update, and nothing was forgotten since.
+    pub fn is_updated(&self) -> bool {
+        self.now.is_some()
+    }
+
     /// The moment of the last update.
     ///
     /// # Panics

@@ -1,5 +1,5 @@
 //! The cache of what is baked: fields, silhouette fields, transfer vectors and self-visibility. Names are hashes of the mesh's content and of everything
-//! else that decides the numbers. One function, [`Cache::find`], serves all kinds; a [`Shelf`] says where one kind is kept.
+//! else that decides the numbers. One function, `Cache::find`, serves all kinds; a `Shelf` says where one kind is kept.
 
 pub use super::names::field_name;
 use super::names::{SelfVisibilityHeader, TransferHeader, identity, key, silhouette_identity, silhouette_name};

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Half angles of the lights as seen from the object's centre, degrees.
 pub const HALF_ANGLES_DEG: [u32; 5] = [1, 3, 8, 15, 30];
-/// Objects over the floor: two built-in meshes, and [`animal`].
+/// Objects over the floor: two built-in meshes, and an animal on thin legs.
 pub const OBJECTS: [&str; 3] = ["teapot", "torus", "animal"];
 /// Number of lights and of things that move in [`many`].
 pub const MANY: [usize; 2] = [32, 24];

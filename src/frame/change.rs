@@ -39,7 +39,7 @@ impl Frame {
         self.scene.data.camera = camera.clone();
     }
 
-    /// Draws at most so many triangles in one render pass from now on, see [`Draw::batch_triangles`]; at least one.
+    /// Draws at most so many triangles in one render pass from now on, see [`crate::draw::Draw::batch_triangles`]; at least one.
     pub fn set_batch(&mut self, triangles: u32) {
         self.picture.draw.batch_triangles = triangles.max(1);
     }

@@ -11,7 +11,7 @@ use shadow_fields::truth::{ExactChain, RayMeshes, Vertex, World, receiver_vertic
 use std::f64::consts::PI;
 use std::path::Path;
 
-/// A ball of radius .5 m, 1 m above a floor of 81 vertices and albedo .6.
+/// A ball of radius 0.5 m, 1 m above a floor of 81 vertices and albedo 0.6.
 fn scene(rest: &str) -> Scene {
     let text = format!(
         r#"
@@ -57,14 +57,14 @@ fn a_ball_under_a_uniform_sky_takes_its_closed_form() {
     for (position, estimate) in positions.iter().zip(&lit) {
         for (channel, radiance) in [1.0, 2.0, 3.0].into_iter().enumerate() {
             let truth = 0.6 * radiance * (1.0 - taken(*position));
-            // .5 % of what is taken for the tessellation, and five standard errors.
+            // 0.5 % of what is taken for the tessellation, and five standard errors.
             let tolerance = 0.005 * 0.6 * radiance * taken(*position) + 5.0 * estimate.error[channel];
             assert!((estimate.radiosity[channel] - truth).abs() < tolerance, "{position}: {estimate:?}, {truth}");
         }
     }
     assert!(relative_error(&lit) < 2e-3 && relative_error(&lit) > 1e-6, "{}", relative_error(&lit));
     let unoccluded = RayCast { shadows: false, ..Default::default() }.run(&world, &vertices);
-    // The albedo .6 is an f32.
+    // The albedo 0.6 is an f32.
     assert!(unoccluded.iter().all(|e| (e.radiosity[1] - 1.2).abs() < 1e-7), "a uniform sky has no noise");
 }
 
@@ -80,7 +80,7 @@ fn a_sphere_light_shines_as_its_closed_form_and_is_hidden_by_what_is_nearer() {
     for (position, estimate) in positions.iter().zip(&lit) {
         let to = DVec3::new(0.0, 2.5, 0.0) - *position;
         let truth = 0.6 * 9.0 * 0.04 / to.length_squared() * to.normalize().y;
-        // The inscribed mesh covers .3 % less than its sphere.
+        // The inscribed mesh covers 0.3 % less than its sphere.
         assert!(
             (estimate.radiosity[0] / truth - 1.0).abs() < 5e-3,
             "{position}: {} against {truth}",
@@ -120,7 +120,7 @@ fn the_exact_chain_of_balls_is_that_of_their_closed_forms() {
                 t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
             }
             let truth = 0.6 / PI * t[0] * (4.0 * PI).sqrt();
-            // Tessellation and 4096 rays: under .3 % of a blocked part of at most a quarter.
+            // Tessellation and 4096 rays: under 0.3 % of a blocked part of at most a quarter.
             assert!((found[0] - truth).abs() < 1e-3, "{bands} bands, {position}: {} against {truth}", found[0]);
         }
     }
@@ -186,7 +186,7 @@ fn runs_repeat_and_seeds_differ() {
 fn a_ray_meets_the_nearest_side_first() {
     let side = shadow_fields::asset::generate::torus_two_colour(0.5, 0.2, 64, 32);
     let shape = shadow_fields::truth::ray_mesh::RayMesh::new(&side);
-    // Along x both colours lie behind one another; in units of the bounding radius, .7 m.
+    // Along x both colours lie behind one another; in units of the bounding radius, 0.7 m.
     for (sign, color) in [(1.0, shadow_fields::asset::generate::WARM), (-1.0, shadow_fields::asset::generate::COOL)] {
         for height in [0.0, 0.05, 0.15] {
             let origin = Vec3::new(sign * 3.0, height / 0.7, 0.01);
@@ -202,7 +202,7 @@ fn a_ray_meets_the_nearest_side_first() {
 }
 
 /// Radiosity of the floor's middle, where the light's cone stands upright, of a light of radius `radius_m` at `height_m`: albedo
-/// .6, radiance 9.
+/// 0.6, radiance 9.
 fn below(radius_m: f64, height_m: f64) -> f64 {
     0.6 * 9.0 * (radius_m / height_m).powi(2)
 }
@@ -221,7 +221,7 @@ fn middle(rest: &str) -> [f64; 2] {
     found
 }
 
-/// A light (mesh `ball` of radius .5 m) of a given radius and place.
+/// A light (mesh `ball` of radius 0.5 m) of a given radius and place.
 fn bulb(radius_m: f64, place: [f64; 3]) -> String {
     format!("{}emission = [9, 9, 9]\n", ball(radius_m, place))
 }
@@ -231,7 +231,7 @@ fn ball(radius_m: f64, place: [f64; 3]) -> String {
     format!("[[entity]]\nmesh = \"ball\"\nposition = {place:?}\nscale = {scale}\nreceives = false\n")
 }
 
-/// Whether two radiosities agree but for the tessellation's .3 % and the rays' noise.
+/// Whether two radiosities agree but for the tessellation's 0.3 % and the rays' noise.
 fn near(found: f64, expected: f64) -> bool {
     (found - expected).abs() < 5e-3 * expected
 }
@@ -263,7 +263,7 @@ fn what_lies_behind_a_lights_surface_hides_nothing_though_its_centre_is_nearer()
     let [surfaces, centres] = middle(&format!("{light}{}", ball(0.2, [0.0, 2.0, 0.0])));
     let seen = below(1.0, 3.0) - below(0.2, 2.0);
     assert!(near(centres, seen) && surfaces > seen && surfaces < below(1.0, 3.0), "{surfaces} {centres}");
-    // The circle in which the two spheres meet: 1 and .2 m around centres 1 m apart, seen from 2 and 3 m below.
+    // The circle in which the two spheres meet: 1 and 0.2 m around centres 1 m apart, seen from 2 and 3 m below.
     let along = (1.0 - 0.04 + 1.0) / 2.0;
     let (radius_squared, height) = (1.0 - along * along, 3.0 - along);
     let cap = 0.6 * 9.0 * radius_squared / (radius_squared + height * height);
@@ -346,7 +346,7 @@ fn surfaces_that_touch_and_coincide_stay_bounded() {
 
 #[test]
 fn a_tiny_light_far_away_has_its_size() {
-    // Half angles of .05 to .5 degrees: 1 146 to 115 radii away.
+    // Half angles of 0.05 to 0.5 degrees: 1 146 to 115 radii away.
     for half_angle_deg in [0.05_f64, 0.2, 0.5] {
         let radius = 100.0 * half_angle_deg.to_radians().sin();
         let [found, _] = middle(&bulb(radius, [0.0, 100.0, 0.0]));

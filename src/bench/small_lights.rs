@@ -78,7 +78,7 @@ fn read(path: &Path) -> Result<Vec<u8>> {
     }
 }
 
-/// Radius of the animal's legs, metres: .03 of its bounding radius.
+/// Radius of the animal's legs, metres: 0.03 of its bounding radius.
 const LEG_M: f64 = 0.022;
 
 /// An OBJ file: a body, a neck and a head on four thin legs, 1.1 m high.

@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// The authors' viewing conditions, on which published means rest: a screen of 3840 pixels and .7 m, seen from .7 m.
+/// The authors' viewing conditions, on which published means rest: a screen of 3840 pixels and 0.7 m, seen from 0.7 m.
 const PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;
 
 /// Contrast sensitivity as sums of two Gaussians, amplitude and squared width of each, in degrees: of luminance, red to green, and

@@ -1,7 +1,7 @@
 //! Bakes or finds in the cache every field and transfer vector that a scene needs. Everything that shows a scene calls [`ensure()`].
 
-use super::cache::{Cache, field_name};
-use super::{BakeReport, Baker, Options, header};
+use super::cache::{Cache, Found, field_name};
+use super::{BakeReport, Baker, Options, Progress, header};
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
@@ -170,47 +170,47 @@ pub fn ensure(
             *to = known.get(&name).cloned();
         }
     }
-    let mut known = HashMap::<[u8; 32], Arc<SilhouetteField>>::new();
-    for ((mesh, needed), to) in scene.meshes.iter().zip(&needs.silhouettes).zip(&mut out.meshes) {
-        if !needed {
-            continue;
-        }
-        if !known.contains_key(&mesh.content_hash()) {
-            let what = format!("{} silhouette", mesh.name);
-            let done = |now, all| progress(&what, now, all);
-            let (field, report) = cache.silhouette(baker, mesh, &needs.options, &done)?;
-            out.baked.extend(report.map(|report| Baked { what, report }));
-            known.insert(mesh.content_hash(), field);
-        }
-        to.silhouette = known.get(&mesh.content_hash()).cloned();
-    }
-    let mut known = HashMap::<[u8; 32], Arc<Vec<u8>>>::new();
-    for ((mesh, needed), to) in scene.meshes.iter().zip(&needs.self_visibility).zip(&mut out.meshes) {
-        if !needed {
-            continue;
-        }
-        if !known.contains_key(&mesh.content_hash()) {
-            let what = format!("{} self-visibility", mesh.name);
-            let done = |now, all| progress(&what, now, all);
-            let (maps, report) = cache.self_visibility(baker, mesh, &needs.options, &done)?;
-            out.baked.extend(report.map(|report| Baked { what, report }));
-            known.insert(mesh.content_hash(), maps);
-        }
-        to.self_visibility = known.get(&mesh.content_hash()).cloned();
-    }
-    let mut known = HashMap::<[u8; 32], Arc<Vec<f32>>>::new();
-    for ((mesh, needed), to) in scene.meshes.iter().zip(&needs.transfers).zip(&mut out.meshes) {
-        if !needed {
-            continue;
-        }
-        if !known.contains_key(&mesh.content_hash()) {
-            let what = format!("{} transfer", mesh.name);
-            let done = |now, all| progress(&what, now, all);
-            let (transfer, report) = cache.transfer(baker, mesh, &needs.options, &done)?;
-            out.baked.extend(report.map(|report| Baked { what, report }));
-            known.insert(mesh.content_hash(), transfer);
-        }
-        to.transfer = known.get(&mesh.content_hash()).cloned();
-    }
+    let BakedScene { meshes, baked } = &mut out;
+    let mut of_meshes = OfMeshes { scene, progress, baked };
+    let found = of_meshes
+        .find("silhouette", &needs.silhouettes, |mesh, done| cache.silhouette(baker, mesh, &needs.options, done))?;
+    meshes.iter_mut().zip(found).for_each(|(to, found)| to.silhouette = found);
+    let found = of_meshes.find("self-visibility", &needs.self_visibility, |mesh, done| {
+        cache.self_visibility(baker, mesh, &needs.options, done)
+    })?;
+    meshes.iter_mut().zip(found).for_each(|(to, found)| to.self_visibility = found);
+    let found =
+        of_meshes.find("transfer", &needs.transfers, |mesh, done| cache.transfer(baker, mesh, &needs.options, done))?;
+    meshes.iter_mut().zip(found).for_each(|(to, found)| to.transfer = found);
     Ok(out)
+}
+
+/// Bakes of which a mesh has one of a kind.
+struct OfMeshes<'e> {
+    scene: &'e Scene,
+    progress: SceneProgress<'e>,
+    baked: &'e mut Vec<Baked>,
+}
+
+impl OfMeshes<'_> {
+    /// What each mesh has of a kind that is `needed`; meshes of equal content share it. `find` looks in the cache or bakes.
+    fn find<T>(
+        &mut self,
+        kind: &str,
+        needed: &[bool],
+        find: impl Fn(&Mesh, Progress<'_>) -> Result<Found<T>>,
+    ) -> Result<Vec<Option<Arc<T>>>> {
+        let mut known = HashMap::<[u8; 32], Arc<T>>::new();
+        let mut all = Vec::with_capacity(needed.len());
+        for (mesh, needed) in self.scene.meshes.iter().zip(needed) {
+            if *needed && !known.contains_key(&mesh.content_hash()) {
+                let what = format!("{} {kind}", mesh.name);
+                let (found, report) = find(mesh, &|now, all| (self.progress)(&what, now, all))?;
+                self.baked.extend(report.map(|report| Baked { what, report }));
+                known.insert(mesh.content_hash(), found);
+            }
+            all.push(known.get(&mesh.content_hash()).filter(|_| *needed).cloned());
+        }
+        Ok(all)
+    }
 }

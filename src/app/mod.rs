@@ -3,6 +3,7 @@
 mod bake;
 mod bench;
 mod check;
+mod compare;
 mod compiling;
 mod context;
 mod demo;
@@ -49,6 +50,8 @@ enum Subcommands {
     Bench(bench::Arguments),
     /// Hold every pass against its CPU twin on the chosen device; exit code 1 where one is off
     Check(check::Arguments),
+    /// Compare two pictures, made by this program or not; exit code 1 where they differ by more than a bound
+    Compare(compare::Arguments),
     /// Time every pass and every variant of the merge shader on this device
     Profile(profile::Arguments),
     /// Open a window: move lights and occluders by hand and see the shadows follow
@@ -86,6 +89,7 @@ fn run(cli: &Cli) -> Result<()> {
         Subcommands::Inspect(arguments) => inspect::run(&cli.global, arguments),
         Subcommands::Bench(arguments) => bench::run(&cli.global, arguments),
         Subcommands::Check(arguments) => check::run(&cli.global, arguments),
+        Subcommands::Compare(arguments) => compare::run(&cli.global, arguments),
         Subcommands::Profile(arguments) => profile::run(&cli.global, arguments),
         #[cfg(feature = "view")]
         Subcommands::View(arguments) => view::run(&cli.global, arguments),

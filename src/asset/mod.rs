@@ -9,6 +9,7 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 
+pub mod decode;
 pub mod edges;
 pub mod embedded;
 pub mod enclose;

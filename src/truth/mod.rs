@@ -18,6 +18,7 @@
 //! T0c on an occluder precedes a light as a whole or not at all, if its bounding sphere's centre is nearer to the vertex (ties by
 //! index), and the receiver shadows itself from what lies beyond the light too. Without local lights T0 and T0c are the same.
 
+pub mod difference;
 pub mod error_map;
 pub mod exact;
 pub mod flip;

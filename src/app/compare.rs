@@ -1,0 +1,152 @@
+//! `shadow-fields compare`
+
+use super::{Global, output};
+use crate::asset::decode::Picture;
+use crate::asset::picture::write_png;
+use crate::error::{Error, Result};
+use crate::truth::difference::{Difference, Place, Values};
+use clap::Args;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Arguments of `compare`.
+#[derive(Args)]
+#[command(
+    after_help = "FLIP (Andersson et al. 2020) is how different two pictures look when one flips between them, 0 to 1 a pixel: \
+    colours are blurred\nas the eye blurs them 0.7 m from a screen of 0.7 m and 3840 pixels. A mean of 0.01 is hard to see, 0.1 is \
+    plain.\nRMS and the largest difference are of sRGB values from 0 to 1 as a screen shows them (1 of 255 steps is 0.0039), or of \
+    linear values\nwhere both pictures are EXR or HDR. Alpha is not compared. A pixel that is not finite in one picture alone is \
+    beyond every bound.\n\nExamples:\n  shadow-fields compare expected.png out/teapot.png --max-flip 0.01 -o difference.png\n  \
+    shadow-fields compare a.exr b.exr --max-rms 0.001 --mask without_clock.png --json\n\nExit codes: 0 within the bounds (or none is \
+    given), 1 beyond one, 2 usage, 4 no picture, or pictures of different sizes"
+)]
+pub struct Arguments {
+    /// Picture in PNG, EXR or HDR, made by this program or not; of an animated PNG the first picture counts
+    #[arg(value_name = "A")]
+    first: PathBuf,
+    /// Picture of the same size
+    #[arg(value_name = "B")]
+    second: PathBuf,
+    /// Also write a picture of FLIP in false colour: dark where the two look alike
+    #[arg(short, long, value_name = "DIFF.png")]
+    output: Option<PathBuf>,
+    /// End with exit code 1 where mean FLIP is above this
+    #[arg(long, value_name = "0..1", value_parser = share, allow_negative_numbers = true)]
+    max_flip: Option<f64>,
+    /// End with exit code 1 where the root mean square difference is above this
+    #[arg(long, value_name = "X", value_parser = bound, allow_negative_numbers = true)]
+    max_rms: Option<f64>,
+    /// Picture of the same size: only pixels that are light in it (green at least half of white) count
+    #[arg(long, value_name = "MASK.png")]
+    mask: Option<PathBuf>,
+    /// Stops by which EXR and HDR pictures are brightened where they are shown: for FLIP, and beside a PNG
+    #[arg(long, default_value_t = 0.0, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
+    exposure_ev: f32,
+}
+
+/// A number from 0 to 1.
+fn share(text: &str) -> std::result::Result<f64, String> {
+    let number = text.parse().ok().filter(|x| (0.0..=1.0).contains(x));
+    number.ok_or_else(|| format!("expected a number from 0 to 1, got \"{text}\""))
+}
+
+/// A finite number from 0.
+fn bound(text: &str) -> std::result::Result<f64, String> {
+    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x >= 0.0);
+    number.ok_or_else(|| format!("expected a finite number from 0, got \"{text}\""))
+}
+
+/// Stops, as in a scene file.
+fn stops(text: &str) -> std::result::Result<f32, String> {
+    let number = text.parse().ok().filter(|x| (-32.0..=32.0).contains(x));
+    number.ok_or_else(|| format!("expected stops from -32 to 32, got \"{text}\""))
+}
+
+/// Compares, prints, and fails beyond a bound.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    if let Some(path) = &arguments.output {
+        output::check_folder(path)?;
+        output::check_ending(path, "png", "the difference picture")?;
+    }
+    let [a, b] = [&arguments.first, &arguments.second].map(|path| Picture::read(path));
+    let (a, b) = (a?, b?);
+    for (picture, path) in [(&a, &arguments.first), (&b, &arguments.second)] {
+        if picture.is_transparent {
+            output::note(
+                global,
+                format!("note: {}: some pixels are transparent; only colours are compared", path.display()),
+            );
+        }
+    }
+    let mask = arguments.mask.as_ref().map(|path| {
+        let mask = Picture::read(path)?;
+        if (mask.width, mask.height) != (a.width, a.height) {
+            let sizes = format!("{} x {} pixels for pictures of {} x {}", mask.width, mask.height, a.width, a.height);
+            return Err(Error::input(path, format!("the mask has another size: {sizes}")));
+        }
+        let counts: Vec<bool> = mask.shown(0.0).chunks_exact(3).map(|rgb| rgb[1] >= 0.5).collect();
+        if counts.contains(&true) { Ok(counts) } else { Err(Error::input(path, "the mask is dark everywhere")) }
+    });
+    let mask = mask.transpose()?;
+    let found = Difference::new(&a, &b, mask.as_deref(), arguments.exposure_ev)
+        .map_err(|error| error.context(arguments.second.display()))?;
+    if let Some(path) = &arguments.output {
+        let (rgb, height) = found.picture(mask.as_deref());
+        write_png(path, found.width as u32, height as u32, &rgb, 0.0)?;
+    }
+    let beyond = beyond(arguments, &found);
+    if global.json {
+        let mut report = json!(found);
+        report["a"] = json!(arguments.first.display().to_string());
+        report["b"] = json!(arguments.second.display().to_string());
+        report["passed"] = json!(beyond.is_empty());
+        output::say(format!("{report:#}"));
+    } else {
+        say(&found);
+    }
+    if beyond.is_empty() {
+        return Ok(());
+    }
+    let (first, second) = (arguments.first.display(), arguments.second.display());
+    Err(Error::Failed(format!("{second} differs from {first}: {}", beyond.join(", "))))
+}
+
+/// What is above its bound.
+fn beyond(arguments: &Arguments, found: &Difference) -> Vec<String> {
+    let measures = [
+        ("mean FLIP", found.mean_flip, arguments.max_flip, "--max-flip"),
+        ("RMS", found.rms, arguments.max_rms, "--max-rms"),
+    ];
+    let above = measures.into_iter().filter_map(|(what, value, bound, option)| {
+        let bound = bound.filter(|bound| value > *bound || found.not_finite_count > 0)?;
+        Some(format!("{what} {value:.3e} is over {option} {bound}"))
+    });
+    let mut above: Vec<String> = above.collect();
+    if !above.is_empty() && found.not_finite_count > 0 {
+        above.push(format!("{} pixels are not finite in one of them alone", found.not_finite_count));
+    }
+    above
+}
+
+fn say(found: &Difference) {
+    let unit = match found.values {
+        Values::Srgb => "sRGB values from 0 to 1",
+        Values::Linear => "linear values",
+    };
+    let at = |place: &Place| {
+        let rgb = |c: [f32; 3]| c.map(|c| format!("{c:.4}")).join(" ");
+        format!("at x {}, y {}: {} against {}", place.x, place.y, rgb(place.a), rgb(place.b))
+    };
+    output::say(format!("{} x {} pixels, {} compared, {unit}", found.width, found.height, found.pixel_count));
+    let row = |name: &str, value: f64, place: String| vec![name.to_owned(), format!("{value:.6}"), place];
+    let rows = [
+        row("mean FLIP", found.mean_flip, String::new()),
+        row("largest FLIP", found.largest_flip.difference, at(&found.largest_flip)),
+        row("RMS", found.rms, String::new()),
+        row("largest", found.largest.difference, at(&found.largest)),
+    ];
+    rows.iter().for_each(|row| output::say(format!("{:13} {:>10}  {}", row[0], row[1], row[2]).trim_end()));
+    if found.not_finite_count > 0 {
+        output::say(format!("{} pixels are not finite in one of them alone", found.not_finite_count));
+    }
+}

@@ -77,6 +77,9 @@ fn keys_that_are_read() -> BTreeMap<String, BTreeSet<String>> {
         add("[[entity]]", &format!("[[entity]]\nmotion = [{{ {movement} = {{ zzz = 1 }} }}]"));
     }
     add("[[entity]]", "[[entity]]\nmotion = [{ keyframes = { keys = [{ zzz = 1 }] } }]");
+    for part in ["position", "rotation", "scale"] {
+        add("[[entity]]", &format!("[[entity]]\nmotion = [{{ node = {{ {part}_keys = {{ zzz = 1 }} }} }}]"));
+    }
     // These two are read by hand; the complaint lists only generators.
     tables.get_mut("[[mesh]]").unwrap().extend(["name".to_owned(), "file".to_owned()]);
     tables

@@ -3,7 +3,8 @@
 use glam::{DQuat, DVec3, Vec3};
 use proptest::prelude::*;
 use shadow_fields::scene::EntityData;
-use shadow_fields::scene::motion::{Interpolation, Keyframe, Motion, RotationData};
+use shadow_fields::scene::keys::{Between, Keys, Written};
+use shadow_fields::scene::motion::{Interpolation, Keyframe, Motion, Node, RotationData};
 use shadow_fields::view::edit;
 
 fn place() -> impl Strategy<Value = Vec3> {
@@ -44,8 +45,36 @@ fn motion() -> impl Strategy<Value = Motion> {
     ]
 }
 
+/// Three keys of a position.
+fn keys() -> impl Strategy<Value = Keys<Vec3>> {
+    let three = || [place(), place(), place()].prop_map(|three| three.to_vec());
+    let between = prop_oneof![Just(Between::Step), Just(Between::Linear), Just(Between::Cubic)];
+    (three(), three(), between, prop::option::of(0.5_f64..9.0)).prop_map(|(values, slopes, interpolation, period_s)| {
+        let slopes = if interpolation == Between::Cubic { slopes } else { Vec::new() };
+        let (in_slopes, out_slopes, times_s) = (slopes.clone(), slopes, vec![-1.0, 0.5, 3.0]);
+        Keys::try_from(Written { times_s, values, interpolation, in_slopes, out_slopes, period_s }).unwrap()
+    })
+}
+
+fn node() -> impl Strategy<Value = Motion> {
+    (place(), rotation(), 0.3_f32..2.0, prop::option::of(keys())).prop_map(
+        |(position, rotation, scale, position_keys)| {
+            let still = Node::still(position, rotation.unit(), scale);
+            Motion::Node(Box::new(Node { position_keys, ..still }))
+        },
+    )
+}
+
 fn entity() -> impl Strategy<Value = EntityData> {
-    (place(), rotation(), 0.2_f32..4.0, prop::collection::vec(motion(), 0..4)).prop_map(
+    entity_with(motion())
+}
+
+fn entity_in_nodes() -> impl Strategy<Value = EntityData> {
+    entity_with(prop_oneof![motion(), node()])
+}
+
+fn entity_with(motion: impl Strategy<Value = Motion>) -> impl Strategy<Value = EntityData> {
+    (place(), rotation(), 0.2_f32..4.0, prop::collection::vec(motion, 0..4)).prop_map(
         |(position, rotation, scale, motion)| EntityData {
             name: None,
             mesh: "m".into(),
@@ -79,7 +108,7 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn moving_moves_the_whole_path(entity in entity(), by in place(), time in time()) {
+    fn moving_moves_the_whole_path(entity in entity_in_nodes(), by in place(), time in time()) {
         let (before, after) = (entity.at(time), edit::moved(&entity, by.as_dvec3()).unwrap().at(time));
         prop_assert!((after.position - before.position).distance(by) < 1e-4);
         prop_assert!(after.rotation.dot(before.rotation).abs() > 1.0 - 1e-6);
@@ -87,7 +116,7 @@ proptest! {
     }
 
     #[test]
-    fn scaling_scales_at_all_times(entity in entity(), by in 0.5_f64..2.0, time in time()) {
+    fn scaling_scales_at_all_times(entity in entity_in_nodes(), by in 0.5_f64..2.0, time in time()) {
         let (before, after) = (entity.at(time), edit::scaled(&entity, by).unwrap().at(time));
         prop_assert!(after.position == before.position && after.rotation == before.rotation);
         prop_assert!((f64::from(after.scale / before.scale) / by - 1.0).abs() < 1e-5);
@@ -104,7 +133,7 @@ proptest! {
 
     /// Where things are is a function of time: asked in any order, and the same to the bit.
     #[test]
-    fn motion_has_no_memory(entity in entity(), times in prop::collection::vec(time(), 1..20)) {
+    fn motion_has_no_memory(entity in entity_in_nodes(), times in prop::collection::vec(time(), 1..20)) {
         let forth: Vec<_> = times.iter().map(|t| entity.at(*t)).collect();
         let back: Vec<_> = times.iter().rev().map(|t| entity.at(*t)).collect();
         prop_assert!(forth.iter().eq(back.iter().rev()));

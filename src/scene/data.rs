@@ -32,7 +32,8 @@
 //!         { time_s = 0, position = [0, 0.6, 0] }, { time_s = 2, position = [1, 0.9, 0] }, { time_s = 4, position = [0, 0.6, 0] } ] } },
 //!     { orbit = { centre = [0, 0, 0], period_s = 8 } }, { spin = { axis = [0, 1, 0], period_s = 4 } },
 //!     { bob = { amplitude_m = 0.1, period_s = 3 } },
-//! ]
+//!     { node = { position = [0, 1, 0], rotation_keys = { times_s = [0, 1], values = [[0, 0, 0, 1], [0, 1, 0, 0]], period_s = 2 } } },
+//! ]                                          # a node carries what stands in it; keys are "step", "linear" or "cubic"
 //! ```
 
 use std::path::{Path, PathBuf};
@@ -175,7 +176,8 @@ impl TryFrom<OutputWritten> for Output {
     }
 }
 
-/// A mesh, read from a file or made by a generator.
+/// A mesh, read from a file or made by a generator. In a scene that was read from a glTF file it may be neither: then only
+/// [`super::Scene::meshes`] has it, and a scene file can name it once it is written ([`super::export`]).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeshData {
     /// The name that entities use; it is unique.
@@ -238,7 +240,7 @@ pub struct EntityData {
     #[serde(default)]
     pub rotation: RotationData,
     /// A uniform factor, 1e-7 to 1e7. The default is 1.
-    #[serde(default = "one", deserialize_with = "values::scale")]
+    #[serde(default = "values::one", deserialize_with = "values::scale")]
     pub scale: f32,
     /// Linear reflectance, 0 to 1. The default is a grey of 0.7.
     #[serde(default = "grey", deserialize_with = "values::albedo")]
@@ -260,15 +262,28 @@ pub struct EntityData {
     pub motion: Vec<Motion>,
 }
 
-fn one() -> f32 {
-    1.0
-}
-
 fn grey() -> Vec3 {
     Vec3::splat(0.7)
 }
 
 impl EntityData {
+    /// An entity with that mesh and every other key left out.
+    pub fn of_mesh(mesh: &str) -> Self {
+        EntityData {
+            name: None,
+            mesh: mesh.to_owned(),
+            position: Vec3::ZERO,
+            rotation: RotationData::default(),
+            scale: values::one(),
+            albedo: grey(),
+            emission: Vec3::ZERO,
+            emits: None,
+            occludes: None,
+            receives: None,
+            motion: Vec::new(),
+        }
+    }
+
     /// The placement at `time_s` seconds.
     pub fn at(&self, time_s: f64) -> Placement {
         let rest = PlacementF64::new(self.position, self.rotation, self.scale);

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DQuat, DVec3, DVec4, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
+use super::keys::{Keys, hermite};
 use super::values;
 
 /// Object to world: scale, then rotation, then position.
@@ -149,6 +150,70 @@ pub enum Motion {
         #[serde(default, deserialize_with = "values::number")]
         phase_deg: f64,
     },
+    /// Places the entity in the space of a node that stands still or moves.
+    Node(Box<Node>),
+}
+
+/// A node that carries what stands in it: what is placed in its space is scaled, turned and moved as it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Node {
+    /// Position in metres where no keys give it. The default is the origin.
+    #[serde(default, deserialize_with = "values::position")]
+    pub position: Vec3,
+    /// Rotation where no keys give it. The default is none.
+    #[serde(default)]
+    pub rotation: RotationData,
+    /// Scale where no keys give it, 1e-7 to 1e7. The default is 1.
+    #[serde(default = "values::one", deserialize_with = "values::scale")]
+    pub scale: f32,
+    /// Keys of the position in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position_keys: Option<Keys<Vec3>>,
+    /// Keys of the rotation: quaternions x, y, z, w.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation_keys: Option<Keys<[f32; 4]>>,
+    /// Keys of the scale.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_keys: Option<Keys<f32>>,
+}
+
+impl Node {
+    /// A node that stands still.
+    pub fn still(position: Vec3, rotation: DQuat, scale: f32) -> Self {
+        let rotation = RotationData::Quaternion(rotation.as_quat().to_array());
+        Node { position, rotation, scale, position_keys: None, rotation_keys: None, scale_keys: None }
+    }
+
+    /// Whether no keys move it.
+    pub fn is_still(&self) -> bool {
+        self.key_count() == 0
+    }
+
+    /// How many keys it has.
+    pub fn key_count(&self) -> usize {
+        self.position_keys.as_ref().map_or(0, Keys::count)
+            + self.rotation_keys.as_ref().map_or(0, Keys::count)
+            + self.scale_keys.as_ref().map_or(0, Keys::count)
+    }
+
+    /// Where it stands at `time_s` seconds. Cubic keys that leave the range of a scene file end at its limits.
+    fn at(&self, time_s: f64) -> PlacementF64 {
+        let mut out = PlacementF64::new(self.position, self.rotation, self.scale);
+        let limit = f64::from(values::POSITION_LIMIT_M);
+        if let Some(keys) = &self.position_keys {
+            out.position = keys.at(time_s).truncate().clamp(DVec3::splat(-limit), DVec3::splat(limit));
+        }
+        if let Some(keys) = &self.rotation_keys {
+            let turn = DQuat::from_vec4(keys.at(time_s));
+            out.rotation = if turn.length_squared() > 1e-24 { turn.normalize() } else { DQuat::IDENTITY };
+        }
+        if let Some(keys) = &self.scale_keys {
+            let limit = f64::from(values::SCALE_LIMIT);
+            out.scale = keys.at(time_s).x.clamp(1.0 / limit, limit);
+        }
+        out
+    }
 }
 
 /// Interpolation of positions and scales between keys. Rotations always take the short way at a constant rate (spherical
@@ -254,6 +319,12 @@ impl PlacementF64 {
                 let angle = TAU * (time_s / period_s).fract() + phase_deg.to_radians();
                 self.position += axis.as_dvec3().normalize() * (amplitude_m * angle.sin());
             }
+            Motion::Node(node) => {
+                let node = node.at(time_s);
+                self.position = node.position + node.rotation * (self.position * node.scale);
+                self.rotation = node.rotation * self.rotation;
+                self.scale *= node.scale;
+            }
         }
         self
     }
@@ -307,10 +378,4 @@ fn interpolate(
         }
     };
     PlacementF64 { position: between.truncate(), rotation, scale: between.w }
-}
-
-/// The cubic with the given values and slopes at 0 and 1.
-fn hermite([a, b]: [DVec4; 2], [from, to]: [DVec4; 2], t: f64) -> DVec4 {
-    let rest = 1.0 - t;
-    (a * (1.0 + 2.0 * t) + from * t) * rest * rest + (b * (1.0 + 2.0 * rest) - to * rest) * t * t
 }

@@ -72,6 +72,11 @@ pub fn period<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     }
 }
 
+/// Default of scales.
+pub(super) fn one() -> f32 {
+    1.0
+}
+
 const SCALE: &str = "one scale, uniform and positive (1e-7 to 1e7)";
 
 /// One factor for all axes.

@@ -2,6 +2,7 @@
 
 use super::context::{Context, on_or_off};
 use super::quality::BakeArguments;
+use super::source::GltfArguments;
 use super::{Global, output, silhouette};
 use crate::asset::Mesh;
 use crate::asset::environment::RADIANCE_LIMIT;
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:\n  shadow-fields bake assets/meshes/teapot.obj -o teapot.sf\n  \
     shadow-fields bake lamp.obj -o lamp.sf --radiance 4,3,2 --quality high")]
 pub struct Arguments {
-    /// Mesh to bake, a Wavefront OBJ file with lengths in metres
+    /// Mesh to bake with lengths in metres: a Wavefront OBJ file, or all triangles of a glTF file (.glb, .gltf) as they stand at rest
     mesh: PathBuf,
     /// Field file to write
     #[arg(short, long, value_name = "F.sf")]
@@ -44,6 +45,8 @@ pub struct Arguments {
     inside: bool,
     #[command(flatten)]
     bake: BakeArguments,
+    #[command(flatten)]
+    gltf: GltfArguments,
 }
 
 /// Parses three numbers with commas between them.
@@ -78,9 +81,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     output::check_folder(&arguments.output)?;
     output::check_ending(&arguments.output, "sf", "a field file")?;
     if arguments.silhouette {
-        return silhouette::bake(global, &arguments.mesh, &arguments.output, arguments.bake.quality);
+        let mesh = arguments.gltf.mesh(global, &arguments.mesh)?;
+        return silhouette::bake(global, (&mesh, &arguments.mesh), &arguments.output, arguments.bake.quality);
     }
-    let mut mesh = Mesh::load(&arguments.mesh)?;
+    let mut mesh = arguments.gltf.mesh(global, &arguments.mesh)?;
     let kind = if arguments.radiance.is_some() { FieldKind::Radiance } else { FieldKind::Occlusion };
     if let Some(radiance) = arguments.radiance {
         mesh = shining(mesh, radiance, &arguments.mesh)?;

@@ -21,7 +21,7 @@ use std::path::PathBuf;
     given), 1 beyond one, 2 usage, 4 no picture, or pictures of different sizes"
 )]
 pub struct Arguments {
-    /// Picture in PNG, EXR or HDR, made by this program or not; of an animated PNG the first picture counts
+    /// Picture in PNG, JPEG, EXR or HDR, made by this program or not; of an animated PNG the first picture counts
     #[arg(value_name = "A")]
     first: PathBuf,
     /// Picture of the same size
@@ -39,7 +39,7 @@ pub struct Arguments {
     /// Picture of the same size: only pixels that are light in it (green at least half of white) count
     #[arg(long, value_name = "MASK.png")]
     mask: Option<PathBuf>,
-    /// Stops by which EXR and HDR pictures are brightened where they are shown: for FLIP, and beside a PNG
+    /// Stops by which EXR and HDR pictures are brightened where they are shown: for FLIP, and beside another
     #[arg(long, default_value_t = 0.0, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
     exposure_ev: f32,
 }

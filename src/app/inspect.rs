@@ -10,6 +10,7 @@ use crate::error::{Error, Result, one_line};
 use crate::field::file;
 use crate::field::silhouette::SILHOUETTE_MAGIC;
 use crate::field::{FieldHeader, FieldKind, Lookup, ShadowField, growth};
+use crate::scene;
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
 use crate::text;
@@ -145,7 +146,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
 
 /// The mesh that a field was baked from, with the colours that it had then.
 fn baked_mesh(header: &FieldHeader, path: &Path, radiance: Option<Vec3>) -> Result<Mesh> {
-    let mut mesh = Mesh::load(path)?;
+    let (mut mesh, _) = scene::load_mesh(path)?;
     if header.kind == FieldKind::Radiance {
         mesh = shining(mesh, radiance.unwrap_or(Vec3::ONE), path)?;
     } else if radiance.is_some() {

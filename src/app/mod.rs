@@ -8,6 +8,7 @@ mod compiling;
 mod context;
 mod demo;
 mod devices;
+mod import;
 mod inspect;
 mod output;
 mod profile;
@@ -15,6 +16,7 @@ mod quality;
 mod render;
 mod sheet;
 mod silhouette;
+mod source;
 #[cfg(feature = "view")]
 mod view;
 
@@ -44,6 +46,8 @@ enum Subcommands {
     Render(render::Arguments),
     /// Bake the field of a mesh into an .sf file
     Bake(bake::Arguments),
+    /// Write a glTF file as a scene file with its meshes, to be edited
+    Import(import::Arguments),
     /// Show what is in an .sf file: header, one lookup, contact sheets
     Inspect(inspect::Arguments),
     /// Measure error, time and stability and write tables and plots
@@ -86,6 +90,7 @@ fn run(cli: &Cli) -> Result<()> {
         Subcommands::Demo(arguments) => demo::run(&cli.global, arguments),
         Subcommands::Render(arguments) => render::run(&cli.global, arguments),
         Subcommands::Bake(arguments) => bake::run(&cli.global, arguments),
+        Subcommands::Import(arguments) => import::run(&cli.global, arguments),
         Subcommands::Inspect(arguments) => inspect::run(&cli.global, arguments),
         Subcommands::Bench(arguments) => bench::run(&cli.global, arguments),
         Subcommands::Check(arguments) => check::run(&cli.global, arguments),

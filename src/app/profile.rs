@@ -2,7 +2,6 @@
 
 use super::context::{Context, size};
 use super::{Global, output};
-use crate::asset::Mesh;
 use crate::bench::Bench;
 use crate::bench::ceilings::{self, Ceilings};
 use crate::bench::profile::{self, Contender, ProfileRow, Start, Tenths};
@@ -10,7 +9,7 @@ use crate::error::Result;
 use crate::gpu::{self, Device, Validation};
 use crate::merge::calibrate;
 use crate::merge::workload::Workload;
-use crate::scene::Scene;
+use crate::scene::{self, Scene};
 use crate::text;
 use clap::Args;
 use serde_json::{Value, json};
@@ -123,7 +122,7 @@ fn time_cases(
         origin: context.origin(global),
     };
     if let Some(path) = &arguments.bake {
-        return Ok(vec![profile::bake(&bench, &Mesh::load(path)?, arguments.runs)?]);
+        return Ok(vec![profile::bake(&bench, &scene::load_mesh(path)?.0, arguments.runs)?]);
     }
     if let Some(path) = &arguments.scene {
         let scene = Scene::load(path)?;

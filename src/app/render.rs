@@ -2,6 +2,7 @@
 
 use super::context::{Context, MergeArguments, size};
 use super::quality::BakeArguments;
+use super::source::GltfArguments;
 use super::{Global, output};
 use crate::asset::false_color::Scheme;
 use crate::asset::picture;
@@ -24,7 +25,7 @@ const ANNOUNCED_BYTES: u64 = 1_000_000_000;
 /// Arguments of `render`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Scene file (see assets/scenes for examples), or the name of a built-in one
+    /// Scene file (see assets/scenes for examples), the name of a built-in one, or a glTF file (.glb, .gltf)
     scene: PathBuf,
     /// Picture to write; with --frames an animated PNG, or pictures numbered from 0 when the name has a run of #: out/f_####.png
     #[arg(short, long, value_name = "P.png")]
@@ -73,12 +74,14 @@ pub struct Arguments {
     merge: MergeArguments,
     #[command(flatten)]
     bake: BakeArguments,
+    #[command(flatten)]
+    gltf: GltfArguments,
 }
 
 /// Renders a scene.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let names = PictureNames::new(arguments)?;
-    let scene = Scene::load(&arguments.scene)?;
+    let scene = arguments.gltf.scene(global, &arguments.scene)?;
     let context = Context::new(global)?;
     let mut rendering = Rendering::new(global, arguments, &context, &scene)?;
     rendering.write_pictures(&names)?;

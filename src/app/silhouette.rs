@@ -11,13 +11,12 @@ use glam::DVec3;
 use serde_json::json;
 use std::path::Path;
 
-/// Bakes the silhouette field of a mesh and writes it.
-pub fn bake(global: &Global, mesh_file: &Path, out: &Path, quality: Quality) -> Result<()> {
-    let mesh = Mesh::load(mesh_file)?;
+/// Bakes the silhouette field of a mesh that was read from a file, and writes it.
+pub fn bake(global: &Global, (mesh, mesh_file): (&Mesh, &Path), out: &Path, quality: Quality) -> Result<()> {
     let context = Context::new(global)?;
     let told = |done, all| context.progress.show(&mesh.name, done, all);
     let (device, library) = (context.baker.device(), context.baker.library());
-    let (field, report) = bake_silhouette((device, library), &mesh, quality.options().silhouette, &told)
+    let (field, report) = bake_silhouette((device, library), mesh, quality.options().silhouette, &told)
         .map_err(|error| error.context(mesh_file.display()))?;
     let seconds = report.total.as_secs_f64();
     let result = json!({

@@ -2,6 +2,7 @@
 
 use super::context::{Context, MergeArguments, size};
 use super::quality::BakeArguments;
+use super::source::GltfArguments;
 use super::{Global, output};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
@@ -34,7 +35,7 @@ const LEAST_SIZE: PhysicalSize<u32> = PhysicalSize::new(160, 120);
 #[derive(Args)]
 #[command(after_long_help = format!("Controls:\n{}", crate::view::input::help()))]
 pub struct Arguments {
-    /// Scene file, or the name of a built-in one
+    /// Scene file, the name of a built-in one, or a glTF file (.glb, .gltf)
     #[arg(default_value = "assets/scenes/teapot_lights.toml")]
     scene: PathBuf,
     /// Size of the window in pixels; default: the scene's
@@ -57,11 +58,13 @@ pub struct Arguments {
     merge: MergeArguments,
     #[command(flatten)]
     bake: BakeArguments,
+    #[command(flatten)]
+    gltf: GltfArguments,
 }
 
 /// Opens the window and stays until it is closed.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let scene = Scene::load(&arguments.scene)?;
+    let scene = arguments.gltf.scene(global, &arguments.scene)?;
     let events = event_loop()?;
     let display = events.owned_display_handle();
     let display = display.display_handle().map_err(no_display)?.as_raw();

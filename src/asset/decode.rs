@@ -1,4 +1,4 @@
-//! Reads pictures: PNG, OpenEXR and Radiance HDR.
+//! Reads pictures: PNG, JPEG, OpenEXR and Radiance HDR.
 //!
 //! A picture's size is known before its pixels are decoded, so that a small file cannot ask for much memory.
 
@@ -15,6 +15,9 @@ pub const PIXEL_LIMIT: u64 = 1 << 25;
 /// Largest file of a picture in bytes: 512 MiB, what a picture of [`PIXEL_LIMIT`] pixels takes as uncompressed f32 RGBA.
 const FILE_LIMIT_BYTES: u64 = 512 << 20;
 
+/// What is read.
+const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::OpenExr, ImageFormat::Hdr];
+
 /// A picture as it is stored: rows from the top, pixels from the left, three channels each. Alpha is dropped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
@@ -24,7 +27,7 @@ pub struct Picture {
     pub height: usize,
     /// Red, green and blue of every pixel: sRGB from 0 to 1, or linear and of any value.
     pub rgb: Vec<f32>,
-    /// Whether the values are linear, as in OpenEXR and HDR, or sRGB, as in PNG.
+    /// Whether the values are linear, as in OpenEXR and HDR, or sRGB, as in PNG and JPEG.
     pub is_linear: bool,
     /// Whether some pixel is not opaque in the file.
     pub is_transparent: bool,
@@ -39,7 +42,7 @@ impl Picture {
         Self::decode(&super::read_file(path, FILE_LIMIT_BYTES)?).map_err(|error| error.context(path.display()))
     }
 
-    /// Decodes a PNG, of an animated one the first picture; OpenEXR with red, green and blue; or Radiance HDR.
+    /// Decodes a PNG, of an animated one the first picture; JPEG; OpenEXR with red, green and blue; or Radiance HDR.
     ///
     /// # Errors
     /// [`Error::Input`] in one line: of another format, damaged, or of more than [`PIXEL_LIMIT`] pixels.
@@ -47,9 +50,8 @@ impl Picture {
         let damaged = |error: image::ImageError| Error::Input(error.to_string().replace('\n', " "));
         let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
         let mut reader = reader.map_err(|error| Error::Input(error.to_string()))?;
-        let format =
-            reader.format().filter(|f| matches!(f, ImageFormat::Png | ImageFormat::OpenExr | ImageFormat::Hdr));
-        let format = format.ok_or_else(|| Error::Input("expected a picture in PNG, EXR or HDR".into()))?;
+        let format = reader.format().filter(|f| FORMATS.contains(f));
+        let format = format.ok_or_else(|| Error::Input("expected a picture in PNG, JPEG, EXR or HDR".into()))?;
         let mut limits = Limits::default();
         // Twice the largest pixel, of four f32: the decoder may hold a copy.
         limits.max_alloc = Some(PIXEL_LIMIT * 32);
@@ -63,7 +65,7 @@ impl Picture {
         let is_transparent =
             decoded.color().has_alpha() && decoded.to_rgba32f().pixels().any(|pixel| pixel.0[3] != 1.0);
         let rgb = decoded.into_rgb32f().into_raw();
-        let is_linear = format != ImageFormat::Png;
+        let is_linear = matches!(format, ImageFormat::OpenExr | ImageFormat::Hdr);
         Ok(Picture { width: width as usize, height: height as usize, rgb, is_linear, is_transparent })
     }
 

@@ -26,12 +26,11 @@ impl Case {
         Case { name, light: light(&scene), scene, time_s: 0.0, distant }
     }
 
-    /// A scene file at the time of its first picture, named after the file. Built-in scenes go by name or path.
+    /// The scene of a file at the time of its first picture, named after the file.
     ///
     /// # Errors
-    /// As [`Scene::load`], and `Input` when nothing in the scene shines, or nothing is lit.
-    pub fn of_file(path: &Path) -> Result<Self> {
-        let scene = Scene::load(path)?;
+    /// `Input` when nothing in the scene shines, or nothing is lit.
+    pub fn of_file(path: &Path, scene: Scene) -> Result<Self> {
         let missing = if !scene.entities.iter().any(|e| e.receives) {
             "no entity receives light"
         } else if scene.environment.is_none() && !scene.entities.iter().any(|e| e.emits) {

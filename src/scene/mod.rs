@@ -3,6 +3,9 @@
 //! [`Data`] has the content of the file and can be written as TOML; [`Scene`] adds derived data.
 
 pub mod data;
+pub mod export;
+pub mod gltf;
+pub mod keys;
 pub mod light;
 pub mod motion;
 pub mod values;
@@ -62,11 +65,38 @@ pub struct Entity {
 
 impl Scene {
     /// Reads a scene and the files that it names, relative to it. If the path does not exist, an embedded scene is read
-    /// (`assets/scenes/NAME.toml`, or NAME alone).
+    /// (`assets/scenes/NAME.toml`, or NAME alone). A `.glb` or `.gltf` file is read as [`gltf`] says; what is left out of it is
+    /// logged.
     ///
     /// # Errors
     /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line.
     pub fn load(path: &Path) -> Result<Self> {
+        let (scene, notes) = Self::load_with_notes(path)?;
+        notes.left_out().iter().for_each(|line| log::warn!("{}: {line}", path.display()));
+        notes.said().iter().for_each(|line| log::info!("{}: {line}", path.display()));
+        Ok(scene)
+    }
+
+    /// As [`Scene::load`], with what a reader of a glTF file has to know, which is nothing of other files.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn load_with_notes(path: &Path) -> Result<(Self, gltf::Notes)> {
+        if !gltf::is_gltf(path) {
+            return Ok((Self::load_toml(path)?, gltf::Notes::default()));
+        }
+        let gltf::Import { data, meshes, notes } = gltf::load(path)?;
+        let entity = |(i, entity): (usize, &EntityData)| {
+            let mesh = data.meshes.iter().position(|mesh| mesh.name == entity.mesh);
+            let mesh = mesh.ok_or_else(|| Error::input(path, format!("there is no mesh {:?}", entity.mesh)))?;
+            Ok(resolve(i, entity, mesh, &meshes[mesh]))
+        };
+        let entities = data.entities.iter().enumerate().map(entity).collect::<Result<Vec<_>>>()?;
+        let environment = Environment::new(&data.environment, &read_named).map_err(|e| e.context(path.display()))?;
+        Ok((Self { data, meshes, entities, environment }, notes))
+    }
+
+    fn load_toml(path: &Path) -> Result<Self> {
         let named = embedded::scene_path(path).filter(|_| !path.exists());
         let path = named.as_deref().unwrap_or(path);
         if !path.exists() && embedded::find(path).is_some() {
@@ -154,6 +184,15 @@ fn resolve(index: usize, data: &EntityData, mesh: usize, shape: &Mesh) -> Entity
         occludes: data.occludes.unwrap_or(!emits && !shape.is_flat()),
         receives: data.receives.unwrap_or(true),
     }
+}
+
+/// Reads a mesh: all triangles of a glTF file's scene at rest, or a Wavefront OBJ file, with what a reader of the
+/// former has to know.
+///
+/// # Errors
+/// As [`gltf::load_mesh`] and [`Mesh::load`].
+pub fn load_mesh(path: &Path) -> Result<(Mesh, gltf::Notes)> {
+    if gltf::is_gltf(path) { gltf::load_mesh(path) } else { Ok((Mesh::load(path)?, gltf::Notes::default())) }
 }
 
 /// Reads a file that a scene names: a mesh or a picture.

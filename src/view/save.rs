@@ -3,8 +3,7 @@
 use super::editor::Editor;
 use crate::asset::embedded;
 use crate::error::{Error, Result};
-use crate::files;
-use crate::scene::Data;
+use crate::scene::{Data, export};
 use std::path::{Path, PathBuf};
 
 /// Suffix of a saved scene's name, so that the original file with its comments is kept.
@@ -67,18 +66,16 @@ impl Editor {
         Ok(data)
     }
 
-    /// Writes the state as a scene file.
+    /// Writes the state as a scene file, and meshes that no file has beside it.
     ///
     /// # Errors
     /// `Failed` when it cannot be written; then an older file is unchanged.
     pub fn save(&mut self, path: &Path) -> Result<()> {
         let data = self.data(path.parent().unwrap_or(Path::new("")))?;
-        let text = format!(
-            "# Written by shadow-fields view; `shadow-fields render` gives the same picture.\n\n{}",
-            data.to_toml()
-        );
-        files::replace_with(path, |file| file.write_all(text.as_bytes())).map_err(|error: std::io::Error| {
-            Error::Failed(format!("{}: cannot be written: {error}", path.display()))
+        let head = "Written by shadow-fields view; `shadow-fields render` gives the same picture.";
+        export::write(&data, &self.scene().meshes, path, head).map_err(|error| match error {
+            Error::Input(message) => Error::Failed(message),
+            other => other,
         })?;
         self.saved.insert(path.to_owned());
         self.kept = self.scene().data.clone();

@@ -1,6 +1,7 @@
 //! `shadow-fields bench time-error`
 
 use super::common::start;
+use crate::app::source::GltfArguments;
 use crate::app::{Global, output};
 use crate::bench::cases::Case;
 use crate::bench::time_error::{self, Selection};
@@ -19,8 +20,8 @@ use std::path::PathBuf;
     objects\"."
 )]
 pub struct Arguments {
-    /// Scene to measure and sweep instead of the built-in cases, at the time_s of its [output]
-    #[arg(value_name = "SCENE.toml", conflicts_with = "case")]
+    /// Scene file or glTF file to measure and sweep instead of the built-in cases, at the time_s of its [output]
+    #[arg(value_name = "SCENE", conflicts_with = "case")]
     scene: Option<PathBuf>,
     /// A minute on two cores instead of a quarter of an hour: fewer scenes, settings and rays
     #[arg(long)]
@@ -35,11 +36,14 @@ pub struct Arguments {
     /// error pictures, and the picture of the merge beside that of ray casting
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    gltf: GltfArguments,
 }
 
 /// Measures and prints the budget and the comparison.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let own = arguments.scene.as_deref().map(Case::of_file).transpose()?;
+    let own =
+        arguments.scene.as_deref().map(|path| Case::of_file(path, arguments.gltf.scene(global, path)?)).transpose()?;
     let selection =
         Selection { scene: arguments.scene.clone(), cases: arguments.case.clone(), axes: arguments.axis.clone() };
     let (context, outcome) =

@@ -1,0 +1,69 @@
+//! Writes a scene with those of its meshes that no file has.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::FILE_LIMIT_BYTES;
+use super::data::Data;
+use crate::asset::Mesh;
+use crate::asset::obj;
+use crate::error::{Error, Result};
+use crate::files;
+
+/// Writes a scene file that starts with the comment `head` (without `#`), and the meshes that neither have a file nor a generator as
+/// OBJ files in the folder `NAME_meshes` beside it. Returns what was written as data. The scene file comes last, so that it never names
+/// what is not there.
+///
+/// # Errors
+/// `Failed` where a file cannot be written; `Input` where the scene or a mesh is larger than what is read, or has a number that is
+/// not.
+pub fn write(data: &Data, meshes: &[Arc<Mesh>], path: &Path, head: &str) -> Result<Data> {
+    let mut data = data.clone();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let folder = PathBuf::from(format!("{stem}_meshes"));
+    let beside = path.parent().unwrap_or(Path::new(""));
+    let mut taken = HashSet::new();
+    let mut files_to_write = Vec::new();
+    for (mesh, built) in data.meshes.iter_mut().zip(meshes) {
+        if mesh.file.is_some() || mesh.generator.is_some() {
+            continue;
+        }
+        let file = folder.join(file_name(&mesh.name, &mut taken));
+        files_to_write.push((beside.join(&file), built));
+        mesh.file = Some(file);
+    }
+    if data.meshes.iter().filter_map(|mesh| mesh.file.as_ref()).any(|file| file.to_str().is_none()) {
+        return Err(Error::Failed(format!("{}: a scene file can only name UTF-8 paths", path.display())));
+    }
+    let text = format!("# {head}\n\n{}", data.to_toml());
+    if text.len() > FILE_LIMIT_BYTES {
+        return Err(Error::input(path, format!("over the limit of {} MiB for a scene file", FILE_LIMIT_BYTES >> 20)));
+    }
+    Data::parse(&text, path)?;
+    for (path, mesh) in files_to_write {
+        let text = obj::write_obj(mesh);
+        if text.len() as u64 > obj::FILE_LIMIT_BYTES {
+            let what = format!("over the limit of {} MiB for a mesh file", obj::FILE_LIMIT_BYTES >> 20);
+            return Err(Error::input(&path, what));
+        }
+        files::replace(&path, text.as_bytes()).map_err(|error| unwritten(&path, &error))?;
+    }
+    files::replace_with(path, |file| file.write_all(text.as_bytes()))
+        .map_err(|error: std::io::Error| unwritten(path, &error))?;
+    Ok(data)
+}
+
+fn unwritten(path: &Path, error: &std::io::Error) -> Error {
+    Error::Failed(format!("{}: cannot be written: {error}", path.display()))
+}
+
+/// A name that every file system takes and that is not taken, also where case does not count.
+fn file_name(name: &str, taken: &mut HashSet<String>) -> String {
+    let safe = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+    let stem: String = name.chars().take(60).map(safe).collect();
+    let stem = if stem.is_empty() { "mesh".to_owned() } else { stem };
+    let all = std::iter::once(stem.clone()).chain((2..).map(|n| format!("{stem}_{n}")));
+    let free = all.into_iter().find(|name| taken.insert(name.to_lowercase())).unwrap_or(stem);
+    format!("{free}.obj")
+}

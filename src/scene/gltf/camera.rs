@@ -1,0 +1,95 @@
+//! The viewpoint: the file's first perspective camera, or one that sees the whole scene.
+
+use ::gltf::json::camera::Type;
+use ::gltf::json::validation::Checked;
+use glam::{DVec3, Vec3};
+
+use super::document::Document;
+use super::notes::Notes;
+use super::tree::Stand;
+use crate::error::Result;
+use crate::scene::data::{Camera, EntityData, Output};
+
+/// Where a camera stands that the file does not have, as seen from the scene's centre.
+const TOWARD: DVec3 = DVec3::new(0.5, 0.5, 1.0);
+/// Its vertical field of view, degrees.
+const FOV_DEG: f32 = 40.0;
+/// Height of pictures in pixels where the camera states an aspect.
+const HEIGHT_PX: f32 = 640.0;
+
+/// The camera, and the size of pictures, for a scene with that bounding sphere (metres).
+///
+/// # Errors
+/// `Input` for numbers of a camera that are out of range.
+pub fn camera(
+    document: &Document,
+    stands: &[Stand],
+    (centre, radius_m): (DVec3, f64),
+    notes: &mut Notes,
+) -> Result<(Camera, Output)> {
+    let mut found = None;
+    for stand in stands {
+        let Some(index) = document.root.nodes[stand.node].camera.map(|camera| camera.value()) else { continue };
+        let json = &document.root.cameras[index];
+        match (&json.type_, &json.perspective) {
+            (Checked::Valid(Type::Perspective), Some(_)) if found.is_some() => notes.leave_out("further cameras"),
+            (Checked::Valid(Type::Perspective), Some(perspective)) => found = Some((index, stand, perspective)),
+            _ => notes.leave_out("cameras without perspective"),
+        }
+    }
+    let Some((index, stand, perspective)) = found else {
+        notes.say("there is no camera: one that sees everything is added".into());
+        let distance_m = radius_m / f64::from(FOV_DEG / 2.0).to_radians().sin();
+        let eye = centre + TOWARD.normalize() * distance_m;
+        return Ok((Camera { eye: eye.as_vec3(), target: centre.as_vec3(), fov_deg: FOV_DEG }, Output::default()));
+    };
+    let place = format!("cameras[{index}].perspective");
+    let fov_deg = perspective.yfov.to_degrees();
+    if !(1.0..=170.0).contains(&fov_deg) {
+        return Err(document.fail(place, format!("a yfov of {fov_deg} degrees is not within 1 to 170")));
+    }
+    if !stand.motion.is_empty() {
+        notes.leave_out("movements of cameras (they stand where they are at time 0)");
+    }
+    // The placement of an entity that stands there at time 0; cameras look along -z.
+    let at = EntityData { motion: stand.motion.clone(), ..EntityData::of_mesh("") }.at(0.0);
+    let to_world =
+        |p: DVec3| at.position.as_dvec3() + at.turn() * (stand.fixed.transform_point3(p) * f64::from(at.scale));
+    let (eye, ahead) = (to_world(DVec3::ZERO), to_world(DVec3::NEG_Z));
+    let ahead = (ahead - eye).try_normalize().ok_or_else(|| document.fail(&place, "its node squeezes space flat"))?;
+    let distance_m = (centre - eye).dot(ahead).max(0.1 * radius_m).max(1e-3);
+    let camera = Camera { eye: eye.as_vec3(), target: (eye + ahead * distance_m).as_vec3(), fov_deg };
+    if camera.eye.distance(camera.target) < 1e-6 || !camera.target.is_finite() {
+        return Err(document.fail(place, "it stands too far out to look anywhere"));
+    }
+    let up = (to_world(DVec3::Y) - eye).normalize_or_zero();
+    let right = ahead.cross(camera.up().as_dvec3()).normalize_or_zero();
+    if up.dot(right).abs() > 0.02 {
+        notes.leave_out("tilts of cameras (up stays up in the picture)");
+    }
+    let mut output = Output::default();
+    if let Some(aspect) = perspective.aspect_ratio {
+        if !(0.05..=20.0).contains(&aspect) {
+            return Err(document.fail(place, format!("an aspectRatio of {aspect} is not within 0.05 to 20")));
+        }
+        (output.width, output.height) = ((HEIGHT_PX * aspect).round() as u32, HEIGHT_PX as u32);
+    }
+    Ok((camera, output))
+}
+
+/// A sphere around entities at time 0: centre and radius in metres. Each is its mesh's bounding sphere and its data.
+pub fn bounds<'a>(entities: impl Iterator<Item = ((Vec3, f32), &'a EntityData)>) -> (DVec3, f64) {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for ((centre, radius_m), entity) in entities {
+        let at = entity.at(0.0);
+        let scale = f64::from(at.scale);
+        let centre = at.position.as_dvec3() + at.turn() * (centre.as_dvec3() * scale);
+        let reach = DVec3::splat(f64::from(radius_m) * scale);
+        (low, high) = (low.min(centre - reach), high.max(centre + reach));
+    }
+    if low.x > high.x {
+        return (DVec3::ZERO, 1.0);
+    }
+    // The box of the spheres is larger than what is in them.
+    ((low + high) / 2.0, ((high - low).length() / 2.0 / 3.0_f64.sqrt() * 1.2).max(1e-3))
+}

@@ -1,0 +1,186 @@
+//! Punctual lights as glowing balls, and spots as balls in a housing with a round hole.
+//!
+//! A point has no size, so a lamp gets one, which is said: a hundredth of the scene's radius. Candela are taken as W sr^-1, and the
+//! ball's radiance is the intensity over its mean outline, so that what is lit from afar does not depend on the radius.
+
+use ::gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
+use ::gltf::json::validation::Checked;
+use glam::{DMat3, DQuat, DVec3, Vec3};
+
+use super::document::Document;
+use super::notes::Notes;
+use super::spot::{Housing, PLATE, WIDEST_DEG};
+use super::tree::Stand;
+use crate::asset::Mesh;
+use crate::asset::environment::RADIANCE_LIMIT;
+use crate::asset::generate::{Generator, sphere};
+use crate::error::Result;
+use crate::scene::data::{EntityData, MeshData};
+use crate::scene::motion::{Motion, RotationData};
+
+/// Radius of a lamp, as a share of the scene's.
+const RADIUS_SHARE: f64 = 0.01;
+/// Half the width of the widest housing of a spot, in radii of a lamp that has none.
+const HOUSING_RADII: f64 = 6.0;
+/// Cuts of the icosahedron that stands for a ball: 320 triangles.
+const SUBDIVISIONS: u32 = 2;
+/// Name of the lamps' mesh.
+pub const BALL: &str = "lamp";
+
+/// What stands for the lights: meshes, which are generated or none but this has, and entities.
+#[derive(Default)]
+pub struct Fittings {
+    /// Meshes with their data.
+    pub meshes: Vec<(MeshData, Mesh)>,
+    /// Lamps and plates.
+    pub entities: Vec<EntityData>,
+}
+
+/// The lights of a file that shine.
+pub struct Lamps<'a> {
+    /// Every light with where it stands.
+    lights: Vec<(&'a Light, &'a Stand)>,
+    radius_m: f64,
+}
+
+impl<'a> Lamps<'a> {
+    /// The lights that nodes hold, for a scene of that radius in metres.
+    ///
+    /// # Errors
+    /// `Input` for an intensity or colour that is negative or too large.
+    pub fn new(document: &'a Document, stands: &'a [Stand], scene_radius_m: f64, notes: &mut Notes) -> Result<Self> {
+        let all = document.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+        let all = all.map_or(&[][..], |e| &e.lights);
+        let mut lights = Vec::new();
+        for stand in stands {
+            let of = document.root.nodes[stand.node].extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+            let Some(index) = of.map(|e| e.light.value()) else { continue };
+            let light = &all[index];
+            let usable = |x: &f32| (0.0..=1e12).contains(x);
+            if !usable(&light.intensity) || !light.color.iter().all(usable) {
+                let place = format!("extensions.KHR_lights_punctual.lights[{index}]");
+                return Err(document.fail(place, "its intensity or colour is negative, not finite or beyond 1e12"));
+            }
+            if light.range.is_some() {
+                notes.leave_out("ranges of lights (their light reaches any distance)");
+            }
+            match light.type_ {
+                Checked::Valid(Type::Directional) => notes.leave_out("directional lights"),
+                Checked::Valid(_) if intensity(light) != Vec3::ZERO => lights.push((light, stand)),
+                _ => {}
+            }
+        }
+        Ok(Lamps { lights, radius_m: (scene_radius_m * RADIUS_SHARE).clamp(1e-4, 1e4) })
+    }
+
+    /// Their meshes and entities.
+    ///
+    /// # Errors
+    /// `Input` where a lamp becomes too bright.
+    pub fn entities(&self, document: &Document, notes: &mut Notes) -> Result<Fittings> {
+        let mut out = Fittings::default();
+        if self.lights.is_empty() {
+            return Ok(out);
+        }
+        out.add(BALL, Generator::Sphere { radius_m: 1.0, subdivisions: SUBDIVISIONS })?;
+        let mut housings: Vec<(Housing, String)> = Vec::new();
+        let mut least_m = self.radius_m;
+        for (light, stand) in &self.lights {
+            let housing = light.spot.as_ref().filter(|_| is_spot(light)).map(|spot| {
+                let [inner, outer] = [spot.inner_cone_angle, spot.outer_cone_angle].map(f64::from);
+                if outer > WIDEST_DEG.to_radians() {
+                    notes.leave_out("spots that are wider than 80 degrees off their axis (they end there)");
+                }
+                Housing::new(inner, outer)
+            });
+            let widest_m = self.radius_m * HOUSING_RADII;
+            let radius_m = housing.map_or(self.radius_m, |housing| self.radius_m.min(widest_m / housing.half_width));
+            least_m = least_m.min(radius_m);
+            // A convex body's mean outline is its area over four.
+            let outline_m2 = sphere(1.0, SUBDIVISIONS).area_m2() / 4.0 * radius_m.powi(2);
+            let emission = intensity(light) / outline_m2 as f32;
+            if emission.max_element() > RADIANCE_LIMIT {
+                return Err(document.fail(format!("nodes[{}]", stand.node), "its light is too bright for its size"));
+            }
+            let name = document.root.nodes[stand.node].name.clone().or_else(|| light.name.clone());
+            let lamp = EntityData { emission, name, ..ball(stand, radius_m) };
+            if let Some(housing) = housing {
+                if housings.is_empty() {
+                    out.add(PLATE, Generator::Plane { size_m: 1.0, cells: 1 })?;
+                }
+                let known = housings.iter().position(|(other, _)| *other == housing);
+                let index = known.map_or_else(
+                    || {
+                        let name = format!("{PLATE} with hole {}", housings.len() + 1);
+                        let front = housing.front(&name)?;
+                        out.meshes.push((MeshData { name: name.clone(), file: None, generator: None }, front));
+                        housings.push((housing, name));
+                        Ok(housings.len() - 1)
+                    },
+                    Ok,
+                )?;
+                out.entities.extend(housing.entities(&lamp, &housings[index].1));
+            }
+            out.entities.push(lamp);
+        }
+        let radii = if least_m < self.radius_m {
+            format!("{least_m:.3} to {:.3}", self.radius_m)
+        } else {
+            format!("{least_m:.3}")
+        };
+        notes.say(format!("{} point and spot lights are balls of radius {radii} m", self.lights.len()));
+        let spots = self.lights.iter().filter(|(light, _)| is_spot(light)).count();
+        if spots > 0 {
+            notes.say(format!("{spots} spot lights stand in housings of six plates, which cast shadows"));
+        }
+        Ok(out)
+    }
+
+    /// The exposure in stops at which a white surface in the middle of the scene, lit by all lamps, shows half of white: the lamps'
+    /// photometric units say nothing of how bright a picture should be. `None` without lamps.
+    pub fn exposure_ev(&self, centre: DVec3, scene_radius_m: f64) -> Option<f32> {
+        let irradiance = |(light, stand): &(&Light, &Stand)| {
+            let distance_m = centre.distance(stand.rest.translation).max(0.3 * scene_radius_m);
+            f64::from(intensity(light).max_element()) / distance_m.powi(2)
+        };
+        let radiance = self.lights.iter().map(irradiance).sum::<f64>() / std::f64::consts::PI;
+        (radiance > 0.0).then(|| (((0.5 / radiance).log2() * 2.0).round() / 2.0).clamp(-32.0, 32.0) as f32)
+    }
+}
+
+impl Fittings {
+    fn add(&mut self, name: &str, generator: Generator) -> Result<()> {
+        let built = generator.build()?;
+        self.meshes.push((MeshData { name: name.into(), file: None, generator: Some(generator) }, built));
+        Ok(())
+    }
+}
+
+fn is_spot(light: &Light) -> bool {
+    matches!(light.type_, Checked::Valid(Type::Spot))
+}
+
+/// A ball of that radius in metres where a light stands.
+fn ball(stand: &Stand, radius_m: f64) -> EntityData {
+    // Lights look along -z, whatever mirrors them.
+    let linear = stand.fixed.matrix3;
+    let z = linear.z_axis.try_normalize().unwrap_or(DVec3::Z);
+    let y = (linear.y_axis - z * z.dot(linear.y_axis)).try_normalize().unwrap_or_else(|| z.any_orthonormal_vector());
+    let rotation = DQuat::from_mat3(&DMat3::from_cols(y.cross(z), y, z)).normalize();
+    // Nor do they grow with the nodes that carry them.
+    let size = |motion: &Motion| if let Motion::Node(node) = motion { f64::from(node.scale) } else { 1.0 };
+    let carried: f64 = stand.motion.iter().map(size).product();
+    EntityData {
+        position: stand.fixed.translation.as_vec3(),
+        rotation: RotationData::Quaternion(rotation.as_quat().to_array()),
+        scale: ((radius_m / carried) as f32).clamp(1e-7, 1e7),
+        receives: Some(false),
+        motion: stand.motion.clone(),
+        ..EntityData::of_mesh(BALL)
+    }
+}
+
+/// Intensity in candela a channel.
+fn intensity(light: &Light) -> Vec3 {
+    Vec3::from(light.color) * light.intensity
+}

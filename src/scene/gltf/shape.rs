@@ -1,0 +1,175 @@
+//! Primitives of meshes as triangles.
+
+use std::collections::HashMap;
+
+use ::gltf::json::mesh::{Mode, Primitive, Semantic};
+use ::gltf::json::validation::Checked;
+use glam::{DMat3, DVec3, Vec3};
+
+use super::accessor;
+use super::document::Document;
+use super::notes::Notes;
+use crate::asset::Mesh;
+use crate::asset::mesh::TRIANGLE_LIMIT;
+use crate::error::Result;
+
+/// The triangles of a primitive. Where it has no normals, every triangle has vertices of its own with its own normal, as the
+/// specification demands.
+pub struct Shape {
+    /// Place in the JSON.
+    pub place: String,
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    /// The element of the accessors that each vertex has.
+    source: Vec<u32>,
+    attributes: HashMap<Semantic, usize>,
+}
+
+impl Shape {
+    /// Reads a primitive; `None` where it is of points or lines, which is noted.
+    ///
+    /// # Errors
+    /// `Input` that names the place.
+    pub fn read(document: &Document, mesh: usize, at: usize, notes: &mut Notes) -> Result<Option<Self>> {
+        let place = format!("meshes[{mesh}].primitives[{at}]");
+        let primitive = &document.root.meshes[mesh].primitives[at];
+        let attributes = attributes(primitive);
+        let Checked::Valid(mode) = primitive.mode else { return Ok(None) };
+        if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+            notes.leave_out("primitives of points or lines");
+            return Ok(None);
+        }
+        if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
+            notes.leave_out("primitives with morph targets (they keep the shape that is stored first)");
+        }
+        let positions = attributes.get(&Semantic::Positions).map(|index| accessor::triples(document, *index));
+        let positions = positions.ok_or_else(|| document.fail(&place, "there is no attribute POSITION"))??;
+        let normals = attributes.get(&Semantic::Normals).map(|index| accessor::triples(document, *index));
+        let normals = normals.transpose()?;
+        if normals.as_ref().is_some_and(|normals| normals.len() != positions.len()) {
+            return Err(document.fail(&place, "there are not as many normals as positions"));
+        }
+        let corners = match primitive.indices {
+            Some(index) => accessor::indices(document, index.value())?,
+            None => (0..positions.len() as u32).collect(),
+        };
+        if let Some(bad) = corners.iter().find(|corner| **corner as usize >= positions.len()) {
+            let what = format!("index {bad} is out of range: there are {} vertices", positions.len());
+            return Err(document.fail(format!("{place}.indices"), what));
+        }
+        let triangles = triangles(mode, &corners).map_err(|what| document.fail(&place, what))?;
+        let mut shape = match normals {
+            Some(normals) => {
+                let source = (0..positions.len() as u32).collect();
+                Shape { place, positions, normals, triangles, source, attributes }
+            }
+            None => flat(place, &positions, &triangles, attributes),
+        };
+        if shape.triangles.len() > TRIANGLE_LIMIT {
+            let what = format!("{} triangles are over the limit of {TRIANGLE_LIMIT}", shape.triangles.len());
+            return Err(document.fail(&shape.place, what));
+        }
+        shape.triangles.shrink_to_fit();
+        Ok(Some(shape))
+    }
+
+    /// The mesh, transformed by `bend`, with a colour a vertex if there are any.
+    ///
+    /// # Errors
+    /// As [`Mesh::new`], with the place in front.
+    pub fn mesh(&self, document: &Document, name: &str, bend: DMat3, colors: Option<Vec<Vec3>>) -> Result<Mesh> {
+        let shape = self.bent(bend, DVec3::ZERO);
+        Mesh::new(name, shape.0, shape.1, colors, shape.2).map_err(|error| document.fail(&self.place, error))
+    }
+
+    /// Positions, normals and triangles after a transformation; a mirrored surface keeps its outside.
+    pub fn bent(&self, bend: DMat3, shift: DVec3) -> (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>) {
+        if bend == DMat3::IDENTITY && shift == DVec3::ZERO {
+            return (self.positions.clone(), self.normals.clone(), self.triangles.clone());
+        }
+        let positions = self.positions.iter().map(|p| (bend * p.as_dvec3() + shift).as_vec3()).collect();
+        let upright = bend.inverse().transpose();
+        let normals = self.normals.iter().map(|n| (upright * n.as_dvec3()).normalize_or_zero().as_vec3()).collect();
+        let mirrored = bend.determinant() < 0.0;
+        let turned = |t: &[u32; 3]| if mirrored { [t[0], t[2], t[1]] } else { *t };
+        (positions, normals, self.triangles.iter().map(turned).collect())
+    }
+
+    /// Numbers of an attribute for every vertex, `width` of each element; `None` where the primitive has no such attribute.
+    ///
+    /// # Errors
+    /// As [`accessor::numbers`].
+    pub fn attribute(
+        &self,
+        document: &Document,
+        of: &Semantic,
+        widths: &[usize],
+        width: usize,
+    ) -> Result<Option<Vec<f32>>> {
+        let Some(index) = self.attributes.get(of) else { return Ok(None) };
+        let numbers = accessor::numbers(document, *index, widths)?;
+        let count = document.root.accessors[*index].count.0 as usize;
+        let stored = numbers.len() / count.max(1);
+        if self.source.iter().max().is_some_and(|last| *last as usize >= count) {
+            return Err(document.fail(&self.place, format!("there are fewer {} than positions", of.to_string())));
+        }
+        Ok(Some(self.source.iter().flat_map(|i| &numbers[*i as usize * stored..][..width]).copied().collect()))
+    }
+
+    /// A third of the area of the triangles around each vertex.
+    pub fn weights(&self) -> Vec<f64> {
+        let mut weights = vec![0.0; self.positions.len()];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|i| self.positions[i as usize].as_dvec3());
+            triangle.iter().for_each(|i| weights[*i as usize] += (b - a).cross(c - a).length() / 6.0);
+        }
+        weights
+    }
+
+    /// How many vertices there are.
+    pub fn vertex_count(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// How many triangles there are.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.len()
+    }
+}
+
+/// Accessors of a primitive by what they hold.
+fn attributes(primitive: &Primitive) -> HashMap<Semantic, usize> {
+    let valid = primitive.attributes.iter().filter_map(|(semantic, accessor)| match semantic {
+        Checked::Valid(semantic) => Some((semantic.clone(), accessor.value())),
+        Checked::Invalid => None,
+    });
+    valid.collect()
+}
+
+fn triangles(mode: Mode, corners: &[u32]) -> std::result::Result<Vec<[u32; 3]>, String> {
+    if corners.len() < 3 || mode == Mode::Triangles && corners.len() % 3 != 0 {
+        return Err(format!("{} corners are no whole triangles", corners.len()));
+    }
+    Ok(match mode {
+        Mode::TriangleStrip => {
+            let odd_first = |(i, t): (usize, &[u32])| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] };
+            corners.windows(3).enumerate().map(odd_first).collect()
+        }
+        Mode::TriangleFan => corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]).collect(),
+        _ => corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+    })
+}
+
+/// Triangles that share no vertex.
+fn flat(place: String, positions: &[Vec3], triangles: &[[u32; 3]], attributes: HashMap<Semantic, usize>) -> Shape {
+    let source: Vec<u32> = triangles.as_flattened().to_vec();
+    let apart: Vec<Vec3> = source.iter().map(|i| positions[*i as usize]).collect();
+    let normal = |t: &[Vec3]| {
+        let [a, b, c] = [t[0], t[1], t[2]].map(|p| p.as_dvec3());
+        [(b - a).cross(c - a).normalize_or_zero().as_vec3(); 3]
+    };
+    let normals = apart.chunks_exact(3).flat_map(normal).collect();
+    let triangles = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    Shape { place, positions: apart, normals, triangles, source, attributes }
+}

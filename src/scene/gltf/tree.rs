@@ -1,0 +1,197 @@
+//! Nodes: where each stands, at rest and over time.
+//!
+//! What stands still between a moving node and the next is folded into one transformation. Placements have one positive scale, so a
+//! transformation splits into a placement and a *bend*: an upper triangular matrix, which is baked into a copy of the mesh.
+
+use ::gltf::json::scene::Node as NodeJson;
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
+
+use super::animation::Tracks;
+use super::document::Document;
+use super::notes::Notes;
+use crate::error::Result;
+use crate::scene::motion::{Motion, Node, RotationData};
+use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
+
+/// Largest number of nodes that stand in one another.
+const DEPTH_LIMIT: usize = 256;
+/// Largest number of keys of all motions, counted for every node that they carry.
+const KEY_LIMIT: usize = 1_000_000;
+/// What differs by less than this share of the largest is the same: f32 transformations are rounded.
+const SAME: f64 = 1e-5;
+
+/// Where a node stands.
+#[derive(Clone, Debug)]
+pub struct Stand {
+    /// Index of the node.
+    pub node: usize,
+    /// What stands still about it, from its own space to that of the moving node that carries it, or to the world.
+    pub fixed: DAffine3,
+    /// What carries it, from the nearest to the outermost.
+    pub motion: Vec<Motion>,
+    /// From its own space to the world as the file's transformations place it at rest.
+    pub rest: DAffine3,
+}
+
+/// A transformation as a placement and what is left of it.
+pub struct Parts {
+    /// Rotation.
+    pub rotation: DQuat,
+    /// Upper triangular; a multiple of the identity if the scale is uniform.
+    pub bend: DMat3,
+}
+
+impl Parts {
+    /// Splits a linear map by Gram and Schmidt's method; `None` if it squeezes space flat.
+    pub fn new(linear: DMat3) -> Option<Self> {
+        let longest = linear.to_cols_array_2d().into_iter().map(|c| DVec3::from(c).length()).fold(0.0, f64::max);
+        let x = linear.x_axis.try_normalize()?;
+        let y = (linear.y_axis - x * x.dot(linear.y_axis)).try_normalize()?;
+        let z = x.cross(y);
+        let turn = DMat3::from_cols(x, y, z);
+        let bend = turn.transpose() * linear;
+        // A mirror is left to the bend: the three columns are right-handed.
+        if bend.determinant().abs() < 1e-9 * longest.powi(3) || !bend.is_finite() {
+            return None;
+        }
+        // Rounded, so that instances of one scale in several rotations share one mesh.
+        let grid = 2.0_f64.powi(longest.log2().ceil() as i32 - 20);
+        let round = |column: DVec3| (column / grid).round() * grid;
+        let bend = DMat3::from_cols(round(bend.x_axis), round(bend.y_axis), round(bend.z_axis));
+        Some(Parts { rotation: DQuat::from_mat3(&turn).normalize(), bend })
+    }
+
+    /// The scale, if it is the same along all axes and mirrors nothing.
+    pub fn uniform_scale(&self) -> Option<f64> {
+        let scale = self.bend.x_axis.x;
+        let rest = self.bend - DMat3::from_diagonal(DVec3::splat(scale));
+        let largest = rest.to_cols_array().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        (largest <= SAME * scale && scale > 0.0).then_some(scale)
+    }
+}
+
+/// All nodes of the file's scene, those that carry before those that are carried.
+///
+/// # Errors
+/// `Input` for nodes that stand in themselves or in two others, too many in one another, and numbers out of range.
+pub fn stands(document: &Document, tracks: &[Option<Tracks>], notes: &mut Notes) -> Result<Vec<Stand>> {
+    let root = &document.root;
+    let mut seen = vec![false; root.nodes.len()];
+    let scene = root.scene.map_or(0, |scene| scene.value());
+    let roots: Vec<usize> = match root.scenes.get(scene) {
+        Some(scene) => scene.nodes.iter().map(|node| node.value()).collect(),
+        None => {
+            let children = root.nodes.iter().flat_map(|node| node.children.iter().flatten());
+            let carried: std::collections::HashSet<usize> = children.map(|child| child.value()).collect();
+            (0..root.nodes.len()).filter(|node| !carried.contains(node)).collect()
+        }
+    };
+    notes.leave_out_many("further scenes", root.scenes.len().saturating_sub(1));
+    let world = Stand { node: 0, fixed: DAffine3::IDENTITY, motion: Vec::new(), rest: DAffine3::IDENTITY };
+    let mut open: Vec<(usize, usize, Stand)> = roots.into_iter().rev().map(|node| (node, 1, world.clone())).collect();
+    let (mut out, mut keys) = (Vec::new(), 0);
+    while let Some((index, depth, outer)) = open.pop() {
+        let place = format!("nodes[{index}]");
+        if std::mem::replace(&mut seen[index], true) {
+            return Err(document.fail(place, "it stands in two nodes, or in itself"));
+        }
+        if depth > DEPTH_LIMIT {
+            return Err(document.fail(place, format!("over the limit of {DEPTH_LIMIT} nodes in one another")));
+        }
+        let stand = placed(document, index, &outer, tracks[index].as_ref(), notes)?;
+        keys += stand.motion.iter().map(|motion| 1 + key_count(motion)).sum::<usize>();
+        if keys > KEY_LIMIT {
+            return Err(document.fail(place, format!("over the limit of {KEY_LIMIT} keys, counted for every node")));
+        }
+        let children = root.nodes[index].children.iter().flatten().rev();
+        open.extend(children.map(|child| (child.value(), depth + 1, stand.clone())));
+        out.push(stand);
+    }
+    Ok(out)
+}
+
+fn key_count(motion: &Motion) -> usize {
+    match motion {
+        Motion::Node(node) => node.key_count(),
+        _ => 0,
+    }
+}
+
+/// Where a node stands within its parent.
+fn placed(
+    document: &Document,
+    index: usize,
+    outer: &Stand,
+    tracks: Option<&Tracks>,
+    notes: &mut Notes,
+) -> Result<Stand> {
+    let node = &document.root.nodes[index];
+    let fail = |what: &str| document.fail(format!("nodes[{index}]"), what);
+    let (position, rotation, scale) =
+        properties(node).ok_or_else(|| fail("its transformation is not finite, too large, or its rotation is 0"))?;
+    let own = match node.matrix {
+        Some(matrix) if !matrix.iter().all(|x| x.abs() <= POSITION_LIMIT_M) => {
+            return Err(fail("its matrix is not finite, or too large"));
+        }
+        Some(matrix) => DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from))),
+        None => DAffine3::from_scale_rotation_translation(scale, rotation, position),
+    };
+    let rest = outer.rest * own;
+    if !(rest.translation.abs().max_element() <= f64::from(POSITION_LIMIT_M)) {
+        return Err(fail("it stands beyond the limit of 1e7 m"));
+    }
+    let Some(tracks) = tracks else {
+        return Ok(Stand { node: index, fixed: outer.fixed * own, motion: outer.motion.clone(), rest });
+    };
+    if node.matrix.is_some() {
+        return Err(fail("an animated node has a translation, rotation and scale, but this has a matrix"));
+    }
+    // What carries the moving node and stands still.
+    let mut motion = Vec::new();
+    if outer.fixed != DAffine3::IDENTITY {
+        let linear = outer.fixed.matrix3;
+        let parts = Parts::new(linear).unwrap_or(Parts { rotation: DQuat::IDENTITY, bend: DMat3::IDENTITY });
+        let size = parts.uniform_scale().unwrap_or_else(|| {
+            notes.leave_out(
+                "uneven scales of nodes that carry moving ones (one scale of the same volume stands for them)",
+            );
+            linear.determinant().abs().cbrt()
+        });
+        motion.push(Motion::Node(Box::new(Node::still(
+            outer.fixed.translation.as_vec3(),
+            parts.rotation,
+            within(size),
+        ))));
+    }
+    motion.extend(outer.motion.iter().cloned());
+    // Uneven scales that do not move are left to what the node carries.
+    let even = Parts::new(DMat3::from_diagonal(scale)).and_then(|parts| parts.uniform_scale());
+    let (size, fixed) = match even {
+        Some(size) => (size, DAffine3::IDENTITY),
+        None if tracks.scale.is_none() => (1.0, DAffine3::from_scale(scale)),
+        None => (1.0, DAffine3::IDENTITY),
+    };
+    let moving = Node {
+        position_keys: tracks.position.clone(),
+        rotation_keys: tracks.rotation.clone(),
+        scale_keys: tracks.scale.clone(),
+        ..Node::still(position.as_vec3(), rotation, within(size))
+    };
+    motion.insert(0, Motion::Node(Box::new(moving)));
+    Ok(Stand { node: index, fixed, motion, rest })
+}
+
+fn within(scale: f64) -> f32 {
+    (scale as f32).clamp(1.0 / SCALE_LIMIT, SCALE_LIMIT)
+}
+
+/// Translation, unit rotation and scale; `None` if a number is out of range.
+fn properties(node: &NodeJson) -> Option<(DVec3, DQuat, DVec3)> {
+    let within = |numbers: &[f32]| numbers.iter().all(|x| x.abs() <= POSITION_LIMIT_M);
+    let (position, scale) = (node.translation.unwrap_or_default(), node.scale.unwrap_or([1.0; 3]));
+    let rotation = node.rotation.unwrap_or_default().0;
+    let length = DQuat::from_array(rotation.map(f64::from)).length();
+    let usable = within(&position) && within(&scale) && within(&rotation) && length > 1e-6;
+    let unit = || RotationData::Quaternion(rotation).unit();
+    usable.then(|| (Vec3::from(position).as_dvec3(), unit(), Vec3::from(scale).as_dvec3()))
+}

@@ -1,0 +1,230 @@
+//! Makes glTF models for tests: JSON with accessors into one buffer, written as GLB, or as JSON with a buffer beside it or within.
+
+#![allow(dead_code)] // every test binary uses its own part
+
+use base64::Engine as _;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Component types of accessors.
+pub const I8: u32 = 5120;
+pub const U8: u32 = 5121;
+pub const I16: u32 = 5122;
+pub const U16: u32 = 5123;
+pub const U32: u32 = 5125;
+pub const F32: u32 = 5126;
+
+/// A model in the making. The JSON may be changed before it is written.
+pub struct Model {
+    pub json: Value,
+    pub bytes: Vec<u8>,
+}
+
+impl Default for Model {
+    fn default() -> Self {
+        Model { json: json!({ "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [] }] }), bytes: vec![] }
+    }
+}
+
+impl Model {
+    /// Adds an element to a list at the top and returns its index.
+    pub fn push(&mut self, list: &str, value: Value) -> usize {
+        if self.json[list].is_null() {
+            self.json[list] = json!([]);
+        }
+        let list = self.json[list].as_array_mut().unwrap();
+        list.push(value);
+        list.len() - 1
+    }
+
+    /// A buffer view of these bytes.
+    pub fn view(&mut self, bytes: &[u8]) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let offset = self.bytes.len();
+        self.bytes.extend(bytes);
+        self.push("bufferViews", json!({ "buffer": 0, "byteOffset": offset, "byteLength": bytes.len() }))
+    }
+
+    /// An accessor of bytes as they stand.
+    pub fn accessor(&mut self, component: u32, width: usize, count: usize, bytes: &[u8]) -> usize {
+        let view = self.view(bytes);
+        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][width - 1];
+        let json = json!({ "bufferView": view, "componentType": component, "count": count, "type": kind });
+        self.push("accessors", json)
+    }
+
+    /// An accessor of f32.
+    pub fn floats(&mut self, width: usize, numbers: &[f32]) -> usize {
+        let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+        self.accessor(F32, width, numbers.len() / width, &bytes)
+    }
+
+    /// An accessor of positions, with the bounds that the specification demands.
+    pub fn positions(&mut self, numbers: &[f32]) -> usize {
+        let index = self.floats(3, numbers);
+        let of = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
+            (0..3).map(|axis| numbers.iter().skip(axis).step_by(3).copied().reduce(pick).unwrap()).collect()
+        };
+        self.json["accessors"][index]["min"] = json!(of(f32::min));
+        self.json["accessors"][index]["max"] = json!(of(f32::max));
+        index
+    }
+
+    /// An accessor of u16 indices.
+    pub fn indices(&mut self, indices: &[u16]) -> usize {
+        let bytes: Vec<u8> = indices.iter().flat_map(|x| x.to_le_bytes()).collect();
+        self.accessor(U16, 1, indices.len(), &bytes)
+    }
+
+    /// A mesh of one primitive with these attributes.
+    pub fn mesh(&mut self, attributes: Value, indices: Option<usize>, material: Option<usize>) -> usize {
+        let mut primitive = json!({ "attributes": attributes });
+        if let Some(indices) = indices {
+            primitive["indices"] = json!(indices);
+        }
+        if let Some(material) = material {
+            primitive["material"] = json!(material);
+        }
+        self.push("meshes", json!({ "primitives": [primitive] }))
+    }
+
+    /// A node that stands in no other.
+    pub fn node(&mut self, node: Value) -> usize {
+        let index = self.push("nodes", node);
+        self.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(index));
+        index
+    }
+
+    /// A node that stands in another.
+    pub fn child(&mut self, of: usize, node: Value) -> usize {
+        let index = self.push("nodes", node);
+        if self.json["nodes"][of]["children"].is_null() {
+            self.json["nodes"][of]["children"] = json!([]);
+        }
+        self.json["nodes"][of]["children"].as_array_mut().unwrap().push(json!(index));
+        index
+    }
+
+    /// A material of one base colour.
+    pub fn paint(&mut self, rgb: [f32; 3]) -> usize {
+        let pbr = json!({ "baseColorFactor": [rgb[0], rgb[1], rgb[2], 1.0], "metallicFactor": 0 });
+        self.push("materials", json!({ "pbrMetallicRoughness": pbr }))
+    }
+
+    /// An indexed box between two corners, with a normal a face.
+    pub fn cuboid(&mut self, low: [f32; 3], high: [f32; 3], material: Option<usize>) -> usize {
+        let (positions, normals, indices) = cuboid(low, high);
+        let (positions, normals) = (self.positions(&positions), self.floats(3, &normals));
+        let indices = self.indices(&indices);
+        self.mesh(json!({ "POSITION": positions, "NORMAL": normals }), Some(indices), material)
+    }
+
+    /// An animation channel of a node: times and numbers, `width` a value.
+    pub fn animate(&mut self, animation: usize, node: usize, path: &str, how: &str, times: &[f32], numbers: &[f32]) {
+        let width = if path == "rotation" { 4 } else { 3 };
+        let (input, output) = (self.floats(1, times), self.floats(width, numbers));
+        while self.json["animations"].as_array().map_or(0, Vec::len) <= animation {
+            self.push("animations", json!({ "channels": [], "samplers": [] }));
+        }
+        let json = &mut self.json["animations"][animation];
+        let samplers = json["samplers"].as_array_mut().unwrap();
+        samplers.push(json!({ "input": input, "output": output, "interpolation": how }));
+        let sampler = samplers.len() - 1;
+        let channel = json!({ "sampler": sampler, "target": { "node": node, "path": path } });
+        json["channels"].as_array_mut().unwrap().push(channel);
+    }
+
+    /// Adds a light that nodes name by its index.
+    pub fn light(&mut self, light: Value) -> usize {
+        if self.json["extensions"].is_null() {
+            self.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+            self.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [] } });
+        }
+        let lights = self.json["extensions"]["KHR_lights_punctual"]["lights"].as_array_mut().unwrap();
+        lights.push(light);
+        lights.len() - 1
+    }
+
+    fn with_buffer(&self, uri: Option<String>) -> String {
+        let mut json = self.json.clone();
+        if !self.bytes.is_empty() {
+            json["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
+            if let Some(uri) = uri {
+                json["buffers"][0]["uri"] = json!(uri);
+            }
+        }
+        json.to_string()
+    }
+
+    /// The model as GLB.
+    pub fn glb(&self) -> Vec<u8> {
+        glb(self.with_buffer(None).as_bytes(), &self.bytes)
+    }
+
+    /// Writes `NAME.glb` into a folder.
+    pub fn write(&self, folder: &Path, name: &str) -> PathBuf {
+        let path = folder.join(format!("{name}.glb"));
+        std::fs::write(&path, self.glb()).unwrap();
+        path
+    }
+
+    /// Writes `NAME.gltf` into a folder, with its buffer as base64.
+    pub fn write_embedded(&self, folder: &Path, name: &str) -> PathBuf {
+        let data = base64::engine::general_purpose::STANDARD.encode(&self.bytes);
+        let text = self.with_buffer(Some(format!("data:application/octet-stream;base64,{data}")));
+        let path = folder.join(format!("{name}.gltf"));
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+
+    /// Writes `NAME.gltf` into a folder, with its buffer in a file beside it that `uri` names.
+    pub fn write_beside(&self, folder: &Path, name: &str, uri: &str, file: &Path) -> PathBuf {
+        std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+        std::fs::write(file, &self.bytes).unwrap();
+        let path = folder.join(format!("{name}.gltf"));
+        std::fs::write(&path, self.with_buffer(Some(uri.to_owned()))).unwrap();
+        path
+    }
+}
+
+/// A GLB file of JSON and a binary part, which may be empty.
+pub fn glb(json: &[u8], binary: &[u8]) -> Vec<u8> {
+    let mut out = b"glTF\x02\0\0\0\0\0\0\0".to_vec();
+    for (kind, part, fill) in [(b"JSON", json, b' '), (b"BIN\0", binary, 0)] {
+        if part.is_empty() {
+            continue;
+        }
+        let length = part.len().next_multiple_of(4);
+        out.extend((length as u32).to_le_bytes());
+        out.extend(kind);
+        out.extend(part);
+        out.resize(out.len().next_multiple_of(4), fill);
+    }
+    let length = (out.len() as u32).to_le_bytes();
+    out[8..12].copy_from_slice(&length);
+    out
+}
+
+/// Positions, normals and indices of a box.
+pub fn cuboid(low: [f32; 3], high: [f32; 3]) -> (Vec<f32>, Vec<f32>, Vec<u16>) {
+    let (mut positions, mut normals, mut indices) = (Vec::new(), Vec::new(), Vec::new());
+    for axis in 0..3 {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for (side, sign) in [(low, -1.0), (high, 1.0)] {
+            let first = (positions.len() / 3) as u16;
+            for (a, b) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
+                let mut corner = [0.0; 3];
+                corner[axis] = side[axis];
+                corner[u] = [low[u], high[u]][a];
+                corner[v] = [low[v], high[v]][b];
+                positions.extend(corner);
+                let mut normal = [0.0; 3];
+                normal[axis] = sign;
+                normals.extend(normal);
+            }
+            let face = if sign > 0.0 { [0, 1, 2, 0, 2, 3] } else { [0, 2, 1, 0, 3, 2] };
+            indices.extend(face.map(|i| first + i));
+        }
+    }
+    (positions, normals, indices)
+}

@@ -326,6 +326,62 @@ fn files_outside_the_folder_are_refused() {
     good(&inner, &["import", "m.gltf", "-o", "out.toml"]);
 }
 
+/// Every command that takes a scene or a mesh refuses a bad file alike.
+#[test]
+fn commands_agree() {
+    let folder = folder();
+    let whole = room().glb();
+    std::fs::write(folder.path().join("cut.glb"), &whole[..whole.len() / 2]).unwrap();
+    let mut commands = vec![
+        vec!["import", "cut.glb", "-o", "out.toml"],
+        vec!["render", "cut.glb", "-o", "out.png"],
+        vec!["bake", "cut.glb", "-o", "out.sf"],
+        vec!["bake", "cut.glb", "-o", "out.sf", "--silhouette"],
+        vec!["bench", "time-error", "cut.glb", "--out", "out"],
+    ];
+    if cfg!(feature = "view") {
+        commands.push(vec!["view", "cut.glb"]);
+    }
+    for arguments in commands {
+        let ran = finish(&mut command(folder.path(), &arguments));
+        assert_eq!((ran.code, ran.stderr.lines().count()), (4, 1), "{arguments:?}: {}", ran.stderr);
+        assert!(ran.stderr.starts_with("shadow-fields: cut.glb: a GLB file of"), "{arguments:?}: {}", ran.stderr);
+    }
+    assert_eq!(names(folder.path()), ["cut.glb"]);
+}
+
+/// Bytes of a good file changed at random: it is read or refused in one line, and nothing panics.
+#[test]
+fn damage_at_random_is_read_or_refused() {
+    let folder = folder();
+    let path = folder.path().join("m.glb");
+    let whole = room().glb();
+    let json_end = 20 + u32::from_le_bytes(whole[12..16].try_into().unwrap()) as usize;
+    let mut random = fastrand::Rng::with_seed(5);
+    let (mut read, mut refused) = (0, 0);
+    for round in 0..3000 {
+        let mut bytes = whole.clone();
+        for _ in 0..random.usize(1..4) {
+            // Mostly the JSON, where a digit for another makes another index or size.
+            let at = if round % 4 == 0 { random.usize(0..bytes.len()) } else { random.usize(20..json_end) };
+            bytes[at] = match bytes[at] {
+                b'0'..=b'9' => random.u8(b'0'..=b'9'),
+                b'a'..=b'z' => random.u8(b'a'..=b'z'),
+                _ => random.u8(..),
+            };
+        }
+        std::fs::write(&path, &bytes).unwrap();
+        match shadow_fields::scene::gltf::load(&path) {
+            Ok(_) => read += 1,
+            Err(error) => {
+                assert_eq!((error.exit_code(), error.line().lines().count()), (4, 1), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(read > 100 && refused > 100, "{read} read, {refused} refused");
+}
+
 /// Small files that ask for much: told before anything of that size is made.
 #[test]
 fn bombs() {

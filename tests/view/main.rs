@@ -3,9 +3,13 @@
 mod camera;
 mod controls;
 mod files;
+mod gltf;
 mod history;
 mod selection;
 mod steps;
+
+#[path = "../common/model.rs"]
+mod model;
 
 use glam::DVec3;
 use shadow_fields::asset::embedded;

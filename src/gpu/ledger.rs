@@ -23,6 +23,22 @@ thread_local! {
     static CURRENT: RefCell<Option<Arc<Ledger>>> = const { RefCell::new(None) };
     /// Fallible calls until one fails; see [`fail_call`].
     static FAULT: Cell<Option<usize>> = const { Cell::new(None) };
+    /// The call of a library that failed last: libraries pass on the error, not what was called.
+    static FAILED: Cell<&'static str> = const { Cell::new("drawing") };
+}
+
+/// The Vulkan function that failed last when a library on this thread called it.
+pub(super) fn failed_call() -> String {
+    let words = FAILED.get().split('_').map(|word| word[..1].to_uppercase() + &word[1..]);
+    format!("vk{}", words.collect::<String>())
+}
+
+/// Notes whether a call failed.
+fn noted(call: &'static str, result: vk::Result) -> vk::Result {
+    if result.as_raw() < 0 {
+        FAILED.set(call);
+    }
+    result
 }
 
 /// Makes the `index`-th fallible call of libraries on this thread, counted from 0, fail once, so that a test can show what follows.
@@ -122,7 +138,7 @@ macro_rules! objects {
                 object: *mut vk::$kind,
             ) -> vk::Result {
                 if fails() {
-                    return vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
+                    return noted(stringify!($create), vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
                 }
                 let ledger = current();
                 // SAFETY: the caller keeps the contract of this very function.
@@ -131,7 +147,7 @@ macro_rules! objects {
                     // SAFETY: the function succeeded, so it has written the handle.
                     ledger.live().push((vk::$kind::TYPE, unsafe { *object }.as_raw()));
                 }
-                result
+                noted(stringify!($create), result)
             }
 
             /// As the Vulkan function of that name; strikes the object off.
@@ -204,7 +220,7 @@ unsafe extern "system" fn create_graphics_pipelines(
     if fails() {
         // SAFETY: the caller has room for `count` handles, which are null where creation fails.
         unsafe { std::slice::from_raw_parts_mut(pipelines, count as usize) }.fill(vk::Pipeline::null());
-        return vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
+        return noted("create_graphics_pipelines", vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
     }
     let ledger = current();
     let create = ledger.device.handle.fp_v1_0().create_graphics_pipelines;
@@ -214,7 +230,7 @@ unsafe extern "system" fn create_graphics_pipelines(
     let made = unsafe { std::slice::from_raw_parts(pipelines, count as usize) };
     let made = made.iter().filter(|pipeline| !pipeline.is_null());
     ledger.live().extend(made.map(|pipeline| (vk::Pipeline::TYPE, pipeline.as_raw())));
-    result
+    noted("create_graphics_pipelines", result)
 }
 
 /// As the Vulkan function of that name; strikes the pipeline off.
@@ -242,10 +258,11 @@ macro_rules! fallible {
             /// That of the Vulkan function.
             unsafe extern "system" fn $name($($parameter: $type),*) -> vk::Result {
                 if fails() {
-                    return vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
+                    return noted(stringify!($name), vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
                 }
                 // SAFETY: the caller keeps the contract of this very function.
-                unsafe { (current().device.handle.fp_v1_0().$name)($($parameter),*) }
+                let result = unsafe { (current().device.handle.fp_v1_0().$name)($($parameter),*) };
+                noted(stringify!($name), result)
             }
         )*
 

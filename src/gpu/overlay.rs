@@ -44,7 +44,9 @@ impl Drop for CommandPool {
 
 fn failed(error: RendererError) -> Error {
     match error {
-        RendererError::Vulkan(code) => Err::<(), _>(code).checked("drawing", "overlay").expect_err("it is one"),
+        RendererError::Vulkan(code) => {
+            Err::<(), _>(code).checked(&ledger::failed_call(), "overlay").expect_err("it is one")
+        }
         other => Error::Failed(format!("overlay: {other}")),
     }
 }

@@ -98,7 +98,7 @@ impl Capture {
 
     /// Faces in a row of the atlas.
     pub fn columns(device: &Device, face_px: u32, radiance: bool) -> u32 {
-        let atlas_px = ATLAS_PX.min(device.limits.max_image_dimension2_d);
+        let atlas_px = ATLAS_PX.min(device.most_image_px());
         // The texels of a radiance capture, with depth, are 20 times as large. Six faces always fit.
         (if radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3)
     }
@@ -109,8 +109,12 @@ impl Capture {
     /// `Input` when a face is larger than the device's images.
     pub fn new(device: &Arc<Device>, library: &Library, face_px: u32, radiance: bool) -> Result<Self> {
         let columns = Self::columns(device, face_px, radiance);
-        if columns * face_px > device.limits.max_image_dimension2_d {
-            return Err(Error::Input(format!("cube faces of {face_px} px are larger than the device's images allow")));
+        let most = device.most_image_px();
+        if columns * face_px > most {
+            let edge = columns * face_px;
+            return Err(Error::Input(format!(
+                "cube faces of {face_px} px take images of {edge} px, the device's have at most {most} px"
+            )));
         }
         let color = if radiance { vk::Format::R32G32B32A32_SFLOAT } else { vk::Format::R8_UNORM };
         let depth = radiance.then_some(vk::Format::D32_SFLOAT);

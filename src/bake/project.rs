@@ -108,8 +108,9 @@ impl Project {
         let pipeline = ComputePipeline::new(device, "project", &shader, &[])?;
         let texels = Buffer::with_data(device, "project texels", &texel_table(face_px as usize))?;
         if !TexelView::fits(device, TEXEL_FORMAT, texels.size_bytes) {
+            let most = device.limits.max_texel_buffer_elements;
             return Err(Error::Input(format!(
-                "cube faces of {face_px} px have more texels than the device's views hold"
+                "cube faces of {face_px} px have more texels than the device's views hold ({most})"
             )));
         }
         Ok(Project { pipeline, texels, bands, projection, face_px, columns })

@@ -163,7 +163,7 @@ impl Silhouette {
     /// # Errors
     /// `Input` when a view is larger than the device's images; `Failed` when a shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, map_px: u32, view_px: u32) -> Result<Self> {
-        let most = device.limits.max_image_dimension2_d;
+        let most = device.most_image_px();
         if view_px > most {
             return Err(Error::Input(format!("views of {view_px} px are larger than the device's images ({most} px)")));
         }

@@ -270,6 +270,12 @@ impl Device {
         self.memory.memory_heaps_as_slice().iter().filter(own).map(|heap| heap.size).max().unwrap_or(u64::MAX)
     }
 
+    /// Largest edge in pixels of an image that passes draw into.
+    pub fn most_image_px(&self) -> u32 {
+        let limits = &self.limits;
+        limits.max_image_dimension2_d.min(limits.max_framebuffer_width).min(limits.max_framebuffer_height)
+    }
+
     /// Messages of the validation layer since the last call.
     pub fn take_validation_messages(&self) -> Vec<String> {
         self.instance.messages.take()

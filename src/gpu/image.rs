@@ -62,7 +62,7 @@ impl Image {
     /// `Input` when it exceeds the device's largest image, `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, name: &str, shape: ImageShape) -> Result<Self> {
         use vk::ImageUsageFlags as Use;
-        let most = device.limits.max_image_dimension2_d.min(device.limits.max_framebuffer_width);
+        let most = device.most_image_px();
         if shape.width == 0 || shape.height == 0 || shape.width > most || shape.height > most {
             let (width, height) = (shape.width, shape.height);
             return Err(Error::Input(format!("{name}: {width}x{height} is outside the device's 1..={most}")));

@@ -16,6 +16,7 @@ mod heap;
 pub mod image;
 #[cfg(feature = "view")]
 mod ledger;
+mod limits;
 mod manifest;
 pub mod memory;
 #[cfg(feature = "view")]

@@ -1,10 +1,10 @@
 //! Pipelines and their layouts, built from the reflection of their shaders.
 
-use super::Checked;
 use super::compiling::Compiling;
 use super::device::Device;
 use super::reflect::{Binding, BindingKind, VertexInput};
 use super::shader::{Shader, Stage};
+use super::{Checked, limits};
 use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::Arc;
@@ -28,6 +28,7 @@ impl Layout {
             }
         }
         bindings.sort_by_key(|b| b.index);
+        limits::check(&device.limits, name, shaders, &bindings)?;
         let all_stages = shaders.iter().fold(vk::ShaderStageFlags::empty(), |all, s| all | stage_flag(s.stage));
         let descriptions: Vec<_> = bindings
             .iter()
@@ -54,12 +55,6 @@ impl Layout {
                 .filter(|s| s.reflection.push_bytes > 0)
                 .fold(vk::ShaderStageFlags::empty(), |all, s| all | stage_flag(s.stage)),
         };
-        if layout.push_bytes > device.limits.max_push_constants_size {
-            return Err(Error::Unsupported(format!(
-                "{name} has {} bytes of push constants, the device takes {}",
-                layout.push_bytes, device.limits.max_push_constants_size
-            )));
-        }
         let sets = [set];
         let ranges = [vk::PushConstantRange { stage_flags: layout.push_stages, offset: 0, size: layout.push_bytes }];
         let create = vk::PipelineLayoutCreateInfo::default()
@@ -153,13 +148,6 @@ impl ComputePipeline {
     pub fn new(device: &Arc<Device>, name: &str, shader: &Shader, constants: &[(&str, u32)]) -> Result<Self> {
         let layout = Layout::new(device, name, &[shader])?;
         let local_size = shader.reflection.local_size;
-        let invocations: u32 = local_size.iter().product();
-        if invocations > device.limits.max_compute_work_group_invocations {
-            return Err(Error::Unsupported(format!(
-                "{name} wants {invocations} invocations a workgroup, the device takes {}",
-                device.limits.max_compute_work_group_invocations
-            )));
-        }
         let mut entries = Vec::new();
         let mut data = Vec::new();
         for (wanted, value) in constants {

@@ -64,6 +64,8 @@ pub struct Reflection {
     pub bindings: Vec<Binding>,
     /// Size of the push-constant block in bytes; 0 without one.
     pub push_bytes: u32,
+    /// Memory that the invocations of a workgroup share, bytes.
+    pub shared_bytes: u32,
     /// Workgroup size of a compute shader.
     pub local_size: [u32; 3],
     /// Specialisation constants.
@@ -212,6 +214,7 @@ impl<'m> Reader<'m> {
         let target = id(&pointer.operands[1]);
         match class {
             StorageClass::PushConstant => out.push_bytes = self.size_bytes(target),
+            StorageClass::Workgroup => out.shared_bytes += self.size_bytes(target),
             StorageClass::Input => {
                 if let Some(location) = self.decoration(result, Decoration::Location) {
                     let components = match self.definitions[&target].class.opcode {

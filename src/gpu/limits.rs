@@ -1,0 +1,53 @@
+//! What shaders ask of a device, held against its limits before anything is made of them.
+
+use super::reflect::{Binding, BindingKind, Reflection};
+use super::shader::{Shader, Stage};
+use crate::error::{Error, Result};
+use ash::vk;
+
+/// Refuses what exceeds a limit.
+///
+/// # Errors
+/// `Unsupported` with what is asked for, how much of it, and how much the device takes.
+pub(super) fn check(
+    limits: &vk::PhysicalDeviceLimits,
+    name: &str,
+    shaders: &[&Shader],
+    bindings: &[Binding],
+) -> Result<()> {
+    let push_bytes = shaders.iter().map(|s| s.reflection.push_bytes).max().unwrap_or(0);
+    at_most(name, "bytes of push constants", push_bytes, limits.max_push_constants_size)?;
+    let count = |kinds: &[BindingKind]| bindings.iter().filter(|b| kinds.contains(&b.kind)).count() as u32;
+    // A texel buffer counts as a sampled image, and a sampler's image as a sampler too.
+    let sampled = [BindingKind::Texel, BindingKind::Image, BindingKind::Volume];
+    for (what, asked, most) in [
+        ("storage buffers a stage", count(&[BindingKind::Storage]), limits.max_per_stage_descriptor_storage_buffers),
+        ("uniform buffers a stage", count(&[BindingKind::Uniform]), limits.max_per_stage_descriptor_uniform_buffers),
+        ("sampled images a stage", count(&sampled), limits.max_per_stage_descriptor_sampled_images),
+        ("samplers a stage", count(&[BindingKind::Volume]), limits.max_per_stage_descriptor_samplers),
+        ("resources a stage", bindings.len() as u32, limits.max_per_stage_resources),
+    ] {
+        at_most(name, what, asked, most)?;
+    }
+    shaders
+        .iter()
+        .filter(|shader| shader.stage == Stage::Compute)
+        .try_for_each(|shader| check_workgroup(limits, name, &shader.reflection))
+}
+
+fn check_workgroup(limits: &vk::PhysicalDeviceLimits, name: &str, shader: &Reflection) -> Result<()> {
+    let size = shader.local_size;
+    at_most(name, "invocations a workgroup", size.iter().product(), limits.max_compute_work_group_invocations)?;
+    for (axis, (asked, most)) in ["x", "y", "z"].iter().zip(size.iter().zip(limits.max_compute_work_group_size)) {
+        at_most(name, &format!("invocations a workgroup along {axis}"), *asked, most)?;
+    }
+    let shared = "bytes of memory shared by a workgroup";
+    at_most(name, shared, shader.shared_bytes, limits.max_compute_shared_memory_size)
+}
+
+fn at_most(name: &str, what: &str, asked: u32, most: u32) -> Result<()> {
+    if asked > most {
+        return Err(Error::Unsupported(format!("{name} wants {asked} {what}, the device takes {most}")));
+    }
+    Ok(())
+}

@@ -20,10 +20,11 @@ mod source;
 #[cfg(feature = "view")]
 mod view;
 
-use crate::error::{Result, one_line};
+use crate::error::{Error, Result, one_line};
 use crate::gpu::signals;
 use clap::{Parser, Subcommand};
 pub use context::Global;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 /// Precomputed shadow fields: soft shadows of many moving objects under many moving lights, on Vulkan.
@@ -63,6 +64,26 @@ enum Subcommands {
     View(view::Arguments),
     /// List the Vulkan devices of this machine
     Devices(devices::Arguments),
+}
+
+/// Runs the program on arguments, the first of which is its name, as the command line does.
+///
+/// # Errors
+/// `Usage` with the parser's words, on several lines, where the arguments are not understood; what the subcommand returns.
+pub fn run_on<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<()> {
+    run(&parse(arguments)?).and_then(|()| output::written())
+}
+
+/// Whether the command line understands arguments, the first of which is the program's name. Nothing is run.
+///
+/// # Errors
+/// `Usage` as [`run_on`].
+pub fn understand<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<()> {
+    parse(arguments).map(|_| ())
+}
+
+fn parse<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<Cli> {
+    Cli::try_parse_from(arguments).map_err(|error| Error::Usage(error.to_string()))
 }
 
 /// Runs the program on the process's arguments and returns its exit code.

@@ -1,9 +1,8 @@
 //! Instance, logical device and queue: the root that every other Vulkan object keeps alive.
 
-use super::Checked;
-use super::manifest;
 use super::select::{Candidate, choose, physical_devices, queue_family, version_text};
 use super::validation::{LAYER, Messages, Validation, on_message};
+use super::{Checked, loader, manifest};
 use crate::error::{Error, Result};
 use ash::vk;
 use std::ffi::{CStr, CString};
@@ -75,10 +74,7 @@ fn check_loader(entry: &ash::Entry, validation: Validation, surface: &[&'static 
 impl Instance {
     /// `surface` lists the extensions that a window needs.
     fn new(validation: Validation, surface: &[&'static CStr]) -> Result<Self> {
-        // SAFETY: loading the system's Vulkan loader runs its initialisers, which are trusted like any shared library.
-        let entry = unsafe { ash::Entry::load() }.map_err(|error| {
-            Error::Unsupported(format!("no Vulkan loader found ({error}); Debian's package is libvulkan1"))
-        })?;
+        let entry = loader::entry()?;
         let has_debug_utils = check_loader(&entry, validation, surface)?;
         let application = vk::ApplicationInfo::default()
             .application_name(c"shadow-fields")

@@ -17,6 +17,7 @@ pub mod image;
 #[cfg(feature = "view")]
 mod ledger;
 mod limits;
+pub mod loader;
 mod manifest;
 pub mod memory;
 #[cfg(feature = "view")]

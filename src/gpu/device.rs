@@ -300,31 +300,6 @@ impl Device {
         // SAFETY: the object belongs to this device and is alive. Names only serve debugging, so a failure is ignored.
         let _ = unsafe { names.set_debug_utils_object_name(&info) };
     }
-
-    fn pipeline_cache_path(&self) -> Option<PathBuf> {
-        Some(self.cache_dir.as_ref()?.join(format!("pipelines-{}.bin", self.info.uuid)))
-    }
-
-    fn load_pipeline_cache(&self, properties: &vk::PhysicalDeviceProperties) -> Result<vk::PipelineCache> {
-        let data = self.pipeline_cache_path().and_then(|path| std::fs::read(path).ok()).unwrap_or_default();
-        let trusted = cache_header_fits(&data, properties);
-        if !trusted && !data.is_empty() {
-            log::info!("the pipeline cache on disk belongs to another driver and is replaced");
-        }
-        let create = vk::PipelineCacheCreateInfo::default().initial_data(if trusted { &data } else { &[] });
-        // SAFETY: the data's header was checked against this device; destroyed in `Drop`.
-        unsafe { self.handle.create_pipeline_cache(&create, None) }.checked("vkCreatePipelineCache", "pipeline cache")
-    }
-
-    /// Writes the pipeline cache to disk through a temporary file. A failure is logged and is no error.
-    pub fn save_pipeline_cache(&self) {
-        let Some(path) = self.pipeline_cache_path() else { return };
-        // SAFETY: the cache is alive.
-        let Ok(data) = (unsafe { self.handle.get_pipeline_cache_data(self.pipeline_cache) }) else { return };
-        if let Err(error) = crate::files::replace(&path, &data) {
-            log::warn!("{}: the pipeline cache was not saved: {error}", path.display());
-        }
-    }
 }
 
 impl Drop for Device {
@@ -335,41 +310,5 @@ impl Drop for Device {
             self.handle.destroy_pipeline_cache(self.pipeline_cache, None);
             self.handle.destroy_device(None);
         }
-    }
-}
-
-/// Whether pipeline-cache data starts with a version-one header of this very device (Vulkan specification, "Pipeline Cache
-/// Header").
-fn cache_header_fits(data: &[u8], properties: &vk::PhysicalDeviceProperties) -> bool {
-    let word = |at: usize| data.get(at..at + 4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes")));
-    let one = vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32;
-    word(0).is_some_and(|length| length >= 32 && length as usize <= data.len())
-        && word(4) == Some(one)
-        && word(8) == Some(properties.vendor_id)
-        && word(12) == Some(properties.device_id)
-        && data.get(16..32) == Some(&properties.pipeline_cache_uuid[..])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn foreign_pipeline_caches_are_refused() {
-        let mut properties = vk::PhysicalDeviceProperties { vendor_id: 7, device_id: 9, ..Default::default() };
-        properties.pipeline_cache_uuid[3] = 5;
-        let mut data = Vec::new();
-        for word in [32_u32, 1, 7, 9] {
-            data.extend(word.to_le_bytes());
-        }
-        data.extend(properties.pipeline_cache_uuid);
-        assert!(cache_header_fits(&data, &properties));
-        for at in [0, 4, 8, 12, 19] {
-            let mut damaged = data.clone();
-            damaged[at] ^= 0x40;
-            assert!(!cache_header_fits(&damaged, &properties), "byte {at}");
-        }
-        assert!(!cache_header_fits(&data[..31], &properties));
-        assert!(!cache_header_fits(&[], &properties));
     }
 }

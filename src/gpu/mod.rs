@@ -23,6 +23,7 @@ pub mod memory;
 #[cfg(feature = "view")]
 pub mod overlay;
 pub mod pipeline;
+pub mod pipeline_cache;
 #[cfg(feature = "view")]
 pub mod present;
 pub mod reflect;

@@ -184,7 +184,7 @@ fn seal(key: &str, spirv: &[u32]) -> Vec<u8> {
 }
 
 /// The words of a cache file; `None` if it was not sealed with this key.
-fn words(key: &str, sealed: &[u8]) -> Option<Vec<u32>> {
+pub fn words(key: &str, sealed: &[u8]) -> Option<Vec<u32>> {
     let (sealed_hash, bytes) = sealed.split_at_checked(32)?;
     (hash(key, bytes).as_bytes() == sealed_hash && bytes.len() % 4 == 0)
         .then(|| bytes.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes"))).collect())

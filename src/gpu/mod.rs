@@ -72,8 +72,16 @@ impl<T> Checked<T> for std::result::Result<T, vk::Result> {
             match code {
                 vk::Result::ERROR_OUT_OF_HOST_MEMORY
                 | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
+                | vk::Result::ERROR_OUT_OF_POOL_MEMORY
+                | vk::Result::ERROR_FRAGMENTED_POOL
+                | vk::Result::ERROR_FRAGMENTATION
+                | vk::Result::ERROR_TOO_MANY_OBJECTS
+                | vk::Result::ERROR_MEMORY_MAP_FAILED
+                | vk::Result::ERROR_SURFACE_LOST_KHR
                 | vk::Result::ERROR_DEVICE_LOST => Error::Device(message),
-                vk::Result::ERROR_FEATURE_NOT_PRESENT
+                vk::Result::ERROR_INITIALIZATION_FAILED
+                | vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR
+                | vk::Result::ERROR_FEATURE_NOT_PRESENT
                 | vk::Result::ERROR_EXTENSION_NOT_PRESENT
                 | vk::Result::ERROR_LAYER_NOT_PRESENT
                 | vk::Result::ERROR_INCOMPATIBLE_DRIVER => Error::Unsupported(message),

@@ -1,0 +1,212 @@
+//! Runs something again and again, and lets one Vulkan call after another fail.
+
+use super::common::report;
+use super::layer::{Call, Claims, Heard, Plan, watch};
+use ash::vk;
+use shadow_fields::{Error, Result};
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// Longest time that a run may take.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// What is run: in a folder with the inputs, it makes outputs.
+pub struct Job {
+    pub name: &'static str,
+    pub run: fn(&Path) -> Result<()>,
+    /// Files that a good run makes, the same in every run.
+    pub outputs: &'static [&'static str],
+    /// What is removed from the folder before a run, besides its outputs.
+    pub cold: &'static [&'static str],
+}
+
+/// How many calls were made to fail, by name.
+pub type Tally = BTreeMap<&'static str, usize>;
+
+/// Ends the process where a run hangs, which no test could do otherwise.
+fn guarded<R>(what: &str, run: impl FnOnce() -> R) -> R {
+    let (done, waits) = channel::<()>();
+    let what = what.to_owned();
+    let guard = std::thread::spawn(move || {
+        if waits.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
+            report(&format!("{what}: it hangs"));
+            std::process::exit(101);
+        }
+    });
+    let outcome = run();
+    drop(done);
+    guard.join().unwrap();
+    outcome
+}
+
+impl Job {
+    pub fn remove(&self, folder: &Path, names: &[&str]) {
+        for name in names {
+            let path = folder.join(name);
+            let gone = if path.is_dir() { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) };
+            assert!(gone.is_ok() || !path.exists(), "{}: {}", self.name, path.display());
+        }
+    }
+
+    /// Content of the outputs; `None` of one that is not there.
+    pub fn made(&self, folder: &Path) -> Vec<Option<Vec<u8>>> {
+        self.outputs.iter().map(|name| std::fs::read(folder.join(name)).ok()).collect()
+    }
+
+    /// One run without a fault, with all that it made.
+    pub fn good(&self, folder: &Path, what: &str) -> (Vec<Option<Vec<u8>>>, Heard) {
+        let (outcome, heard) =
+            guarded(what, || watch(None, Claims::default(), || catch_unwind(AssertUnwindSafe(|| (self.run)(folder)))));
+        match outcome {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => panic!("{}: {what}: {error}", self.name),
+            Err(_) => panic!("{}: {what}: it panicked", self.name),
+        }
+        assert_clean(&format!("{}: {what}", self.name), &heard);
+        let made = self.made(folder);
+        for (name, content) in self.outputs.iter().zip(&made) {
+            assert!(content.is_some(), "{}: {what}: there is no {name}", self.name);
+        }
+        (made, heard)
+    }
+
+    /// Lets calls fail, each in a run of its own, and runs again without a fault: all of them with all of their errors, or one in
+    /// `share` of these, picked by a seed. Of the latter only every third is followed by another run, and of names for debuggers,
+    /// which nobody misses, a tenth as many fail.
+    pub fn sweep(&self, folder: &Path, share: usize, seed: u64) -> Tally {
+        let start = Instant::now();
+        self.good(folder, "the first run");
+        self.remove(folder, self.outputs);
+        self.remove(folder, self.cold);
+        let (expected, heard) = self.good(folder, "the second run");
+        let mut faults: Vec<(usize, Call, usize)> = Vec::new();
+        for (at, call) in heard.calls.iter().enumerate() {
+            faults.extend((0..call.errors.len()).map(|error| (at, *call, error)));
+        }
+        let all = faults.len();
+        let mut random = fastrand::Rng::with_seed(seed);
+        random.shuffle(&mut faults);
+        if share > 1 {
+            let (names, mut others): (Vec<_>, Vec<_>) =
+                faults.into_iter().partition(|(_, call, _)| call.name == "vkSetDebugUtilsObjectNameEXT");
+            others.truncate(others.len().div_ceil(share));
+            others.extend_from_slice(&names[..names.len().div_ceil(10 * share)]);
+            faults = others;
+        }
+        let mut tally = Tally::new();
+        for (index, (at, call, error)) in faults.iter().enumerate() {
+            let what = format!("{}: call {at}, {} with {:?}", self.name, call.name, call.errors[*error]);
+            self.one(folder, &what, Plan { at: *at, error: *error }, &expected);
+            if share == 1 || index % 3 == 0 {
+                // The same process, and whatever the run left in the cache.
+                self.remove(folder, self.outputs);
+                let (made, _) = self.good(folder, &format!("{what}, the run after it"));
+                assert!(made == expected, "{what}: the run after it makes something else");
+            }
+            *tally.entry(call.name).or_default() += 1;
+        }
+        report(&format!(
+            "{}: {} calls can fail, {} of {all} faults were injected, {:.1} s",
+            self.name,
+            heard.calls.len(),
+            faults.len(),
+            start.elapsed().as_secs_f64()
+        ));
+        tally
+    }
+
+    /// One run with a fault.
+    fn one(&self, folder: &Path, what: &str, plan: Plan, expected: &[Option<Vec<u8>>]) {
+        self.remove(folder, self.outputs);
+        self.remove(folder, self.cold);
+        let (outcome, heard) = guarded(what, || {
+            watch(Some(plan), Claims::default(), || catch_unwind(AssertUnwindSafe(|| (self.run)(folder))))
+        });
+        let Ok(outcome) = outcome else { panic!("{what}: it panicked") };
+        assert_clean(what, &heard);
+        let (call, code) = heard.fired.unwrap_or_else(|| panic!("{what}: only {} calls were made", heard.calls.len()));
+        match &outcome {
+            Ok(()) => assert!(is_forgiven(call), "{what}: nobody noticed"),
+            Err(error) => assert_told(what, call, code, error),
+        }
+        for ((name, expected), made) in self.outputs.iter().zip(expected).zip(self.made(folder)) {
+            assert!(outcome.is_err() || made.is_some(), "{what}: there is no {name}");
+            assert!(made.is_none() || made == *expected, "{what}: {name} is not what it is without a fault");
+        }
+        assert_no_leftovers(what, folder);
+    }
+}
+
+/// Nothing is left, and nothing was done that no valid program does.
+pub fn assert_clean(what: &str, heard: &Heard) {
+    assert!(heard.left.is_empty(), "{what}: not destroyed: {:?}", heard.left);
+    assert!(heard.wrong.is_empty(), "{what}: {:?}", heard.wrong);
+}
+
+/// Calls whose failure changes nothing that a user asked for: names for debuggers, the pipeline cache, and waiting for what has ended.
+fn is_forgiven(call: Call) -> bool {
+    ["vkSetDebugUtilsObjectNameEXT", "vkGetPipelineCacheData", "vkDeviceWaitIdle", "vkQueueWaitIdle", "vkWaitForFences"]
+        .contains(&call.name)
+}
+
+/// The exit code that an error of Vulkan leads to.
+fn exit_code(error: vk::Result) -> u8 {
+    match error {
+        vk::Result::ERROR_INITIALIZATION_FAILED
+        | vk::Result::ERROR_INCOMPATIBLE_DRIVER
+        | vk::Result::ERROR_LAYER_NOT_PRESENT
+        | vk::Result::ERROR_EXTENSION_NOT_PRESENT
+        | vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR
+        | vk::Result::ERROR_FEATURE_NOT_PRESENT => 3,
+        _ => 5,
+    }
+}
+
+/// One line that names the call, the object and the error, and the right exit code.
+fn assert_told(what: &str, call: Call, code: vk::Result, error: &Error) {
+    static TOLD: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
+    let line = error.to_string();
+    assert!(!line.contains('\n') && line == error.line(), "{what}: {line:?} is not one line");
+    assert_eq!(error.exit_code(), exit_code(code), "{what}: {line}");
+    let in_words = match (call.name, code) {
+        ("vkCreateInstance", vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Some("no Vulkan driver found"),
+        ("vkEnumeratePhysicalDevices", vk::Result::ERROR_INITIALIZATION_FAILED) => Some("no Vulkan device found"),
+        _ => None,
+    };
+    if let Some(words) = in_words {
+        return assert!(line.contains(words), "{what}: {line}");
+    }
+    // Which surface is made depends on the display.
+    let name = if call.name.ends_with("SurfaceKHR") && call.name.starts_with("vkCreate") {
+        "vkCreateSurfaceKHR"
+    } else {
+        call.name
+    };
+    let (_, rest) =
+        line.split_once(&format!("{name} (")).unwrap_or_else(|| panic!("{what}: {line} does not name the call"));
+    let (object, rest) = rest.split_once("): ").unwrap_or_else(|| panic!("{what}: {line} does not name an object"));
+    assert!(!object.is_empty() && rest.starts_with(&format!("{code:?}")), "{what}: {line}");
+    let mut told = TOLD.lock().unwrap();
+    if told.insert(call.name.to_owned(), line.clone()).is_none() {
+        report(&format!("    {line}"));
+    }
+}
+
+/// No half-written file in the folder or below.
+fn assert_no_leftovers(what: &str, folder: &Path) {
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path: PathBuf = entry.unwrap().path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            assert!(!name.starts_with(".unfinished-"), "{what}: {} is left", path.display());
+            if path.is_dir() {
+                folders.push(path);
+            }
+        }
+    }
+}

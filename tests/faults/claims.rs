@@ -2,7 +2,7 @@
 
 use super::layer::{Claims, watch};
 use super::sweep::assert_clean;
-use super::{folder, run};
+use super::{Place, run};
 use shadow_fields::error::one_line;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -174,8 +174,8 @@ fn picture(folder: &Path, more: &[&str]) -> shadow_fields::Result<()> {
 
 #[test]
 fn devices_that_have_less_are_refused_with_the_number_or_worked_around() {
-    let Some(folder) = folder() else { return };
-    let folder = folder.path();
+    let Some(place) = Place::new() else { return };
+    let folder = place.path();
     let output = folder.join("p.png");
     let mut wrong = Vec::new();
     let mut pictures = BTreeMap::new();

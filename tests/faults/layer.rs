@@ -84,8 +84,6 @@ fn state() -> MutexGuard<'static, State> {
 
 /// Runs something and tells what was seen. One watch at a time.
 pub fn watch<R>(plan: Option<Plan>, claims: Claims, run: impl FnOnce() -> R) -> (R, Heard) {
-    static TURN: Mutex<()> = Mutex::new(());
-    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     // SAFETY: the function answers with the loader's functions or with wrappers of the same kind, all of which are static.
     unsafe { shadow_fields::gpu::loader::stand_before(instance_address) };
     *state() = State { plan, claims, ..State::default() };

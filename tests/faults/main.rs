@@ -13,6 +13,7 @@ mod window;
 
 use shadow_fields::{Error, Result, app};
 use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use sweep::Job;
 
 /// Of all faults, one in so many is injected by default.
@@ -94,26 +95,40 @@ const JOBS: &[Job] = &[
     Job { name: "window", run: window, outputs: &["w.raw"], cold: &[] },
 ];
 
-/// A folder with inputs; `None` where there is no device.
-fn folder() -> Option<tempfile::TempDir> {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
-    std::fs::write(folder.path().join("mesh.obj"), MESH).unwrap();
-    match run(folder.path(), &["devices"]) {
-        Ok(()) => Some(folder),
-        Err(Error::Unsupported(error)) => {
-            common::skip(&error);
-            None
+/// A folder with inputs, held by one test at a time: the layer is the whole process's.
+struct Place {
+    folder: tempfile::TempDir,
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Place {
+    /// `None` where there is no device.
+    fn new() -> Option<Self> {
+        static TURN: Mutex<()> = Mutex::new(());
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+        std::fs::write(folder.path().join("mesh.obj"), MESH).unwrap();
+        match run(folder.path(), &["devices"]) {
+            Ok(()) => Some(Place { folder, _turn: turn }),
+            Err(Error::Unsupported(error)) => {
+                common::skip(&error);
+                None
+            }
+            Err(error) => panic!("{error}"),
         }
-        Err(error) => panic!("{error}"),
+    }
+
+    fn path(&self) -> &Path {
+        self.folder.path()
     }
 }
 
 fn sweep(share: usize) {
-    let Some(folder) = folder() else { return };
+    let Some(place) = Place::new() else { return };
     let mut all = sweep::Tally::new();
     for job in JOBS {
-        for (name, count) in job.sweep(folder.path(), share, 1) {
+        for (name, count) in job.sweep(place.path(), share, 1) {
             *all.entry(name).or_default() += count;
         }
     }

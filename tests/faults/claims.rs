@@ -159,7 +159,7 @@ fn table() -> Vec<Row> {
         ),
         (
             "one sample a pixel",
-            &["--antialias", "samples"],
+            &["--antialias", "samples", "--lights", "sh"],
             limits(|p| p.limits.framebuffer_color_sample_counts = ash::vk::SampleCountFlags::TYPE_1),
             Other,
         ),
@@ -169,7 +169,8 @@ fn table() -> Vec<Row> {
 fn picture(folder: &Path, more: &[&str]) -> shadow_fields::Result<()> {
     let variant = if more.contains(&"--variant") { &[][..] } else { &["--variant", "storage"] };
     let small = ["--lattice", "cube:2x2", "--face-px", "4", "--quality", "draft"];
-    run(folder, &[&["render", "@scene.toml", "-o", "@p.png"], variant, &small, more].concat())
+    let antialias = if more.contains(&"--antialias") { &[][..] } else { &["--antialias", "none"] };
+    run(folder, &[&["render", "@scene.toml", "-o", "@p.png"], variant, antialias, &small, more].concat())
 }
 
 #[test]

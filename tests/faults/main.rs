@@ -1,7 +1,7 @@
 //! Every Vulkan call that can fail fails once, with every error that the specification allows: no panic, hang or leak, one line with
 //! the right exit code, outputs whole or absent, and the next run in the same process is as if nothing had happened.
 //!
-//! A seeded tenth runs by default. All of it: `cargo test --test faults -- --ignored --nocapture`.
+//! By default a seeded tenth of the calls fails. All of it: `cargo test --test faults -- --ignored --nocapture`.
 
 mod claims;
 #[path = "../common/mod.rs"]
@@ -16,7 +16,7 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use sweep::Job;
 
-/// Of all faults, one in so many is injected by default.
+/// Of all calls, one in so many fails by default.
 const SHARE: usize = 10;
 
 const SCENE: &str = r#"
@@ -138,12 +138,12 @@ fn sweep(share: usize) {
 }
 
 #[test]
-fn a_tenth_of_all_faults_is_survived() {
+fn faults_in_a_tenth_of_all_calls_are_survived() {
     sweep(SHARE);
 }
 
 #[test]
-#[ignore = "takes minutes; a tenth of it runs by default"]
+#[ignore = "takes three quarters of an hour; a tenth of the calls fails by default"]
 fn every_fault_is_survived() {
     sweep(1);
 }

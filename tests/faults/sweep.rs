@@ -75,33 +75,38 @@ impl Job {
     }
 
     /// Lets calls fail, each in a run of its own, and runs again without a fault: all of them with all of their errors, or one in
-    /// `share` of these, picked by a seed. Of the latter only every third is followed by another run, and of names for debuggers,
-    /// which nobody misses, a tenth as many fail.
+    /// `share` calls with one of its errors, picked by a seed. Of the latter every eighth is followed by another run, and of names for
+    /// debuggers, which nobody misses, a tenth as many fail.
     pub fn sweep(&self, folder: &Path, share: usize, seed: u64) -> Tally {
         let start = Instant::now();
         self.good(folder, "the first run");
         self.remove(folder, self.outputs);
         self.remove(folder, self.cold);
         let (expected, heard) = self.good(folder, "the second run");
-        let mut faults: Vec<(usize, Call, usize)> = Vec::new();
-        for (at, call) in heard.calls.iter().enumerate() {
-            faults.extend((0..call.errors.len()).map(|error| (at, *call, error)));
-        }
+        let every = |(at, call): (usize, &Call)| (0..call.errors.len()).map(move |error| (at, error));
+        let mut faults: Vec<(usize, usize)> = heard.calls.iter().enumerate().flat_map(every).collect();
         let all = faults.len();
         let mut random = fastrand::Rng::with_seed(seed);
-        random.shuffle(&mut faults);
         if share > 1 {
-            let (names, mut others): (Vec<_>, Vec<_>) =
-                faults.into_iter().partition(|(_, call, _)| call.name == "vkSetDebugUtilsObjectNameEXT");
+            let one = |(at, call): (usize, &Call)| (at, random.usize(0..call.errors.len()));
+            let (mut names, mut others): (Vec<_>, Vec<_>) = heard
+                .calls
+                .iter()
+                .enumerate()
+                .map(one)
+                .partition(|(at, _)| heard.calls[*at].name == "vkSetDebugUtilsObjectNameEXT");
+            random.shuffle(&mut others);
+            random.shuffle(&mut names);
             others.truncate(others.len().div_ceil(share));
-            others.extend_from_slice(&names[..names.len().div_ceil(10 * share)]);
-            faults = others;
+            names.truncate(names.len().div_ceil(10 * share));
+            faults = [others, names].concat();
         }
         let mut tally = Tally::new();
-        for (index, (at, call, error)) in faults.iter().enumerate() {
+        for (index, (at, error)) in faults.iter().enumerate() {
+            let call = heard.calls[*at];
             let what = format!("{}: call {at}, {} with {:?}", self.name, call.name, call.errors[*error]);
             self.one(folder, &what, Plan { at: *at, error: *error }, &expected);
-            if share == 1 || index % 3 == 0 {
+            if share == 1 || index % 8 == 0 {
                 // The same process, and whatever the run left in the cache.
                 self.remove(folder, self.outputs);
                 let (made, _) = self.good(folder, &format!("{what}, the run after it"));

@@ -66,7 +66,7 @@ fn frame_options() -> frame::Options {
     frame::Options {
         bake: bake::Options { lattice, face_px: 4, ..Default::default() },
         lights: Lights::Sharp,
-        shading: Some(Shading::Pixel),
+        shading: Some(Shading::Vertex),
         size: SIZE,
         antialias: Antialias::Outlines,
         ..check::merge::options()

@@ -1,0 +1,468 @@
+//! Every parser and decoder, with the inputs that mutation starts from.
+
+use glam::DVec3;
+use shadow_fields::asset::equirect::Equirect;
+use shadow_fields::asset::{Mesh, embedded, generate, picture};
+use shadow_fields::bake::{self, partial::Partial};
+use shadow_fields::error::Error;
+use shadow_fields::field::file::{self, FIELD_MAGIC, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC};
+use shadow_fields::field::silhouette::{SILHOUETTE_MAGIC, SilhouetteField, SilhouetteHeader};
+use shadow_fields::field::{FieldKind, Lattice, Lookup, ShadowField, Storage};
+use shadow_fields::gpu::{pipeline_cache, shader};
+use shadow_fields::merge::calibrate::Calibration;
+use shadow_fields::scene::Scene;
+use shadow_fields::{Result, app};
+use std::path::Path;
+
+/// A parser, what it says to an input, and words of its format.
+pub struct Target {
+    pub name: &'static str,
+    pub seeds: fn() -> Vec<Vec<u8>>,
+    pub tokens: &'static [&'static str],
+    /// Parses; what was read is used as the program would use it.
+    pub parse: fn(&[u8]) -> Result<()>,
+    /// Whether it reads a file: then an error is one line that names it.
+    pub reads_file: bool,
+}
+
+/// The name under which inputs are read.
+pub const NAME: &str = "fuzzed";
+
+pub const TARGETS: &[Target] = &[
+    Target {
+        name: "obj",
+        seeds: meshes,
+        tokens: &["v ", "vn ", "vt ", "f ", "//", "/", "\n", "\\\n", "g x\n", "usemtl m\n", "1/1/1"],
+        parse: mesh,
+        reads_file: true,
+    },
+    Target { name: "toml", seeds: scenes, tokens: TOML, parse: scene, reads_file: true },
+    Target { name: "sf", seeds: fields, tokens: HEADER, parse: field, reads_file: true },
+    Target { name: "outlines", seeds: outlines, tokens: HEADER, parse: outline, reads_file: true },
+    Target { name: "selfvis", seeds: payloads, tokens: HEADER, parse: payload, reads_file: true },
+    Target { name: "part", seeds: parts, tokens: HEADER, parse: part, reads_file: false },
+    Target {
+        name: "picture",
+        seeds: pictures,
+        tokens: &[
+            "#?RADIANCE\n",
+            "FORMAT=32-bit_rle_rgbe\n",
+            "-Y 2 +X 4\n",
+            "IHDR",
+            "IDAT",
+            "acTL",
+            "channels",
+            "chlist",
+            "dataWindow",
+            "compression",
+        ],
+        parse: decode,
+        reads_file: false,
+    },
+    Target {
+        name: "lattice",
+        seeds: lattices,
+        tokens: &[
+            "cube:",
+            "latlon:",
+            "x",
+            ",chord",
+            ",log",
+            ",linear",
+            ",scaled",
+            ",raw",
+            ",inner=",
+            ",outer=",
+            ",edges",
+            ",edges=auto",
+            ",round",
+            ",centre=",
+            ",stretch=",
+            ":",
+        ],
+        parse: lattice,
+        reads_file: false,
+    },
+    Target { name: "spirv", seeds: words, tokens: &[], parse: spirv, reads_file: false },
+    Target { name: "pipelines", seeds: caches, tokens: &[], parse: pipelines, reads_file: false },
+    Target {
+        name: "calibration",
+        seeds: calibrations,
+        tokens: &["\"driver\":", "null", "1e999", "[", "]", "{", "}"],
+        parse: calibration,
+        reads_file: false,
+    },
+    Target { name: "options", seeds: options, tokens: OPTIONS, parse: option, reads_file: false },
+];
+
+const TOML: &[&str] = &[
+    "[camera]\n",
+    "[output]\n",
+    "[environment]\n",
+    "[[mesh]]\n",
+    "[[entity]]\n",
+    "eye = ",
+    "target = ",
+    "fov_deg = ",
+    "width = ",
+    "height = ",
+    "exposure_ev = ",
+    "time_s = ",
+    "strength = ",
+    "turn_deg = ",
+    "uniform = ",
+    "gradient = { radiance = ",
+    "key = { radiance = ",
+    "sky = { turbidity = ",
+    "image = { file = \"sky.hdr\" }\n",
+    "name = \"m\"\n",
+    "file = \"m.obj\"\n",
+    "plane = { size_m = 1, cells = 2 }\n",
+    "sphere = { radius_m = 1, subdivisions = 1 }\n",
+    "teapot = { subdivisions = 1 }\n",
+    "mesh = \"m\"\n",
+    "position = ",
+    "rotation = ",
+    "scale = ",
+    "albedo = ",
+    "emission = ",
+    "emits = true\n",
+    "motion = [",
+    "keyframes = { keys = [",
+    "orbit = ",
+    "spin = ",
+    "bob = ",
+    "[0, 1, 0]",
+    "true",
+    "\n",
+];
+const HEADER: &[&str] = &[
+    "\"bands\":",
+    "\"lattice\":",
+    "\"shells\":",
+    "\"cells\":",
+    "\"map_px\":",
+    "\"view_px\":",
+    "\"radius_m\":",
+    "null",
+    "1e999",
+    "{",
+    "}",
+    "[",
+    "]",
+];
+const OPTIONS: &[&str] = &[
+    "render\n",
+    "bake\n",
+    "inspect\n",
+    "view\n",
+    "check\n",
+    "bench\n",
+    "demo\n",
+    "profile\n",
+    "devices\n",
+    "-o\n",
+    "--lattice\n",
+    "--size\n",
+    "--frames\n",
+    "--time\n",
+    "--skip\n",
+    "--eps\n",
+    "--radiance\n",
+    "--lights\n",
+    "--variant\n",
+    "--face-px\n",
+    "--bands\n",
+    "--seed\n",
+    "--quality\n",
+    "--json\n",
+    "=",
+    ",",
+    "x",
+];
+
+fn meshes() -> Vec<Vec<u8>> {
+    let cut = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nvn 0 0 1\nvt 0 0\nf 1/1/1 2/1/1 3//1\nf -1 -2 -3\n# end\n";
+    vec![shadow_fields::asset::obj::write_obj(&generate::cuboid(glam::Vec3::ONE, 1)).into_bytes(), cut.into()]
+}
+
+fn mesh(bytes: &[u8]) -> Result<()> {
+    Mesh::parse(bytes, Path::new(NAME)).map(|_| ())
+}
+
+fn scenes() -> Vec<Vec<u8>> {
+    let small = "[camera]\neye = [0, 1, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"m\"\nsphere = { radius_m = 1, subdivisions = 0 }\n\
+        [[entity]]\nmesh = \"m\"\nposition = [0, 1, 0]\n";
+    vec![small.into(), include_bytes!("corpus/toml/all_keys.toml").to_vec()]
+}
+
+fn scene(bytes: &[u8]) -> Result<()> {
+    let text = std::str::from_utf8(bytes).map_err(|error| Error::input(Path::new(NAME), error))?;
+    let read = |path: &Path| match path.extension().and_then(|ending| ending.to_str()) {
+        Some("obj") => Ok(meshes().remove(1)),
+        Some("hdr") => Ok(radiance_picture()),
+        _ => embedded::read(path),
+    };
+    let scene = Scene::parse(text, Path::new(NAME), &read)?;
+    for time_s in [0.0, 0.3, -1e9] {
+        let finite = scene.at(time_s).iter().all(|p| p.position.is_finite() && p.rotation.is_finite() && p.scale > 0.0);
+        assert!(finite, "a placement is not finite");
+    }
+    // What is read can be saved and read again.
+    let saved = scene.to_toml();
+    Scene::parse(&saved, Path::new(NAME), &read)
+        .unwrap_or_else(|error| panic!("what was saved is refused: {error}\n{saved}"));
+    Ok(())
+}
+
+/// A file in memory that functions which take paths can read.
+fn with_file<R>(bytes: &[u8], read: impl FnOnce(&Path) -> R) -> R {
+    thread_local! {
+        static FOLDER: tempfile::TempDir = {
+            let memory = Path::new("/dev/shm");
+            if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.unwrap()
+        };
+    }
+    FOLDER.with(|folder| {
+        let path = folder.path().join(NAME);
+        std::fs::write(&path, bytes).unwrap();
+        read(&path)
+    })
+}
+
+/// Lengths and hash as a file has them, so that mutation reaches what is behind them: every second input.
+fn sealed(bytes: &[u8]) -> Vec<u8> {
+    let mut out = bytes.to_vec();
+    if out.len() < 56 || out.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte)) % 2 == 0 {
+        return out;
+    }
+    let rest = &out[56..];
+    let header = rest.windows(2).position(|pair| pair == b"}\0").map_or(rest.len(), |at| at + 1);
+    let payload = rest[header..].strip_prefix(b"\0").unwrap_or(&rest[header..]).to_vec();
+    let header = rest[..header].to_vec();
+    out.truncate(12);
+    out.extend((header.len() as u32).to_le_bytes());
+    out.extend((payload.len() as u64).to_le_bytes());
+    let hash = blake3::Hasher::new().update(&out).update(&header).update(&payload).finalize();
+    out.extend(hash.as_bytes());
+    out.extend(header);
+    out.extend(payload);
+    out
+}
+
+/// The file that `write` writes, with a zero byte between header and payload so that [`sealed`] finds the border.
+fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
+    with_file(&[], |path| {
+        write(path);
+        let mut bytes = std::fs::read(path).unwrap();
+        let header = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+        bytes.insert(56 + header, 0);
+        bytes
+    })
+}
+
+fn field_of(kind: FieldKind, storage: Storage, lattice: &str) -> ShadowField {
+    let options =
+        bake::Options { storage, lattice: lattice.parse().unwrap(), bands: 2, face_px: 16, ..Default::default() };
+    let header = bake::header(&generate::sphere(0.7, 0), kind, &options);
+    let payload = (0..header.payload_bytes()).map(|i| (i * 37) as u8 & 0x3f).collect();
+    ShadowField { header, payload }
+}
+
+fn fields() -> Vec<Vec<u8>> {
+    let one = field_of(FieldKind::Occlusion, Storage::F16, "cube:2x2");
+    let other = field_of(FieldKind::Radiance, Storage::F32, "latlon:2x2x2,log,raw,inner=0.3,outer=5");
+    [one, other].map(|field| written(|path| field.write(path).unwrap())).into()
+}
+
+fn field(bytes: &[u8]) -> Result<()> {
+    with_file(&sealed(bytes), |path| {
+        let field = ShadowField::read(path)?;
+        let mut out = vec![0.0; field.header.bands * field.header.bands];
+        for at in [DVec3::new(0.0, 1.5, 0.2), DVec3::new(-30.0, 1.0, 4.0), DVec3::ZERO] {
+            for lookup in [Lookup::Trilinear, Lookup::Nearest] {
+                field.lookup(at, lookup, 0, &mut out);
+            }
+        }
+        Ok(())
+    })
+}
+
+fn outline_field() -> SilhouetteField {
+    let header = SilhouetteHeader {
+        cells: 1,
+        map_px: 8,
+        view_px: 16,
+        centre_m: [0.0; 3],
+        radius_m: 1.0,
+        mesh: "m".into(),
+        mesh_hash: String::new(),
+    };
+    let map: Vec<u8> = [0.0_f32, 0.0, 0.5, 0.5].iter().flat_map(|x| x.to_le_bytes()).chain([9; 128]).collect();
+    let payload = map.repeat(header.map_count());
+    SilhouetteField::new(header, payload).unwrap()
+}
+
+fn outlines() -> Vec<Vec<u8>> {
+    vec![written(|path| outline_field().write(path).unwrap())]
+}
+
+fn outline(bytes: &[u8]) -> Result<()> {
+    with_file(&sealed(bytes), |path| {
+        let field = SilhouetteField::read(path)?;
+        for direction in [DVec3::X, DVec3::new(0.3, -0.8, 0.52).normalize()] {
+            let near = field.near(DVec3::new(0.4, 2.0, -0.1), direction);
+            let blocked = field.blocked(&near, direction, 1.0, 0.1);
+            assert!((0.0..=1.0).contains(&blocked), "{blocked} of a light is blocked");
+        }
+        Ok(())
+    })
+}
+
+const MAGICS: [[u8; 8]; 4] = [SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC, FIELD_MAGIC, SILHOUETTE_MAGIC];
+
+fn payloads() -> Vec<Vec<u8>> {
+    let header = serde_json::json!({ "mesh_hash": "00", "face_px": 16, "offset": 1e-3, "side": 16, "vertex_count": 2 });
+    let of = |magic| written(|path| file::write(path, magic, &header, &[7; 64]).unwrap());
+    MAGICS.into_iter().take(2).map(of).collect()
+}
+
+fn payload(bytes: &[u8]) -> Result<()> {
+    with_file(&sealed(bytes), |path| {
+        let outcomes = MAGICS.map(|magic| file::read::<serde_json::Value>(path, magic).map(|_| ()));
+        let [first, ..] = outcomes;
+        first
+    })
+}
+
+fn parts() -> Vec<Vec<u8>> {
+    let header = serde_json::json!({ "done": 2, "all": 3, "numbers": 12 });
+    vec![written(|path| file::write(path, *b"SHPART\n\0", &header, &[7; 48]).unwrap())]
+}
+
+fn part(bytes: &[u8]) -> Result<()> {
+    with_file(&sealed(bytes), |path| {
+        let mut values = [0_f32; 12];
+        let done = Partial::new(Some(path.to_owned())).load(&mut values, 3);
+        assert!(done <= 3, "{done} of 3 samples are kept");
+        if done == 0 { Err(Error::Failed("it counts as none".into())) } else { Ok(()) }
+    })
+}
+
+fn radiance_picture() -> Vec<u8> {
+    let mut bytes = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec();
+    bytes.extend([128, 64, 32, 129].repeat(8));
+    bytes
+}
+
+fn pictures() -> Vec<Vec<u8>> {
+    let linear: Vec<f32> = (0..24).map(|i| i as f32 / 8.0).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let [png, exr] = ["p.png", "p.exr"].map(|name| folder.path().join(name));
+    picture::write_png(&png, 4, 2, &linear, 0.0).unwrap();
+    picture::write_exr(&exr, 4, 2, &linear).unwrap();
+    let mut long = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 8\n\x02\x02\x00\x08".to_vec();
+    long.extend([0x88, 128].repeat(4));
+    vec![radiance_picture(), long, std::fs::read(png).unwrap(), std::fs::read(exr).unwrap()]
+}
+
+fn decode(bytes: &[u8]) -> Result<()> {
+    let picture = Equirect::decode(bytes)?;
+    let finite = picture.coefficients(4).iter().all(|channel| channel.iter().all(|c| c.is_finite()));
+    assert!(finite, "a coefficient is not finite");
+    assert!(picture.radiance(DVec3::new(0.6, 0.0, -0.8)).is_finite());
+    Ok(())
+}
+
+fn lattices() -> Vec<Vec<u8>> {
+    [
+        "cube:18x7",
+        "latlon:8x4x4,log,raw,inner=0.9,outer=5,edges",
+        "cube:2x2,round",
+        "cube:3x3,centre=0:1:0,stretch=1:1:2,edges=auto",
+    ]
+    .map(|text| text.into())
+    .into()
+}
+
+fn lattice(bytes: &[u8]) -> Result<()> {
+    let text = String::from_utf8_lossy(bytes);
+    let lattice: Lattice = text.parse().map_err(Error::Usage)?;
+    let again: Lattice = lattice.to_string().parse().unwrap_or_else(|error| panic!("{lattice} is refused: {error}"));
+    assert_eq!(again, lattice, "its text says something else");
+    assert!(lattice.position(lattice.sample_count() - 1).is_finite());
+    Ok(())
+}
+
+/// The key under which compiled words are kept here.
+const KEY: &str = "0123456789abcdef0123456789abcdef";
+
+fn words() -> Vec<Vec<u8>> {
+    let words = [0x0723_0203_u32, 0x0001_0500, 0, 8, 0].map(u32::to_le_bytes).concat();
+    let mut file = blake3::Hasher::new().update(KEY.as_bytes()).update(&words).finalize().as_bytes().to_vec();
+    file.extend(&words);
+    vec![file]
+}
+
+fn spirv(bytes: &[u8]) -> Result<()> {
+    match shader::words(KEY, bytes) {
+        None => Err(Error::Failed("not sealed".into())),
+        Some(words) => {
+            assert_eq!(bytes, &super::targets::words()[0], "{} words pass that nobody compiled", words.len());
+            Ok(())
+        }
+    }
+}
+
+fn properties() -> ash::vk::PhysicalDeviceProperties {
+    ash::vk::PhysicalDeviceProperties { vendor_id: 7, device_id: 9, ..Default::default() }
+}
+
+fn caches() -> Vec<Vec<u8>> {
+    let mut data = [32_u32, 1, 7, 9].map(u32::to_le_bytes).concat();
+    data.extend([0; 40]);
+    vec![pipeline_cache::sealed(&data)]
+}
+
+fn pipelines(bytes: &[u8]) -> Result<()> {
+    match pipeline_cache::trusted(bytes, &properties()) {
+        None => Err(Error::Failed("not sealed".into())),
+        Some(data) => {
+            assert!(bytes == caches()[0], "{} bytes pass that nobody wrote", data.len());
+            Ok(())
+        }
+    }
+}
+
+fn calibrations() -> Vec<Vec<u8>> {
+    let known = Calibration {
+        driver: "d".into(),
+        program: "p".into(),
+        fastest: "texel".into(),
+        milliseconds: vec![("texel".into(), Some(1.5)), ("storage".into(), None)],
+    };
+    vec![serde_json::to_vec(&known).unwrap()]
+}
+
+fn calibration(bytes: &[u8]) -> Result<()> {
+    serde_json::from_slice::<Calibration>(bytes).map(|_| ()).map_err(|error| Error::Failed(error.to_string()))
+}
+
+/// Arguments stand on lines.
+fn options() -> Vec<Vec<u8>> {
+    [
+        "render\ns.toml\n-o\np.png\n--frames\n3\n--time\n1.5\n--size\n64x48\n--skip\nall\n--eps\n0.01\n--lattice\ncube:2x2",
+        "bake\nm.obj\n-o\nf.sf\n--radiance\n1,0.5,0.2\n--quality\nhigh\n--symmetry\noff",
+        "inspect\nf.sf\n--faces\nsheet.png",
+        "bench\ntime-error\n--out\no\n--json",
+        "view\ns.toml\n--size=64x48\n--present-mode\nfifo\n--paused",
+        "check\nmerge\n--seed\n7\n-vv",
+    ]
+    .map(|text| text.into())
+    .into()
+}
+
+fn option(bytes: &[u8]) -> Result<()> {
+    let text = String::from_utf8_lossy(bytes).into_owned();
+    app::understand(["shadow-fields"].into_iter().chain(text.split('\n')))
+}

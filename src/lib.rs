@@ -37,7 +37,7 @@
 //! | [`field`] | what is sampled where, what is stored, and its file |
 //! | [`shaders`] | every shader entry point and its permutations |
 //! | [`asset`] | meshes, distant light, pictures |
-//! | [`scene`] | scenes as plain data, and motion |
+//! | [`scene`] | scenes as plain data, motion, glTF |
 //! | [`bake`] | capture, project, assemble: fields and transfer vectors of a mesh, and their cache |
 //! | [`lists`] | which entities concern which cluster of vertices, and which clusters have to be merged again |
 //! | [`merge`] | the merge pass, its permutations, its CPU twin and its calibration |

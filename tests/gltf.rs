@@ -114,7 +114,7 @@ fn uniform_scales_are_placements_and_others_are_baked() {
     assert_eq!(import.data.entities[1].mesh, import.data.entities[2].mesh);
     assert!(import.meshes.iter().all(|mesh| mesh.is_solid()), "also the mirrored one faces outwards");
     let said = import.notes.said().join("\n");
-    assert!(said.contains("2 meshes are copies with a scale baked in"), "{said}");
+    assert!(said.contains("baked into copies of meshes (2)"), "{said}");
 }
 
 #[test]
@@ -194,7 +194,7 @@ fn strips_and_fans_are_triangles_and_lines_are_left_out() {
         assert_eq!(mesh.triangles.len(), 2);
         assert!((mesh.area_m2() - 1.0).abs() < 1e-6 && mesh.normals.iter().all(|n| *n == Vec3::Z));
     }
-    assert_eq!(import.notes.left_out(), ["left out: 2 primitives of points or lines"]);
+    assert_eq!(import.notes.left_out(), ["left out (2): primitives of points or lines"]);
 }
 
 #[test]
@@ -321,7 +321,7 @@ fn textures_become_means_over_vertices() {
     assert!(close(albedo(2), [0.5, 0.5, 0.0]), "red and green: {}", albedo(2));
     assert!(close(albedo(3), [0.5, 1.0, 0.5]), "green and white: {}", albedo(3));
     let left_out = import.notes.left_out();
-    assert_eq!(left_out, ["left out: 4 base colour textures (their mean over the vertices is the albedo)"]);
+    assert_eq!(left_out, ["left out (4): base colour textures (their mean over the vertices is the albedo)"]);
 }
 
 #[test]
@@ -352,7 +352,7 @@ fn emission_has_its_strength_and_pattern() {
     assert!(import.data.environment.is_empty(), "something shines, so no daylight is added");
     assert_eq!(import.data.output.exposure_ev, 0.0);
     let left_out = import.notes.left_out();
-    assert_eq!(left_out, ["left out: 1 emissive textures (vertices have their colours)"]);
+    assert_eq!(left_out, ["left out (1): emissive textures (vertices have their colours)"]);
 }
 
 #[test]
@@ -388,9 +388,9 @@ fn lights_are_balls_of_their_intensity() {
     let intensity = lamp.emission * std::f32::consts::PI * lamp.scale * lamp.scale;
     assert!((intensity - Vec3::new(12., 6., 0.)).length() < 0.3, "{intensity}");
     let said = import.notes.said().join("\n");
-    assert!(said.contains(&format!("1 point and spot lights are balls of radius {:.3} m", lamp.scale)), "{said}");
+    assert!(said.contains(&format!("point and spot lights (1) are balls of radius {:.3} m", lamp.scale)), "{said}");
     assert!(said.contains("exposure_ev"), "{said}");
-    assert_eq!(import.notes.left_out(), ["left out: 1 directional lights"]);
+    assert_eq!(import.notes.left_out(), ["left out (1): directional lights"]);
 }
 
 /// A spot 2 m above a floor, by ray casting: what the floor gets is the intensity over the square of the distance within the inner
@@ -415,7 +415,7 @@ fn spots_shine_within_their_cone() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, notes) = Scene::load_with_notes(&model.write(folder.path(), "m")).unwrap();
     assert_eq!(notes.left_out(), [""; 0]);
-    assert!(notes.said().iter().any(|line| line.contains("1 spot lights stand in housings")), "{:?}", notes.said());
+    assert!(notes.said().iter().any(|line| line.contains("spot lights (1) stand in housings")), "{:?}", notes.said());
     assert_eq!(scene.entities.len(), 8, "a floor, a lamp and six plates");
     let cast = RayCast { rays: 512, seed: 3, ..Default::default() };
     let (lit, _) = shadow_fields::truth::picture(&scene, &scene.at(0.0), &cast);
@@ -463,7 +463,7 @@ fn the_first_perspective_camera_is_taken() {
     let ahead = (camera.target - camera.eye).normalize();
     assert!((ahead - Vec3::NEG_X).length() < 1e-5 && (camera.fov_deg - 0.5_f32.to_degrees()).abs() < 1e-4, "{ahead}");
     assert_eq!((import.data.output.width, import.data.output.height), (960, 640));
-    assert_eq!(import.notes.left_out(), ["left out: 1 cameras without perspective", "left out: 1 further cameras"]);
+    assert_eq!(import.notes.left_out(), ["left out (1): cameras without perspective", "left out (1): further cameras"]);
 }
 
 #[test]
@@ -485,11 +485,11 @@ fn what_is_left_out_is_counted() {
     assert_eq!(
         load(&model).notes.left_out(),
         [
-            "left out: 1 further scenes",
-            "left out: 1 nodes with a skin (their meshes stand still as they are stored)",
-            "left out: 1 primitives with morph targets (they keep the shape that is stored first)",
-            "left out: 1 textures of normals, roughness, metal or occlusion",
-            "left out: 3 transparent materials (they are opaque)",
+            "left out (1): further scenes",
+            "left out (1): nodes with a skin (their meshes stand still as they are stored)",
+            "left out (1): primitives with morph targets (they keep the shape that is stored first)",
+            "left out (1): textures of normals, roughness, metal or occlusion",
+            "left out (3): transparent materials (they are opaque)",
         ]
     );
 }

@@ -171,11 +171,11 @@ fn what_placements_cannot_do_is_told() {
     assert_eq!(
         import.notes.left_out(),
         [
-            "left out: 1 animations of morph targets",
-            "left out: 1 animations of scales that reach 0 or mirror (they end at 1e-7)",
-            "left out: 1 animations of uneven scales (one scale of the same volume stands for them)",
-            "left out: 1 channels of animations that move what an earlier one moves",
-            "left out: 1 uneven scales of nodes that carry moving ones (one scale of the same volume stands for them)",
+            "left out (1): animations of morph targets",
+            "left out (1): animations of scales that reach 0 or mirror (they end at 1e-7)",
+            "left out (1): animations of uneven scales (one scale of the same volume stands for them)",
+            "left out (1): channels of animations that move what an earlier one moves",
+            "left out (1): uneven scales of nodes that carry moving ones (one scale of the same volume stands for them)",
         ]
     );
     assert!((import.data.entities[0].at(0.999_999_9).scale - 2.0).abs() < 1e-4);
@@ -198,7 +198,7 @@ fn lights_and_cameras_move_with_their_nodes() {
     let scale = import.data.entities[lamp].at(1.0).scale;
     assert!(said.contains(&format!("radius {scale:.3} m")), "{scale}: {said}");
     assert_eq!(import.data.camera.eye, Vec3::new(1.0, 2.0, 0.0));
-    assert_eq!(import.notes.left_out(), ["left out: 1 movements of cameras (they stand where they are at time 0)"]);
+    assert_eq!(import.notes.left_out(), ["left out (1): movements of cameras (they stand where they are at time 0)"]);
 }
 
 #[test]

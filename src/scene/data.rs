@@ -42,7 +42,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::motion::{Motion, Placement, PlacementF64, RotationData};
-use super::{ENTITY_LIMIT, MESH_LIMIT, values};
+use super::{ENTITY_LIMIT, MESH_LIMIT, gltf, values};
 use crate::asset::Mesh;
 use crate::asset::environment::EnvironmentData;
 use crate::asset::generate::Generator;
@@ -182,7 +182,7 @@ impl TryFrom<OutputWritten> for Output {
 pub struct MeshData {
     /// The name that entities use; it is unique.
     pub name: String,
-    /// A Wavefront OBJ file, relative to the scene file. If there is no such file, a built-in mesh of that name is taken, such as
+    /// A Wavefront OBJ file or a glTF file, all triangles of which are taken at rest, relative to the scene file. If there is no such file, a built-in mesh of that name is taken, such as
     /// `assets/meshes/torus.obj`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
@@ -215,6 +215,12 @@ impl MeshData {
     /// Reads the file or runs the generator.
     pub(super) fn build(&self, folder: &Path, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Mesh> {
         let mut mesh = match (&self.file, &self.generator) {
+            (Some(file), None) if gltf::is_gltf(file) => {
+                let path = folder.join(file);
+                let (mesh, notes) = gltf::load_mesh(&path)?;
+                notes.left_out().iter().for_each(|line| log::warn!("{}: {line}", path.display()));
+                mesh
+            }
             (Some(file), None) => Mesh::parse(&read(file)?, &folder.join(file))?,
             (None, Some(generator)) => generator.build()?,
             _ => return Err(Error::Input("a mesh has either a file or one generator".into())),

@@ -128,10 +128,10 @@ impl<'a> Lamps<'a> {
         } else {
             format!("{least_m:.3}")
         };
-        notes.say(format!("{} point and spot lights are balls of radius {radii} m", self.lights.len()));
+        notes.say(format!("point and spot lights ({}) are balls of radius {radii} m", self.lights.len()));
         let spots = self.lights.iter().filter(|(light, _)| is_spot(light)).count();
         if spots > 0 {
-            notes.say(format!("{spots} spot lights stand in housings of six plates, which cast shadows"));
+            notes.say(format!("spot lights ({spots}) stand in housings of six plates, which cast shadows"));
         }
         Ok(out)
     }

@@ -278,7 +278,7 @@ impl<'a> Builder<'a> {
         let document = self.document;
         if self.bent_count > 0 {
             let copies = self.bent_count;
-            self.notes.say(format!("{copies} meshes are copies with a scale baked in that is not uniform, or mirrors"));
+            self.notes.say(format!("baked into copies of meshes ({copies}): scales that are not uniform, or mirror"));
         }
         let spheres: HashMap<&str, (Vec3, f32)> =
             self.meshes.iter().map(|(name, mesh)| (name.as_str(), mesh.bounding_sphere())).collect();

@@ -27,9 +27,9 @@ impl Notes {
         self.said.push(line);
     }
 
-    /// A line for each kind of thing that was left out: `left out: 2 skins (...)`.
+    /// A line for each kind of thing that was left out: `left out (2): skins ...`.
     pub fn left_out(&self) -> Vec<String> {
-        self.left_out.iter().map(|(what, count)| format!("left out: {count} {what}")).collect()
+        self.left_out.iter().map(|(what, count)| format!("left out ({count}): {what}")).collect()
     }
 
     /// Lines of what was made of something.

@@ -148,7 +148,7 @@ fn attributes(primitive: &Primitive) -> HashMap<Semantic, usize> {
 }
 
 fn triangles(mode: Mode, corners: &[u32]) -> std::result::Result<Vec<[u32; 3]>, String> {
-    if corners.len() < 3 || mode == Mode::Triangles && corners.len() % 3 != 0 {
+    if corners.len() < 3 || mode == Mode::Triangles && !corners.len().is_multiple_of(3) {
         return Err(format!("{} corners are no whole triangles", corners.len()));
     }
     Ok(match mode {

@@ -137,7 +137,7 @@ fn placed(
         None => DAffine3::from_scale_rotation_translation(scale, rotation, position),
     };
     let rest = outer.rest * own;
-    if !(rest.translation.abs().max_element() <= f64::from(POSITION_LIMIT_M)) {
+    if rest.translation.to_array().iter().any(|x| x.is_nan() || x.abs() > f64::from(POSITION_LIMIT_M)) {
         return Err(fail("it stands beyond the limit of 1e7 m"));
     }
     let Some(tracks) = tracks else {

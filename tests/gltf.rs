@@ -510,6 +510,8 @@ fn a_file_is_one_mesh_where_a_mesh_is_wanted() {
 fn scenes_load_by_their_ending() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, notes) = Scene::load_with_notes(&arrows().write(folder.path(), "A")).unwrap();
-    assert_eq!((scene.entities.len(), scene.meshes.len(), notes.left_out().len()), (4, 4, 0));
-    assert!(scene.entities.iter().all(|entity| entity.occludes && entity.receives && !entity.emits));
+    assert_eq!((scene.data.entities.len(), scene.data.meshes.len(), notes.left_out().len()), (4, 4, 0));
+    // A scene without light gets a sky, whose sun stands behind the entities of the file.
+    assert!(scene.entities[..4].iter().all(|entity| entity.occludes && entity.receives && !entity.emits));
+    assert!(scene.entities[4..].iter().all(|entity| entity.emits));
 }

@@ -293,8 +293,9 @@ fn the_scenes_of_the_documentation_load() {
         source.uniform.is_some(),
         source.gradient.is_some(),
         source.key.is_some(),
+        source.sun.is_some(),
         source.sky.is_some(),
         source.image.is_some(),
     ];
-    assert_eq!((parts, scene.data.entities[0].motion.len()), ([true; 5], 4));
+    assert_eq!((parts, scene.data.entities[0].motion.len()), ([true; 6], 5));
 }

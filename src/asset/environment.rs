@@ -1,4 +1,5 @@
-//! Distant light: radiance that depends on direction only, evaluated and projected to spherical harmonics.
+//! Distant light: radiance that depends on direction only, evaluated and projected to spherical harmonics. Its small bright discs
+//! are kept apart.
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -7,6 +8,7 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
+use super::disc::{Disc, Sun};
 use super::equirect::Equirect;
 pub use super::radiance::RADIANCE_LIMIT;
 use super::radiance::{key_zonal, one};
@@ -44,6 +46,9 @@ pub struct EnvironmentData {
     /// An equirectangular picture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image: Option<EnvironmentImage>,
+    /// A distant disc.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sun: Option<Sun>,
 }
 
 impl Default for EnvironmentData {
@@ -57,6 +62,7 @@ impl Default for EnvironmentData {
             key: None,
             sky: None,
             image: None,
+            sun: None,
         }
     }
 }
@@ -111,6 +117,10 @@ impl EnvironmentData {
             sky.check()?;
             self.within("sky", f64::from(sky.radiance) * f64::from(sky.sun.max(1.0)))?;
         }
+        if let Some(sun) = &self.sun {
+            sun.check()?;
+            self.within("sun", f64::from(sun.radiance.max_element()))?;
+        }
         self.image.as_ref().map_or(Ok(()), |image| amount("image scale", &[image.scale]))
     }
 
@@ -136,7 +146,12 @@ impl EnvironmentData {
 
     /// Whether no part is given.
     pub fn is_empty(&self) -> bool {
-        *self == EnvironmentData { strength: self.strength, turn_deg: self.turn_deg, ..EnvironmentData::default() }
+        self.has_at_most_a_sun() && self.sun.is_none()
+    }
+
+    fn has_at_most_a_sun(&self) -> bool {
+        let bare = EnvironmentData { strength: self.strength, turn_deg: self.turn_deg, ..EnvironmentData::default() };
+        *self == EnvironmentData { sun: self.sun.clone(), ..bare }
     }
 }
 
@@ -240,16 +255,34 @@ impl Environment {
         &self.source
     }
 
-    /// Whether the radiance is 0 in all directions.
+    /// Whether the radiance is 0 in all directions, [`Environment::discs`] left out.
     pub fn is_none(&self) -> bool {
-        self.source.is_empty() || self.source.strength == 0.0
+        self.source.has_at_most_a_sun() || self.source.strength == 0.0
+    }
+
+    /// Distant discs: the sun, that of the generated sky, and what was taken out of the picture ([`Equirect::peak`]). Scenes light by
+    /// them as by entities, so that they cast sharp shadows.
+    pub fn discs(&self) -> Vec<Disc> {
+        let EnvironmentData { sun, image, strength, .. } = &self.source;
+        let peak = self.picture.as_ref().zip(image.as_ref()).and_then(|(picture, image)| {
+            let scaled = |disc: Disc| Disc { radiance: disc.radiance * f64::from(image.scale), ..disc };
+            picture.peak().map(scaled)
+        });
+        let all = [sun.as_ref().map(Sun::disc), self.dome.as_ref().map(|dome| dome.disc()), peak];
+        let turn = self.turn();
+        let placed = |disc: Disc| Disc {
+            toward: (turn * disc.toward).normalize(),
+            radiance: disc.radiance * f64::from(*strength),
+            ..disc
+        };
+        all.into_iter().flatten().filter(|disc| disc.radiance != DVec3::ZERO).map(placed).collect()
     }
 
     fn turn(&self) -> DQuat {
         DQuat::from_rotation_y(f64::from(self.source.turn_deg).to_radians())
     }
 
-    /// Linear RGB radiance from the unit vector `direction`, not projected.
+    /// Linear RGB radiance from the unit vector `direction`, not projected, without [`Environment::discs`].
     pub fn radiance(&self, direction: DVec3) -> [f64; 3] {
         let direction = if self.source.turn_deg == 0.0 { direction } else { self.turn().inverse() * direction };
         let mut sum = DVec3::ZERO;
@@ -272,7 +305,7 @@ impl Environment {
         (sum * f64::from(self.source.strength)).to_array()
     }
 
-    /// Projection of each channel to `bands` bands, bands^2 coefficients. All parts but the sky are exact: closed forms, a
+    /// Projection of each channel to `bands` bands, bands^2 coefficients, without [`Environment::discs`]. All parts but the sky are exact: closed forms, a
     /// one-dimensional integral, and for pictures the integral over every texel.
     pub fn coefficients(&self, bands: usize) -> [Vec<f64>; 3] {
         let turn = Rotation::new(bands, self.turn());

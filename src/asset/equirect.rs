@@ -7,6 +7,8 @@ use glam::{DMat3, DQuat, DVec3};
 use image::{ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 
+use super::disc::Disc;
+use super::peak;
 use super::picture::linear_from_srgb;
 use crate::error::{Error, Result};
 use crate::sh::basis::{self, MAX_BANDS, MAX_COEFFICIENTS};
@@ -28,6 +30,7 @@ pub struct Equirect {
     width: usize,
     height: usize,
     texels: Vec<[f32; 3]>,
+    peak: Option<Disc>,
     /// Its projection to [`MAX_BANDS`] bands.
     coefficients: [Vec<f64>; 3],
 }
@@ -64,10 +67,28 @@ impl Equirect {
             width: rgb.width() as usize,
             height: rgb.height() as usize,
             texels,
+            peak: None,
             coefficients: Default::default(),
         };
+        picture.peak = picture.take_out_peak();
         picture.coefficients = picture.project();
         Ok(picture)
+    }
+
+    /// The sun of the picture, which its texels and coefficients no longer hold, if it had one: a spot of at most 8 degrees that sends at
+    /// least a twentieth of all light.
+    pub fn peak(&self) -> Option<Disc> {
+        self.peak
+    }
+
+    fn take_out_peak(&mut self) -> Option<Disc> {
+        let (width, height) = (self.width as f64, self.height as f64);
+        let direction = |x: usize, y: usize| {
+            let (across, ahead) = (TAU * ((x as f64 + 0.5) / width - 0.5)).sin_cos();
+            let (level, up) = (PI * (y as f64 + 0.5) / height).sin_cos();
+            DVec3::new(level * across, up, -level * ahead)
+        };
+        peak::take_out(&mut self.texels, [self.width, self.height], &direction)
     }
 
     /// The texel in `direction` (unit).

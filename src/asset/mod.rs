@@ -10,6 +10,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 
 pub mod decode;
+pub mod disc;
 pub mod edges;
 pub mod embedded;
 pub mod enclose;
@@ -21,6 +22,7 @@ pub mod grid;
 pub mod lettering;
 pub mod mesh;
 pub mod obj;
+mod peak;
 pub mod picture;
 mod radiance;
 pub mod sky;

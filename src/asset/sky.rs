@@ -1,5 +1,5 @@
 //! A generated sky: the daylight of Preetham, Shirley and Smits, *A Practical Analytic Model for Daylight*, SIGGRAPH 1999, over
-//! ground of one colour, with a soft sun.
+//! ground of one colour, with a sun.
 //!
 //! Luminance and chromaticity of the dome are the paper's equation 3 with the coefficients of its appendix A.2. The brightness is
 //! not physical: [`Sky::radiance`] and [`Sky::sun`] set the radiance of a white surface, so that no exposure has to be found.
@@ -9,15 +9,13 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::{DMat3, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::radiance::{RADIANCE_LIMIT, key_zonal, one};
+use super::disc::{Disc, SUN_DEG, check_angle};
+use super::radiance::{RADIANCE_LIMIT, one};
 use super::short;
 use crate::error::{Error, Result};
 use crate::sh::basis::{self, MAX_BANDS, MAX_COEFFICIENTS};
-use crate::sh::lobe;
 use crate::sh::quadrature::gauss_legendre;
 
-/// The sun's lobe is exp(SHARPNESS * (cos - 1)), which falls to half at 14 degrees. Four bands cannot represent a smaller sun.
-const SUN_SHARPNESS: f64 = 24.0;
 /// Nodes in the cosine and in azimuth of the rule that projects the dome. Doubling them changes every coefficient by less than
 /// 2e-4 of the first one.
 const RULE: (usize, usize) = (64, 128);
@@ -40,6 +38,8 @@ pub struct Sky {
     pub radiance: f32,
     /// Radiance of a white surface that faces the sun, under the sun alone, as a factor on `radiance`.
     pub sun: f32,
+    /// Angular diameter of the sun, 0.01 to 90 degrees.
+    pub sun_angle_deg: f32,
     /// Linear reflectance of the ground below the horizon, 0 to 1.
     pub ground: Vec3,
 }
@@ -52,6 +52,7 @@ impl Default for Sky {
             turbidity: 3.0,
             radiance: 0.35,
             sun: one(),
+            sun_angle_deg: SUN_DEG,
             ground: Vec3::splat(0.2),
         }
     }
@@ -75,6 +76,7 @@ impl Sky {
         range("turbidity", self.turbidity, 2.0, 10.0)?;
         range("radiance", self.radiance, 0.0, RADIANCE_LIMIT)?;
         range("sun", self.sun, 0.0, 1e6)?;
+        check_angle("sky sun_angle_deg", self.sun_angle_deg)?;
         self.ground.to_array().into_iter().try_for_each(|c| range("ground", c, 0.0, 1.0))
     }
 }
@@ -84,7 +86,9 @@ impl Sky {
 pub struct Dome {
     /// Direction to the sun, unit.
     sun: DVec3,
-    /// Linear RGB radiance in the middle of the sun's lobe.
+    /// Half the sun's angular diameter, radians.
+    sun_half_angle_rad: f64,
+    /// Linear RGB radiance of the sun's disc.
     sun_radiance: DVec3,
     /// Perez coefficients A to E of Y, x and y.
     perez: [[f64; 5]; 3],
@@ -112,6 +116,7 @@ impl Dome {
 
         let mut dome = Dome {
             sun,
+            sun_half_angle_rad: f64::from(sky.sun_angle_deg).to_radians() / 2.0,
             sun_radiance: DVec3::ZERO,
             perez,
             zenith,
@@ -130,7 +135,8 @@ impl Dome {
         let air_mass = 1.0 / (elevation.sin() + 0.50572 * (elevation.to_degrees() + 6.07995).powf(-1.6364));
         let depth = AIR_DEPTH + HAZE_DEPTH * (turbidity - 1.0);
         let hue = (-depth * air_mass).exp();
-        let facing = lobe_irradiance(SUN_SHARPNESS) / PI;
+        // Irradiance of a disc of radiance 1 on a surface that faces it, over pi.
+        let facing = dome.sun_half_angle_rad.sin().powi(2);
         dome.sun_radiance = hue / luminance(hue) * (f64::from(sky.sun * sky.radiance) / facing);
         let on_ground = white(&dome) + dome.sun_radiance * (facing * elevation.sin());
         dome.ground = sky.ground.as_dvec3() * on_ground;
@@ -138,10 +144,15 @@ impl Dome {
         dome
     }
 
-    /// Linear RGB radiance from the unit vector `direction`.
+    /// Linear RGB radiance from the unit vector `direction`, without the sun's disc.
     pub fn radiance(&self, direction: DVec3) -> DVec3 {
-        let base = if direction.y > 0.0 { self.above(direction) } else { self.ground };
-        base + self.sun_radiance * (SUN_SHARPNESS * (direction.dot(self.sun) - 1.0)).exp()
+        if direction.y > 0.0 { self.above(direction) } else { self.ground }
+    }
+
+    /// The sun's disc.
+    pub fn disc(&self) -> Disc {
+        let Dome { sun: toward, sun_half_angle_rad: half_angle_rad, sun_radiance: radiance, .. } = *self;
+        Disc { name: "sun of the sky", toward, half_angle_rad, radiance }
     }
 
     /// Direction to the sun, unit.
@@ -177,10 +188,6 @@ impl Dome {
             // The ground uses the mirrored rule, which is exact because the ground has one colour.
             add(direction * DVec3::new(1.0, -1.0, 1.0), self.ground * weight);
         }
-        let disc = lobe::zonal(MAX_BANDS, &key_zonal(MAX_BANDS, SUN_SHARPNESS), self.sun);
-        for (channel, amount) in sum.iter_mut().zip(self.sun_radiance.to_array()) {
-            channel.iter_mut().zip(&disc).for_each(|(c, d)| *c += amount * d);
-        }
         sum
     }
 }
@@ -198,11 +205,6 @@ fn rule() -> Vec<(DVec3, f64)> {
         }
     }
     out
-}
-
-/// Irradiance of exp(s (cos - 1)) on a surface that faces its middle: 2 pi times the integral of c exp(s (c - 1)) over 0 to 1.
-fn lobe_irradiance(s: f64) -> f64 {
-    TAU * (1.0 / s - (1.0 - (-s).exp()) / (s * s))
 }
 
 /// Equation 3 of the paper: (1 + A exp(B / cos theta)) (1 + C exp(D gamma) + E cos^2 gamma).

@@ -229,7 +229,7 @@ impl<'m> Scope<'m> {
         let EntityBounds { centre, radius_m, .. } = self.scene.entities[occluder];
         let to_light = DVec3::new(x.into(), y.into(), z.into()) - self.centre;
         let distance = to_light.length().max(1e-15);
-        let (toward, radius) = (to_light / distance, self.radius_m + self.slack * distance);
+        let (toward, radius) = (to_light / distance, self.radius_m + self.slack * (centre - self.centre).length());
         let width = |way: f64| radius + (f64::from(light_radius) - radius) * (way / distance).clamp(0.0, 1.0);
         let along = (centre - self.centre).dot(toward);
         let widest = width(along - radius_m).max(width(along + radius_m)) / radius_m;

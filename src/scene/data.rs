@@ -15,6 +15,7 @@
 //! uniform = [0.02, 0.02, 0.03]
 //! gradient = { radiance = [0.1, 0.12, 0.16] }                              # brighter towards the zenith
 //! key = { radiance = [3, 3, 2], toward = [1, 2, 1], sharpness = 8 }        # a soft directional light
+//! sun = { toward = [1, 2, 1], angle_deg = 0.53, radiance = [9e4, 8e4, 7e4] } # a distant disc, whose shadows are sharp
 //! sky = { sun_elevation_deg = 40, turbidity = 3, radiance = 0.35 }         # generated daylight; sky = {} takes the defaults
 //! image = { file = "studio.hdr", scale = 0.5 }                             # equirectangular HDR, EXR or PNG
 //! [[mesh]]

@@ -8,6 +8,7 @@ pub mod gltf;
 pub mod keys;
 pub mod light;
 pub mod motion;
+mod sun;
 pub mod values;
 
 use std::path::Path;
@@ -38,8 +39,10 @@ pub struct Scene {
     pub data: Data,
     /// Meshes in the file's order.
     pub meshes: Vec<Arc<Mesh>>,
-    /// Entities in the file's order, with their switches resolved. [`Scene::at`] gives their placements.
+    /// Entities in the file's order, with their switches resolved, and then suns. [`Scene::at`] gives their placements.
     pub entities: Vec<Entity>,
+    /// Where the suns stand, which are the last of the entities and do not stand in the file.
+    suns: Vec<Placement>,
     /// Distant light.
     pub environment: Environment,
 }
@@ -93,7 +96,7 @@ impl Scene {
         };
         let entities = data.entities.iter().enumerate().map(entity).collect::<Result<Vec<_>>>()?;
         let environment = Environment::new(&data.environment, &read_named).map_err(|e| e.context(path.display()))?;
-        Ok((Self { data, meshes, entities, environment }, notes))
+        Ok((Self::assemble(data, meshes, entities, environment), notes))
     }
 
     fn load_toml(path: &Path) -> Result<Self> {
@@ -141,12 +144,18 @@ impl Scene {
         let entities = data.entities.iter().enumerate().map(entity).collect::<Result<Vec<_>>>()?;
         let environment =
             Environment::new(&data.environment, &read).map_err(|e| Error::input_at(path, lines.environment(), e))?;
-        Ok(Self { data, meshes, entities, environment })
+        Ok(Self::assemble(data, meshes, entities, environment))
+    }
+
+    fn assemble(data: Data, meshes: Vec<Arc<Mesh>>, entities: Vec<Entity>, environment: Environment) -> Self {
+        let mut scene = Self { data, meshes, entities, suns: Vec::new(), environment };
+        scene.place_suns();
+        scene
     }
 
     /// Placements of all entities at `time_s` seconds, in order. They depend on the time alone, not on earlier frames.
     pub fn at(&self, time_s: f64) -> Vec<Placement> {
-        self.data.entities.iter().map(|e| e.at(time_s)).collect()
+        self.data.entities.iter().map(|e| e.at(time_s)).chain(self.suns.iter().copied()).collect()
     }
 
     /// Replaces the data of an entity; its mesh stays the same.
@@ -163,6 +172,7 @@ impl Scene {
     pub fn set_environment(&mut self, source: &EnvironmentData) -> Result<()> {
         self.environment = self.environment.with(source)?;
         self.data.environment = source.clone();
+        self.place_suns();
         Ok(())
     }
 

@@ -111,7 +111,7 @@ impl Editor {
     /// The selected entity if it emits; all emitting entities if nothing is selected.
     fn lights(&self) -> Vec<usize> {
         let concerned = |i: &usize| self.scene.entities[*i].emits && self.selection.is_none_or(|s| s == *i);
-        (0..self.scene.entities.len()).filter(concerned).collect()
+        (0..self.scene.data.entities.len()).filter(concerned).collect()
     }
 
     fn set_light(&mut self, ev: f32) -> Effect {

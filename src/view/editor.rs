@@ -248,7 +248,8 @@ impl Editor {
 
     /// Entities that a step moves: the selected one; else all that occlude or emit; if none does, all.
     pub(super) fn affected_of(&self, selection: Option<usize>) -> impl Iterator<Item = usize> {
-        let entities = &self.scene.entities;
+        // Suns stand behind the entities of the file, and nobody moves them.
+        let entities = &self.scene.entities[..self.scene.data.entities.len()];
         let acts = |i: &usize| entities[*i].occludes || entities[*i].emits;
         let any = (0..entities.len()).any(|i| acts(&i));
         let chosen: Vec<usize> = match selection {
@@ -278,7 +279,7 @@ impl Editor {
     }
 
     fn cycle(&mut self, by: isize) -> Effect {
-        let count = self.scene.entities.len();
+        let count = self.scene.data.entities.len();
         if count == 0 {
             return Effect::default();
         }

@@ -65,7 +65,7 @@ impl Editor {
             return None;
         }
         let placements = self.placements();
-        let mut near: Vec<(f64, usize)> = (0..placements.len())
+        let mut near: Vec<(f64, usize)> = (0..self.scene.data.entities.len())
             .filter_map(|entity| {
                 let (centre, radius_m) = self.sphere(entity, &placements[entity]);
                 Some((ray.enters(centre, radius_m)?, entity))

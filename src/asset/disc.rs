@@ -1,0 +1,88 @@
+//! Distant discs of light: suns.
+
+use super::radiance::RADIANCE_LIMIT;
+use super::short;
+use crate::error::{Error, Result};
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// The sun's angular diameter seen from the earth, degrees.
+pub const SUN_DEG: f32 = 0.53;
+/// Angular diameters that a disc may have, degrees.
+const ANGLES_DEG: (f32, f32) = (0.01, 90.0);
+
+/// A distant disc of one radiance, as data.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sun {
+    /// Direction towards its middle, of any length but 0.
+    pub toward: Vec3,
+    /// Angular diameter, 0.01 to 90 degrees.
+    #[serde(default = "sun_deg")]
+    pub angle_deg: f32,
+    /// Linear RGB radiance, W m^-2 sr^-1. A white surface that faces a disc of diameter `a` shines with radiance * sin^2(a / 2).
+    pub radiance: Vec3,
+}
+
+/// [`SUN_DEG`], for serde.
+pub(super) fn sun_deg() -> f32 {
+    SUN_DEG
+}
+
+impl Sun {
+    /// # Errors
+    /// [`Error::Input`], one line that names the key out of range.
+    pub(super) fn check(&self) -> Result<()> {
+        check_angle("sun angle_deg", self.angle_deg)?;
+        if let Some(bad) = self.radiance.to_array().iter().find(|c| !(0.0..=RADIANCE_LIMIT).contains(*c)) {
+            let (bad, limit) = (short(*bad), short(RADIANCE_LIMIT));
+            return Err(Error::Input(format!("environment sun radiance {bad} is not within 0 to {limit}")));
+        }
+        if self.toward.as_dvec3().try_normalize().is_none() {
+            return Err(Error::Input("environment sun has no direction towards it".into()));
+        }
+        Ok(())
+    }
+
+    /// The disc that it is.
+    pub fn disc(&self) -> Disc {
+        Disc {
+            name: "sun",
+            toward: self.toward.as_dvec3().normalize(),
+            half_angle_rad: f64::from(self.angle_deg).to_radians() / 2.0,
+            radiance: self.radiance.as_dvec3(),
+        }
+    }
+}
+
+/// Refuses an angular diameter out of range.
+pub(super) fn check_angle(what: &str, angle_deg: f32) -> Result<()> {
+    let (low, high) = ANGLES_DEG;
+    if (low..=high).contains(&angle_deg) {
+        return Ok(());
+    }
+    let angle = short(angle_deg);
+    Err(Error::Input(format!("environment {what} {angle} is not within {low} to {high}")))
+}
+
+/// A distant disc of one radiance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disc {
+    /// What people call it.
+    pub name: &'static str,
+    /// Direction towards its middle, unit.
+    pub toward: DVec3,
+    /// Half its angular diameter, radians.
+    pub half_angle_rad: f64,
+    /// Linear RGB radiance, W m^-2 sr^-1.
+    pub radiance: DVec3,
+}
+
+impl Disc {
+    /// Solid angle in steradians of a disc of half the diameter `half_angle_rad`.
+    pub fn solid_angle(half_angle_rad: f64) -> f64 {
+        // 1 - cos a = 2 sin^2(a / 2) keeps its digits for small discs.
+        2.0 * TAU * (half_angle_rad / 2.0).sin().powi(2)
+    }
+}

@@ -82,14 +82,30 @@ const TRIALS: &[(&str, &str)] = &[
     ("radiance 0", "position = [0, 1, 0]; position = [1, 1, 0]\nemission = [0, 0, 0]\nemits = true"),
     ("radiance 10^-6", "position = [0, 1, 0]; position = [1, 1, 0]\nemission = [1e-6, 1e-6, 1e-6]"),
     ("radiance 10^6", "position = [0, 1, 0]; position = [1, 1, 0]\nemission = [1e6, 1e6, 1e6]"),
+    (
+        "a light of almost no size",
+        "position = [0, 1, 0]; position = [1, 2, 0]\nscale = 1e-7\nemission = [1e14, 1e14, 1e14]",
+    ),
+    ("a light that touches the floor", "position = [0, 1, 0]; position = [1, 0.5, 0]\nemission = [5, 5, 5]"),
+    ("a light half in the floor", "position = [0, 1, 0]; position = [1, 0, 0]\nemission = [5, 5, 5]"),
+    ("a light that touches an occluder", "position = [0, 1, 0]; position = [1, 1, 0]\nemission = [5, 5, 5]"),
 ];
 
-/// A floor of `cells` x `cells`, a ball and a two-coloured ring to place, and a sky.
+/// Suns over a floor and a ball, and what is odd about each.
+const SUNS: &[(&str, &str)] = &[
+    ("a sun of 0.01 degrees", "toward = [1, 2, 0], angle_deg = 0.01, radiance = [1e8, 1e8, 1e8]"),
+    ("a sun of 90 degrees", "toward = [1, 2, 0], angle_deg = 90, radiance = [1, 1, 1]"),
+    ("a sun in the horizon", "toward = [1, 0, 0], angle_deg = 2, radiance = [1000, 1000, 1000]"),
+    ("a sun below the floor", "toward = [0, -1, 0], angle_deg = 2, radiance = [1000, 1000, 1000]"),
+];
+
+/// A floor of `cells` x `cells`, two balls and a two-coloured ring to place, and a sky.
 pub(super) fn scene(cells: u32, sky: &str, entities: &str) -> Result<Scene> {
     let text = format!(
         "[camera]\neye = [0, 3, 6]\ntarget = [0, 0, 0]\n{sky}\n\
          [[mesh]]\nname = \"floor\"\nplane = {{ size_m = 4, cells = {cells} }}\n\
          [[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.5, subdivisions = 3 }}\n\
+         [[mesh]]\nname = \"lamp\"\nsphere = {{ radius_m = 0.4, subdivisions = 2 }}\n\
          [[mesh]]\nname = \"ring\"\ntorus_two_colour = {{ major_m = 0.4, minor_m = 0.1, segments = 24, sides = 12 }}\n{entities}"
     );
     Scene::parse(&text, Path::new("assets/scenes/trial.toml"), &embedded::read)
@@ -115,6 +131,25 @@ pub fn cases(longest: usize) -> Result<Vec<TrialCase>> {
         let balls: String = places.split(';').map(|place| entity("ball", place.trim())).collect();
         add((*name).to_owned(), scene(40, GRADIENT, &format!("{FLOOR}{balls}"))?);
     }
+    for (name, sun) in SUNS {
+        let sky = format!("[environment]\nsun = {{ {sun} }}");
+        let ball = entity("ball", "position = [0, 0.7, 0]");
+        add((*name).to_owned(), scene(40, &sky, &format!("{FLOOR}{ball}"))?);
+    }
+    let glows = "emission = [9, 9, 9]";
+    for (name, keeps) in [("one triangle", 1), ("an open mesh", 640)] {
+        let between = entity("ball", "position = [0, 0.7, 0]");
+        let light = |mesh| entity(mesh, &format!("position = [0.6, 1.8, 0.2]\n{glows}"));
+        // As what blocks, and as what shines.
+        for (role, entities) in [("occludes", format!("{between}{}", light("lamp"))), ("shines", light("ball"))] {
+            let mut scene = scene(20, "", &format!("{FLOOR}{entities}"))?;
+            change(&mut scene, 1, |mesh| mesh.triangles.truncate(keeps))?;
+            add(format!("{name} {role}"), scene);
+        }
+    }
+    for count in [100, 1000].into_iter().filter(|count| *count <= longest) {
+        add(format!("{count} lights"), many_lights(count)?);
+    }
     add("receivers on centre, axes, edges, corners, shells, inside, far".into(), marks()?);
     for (name, pattern, emission) in
         [("0", 1.0, 0.0), ("10^-6", 1.0, 1e-6), ("10^6", 1.0, 1e6), ("10^6 by its colours", 1e6, 1.0)]
@@ -122,7 +157,7 @@ pub fn cases(longest: usize) -> Result<Vec<TrialCase>> {
         let ring = format!("position = [0.3, 1, 0]\nemission = [{emission}, {emission}, {emission}]\nemits = true");
         let lit = entity("ball", "position = [-0.8, 0.6, 0]");
         let mut scene = scene(20, "", &format!("{FLOOR}{lit}{}", entity("ring", &ring)))?;
-        change(&mut scene, 2, |mesh| {
+        change(&mut scene, 3, |mesh| {
             mesh.colors.iter_mut().flatten().for_each(|color| *color *= pattern);
         })?;
         add(format!("two colours of radiance {name}"), scene);
@@ -179,6 +214,18 @@ fn marks() -> Result<Scene> {
         }
     }
     scene(2, GRADIENT, &entities)
+}
+
+/// A coarse floor and a ball under many small lights.
+fn many_lights(count: usize) -> Result<Scene> {
+    let mut rng = fastrand::Rng::with_seed(8);
+    let mut entities = format!("{FLOOR}{}", entity("ball", "position = [0, 0.6, 0]\nreceives = false"));
+    for _ in 0..count {
+        let (x, y, z) = (4.0 * rng.f64() - 2.0, 1.5 + 2.0 * rng.f64(), 4.0 * rng.f64() - 2.0);
+        let light = format!("position = [{x}, {y}, {z}]\nscale = 0.05\nemission = [1, 1, 1]\nreceives = false");
+        entities += &entity("lamp", &light);
+    }
+    scene(6, "", &entities)
 }
 
 /// A coarse floor under many balls that are not lit.

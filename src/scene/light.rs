@@ -50,6 +50,14 @@ impl LightForm {
     }
 }
 
+/// Every light of a scene by its name, and how it is computed: entities that emit, and then the distant light.
+pub fn listed(scene: &Scene, lights: Lights) -> Vec<(&str, LightForm)> {
+    let local =
+        emitters(scene).map(|entity| (scene.entities[entity].name.as_str(), LightForm::of(scene, entity, lights)));
+    let distant = (!scene.environment.is_none()).then_some(("sky", LightForm::Harmonics));
+    local.chain(distant).collect()
+}
+
 /// Whether any light of a scene is sharp.
 pub fn has_sharp(scene: &Scene, lights: Lights) -> bool {
     emitters(scene).any(|entity| LightForm::of(scene, entity, lights).is_sharp())

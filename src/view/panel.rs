@@ -8,6 +8,7 @@ use super::notes;
 use super::status::{MARGIN, Status, grouped};
 use super::task::TaskProgress;
 use crate::merge::variant::VARIANTS;
+use crate::scene::light;
 use egui::collapsing_header::CollapsingState;
 use egui::{Align2, Color32, Context, Id, Pos2, RichText, Stroke, Ui, pos2, vec2};
 
@@ -147,9 +148,19 @@ fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec
     if let Some((merged, all)) = status.merged {
         ui.label(format!("clusters merged again {} of {}", grouped(merged as u64), grouped(all as u64)));
     }
+    lights(ui, editor, status);
     variants(ui, editor, status, commands);
     ui.separator();
     sliders(ui, editor, commands);
+}
+
+/// How many lights are computed one way and the other; each with its name where the pointer rests.
+fn lights(ui: &mut Ui, editor: &Editor, status: &Status<'_>) {
+    let listed = light::listed(editor.scene(), status.lights);
+    let sharp = listed.iter().filter(|(_, form)| form.is_sharp()).count();
+    let names: Vec<String> = listed.iter().map(|(name, form)| format!("{name}: {}", form.name())).collect();
+    let label = ui.label(format!("lights: {sharp} sharp, {} in bands", listed.len() - sharp));
+    label.on_hover_text(names.join("\n"));
 }
 
 fn variants(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec<Command>) {
@@ -227,6 +238,7 @@ mod tests {
             counts: None,
             merged: None,
             vertices: 0,
+            lights: Default::default(),
             variant: None,
             bake: None,
             rays: None,

@@ -3,6 +3,7 @@
 use super::task::TaskProgress;
 use crate::gpu::Timing;
 use crate::lists::gather::Counts;
+use crate::scene::Lights;
 use egui::Color32;
 use std::collections::VecDeque;
 
@@ -40,6 +41,8 @@ pub struct Status<'s> {
     pub merged: Option<(usize, usize)>,
     /// Number of lit vertices.
     pub vertices: usize,
+    /// Which lights are sharp.
+    pub lights: Lights,
     /// Merge variant in use; `None` before the first frame of a scene.
     pub variant: Option<&'s str>,
     /// Progress of the background bake.

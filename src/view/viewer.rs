@@ -383,6 +383,7 @@ impl Viewer {
             counts: self.counts.as_ref().map(|(_, counts)| *counts),
             merged: self.frame.as_ref().map(|f| (f.merged().merged_clusters, f.merged().clusters)),
             vertices: self.frame.as_ref().map_or(0, Frame::receiver_vertex_count),
+            lights: self.setup.frame.lights,
             variant: self.frame.as_ref().map(|frame| frame.variant().name),
             bake: self.bake.as_ref().map(BackgroundTask::progress),
             rays: self.rays.as_ref().filter(|rays| rays.is_running()).map(BackgroundTask::progress),

@@ -1,5 +1,5 @@
 #version 460
-// Transforms a corner of a grid, which is drawn as one parallelogram.
+// Transforms a corner of a grid, which is drawn as one parallelogram, or of a block of its cells.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec2 cell; // in cells from the first
 layout(location = 0) out vec2 place;
@@ -13,8 +13,34 @@ layout(push_constant) uniform Push {
     uvec2 cells;
 } push;
 
+#if BLOCK_CELLS > 0
+// A block is thrown away unless a shadow's edge comes near one of its vertices.
+layout(binding = 0) uniform utextureBuffer corners;  // vertices of each cell; see asset::grid
+layout(binding = 1) uniform textureBuffer radiosity; // w: whether an edge is near
+
+bool has_edge(uint block) {
+    uint row = (push.cells.x + BLOCK_CELLS - 1) / BLOCK_CELLS;
+    uvec2 low = BLOCK_CELLS * uvec2(block % row, block / row);
+    float most = 0.0;
+    for (uint i = 0; i < (BLOCK_CELLS + 1) * (BLOCK_CELLS + 1); i++) {
+        uvec2 vertex = min(low + uvec2(i % (BLOCK_CELLS + 1), i / (BLOCK_CELLS + 1)), push.cells);
+        uvec2 cell = min(vertex, push.cells - 1);
+        uvec4 corner = texelFetch(corners, int(cell.y * push.cells.x + cell.x));
+        uvec2 near = vertex.y > cell.y ? corner.zw : corner.xy;
+        uint index = (vertex.x > cell.x ? near.y : near.x) & 0x7fffffffu;
+        most = max(most, texelFetch(radiosity, int(push.first + index)).w);
+    }
+    return most > 0.0;
+}
+#endif
+
 void main() {
     place = cell;
     at = position;
     gl_Position = push.clip_from_object * vec4(position, 1.0);
+#if BLOCK_CELLS > 0
+    if (!has_edge(uint(gl_VertexIndex) / 4)) {
+        gl_Position = vec4(0.0, 0.0, 0.0, 1.0);
+    }
+#endif
 }

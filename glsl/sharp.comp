@@ -44,6 +44,7 @@ uint self_cell(uint i) {
 #include "self_frame.glsl"
 #include "self_visibility.glsl"
 #endif
+#define EDGES
 #include "sharp_light.glsl"
 
 void main() {
@@ -60,6 +61,7 @@ void main() {
     vec3 normal = vertex_quad(at + 1).xyz;
     surface.normal = to_world(receiver, normal);
     surface.origin = receiver.centre.xyz;
+    surface.step = receiver.sharp.z;
 #if SELF
     surface.self_first = cluster.self_first == NONE ? NONE : cluster.self_first + v * ((SELF_SIDE - 1) * (SELF_SIDE - 1));
     mat3 frame = self_frame(normal);
@@ -69,5 +71,6 @@ void main() {
     if (cluster.sharp_count > 0) {
         sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo.rgb;
     }
+    sum.w = edge ? 1.0 : 0.0;
     radiosity[cluster.radiosity_first + v] = sum;
 }

@@ -1,10 +1,19 @@
 // Light that a surface receives from sharp lights, past what is listed before each of them. The twin is src/sharp/twin.rs.
 #include "sub_light.glsl"
 
+#ifdef EDGES
+// Whether a shadow's edge lies no farther from the surface's point than the next vertex, and is so narrow that the light on vertices around
+// it does not carry it.
+bool edge = false;
+#endif
+
 struct Surface {
     vec3 position; // world axes, metres from `origin`
     vec3 normal;   // world
     vec3 origin;   // world
+#ifdef EDGES
+    float step;    // distance between neighbouring vertices of a grid, metres; 0 on other meshes
+#endif
 #if SELF
     uint self_first;  // word of its self-visibility, or NONE
     mat3 self_frame;  // about the normal, world
@@ -42,7 +51,14 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         vec2 p = part_place(block, k);
         float reach = light.distance * (along[k].x - light.sine * sqrt(1.0 - dot(p, p)));
         float limit = before ? reach * occluder.centre.w : 1e30;
-        through[k] = 1.0 - blocked(found[k].x, found[k].y - offset[k], limit, tangent);
+        float away = found[k].y - offset[k];
+        through[k] = 1.0 - blocked(found[k].x, away, limit, tangent);
+#ifdef EDGES
+        float step = surface.step * occluder.centre.w;
+        float penumbra = max(away, NEAREST) * tangent;
+        bool stands = before && away > -NEAREST - step && away < limit + NEAREST + step;
+        edge = edge || stands && abs(found[k].x) < penumbra + EDGE_REACH * step && penumbra < EDGE_STEPS * step;
+#endif
     }
     return through;
 }

@@ -69,6 +69,13 @@ fn scenes() -> Vec<(&'static str, Scene, f64)> {
             f64::INFINITY,
         ),
         (
+            "a sun",
+            parse(&format!(
+                "{HEAD}{ball}[environment]\nsun = {{ toward = [1, 1.4, 0.5], angle_deg = 3, radiance = [900, 800, 700] }}\n"
+            )),
+            0.01,
+        ),
+        (
             "a ring that glows",
             parse(&format!(
                 "{HEAD}{ball}{}",
@@ -161,4 +168,64 @@ fn occluders_that_all_rays_pass_by_stand_on_no_list_and_change_nothing() {
     report(&format!("{} of {} lookups are passed by, {} apart", counts.passed_by, counts.considered, counts.apart));
     assert!(counts.passed_by > 0);
     assert_eq!(host, device, "what is passed by blocks exactly nothing");
+}
+
+/// A switch that moves nothing still changes what pixels show, and back.
+#[test]
+fn pixels_follow_switches_of_entities() {
+    let Some(gpu) = gpu() else { return };
+    let (_, scene, _) = scenes().swap_remove(0);
+    let options =
+        Options { shading: Some(Shading::Pixel), size: [96, 72], antialias: Antialias::None, ..check::sharp_options() };
+    let new = |scene: &Scene| Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
+    let show = |frame: &mut Frame| {
+        frame.render(&scene.at(0.0), Some(4.0)).unwrap();
+        frame.picture()
+    };
+    let mut bare = scene.clone();
+    bare.entities[1].occludes = false;
+    let mut frame = new(&scene);
+    let with = show(&mut frame);
+    assert!(frame.covers(&bare));
+    frame.set_scene(&bare).unwrap();
+    let without = show(&mut frame);
+    frame.set_scene(&scene).unwrap();
+    let again = show(&mut frame);
+    assert!(with != without && with == again);
+    assert!(without == show(&mut new(&bare)), "a frame that was made for the other scene shows something else");
+}
+
+/// A frame without sharp lights lacks the pass that a scene with one needs.
+#[test]
+fn a_frame_covers_no_scene_whose_sharp_lights_have_no_pass() {
+    let Some(gpu) = gpu() else { return };
+    let (_, scene, _) = scenes().swap_remove(0);
+    let mut dark = scene.clone();
+    dark.entities[2].emits = false;
+    let options = check::sharp_options();
+    let frame = Frame::new(&gpu.baker(), &Cache::new(None), &dark, options, &|_, _, _| ()).unwrap();
+    assert!(frame.covers(&dark) && !frame.covers(&scene));
+}
+
+/// A sun's light on a floor that nothing shades, against its closed form: radiance * sin^2(a / 2) * cosine of a white surface.
+#[test]
+fn a_sun_lights_as_its_closed_form() {
+    let Some(gpu) = gpu() else { return };
+    for (angle_deg, toward) in
+        [(0.01, [0.0, 1.0, 0.0]), (0.53, [1.0, 1.0, 0.0]), (3.0, [0.0, 1.0, -2.0]), (40.0, [0.0, 1.0, 0.0])]
+    {
+        let scene = parse(&format!(
+            "{HEAD}albedo = [1, 1, 1]\n[environment]\nsun = {{ toward = {toward:?}, angle_deg = {angle_deg:?}, radiance = [4, 2, 1] }}\n"
+        ));
+        let mut frame =
+            Frame::new(&gpu.baker(), &Cache::new(None), &scene, check::sharp_options(), &|_, _, _| ()).unwrap();
+        frame.render(&scene.at(0.0), None).unwrap();
+        let [x, y, z] = toward;
+        let cosine = y / f64::sqrt(x * x + y * y + z * z);
+        let wanted = 4.0 * (f64::to_radians(angle_deg) / 2.0).sin().powi(2) * cosine;
+        for [red, green, blue] in frame.radiosity(0).unwrap().into_iter().map(|rgb| rgb.map(f64::from)) {
+            assert!((red / wanted - 1.0).abs() < 2e-3, "{angle_deg} degrees: {red} for {wanted}");
+            assert!((red - 2.0 * green).abs() < 1e-5 * red && (red - 4.0 * blue).abs() < 1e-5 * red);
+        }
+    }
 }

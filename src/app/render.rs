@@ -10,7 +10,7 @@ use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame, PictureMemory};
 use crate::gpu::Timing;
-use crate::scene::{LightForm, Placement, Scene, values::NUMBER_LIMIT};
+use crate::scene::{Placement, Scene, light, values::NUMBER_LIMIT};
 use crate::text;
 use crate::truth::{self, ErrorMap, error_map, raycast::RayCast};
 use clap::Args;
@@ -233,8 +233,12 @@ impl<'a> Rendering<'a> {
         let (frame, options) = (&self.frame, &self.options);
         let pictures = self.timings.iter().map(|(time_s, wall, passes)| {
             let named = |t: &Timing| (format!("{}_ms", t.pass.replace(' ', "_")), json!(t.milliseconds));
+            let evaluated = frame.pixels_evaluated(passes);
             let passes: serde_json::Map<_, _> = passes.iter().map(named).collect();
-            json!({ "time_s": time_s, "frame_ms": wall.as_secs_f64() * 1e3, "passes": passes })
+            json!({
+                "time_s": time_s, "frame_ms": wall.as_secs_f64() * 1e3, "passes": passes,
+                "pixels_evaluated": evaluated,
+            })
         });
         json!({
             "origin": self.context.origin(self.global),
@@ -262,11 +266,8 @@ impl<'a> Rendering<'a> {
 
     /// Every light, and how it is computed.
     fn lights(&self) -> Vec<serde_json::Value> {
-        let entities = self.scene.entities.iter().enumerate().filter(|(_, entity)| entity.emits);
-        let form = |index| LightForm::of(self.scene, index, self.options.lights).name();
-        let local = entities.map(|(index, entity)| json!({ "entity": entity.name, "form": form(index) }));
-        let distant = (!self.scene.environment.is_none()).then(|| json!({ "form": LightForm::Harmonics.name() }));
-        local.chain(distant.into_iter()).collect()
+        let listed = light::listed(self.scene, self.options.lights);
+        listed.into_iter().map(|(name, form)| json!({ "name": name, "form": form.name() })).collect()
     }
 
     /// One line for people.

@@ -122,7 +122,7 @@ impl Capture {
         let [vertex, fragment] = Self::rows(radiance);
         let (vertex, fragment) = (library.shader(&vertex)?, library.shader(&fragment)?);
         let pipeline = |cull| {
-            let state = GraphicsState { color, depth, samples: 1, cull, keeps_largest: false };
+            let state = GraphicsState { color, depth, samples: 1, cull, keeps_largest: false, nearer_steps: 0.0 };
             GraphicsPipeline::new(device, "capture", &vertex, &fragment, state)
         };
         Ok(Capture {

@@ -177,6 +177,7 @@ impl Silhouette {
             samples: 1,
             cull: vk::CullModeFlags::NONE,
             keeps_largest: true,
+            nearer_steps: 0.0,
         };
         let (vertex, fragment) = (library.shader(&vertex)?, library.shader(&fragment)?);
         let reduce = |name, row| ComputePipeline::new(device, name, &library.shader(row)?, &[]);

@@ -132,6 +132,7 @@ impl ShadowMaps {
             samples: 1,
             cull: vk::CullModeFlags::NONE,
             keeps_largest: false,
+            nearer_steps: 0.0,
         };
         let mesh = |mesh: &Arc<Mesh>| {
             let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.to_array()).collect();

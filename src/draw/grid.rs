@@ -4,6 +4,7 @@
 //! small triangles than for a large one of the same area. The picture is that of the triangles, except for rounding.
 
 use crate::asset::grid::{Grid, UPWARDS};
+use crate::draw::patches::{BLOCK_CELLS, Patches};
 use crate::draw::{DrawnEntity, DrawnViewport};
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
@@ -16,6 +17,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 const QUADS: vk::Format = vk::Format::R32G32B32A32_UINT;
+/// How much nearer patches are drawn than the grid that they lie on, in steps of depth: 2e-6 of the distance. Rounding of two triangles
+/// in one plane differs by less.
+const NEARER_STEPS: f32 = 32.0;
 const FLOATS: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// A grid on the device.
@@ -25,10 +29,15 @@ pub struct DrawnGrid {
     indices: Buffer,
     corners: Buffer,
     cells: [u32; 2],
+    /// [`Patches`]: positions, places and indices.
+    patches: [Buffer; 3],
+    patch_indices: u32,
     /// Unit normal.
     normal: Vec3,
     /// Diagonal of a cell at most, metres.
     pub reach_m: f32,
+    /// Longest side of a cell, metres.
+    pub step_m: f32,
 }
 
 impl DrawnGrid {
@@ -51,14 +60,22 @@ impl DrawnGrid {
             .iter()
             .map(|cell| cell.map(|vertex| place[(vertex & !UPWARDS) as usize] | vertex & UPWARDS))
             .collect();
+        let patches = Patches::new(grid, corner);
         Ok(DrawnGrid {
             positions: Buffer::with_data(device, "grid positions", &positions)?,
             places: Buffer::with_data(device, "grid places", &places)?,
             indices: Buffer::with_data(device, "grid indices", &[[0_u32, 1, 2], [2, 1, 3]])?,
             corners: Buffer::with_data(device, "grid corners", &corners)?,
             cells: grid.cells,
+            patches: [
+                Buffer::with_data(device, "grid patch positions", &patches.positions)?,
+                Buffer::with_data(device, "grid patch places", &patches.places)?,
+                Buffer::with_data(device, "grid patch indices", &patches.indices)?,
+            ],
+            patch_indices: 3 * patches.indices.len() as u32,
             normal,
             reach_m: u.length() / columns + v.length() / rows,
+            step_m: (u.length() / columns).max(v.length() / rows),
         })
     }
 
@@ -69,7 +86,8 @@ impl DrawnGrid {
 
     /// Device memory, bytes.
     pub fn size_bytes(&self) -> u64 {
-        [&self.positions, &self.places, &self.indices, &self.corners].map(|buffer| buffer.size_bytes).iter().sum()
+        let own = [&self.positions, &self.places, &self.indices, &self.corners];
+        own.into_iter().chain(&self.patches).map(|buffer| buffer.size_bytes).sum()
     }
 }
 
@@ -88,6 +106,7 @@ struct Push {
 }
 
 /// What grids read whose pixels evaluate sharp lights themselves.
+#[derive(Clone, Copy)]
 pub struct PixelLight<'d> {
     /// [`crate::layout::Entity`] of every entity.
     pub entities: &'d Buffer,
@@ -123,8 +142,10 @@ impl DrawGrid {
         let vertex = library.shader(&ShaderPermutation::new("grid.vert", 4))?;
         let fragment = library.shader(&Self::row(display, None))?;
         let pixel = |sharp| -> Result<GraphicsPipeline> {
+            let vertex = library.shader(&ShaderPermutation::new("grid.vert", 4).define("BLOCK_CELLS", BLOCK_CELLS))?;
             let fragment = library.shader(&Self::row(display, Some(sharp)))?;
-            GraphicsPipeline::new(device, "draw grid pixels", &vertex, &fragment, state)
+            let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..state };
+            GraphicsPipeline::new(device, "draw grid pixels", &vertex, &fragment, nearer)
         };
         Ok(DrawGrid {
             pipeline: GraphicsPipeline::new(device, "draw grid", &vertex, &fragment, state)?,
@@ -150,23 +171,54 @@ impl DrawGrid {
         viewport: &DrawnViewport<'r>,
         white: f32,
     ) -> Result<()> {
-        let pixel = self.pixel.as_ref().zip(viewport.pixel.as_ref()).zip(entity.cluster_first);
-        let pipeline = pixel.map_or(&self.pipeline, |((pipeline, _), _)| pipeline);
-        drawing.bind(pipeline, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
-        let texel = |buffer: &'r Buffer, format| TexelView::new(buffer, format).map(Bind::Texel);
-        let mut resources = vec![texel(&grid.corners, QUADS)?, texel(viewport.radiosity, FLOATS)?];
-        if let Some(((_, light), _)) = &pixel {
-            let [nodes, cells] = light.silhouettes;
-            resources.extend([
-                texel(light.entities, FLOATS)?,
-                texel(nodes, FLOATS)?,
-                texel(cells, vk::Format::R32G32_UINT)?,
-                texel(light.entries, vk::Format::R32_UINT)?,
-                texel(light.chains, vk::Format::R32G32_UINT)?,
-                texel(light.soft, FLOATS)?,
-            ]);
-        }
+        drawing.bind(&self.pipeline, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
+        drawing.resources(&Self::resources(grid, viewport)?)?;
+        Self::finish(drawing, grid, entity, white, indices);
+        Ok(())
+    }
+
+    /// Draws an entity's patches over the grid. Their pixels evaluate sharp lights themselves.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn record_patches<'r>(
+        &'r self,
+        drawing: &mut Drawing<'_, 'r>,
+        grid: &'r DrawnGrid,
+        entity: &DrawnEntity<'r>,
+        viewport: &DrawnViewport<'r>,
+        white: f32,
+    ) -> Result<()> {
+        let Some((pipeline, light)) = self.pixel.as_ref().zip(viewport.pixel.as_ref()) else { return Ok(()) };
+        let [positions, places, indices] = &grid.patches;
+        drawing.bind(pipeline, &[(positions, 0), (places, 0)], indices);
+        let mut resources = Self::resources(grid, viewport)?;
+        let [nodes, cells] = light.silhouettes;
+        resources.extend([
+            texel(light.entities, FLOATS)?,
+            texel(nodes, FLOATS)?,
+            texel(cells, vk::Format::R32G32_UINT)?,
+            texel(light.entries, vk::Format::R32_UINT)?,
+            texel(light.chains, vk::Format::R32G32_UINT)?,
+            texel(light.soft, FLOATS)?,
+        ]);
         drawing.resources(&resources)?;
+        Self::finish(drawing, grid, entity, white, 0..grid.patch_indices);
+        Ok(())
+    }
+
+    /// What both fragment shaders read.
+    fn resources<'r>(grid: &'r DrawnGrid, viewport: &DrawnViewport<'r>) -> Result<Vec<Bind<'r>>> {
+        Ok(vec![texel(&grid.corners, QUADS)?, texel(viewport.radiosity, FLOATS)?])
+    }
+
+    fn finish(
+        drawing: &mut Drawing<'_, '_>,
+        grid: &DrawnGrid,
+        entity: &DrawnEntity<'_>,
+        white: f32,
+        indices: Range<u32>,
+    ) {
         drawing.push(&Push {
             clip_from_object: entity.clip_from_object.to_cols_array(),
             emission_white: entity.emission.extend(white).to_array(),
@@ -179,6 +231,9 @@ impl DrawGrid {
             normal: grid.normal.extend(0.0).to_array(),
         });
         drawing.indexed(indices);
-        Ok(())
     }
+}
+
+fn texel(buffer: &Buffer, format: vk::Format) -> Result<Bind<'_>> {
+    TexelView::new(buffer, format).map(Bind::Texel)
 }

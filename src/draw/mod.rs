@@ -7,6 +7,7 @@
 pub mod camera;
 mod choices;
 pub mod grid;
+pub mod patches;
 pub mod show;
 pub mod smooth;
 
@@ -18,7 +19,7 @@ use crate::draw::smooth::Smooth;
 use crate::error::Result;
 use crate::gpu::ImageShape;
 use crate::gpu::Target;
-use crate::gpu::{Access, Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
+use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsPipeline, GraphicsState, Image};
 use crate::lists::sight::{Faces, Sight};
 use crate::shaders::{Library, ShaderPermutation};
 use crate::sharp::SharpPermutation;
@@ -117,9 +118,9 @@ impl DrawnMesh {
         out
     }
 
-    /// Whether it is drawn as a grid.
-    pub fn is_grid(&self) -> bool {
-        matches!(self, DrawnMesh::Grid(..))
+    /// The grid that it is drawn as, if it is.
+    pub fn grid(&self) -> Option<&DrawnGrid> {
+        if let DrawnMesh::Grid(grid, _) = self { Some(grid) } else { None }
     }
 
     /// Device memory, bytes.
@@ -212,8 +213,14 @@ impl Draw {
         let samples = antialias.samples(device);
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
         let shape = ImageShape { format: color, width, height, samples: 1 };
-        let state =
-            GraphicsState { color, depth: Some(DEPTH), samples, cull: vk::CullModeFlags::NONE, keeps_largest: false };
+        let state = GraphicsState {
+            color,
+            depth: Some(DEPTH),
+            samples,
+            cull: vk::CullModeFlags::NONE,
+            keeps_largest: false,
+            nearer_steps: 0.0,
+        };
         let vertex = library.shader(&ShaderPermutation::new("draw.vert", 4))?;
         let fragment =
             library.shader(&ShaderPermutation::new("draw.frag", 4).define("DISPLAY", finish == Finish::Display))?;
@@ -335,10 +342,36 @@ impl Draw {
                         }
                     }
                 }
-                Ok(())
+                if number + 1 == count { self.record_patches(drawing, viewports, white) } else { Ok(()) }
             })?;
         }
         Ok(())
+    }
+}
+
+impl Draw {
+    /// Draws the patches of all grids, after everything that may hide them: a pixel of a patch costs most.
+    fn record_patches<'r>(
+        &'r self,
+        drawing: &mut Drawing<'_, 'r>,
+        viewports: &[DrawnViewport<'r>],
+        white: f32,
+    ) -> Result<()> {
+        if viewports.iter().all(|viewport| viewport.pixel.is_none()) {
+            return Ok(());
+        }
+        drawing.counted(|drawing| {
+            for viewport in viewports.iter().filter(|viewport| viewport.pixel.is_some()) {
+                let [left, top, width, height] = viewport.area;
+                drawing.area(left, top, width, height);
+                for entity in viewport.entities.iter().filter(|e| e.cluster_first.is_some() && !e.indices.is_empty()) {
+                    if let DrawnMesh::Grid(grid, _) = entity.mesh {
+                        self.grid.record_patches(drawing, grid, entity, viewport, white)?;
+                    }
+                }
+            }
+            Ok(())
+        })
     }
 }
 

@@ -35,6 +35,7 @@ impl Show {
             samples: 1,
             cull: vk::CullModeFlags::NONE,
             keeps_largest: false,
+            nearer_steps: 0.0,
         };
         let vertex = library.shader(&ShaderPermutation::new("show.vert", 4))?;
         let fragment = library.shader(&ShaderPermutation::new("show.frag", 4))?;

@@ -161,6 +161,7 @@ impl Smooth {
             samples: 1,
             cull: vk::CullModeFlags::NONE,
             keeps_largest: false,
+            nearer_steps: 0.0,
         };
         let vertex = library.shader(&ShaderPermutation::new("smooth.vert", 4))?;
         let fragment = library.shader(&Self::fragment(display))?;
@@ -184,7 +185,7 @@ impl Smooth {
     ) -> Result<()> {
         commands.copy_between(picture, &self.picture);
         commands.image_barrier(&self.picture, Some(Access::TransferWrite), Access::ColorWrite);
-        commands.image_barrier(picture, Some(Access::TransferRead), Access::FragmentSampled);
+        commands.image_barrier(picture, Some(Access::TransferRead), Access::GraphicsSampled);
         let target = Target { color: &self.picture, clear: None, depth: None, resolve: None };
         commands.render(&target, |drawing| {
             drawing.bind(&self.pipeline, &[(&lines.corners, 0), (&lines.marks, 0)], &lines.indices);

@@ -1,17 +1,23 @@
 //! What may change from frame to frame: the scene's lights and camera, the merge's variant, and shader files.
 
 use super::permutation::{CompiledMerge, usable};
-use super::{Frame, Options, forms};
+use super::{Frame, Options, forms, permutation};
 use crate::error::Result;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{Camera, Scene};
-use crate::sharp::Sharp;
+use crate::sharp::{Sharp, SharpPermutation};
 
 impl Frame {
-    /// Whether the fields that `scene` needs are here; it has the meshes and entities that this frame was made for.
+    /// Whether the fields that `scene` needs are here, and the passes that its sharp lights need; it has the meshes and entities
+    /// that this frame was made for.
     pub fn covers(&self, scene: &Scene) -> bool {
-        self.buffers.covers(scene, self.options.lights)
+        let forms = forms(scene, self.options.lights);
+        let wanted = permutation::sharp(&self.options, &self.merge.permutation, &forms, scene, &self.buffers);
+        let has = |wanted: SharpPermutation| {
+            self.sharp.as_ref().is_some_and(|sharp| sharp.permutation.outlines || !wanted.outlines)
+        };
+        self.buffers.covers(scene, self.options.lights) && wanted.is_none_or(has)
     }
 
     /// Takes over lights, switches, sky and camera of a scene that has the meshes and receivers that this frame was made for.

@@ -99,7 +99,7 @@ impl Frame {
             let mesh = &self.scene.meshes[entity.mesh];
             let radiosity = self.radiosity(index)?;
             let rotation = placement.turn();
-            let grid = self.buffers.meshes[entity.mesh].drawn.is_grid().then_some(index);
+            let grid = self.buffers.meshes[entity.mesh].drawn.grid().map(|_| index);
             let corner = |&i: &u32| {
                 let v = i as usize;
                 let world = placement.position.as_dvec3()

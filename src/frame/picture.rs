@@ -10,7 +10,7 @@ use crate::draw::grid::PixelLight;
 use crate::draw::smooth::{Lines, Strips};
 use crate::draw::{Antialias, Draw, DrawnViewport, Finish, Shading};
 use crate::error::Result;
-use crate::gpu::{Buffer, BufferKind, Device, Image};
+use crate::gpu::{Buffer, BufferKind, Device, Image, Timing};
 use crate::scene::Placement;
 use crate::shaders::Library;
 use crate::sharp::SharpPermutation;
@@ -137,7 +137,7 @@ impl Frame {
     pub(super) fn prepare_pixels(&mut self) -> Result<()> {
         let shows = self.shading() == Shading::Pixel && self.work.lists.is_updated();
         let Some(pixel) = self.pixel.as_mut().filter(|_| shows) else { return Ok(()) };
-        pixel.prepare(&self.work.lists, &self.work.lists.now().entities)
+        pixel.prepare(&self.work.lists)
     }
 
     /// What the pixels of grids read that evaluate sharp lights in a viewport.
@@ -152,6 +152,13 @@ impl Frame {
             chains: &pixel.chains,
             soft: self.radiosity.soft(),
         })
+    }
+
+    /// Pixels of a picture that evaluated sharp lights themselves, by the timings of its passes: the samples that they wrote over the
+    /// samples of a pixel. `None` where the device does not count, or no pixel was to.
+    pub fn pixels_evaluated(&self, timings: &[Timing]) -> Option<u64> {
+        let samples = u64::from(self.picture.draw.samples());
+        timings.iter().find_map(|timing| timing.samples).map(|written| written.div_ceil(samples))
     }
 
     /// Makes pictures of another size from now on.

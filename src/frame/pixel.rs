@@ -4,7 +4,8 @@ use crate::draw::DrawnMesh;
 use crate::error::Result;
 use crate::gpu::{Device, Upload};
 use crate::layout::{self, CLUSTER_VERTICES};
-use crate::lists::incremental::ClusterLists;
+use crate::lists::gather::EntityBounds;
+use crate::lists::incremental::{ClusterLists, State};
 use crate::scene::Scene;
 use crate::scene_buffers::SceneBuffers;
 use std::sync::Arc;
@@ -20,8 +21,8 @@ pub(super) struct PixelChains {
     /// Of every entity that is lit and drawn as a grid: its first cluster there, and how far the pixels of a cluster may lie from its
     /// vertices, metres.
     grids: Vec<Option<(u32, f32)>>,
-    /// Entities as they were when the chains were made.
-    known: Vec<layout::Entity>,
+    /// Entities as they were when the chains were made, and their bounds with what each of them takes part in.
+    known: Option<(Vec<layout::Entity>, Vec<EntityBounds>)>,
 }
 
 impl PixelChains {
@@ -49,7 +50,7 @@ impl PixelChains {
             entries: upload("pixel entries", 16)?,
             chains: upload("pixel chains", 8 * clusters.max(1) as usize)?,
             grids,
-            known: Vec::new(),
+            known: None,
         })
     }
 
@@ -60,15 +61,20 @@ impl PixelChains {
 
     /// Whether chains have been made.
     pub fn is_ready(&self) -> bool {
-        !self.known.is_empty()
+        self.known.is_some()
     }
 
     /// Makes the chains of this moment.
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn prepare(&mut self, lists: &ClusterLists, entities: &[layout::Entity]) -> Result<()> {
-        if bytemuck::cast_slice::<_, u8>(entities) == bytemuck::cast_slice::<_, u8>(&self.known) {
+    pub fn prepare(&mut self, lists: &ClusterLists) -> Result<()> {
+        let State { entities, scene_bounds, .. } = lists.now();
+        let is_known = self.known.as_ref().is_some_and(|(known, bounds)| {
+            bytemuck::cast_slice::<_, u8>(known) == bytemuck::cast_slice::<_, u8>(entities)
+                && *bounds == scene_bounds.entities
+        });
+        if is_known {
             return Ok(());
         }
         let (mut entries, mut chains) = (Vec::new(), Vec::new());
@@ -83,7 +89,7 @@ impl PixelChains {
         self.entities.write(entities)?;
         self.entries.write(&entries)?;
         self.chains.write(&chains)?;
-        self.known = entities.to_vec();
+        self.known = Some((entities.clone(), scene_bounds.entities.clone()));
         Ok(())
     }
 

@@ -96,7 +96,7 @@ pub fn record<'f>(
     if merge.is_some() && picture.is_some() {
         // Triangles read the radiosity as a vertex attribute, grids look it up in the fragment shader.
         commands.barrier(Access::ComputeWrite, Access::VertexRead);
-        commands.barrier(Access::ComputeWrite, Access::FragmentSampled);
+        commands.barrier(Access::ComputeWrite, Access::GraphicsSampled);
     }
     if let Some(PictureWork { draw, viewports, background, white, lines }) = picture {
         for (image, access) in draw.attachments() {
@@ -105,14 +105,14 @@ pub fn record<'f>(
         commands.pass("draw", |c| draw.record(c, viewports, *background, *white))?;
         if let Some(smooth) = &draw.smooth {
             // The pass copies the picture, and then reads picture and depth while it changes the copy.
-            commands.barrier(Access::ColorWrite, Access::FragmentSampled);
+            commands.barrier(Access::ColorWrite, Access::GraphicsSampled);
             commands.image_barrier(&draw.picture, Some(Access::ColorWrite), Access::TransferRead);
-            commands.image_barrier(&draw.depth, Some(Access::DepthWrite), Access::FragmentSampled);
+            commands.image_barrier(&draw.depth, Some(Access::DepthWrite), Access::GraphicsSampled);
             commands.image_barrier(&smooth.picture, None, Access::TransferWrite);
             commands.pass("smooth", |c| smooth.record(c, (&draw.picture, &draw.depth), lines, viewports))?;
         }
         let reader =
-            if matches!(target, PictureTarget::Host { .. }) { Access::TransferRead } else { Access::FragmentSampled };
+            if matches!(target, PictureTarget::Host { .. }) { Access::TransferRead } else { Access::GraphicsSampled };
         commands.image_barrier(draw.finished(), Some(Access::ColorWrite), reader);
     }
     match target {

@@ -110,7 +110,7 @@ impl Frame {
             };
             let radius_m = device_mesh.radius_m * f64::from(placement.scale);
             let distance_m = self.centre(index, placement).distance(camera.eye) - radius_m;
-            (drawn.mesh.is_grid(), distance_m, drawn)
+            (drawn.mesh.grid().is_some(), distance_m, drawn)
         });
         // From near to far, so that few fragments are shaded that something nearer hides later. Grids come last: a fragment of a
         // grid costs most.

@@ -24,8 +24,8 @@ pub enum Access {
     ComputeWrite,
     /// A compute shader reads a texel buffer or a sampled image.
     ComputeSampled,
-    /// A fragment shader reads an image or a texel buffer with `texelFetch`.
-    FragmentSampled,
+    /// A vertex or fragment shader reads an image or a texel buffer with `texelFetch`.
+    GraphicsSampled,
     /// Vertex attributes and indices.
     VertexRead,
     /// Colour attachment of a render pass, resolve included.
@@ -43,7 +43,7 @@ impl Access {
             Access::HostRead => Stage::HOST,
             Access::TransferRead | Access::TransferWrite => Stage::ALL_TRANSFER,
             Access::ComputeRead | Access::ComputeWrite | Access::ComputeSampled => Stage::COMPUTE_SHADER,
-            Access::FragmentSampled => Stage::FRAGMENT_SHADER,
+            Access::GraphicsSampled => Stage::VERTEX_SHADER | Stage::FRAGMENT_SHADER,
             Access::VertexRead => Stage::VERTEX_INPUT,
             Access::ColorWrite => Stage::COLOR_ATTACHMENT_OUTPUT,
             Access::DepthWrite => Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS,
@@ -60,7 +60,7 @@ impl Access {
             Access::TransferWrite => Mask::TRANSFER_WRITE,
             Access::ComputeRead => Mask::SHADER_STORAGE_READ | Mask::UNIFORM_READ,
             Access::ComputeWrite => Mask::SHADER_STORAGE_READ | Mask::SHADER_STORAGE_WRITE,
-            Access::ComputeSampled | Access::FragmentSampled => Mask::SHADER_SAMPLED_READ,
+            Access::ComputeSampled | Access::GraphicsSampled => Mask::SHADER_SAMPLED_READ,
             Access::VertexRead => Mask::VERTEX_ATTRIBUTE_READ | Mask::INDEX_READ,
             Access::ColorWrite => Mask::COLOR_ATTACHMENT_READ | Mask::COLOR_ATTACHMENT_WRITE,
             Access::DepthWrite => Mask::DEPTH_STENCIL_ATTACHMENT_READ | Mask::DEPTH_STENCIL_ATTACHMENT_WRITE,

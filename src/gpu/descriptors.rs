@@ -59,7 +59,7 @@ impl<'r> Commands<'r> {
         let set = self.descriptor_set(layout)?;
         let pass = self.pass_name();
         let graphics = point == vk::PipelineBindPoint::GRAPHICS;
-        let sampled = if graphics { Access::FragmentSampled } else { Access::ComputeSampled };
+        let sampled = if graphics { Access::GraphicsSampled } else { Access::ComputeSampled };
         for binding in &layout.bindings {
             let resource = resources.get(binding.index as usize).unwrap_or(&Bind::None);
             let mut write = vk::WriteDescriptorSet::default()

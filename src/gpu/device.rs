@@ -229,9 +229,11 @@ impl Device {
             .synchronization2(true)
             .maintenance4(true);
         let extension_names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
+        let features = vk::PhysicalDeviceFeatures::default().occlusion_query_precise(info.counts_samples);
         let create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extension_names)
+            .enabled_features(&features)
             .push_next(&mut core_1_3);
         // SAFETY: the features were checked in `physical_devices`; destroyed in `Drop`, before the instance.
         let handle =

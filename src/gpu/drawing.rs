@@ -3,6 +3,7 @@
 use super::access::Access;
 use super::bind::Bind;
 use super::commands::Commands;
+use super::flight::Recording;
 use super::image::Image;
 use super::memory::Buffer;
 use super::pipeline::GraphicsPipeline;
@@ -160,6 +161,36 @@ impl<'r> Drawing<'_, 'r> {
     pub fn resources(&mut self, resources: &[Bind<'r>]) -> Result<()> {
         let pipeline = self.pipeline.expect("a pipeline is bound before its resources");
         self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)
+    }
+
+    /// Counts the samples that `record` draws, once a pass; its [`super::Timing`] holds the number. A device that cannot count exactly
+    /// counts nothing.
+    ///
+    /// # Errors
+    /// What `record` returns.
+    ///
+    /// # Panics
+    /// When a pass counts twice.
+    pub fn counted(&mut self, record: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        let recording = &mut self.commands.recording;
+        if !recording.device.info.counts_samples {
+            return record(self);
+        }
+        let query = recording.passes.len() as u32 - 1;
+        assert!(!recording.counted.contains(&query), "{}: a pass counts once", recording.name);
+        recording.counted.push(query);
+        // SAFETY: for both calls, the command buffer is recording inside a render pass, and the query was reset at its start.
+        unsafe {
+            let Recording { device, buffer, samples, .. } = &self.commands.recording;
+            device.handle.cmd_begin_query(*buffer, *samples, query, vk::QueryControlFlags::PRECISE);
+        }
+        let outcome = record(self);
+        // SAFETY: begun above.
+        unsafe {
+            let Recording { device, buffer, samples, .. } = &self.commands.recording;
+            device.handle.cmd_end_query(*buffer, *samples, query);
+        }
+        outcome
     }
 
     #[cfg(feature = "view")]

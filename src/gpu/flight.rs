@@ -22,6 +22,8 @@ pub struct Timing {
     pub pass: String,
     /// Milliseconds between the timestamps around it.
     pub milliseconds: f64,
+    /// Samples that its counted draws wrote, see [`super::Drawing::counted`]; `None` where it has none.
+    pub samples: Option<u64>,
 }
 
 /// Semaphores around a submission.
@@ -41,6 +43,10 @@ pub(super) struct Recording {
     pub buffer: vk::CommandBuffer,
     fence: vk::Fence,
     pub queries: vk::QueryPool,
+    /// Samples written, one query a pass.
+    pub samples: vk::QueryPool,
+    /// Passes whose query was used.
+    pub counted: Vec<u32>,
     pub descriptors: Vec<(vk::DescriptorPool, u32)>,
     pub passes: Vec<String>,
     running: bool,
@@ -55,6 +61,8 @@ impl Recording {
             buffer: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
             queries: vk::QueryPool::null(),
+            samples: vk::QueryPool::null(),
+            counted: Vec::new(),
             descriptors: Vec::new(),
             passes: Vec::new(),
             running: false,
@@ -65,12 +73,14 @@ impl Recording {
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         let queries =
             vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_PASSES);
+        let samples = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION).query_count(MAX_PASSES);
         // SAFETY: for the whole block, every handle is stored in `recording` as soon as it exists and destroyed in its `Drop`.
         unsafe {
             recording.pool = handle.create_command_pool(&pool, None).checked("vkCreateCommandPool", name)?;
             recording.fence =
                 handle.create_fence(&vk::FenceCreateInfo::default(), None).checked("vkCreateFence", name)?;
             recording.queries = handle.create_query_pool(&queries, None).checked("vkCreateQueryPool", name)?;
+            recording.samples = handle.create_query_pool(&samples, None).checked("vkCreateQueryPool", name)?;
             let allocate = vk::CommandBufferAllocateInfo::default()
                 .command_pool(recording.pool)
                 .level(vk::CommandBufferLevel::PRIMARY)
@@ -79,11 +89,13 @@ impl Recording {
             let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             handle.begin_command_buffer(recording.buffer, &begin).checked("vkBeginCommandBuffer", name)?;
             handle.cmd_reset_query_pool(recording.buffer, recording.queries, 0, 2 * MAX_PASSES);
+            handle.cmd_reset_query_pool(recording.buffer, recording.samples, 0, MAX_PASSES);
         }
         device.name(recording.pool, name);
         device.name(recording.buffer, name);
         device.name(recording.fence, name);
         device.name(recording.queries, name);
+        device.name(recording.samples, name);
         Ok(recording)
     }
 
@@ -151,6 +163,7 @@ impl Drop for Recording {
                 handle.destroy_descriptor_pool(*pool, None);
             }
             handle.destroy_query_pool(self.queries, None);
+            handle.destroy_query_pool(self.samples, None);
             handle.destroy_fence(self.fence, None);
             handle.destroy_command_pool(self.pool, None);
         }
@@ -180,12 +193,22 @@ impl Flight {
         }
         let period_ns = f64::from(recording.device.limits.timestamp_period);
         let passes = recording.passes.iter().zip(stamps.chunks_exact(2));
-        Ok(passes
+        let mut timings: Vec<Timing> = passes
             .map(|(pass, pair)| Timing {
                 pass: pass.clone(),
                 milliseconds: pair[1].saturating_sub(pair[0]) as f64 * period_ns * 1e-6,
+                samples: None,
             })
-            .collect())
+            .collect();
+        for &pass in &recording.counted {
+            let mut count = [0_u64];
+            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+            // SAFETY: the pool is alive, and the query was begun and ended in the recording.
+            unsafe { recording.device.handle.get_query_pool_results(recording.samples, pass, &mut count, flags) }
+                .checked("vkGetQueryPoolResults", &recording.name)?;
+            timings[pass as usize].samples = Some(count[0]);
+        }
+        Ok(timings)
     }
 }
 

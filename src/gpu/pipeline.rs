@@ -194,6 +194,8 @@ pub struct GraphicsState {
     pub cull: vk::CullModeFlags,
     /// Whether a pixel keeps the largest value that was drawn, channel by channel, rather than the last.
     pub keeps_largest: bool,
+    /// How much nearer everything is drawn than it is, in steps of the largest depth of its triangle.
+    pub nearer_steps: f32,
 }
 
 /// A vertex and a fragment shader, ready to draw indexed triangles. Vertex input `location` reads tightly packed floats
@@ -238,6 +240,8 @@ impl GraphicsPipeline {
             .polygon_mode(vk::PolygonMode::FILL)
             .cull_mode(state.cull)
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
+            .depth_bias_enable(state.nearer_steps != 0.0)
+            .depth_bias_constant_factor(state.nearer_steps)
             .line_width(1.0);
         let multisample = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::from_raw(state.samples));

@@ -20,6 +20,8 @@ pub struct Candidate {
     pub driver: String,
     /// Device UUID as 32 hexadecimal digits.
     pub uuid: String,
+    /// Whether it counts the samples that a draw writes.
+    pub counts_samples: bool,
     /// Why this device cannot be used, if it cannot.
     pub unsuitable: Option<String>,
 }
@@ -117,7 +119,7 @@ pub(super) fn physical_devices(instance: &ash::Instance) -> Result<Vec<(vk::Phys
 fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
     // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are only
     // chained if the device supports 1.3.
-    let (properties, unsuitable, identity, driver) = unsafe {
+    let (properties, unsuitable, counts_samples, identity, driver) = unsafe {
         let properties = instance.get_physical_device_properties(physical);
         let mut identity = vk::PhysicalDeviceIDProperties::default();
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
@@ -126,12 +128,14 @@ fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice
             instance.get_physical_device_properties2(physical, &mut both);
         }
         let mut unsuitable = None;
+        let mut counts_samples = false;
         if properties.api_version < vk::API_VERSION_1_3 {
             unsuitable = Some(format!("supports Vulkan {}, but 1.3 is needed", version_text(properties.api_version)));
         } else {
             let mut core_1_3 = vk::PhysicalDeviceVulkan13Features::default();
             let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut core_1_3);
             instance.get_physical_device_features2(physical, &mut features);
+            counts_samples = features.features.occlusion_query_precise == vk::TRUE;
             let families = instance.get_physical_device_queue_family_properties(physical);
             let missing = [
                 (core_1_3.dynamic_rendering, "dynamicRendering"),
@@ -144,7 +148,7 @@ fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice
                 unsuitable = Some("has no queue with graphics, compute and timestamps".into());
             }
         }
-        (properties, unsuitable, identity, driver)
+        (properties, unsuitable, counts_samples, identity, driver)
     };
     let text = |chars: &[std::ffi::c_char]| {
         let bytes: Vec<u8> = chars.iter().map(|&c| c.cast_unsigned()).collect();
@@ -163,6 +167,7 @@ fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice
         api: version_text(properties.api_version),
         driver,
         uuid: identity.device_uuid.iter().map(|byte| format!("{byte:02x}")).collect(),
+        counts_samples,
         unsuitable,
     }
 }
@@ -179,6 +184,7 @@ mod tests {
             api: "1.3.0".into(),
             driver: "test".into(),
             uuid: format!("{index:032x}"),
+            counts_samples: true,
             unsuitable: unsuitable.map(String::from),
         }
     }

@@ -19,6 +19,13 @@ use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use std::sync::Arc;
 
+/// How near a shadow's edge must come to a vertex of a grid for pixels around it to evaluate lights, in steps of the grid: more than the
+/// 0.71 that the middle of a cell is away from its corners.
+const EDGE_REACH: f64 = 0.75;
+/// Half-width, in steps of the grid, of the widest penumbra of a part of a light that pixels evaluate. Light on vertices carries wider
+/// ones: a picture of the scene teapot_lights changes by 0.0012 relative RMS where this stands for infinity.
+const EDGE_STEPS: f64 = 0.5;
+
 /// What the shader is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharpPermutation {
@@ -64,6 +71,8 @@ impl SharpPermutation {
             ("REACH", REACH),
             ("NEAREST", NEAREST),
             ("LEAST_PENUMBRA", LEAST_PENUMBRA),
+            ("EDGE_REACH", EDGE_REACH),
+            ("EDGE_STEPS", EDGE_STEPS),
             ("MOST_SINE", MOST_SINE),
             ("LIMIT_SINE", LIMIT_SINE),
             ("BLEND", BLEND),

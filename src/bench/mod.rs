@@ -20,6 +20,7 @@ pub mod scaling;
 pub mod shadow_map;
 pub mod skips;
 pub mod small_lights;
+pub mod soak;
 pub mod stability;
 pub mod sweep;
 pub mod time_error;

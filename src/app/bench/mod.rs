@@ -5,6 +5,7 @@ mod floor;
 mod product;
 mod scaling;
 mod skip;
+mod soak;
 mod stability;
 mod time_error;
 
@@ -31,6 +32,8 @@ enum What {
     Stability(stability::Arguments),
     /// What each skip saves and what it does to the error
     Skip(skip::Arguments),
+    /// Whether memory grows, pictures drift or frames slow over a million frames; exit code 1 where they do
+    Soak(soak::Arguments),
     /// Time and memory as vertices, entities and lights become many
     Scaling(scaling::Arguments),
 }
@@ -43,6 +46,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         What::Product(arguments) => product::run(global, arguments),
         What::Stability(arguments) => stability::run(global, arguments),
         What::Skip(arguments) => skip::run(global, arguments),
+        What::Soak(arguments) => soak::run(global, arguments),
         What::Scaling(arguments) => scaling::run(global, arguments),
     }
 }

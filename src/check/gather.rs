@@ -5,7 +5,7 @@ use super::CheckRow;
 use crate::bake::Baker;
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
-use crate::layout::{Cluster, Entity};
+use crate::layout::{Cluster, Entity, ListEntry};
 use crate::lists::gather::{
     self, Bounds, Candidates, EntityBounds, GROUP_CLUSTERS, Gather, Group, Inputs, Packed, Report, SLACK, SceneBounds,
     Scope,
@@ -31,7 +31,8 @@ pub struct Crowded {
 /// How lists agree with the rule.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ListAgreement {
-    /// Lists that miss something of the rule without slack, hold something beyond the rule with twice the slack, or are out of order.
+    /// Lists that miss something of the rule without slack, hold something beyond the rule with twice the slack, are out of order, or
+    /// whose cluster has another number of entries for sharp lights at the front.
     pub wrong_lists: usize,
     /// Entries of all lists.
     pub entries: usize,
@@ -54,11 +55,11 @@ fn is_within(part: &[u32], whole: &[u32]) -> bool {
     part.iter().all(|entry| rest.any(|other| other == entry))
 }
 
-/// Entities near and far, of which every fifth does not occlude and every 25th shines.
+/// Entities near and far, of which every fifth does not occlude and every 25th shines, in harmonics, in colours or sharply.
 fn random_entities(rng: &mut fastrand::Rng, count: usize, spread_m: f64, corner: DVec3) -> Vec<EntityBounds> {
     (0..count)
         .map(|i| EntityBounds {
-            sharp: false,
+            sharp: i % 100 == 25,
             centre: corner + DVec3::new(rng.f64() - 0.5, 0.1 * rng.f64(), rng.f64() - 0.5) * spread_m,
             radius_m: 0.1 + 0.4 * rng.f64(),
             occludes: i % 5 != 0,
@@ -119,8 +120,14 @@ impl Crowded {
     pub fn hold(&self, lists: &[(Cluster, Vec<u32>)]) -> ListAgreement {
         let (strict, double) = (self.expected(0.0), self.expected(2.0 * SLACK));
         let mut agreement = ListAgreement::default();
-        for ((_, found), (least, most)) in lists.iter().zip(strict.iter().zip(&double)) {
-            agreement.wrong_lists += usize::from(!is_within(least, found) || !is_within(found, most));
+        let is_sharp = |entry: &&u32| {
+            let light = ListEntry::entities(**entry)[1] as usize;
+            self.scene_bounds.entities.get(light).is_some_and(|light| light.emits && light.sharp)
+        };
+        for ((cluster, found), (least, most)) in lists.iter().zip(strict.iter().zip(&double)) {
+            let sharp = found.iter().take_while(is_sharp).count();
+            let told = cluster.sharp_count as usize == sharp && !found[sharp..].iter().any(|entry| is_sharp(&entry));
+            agreement.wrong_lists += usize::from(!is_within(least, found) || !is_within(found, most) || !told);
             agreement.entries += found.len();
             agreement.extra_entries += found.len().saturating_sub(least.len());
         }

@@ -197,5 +197,12 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
             add(CheckRow::new("project", what, "of 1 + coefficient", worst, F32));
         }
     }
+    // Faces of this size stand in several rows of the atlas.
+    let eyes: Vec<Vec3> = EYES.iter().flat_map(|eye| [*eye, -*eye, 1.5 * *eye, -1.5 * *eye]).collect();
+    let large = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &eyes, (128, false, true))?;
+    let rows = large.plan.iter().flatten().any(|slot| *slot != NO_SLOT && *slot >= large.capture.columns);
+    let (worst, _) = compare(&large, 4, Projection::Transfer)?;
+    let worst = if rows { worst } else { f64::INFINITY };
+    add(CheckRow::new("project", "transfer, 4 bands, 128 px", "of 1 + coefficient", worst, F32));
     Ok(())
 }

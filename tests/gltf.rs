@@ -373,9 +373,12 @@ fn colours_of_vertices_are_a_mean_by_area() {
 fn lights_are_balls_of_their_intensity() {
     let mut model = arrows();
     let point = model.light(json!({ "type": "point", "color": [1, 0.5, 0], "intensity": 12 }));
-    let sun = model.light(json!({ "type": "directional" }));
+    let sun = model.light(json!({ "type": "directional", "intensity": 3, "color": [1, 0.5, 0] }));
     let dark = model.light(json!({ "type": "point", "intensity": 0 }));
-    for (light, name) in [(point, "lamp at"), (sun, "sun"), (dark, "dark")] {
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let extension = json!({ "KHR_lights_punctual": { "light": sun } });
+    model.node(json!({ "name": "sun", "rotation": [-half, 0, 0, half], "extensions": extension }));
+    for (light, name) in [(point, "lamp at"), (sun, "second sun"), (dark, "dark")] {
         let extension = json!({ "KHR_lights_punctual": { "light": light } });
         model.node(json!({ "name": name, "translation": [1, 4, 2], "scale": [3, 3, 3], "extensions": extension }));
     }
@@ -390,7 +393,14 @@ fn lights_are_balls_of_their_intensity() {
     let said = import.notes.said().join("\n");
     assert!(said.contains(&format!("point and spot lights (1) are balls of radius {:.3} m", lamp.scale)), "{said}");
     assert!(said.contains("exposure_ev"), "{said}");
-    assert_eq!(import.notes.left_out(), ["left out (1): directional lights"]);
+    // Lux on a surface that faces the disc; directional lights look along -z.
+    let sun = import.data.environment.sun.as_ref().unwrap();
+    let share = std::f32::consts::PI * (sun.angle_deg.to_radians() / 2.0).sin().powi(2);
+    assert!((sun.radiance * share - Vec3::new(3., 1.5, 0.)).length() < 1e-4, "{sun:?}");
+    assert!((sun.toward - Vec3::Y).length() < 1e-6, "{sun:?}");
+    assert!(said.contains("the directional light is a distant disc"), "{said}");
+    assert_eq!(import.notes.left_out(), ["left out (1): further directional lights"]);
+    assert!(import.data.environment.sky.is_none());
 }
 
 /// A spot 2 m above a floor, by ray casting: what the floor gets is the intensity over the square of the distance within the inner

@@ -1,4 +1,4 @@
-//! Punctual lights as glowing balls, and spots as balls in a housing with a round hole.
+//! Punctual lights as glowing balls, spots as balls in a housing with a round hole, and a directional light as a distant disc.
 //!
 //! A point has no size, so a lamp gets one, which is said: a hundredth of the scene's radius. Candela are taken as W sr^-1, and the
 //! ball's radiance is the intensity over its mean outline, so that what is lit from afar does not depend on the radius.
@@ -12,6 +12,7 @@ use super::notes::Notes;
 use super::spot::{Housing, PLATE, WIDEST_DEG};
 use super::tree::Stand;
 use crate::asset::Mesh;
+use crate::asset::disc::{SUN_DEG, Sun};
 use crate::asset::environment::RADIANCE_LIMIT;
 use crate::asset::generate::{Generator, sphere};
 use crate::error::Result;
@@ -40,6 +41,8 @@ pub struct Fittings {
 pub struct Lamps<'a> {
     /// Every light with where it stands.
     lights: Vec<(&'a Light, &'a Stand)>,
+    /// The first directional light.
+    pub sun: Option<Sun>,
     radius_m: f64,
 }
 
@@ -51,7 +54,7 @@ impl<'a> Lamps<'a> {
     pub fn new(document: &'a Document, stands: &'a [Stand], scene_radius_m: f64, notes: &mut Notes) -> Result<Self> {
         let all = document.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
         let all = all.map_or(&[][..], |e| &e.lights);
-        let mut lights = Vec::new();
+        let (mut lights, mut sun) = (Vec::new(), None);
         for stand in stands {
             let of = document.root.nodes[stand.node].extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
             let Some(index) = of.map(|e| e.light.value()) else { continue };
@@ -65,12 +68,15 @@ impl<'a> Lamps<'a> {
                 notes.leave_out("ranges of lights (their light reaches any distance)");
             }
             match light.type_ {
-                Checked::Valid(Type::Directional) => notes.leave_out("directional lights"),
-                Checked::Valid(_) if intensity(light) != Vec3::ZERO => lights.push((light, stand)),
-                _ => {}
+                _ if intensity(light) == Vec3::ZERO => {}
+                Checked::Valid(Type::Directional) if sun.is_none() => {
+                    sun = Some(distant(document, light, stand, notes)?)
+                }
+                Checked::Valid(Type::Directional) => notes.leave_out("further directional lights"),
+                _ => lights.push((light, stand)),
             }
         }
-        Ok(Lamps { lights, radius_m: (scene_radius_m * RADIUS_SHARE).clamp(1e-4, 1e4) })
+        Ok(Lamps { lights, sun, radius_m: (scene_radius_m * RADIUS_SHARE).clamp(1e-4, 1e4) })
     }
 
     /// Their meshes and entities.
@@ -136,14 +142,15 @@ impl<'a> Lamps<'a> {
         Ok(out)
     }
 
-    /// The exposure in stops at which a white surface in the middle of the scene, lit by all lamps, shows half of white: the lamps'
-    /// photometric units say nothing of how bright a picture should be. `None` without lamps.
+    /// The exposure in stops at which a white surface in the middle of the scene, lit by all lights, shows half of white: their
+    /// photometric units say nothing of how bright a picture should be. `None` without lights.
     pub fn exposure_ev(&self, centre: DVec3, scene_radius_m: f64) -> Option<f32> {
         let irradiance = |(light, stand): &(&Light, &Stand)| {
             let distance_m = centre.distance(stand.rest.translation).max(0.3 * scene_radius_m);
             f64::from(intensity(light).max_element()) / distance_m.powi(2)
         };
-        let radiance = self.lights.iter().map(irradiance).sum::<f64>() / std::f64::consts::PI;
+        let sun = self.sun.as_ref().map_or(0.0, |sun| f64::from(sun.radiance.max_element()) * disc_sr(sun.angle_deg));
+        let radiance = (self.lights.iter().map(irradiance).sum::<f64>() + sun) / std::f64::consts::PI;
         (radiance > 0.0).then(|| (((0.5 / radiance).log2() * 2.0).round() / 2.0).clamp(-32.0, 32.0) as f32)
     }
 }
@@ -154,6 +161,28 @@ impl Fittings {
         self.meshes.push((MeshData { name: name.into(), file: None, generator: Some(generator) }, built));
         Ok(())
     }
+}
+
+/// What a surface that faces a disc of that angular diameter gets, for a radiance of 1: pi sin^2 of half the diameter.
+fn disc_sr(angle_deg: f32) -> f64 {
+    std::f64::consts::PI * (f64::from(angle_deg).to_radians() / 2.0).sin().powi(2)
+}
+
+/// A directional light as a disc as wide as the sun, of the same irradiance: lux are taken as W m^-2.
+fn distant(document: &Document, light: &Light, stand: &Stand, notes: &mut Notes) -> Result<Sun> {
+    let place = || format!("nodes[{}]", stand.node);
+    if !stand.motion.is_empty() {
+        notes.leave_out("movements of directional lights (they shine as they do at rest)");
+    }
+    let toward = stand.rest.matrix3.z_axis.try_normalize();
+    let toward =
+        toward.ok_or_else(|| document.fail(place(), "it squeezes space flat, so its light has no direction"))?;
+    let radiance = intensity(light) / disc_sr(SUN_DEG) as f32;
+    if radiance.max_element() > RADIANCE_LIMIT {
+        return Err(document.fail(place(), "its light is too bright for a disc as wide as the sun"));
+    }
+    notes.say(format!("the directional light is a distant disc, {SUN_DEG} degrees across"));
+    Ok(Sun { toward: toward.as_vec3(), angle_deg: SUN_DEG, radiance })
 }
 
 fn is_spot(light: &Light) -> bool {

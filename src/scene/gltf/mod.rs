@@ -12,6 +12,7 @@
 //! | base colour factor, texture, colours of vertices | albedo, a mean over the surface |
 //! | emissive factor and strength; texture | emission; colours of the mesh's vertices |
 //! | point and spot lights | glowing balls; those of spots in housings with a round hole |
+//! | the first directional light | the sun of the distant light |
 //! | the first perspective camera | the camera |
 
 mod accessor;
@@ -292,8 +293,8 @@ impl<'a> Builder<'a> {
             self.notes.say(format!("exposure_ev is {exposure_ev}, from the intensities of the lights"));
         }
         entities.extend(fittings.entities);
-        let mut environment = EnvironmentData::default();
-        if entities.iter().all(|entity| entity.emission == Vec3::ZERO) {
+        let mut environment = EnvironmentData { sun: lamps.sun.clone(), ..EnvironmentData::default() };
+        if environment.sun.is_none() && entities.iter().all(|entity| entity.emission == Vec3::ZERO) {
             environment.sky = Some(Sky::default());
             self.notes.say("nothing in the file shines: daylight is added".into());
         }

@@ -65,7 +65,7 @@ fn keys_that_are_read() -> BTreeMap<String, BTreeSet<String>> {
     add("[camera]", "[camera]\nzzz = 1");
     add("[output]", "[output]\nzzz = 1");
     add("[environment]", "[environment]\nzzz = 1");
-    for part in ["gradient", "key", "sky", "image"] {
+    for part in ["gradient", "key", "sun", "sky", "image"] {
         add("[environment]", &format!("[environment]\n{part} = {{ zzz = 1 }}"));
     }
     for generator in add("[[mesh]]", "[[mesh]]\nname = 'a'\nzzz = 1") {

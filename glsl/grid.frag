@@ -20,8 +20,8 @@ layout(push_constant) uniform Push {
 } push;
 
 #if PIXEL
-// Where a cluster's chains of sharp lights hold an occluder, every pixel evaluates the lights itself: vertices carry no edge that is finer
-// than their cells.
+// Blocks of cells that a shadow's edge comes near are drawn by this: their pixels evaluate sharp lights themselves, since vertices carry no
+// edge that is finer than their cells.
 #extension GL_EXT_control_flow_attributes : require
 #include "merge_layout.glsl"
 #define ENTITY_BINDING 2

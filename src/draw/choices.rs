@@ -46,13 +46,15 @@ impl Antialias {
 pub enum Shading {
     /// At vertices; pixels interpolate.
     Vertex,
-    /// At the pixels of grids where something stands before a light; else at vertices.
+    /// At the pixels of grids near narrow shadow edges; else at vertices.
     Pixel,
 }
 
 impl Shading {
-    /// What pictures have that ask for neither: pixels where they have several samples, as on a GPU and in files. On llvmpipe a pixel that
-    /// evaluates lights makes "draw" take 6 to 17 times as long with one sample a pixel, 1.1 to 2 times with four.
+    /// What pictures have that ask for neither: pixels where they have several samples, as on a GPU and in files. A pixel that evaluates
+    /// lights takes about 1 us of a core on llvmpipe. Against frames with vertices, 1280x720, those of sphere_over_plane take 1.0 to 1.2
+    /// times as long, of teapot_lights 1.5 times with four samples and 2.8 times with one, of small_lights, whose floor is full of edges,
+    /// 5 and 14 times.
     pub fn usual(antialias: Antialias) -> Self {
         if antialias == Antialias::Samples { Shading::Pixel } else { Shading::Vertex }
     }

@@ -8,7 +8,7 @@ use crate::asset::grid::Grid;
 use glam::Vec3;
 
 /// Cells along an edge of a block.
-pub const BLOCK_CELLS: u32 = 2;
+pub const BLOCK_CELLS: u32 = 4;
 
 /// How far a block reaches over its cells on every side, in cells: corners that lie on a neighbour's edge leave cracks.
 const OVERLAP: f32 = 1.0 / 16.0;

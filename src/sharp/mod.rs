@@ -23,8 +23,9 @@ use std::sync::Arc;
 /// 0.71 that the middle of a cell is away from its corners.
 const EDGE_REACH: f64 = 0.75;
 /// Half-width, in steps of the grid, of the widest penumbra of a part of a light that pixels evaluate. Light on vertices carries wider
-/// ones: a picture of the scene teapot_lights changes by 0.0012 relative RMS where this stands for infinity.
-const EDGE_STEPS: f64 = 0.5;
+/// ones: against a picture whose pixels evaluate every edge, those of sphere_over_plane, teapot_lights and small_lights differ by 0.0015,
+/// 0.0022 and 0.0007 relative RMS, by 0.031 of white at most.
+const EDGE_STEPS: f64 = 0.3;
 
 /// What the shader is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq)]

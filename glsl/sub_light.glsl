@@ -19,7 +19,8 @@ struct Block {
 SeenLight seen_light(vec3 to, float radius) {
     SeenLight light;
     light.distance = length(to);
-    light.toward = to / max(light.distance, 1e-30);
+    // From its very centre it is seen above, as the twin has it.
+    light.toward = light.distance > 0.0 ? to / light.distance : vec3(0.0, 1.0, 0.0);
     light.sine = min(radius / max(light.distance, 1e-30), MOST_SINE);
     vec3 across = cross(light.toward, vec3(TURNED_X, TURNED_Y, TURNED_Z));
     light.across = across / max(length(across), 1e-30);

@@ -1,6 +1,5 @@
 //! Distant discs of light: suns.
 
-use super::radiance::RADIANCE_LIMIT;
 use super::short;
 use crate::error::{Error, Result};
 use glam::{DVec3, Vec3};
@@ -26,19 +25,17 @@ pub struct Sun {
 }
 
 /// [`SUN_DEG`], for serde.
-pub(super) fn sun_deg() -> f32 {
+fn sun_deg() -> f32 {
     SUN_DEG
 }
 
 impl Sun {
+    /// Checks angle and direction; radiance is checked as that of all parts is.
+    ///
     /// # Errors
     /// [`Error::Input`], one line that names the key out of range.
     pub(super) fn check(&self) -> Result<()> {
         check_angle("sun angle_deg", self.angle_deg)?;
-        if let Some(bad) = self.radiance.to_array().iter().find(|c| !(0.0..=RADIANCE_LIMIT).contains(*c)) {
-            let (bad, limit) = (short(*bad), short(RADIANCE_LIMIT));
-            return Err(Error::Input(format!("environment sun radiance {bad} is not within 0 to {limit}")));
-        }
         if self.toward.as_dvec3().try_normalize().is_none() {
             return Err(Error::Input("environment sun has no direction towards it".into()));
         }

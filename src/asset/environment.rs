@@ -118,6 +118,7 @@ impl EnvironmentData {
             self.within("sky", f64::from(sky.radiance) * f64::from(sky.sun.max(1.0)))?;
         }
         if let Some(sun) = &self.sun {
+            amount("sun radiance", &sun.radiance.to_array())?;
             sun.check()?;
             self.within("sun", f64::from(sun.radiance.max_element()))?;
         }

@@ -106,7 +106,6 @@ struct Push {
 }
 
 /// What grids read whose pixels evaluate sharp lights themselves.
-#[derive(Clone, Copy)]
 pub struct PixelLight<'d> {
     /// [`crate::layout::Entity`] of every entity.
     pub entities: &'d Buffer,

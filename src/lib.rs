@@ -47,8 +47,8 @@
 //! | [`frame`] | the sequence of passes with all barriers |
 //! | [`truth`] | ray casting and the exact SH chain |
 //! | [`check`] | every pass against its CPU twin |
-//! | [`mod@bench`] | what things cost and how wrong they are |
-//! | [`view`], [`app`] | the state behind the window; a file for each subcommand |
+//! | `bench` | what things cost and how wrong they are (feature `cli`) |
+//! | `view`, `app` | the state behind the window; a file for each subcommand (feature `cli`) |
 //!
 //! # Beyond one device
 //!
@@ -66,9 +66,11 @@
 //! *Larger scenes.* Fields that together exceed what a device can bind need several buffers, or only the fields of one neighbourhood
 //! at a time. The cluster lists already name those.
 
+#[cfg(feature = "cli")]
 pub mod app;
 pub mod asset;
 pub mod bake;
+#[cfg(feature = "cli")]
 pub mod bench;
 pub mod check;
 pub mod draw;
@@ -88,6 +90,7 @@ pub mod shaders;
 pub mod sharp;
 pub mod text;
 pub mod truth;
+#[cfg(feature = "cli")]
 pub mod view;
 
 pub use error::{Error, Result};

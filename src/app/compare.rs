@@ -2,6 +2,7 @@
 
 use super::{Global, output};
 use crate::asset::decode::Picture;
+use crate::asset::false_color::{ColorScale, NEUTRAL, Scheme};
 use crate::asset::picture::write_png;
 use crate::error::{Error, Result};
 use crate::truth::difference::{Difference, Place, Values};
@@ -91,7 +92,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let found = Difference::new(&a, &b, mask.as_deref(), arguments.exposure_ev)
         .map_err(|error| error.context(arguments.second.display()))?;
     if let Some(path) = &arguments.output {
-        let (rgb, height) = found.picture(mask.as_deref());
+        let (rgb, height) = picture(&found, mask.as_deref());
         write_png(path, found.width as u32, height as u32, &rgb, 0.0)?;
     }
     let beyond = beyond(arguments, &found);
@@ -109,6 +110,17 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     let (first, second) = (arguments.first.display(), arguments.second.display());
     Err(Error::Failed(format!("{second} differs from {first}: {}", beyond.join(", "))))
+}
+
+/// A picture of FLIP in linear RGB with a labelled bar below, and its height in pixels: dark where the two look alike. Pixels that do
+/// not count are grey.
+fn picture(found: &Difference, mask: Option<&[bool]>) -> (Vec<f32>, usize) {
+    let scale = ColorScale::fitting(Scheme::Absolute, std::iter::once(found.largest_flip.difference.max(1e-3)));
+    let color = |(pixel, flip): (usize, &f64)| {
+        if mask.is_none_or(|mask| mask[pixel]) { scale.color(*flip) } else { NEUTRAL }
+    };
+    let rgb: Vec<f32> = found.flip.iter().enumerate().flat_map(color).collect();
+    scale.with_bar(&rgb, found.width, "FLIP: how different the two pictures look")
 }
 
 /// What is above its bound.

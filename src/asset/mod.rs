@@ -16,9 +16,11 @@ pub mod embedded;
 pub mod enclose;
 pub mod environment;
 pub mod equirect;
+#[cfg(feature = "cli")]
 pub mod false_color;
 pub mod generate;
 pub mod grid;
+#[cfg(feature = "cli")]
 pub mod lettering;
 pub mod mesh;
 pub mod obj;

@@ -14,7 +14,8 @@ pub enum Finish {
 }
 
 /// How the edges of what is drawn are kept from showing as stairs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Antialias {
     /// One sample a pixel; edges show as stairs.
@@ -41,7 +42,8 @@ impl Antialias {
 }
 
 /// Where the light of sharp lights is evaluated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Shading {
     /// At vertices; pixels interpolate.

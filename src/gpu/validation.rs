@@ -12,7 +12,8 @@ pub const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 const ACCEPTED: &[(&str, &str)] = &[];
 
 /// How much of the validation layer is switched on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Validation {
     /// The layer is not loaded.
     #[default]

@@ -49,7 +49,8 @@ const ROOMS: u32 = 16;
 pub const TURNS: u32 = 30_000;
 
 /// Where lists are made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Place {
     /// The host makes them, on all its cores.

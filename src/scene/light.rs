@@ -4,7 +4,8 @@ use super::Scene;
 use serde::{Deserialize, Serialize};
 
 /// Which lights are sharp.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Lights {
     /// None: every light goes through its field of spherical harmonics.

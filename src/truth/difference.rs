@@ -2,7 +2,6 @@
 
 use super::flip;
 use crate::asset::decode::Picture;
-use crate::asset::false_color::{ColorScale, NEUTRAL, Scheme};
 use crate::error::{Error, Result};
 
 /// What root mean squares and largest differences are taken of.
@@ -129,17 +128,6 @@ impl Difference {
             largest_flip: place(largest_flip),
             flip,
         })
-    }
-
-    /// A picture of FLIP in linear RGB with a labelled bar below, and its height in pixels: dark where the two look alike. Pixels
-    /// that do not count are grey.
-    pub fn picture(&self, mask: Option<&[bool]>) -> (Vec<f32>, usize) {
-        let scale = ColorScale::fitting(Scheme::Absolute, std::iter::once(self.largest_flip.difference.max(1e-3)));
-        let color = |(pixel, flip): (usize, &f64)| {
-            if mask.is_none_or(|mask| mask[pixel]) { scale.color(*flip) } else { NEUTRAL }
-        };
-        let rgb: Vec<f32> = self.flip.iter().enumerate().flat_map(color).collect();
-        scale.with_bar(&rgb, self.width, "FLIP: how different the two pictures look")
     }
 }
 

@@ -19,6 +19,7 @@
 //! index), and the receiver shadows itself from what lies beyond the light too. Without local lights T0 and T0c are the same.
 
 pub mod difference;
+#[cfg(feature = "cli")]
 pub mod error_map;
 pub mod exact;
 pub mod flip;
@@ -28,6 +29,7 @@ pub mod raycast;
 pub mod sequence;
 pub mod world;
 
+#[cfg(feature = "cli")]
 pub use error_map::ErrorMap;
 pub use exact::ExactChain;
 pub use ray_mesh::RayMeshes;

@@ -20,28 +20,30 @@ struct Surface {
 #endif
 };
 
-// Of the parts of a block, what an occluder lets through that counts only before the light (`before`), or anywhere.
+// Of the parts of a block, what an occluder lets through that counts only before the light (`before`), or the light's own outline.
 vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block, bool before) {
-    vec3 to = surface.position - (occluder.centre.xyz - surface.origin);
-    vec3 point = to_object(occluder, to) * occluder.centre.w;
     mat3 axes = mat3(to_object(occluder, light.toward), to_object(occluder, light.across), to_object(occluder, light.down));
-    vec3 place = point * axes;
+    // The surface's point by the light's axes, from the occluder's centre. From the light's own centre it lies on the first axis.
+    vec3 to = surface.position - (occluder.centre.xyz - surface.origin);
+    vec3 place = before ? to * mat3(light.toward, light.across, light.down) : vec3(-light.distance, 0.0, 0.0);
+    place *= occluder.centre.w;
     vec3 middle = along_axes(light, block.middle);
     NodeCell cell = node_cell(floatBitsToUint(occluder.sharp.x), axes * middle);
-    vec3 along[4];
+    vec3 along[4], foot[4];
     vec4 offset;
     vec4 weights[4];
     vec2 found[4];
     [[unroll]] for (uint k = 0; k < 4; k++) {
         along[k] = along_axes(light, part_place(block, k));
         offset[k] = dot(place, along[k]);
+        foot[k] = place - offset[k] * along[k];
         weights[k] = node_weights(cell, axes * along[k]);
         found[k] = vec2(0.0);
     }
     [[unroll]] for (uint m = 0; m < 4; m++) {
-        NearMap near = near_map(cell, m, point, axes, middle, dot(place, middle));
+        NearMap near = near_map(cell, m, axes, place - dot(place, middle) * middle);
         [[unroll]] for (uint k = 0; k < 4; k++) {
-            found[k] += weights[k][m] * outline(near, along[k], offset[k]);
+            found[k] += weights[k][m] * outline(near, along[k], foot[k]);
         }
     }
     float tangent = block.sine * inversesqrt(1.0 - block.sine * block.sine);
@@ -93,9 +95,12 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
     do {
         Entity shining = ENTITY(chain_light(entry_at(first + i)));
         SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, 1.0 / shining.centre.w);
-        float fine = fine_share(light);
-        uint b = fine >= 1.0 ? 1 : 0;
-        uint last = fine <= 0.0 ? 0 : 4;
+#if OUTLINES
+        // Four parts do not carry the outline of a mesh.
+        light.fine = shining.sharp.y > 0.0 ? light.fine : 1.0;
+#endif
+        uint b = light.fine >= 1.0 ? 1 : 0;
+        uint last = light.fine <= 0.0 ? 0 : 4;
         float irradiance = 0.0;
         uint j;
         do {

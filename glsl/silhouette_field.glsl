@@ -65,36 +65,37 @@ struct NearMap {
     float sign;      // -1 where the map is seen from behind
     uint first_cell;
     vec2 half_edges; // of its rectangle, in r
-    vec2 place;      // of the point
+    vec2 centre;     // place of the sphere's centre
     mat3x2 steps;    // on the map, along each of the axes that directions are given in, for a way of r
     float depth;     // of the outline along the direction in the middle
 };
 
-// The map at corner k of a cell. `axes`: those that directions are given in, in the object's frame, in which `point` is too, in r;
-// `middle`: direction by those axes, `offset`: of the point along it.
-NearMap near_map(NodeCell cell, uint k, vec3 point, mat3 axes, vec3 middle, float offset) {
+// The map at corner k of a cell. `axes`: those that directions are given in, in the object's frame; `foot`: by those axes, in r, the place
+// on the ray in the middle that is nearest to the sphere's centre. Places on rays are given by such feet, because they stay small where
+// the object is far away, so that f32 keeps them.
+NearMap near_map(NodeCell cell, uint k, mat3 axes, vec3 foot) {
     uint quad = cell.first + 3 * ((k >> 1) * (NODE_CELLS + 1) + (k & 1));
     vec4 right = node_quad(quad), down = node_quad(quad + 1), map = node_quad(quad + 2);
     NearMap near;
     near.sign = map.w;
     near.first_cell = floatBitsToUint(map.z);
     near.half_edges = map.xy;
-    near.place = vec2(dot(right.xyz, point) + right.w, dot(down.xyz, point) + down.w);
+    near.centre = vec2(right.w, down.w);
     near.steps[0] = vec2(dot(right.xyz, axes[0]), dot(down.xyz, axes[0]));
     near.steps[1] = vec2(dot(right.xyz, axes[1]), dot(down.xyz, axes[1]));
     near.steps[2] = vec2(dot(right.xyz, axes[2]), dot(down.xyz, axes[2]));
     // The outline lies off the centre's plane, at this depth: so the map sees it elsewhere.
     vec4 weights;
-    uvec2 around_it = around(near.place - offset * (near.steps * middle), near.first_cell, weights);
+    uvec2 around_it = around(near.centre + near.steps * foot, near.first_cell, weights);
     near.depth = near.sign * dot(unpackSnorm4x8(around_it.y), weights);
     return near;
 }
 
-// What one map knows of the outline near the ray in direction `along` (by the axes), the point's own place along it being `offset`.
+// What one map knows of the outline near the ray in direction `along` with that foot, both by the axes.
 // x: signed distance of the ray from the outline, positive where it meets the object; y: depth along the ray of the outline's nearest
 // point. Object's frame, in r.
-vec2 outline(NearMap near, vec3 along, float offset) {
-    vec2 place = near.place + (near.depth - offset) * (near.steps * along);
+vec2 outline(NearMap near, vec3 along, vec3 foot) {
+    vec2 place = near.centre + near.steps * (foot + near.depth * along);
     vec2 beyond = (place - clamp(place, -1.0, 1.0)) * near.half_edges;
     vec4 weights;
     uvec2 cell = around(place, near.first_cell, weights);

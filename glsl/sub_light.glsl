@@ -6,6 +6,7 @@ struct SeenLight {
     vec3 down;
     float distance; // of its centre, metres
     float sine;     // of its angular radius
+    float fine;     // share of the four fine blocks
 };
 
 struct Block {
@@ -25,12 +26,8 @@ SeenLight seen_light(vec3 to, float radius) {
     vec3 across = cross(light.toward, vec3(TURNED_X, TURNED_Y, TURNED_Z));
     light.across = across / max(length(across), 1e-30);
     light.down = cross(light.toward, light.across);
+    light.fine = clamp((light.sine / LIMIT_SINE - 1.0) / (BLEND - 1.0), 0.0, 1.0);
     return light;
-}
-
-// Share of the four fine blocks.
-float fine_share(SeenLight light) {
-    return clamp((light.sine / LIMIT_SINE - 1.0) / (BLEND - 1.0), 0.0, 1.0);
 }
 
 // Corner k of the square around the middle of a disc of radius 1.
@@ -41,12 +38,11 @@ vec2 corner(uint k) {
 
 // Block 0 is the whole light, 1 to 4 are lights of half its radius.
 Block block_of(SeenLight light, uint b) {
-    float fine = fine_share(light);
     Block block;
     block.middle = b == 0 ? vec2(0.0) : corner(b - 1);
     block.radius = b == 0 ? 1.0 : 0.5;
     block.sine = 0.5 * light.sine * block.radius;
-    block.weight = 3.14159265 * light.sine * light.sine * (b == 0 ? 0.25 * (1.0 - fine) : 0.0625 * fine);
+    block.weight = 3.14159265 * light.sine * light.sine * (b == 0 ? 0.25 * (1.0 - light.fine) : 0.0625 * light.fine);
     return block;
 }
 

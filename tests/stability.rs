@@ -7,6 +7,7 @@ mod stage;
 use common::report;
 use shadow_fields::bake;
 use shadow_fields::bench::trials::{cases, run};
+use shadow_fields::check;
 use shadow_fields::field::Storage;
 use shadow_fields::frame::Options;
 use shadow_fields::lists::skip::Skip;
@@ -16,9 +17,9 @@ use stage::{small, stage};
 fn odd_scenes_stay_bounded() {
     let Some(stage) = stage() else { return };
     for case in cases(64).unwrap() {
-        for storage in [Storage::F16, Storage::F32] {
-            let bake = bake::Options { storage, ..small().bake };
-            let options = Options { bake, skip: Skip::without("unmoved"), ..small() };
+        for (storage, base) in [(Storage::F16, check::sharp::sharp_options()), (Storage::F32, small())] {
+            let bake = bake::Options { storage, ..base.bake };
+            let options = Options { bake, skip: Skip::without("unmoved"), ..base };
             let trial = run(&case, stage.frame(&case.scene, options), storage).unwrap();
             report(&format!("{trial:?}"));
             assert!(trial.passed, "{trial:?}");

@@ -71,7 +71,8 @@ impl Task<'_> {
     /// Irradiance of a light of radiance 1.
     fn irradiance(&self, v: usize, point: &SurfacePoint, light: &SharpLight) -> f64 {
         let shining = &self.objects[light.entity];
-        let seen = SeenLight::new(shining.centre - point.position, shining.radius_m);
+        let see = if light.ball_share.is_some() { SeenLight::new } else { SeenLight::outlined };
+        let seen = see(shining.centre - point.position, shining.radius_m);
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
         let occluders: Vec<&Object<'_>> = self.occluders.iter().filter(between).map(|&j| &self.objects[j]).collect();
         let near = |object: &Object<'_>, toward: DVec3| {

@@ -34,7 +34,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
     vec4 weights[4];
     vec2 found[4];
     [[unroll]] for (uint k = 0; k < 4; k++) {
-        along[k] = along_axes(light, part_place(block, k));
+        along[k] = along_axes(light, part_place(light, block, k));
         offset[k] = dot(place, along[k]);
         foot[k] = place - offset[k] * along[k];
         weights[k] = node_weights(cell, axes * along[k]);
@@ -46,13 +46,13 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
             found[k] += weights[k][m] * outline(near, along[k], foot[k]);
         }
     }
-    float tangent = block.sine * inversesqrt(1.0 - block.sine * block.sine);
     vec4 through;
     [[unroll]] for (uint k = 0; k < 4; k++) {
         // The light's surface in this direction.
-        vec2 p = part_place(block, k);
-        float reach = light.distance * (along[k].x - light.sine * sqrt(1.0 - dot(p, p)));
-        float limit = before ? reach * occluder.centre.w : 1e30;
+        vec2 part = part_place(light, block, k);
+        float limit = before ? reach_of(light, part, along[k]) * occluder.centre.w : 1e30;
+        float sine = part_sine(light, block, part, along[k]);
+        float tangent = sine * inversesqrt(1.0 - sine * sine);
         float away = found[k].y - offset[k];
         through[k] = 1.0 - blocked(found[k].x, away, limit, tangent);
 #ifdef EDGES
@@ -70,13 +70,15 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
     mat3 axes = mat3(light.toward, light.across, light.down);
     vec4 share;
     [[unroll]] for (uint k = 0; k < 4; k++) {
-        vec3 along = along_axes(light, part_place(block, k));
+        vec2 part = part_place(light, block, k);
+        vec3 along = along_axes(light, part);
         vec3 direction = axes * along;
-        share[k] = block.weight / along.x * part_cosine(dot(surface.normal, direction), block.sine);
+        float sine = part_sine(light, block, part, along);
+        share[k] = block.weight * part_light(light, block, part, along) * part_cosine(dot(surface.normal, direction), sine);
 #if SELF
         // A part's radius is small enough for its sine to stand for it.
         bool shadows = surface.self_first != NONE;
-        float sees = self_visible(shadows ? surface.self_first : 0, surface.self_frame, direction, block.sine);
+        float sees = self_visible(shadows ? surface.self_first : 0, surface.self_frame, direction, sine);
         share[k] *= shadows ? sees : 1.0;
 #endif
     }
@@ -94,11 +96,7 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
     // Loops are tested at their ends, as in the merge.
     do {
         Entity shining = ENTITY(chain_light(entry_at(first + i)));
-        SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, 1.0 / shining.centre.w);
-#if OUTLINES
-        // Four parts do not carry the outline of a mesh.
-        light.fine = shining.sharp.y > 0.0 ? light.fine : 1.0;
-#endif
+        SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, shining);
         uint b = light.fine >= 1.0 ? 1 : 0;
         uint last = light.fine <= 0.0 ? 0 : 4;
         float irradiance = 0.0;

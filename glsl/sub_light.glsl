@@ -1,49 +1,90 @@
-// A round light and its parts, four to a block. The twin is src/field/sub_light.rs.
+// A ball or a panel of light and its parts, four to a block. The twin is src/field/sub_light.rs.
 
 struct SeenLight {
     vec3 toward;    // unit, to its centre
     vec3 across;    // unit axes at right angles to that
     vec3 down;
     float distance; // of its centre, metres
-    float sine;     // of its angular radius
+    float sine;     // of the angular radius of its bounding sphere
     float fine;     // share of the four fine blocks
+#if PANELS
+    float panel;    // 0: a ball; less: a disc; more: a rectangle
+    vec3 facing;    // unit normal of a panel's side that shines, by the axes above
+    mat2x3 half_edges; // from its middle to the middles of two edges, by the axes above, metres
+    float area;     // square metres
+#endif
 };
 
 struct Block {
-    vec2 middle;  // on a disc of radius 1
-    float radius; // on that disc
-    float weight; // of a part: irradiance that it sends to a surface that faces it, times its tilt, of radiance 1
-    float sine;   // of a part's angular radius
+    vec2 middle;  // 0 to 1 from the light's
+    float scale;  // its size, of the light's
+    float area;   // share of the light in each part
+    float weight; // of this block beside those of another size
 };
 
 // `to`: vector to the centre.
-SeenLight seen_light(vec3 to, float radius) {
+SeenLight seen_light(vec3 to, Entity shining) {
     SeenLight light;
     light.distance = length(to);
     // From its very centre it is seen above, as the twin has it.
     light.toward = light.distance > 0.0 ? to / light.distance : vec3(0.0, 1.0, 0.0);
-    light.sine = min(radius / max(light.distance, 1e-30), MOST_SINE);
+    light.sine = min(1.0 / (shining.centre.w * max(light.distance, 1e-30)), MOST_SINE);
     vec3 across = cross(light.toward, vec3(TURNED_X, TURNED_Y, TURNED_Z));
     light.across = across / max(length(across), 1e-30);
     light.down = cross(light.toward, light.across);
     light.fine = clamp((light.sine / LIMIT_SINE - 1.0) / (BLEND - 1.0), 0.0, 1.0);
+#if OUTLINES
+    // Four parts do not carry the outline of a mesh.
+    light.fine = shining.sharp.y > 0.0 ? light.fine : 1.0;
+#endif
+#if PANELS
+    light.panel = shining.sharp.w;
+    float ratio = light.panel;
+    vec2 radii = (ratio > 0.0 ? vec2(1.0, ratio) * inversesqrt(1.0 + ratio * ratio) : vec2(sqrt(abs(ratio)))) / shining.centre.w;
+    mat3 axes = mat3(light.toward, light.across, light.down);
+    light.facing = to_world(shining, vec3(0.0, 1.0, 0.0)) * axes;
+    light.half_edges[0] = radii.x * (to_world(shining, vec3(1.0, 0.0, 0.0)) * axes);
+    light.half_edges[1] = radii.y * (to_world(shining, vec3(0.0, 0.0, 1.0)) * axes);
+    light.area = radii.x * radii.y * (ratio > 0.0 ? 4.0 : 3.14159265);
+#endif
     return light;
 }
 
-// Corner k of the square around the middle of a disc of radius 1.
-vec2 corner(uint k) {
-    float reach = (k & 2) == 0 ? CORNER : -CORNER;
-    return (k & 1) == 0 ? vec2(reach, 0.0) : vec2(0.0, reach);
+// Place of part k of a whole.
+vec2 corner(SeenLight light, uint k) {
+    vec2 place = (k & 1) == 0 ? vec2(CORNER, 0.0) : vec2(0.0, CORNER);
+    place = (k & 2) == 0 ? place : -place;
+#if PANELS
+    if (light.panel > 0.0) {
+        float along = 0.5 * float(k) - 0.75;
+        place = vec2((k & 1) == 0 ? -0.5 : 0.5, (k & 2) == 0 ? -0.5 : 0.5);
+        place = light.panel * STRIP < 1.0 ? vec2(along, 0.0) : light.panel > STRIP ? vec2(0.0, along) : place;
+    }
+#endif
+    return place;
 }
 
-// Block 0 is the whole light, 1 to 4 are lights of half its radius.
+// Block 0 is the whole light, 1 to 4 are its quarters.
 Block block_of(SeenLight light, uint b) {
     Block block;
-    block.middle = b == 0 ? vec2(0.0) : corner(b - 1);
-    block.radius = b == 0 ? 1.0 : 0.5;
-    block.sine = 0.5 * light.sine * block.radius;
-    block.weight = 3.14159265 * light.sine * light.sine * (b == 0 ? 0.25 * (1.0 - light.fine) : 0.0625 * light.fine);
+    block.middle = vec2(0.0);
+    block.scale = 1.0;
+    block.area = 0.25;
+    block.weight = 1.0 - light.fine;
+    if (b > 0) {
+        block.middle = corner(light, b - 1);
+        block.scale = 0.5;
+#if PANELS
+        block.scale = light.panel > 0.0 && (light.panel * STRIP < 1.0 || light.panel > STRIP) ? 0.25 : 0.5;
+#endif
+        block.area = 0.0625;
+        block.weight = light.fine;
+    }
     return block;
+}
+
+vec2 part_place(SeenLight light, Block block, uint k) {
+    return block.middle + block.scale * corner(light, k);
 }
 
 // Cosine of the angle between the light's middle and a place on its disc.
@@ -51,13 +92,46 @@ float tilt_of(SeenLight light, vec2 place) {
     return sqrt(1.0 - light.sine * light.sine * dot(place, place));
 }
 
-// Direction of a place on the light's disc, by the light's axes.
+// Unit direction of a place on the light, by the light's axes.
 vec3 along_axes(SeenLight light, vec2 place) {
+#if PANELS
+    if (light.panel != 0.0) {
+        vec3 to = vec3(light.distance, 0.0, 0.0) + light.half_edges * place;
+        return to / max(length(to), 1e-30);
+    }
+#endif
     return vec3(tilt_of(light, place), light.sine * place);
 }
 
-vec2 part_place(Block block, uint k) {
-    return block.middle + block.radius * corner(k);
+// How far the light's surface is at a place, in direction `along`.
+float reach_of(SeenLight light, vec2 place, vec3 along) {
+#if PANELS
+    if (light.panel != 0.0) {
+        return length(vec3(light.distance, 0.0, 0.0) + light.half_edges * place);
+    }
+#endif
+    return light.distance * (along.x - light.sine * sqrt(1.0 - dot(place, place)));
+}
+
+// Irradiance that a part sends to a surface that faces it, of radiance 1.
+float part_light(SeenLight light, Block block, vec2 place, vec3 along) {
+#if PANELS
+    if (light.panel != 0.0) {
+        float reach = reach_of(light, place, along), area = light.area * block.area;
+        return area * max(-dot(light.facing, along), 0.0) / (reach * reach + area / 3.14159265);
+    }
+#endif
+    return 3.14159265 * light.sine * light.sine * block.area / along.x;
+}
+
+// Sine of a part's angular radius.
+float part_sine(SeenLight light, Block block, vec2 place, vec3 along) {
+#if PANELS
+    if (light.panel != 0.0) {
+        return min(sqrt(part_light(light, block, place, along) / 3.14159265), MOST_SINE);
+    }
+#endif
+    return light.sine * sqrt(block.area);
 }
 
 // Mean of the cosine to a normal over a part, which the horizon may cut.

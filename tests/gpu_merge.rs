@@ -5,8 +5,8 @@ mod common;
 mod stage;
 
 use common::report;
+use shadow_fields::asset::Generator;
 use shadow_fields::asset::embedded;
-use shadow_fields::asset::generate::Generator;
 use shadow_fields::check::merge::{ARITHMETIC, Agreement, FILTER, LATTICES, MIXED, TIES, against_twin};
 use shadow_fields::field::{Lookup, Storage};
 use shadow_fields::frame::{Frame, Options};

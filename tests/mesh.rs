@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use glam::{DVec3, Quat, Vec3};
-use shadow_fields::asset::generate::{Generator, cuboid, library, plane, sphere, torus, torus_two_colour};
+use shadow_fields::asset::Generator;
+use shadow_fields::asset::generate::{cuboid, library, plane, sphere, torus, torus_two_colour};
 use shadow_fields::asset::{Mesh, enclose, obj, teapot};
 
 /// f32 positions: a few roundings of 6e-8 each, summed over many triangles of either sign.

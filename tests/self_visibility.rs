@@ -178,9 +178,7 @@ fn by_map(map: &[u8], normal: DVec3, toward: DVec3, angle: f64) -> f64 {
     let blocks = SeenLight::new(1e6 * toward, 1e6 * angle.sin()).blocks();
     let parts = blocks.iter().flat_map(|(_, parts)| parts);
     let sees = |part: &Part| visible(map, normal, part.toward, part.sine);
-    // Weights are shares of a disc at right angles to the light's middle, whose area is pi sin^2 of 2 pi (1 - cos).
-    let spread = (1.0 + angle.cos()) / 2.0;
-    parts.map(|part| spread * part.weight * part.cosine(normal) / part.tilt * sees(part)).sum()
+    parts.map(|part| part.share(normal) * sees(part)).sum::<f64>() / (TAU * (1.0 - angle.cos()))
 }
 
 /// Its figures stand in `src/field/self_visibility.rs`.

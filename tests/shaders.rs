@@ -38,10 +38,10 @@ fn sharp() -> Vec<ShaderPermutation> {
     let way = |bits: u32| {
         let on = |bit: u32| bits >> bit & 1 == 1;
         let silhouette = SilhouetteOptions::default();
-        let (texel, uniform, outlines, self_shadows) = (on(0), on(1), on(2), on(3));
-        SharpPermutation { texel, uniform, entity_limit: 48, silhouette, outlines, self_shadows }.row()
+        let (texel, uniform, outlines, panels, self_shadows) = (on(0), on(1), on(2), on(3), on(4));
+        SharpPermutation { texel, uniform, entity_limit: 48, silhouette, outlines, panels, self_shadows }.row()
     };
-    (0..16).map(way).collect()
+    (0..32).map(way).collect()
 }
 
 fn drawing() -> Vec<ShaderPermutation> {
@@ -53,6 +53,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         entity_limit: 48,
         silhouette,
         outlines,
+        panels: outlines,
         self_shadows: true,
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];

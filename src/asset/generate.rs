@@ -1,16 +1,13 @@
 //! Generated meshes with analytic normals, for the built-in scenes and the tests.
 //!
-//! The functions assert their ranges. [`Generator`] is their form in scene files; it reports bad numbers as errors.
+//! The functions assert their ranges. [`Generator`](super::Generator) is their form in scene files; it reports bad numbers as errors.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-use glam::{DVec3, Vec3};
-use serde::{Deserialize, Serialize};
-
-use super::mesh::{COORDINATE_LIMIT_M, Mesh, TRIANGLE_LIMIT};
+use super::mesh::Mesh;
 use super::teapot;
-use crate::error::{Error, Result};
+use glam::{DVec3, Vec3};
 
 /// Largest number of times that an icosahedron's triangles are divided: 1.3 million triangles.
 pub const SPHERE_SUBDIVISION_LIMIT: u32 = 8;
@@ -20,108 +17,6 @@ pub const COOL: Vec3 = Vec3::new(0.02, 0.12, 1.0);
 pub const WARM: Vec3 = Vec3::new(1.0, 0.12, 0.02);
 /// Half the width of the blend between the two colours, as a share of the major radius. It spans several segments.
 const BLEND: f64 = 0.15;
-
-/// A generated mesh as a scene file names it: a table with one key, for example `sphere = { radius_m = 0.5, subdivisions = 3 }`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Generator {
-    /// See [`plane`].
-    Plane {
-        /// Edge length in metres.
-        size_m: f32,
-        /// Squares along an edge.
-        cells: u32,
-    },
-    /// See [`sphere`].
-    Sphere {
-        /// Radius in metres.
-        radius_m: f32,
-        /// Number of times that every triangle of an icosahedron is divided into four.
-        subdivisions: u32,
-    },
-    /// See [`torus`].
-    Torus {
-        /// Radius in metres of the circle in the middle of the ring.
-        major_m: f32,
-        /// Radius in metres of the ring's cross-section.
-        minor_m: f32,
-        /// Pieces around the axis.
-        segments: u32,
-        /// Pieces around the cross-section.
-        sides: u32,
-    },
-    /// See [`torus_two_colour`]; fields as of `torus`.
-    TorusTwoColour {
-        /// Radius in metres of the circle in the middle of the ring.
-        major_m: f32,
-        /// Radius in metres of the ring's cross-section.
-        minor_m: f32,
-        /// Pieces around the axis.
-        segments: u32,
-        /// Pieces around the cross-section.
-        sides: u32,
-    },
-    /// See [`cuboid`].
-    Cuboid {
-        /// Edge lengths in metres along x, y and z.
-        size_m: Vec3,
-        /// Squares along every edge.
-        cells: u32,
-    },
-    /// See [`teapot::teapot`].
-    Teapot {
-        /// Squares along an edge of each of the 32 patches.
-        subdivisions: u32,
-    },
-}
-
-impl Generator {
-    /// Checks the numbers and makes the mesh.
-    ///
-    /// # Errors
-    /// [`Error::Input`], one line, where a length is not positive and finite or a count is zero or makes too many triangles.
-    pub fn build(&self) -> Result<Mesh> {
-        use Generator::{Cuboid, Plane, Sphere, Teapot, Torus, TorusTwoColour};
-        let square = |n: u32| u64::from(n).pow(2);
-        let (lengths, counts, triangles) = match *self {
-            Plane { size_m, cells } => (vec![size_m], vec![cells], square(cells).saturating_mul(2)),
-            Sphere { radius_m, subdivisions } => {
-                if subdivisions > SPHERE_SUBDIVISION_LIMIT {
-                    return Err(Error::Input(format!("subdivisions are over the limit of {SPHERE_SUBDIVISION_LIMIT}")));
-                }
-                (vec![radius_m], vec![], 0)
-            }
-            Torus { major_m, minor_m, segments, sides } | TorusTwoColour { major_m, minor_m, segments, sides } => {
-                if segments < 3 || sides < 3 {
-                    return Err(Error::Input("a torus needs at least 3 segments and 3 sides".into()));
-                }
-                if minor_m > major_m {
-                    return Err(Error::Input("the minor radius of a torus is at most its major radius".into()));
-                }
-                (vec![major_m, minor_m], vec![], (u64::from(segments) * u64::from(sides)).saturating_mul(2))
-            }
-            Cuboid { size_m, cells } => (size_m.to_array().to_vec(), vec![cells], square(cells).saturating_mul(12)),
-            Teapot { subdivisions } => (vec![], vec![subdivisions], square(subdivisions).saturating_mul(64)),
-        };
-        if lengths.iter().any(|l| !(1e-7..=COORDINATE_LIMIT_M / 2.0).contains(l)) {
-            return Err(Error::Input(format!("a length is not within 1e-7 to {:e} m", COORDINATE_LIMIT_M / 2.0)));
-        }
-        if counts.contains(&0) {
-            return Err(Error::Input("a count of cells or subdivisions is zero".into()));
-        }
-        if triangles > TRIANGLE_LIMIT as u64 {
-            return Err(Error::Input(format!("{triangles} triangles are over the limit of {TRIANGLE_LIMIT}")));
-        }
-        Ok(match *self {
-            Plane { size_m, cells } => plane(size_m, cells),
-            Sphere { radius_m, subdivisions } => sphere(radius_m, subdivisions),
-            Torus { major_m, minor_m, segments, sides } => torus(major_m, minor_m, segments, sides),
-            TorusTwoColour { major_m, minor_m, segments, sides } => torus_two_colour(major_m, minor_m, segments, sides),
-            Cuboid { size_m, cells } => cuboid(size_m, cells),
-            Teapot { subdivisions } => teapot::teapot(teapot::CONTROL_TEXT, subdivisions)?,
-        })
-    }
-}
 
 /// Makes the mesh. It meets the conditions of [`Mesh::new`] if the numbers are in range.
 fn finish(

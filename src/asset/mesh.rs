@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::{enclose, topology};
 use crate::error::{Error, Result};
+use crate::field::sub_light::Panel;
 
 /// Largest number of triangles of a mesh: 48 MB of indices, and edge tables of about 200 MB while it is checked.
 pub const TRIANGLE_LIMIT: usize = 4_000_000;
@@ -34,6 +35,7 @@ pub struct Mesh {
     radius_m: f32,
     shape: topology::Topology,
     content_hash: [u8; 32],
+    panel: Option<Panel>,
 }
 
 impl Mesh {
@@ -74,7 +76,18 @@ impl Mesh {
         }
         let shape = topology::shape(&positions, &triangles, centre, radius_m);
         let content_hash = hash(&positions, &normals, colors.as_deref(), &triangles);
-        Ok(Self { name: name.into(), positions, normals, colors, triangles, centre, radius_m, shape, content_hash })
+        Ok(Self {
+            name: name.into(),
+            positions,
+            normals,
+            colors,
+            triangles,
+            centre,
+            radius_m,
+            shape,
+            content_hash,
+            panel: None,
+        })
     }
 
     /// Centre and radius in metres of the smallest enclosing sphere (see [`enclose::bounding_sphere`]).
@@ -124,6 +137,16 @@ impl Mesh {
         };
         let is_ball = self.is_convex() && radius > 0.0 && self.triangles.iter().all(|t| depth(t) >= 0.9 * radius);
         is_ball.then(|| self.area_m2() / (4.0 * std::f64::consts::PI * radius * radius))
+    }
+
+    /// The face that shines, of a lamp that shines from one flat side.
+    pub fn panel(&self) -> Option<Panel> {
+        self.panel
+    }
+
+    /// The mesh of a lamp with that face.
+    pub(super) fn with_panel(self, panel: Panel) -> Self {
+        Mesh { panel: Some(panel), ..self }
     }
 
     /// Signed volume in cubic metres, positive for a closed mesh wound outwards; of no meaning for an open one.

@@ -19,11 +19,13 @@ pub mod equirect;
 #[cfg(feature = "cli")]
 pub mod false_color;
 pub mod generate;
+pub mod generator;
 pub mod grid;
 #[cfg(feature = "cli")]
 pub mod lettering;
 pub mod mesh;
 pub mod obj;
+pub mod panel;
 mod peak;
 pub mod picture;
 mod radiance;
@@ -31,6 +33,7 @@ pub mod sky;
 pub mod teapot;
 pub mod topology;
 
+pub use generator::Generator;
 pub use mesh::Mesh;
 
 /// A number as text; very large and very small ones have an exponent (`1e15`).

@@ -26,6 +26,7 @@ pub mod sweep;
 pub mod time_error;
 pub mod town;
 pub mod trials;
+pub mod turns;
 pub mod verdict;
 
 use crate::bake::Baker;

@@ -4,7 +4,8 @@ use super::Bench;
 use super::default_options;
 use super::plot::{AxisScale, Curve, Panel, Plot, PlotColumn, RowGroup, Rows};
 use super::refusals::{Refusal, refusals};
-use super::trials::{self, Trial, Turn};
+use super::trials::{self, Trial};
+use super::turns::{Turn, turns};
 use crate::error::Result;
 use crate::field::Storage;
 use crate::merge::chain::{self, Multiplier};
@@ -205,7 +206,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<StabilityOutcome> {
         (bench.progress)(&case.name);
     }
     (bench.progress)("a million small turns");
-    let turns = trials::turns(1_000_000);
+    let turns = turns(1_000_000);
     let rows = |value: Value| value.as_array().cloned().unwrap_or_default();
     let origin = json!({ "origin": bench.origin, "quick": bench.quick, "seed": bench.seed });
     let outcome = StabilityOutcome { chains, trials, turns, refusals: refusals() };

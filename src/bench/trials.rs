@@ -5,11 +5,10 @@ use crate::asset::{Mesh, embedded};
 use crate::error::Result;
 use crate::field::{Lattice, Storage};
 use crate::frame::Frame;
-use crate::scene::{Placement, Scene};
+use crate::scene::Scene;
 use crate::sh::lobe::clamped_cosine;
-use crate::sh::rotation::Rotation;
 use crate::truth::receiver_vertices;
-use glam::{DQuat, DVec3, Quat, Vec3};
+use glam::{DVec3, Vec3};
 use serde::Serialize;
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -92,6 +91,24 @@ const TRIALS: &[(&str, &str)] = &[
     ("a light that touches an occluder", "position = [0, 1, 0]; position = [0.9999, 1, 0.0137]\nemission = [5, 5, 5]"),
 ];
 
+/// Panels over a floor and a ball: how they stand, and what is odd about each.
+const PANELS: &[(&str, &str)] = &[
+    ("a disc that lies on the floor", "disc = { radius_m = 0.4 }|position = [1, 0.001, 0]"),
+    ("a disc that looks away", "disc = { radius_m = 0.4 }|position = [1, 1.5, 0]"),
+    (
+        "a rectangle through the floor",
+        "rectangle = { size_m = [1, 1] }|position = [1, 0, 0.013]\nrotation = { axis = [0, 0, 1], angle_deg = 90 }",
+    ),
+    (
+        "a strip of 1000 to 1",
+        "rectangle = { size_m = [2, 0.002] }|position = [0.3, 1.7, 0.1]\nrotation = { axis = [1, 0, 0], angle_deg = 180 }",
+    ),
+    (
+        "a panel of almost no size",
+        "rectangle = { size_m = [1e-6, 1e-6] }|position = [0.3, 1.7, 0.1]\nrotation = { axis = [1, 0, 0], angle_deg = 180 }",
+    ),
+];
+
 /// Suns over a floor and a ball, and what is odd about each.
 const SUNS: &[(&str, &str)] = &[
     ("a sun of 0.01 degrees", "toward = [1, 2, 0], angle_deg = 0.01, radiance = [1e8, 1e8, 1e8]"),
@@ -136,6 +153,15 @@ pub fn cases(longest: usize) -> Result<Vec<TrialCase>> {
         let sky = format!("[environment]\nsun = {{ {sun} }}");
         let ball = entity("ball", "position = [0, 0.7, 0]");
         add((*name).to_owned(), scene(40, &sky, &format!("{FLOOR}{ball}"))?);
+    }
+    for (name, panel) in PANELS {
+        let (mesh, place) = panel.split_once('|').expect("a mesh and a place");
+        let sky = format!("[[mesh]]\nname = \"panel\"\n{mesh}");
+        let panel = entity("panel", &format!("{place}\nemission = [9, 9, 9]"));
+        add(
+            (*name).to_owned(),
+            scene(40, &sky, &format!("{FLOOR}{}{panel}", entity("ball", "position = [0, 0.7, 0]")))?,
+        );
     }
     let glows = "emission = [9, 9, 9]";
     for (name, keeps) in [("one triangle", 1), ("an open mesh", 640)] {
@@ -293,62 +319,6 @@ pub fn run(case: &TrialCase, mut frame: Frame, storage: Storage) -> Result<Trial
     })
 }
 
-/// A rotation composed of many small ones in f32, as a program does that turns an object a little every frame.
-#[derive(Clone, Debug, Serialize)]
-pub struct Turn {
-    /// What is done after each step.
-    pub name: &'static str,
-    /// Steps.
-    #[serde(rename = "step_count")]
-    pub steps: usize,
-    /// Length of the quaternion in the end.
-    #[serde(rename = "length_ratio")]
-    pub length: f64,
-    /// How far the frame's rotation matrix of it is from keeping lengths: largest error of the SH blocks' rows.
-    #[serde(rename = "not_orthogonal_relative")]
-    pub not_orthogonal: f64,
-    /// Angle to the same turn in f64, degrees.
-    pub drift_deg: f64,
-    /// Whether it is finite and, as the frame normalises what it is given, keeps lengths to f32's rounding.
-    pub passed: bool,
-}
-
-/// Composes `steps` turns of a hundredth of a degree about a tilted axis.
-pub fn turns(steps: usize) -> Vec<Turn> {
-    let axis = DVec3::new(0.48, 0.6, 0.64);
-    let step = DQuat::from_axis_angle(axis, 0.01_f64.to_radians());
-    let turn = |(name, normalise): (&'static str, bool)| {
-        let (mut single, narrow) = (Quat::IDENTITY, step.as_quat());
-        for _ in 0..steps {
-            single = narrow * single;
-            if normalise {
-                single = single.normalize();
-            }
-        }
-        let exact = DQuat::from_axis_angle(axis, (0.01 * steps as f64).to_radians());
-        let given = Placement { position: Vec3::ZERO, rotation: single, scale: 1.0 }.turn();
-        let rotation = Rotation::new(4, given);
-        let mut worst = 0.0_f64;
-        for k in 0..16 {
-            let (mut unit, mut turned) = ([0.0; 16], [0.0; 16]);
-            unit[k] = 1.0;
-            rotation.apply(&unit, &mut turned);
-            worst = worst.max((turned.iter().map(|c| c * c).sum::<f64>() - 1.0).abs());
-        }
-        let drift_deg = given.angle_between(exact).to_degrees();
-        let finite = single.is_finite() && drift_deg.is_finite();
-        Turn {
-            name,
-            steps,
-            length: single.as_dquat().length(),
-            not_orthogonal: worst,
-            drift_deg,
-            passed: finite && worst < 1e-9,
-        }
-    };
-    [("normalised every frame", true), ("never normalised", false)].map(turn).to_vec()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -363,12 +333,5 @@ mod tests {
         let open = scene(2, sky, &entity("floor", "albedo = [1, 1, 1]")).unwrap();
         let bound = bound(&open, 4);
         assert!((1.0..2.0).contains(&bound), "{bound}");
-    }
-
-    #[test]
-    fn a_million_small_turns_keep_lengths() {
-        for turn in turns(1_000_000) {
-            assert!(turn.passed, "{turn:?}");
-        }
     }
 }

@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use shadow_fields::Result;
-use shadow_fields::asset::{Mesh, generate::Generator};
+use shadow_fields::asset::{Generator, Mesh};
 use shadow_fields::bake::{Options, capture, header, project};
 use shadow_fields::field::lattice::{Lattice, Lookup};
 use shadow_fields::field::quantity::FieldKind;

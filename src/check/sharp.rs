@@ -16,7 +16,8 @@ use crate::scene::Lights;
 /// half-width of a penumbra, which near an outline is a thousandth of the object's radius.
 pub const PENUMBRA: f64 = 1e-4;
 
-/// What [`MIXED`] has besides: a light with an outline of its own, a small light, and a ball that stands beyond it.
+/// What [`MIXED`] has besides: a light with an outline of its own, a small light, a ball that stands beyond it, and panels of every
+/// form.
 const MORE: &str = r#"
 [[entity]]
 mesh = "ring"
@@ -33,6 +34,30 @@ emission = [900, 700, 500]
 mesh = "ball"
 position = [0.211, 2.613, -2.037]
 scale = 0.7
+[[mesh]]
+name = "lamp"
+disc = { radius_m = 0.3 }
+[[mesh]]
+name = "window"
+rectangle = { size_m = [0.5, 0.8] }
+[[mesh]]
+name = "tube"
+rectangle = { size_m = [1.7, 0.1] }
+[[entity]]
+mesh = "lamp"
+position = [-1.613, 2.317, 0.291]
+rotation = { axis = [0, 0.3, 1], angle_deg = 217 }
+emission = [9, 7, 5]
+[[entity]]
+mesh = "window"
+position = [1.913, 1.517, 0.591]
+rotation = { axis = [0.1, 0.2, 1], angle_deg = 97 }
+emission = [6, 7, 9]
+[[entity]]
+mesh = "tube"
+position = [0.313, 2.717, 0.691]
+rotation = { axis = [1, 0.2, 0.1], angle_deg = 171 }
+emission = [9, 9, 7]
 "#;
 
 /// A small frame with sharp lights.

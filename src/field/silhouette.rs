@@ -316,7 +316,7 @@ impl SilhouetteField {
         for (toward, parts) in light.blocks() {
             let near = self.near(point, toward);
             for part in parts {
-                let share = light.share(&part, normal);
+                let share = part.share(normal);
                 sums[0] += share * self.blocked(&near, part.toward, part.distance, part.tangent());
                 sums[1] += share;
             }

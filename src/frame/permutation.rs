@@ -86,6 +86,7 @@ pub(super) fn sharp(
         entity_limit: merge.entity_limit,
         silhouette: options.bake.silhouette,
         outlines: emits(&|form| form == LightForm::Outline),
+        panels: emits(&|form| matches!(form, LightForm::Panel(_))),
         self_shadows: buffers.meshes.iter().any(|device_mesh| device_mesh.self_first != NONE),
     })
 }

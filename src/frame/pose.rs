@@ -93,9 +93,10 @@ impl Frame {
         let area = device_mesh.blocked.as_ref().map_or(Area::default(), |slot| slot.area);
         let [area_x, area_y] = area.axes.map(|axis| (rotation * axis).as_vec3());
         let terms = area.terms.map(|term| term as f32);
-        let share = match self.light_form(index) {
-            LightForm::Ball(share) => share,
-            LightForm::Harmonics | LightForm::Outline => 0.0,
+        let (share, panel) = match self.light_form(index) {
+            LightForm::Ball(share) => (share, 0.0),
+            LightForm::Panel(panel) => (1.0, panel.packed()),
+            LightForm::Harmonics | LightForm::Outline => (0.0, 0.0),
         };
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());
         layout::Entity {
@@ -113,7 +114,7 @@ impl Frame {
                 f32::from_bits(device_mesh.silhouette.as_ref().map_or(0, |slot| slot.first_node)),
                 share as f32,
                 device_mesh.drawn.grid().map_or(0.0, |grid| grid.step_m * placement.scale),
-                0.0,
+                panel,
             ],
             blocked_base: device_mesh.blocked.as_ref().map_or(0, base),
             radiance_base: device_mesh.radiance.as_ref().map_or(0, base),

@@ -20,7 +20,7 @@
 //! image = { file = "studio.hdr", scale = 0.5 }                             # equirectangular HDR, EXR or PNG
 //! [[mesh]]
 //! name = "ball"
-//! sphere = { radius_m = 0.5, subdivisions = 4 }                            # or plane, cuboid, torus, torus_two_colour, teapot
+//! sphere = { radius_m = 0.5, subdivisions = 4 }                            # or plane, cuboid, torus, torus_two_colour, teapot, disc, rectangle
 //! [[entity]]
 //! mesh = "ball"
 //! position = [0, 0.6, 0]
@@ -44,9 +44,9 @@ use serde::{Deserialize, Serialize};
 
 use super::motion::{Motion, Placement, PlacementF64, RotationData};
 use super::{ENTITY_LIMIT, MESH_LIMIT, gltf, values};
+use crate::asset::Generator;
 use crate::asset::Mesh;
 use crate::asset::environment::EnvironmentData;
-use crate::asset::generate::Generator;
 use crate::error::{Error, Result};
 
 /// Largest width or height of a picture, in pixels.

@@ -1,6 +1,7 @@
 //! How a scene's lights are computed: by spherical harmonics, or as sharp lights whose shadows have edges.
 
 use super::Scene;
+use crate::field::sub_light::Panel;
 use serde::{Deserialize, Serialize};
 
 /// Which lights are sharp.
@@ -10,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub enum Lights {
     /// None: every light goes through its field of spherical harmonics.
     Sh,
-    /// Every entity that glows in one colour. What has colours of its own, and the distant light, stay in spherical harmonics.
+    /// Every entity that glows in one colour, over its whole surface or from one flat side. What has colours of its own, and the distant light, stay in spherical harmonics.
     #[default]
     Sharp,
 }
@@ -24,16 +25,20 @@ pub enum LightForm {
     Ball(f64),
     /// As a sharp light of the mesh's own outline.
     Outline,
+    /// As a sharp light that shines from one flat side.
+    Panel(Panel),
 }
 
 impl LightForm {
     /// How the light of an entity is computed; of no meaning for one that does not emit.
     pub fn of(scene: &Scene, entity: usize, lights: Lights) -> Self {
         let mesh = &scene.meshes[scene.entities[entity].mesh];
-        if lights == Lights::Sh || mesh.colors.is_some() {
-            return LightForm::Harmonics;
+        match mesh.panel() {
+            _ if lights == Lights::Sh => LightForm::Harmonics,
+            Some(panel) => LightForm::Panel(panel),
+            None if mesh.colors.is_some() => LightForm::Harmonics,
+            None => mesh.ball_share().map_or(LightForm::Outline, LightForm::Ball),
         }
-        mesh.ball_share().map_or(LightForm::Outline, LightForm::Ball)
     }
 
     /// Whether its shadows have edges.
@@ -47,6 +52,8 @@ impl LightForm {
             LightForm::Harmonics => "spherical harmonics",
             LightForm::Ball(_) => "sharp, a ball",
             LightForm::Outline => "sharp, the mesh's outline",
+            LightForm::Panel(Panel::Disc(_)) => "sharp, a disc",
+            LightForm::Panel(Panel::Rectangle(_)) => "sharp, a rectangle",
         }
     }
 }

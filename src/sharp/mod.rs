@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::field::lattice::CELL_WARP;
 use crate::field::silhouette::{LEAST_PENUMBRA, NEAREST, REACH};
 use crate::field::silhouette_nodes::{BEYOND, LEAST_AHEAD};
-use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, TURNED_BY};
+use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, STRIP, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{CLUSTER_VERTICES, ENTRY_BITS};
 use crate::shaders::{Library, ShaderPermutation};
@@ -40,6 +40,8 @@ pub struct SharpPermutation {
     pub silhouette: SilhouetteOptions,
     /// Whether the scene has a sharp light with an outline of its own.
     pub outlines: bool,
+    /// Whether the scene has a sharp light that shines from one flat side.
+    pub panels: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
 }
@@ -65,6 +67,7 @@ impl SharpPermutation {
             .define("ENTITY_LIMIT", self.entity_limit)
             .define("ENTRY_BITS", ENTRY_BITS)
             .define("OUTLINES", self.outlines)
+            .define("PANELS", self.panels)
             .define("SELF", self.self_shadows)
             .define("NODE_CELLS", self.silhouette.cells)
             .define("MAP", self.silhouette.map_px);
@@ -78,6 +81,7 @@ impl SharpPermutation {
             ("LIMIT_SINE", LIMIT_SINE),
             ("BLEND", BLEND),
             ("CORNER", CORNER),
+            ("STRIP", STRIP),
             ("BEYOND", BEYOND),
             ("LEAST_AHEAD", LEAST_AHEAD),
             ("TURNED_X", TURNED_BY[0]),

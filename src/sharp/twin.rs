@@ -2,7 +2,7 @@
 
 use crate::field::self_visibility::{self, NODES};
 use crate::field::silhouette::{Near, SilhouetteField};
-use crate::field::sub_light::{BLOCK, Part, SeenLight};
+use crate::field::sub_light::{BLOCK, Panel, Part, SeenLight};
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -26,8 +26,10 @@ pub struct SharpLight {
     pub entity: usize,
     /// Linear RGB radiance.
     pub emission: DVec3,
-    /// Share of its sphere's disc that it covers if it is a ball; `None` for one with an outline of its own.
+    /// Share of its parts that shines: of its sphere's disc if it is a ball, 1 for a panel; `None` for one with an outline of its own.
     pub ball_share: Option<f64>,
+    /// The face that shines, if it shines from one flat side.
+    pub panel: Option<Panel>,
 }
 
 /// One receiver under all sharp lights.
@@ -71,8 +73,12 @@ impl Task<'_> {
     /// Irradiance of a light of radiance 1.
     fn irradiance(&self, v: usize, point: &SurfacePoint, light: &SharpLight) -> f64 {
         let shining = &self.objects[light.entity];
-        let see = if light.ball_share.is_some() { SeenLight::new } else { SeenLight::outlined };
-        let seen = see(shining.centre - point.position, shining.radius_m);
+        let (to, radius) = (shining.centre - point.position, shining.radius_m);
+        let seen = match light.panel {
+            Some(panel) => SeenLight::panel(to, radius, panel, shining.rotation),
+            None if light.ball_share.is_some() => SeenLight::new(to, radius),
+            None => SeenLight::outlined(to, radius),
+        };
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
         let occluders: Vec<&Object<'_>> = self.occluders.iter().filter(between).map(|&j| &self.objects[j]).collect();
         let near = |object: &Object<'_>, toward: DVec3| {
@@ -98,7 +104,7 @@ impl Task<'_> {
                     let toward = self.rotation.inverse() * part.toward;
                     self_visibility::visible(&maps[v * NODES..][..NODES], point.own_normal, toward, part.sine)
                 });
-                seen.share(part, point.normal) * sees * covers * through
+                part.share(point.normal) * sees * covers * through
             };
             parts.iter().map(part).sum()
         };

@@ -24,7 +24,7 @@ pub fn outline(
 #[cfg(test)]
 mod tests {
     use super::{outline as outline_of, *};
-    use crate::asset::generate::Generator;
+    use crate::asset::Generator;
     use crate::draw::camera::clip_from_world;
     use crate::scene::Camera;
     use glam::{Quat, Vec3};

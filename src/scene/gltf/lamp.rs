@@ -14,7 +14,7 @@ use super::tree::Stand;
 use crate::asset::Mesh;
 use crate::asset::disc::{SUN_DEG, Sun};
 use crate::asset::environment::RADIANCE_LIMIT;
-use crate::asset::generate::{Generator, sphere};
+use crate::asset::{Generator, generate::sphere};
 use crate::error::Result;
 use crate::scene::data::{EntityData, MeshData};
 use crate::scene::motion::{Motion, RotationData};

@@ -37,6 +37,17 @@ impl Error {
         }
     }
 
+    /// The kind of error that has this exit code, as another process told it; `Failed` for a code of none.
+    pub fn of_code(code: u8, message: String) -> Self {
+        match code {
+            2 => Error::Usage(message),
+            3 => Error::Unsupported(message),
+            4 => Error::Input(message),
+            5 => Error::Device(message),
+            _ => Error::Failed(message),
+        }
+    }
+
     /// The message for a terminal: on one line, unless it is a compiler's, and without control characters.
     pub fn line(&self) -> String {
         match self {

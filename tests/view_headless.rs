@@ -58,6 +58,7 @@ impl Stand {
                 validation: Validation::Core,
                 cache_dir: Some(common::cache_dir()),
             },
+            workers: None,
             library,
             cache: Cache::new(Some(&cache)),
             frame: options,

@@ -1,7 +1,7 @@
 //! Options that every subcommand has, and the device that they lead to.
 
 use super::output::{self, Progress};
-use crate::bake::{self, Baker, cache::Cache};
+use crate::bake::{self, Baker, WorkerOptions, cache::Cache};
 use crate::draw::{Antialias, Shading};
 use crate::error::{Error, Result};
 use crate::field::Lookup;
@@ -51,6 +51,34 @@ pub struct Global {
     /// Folder whose shader files are used instead of the built-in ones of the same name
     #[arg(long, global = true, value_name = "DIR")]
     pub shader_dir: Option<PathBuf>,
+    /// Processes that a bake is shared out among; its bytes are the same. Default: on a software device one a core, but one for a
+    /// small mesh; on a GPU one
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub jobs: Option<u32>,
+}
+
+impl Global {
+    /// How worker processes of this program are started; `None` where it does not know its own file.
+    pub fn workers(&self) -> Option<WorkerOptions> {
+        let program = std::env::current_exe().ok()?;
+        Some(WorkerOptions { program, jobs: self.jobs, validation: self.validation })
+    }
+}
+
+/// The folder of what is kept, which exists; `None` where nothing is to be kept or can be.
+pub fn cache_dir(global: &Global) -> Option<PathBuf> {
+    let folder = match (global.no_cache, &global.cache_dir) {
+        (true, _) => None,
+        (false, Some(folder)) => Some(folder.clone()),
+        (false, None) => dirs::cache_dir().map(|folder| folder.join("shadow-fields")),
+    };
+    folder.filter(|folder| match std::fs::create_dir_all(folder) {
+        Ok(()) => true,
+        Err(error) => {
+            log::warn!("{}: the cache folder cannot be made ({error}); nothing is kept", folder.display());
+            false
+        }
+    })
 }
 
 /// Options of a merge.
@@ -145,18 +173,7 @@ impl Context {
     /// # Errors
     /// What `open` returns.
     pub fn with_device(global: &Global, open: impl FnOnce(&gpu::DeviceOptions) -> Result<Arc<Device>>) -> Result<Self> {
-        let cache_dir = match (global.no_cache, &global.cache_dir) {
-            (true, _) => None,
-            (false, Some(folder)) => Some(folder.clone()),
-            (false, None) => dirs::cache_dir().map(|folder| folder.join("shadow-fields")),
-        };
-        let cache_dir = cache_dir.filter(|folder| match std::fs::create_dir_all(folder) {
-            Ok(()) => true,
-            Err(error) => {
-                log::warn!("{}: the cache folder cannot be made ({error}); nothing is kept", folder.display());
-                false
-            }
-        });
+        let cache_dir = cache_dir(global);
         for folder in cache_dir.iter().flat_map(|cache| [cache.clone(), cache.join("fields"), cache.join("spirv")]) {
             files::sweep(&folder);
         }
@@ -175,7 +192,9 @@ impl Context {
         }
         let library = Library { shader_dir: global.shader_dir.clone(), cache_dir: cache_dir.clone() };
         let cache = Cache::new(cache_dir.as_deref());
-        let baker = Baker::new(&device, &library);
+        let baker = global
+            .workers()
+            .map_or_else(|| Baker::new(&device, &library), |workers| Baker::with_workers(&device, &library, workers));
         Ok(Context { device, baker, cache, progress: Progress::new(global), validation: global.validation })
     }
 

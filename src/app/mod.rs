@@ -19,6 +19,7 @@ mod silhouette;
 mod source;
 #[cfg(feature = "view")]
 mod view;
+mod worker;
 
 use crate::error::{Error, Result, one_line};
 use crate::gpu::signals;
@@ -64,6 +65,9 @@ enum Subcommands {
     View(view::Arguments),
     /// List the Vulkan devices of this machine
     Devices(devices::Arguments),
+    /// Capture for a bake in another process, which starts this
+    #[command(name = crate::bake::workers::COMMAND, hide = true)]
+    BakeWorker,
 }
 
 /// Runs the program on arguments, the first of which is its name, as the command line does.
@@ -120,6 +124,7 @@ fn run(cli: &Cli) -> Result<()> {
         #[cfg(feature = "view")]
         Subcommands::View(arguments) => view::run(&cli.global, arguments),
         Subcommands::Devices(arguments) => devices::run(&cli.global, arguments),
+        Subcommands::BakeWorker => worker::run(&cli.global),
     }
 }
 

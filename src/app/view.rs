@@ -179,6 +179,7 @@ impl App<'_> {
         let setup = Setup {
             device: device.clone(),
             options: self.device_options.clone(),
+            workers: self.global.workers(),
             library: self.context.baker.library().clone(),
             cache: self.context.cache.clone(),
             frame: self.arguments.merge.options(self.arguments.bake.options(), own, antialias),

@@ -1,10 +1,13 @@
-//! The captures of one bake. A batch fills the atlas once. This holds the resources that batches share, and the loop over them.
+//! The captures of one bake. A batch fills the atlas once, and is captured in units that can be shared out among processes.
+//!
+//! Every face keeps the place in the atlas that the plan of the whole bake gives it, whichever process captures it and in whatever
+//! order. What a face shows depends on nothing else, so the samples are the same bytes however the units are shared out.
 
 use super::capture::{Capture, Model, NO_SLOT, Slots};
 use super::partial::Partial;
 use super::project::{Job, Project, Projection};
 use super::self_visibility::SelfVisibility;
-use super::{BakeReport, Baker, Progress};
+use super::{BakeReport, Baker};
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::Shortcuts;
@@ -12,11 +15,24 @@ use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::NODES;
 use crate::gpu::memory::TexelView;
 use crate::gpu::{Buffer, BufferKind, Commands};
-use bytemuck::Pod;
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// Most estimated seconds of a unit. It is long beside what a submission costs, and as long as processes wait for the last at the end.
+const UNIT_SECONDS: f64 = 0.25;
+/// Units that each of several processes has to take at least, where there are so many samples.
+const UNITS_EACH: f64 = 4.0;
+/// Seconds that llvmpipe takes a triangle that is drawn, and a texel that is captured and reduced. They were measured on two cores with
+/// the teapot and a torus of 69 696 triangles; no result depends on them, only how work is shared out.
+const TRIANGLE_SECONDS: f64 = 1.7e-7;
+const TEXEL_SECONDS: f64 = 5.5e-8;
+/// Share of the triangles of a closed mesh that are drawn, since chunks that show their backs are left out.
+const FACING_SHARE: f64 = 0.5;
 
 /// What the faces of a sample are reduced to.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Reduction {
     /// SH coefficients, in floats.
     Project { bands: usize, projection: Projection },
@@ -31,11 +47,16 @@ impl Reduction {
     }
 
     /// Numbers of a reduced sample.
-    fn numbers(self) -> usize {
+    pub fn numbers(self) -> usize {
         match self {
             Reduction::Project { bands, projection } => projection.channels() * channel_stride(bands),
             Reduction::SelfVisibility => NODES,
         }
+    }
+
+    /// Bytes of a reduced sample.
+    pub fn sample_bytes(self) -> usize {
+        self.numbers() * if self == Reduction::SelfVisibility { 1 } else { 4 }
     }
 }
 
@@ -76,12 +97,26 @@ pub(super) struct Captures<'c> {
     pub partial: &'c Partial,
 }
 
-/// A sample to capture: the place of its eye, and how its faces are reduced.
-#[derive(Clone, Copy)]
+/// A sample to capture: the place of its eye, and how its faces are reduced. Once it is planned, the job holds the places of the faces.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
 pub(super) struct CaptureTarget {
     /// The place of the eye, in r.
     pub eye: Vec3,
     pub job: Job,
+}
+
+/// Targets that are captured together, and the estimate of what they take.
+pub(super) struct Unit {
+    pub first: u32,
+    pub count: u32,
+    pub seconds: f64,
+}
+
+impl Unit {
+    pub fn targets(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
 }
 
 /// What every batch works with.
@@ -98,6 +133,10 @@ pub(super) struct Batches {
     pub results: Buffer,
     /// Bytes of a reduced sample.
     pub sample_bytes: u64,
+    /// Estimated seconds that drawing the mesh around one eye takes.
+    mesh_seconds: f64,
+    /// And what each face takes besides.
+    face_seconds: f64,
 }
 
 /// Eyes whose faces fit into one atlas, and where each face lies.
@@ -106,39 +145,29 @@ pub(super) struct Batch {
     pub slots: Vec<Slots>,
 }
 
-impl Captures<'_> {
-    /// Captures every target and puts the reduced samples into `values`, in the order of their numbers. It goes on from what a
-    /// cancelled bake has kept.
-    pub fn run<T: Pod>(
-        &self,
-        baker: &Baker,
-        targets: &[CaptureTarget],
-        values: &mut [T],
-        progress: Progress<'_>,
-    ) -> Result<BakeReport> {
-        let all = targets.len() as u32;
-        let begun = self.partial.load(values, all);
-        let numbers = self.reduction.numbers();
-        let mut batches = Batches::new(baker, self, (numbers * size_of::<T>()) as u64)?;
-        let mut report = BakeReport::default();
-        let mut rest = &targets[begun as usize..];
-        while !rest.is_empty() {
-            rest = batches.run_next(rest, (&mut *values, numbers), &mut report)?;
-            let done = (targets.len() - rest.len()) as u32;
-            self.partial.save(values, done, all);
-            progress(done, all);
-        }
-        self.partial.remove();
-        Ok(report)
-    }
+/// Estimated seconds of captures on a software device: of `eyes` that see the mesh in `faces` of `face_px`.
+pub(super) fn estimated_seconds(mesh: &Mesh, eyes: u64, faces: u64, face_px: u32) -> f64 {
+    let share = if mesh.is_closed() { FACING_SHARE } else { 1.0 };
+    let triangles = mesh.triangles.len() as f64 * share * eyes as f64;
+    triangles * TRIANGLE_SECONDS + faces as f64 * f64::from(face_px).powi(2) * TEXEL_SECONDS
+}
+
+/// Faces of a sample that are in the atlas.
+fn drawn(slots: &Slots) -> u32 {
+    slots.iter().filter(|slot| **slot != NO_SLOT).count() as u32
 }
 
 impl Batches {
-    fn new(baker: &Baker, captures: &Captures<'_>, sample_bytes: u64) -> Result<Self> {
+    /// The resources of a bake.
+    ///
+    /// # Errors
+    /// As [`Capture::new`]; `Device` when memory ran out.
+    pub fn new(baker: &Baker, captures: &Captures<'_>) -> Result<Self> {
         let radiance = captures.reduction.is_radiance();
         let (device, library) = (baker.device(), baker.library());
         let mut capture = Capture::new(device, library, captures.face_px, radiance)?;
         capture.skips = captures.shortcuts.faces;
+        let sample_bytes = captures.reduction.sample_bytes() as u64;
         let bytes = u64::from(capture.capacity()) * sample_bytes;
         Ok(Batches {
             reduce: Reduce::new(baker, captures, capture.columns)?,
@@ -148,34 +177,65 @@ impl Batches {
             samples: Buffer::new(device, "batch samples", BufferKind::Device, bytes)?,
             results: Buffer::new(device, "batch results", BufferKind::Readback, bytes)?,
             sample_bytes,
+            mesh_seconds: estimated_seconds(captures.mesh, 1, 0, captures.face_px),
+            face_seconds: estimated_seconds(captures.mesh, 0, 1, captures.face_px),
             capture,
         })
     }
 
-    /// Captures and reduces as many of the targets as fit into one atlas, and returns the others.
-    fn run_next<'t, T: Pod>(
-        &mut self,
-        targets: &'t [CaptureTarget],
-        (values, numbers): (&mut [T], usize),
-        report: &mut BakeReport,
-    ) -> Result<&'t [CaptureTarget]> {
+    /// Gives every face of every target its place in the atlas, batch after batch, and cuts the batches into units for so many
+    /// processes.
+    pub fn plan(&self, targets: &[CaptureTarget], jobs: usize) -> (Vec<CaptureTarget>, Vec<Unit>) {
         let eyes: Vec<Vec3> = targets.iter().map(|target| target.eye).collect();
-        let slots = self.capture.plan(&self.model, &eyes);
-        let (now, rest) = targets.split_at(slots.len());
-        let numbered = now.iter().zip(&slots).enumerate();
-        let jobs: Vec<Job> =
-            numbered.map(|(i, (target, slots))| Job { slots: *slots, target: i as u32, ..target.job }).collect();
+        let (mut planned, mut units) = (targets.to_vec(), Vec::new());
+        let mut first = 0;
+        while first < targets.len() {
+            let slots = self.capture.plan(&self.model, &eyes[first..]);
+            let mut unit = Unit { first: first as u32, count: 0, seconds: 0.0 };
+            for (target, slots) in planned[first..].iter_mut().zip(&slots) {
+                target.job.slots = *slots;
+                unit.count += 1;
+                unit.seconds += self.mesh_seconds + self.face_seconds * f64::from(drawn(slots));
+            }
+            units.push(unit);
+            first += slots.len();
+        }
+        let seconds: f64 = units.iter().map(|unit| unit.seconds).sum();
+        let most = if jobs > 1 { UNIT_SECONDS.min(seconds / (UNITS_EACH * jobs as f64)) } else { UNIT_SECONDS };
+        let cut = units.iter().flat_map(|batch| {
+            let parts = (batch.seconds / most).ceil().clamp(1.0, f64::from(batch.count)) as u32;
+            let at = move |part: u32| (u64::from(batch.count) * u64::from(part) / u64::from(parts)) as u32;
+            (0..parts).map(move |part| Unit {
+                first: batch.first + at(part),
+                count: at(part + 1) - at(part),
+                seconds: batch.seconds / f64::from(parts),
+            })
+        });
+        (planned, cut.collect())
+    }
+
+    /// Captures planned targets of one batch and returns their reduced samples, one after another.
+    ///
+    /// # Errors
+    /// What recording and submitting return.
+    pub fn run_unit(&mut self, targets: &[CaptureTarget], report: &mut BakeReport) -> Result<Vec<u8>> {
+        let numbered = targets.iter().enumerate();
+        let jobs: Vec<Job> = numbered.map(|(i, target)| Job { target: i as u32, ..target.job }).collect();
         self.jobs.write(0, &jobs);
-        let batch = Batch { eyes: eyes[..slots.len()].to_vec(), slots };
+        let batch = Batch {
+            eyes: targets.iter().map(|target| target.eye).collect(),
+            slots: targets.iter().map(|target| target.job.slots).collect(),
+        };
         let texels = self.reduce.texel_view()?;
         let mut commands = Commands::new(self.samples.device(), "bake batch")?;
         super::record_batch(&mut commands, self, &batch, texels.as_ref())?;
         report.add(&commands.submit()?);
-        report.faces += batch.slots.iter().flatten().filter(|slot| **slot != NO_SLOT).count() as u32;
-        let found: Vec<T> = self.results.read(0, now.len() * numbers);
-        for (target, sample) in now.iter().zip(found.chunks_exact(numbers)) {
-            values[target.job.target as usize * numbers..][..numbers].copy_from_slice(sample);
-        }
-        Ok(rest)
+        report.faces += batch.slots.iter().map(drawn).sum::<u32>();
+        Ok(self.results.read(0, targets.len() * self.sample_bytes as usize))
+    }
+
+    /// Most targets that one unit may hold.
+    pub fn capacity(&self) -> u32 {
+        self.capture.capacity()
     }
 }

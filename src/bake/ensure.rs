@@ -182,6 +182,8 @@ pub fn ensure(
     let found =
         of_meshes.find("transfer", &needs.transfers, |mesh, done| cache.transfer(baker, mesh, &needs.options, done))?;
     meshes.iter_mut().zip(found).for_each(|(to, found)| to.transfer = found);
+    // What idle workers hold is free for pictures.
+    baker.workers().into_iter().for_each(|workers| workers.dismiss());
     Ok(out)
 }
 

@@ -21,6 +21,7 @@ mod names;
 pub mod partial;
 pub mod project;
 pub mod report;
+mod run;
 mod samples;
 pub mod self_visibility;
 pub mod silhouette;
@@ -29,6 +30,9 @@ pub mod surface;
 pub mod symmetric_samples;
 pub mod symmetry;
 pub mod triangles;
+mod wire;
+pub mod worker;
+pub mod workers;
 
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
@@ -52,6 +56,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use symmetric_samples::Turned;
 use symmetry::Symmetry;
+pub use workers::{WorkerOptions, Workers};
 
 /// Distance of a transfer capture's eye from the surface along the normal, in r. It is large enough that the surface's own facets
 /// stay below the horizon, and small enough that contact shadows do not move visibly.
@@ -127,12 +132,18 @@ fn record_assembly<'r>(commands: &mut Commands<'r>, assembly: &'r Assembly, head
 pub struct Baker {
     device: Arc<Device>,
     library: Library,
+    workers: Option<Arc<Workers>>,
 }
 
 impl Baker {
-    /// A baker that compiles its shaders from `library`.
+    /// A baker that compiles its shaders from `library` and works in this process alone.
     pub fn new(device: &Arc<Device>, library: &Library) -> Self {
-        Baker { device: device.clone(), library: library.clone() }
+        Baker { device: device.clone(), library: library.clone(), workers: None }
+    }
+
+    /// A baker that shares its captures out among processes, which makes the same bytes in less time.
+    pub fn with_workers(device: &Arc<Device>, library: &Library, options: WorkerOptions) -> Self {
+        Baker { workers: Some(Workers::new(options, device, library)), ..Self::new(device, library) }
     }
 
     /// Checks that the device can bind the field that `header` describes, and the samples that it is baked from.
@@ -281,6 +292,11 @@ impl Baker {
         report.samples = targets.len() as u32;
         report.total = started.elapsed();
         Ok((maps, report))
+    }
+
+    /// Worker processes, if it has any.
+    pub fn workers(&self) -> Option<&Arc<Workers>> {
+        self.workers.as_ref()
     }
 
     /// The library that shaders come from.

@@ -15,12 +15,13 @@ use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 use super::capture::Slots;
 
 /// What a projection makes of the faces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Projection {
     /// Blocked part of an occlusion capture, one channel.
     Blocked,

@@ -60,10 +60,14 @@ impl Viewer {
             return self.build();
         }
         let (options, library) = (self.setup.options.clone(), self.setup.library.clone());
+        let workers = self.setup.workers.clone();
         self.bake = Some(BackgroundTask::new(move |worker: &TaskWorker<()>| {
             worker.report("opening the device for it", 0, 1);
             let device = Device::new(&options)?;
-            let baker = Baker::new(&device, &library);
+            let baker = match workers {
+                Some(workers) => Baker::with_workers(&device, &library, workers),
+                None => Baker::new(&device, &library),
+            };
             limits::check(&device, &scene, &needs)?;
             bake::ensure(&baker, &cache, &scene, &needs, &|what, done, all| worker.report(what, done, all))?;
             drop(baker);

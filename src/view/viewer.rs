@@ -11,8 +11,8 @@ use super::reload::Watch;
 use super::status::{ErrorScale, Status};
 use super::task::{BackgroundTask, TaskProgress};
 use crate::asset::edges::Edges;
-use crate::bake::Baker;
 use crate::bake::cache::Cache;
+use crate::bake::{Baker, WorkerOptions};
 use crate::draw::show::Show;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame};
@@ -36,6 +36,8 @@ pub struct Setup {
     pub device: Arc<Device>,
     /// Options with which background bakes open their own device.
     pub options: gpu::DeviceOptions,
+    /// Processes that background bakes are shared out among; `None` for this one alone.
+    pub workers: Option<WorkerOptions>,
     /// Shaders.
     pub library: Library,
     /// Where bakes are kept: on disk, or in memory.

@@ -24,6 +24,7 @@ pub fn run(folder: &Path) -> Result<()> {
     let setup = Setup {
         device: device.clone(),
         options,
+        workers: None,
         library: Library { shader_dir: None, cache_dir: Some(cache_dir.clone()) },
         cache: Cache::new(Some(&cache_dir)),
         frame: frame_options(),

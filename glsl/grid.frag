@@ -5,7 +5,6 @@
 layout(binding = 0) uniform utextureBuffer corners;  // vertices of each cell; see asset::grid
 layout(binding = 1) uniform textureBuffer radiosity; // of every vertex of the scene
 layout(location = 0) in vec2 place;
-layout(location = 1) in vec3 at_object; // object's frame, metres
 layout(location = 0) out vec4 color; // alpha: the entity's tag
 
 layout(push_constant) uniform Push {
@@ -23,6 +22,7 @@ layout(push_constant) uniform Push {
 // Blocks of cells that a shadow's edge comes near are drawn by this: their pixels evaluate sharp lights themselves, since vertices carry no
 // edge that is finer than their cells.
 #extension GL_EXT_control_flow_attributes : require
+layout(location = 1) in vec3 at_object; // object's frame, metres
 #include "merge_layout.glsl"
 #define ENTITY_BINDING 2
 #include "entities.glsl"

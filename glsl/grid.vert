@@ -3,7 +3,6 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec2 cell; // in cells from the first
 layout(location = 0) out vec2 place;
-layout(location = 1) out vec3 at; // object's frame, metres
 
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
@@ -14,6 +13,8 @@ layout(push_constant) uniform Push {
 } push;
 
 #if BLOCK_CELLS > 0
+layout(location = 1) out vec3 at; // object's frame, metres
+
 // A block is thrown away unless a shadow's edge comes near one of its vertices.
 layout(binding = 0) uniform utextureBuffer corners;  // vertices of each cell; see asset::grid
 layout(binding = 1) uniform textureBuffer radiosity; // w: whether an edge is near
@@ -36,9 +37,9 @@ bool has_edge(uint block) {
 
 void main() {
     place = cell;
-    at = position;
     gl_Position = push.clip_from_object * vec4(position, 1.0);
 #if BLOCK_CELLS > 0
+    at = position;
     if (!has_edge(uint(gl_VertexIndex) / 4)) {
         gl_Position = vec4(0.0, 0.0, 0.0, 1.0);
     }

@@ -45,6 +45,7 @@
 //! | [`draw`] | camera, rasterisation, smoothed outlines, tone and encoding |
 //! | [`scene_buffers`] | what a scene keeps on the device, and whether it fits |
 //! | [`frame`] | the sequence of passes with all barriers |
+//! | [`renderer`] | the front door for programs: a device, a scene, its light and its picture |
 //! | [`truth`] | ray casting and the exact SH chain |
 //! | [`check`] | every pass against its CPU twin |
 //! | `bench` | what things cost and how wrong they are (feature `cli`) |
@@ -83,6 +84,8 @@ pub mod gpu;
 pub mod layout;
 pub mod lists;
 pub mod merge;
+pub mod prelude;
+pub mod renderer;
 pub mod scene;
 pub mod scene_buffers;
 pub mod sh;
@@ -93,4 +96,8 @@ pub mod truth;
 #[cfg(feature = "cli")]
 pub mod view;
 
+/// The crate whose Vulkan handles this library takes and returns.
+pub use ash;
 pub use error::{Error, Result};
+/// The crate whose vectors, matrices and quaternions this library takes and returns.
+pub use glam;

@@ -25,11 +25,13 @@ const ORDER: &[&str] = &[
     "draw",
     "scene_buffers",
     "frame",
+    "renderer",
     "truth",
     "check",
     "bench",
     "view",
     "app",
+    "prelude",
     "main",
 ];
 

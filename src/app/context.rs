@@ -70,7 +70,7 @@ pub fn cache_dir(global: &Global) -> Option<PathBuf> {
     let folder = match (global.no_cache, &global.cache_dir) {
         (true, _) => None,
         (false, Some(folder)) => Some(folder.clone()),
-        (false, None) => dirs::cache_dir().map(|folder| folder.join("shadow-fields")),
+        (false, None) => Cache::usual_folder(),
     };
     folder.filter(|folder| match std::fs::create_dir_all(folder) {
         Ok(()) => true,

@@ -1,10 +1,9 @@
 //! Silhouette fields on the command line: `bake --silhouette`, and `inspect` of what it wrote.
 
 use super::context::Context;
-use super::quality::Quality;
 use super::{Global, output};
 use crate::asset::{Mesh, lettering, picture};
-use crate::bake::silhouette::bake_silhouette;
+use crate::bake::{Quality, silhouette::bake_silhouette};
 use crate::error::{Result, one_line};
 use crate::field::silhouette::{REACH, SilhouetteField};
 use glam::DVec3;

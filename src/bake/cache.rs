@@ -58,6 +58,12 @@ impl Cache {
         Cache { folder: folder.map(|f| f.join("fields")), memory: Arc::default() }
     }
 
+    /// The folder that the program keeps its cache in: `shadow-fields` in the user's cache folder; `None` where the user has none. It may
+    /// not exist yet.
+    pub fn usual_folder() -> Option<PathBuf> {
+        dirs::cache_dir().map(|folder| folder.join("shadow-fields"))
+    }
+
     fn path(&self, key: &str, ending: &str) -> Option<PathBuf> {
         Some(self.folder.as_ref()?.join(format!("{key}.{ending}")))
     }

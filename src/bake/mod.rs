@@ -20,6 +20,7 @@ mod names;
 
 pub mod partial;
 pub mod project;
+pub mod quality;
 pub mod report;
 mod run;
 mod samples;
@@ -50,6 +51,7 @@ pub use header::{Options, first_shell, hash_text, header};
 
 use partial::Partial;
 use project::{Job, Projection};
+pub use quality::Quality;
 pub use report::BakeReport;
 use samples::FieldSamples;
 use std::sync::Arc;

@@ -9,6 +9,7 @@
 mod change;
 mod draw_twin;
 pub mod memory;
+mod options;
 mod permutation;
 mod picture;
 mod pixel;
@@ -24,14 +25,12 @@ mod work;
 use crate::bake::cache::Cache;
 use crate::bake::ensure::SceneProgress;
 use crate::bake::{self, Baker, SceneNeeds};
-use crate::draw::{Antialias, Shading};
+use crate::draw::Shading;
 use crate::error::Result;
-use crate::field::Lookup;
-use crate::gpu::{Commands, Device, Timing};
+use crate::gpu::{Buffer, Commands, Device, Timing};
 use crate::lists::gather::Place;
 use crate::lists::gathering::Gathering;
 use crate::lists::incremental::{ClusterLists, Merged};
-use crate::lists::skip::Skip;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
 use crate::merge::{Inputs, Readable};
@@ -45,40 +44,14 @@ use picture::Picture;
 use pixel::PixelChains;
 use radiosity::Radiosity;
 use sky::SkyLight;
+use std::ops::Range;
 use std::sync::Arc;
 use work::ClusterWork;
 
+pub use options::Options;
 pub use record::{MergeWork, PictureTarget, PictureWork, record};
 pub use room::PictureMemory;
 pub use viewport::{RadiositySource, Viewport};
-
-/// What decides a frame besides the scene.
-#[derive(Clone, Copy, Debug)]
-pub struct Options {
-    /// Fields and transfers.
-    pub bake: bake::Options,
-    /// Which lights are sharp.
-    pub lights: Lights,
-    /// Where their light is evaluated for pictures; `None` takes [`Shading::usual`].
-    pub shading: Option<Shading>,
-    /// Which samples a lookup takes.
-    pub lookup: Lookup,
-    /// How the merge is done; `None` takes what was measured to be the device's fastest.
-    pub variant: Option<Variant>,
-    /// What the merge leaves out.
-    pub skip: Skip,
-    /// Whether an occluder is kept from lengthening a chain of products (see `glsl/merge_product.glsl`).
-    pub guard: bool,
-    /// Light that the merge leaves out: contributions to a vertex that are bounded below this share of the radiance that the
-    /// scene's exposure shows as white; 0 leaves none out.
-    pub eps: f32,
-    /// Where the lists of clusters are made; `None` takes what is known to be quicker on the device.
-    pub lists: Option<Place>,
-    /// Width and height of the picture in pixels.
-    pub size: [u32; 2],
-    /// How edges are kept from showing as stairs.
-    pub antialias: Antialias,
-}
 
 /// How the light of each entity of a scene is computed.
 fn forms(scene: &Scene, lights: Lights) -> Vec<LightForm> {
@@ -172,7 +145,7 @@ impl Frame {
     /// radiance above it is brought down to it, hue kept, before samples are averaged, so that edges of lights are smooth;
     /// infinity leaves radiance as it is. The host can read the picture afterwards. Returns each pass's duration.
     ///
-    /// While things move a picture lights only what it may show ([`Skip::hidden`]): whoever wants radiosity rather than a picture
+    /// While things move a picture lights only what it may show ([`crate::lists::skip::Skip::hidden`]): whoever wants radiosity rather than a picture
     /// calls this without `white`, which lights everything.
     ///
     /// # Errors
@@ -335,6 +308,12 @@ impl Frame {
     /// `Device` when memory ran out.
     pub fn radiosity(&self, entity: usize) -> Result<Vec<[f32; 3]>> {
         self.radiosity.read(entity, self.order(entity))
+    }
+
+    /// The buffer of all radiosity, and for every entity its bytes in it and the order in which its mesh's vertices stand there.
+    pub fn light_buffer(&self) -> (&Buffer, Vec<(Range<u64>, &[u32])>) {
+        let of = |entity| (self.radiosity.bytes(entity, self.order(entity).len()), self.order(entity));
+        (&self.radiosity.merged, (0..self.scene.entities.len()).map(of).collect())
     }
 
     /// Radiosity of every entity's vertices from elsewhere, by entity in the mesh's order, for [`RadiositySource::Comparison`] of

@@ -44,6 +44,12 @@ impl Radiosity {
         })
     }
 
+    /// The bytes of an entity of so many vertices.
+    pub fn bytes(&self, entity: usize, vertex_count: usize) -> std::ops::Range<u64> {
+        let first = self.offsets[entity];
+        first..first + 16 * vertex_count as u64
+    }
+
     /// What the merge writes.
     pub fn soft(&self) -> &Buffer {
         self.soft.as_ref().unwrap_or(&self.merged)
@@ -69,8 +75,7 @@ impl Radiosity {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn read(&self, entity: usize, order: &[u32]) -> Result<Vec<[f32; 3]>> {
-        let first = self.offsets[entity];
-        let quads: Vec<[f32; 4]> = self.merged.download_range(first..first + 16 * order.len() as u64)?;
+        let quads: Vec<[f32; 4]> = self.merged.download_range(self.bytes(entity, order.len()))?;
         let mut values = vec![[0.0; 3]; quads.len()];
         for (&v, [r, g, b, _]) in order.iter().zip(quads) {
             values[v as usize] = [r, g, b];

@@ -75,8 +75,9 @@ pub fn record<'f>(
     picture: Option<&PictureWork<'f>>,
     target: PictureTarget<'_, 'f>,
 ) -> Result<()> {
-    if matches!(target, PictureTarget::Screen { .. }) {
-        // The frame before may be under way, and uses the same buffers and images.
+    if matches!(target, PictureTarget::Screen { .. }) || merge.is_none() || commands.is_shared() {
+        // The frame before may be under way, and uses the same buffers and images; a picture alone shows its light. A caller that
+        // shares the device may still read that light.
         commands.after_flights();
     }
     if let Some(work) = merge {
@@ -92,6 +93,9 @@ pub fn record<'f>(
             commands.barrier(Access::ComputeWrite, Access::ComputeRead);
             commands.pass("sharp", |c| sharp.record(c, inputs, work.radiosity, work.cluster_count))?;
         }
+    }
+    if merge.is_some() && commands.is_shared() {
+        commands.barrier(Access::ComputeWrite, Access::Caller);
     }
     if merge.is_some() && picture.is_some() {
         // Triangles read the radiosity as a vertex attribute, grids look it up in the fragment shader.

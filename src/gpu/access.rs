@@ -34,6 +34,8 @@ pub enum Access {
     DepthWrite,
     /// The window system shows the image after it has waited for a semaphore.
     Present,
+    /// Whatever the caller does with it that shares the device: any read in any later command.
+    Caller,
 }
 
 impl Access {
@@ -49,6 +51,7 @@ impl Access {
             Access::DepthWrite => Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS,
             // The semaphore orders the accesses and makes the writes visible; the barrier only changes the layout.
             Access::Present => Stage::NONE,
+            Access::Caller => Stage::ALL_COMMANDS,
         }
     }
 
@@ -65,6 +68,7 @@ impl Access {
             Access::ColorWrite => Mask::COLOR_ATTACHMENT_READ | Mask::COLOR_ATTACHMENT_WRITE,
             Access::DepthWrite => Mask::DEPTH_STENCIL_ATTACHMENT_READ | Mask::DEPTH_STENCIL_ATTACHMENT_WRITE,
             Access::Present => Mask::NONE,
+            Access::Caller => Mask::MEMORY_READ,
         }
     }
 

@@ -317,7 +317,12 @@ impl<'r> Commands<'r> {
         self.end()?.launch(Signals::default())
     }
 
-    /// Barrier between all recordings launched before and all commands that follow in this one.
+    /// Whether the caller of the library uses the queue and what is on the device too ([`Device::is_shared`]).
+    pub fn is_shared(&self) -> bool {
+        self.recording.device.is_shared()
+    }
+
+    /// Barrier between all that was submitted to the queue before and all commands that follow in this recording.
     pub fn after_flights(&mut self) {
         let barriers = [vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)

@@ -1,9 +1,10 @@
-//! Instance, logical device and queue: the root that every other Vulkan object keeps alive.
+//! Logical device and queue: the root that every other Vulkan object keeps alive.
 
-use super::select::{Candidate, choose, physical_devices, queue_family, version_text};
-use super::validation::{LAYER, Messages, Validation, on_message};
-use super::{Checked, loader, manifest};
-use crate::error::{Error, Result};
+use super::Checked;
+use super::instance::{Instance, OwnInstance};
+use super::select::{Candidate, choose, physical_devices, queue_family};
+use super::validation::{Messages, Validation};
+use crate::error::Result;
 use ash::vk;
 use std::ffi::{CStr, CString};
 use std::path::PathBuf;
@@ -21,127 +22,19 @@ pub struct DeviceOptions {
     pub cache_dir: Option<PathBuf>,
 }
 
-/// Instance-level objects; dropped after the logical device.
-pub(super) struct Instance {
-    pub(super) entry: ash::Entry,
-    pub(super) handle: ash::Instance,
-    debug: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
-    has_debug_utils: bool,
-    /// Shared, with an address that stays: the messenger holds it.
-    messages: Arc<Messages>,
+/// Features of Vulkan 1.3 that a device must have been made with. Nothing else has to be enabled, and no extension.
+pub fn required_features() -> vk::PhysicalDeviceVulkan13Features<'static> {
+    vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true)
 }
 
-/// Checks that the loader has Vulkan 1.3, the validation layer if it is asked for, and the extensions in `surface`, which a window
-/// needs. Answers whether the loader has debug utils, which name objects in captures.
-///
-/// # Errors
-/// `Unsupported` with what is missing.
-fn check_loader(entry: &ash::Entry, validation: Validation, surface: &[&'static CStr]) -> Result<bool> {
-    // SAFETY: this and the two enumerations below are plain queries on a live entry.
-    let version = unsafe { entry.try_enumerate_instance_version() }
-        .checked("vkEnumerateInstanceVersion", "instance")?
-        .unwrap_or(vk::API_VERSION_1_0);
-    if version < vk::API_VERSION_1_3 {
-        return Err(Error::Unsupported(format!(
-            "the Vulkan loader supports version {}, but 1.3 is needed",
-            version_text(version)
-        )));
-    }
-    // SAFETY: as above.
-    let layers = unsafe { entry.enumerate_instance_layer_properties() }
-        .checked("vkEnumerateInstanceLayerProperties", "instance")?;
-    let has_layer = layers.iter().any(|l| l.layer_name_as_c_str() == Ok(LAYER));
-    if validation != Validation::Off && !has_layer {
-        return Err(Error::Unsupported(
-            "the Khronos validation layer is not installed (Debian's package is vulkan-validationlayers)".into(),
-        ));
-    }
-    // SAFETY: as above.
-    let extensions = match unsafe { entry.enumerate_instance_extension_properties(None) } {
-        Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = manifest::broken() => return Err(broken),
-        other => other.checked("vkEnumerateInstanceExtensionProperties", "instance")?,
-    };
-    let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
-    if let Some(missing) = surface.iter().find(|name| !has(name)) {
-        let missing = missing.to_string_lossy();
-        return Err(Error::Unsupported(format!(
-            "the Vulkan driver opens no windows here (it lacks {missing}); `shadow-fields render` needs none"
-        )));
-    }
-    Ok(has(ash::ext::debug_utils::NAME))
-}
-
-impl Instance {
-    /// `surface` lists the extensions that a window needs.
-    fn new(validation: Validation, surface: &[&'static CStr]) -> Result<Self> {
-        let entry = loader::entry()?;
-        let has_debug_utils = check_loader(&entry, validation, surface)?;
-        let application = vk::ApplicationInfo::default()
-            .application_name(c"shadow-fields")
-            .engine_name(c"shadow-fields")
-            .api_version(vk::API_VERSION_1_3);
-        let mut layer_names = Vec::new();
-        let mut extension_names: Vec<_> = surface.iter().map(|name| name.as_ptr()).collect();
-        if has_debug_utils {
-            extension_names.push(ash::ext::debug_utils::NAME.as_ptr());
-        }
-        if validation != Validation::Off {
-            layer_names.push(LAYER.as_ptr());
-            extension_names.push(ash::ext::validation_features::NAME.as_ptr());
-        }
-        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(validation.features());
-        let mut create = vk::InstanceCreateInfo::default()
-            .application_info(&application)
-            .enabled_layer_names(&layer_names)
-            .enabled_extension_names(&extension_names);
-        if validation != Validation::Off {
-            create = create.push_next(&mut features);
-        }
-        // SAFETY: every pointer in `create` outlives the call; the handle is destroyed in `Drop` after its children.
-        let handle = match unsafe { entry.create_instance(&create, None) } {
-            // The loader returns this code when it finds no driver.
-            Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => return Err(manifest::no_driver()),
-            Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) if let Some(broken) = manifest::broken() => return Err(broken),
-            other => other.checked("vkCreateInstance", "instance")?,
-        };
-        let mut instance = Instance { entry, handle, debug: None, has_debug_utils, messages: Arc::default() };
-        if validation != Validation::Off {
-            instance.listen()?;
-        }
-        Ok(instance)
-    }
-
-    fn listen(&mut self) -> Result<()> {
-        let loader = ash::ext::debug_utils::Instance::new(&self.entry, &self.handle);
-        let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
-            .message_severity(
-                vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
-            )
-            .message_type(
-                vk::DebugUtilsMessageTypeFlagsEXT::GENERAL
-                    | vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION
-                    | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
-            )
-            .pfn_user_callback(Some(on_message))
-            .user_data((&raw const *self.messages).cast_mut().cast());
-        // SAFETY: `messages` does not move and is dropped after the messenger (see `Drop`).
-        let messenger = unsafe { loader.create_debug_utils_messenger(&create, None) }
-            .checked("vkCreateDebugUtilsMessengerEXT", "instance")?;
-        self.debug = Some((loader, messenger));
-        Ok(())
-    }
-}
-
-impl Drop for Instance {
-    fn drop(&mut self) {
-        // SAFETY: the logical device was dropped before (field order of `Device`); the messenger goes before its instance.
-        unsafe {
-            if let Some((loader, messenger)) = &self.debug {
-                loader.destroy_debug_utils_messenger(*messenger, None);
-            }
-            self.handle.destroy_instance(None);
-        }
-    }
+/// What a [`Device`] is put together from.
+pub(super) struct Parts {
+    pub physical: vk::PhysicalDevice,
+    pub handle: ash::Device,
+    pub queue: vk::Queue,
+    pub queue_family: u32,
+    pub info: Candidate,
+    pub is_shared: bool,
 }
 
 /// The logical device, its one queue (graphics and compute) and what is known of the hardware.
@@ -151,6 +44,8 @@ pub struct Device {
     pub(super) handle: ash::Device,
     #[cfg(feature = "view")]
     pub(super) physical: vk::PhysicalDevice,
+    /// Whether a caller made it, uses its queue too and destroys it.
+    is_shared: bool,
     pub(super) queue: Mutex<vk::Queue>,
     /// Fences of launched recordings; see `flight`.
     pub(super) flights: Mutex<Vec<vk::Fence>>,
@@ -212,22 +107,13 @@ impl Device {
         extensions: &[&'static CStr],
         cache_dir: Option<PathBuf>,
     ) -> Result<Arc<Self>> {
-        // SAFETY: queries on a handle that the live instance returned.
-        let (families, memory, properties) = unsafe {
-            (
-                instance.handle.get_physical_device_queue_family_properties(physical),
-                instance.handle.get_physical_device_memory_properties(physical),
-                instance.handle.get_physical_device_properties(physical),
-            )
-        };
+        // SAFETY: a query on a handle that the live instance returned.
+        let families = unsafe { instance.handle.get_physical_device_queue_family_properties(physical) };
         let queue_family = queue_family(&families).expect("a suitable candidate has a queue");
         let priorities = [1.0];
         let queues =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
-        let mut core_1_3 = vk::PhysicalDeviceVulkan13Features::default()
-            .dynamic_rendering(true)
-            .synchronization2(true)
-            .maintenance4(true);
+        let mut core_1_3 = required_features();
         let extension_names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
         let features = vk::PhysicalDeviceFeatures::default().occlusion_query_precise(info.counts_samples);
         let create = vk::DeviceCreateInfo::default()
@@ -240,11 +126,30 @@ impl Device {
             unsafe { instance.handle.create_device(physical, &create, None) }.checked("vkCreateDevice", &info.name)?;
         // SAFETY: family and index were given at creation.
         let queue = unsafe { handle.get_device_queue(queue_family, 0) };
-        let names = instance.has_debug_utils.then(|| ash::ext::debug_utils::Device::new(&instance.handle, &handle));
+        Self::complete(instance, Parts { physical, handle, queue, queue_family, info, is_shared: false }, cache_dir)
+    }
+
+    /// A device of its parts: made here, or shared by a caller.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub(super) fn complete(instance: &Arc<Instance>, parts: Parts, cache_dir: Option<PathBuf>) -> Result<Arc<Self>> {
+        let Parts { physical, handle, queue, queue_family, info, is_shared } = parts;
+        // SAFETY: queries on a handle that the live instance returned.
+        let (memory, properties) = unsafe {
+            (
+                instance.handle.get_physical_device_memory_properties(physical),
+                instance.handle.get_physical_device_properties(physical),
+            )
+        };
+        let named = |own: &OwnInstance| own.has_debug_utils;
+        let names = instance.own.as_ref().is_some_and(named);
+        let names = names.then(|| ash::ext::debug_utils::Device::new(&instance.handle, &handle));
         let mut device = Device {
             handle,
             #[cfg(feature = "view")]
             physical,
+            is_shared,
             queue: Mutex::new(queue),
             flights: Mutex::default(),
             queue_family,
@@ -260,6 +165,11 @@ impl Device {
         };
         device.pipeline_cache = device.load_pipeline_cache(&properties)?;
         Ok(Arc::new(device))
+    }
+
+    /// Whether a caller made the device, uses its queue too and destroys it.
+    pub fn is_shared(&self) -> bool {
+        self.is_shared
     }
 
     /// Size of the largest device-local heap in bytes.
@@ -306,11 +216,16 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: every owner of a child object holds an `Arc` of this device, so no child object is left.
+        // SAFETY: every owner of a child object holds an `Arc` of this device, so no child object is left. What was submitted has
+        // ended, as its owners wait for it; a shared device may still work for its caller, who destroys it.
         unsafe {
-            let _ = self.handle.device_wait_idle();
+            if !self.is_shared {
+                let _ = self.handle.device_wait_idle();
+            }
             self.handle.destroy_pipeline_cache(self.pipeline_cache, None);
-            self.handle.destroy_device(None);
+            if !self.is_shared {
+                self.handle.destroy_device(None);
+            }
         }
     }
 }

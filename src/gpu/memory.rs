@@ -262,7 +262,8 @@ impl Buffer {
         &self.memory.device
     }
 
-    pub(super) fn raw(&self) -> vk::Buffer {
+    /// The Vulkan handle, which stays the buffer's own.
+    pub fn raw(&self) -> vk::Buffer {
         self.handle.buffer
     }
 

@@ -94,11 +94,13 @@ pub fn choose<'c>(candidates: &'c [Candidate], word: Option<&str>) -> Result<&'c
 }
 
 pub(super) fn queue_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
+    families.iter().position(serves).and_then(|index| u32::try_from(index).ok())
+}
+
+/// Whether queues of a family do graphics, compute and timestamps.
+pub(super) fn serves(family: &vk::QueueFamilyProperties) -> bool {
     let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
-    families
-        .iter()
-        .position(|f| f.queue_flags.contains(needed) && f.timestamp_valid_bits > 0)
-        .and_then(|index| u32::try_from(index).ok())
+    family.queue_flags.contains(needed) && family.timestamp_valid_bits > 0
 }
 
 pub(super) fn version_text(version: u32) -> String {
@@ -116,7 +118,8 @@ pub(super) fn physical_devices(instance: &ash::Instance) -> Result<Vec<(vk::Phys
     Ok(handles.into_iter().enumerate().map(|(index, handle)| (handle, describe(instance, index, handle))).collect())
 }
 
-fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
+/// What is to be told of one physical device.
+pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
     // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are only
     // chained if the device supports 1.3.
     let (properties, unsuitable, counts_samples, identity, driver) = unsafe {
@@ -137,11 +140,8 @@ fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice
             instance.get_physical_device_features2(physical, &mut features);
             counts_samples = features.features.occlusion_query_precise == vk::TRUE;
             let families = instance.get_physical_device_queue_family_properties(physical);
-            let missing = [
-                (core_1_3.dynamic_rendering, "dynamicRendering"),
-                (core_1_3.synchronization2, "synchronization2"),
-                (core_1_3.maintenance4, "maintenance4"),
-            ];
+            let missing =
+                [(core_1_3.dynamic_rendering, "dynamicRendering"), (core_1_3.synchronization2, "synchronization2")];
             if let Some((_, feature)) = missing.iter().find(|(present, _)| *present == vk::FALSE) {
                 unsuitable = Some(format!("lacks the feature {feature}"));
             } else if queue_family(&families).is_none() {

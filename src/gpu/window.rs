@@ -41,7 +41,9 @@ impl WindowSurface {
         let gone = |error| Error::Unsupported(format!("the window cannot be drawn into: {error}"));
         let display = window.display_handle().map_err(gone)?.as_raw();
         let handle = window.window_handle().map_err(gone)?.as_raw();
-        let (entry, instance) = (&device.instance.entry, &device.instance.handle);
+        let instance = &device.instance.handle;
+        let own = device.instance.own.as_ref();
+        let entry = &own.ok_or_else(|| Error::Unsupported("a shared device opens no windows".into()))?.entry;
         let loader = khr::surface::Instance::new(entry, instance);
         // SAFETY: the handles are those of a live window, which this surface keeps alive; destroyed in `Drop`, before the
         // instance, which the device keeps alive.

@@ -85,6 +85,19 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// A camera with a vertical field of view of 40 degrees.
+    pub fn new(eye: impl Into<Vec3>, target: impl Into<Vec3>) -> Self {
+        Camera { eye: eye.into(), target: target.into(), fov_deg: 40.0 }
+    }
+
+    /// Refuses a camera that a scene file could not have.
+    ///
+    /// # Errors
+    /// [`Error::Input`] in one line.
+    pub fn check(&self) -> Result<()> {
+        check("camera", self)
+    }
+
     /// The direction that points up in the picture: +y, or -z for a camera that looks straight up or down.
     pub fn up(&self) -> Vec3 {
         let ahead = (self.target.as_dvec3() - self.eye.as_dvec3()).normalize();
@@ -323,6 +336,16 @@ impl Data {
         // Every field is a plain value, a table or a list, and TOML can hold these.
         toml::to_string(self).unwrap_or_else(|e| panic!("scene data does not fit TOML: {e}"))
     }
+}
+
+/// Holds data that was made in code to the rules of a scene file: it is written, and read again.
+///
+/// # Errors
+/// [`Error::Input`] in one line that starts with `what`.
+pub(super) fn check<T: Serialize + serde::de::DeserializeOwned>(what: impl std::fmt::Display, data: &T) -> Result<()> {
+    let fail = |message: &str| Error::Input(format!("{what}: {}", plain(&message.trim().replace('\n', ", "))));
+    let text = toml::to_string(data).map_err(|error| fail(&error.to_string()))?;
+    toml::from_str::<T>(&text).map(|_| ()).map_err(|error| fail(error.message()))
 }
 
 /// Replaces the name of one of this program's types in a message by "a table", which is what the file has to hold there.

@@ -2,6 +2,7 @@
 //!
 //! [`Data`] has the content of the file and can be written as TOML; [`Scene`] adds derived data.
 
+pub mod builder;
 pub mod data;
 pub mod export;
 pub mod gltf;
@@ -21,6 +22,7 @@ use toml::Spanned;
 use crate::asset::environment::{Environment, EnvironmentData};
 use crate::asset::{Mesh, embedded, obj, read_file};
 use crate::error::{Error, Result};
+pub use builder::{SceneBuilder, Shape};
 pub use data::{Camera, Data, EntityData, MeshData, Output};
 pub use light::{LightForm, Lights};
 pub use motion::{Motion, Placement};
@@ -67,6 +69,11 @@ pub struct Entity {
 }
 
 impl Scene {
+    /// A scene that is put together in code.
+    pub fn builder() -> SceneBuilder {
+        SceneBuilder::default()
+    }
+
     /// Reads a scene and the files that it names, relative to it. If the path does not exist, an embedded scene is read
     /// (`assets/scenes/NAME.toml`, or NAME alone). A `.glb` or `.gltf` file is read as [`gltf`] says; what is left out of it is
     /// logged.

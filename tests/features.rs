@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::process::Command;
 
 /// Crates of the program, by what they are: argument parser, progress bar, log output, plots, lettering; and of the window.
-const PROGRAM: [&str; 6] = ["clap", "clap_builder", "indicatif", "env_logger", "colorous", "font8x8"];
+const PROGRAM: [&str; 8] =
+    ["clap", "clap_builder", "clap_complete", "clap_mangen", "indicatif", "env_logger", "colorous", "font8x8"];
 const WINDOW: [&str; 5] = ["winit", "egui", "ash-window", "raw-window-handle", "egui-ash-renderer"];
 
 /// Names of all crates that a build of the library with these features links, the library's own left out.

@@ -11,6 +11,7 @@ mod devices;
 mod import;
 mod inspect;
 mod output;
+mod pages;
 mod profile;
 mod quality;
 mod render;
@@ -65,6 +66,9 @@ enum Subcommands {
     View(view::Arguments),
     /// List the Vulkan devices of this machine
     Devices(devices::Arguments),
+    /// Write shell completions and manual pages into a folder
+    #[command(hide = true)]
+    Pages(pages::Arguments),
     /// Capture for a bake in another process, which starts this
     #[command(name = crate::bake::workers::COMMAND, hide = true)]
     BakeWorker,
@@ -124,6 +128,7 @@ fn run(cli: &Cli) -> Result<()> {
         #[cfg(feature = "view")]
         Subcommands::View(arguments) => view::run(&cli.global, arguments),
         Subcommands::Devices(arguments) => devices::run(&cli.global, arguments),
+        Subcommands::Pages(arguments) => pages::run(arguments),
         Subcommands::BakeWorker => worker::run(&cli.global),
     }
 }

@@ -20,49 +20,105 @@ struct Surface {
 #endif
 };
 
-// Of the parts of a block, what an occluder lets through that counts only before the light (`before`), or the light's own outline.
-vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block, bool before) {
-    mat3 axes = mat3(to_object(occluder, light.toward), to_object(occluder, light.across), to_object(occluder, light.down));
-    // The surface's point by the light's axes, from the occluder's centre. From the light's own centre it lies on the first axis.
-    vec3 to = surface.position - (occluder.centre.xyz - surface.origin);
-    vec3 place = before ? to * mat3(light.toward, light.across, light.down) : vec3(-light.distance, 0.0, 0.0);
-    place *= occluder.centre.w;
-    vec3 middle = along_axes(light, block.middle);
-    NodeCell cell = node_cell(floatBitsToUint(occluder.sharp.x), axes * middle);
-    vec3 along[4], foot[4];
-    vec4 offset;
-    vec4 weights[4];
-    vec2 found[4];
-    [[unroll]] for (uint k = 0; k < 4; k++) {
-        along[k] = along_axes(light, part_place(light, block, k));
-        offset[k] = dot(place, along[k]);
-        foot[k] = place - offset[k] * along[k];
-        weights[k] = node_weights(cell, axes * along[k]);
-        found[k] = vec2(0.0);
-    }
+// Rays from a point to the parts of a block, by the light's axes and in an object's r.
+struct Rays {
+    mat3 axes;  // of the light, in the object's frame
+    vec3 place; // of the point, from the object's centre
+    vec3 middle;
+    vec3 along[4];
+    vec3 foot[4]; // places on them that are nearest to the centre
+    vec4 offset;  // of the point along each
+};
+
+// The outline of an object's side near each ray: signed distance, and how far away it lies, in r.
+void outlines(Rays rays, NodeCell cell, vec4 weights[4], uint side, out vec4 distance, out vec4 away) {
+    distance = vec4(0.0);
+    away = -rays.offset;
     [[unroll]] for (uint m = 0; m < 4; m++) {
-        NearMap near = near_map(cell, m, axes, place - dot(place, middle) * middle);
+        NearMap near = near_map(cell, m, side, rays.axes, rays.place - dot(rays.place, rays.middle) * rays.middle);
         [[unroll]] for (uint k = 0; k < 4; k++) {
-            found[k] += weights[k][m] * outline(near, along[k], foot[k]);
+            vec2 found = weights[k][m] * outline(near, side, rays.along[k], rays.foot[k]);
+            distance[k] += found.x;
+            away[k] += found.y;
         }
     }
-    vec4 through;
-    [[unroll]] for (uint k = 0; k < 4; k++) {
-        // The light's surface in this direction.
-        vec2 part = part_place(light, block, k);
-        float limit = before ? reach_of(light, part, along[k]) * occluder.centre.w : 1e30;
-        float sine = part_sine(light, block, part, along[k]);
-        float tangent = sine * inversesqrt(1.0 - sine * sine);
-        float away = found[k].y - offset[k];
-        through[k] = 1.0 - blocked(found[k].x, away, limit, tangent);
+}
+
 #ifdef EDGES
-        float step = surface.step * occluder.centre.w;
-        float penumbra = max(away, NEAREST) * tangent;
-        bool stands = before && away > -NEAREST - step && away < limit + NEAREST + step;
-        edge = edge || stands && abs(found[k].x) < penumbra + EDGE_REACH * step && penumbra < EDGE_STEPS * step;
+void mark_edge(float distance, float away, float limit, float tangent, float step) {
+    float penumbra = max(away, NEAREST) * tangent;
+    bool stands = away > -NEAREST - step && away < limit + NEAREST + step;
+    edge = edge || stands && abs(distance) < penumbra + EDGE_REACH * step && penumbra < EDGE_STEPS * step;
+}
 #endif
+
+// Of the parts of a block, what an occluder lets through that counts only before the light (`before`), or the light's own outline.
+vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block, bool before) {
+    Rays rays;
+    rays.axes = mat3(to_object(occluder, light.toward), to_object(occluder, light.across), to_object(occluder, light.down));
+    // From the light's own centre the point lies on the first axis.
+    vec3 to = surface.position - (occluder.centre.xyz - surface.origin);
+    rays.place = before ? to * mat3(light.toward, light.across, light.down) : vec3(-light.distance, 0.0, 0.0);
+    rays.place *= occluder.centre.w;
+    rays.middle = along_axes(light, block.middle);
+    uint first = floatBitsToUint(occluder.sharp.x);
+    NodeCell cell = node_cell(first & 0x7fffffffu, rays.axes * rays.middle);
+    vec4 weights[4];
+    vec4 limit, tangent;
+    [[unroll]] for (uint k = 0; k < 4; k++) {
+        vec2 part = part_place(light, block, k);
+        rays.along[k] = along_axes(light, part);
+        rays.offset[k] = dot(rays.place, rays.along[k]);
+        rays.foot[k] = rays.place - rays.offset[k] * rays.along[k];
+        weights[k] = node_weights(cell, rays.axes * rays.along[k]);
+        limit[k] = before ? reach_of(light, part, rays.along[k]) * occluder.centre.w : 1e30;
+        float sine = part_sine(light, block, part, rays.along[k]);
+        tangent[k] = sine * inversesqrt(1.0 - sine * sine);
     }
-    return through;
+    vec4 inside = vec4(0.0);
+#if HALVES
+    // Within the bounding sphere each half of the object counts as far as its outline lies between the point and the light.
+    if (before && first > 0x7fffffffu) {
+        [[unroll]] for (uint k = 0; k < 4; k++) {
+            float nearest = min(length(rays.place), length(rays.place + limit[k] * rays.along[k]));
+            float deep = max(rays.offset[k], -rays.offset[k] - limit[k]);
+            inside[k] = clamp((INSIDE_TO - nearest) / (INSIDE_TO - INSIDE_FROM), 0.0, 1.0)
+                      * clamp((deep - DEEP_FROM) / (DEEP_TO - DEEP_FROM), 0.0, 1.0);
+        }
+    }
+#endif
+    // Of each side, the share that it blocks and whether its outline counts. Arrays, because lavapipe may lose what a lane has computed in a
+    // loop that it left before others did, unless it is stored.
+    vec4 share[3], counts[3];
+    uint side = WHOLE;
+    uint last = inside == vec4(0.0) ? WHOLE : NEAR;
+    // A loop, because a software device runs a branch that no lane takes.
+    do {
+        vec4 distance, away, blocks, stands;
+        outlines(rays, cell, weights, side, distance, away);
+        [[unroll]] for (uint k = 0; k < 4; k++) {
+            blocks[k] = share_blocked(distance[k], away[k], tangent[k]);
+            stands[k] = between(away[k], limit[k]);
+#ifdef EDGES
+            if (before && (side == WHOLE || inside[k] > 0.0)) {
+                mark_edge(distance[k], away[k], limit[k], tangent[k], surface.step * occluder.centre.w);
+            }
+#endif
+        }
+        share[side] = blocks;
+        counts[side] = stands;
+        side++;
+    } while (side <= last);
+    vec4 blocked_by = share[WHOLE] * counts[WHOLE];
+#if HALVES
+    if (last != WHOLE) {
+        // Where both halves count, the whole does.
+        vec4 halves = counts[FAR] * counts[NEAR] * share[WHOLE] + counts[FAR] * (1.0 - counts[NEAR]) * share[FAR]
+                    + counts[NEAR] * (1.0 - counts[FAR]) * share[NEAR];
+        blocked_by = mix(blocked_by, halves, inside);
+    }
+#endif
+    return 1.0 - blocked_by;
 }
 
 // Irradiance by the parts of a block, unoccluded, of radiance 1.

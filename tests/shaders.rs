@@ -38,8 +38,9 @@ fn sharp() -> Vec<ShaderPermutation> {
     let way = |bits: u32| {
         let on = |bit: u32| bits >> bit & 1 == 1;
         let silhouette = SilhouetteOptions::default();
-        let (texel, uniform, outlines, panels, self_shadows) = (on(0), on(1), on(2), on(3), on(4));
-        SharpPermutation { texel, uniform, entity_limit: 48, silhouette, outlines, panels, self_shadows }.row()
+        let (texel, uniform, outlines, panels, self_shadows, halves) =
+            (on(0), on(1), on(2), on(3), on(4), on(2) != on(3));
+        SharpPermutation { texel, uniform, entity_limit: 48, silhouette, outlines, panels, halves, self_shadows }.row()
     };
     (0..32).map(way).collect()
 }
@@ -54,6 +55,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         silhouette,
         outlines,
         panels: outlines,
+        halves: outlines,
         self_shadows: true,
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];

@@ -70,9 +70,13 @@ fn scenes() -> Vec<(&'static str, Scene, f64)> {
         ),
         (
             "a light in a ring's hole",
-            parse(&format!("{HEAD}{}{}", entity("ring", [0.0, 0.9, 0.0], ""), bulb([0.0, 0.9, 0.0], 0.2, 60.0))),
-            // What stands before a light and what stands behind it have one outline there.
-            f64::INFINITY,
+            // The ring's own vertices are left out: self-visibility does not know what lies beyond a light.
+            parse(&format!(
+                "{HEAD}{}{}",
+                entity("ring", [0.0, 0.9, 0.0], "receives = false"),
+                bulb([0.0, 0.9, 0.0], 0.2, 60.0)
+            )),
+            0.01,
         ),
         (
             "a sun",
@@ -112,10 +116,7 @@ fn scenes_are_lit_as_by_rays() {
         let found = error(&gpu, &scene, sharp, rays);
         let harmonics = error(&gpu, &scene, Options { lights: Lights::Sh, ..sharp }, 1024);
         report(&format!("{name}: error {found:.4}, in spherical harmonics {harmonics:.4}"));
-        assert!(
-            found.is_finite() && (limit.is_infinite() || found < limit.min(harmonics)),
-            "{name}: {found}, in spherical harmonics {harmonics}"
-        );
+        assert!(found < limit.min(harmonics), "{name}: {found}, in spherical harmonics {harmonics}");
     }
 }
 

@@ -29,7 +29,7 @@ pub struct Arguments {
     #[arg(long, value_name = "R,G,B", value_parser = color, allow_hyphen_values = true)]
     radiance: Option<Vec3>,
     /// Bake a silhouette field instead: outlines from many directions, for lights that are too small for SH bands. It takes
-    /// --quality of the baking options, for 98, 389 or 1 542 KiB
+    /// --quality of the baking options, for 98, 389 or 1 542 KiB, and half as much again where the mesh is not convex
     #[arg(long, conflicts_with_all = ["radiance", "symmetry", "faces", "inside"])]
     silhouette: bool,
     /// Capture only one of the samples that a symmetry of the mesh carries into one another, and turn its coefficients for the

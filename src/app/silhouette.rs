@@ -5,7 +5,7 @@ use super::{Global, output};
 use crate::asset::{Mesh, lettering, picture};
 use crate::bake::{Quality, silhouette::bake_silhouette};
 use crate::error::{Result, one_line};
-use crate::field::silhouette::{REACH, SilhouetteField};
+use crate::field::silhouette::{REACH, Side, SilhouetteField};
 use glam::DVec3;
 use serde_json::json;
 use std::path::Path;
@@ -66,6 +66,10 @@ pub fn inspect(global: &Global, file: &Path, ray: Option<Ray>, sheet: Option<&Pa
         ("bounding sphere", format!("centre {:?} m, radius {} m", header.centre_m, header.radius_m)),
         ("directions", format!("{0} x {0} cells a cube face, {1} maps", header.cells, header.map_count())),
         ("map", format!("{edge} x {edge} texels from views of {0} x {0} pixels", header.view_px)),
+        (
+            "halves",
+            if header.half_px == 0 { "none".to_owned() } else { format!("{0} x {0} texels each", header.half_px) },
+        ),
         ("stored", format!("{} bytes", field.payload().len())),
     ];
     for (name, value) in lines {
@@ -83,7 +87,7 @@ fn lookup(field: &SilhouetteField, (position_m, toward): Ray) -> serde_json::Val
     let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
     let (point, direction) = ((position_m - centre) / radius_m, toward.normalize());
     let near = field.near(point, direction);
-    let outline = field.outline(&near, direction);
+    let outline = field.outline(&near, Side::Whole, direction);
     let blocked = |angle_deg: f64| field.blocked(&near, direction, f64::INFINITY, angle_deg.to_radians().tan());
     json!({
         "position_m": position_m.to_array(), "direction": direction.to_array(),
@@ -113,7 +117,7 @@ fn write_sheet(field: &SilhouetteField, path: &Path) -> Result<()> {
         for map in 0..count {
             let (left, top) = (map % columns * (edge + 1), half * block + TEXT_PX + map / columns * (edge + 1));
             for (y, x) in (0..edge).flat_map(|y| (0..edge).map(move |x| (y, x))) {
-                let value = field.texel(map, x, y)[half] / [REACH, 1.0][half];
+                let value = field.texel(map, Side::Whole, x, y)[half] / [REACH, 1.0][half];
                 let level = picture::linear_from_srgb(0.5 + 0.5 * value as f32);
                 rgb[3 * ((top + y) * width + left + x)..][..3].fill(level);
             }

@@ -48,7 +48,8 @@ impl Quality {
     }
 }
 
-/// 98, 389 and 1 542 KiB of silhouettes a mesh with 4, 8 and 16 cells along a cube's face.
+/// 98, 389 and 1 542 KiB of silhouettes a mesh with 4, 8 and 16 cells along a cube's face, and half as much again for a mesh that is
+/// not convex.
 fn silhouettes(cells: u32) -> SilhouetteOptions {
     SilhouetteOptions { cells, ..Default::default() }
 }

@@ -8,7 +8,7 @@ use super::capture::unit_positions;
 use super::{BakeReport, Progress, hash_text};
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
-use crate::field::silhouette::{Frame, REACH, SilhouetteField, SilhouetteHeader, encode};
+use crate::field::silhouette::{Frame, REACH, Side, SilhouetteField, SilhouetteHeader, encode};
 use crate::field::silhouette_nodes::NodeGrid;
 use crate::gpu::{
     Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, GraphicsPipeline, GraphicsState, Image,
@@ -42,7 +42,7 @@ pub struct SilhouetteOptions {
 }
 
 impl Default for SilhouetteOptions {
-    /// 193 maps of 32 x 32 texels: 392 KiB.
+    /// 193 maps of 32 x 32 texels: 389 KiB, and 193 KiB for the halves of a mesh that is not convex.
     fn default() -> Self {
         SilhouetteOptions { cells: 8, map_px: 32, view_px: 128 }
     }
@@ -55,6 +55,7 @@ pub fn silhouette_header(mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteH
         cells: options.cells,
         map_px: options.map_px,
         view_px: options.view_px,
+        half_px: if mesh.is_convex() { 0 } else { options.map_px / 2 },
         centre_m: centre.to_array(),
         radius_m,
         mesh: mesh.name.clone(),
@@ -79,13 +80,13 @@ struct ViewPush {
 }
 
 impl ViewPush {
-    fn new(frame: &Frame) -> Self {
+    fn new(frame: &Frame, side: Side) -> Self {
         let row = |axis: DVec3, centre: f64, half: f64| (axis / half).extend(-centre / half).as_vec4().to_array();
         let [a, b] = frame.axes;
         ViewPush {
             across: row(a, frame.centre.x, frame.half.x),
             down: row(b, frame.centre.y, frame.half.y),
-            direction: Vec4::from((frame.direction.as_vec3(), 0.0)).to_array(),
+            direction: Vec4::from((frame.direction.as_vec3(), side.sign())).to_array(),
         }
     }
 }
@@ -199,7 +200,7 @@ impl Silhouette {
         (self.atlas_columns * self.atlas_columns) as usize
     }
 
-    /// Draws and reduces the maps from `map_first` on, one for each frame, at most [`Silhouette::capacity`]. Between its own steps
+    /// Draws and reduces that side of the maps from `map_first` on, one for each frame, at most [`Silhouette::capacity`]. Between its own steps
     /// it places its own barriers.
     ///
     /// # Errors
@@ -208,7 +209,7 @@ impl Silhouette {
         &'r self,
         commands: &mut Commands<'r>,
         buffers: &'r SilhouetteBuffers,
-        frames: &[Frame],
+        (frames, side): (&[Frame], Side),
         map_first: usize,
     ) -> Result<()> {
         assert!(frames.len() <= self.capacity(), "{} views in an atlas of {}", frames.len(), self.capacity());
@@ -219,7 +220,7 @@ impl Silhouette {
             for (view, frame) in frames.iter().enumerate() {
                 let (view, px) = (view as u32, self.view_px);
                 drawing.area(view % self.atlas_columns * px, view / self.atlas_columns * px, px, px);
-                drawing.push(&ViewPush::new(frame));
+                drawing.push(&ViewPush::new(frame, side));
                 drawing.indexed(0..buffers.index_count);
             }
             Ok(())
@@ -250,36 +251,46 @@ pub fn bake_silhouette(
     let header = silhouette_header(mesh, options);
     header.validate()?;
     let frames = frames(mesh, options.cells);
-    let pass = Silhouette::new(device, library, options.map_px, options.view_px)?;
-    let buffers = SilhouetteBuffers::new(device, mesh, &frames, options.map_px)?;
-    let (mut done, mut report) = (0, BakeReport::default());
-    for batch in frames.chunks(pass.capacity()) {
-        let mut commands = Commands::new(device, "silhouette bake")?;
-        commands.pass("silhouette", |c| pass.record(c, &buffers, batch, done))?;
-        report.add(&commands.submit()?);
-        done += batch.len();
-        progress(done as u32, frames.len() as u32);
+    let sides = if header.half_px > 0 { &Side::ALL[..] } else { &Side::ALL[..1] };
+    let all = (frames.len() * sides.len()) as u32;
+    let (mut maps, mut done, mut report) = (Vec::new(), 0, BakeReport::default());
+    for &side in sides {
+        let map_px = header.edge_px(side) as u32;
+        let pass = Silhouette::new(device, library, map_px, options.view_px * map_px / options.map_px)?;
+        let buffers = SilhouetteBuffers::new(device, mesh, &frames, map_px)?;
+        let mut first = 0;
+        for batch in frames.chunks(pass.capacity()) {
+            let mut commands = Commands::new(device, "silhouette bake")?;
+            commands.pass("silhouette", |c| pass.record(c, &buffers, (batch, side), first))?;
+            report.add(&commands.submit()?);
+            first += batch.len();
+            done += batch.len() as u32;
+            progress(done, all);
+        }
+        maps.push(buffers.maps.download::<u8>(frames.len() * header.texel_bytes(side))?);
     }
-    let texels: Vec<u8> = buffers.maps.download(2 * frames.len() * (options.map_px * options.map_px) as usize)?;
     report.samples = frames.len() as u32;
     report.total = started.elapsed();
-    Ok((SilhouetteField::new(header, joined(&frames, &texels))?, report))
+    Ok((SilhouetteField::new(header, joined(&frames, &maps))?, report))
 }
 
-/// The payload of a field: each map's rectangle before its texels.
-fn joined(frames: &[Frame], texels: &[u8]) -> Vec<u8> {
-    let maps = texels.chunks_exact(texels.len() / frames.len());
+/// The payload of a field: each map's rectangle before the texels of its sides.
+fn joined(frames: &[Frame], sides: &[Vec<u8>]) -> Vec<u8> {
     let rectangle = |frame: &Frame| [frame.centre.x, frame.centre.y, frame.half.x, frame.half.y].map(|n| n as f32);
-    let map = |(frame, texels): (&Frame, &[u8])| {
+    let map = |(index, frame): (usize, &Frame)| {
         let numbers = rectangle(frame).into_iter().flat_map(f32::to_le_bytes);
-        numbers.chain(texels.iter().copied()).collect::<Vec<u8>>()
+        let texels = sides.iter().flat_map(move |side| {
+            let bytes = side.len() / frames.len();
+            side[index * bytes..][..bytes].iter().copied()
+        });
+        numbers.chain(texels).collect::<Vec<u8>>()
     };
-    frames.iter().zip(maps).flat_map(map).collect()
+    frames.iter().enumerate().flat_map(map).collect()
 }
 
-/// The CPU twin of the pass for one map, in f64 and by plain search: bytes of distance and depth, row by row.
-pub fn silhouette_twin(mesh: &Mesh, frame: &Frame, map_px: u32, view_px: u32) -> Vec<[u8; 2]> {
-    let view = drawn(mesh, frame, view_px as usize);
+/// The CPU twin of the pass for one side of a map, in f64 and by plain search: bytes of distance and depth, row by row.
+pub fn silhouette_twin(mesh: &Mesh, (frame, side): (&Frame, Side), map_px: u32, view_px: u32) -> Vec<[u8; 2]> {
+    let view = drawn(mesh, (frame, side), view_px as usize);
     let px = view_px as usize;
     let pixel = 2.0 * frame.half / px as f64;
     let mut points = Vec::new();
@@ -308,7 +319,7 @@ pub fn silhouette_twin(mesh: &Mesh, frame: &Frame, map_px: u32, view_px: u32) ->
 }
 
 /// Nearest and farthest depth of every covered pixel.
-fn drawn(mesh: &Mesh, frame: &Frame, px: usize) -> Vec<Option<(f64, f64)>> {
+fn drawn(mesh: &Mesh, (frame, side): (&Frame, Side), px: usize) -> Vec<Option<(f64, f64)>> {
     let positions: Vec<DVec3> = unit_positions(mesh).iter().map(|p| p.as_dvec3()).collect();
     let mut view: Vec<Option<(f64, f64)>> = vec![None; px * px];
     for triangle in &mesh.triangles {
@@ -325,8 +336,10 @@ fn drawn(mesh: &Mesh, frame: &Frame, px: usize) -> Vec<Option<(f64, f64)>> {
             let weights = [(b - p).perp_dot(c - p), (c - p).perp_dot(a - p), (a - p).perp_dot(b - p)].map(|w| w / area);
             if weights.iter().all(|w| *w >= 0.0) {
                 let depth = corners.iter().zip(weights).map(|((_, depth), w)| depth * w).sum::<f64>();
-                let (least, most) = view[y * px + x].unwrap_or((depth, depth));
-                view[y * px + x] = Some((least.min(depth), most.max(depth)));
+                if side == Side::Whole || depth * f64::from(side.sign()) >= 0.0 {
+                    let (least, most) = view[y * px + x].unwrap_or((depth, depth));
+                    view[y * px + x] = Some((least.min(depth), most.max(depth)));
+                }
             }
         }
     }

@@ -16,8 +16,8 @@ use crate::scene::Lights;
 /// half-width of a penumbra, which near an outline is a thousandth of the object's radius.
 pub const PENUMBRA: f64 = 1e-4;
 
-/// What [`MIXED`] has besides: a light with an outline of its own, a small light, a ball that stands beyond it, and panels of every
-/// form.
+/// What [`MIXED`] has besides: a light with an outline of its own, a small light, a ball that stands beyond it, a ring around it, and
+/// panels of every form.
 const MORE: &str = r#"
 [[entity]]
 mesh = "ring"
@@ -34,6 +34,11 @@ emission = [900, 700, 500]
 mesh = "ball"
 position = [0.211, 2.613, -2.037]
 scale = 0.7
+[[entity]]
+mesh = "ring"
+position = [0.181, 1.903, -1.497]
+rotation = { axis = [0.2, 0.1, 1], angle_deg = 31 }
+scale = 0.9
 [[mesh]]
 name = "lamp"
 disc = { radius_m = 0.3 }

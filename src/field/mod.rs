@@ -11,6 +11,7 @@ pub mod quantity;
 pub mod self_visibility;
 pub mod shortcuts;
 pub mod silhouette;
+pub mod silhouette_header;
 pub mod silhouette_nodes;
 pub mod sub_light;
 mod text;

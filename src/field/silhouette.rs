@@ -8,13 +8,18 @@
 //! A lookup ([`SilhouetteField::outline`]) blends the four maps around a direction. Each sees an outline point that lies off the
 //! centre's plane at another place, so the depth is read first and the place corrected by it (parallax). How much of a small round
 //! light the outline leaves ([`blocked_share`]) follows from the distance and from how far away the outline's point is.
+//!
+//! Within the bounding sphere a part of the object may lie behind the receiver, or beyond the light, and its outline hides that of the rest.
+//! So a mesh that is not convex has maps of its two halves besides ([`Side`]), at half the resolution. Each half counts as far as its
+//! outline lies between receiver and light; where both do, the whole counts. Lights in the middle of a ring err by 0.01 with halves and
+//! by 0.26 without, receivers in it by 0.03 and 0.11; receivers about a teapot by 0.03 and 0.02, at 3 degrees.
 
 use super::file;
+pub use super::silhouette_header::{Side, SilhouetteHeader};
 use super::silhouette_nodes::{Cell, NodeGrid};
 use super::sub_light::SeenLight;
 use crate::error::{Error, Result};
 use glam::{DVec2, DVec3};
-use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -26,63 +31,13 @@ pub const REACH: f64 = 0.5;
 pub const MARGIN: f64 = 0.08;
 /// Least distance of an outline from a receiver that a penumbra is computed for, in r.
 pub const NEAREST: f64 = 0.02;
+/// Distance from the centre, in r, of a receiver or a light up to which halves count, and from which only the whole does.
+pub const INSIDE: [f64; 2] = [0.9, 1.05];
+/// How deep in the object a receiver or a light lies, along the ray from the centre's plane towards its own end and in r, up to which only
+/// the whole counts, and from which halves do. Nearer to the rim almost all of the object lies between the two.
+pub const DEEP: [f64; 2] = [-0.6, -0.2];
 /// Least half-width of a penumbra, in r: it keeps a light of no size from dividing by nothing.
 pub const LEAST_PENUMBRA: f64 = 1e-9;
-
-/// Everything about a silhouette field but its maps.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SilhouetteHeader {
-    /// Cells along an edge of a cube face of the [`NodeGrid`], 1 to 64.
-    pub cells: u32,
-    /// Texels along an edge of a map: a power of two, 8 to 256.
-    pub map_px: u32,
-    /// Pixels along an edge of the view that a map is reduced from, a multiple of `map_px`.
-    pub view_px: u32,
-    /// Centre of the bounding sphere in the mesh's own frame, metres.
-    pub centre_m: [f32; 3],
-    /// Radius of the bounding sphere, metres.
-    pub radius_m: f32,
-    /// Name of the mesh, for people.
-    pub mesh: String,
-    /// Content hash of the mesh, hexadecimal.
-    pub mesh_hash: String,
-}
-
-impl SilhouetteHeader {
-    /// Maps that are stored: one for each pair of opposite nodes.
-    pub fn map_count(&self) -> usize {
-        NodeGrid::map_count(self.cells)
-    }
-
-    /// Bytes of one map: four floats of its [`Frame`]'s rectangle, then two bytes a texel.
-    pub fn map_bytes(&self) -> usize {
-        16 + 2 * (self.map_px * self.map_px) as usize
-    }
-
-    /// Bytes of all maps.
-    pub fn payload_bytes(&self) -> usize {
-        self.map_count() * self.map_bytes()
-    }
-
-    /// Checks every number against its range.
-    ///
-    /// # Errors
-    /// `Input` naming the number.
-    pub fn validate(&self) -> Result<()> {
-        let bad = |what: String| Err(Error::Input(what));
-        if !(1..=64).contains(&self.cells) {
-            return bad(format!("{} cells a face, a silhouette field has 1 to 64", self.cells));
-        }
-        if !(8..=256).contains(&self.map_px) || !self.map_px.is_power_of_two() {
-            return bad(format!("maps of {} px, a silhouette field has a power of two from 8 to 256", self.map_px));
-        }
-        if !(self.map_px..=1024).contains(&self.view_px) || !self.view_px.is_multiple_of(self.map_px) {
-            return bad(format!("views of {} px for maps of {} px", self.view_px, self.map_px));
-        }
-        let usable = self.centre_m.iter().all(|c| c.is_finite()) && self.radius_m > 0.0 && self.radius_m.is_finite();
-        if usable { Ok(()) } else { bad("centre or radius is not a usable number".into()) }
-    }
-}
 
 /// Where a map lies: the plane through the sphere's centre at right angles to its direction, and a rectangle in that plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,11 +102,16 @@ struct NearMap {
     rows: [DVec3; 2],
     /// Place of the point on the map.
     place: DVec2,
-    /// Depth along the direction of the outline's nearest point, in r from the sphere's centre.
-    depth: f64,
+    /// Depth along the direction of the nearest point of each side's outline, in r from the sphere's centre.
+    depths: [f64; 3],
 }
 
 impl NearMap {
+    /// The map's own side that shows a side as seen along the direction.
+    fn side(&self, side: Side) -> Side {
+        if self.sign < 0.0 { side.mirrored() } else { side }
+    }
+
     /// Place on the map of what lies that far from the point along a direction.
     fn along(&self, direction: DVec3, way: f64) -> DVec2 {
         self.place + way * DVec2::new(self.rows[0].dot(direction), self.rows[1].dot(direction))
@@ -217,7 +177,7 @@ impl SilhouetteField {
 
     /// The nodes as `glsl/silhouette_field.glsl` reads them, three quads each; the cells of the field's maps begin at `first_cell`.
     pub fn node_quads(&self, first_cell: u32) -> Vec<[f32; 4]> {
-        let map_cells = (self.header.map_px - 1).pow(2);
+        let map_cells = Side::ALL.iter().map(|side| self.side_cells(*side)).sum::<usize>() as u32;
         let node = |&(map, mirrored): &(usize, bool)| {
             let Frame { axes, centre, half, .. } = self.frames[map];
             let row = |i: usize| (axes[i] / half[i]).extend(-centre[i] / half[i]).as_vec4().to_array();
@@ -227,20 +187,37 @@ impl SilhouetteField {
         self.nodes.nodes().iter().flat_map(node).collect()
     }
 
-    /// The cells of all maps, row by row: the signed bytes of four neighbouring distances, and of their depths. The first byte of each
-    /// word is the corner nearest to the map's first texel, the second is its neighbour in the row.
+    /// Cells of a side of a map.
+    fn side_cells(&self, side: Side) -> usize {
+        self.header.edge_px(side).saturating_sub(1).pow(2)
+    }
+
+    /// Whether it has maps of the object's halves.
+    pub fn has_halves(&self) -> bool {
+        self.header.half_px > 0
+    }
+
+    /// The cells of all maps and sides, row by row: the signed bytes of four neighbouring distances, and of their depths. The first byte
+    /// of each word is the corner nearest to the map's first texel, the second is its neighbour in the row.
     pub fn cells(&self) -> Vec<[u32; 2]> {
-        let px = self.header.map_px as usize;
-        let map = |map: usize| {
-            let texels = &self.payload[map * self.header.map_bytes() + 16..][..2 * px * px];
+        let of_side = |map: usize, side: Side| {
+            let px = self.header.edge_px(side);
+            let texels = self.texels(map, side);
             let word = move |x: usize, y: usize, i: usize| {
                 let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
                 u32::from_le_bytes(corners.map(|(dx, dy)| texels[2 * ((y + dy) * px + x + dx) + i]))
             };
-            let places = (0..px - 1).flat_map(move |y| (0..px - 1).map(move |x| (x, y)));
+            let last = px.saturating_sub(1);
+            let places = (0..last).flat_map(move |y| (0..last).map(move |x| (x, y)));
             places.map(move |(x, y)| [word(x, y, 0), word(x, y, 1)])
         };
-        (0..self.frames.len()).flat_map(map).collect()
+        (0..self.frames.len()).flat_map(|map| Side::ALL.into_iter().flat_map(move |side| of_side(map, side))).collect()
+    }
+
+    /// The bytes of a side of a map, two a texel.
+    pub fn texels(&self, map: usize, side: Side) -> &[u8] {
+        let first = map * self.header.map_bytes() + self.header.texels_at(side);
+        &self.payload[first..first + self.header.texel_bytes(side)]
     }
 
     /// Writes the field to an `.sf` file.
@@ -261,21 +238,21 @@ impl SilhouetteField {
     }
 
     /// Distance and depth of a texel.
-    pub fn texel(&self, map: usize, x: usize, y: usize) -> [f64; 2] {
-        let at = map * self.header.map_bytes() + 16 + 2 * (y * self.header.map_px as usize + x);
-        [decode(self.payload[at], REACH), decode(self.payload[at + 1], 1.0)]
+    pub fn texel(&self, map: usize, side: Side, x: usize, y: usize) -> [f64; 2] {
+        let texel = &self.texels(map, side)[2 * (y * self.header.edge_px(side) + x)..];
+        [decode(texel[0], REACH), decode(texel[1], 1.0)]
     }
 
     /// Distance and depth of a map at a point of the plane, between four texels. Beyond the rectangle, the distance at its rim less
     /// the way to it.
-    fn sample(&self, map: usize, place: DVec2) -> [f64; 2] {
+    fn sample(&self, map: usize, side: Side, place: DVec2) -> [f64; 2] {
         let frame = &self.frames[map];
         let within = place.clamp(DVec2::NEG_ONE, DVec2::ONE);
-        let px = self.header.map_px as usize;
+        let px = self.header.edge_px(side);
         let at = ((within + 1.0) / 2.0 * px as f64 - 0.5).clamp(DVec2::ZERO, DVec2::splat((px - 1) as f64));
         let (x, y) = ((at.x as usize).min(px - 2), (at.y as usize).min(px - 2));
         let (u, v) = (at.x - x as f64, at.y - y as f64);
-        let corner = |i, j| DVec2::from_array(self.texel(map, x + i, y + j));
+        let corner = |i, j| DVec2::from_array(self.texel(map, side, x + i, y + j));
         let low = corner(0, 0).lerp(corner(1, 0), u);
         let high = corner(0, 1).lerp(corner(1, 1), u);
         let found = low.lerp(high, v);
@@ -290,19 +267,22 @@ impl SilhouetteField {
             let frame = &self.frames[map];
             let rows = [0, 1].map(|i| frame.axes[i] / frame.half[i]);
             let sign = if mirrored { -1.0 } else { 1.0 };
-            let mut near = NearMap { map, sign, rows, place: frame.place(point), depth: 0.0 };
-            near.depth = sign * self.sample(map, near.along(toward, -along))[1];
+            let mut near = NearMap { map, sign, rows, place: frame.place(point), depths: [0.0; 3] };
+            for side in Side::ALL.into_iter().filter(|side| *side == Side::Whole || self.has_halves()) {
+                near.depths[side as usize] = sign * self.sample(map, near.side(side), near.along(toward, -along))[1];
+            }
             near
         });
         Near { point, cell, maps }
     }
 
-    /// The outline near the ray along the unit vector `direction`.
-    pub fn outline(&self, near: &Near, direction: DVec3) -> Outline {
+    /// The outline of one side of the object near the ray along the unit vector `direction`. Halves are those of a field that has them.
+    pub fn outline(&self, near: &Near, side: Side, direction: DVec3) -> Outline {
         let along = near.point.dot(direction);
         let mut found = Outline { distance: 0.0, depth: 0.0 };
         for (map, weight) in near.maps.iter().zip(self.nodes.weights(&near.cell, direction)) {
-            let [distance, depth] = self.sample(map.map, map.along(direction, map.depth - along));
+            let [distance, depth] =
+                self.sample(map.map, map.side(side), map.along(direction, map.depths[side as usize] - along));
             found.distance += weight * distance;
             found.depth += weight * map.sign * depth;
         }
@@ -327,12 +307,25 @@ impl SilhouetteField {
     /// Share of a small round light that the object blocks, as seen from the point of `near`: the light's middle lies in that
     /// unit direction, `distance` away (in r, infinite for distant light), and `tangent` is that of its angular radius.
     pub fn blocked(&self, near: &Near, direction: DVec3, distance: f64, tangent: f64) -> f64 {
-        let outline = self.outline(near, direction);
-        let away = outline.depth - near.point.dot(direction);
-        // An outline behind the receiver or behind the light blocks nothing.
-        fade(away)
-            * fade(distance - away)
-            * blocked_share(outline.distance / (away.max(NEAREST) * tangent).max(LEAST_PENUMBRA))
+        let along = near.point.dot(direction);
+        // Share that an outline blocks, and whether it counts: one behind the receiver or behind the light blocks nothing.
+        let by = |side: Side| {
+            let outline = self.outline(near, side, direction);
+            let away = outline.depth - along;
+            let share = blocked_share(outline.distance / (away.max(NEAREST) * tangent).max(LEAST_PENUMBRA));
+            (share, fade(away) * fade(distance - away))
+        };
+        let (whole, counts) = by(Side::Whole);
+        let nearest = near.point.length().min((near.point + distance.min(1e30) * direction).length());
+        let deep = along.max(-along - distance);
+        let inside = ((INSIDE[1] - nearest) / (INSIDE[1] - INSIDE[0])).clamp(0.0, 1.0)
+            * ((deep - DEEP[0]) / (DEEP[1] - DEEP[0])).clamp(0.0, 1.0);
+        if inside == 0.0 || !self.has_halves() {
+            return whole * counts;
+        }
+        let [(far, beyond), (near, before)] = [by(Side::Far), by(Side::Near)];
+        let halves = beyond * before * whole + beyond * (1.0 - before) * far + before * (1.0 - beyond) * near;
+        whole * counts + inside * (halves - whole * counts)
     }
 }
 

@@ -87,6 +87,7 @@ pub(super) fn sharp(
         silhouette: options.bake.silhouette,
         outlines: emits(&|form| form == LightForm::Outline),
         panels: emits(&|form| matches!(form, LightForm::Panel(_))),
+        halves: buffers.meshes.iter().any(|m| m.silhouette.as_ref().is_some_and(|slot| slot.field.has_halves())),
         self_shadows: buffers.meshes.iter().any(|device_mesh| device_mesh.self_first != NONE),
     })
 }

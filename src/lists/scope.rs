@@ -9,7 +9,7 @@
 //! An entity that is listed for the slack alone adds no light of its own: the weights of cone, horizon and cap in the merge have
 //! faded to exactly zero where the rule without slack ends, and what is bounded below eps stays below eps.
 
-use crate::field::silhouette::REACH;
+use crate::field::silhouette::{REACH, Side};
 use crate::layout;
 use crate::lists::scene_bounds::{Bounds, EntityBounds, Light, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
@@ -239,7 +239,7 @@ impl<'m> Scope<'m> {
         }
         let near =
             outline.field.near(outline.to_object * (self.centre - centre) / radius_m, outline.to_object * toward);
-        outline.field.outline(&near, outline.to_object * toward).distance < -(widest + PASSING_MARGIN)
+        outline.field.outline(&near, Side::Whole, outline.to_object * toward).distance < -(widest + PASSING_MARGIN)
     }
 
     /// Whether no member of a crowd matters to any cluster within the bounds: their weight under the brightest light is negligible.

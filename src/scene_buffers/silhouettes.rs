@@ -16,10 +16,13 @@ pub struct Silhouettes {
     pub cells: Buffer,
 }
 
+/// Bit of a field's first node that says that it has maps of halves.
+const HALVES: u32 = 1 << 31;
+
 /// The silhouette field of a mesh.
 #[derive(Clone)]
 pub struct SilhouetteSlot {
-    /// First quad of its nodes.
+    /// First quad of its nodes, and [`HALVES`] where it has maps of halves.
     pub first_node: u32,
     /// The field, for the twin.
     pub field: Arc<SilhouetteField>,
@@ -40,7 +43,8 @@ impl Silhouettes {
                 cells.extend(field.cells());
                 first
             });
-            SilhouetteSlot { first_node, field: field.clone() }
+            let halves = if field.has_halves() { HALVES } else { 0 };
+            SilhouetteSlot { first_node: first_node | halves, field: field.clone() }
         };
         let slots = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
         nodes.resize(nodes.len().max(ALIGNMENT as usize / 16), [0.0; 4]);

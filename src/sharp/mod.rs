@@ -10,7 +10,7 @@ pub mod twin;
 use crate::bake::silhouette::SilhouetteOptions;
 use crate::error::Result;
 use crate::field::lattice::CELL_WARP;
-use crate::field::silhouette::{LEAST_PENUMBRA, NEAREST, REACH};
+use crate::field::silhouette::{DEEP, INSIDE, LEAST_PENUMBRA, NEAREST, REACH};
 use crate::field::silhouette_nodes::{BEYOND, LEAST_AHEAD};
 use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, STRIP, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
@@ -42,6 +42,8 @@ pub struct SharpPermutation {
     pub outlines: bool,
     /// Whether the scene has a sharp light that shines from one flat side.
     pub panels: bool,
+    /// Whether any silhouette field has maps of halves.
+    pub halves: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
 }
@@ -68,6 +70,7 @@ impl SharpPermutation {
             .define("ENTRY_BITS", ENTRY_BITS)
             .define("OUTLINES", self.outlines)
             .define("PANELS", self.panels)
+            .define("HALVES", self.halves)
             .define("SELF", self.self_shadows)
             .define("NODE_CELLS", self.silhouette.cells)
             .define("MAP", self.silhouette.map_px);
@@ -75,6 +78,10 @@ impl SharpPermutation {
             ("REACH", REACH),
             ("NEAREST", NEAREST),
             ("LEAST_PENUMBRA", LEAST_PENUMBRA),
+            ("INSIDE_FROM", INSIDE[0]),
+            ("INSIDE_TO", INSIDE[1]),
+            ("DEEP_FROM", DEEP[0]),
+            ("DEEP_TO", DEEP[1]),
             ("EDGE_REACH", EDGE_REACH),
             ("EDGE_STEPS", EDGE_STEPS),
             ("MOST_SINE", MOST_SINE),

@@ -293,12 +293,13 @@ fn outline_field() -> SilhouetteField {
         cells: 1,
         map_px: 8,
         view_px: 16,
+        half_px: 4,
         centre_m: [0.0; 3],
         radius_m: 1.0,
         mesh: "m".into(),
         mesh_hash: String::new(),
     };
-    let map: Vec<u8> = [0.0_f32, 0.0, 0.5, 0.5].iter().flat_map(|x| x.to_le_bytes()).chain([9; 128]).collect();
+    let map: Vec<u8> = [0.0_f32, 0.0, 0.5, 0.5].iter().flat_map(|x| x.to_le_bytes()).chain([9; 128 + 2 * 32]).collect();
     let payload = map.repeat(header.map_count());
     SilhouetteField::new(header, payload).unwrap()
 }

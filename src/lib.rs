@@ -49,11 +49,12 @@
 //! | [`truth`] | ray casting and the exact SH chain |
 //! | [`check`] | every pass against its CPU twin |
 //! | `bench` | what things cost and how wrong they are (feature `cli`) |
+//! | [`farm`] | bakes and pictures of many machines: plans, results, engines |
 //! | `view`, `app` | the state behind the window; a file for each subcommand (feature `cli`) |
 //!
 //! # Beyond one device
 //!
-//! Nothing in this section is built.
+//! Only the second paragraph of this section is built.
 //!
 //! *Merges on many devices.* A cluster reads its list, the entities on the list and their fields, and it writes only its own
 //! vertices. Clusters can therefore be dealt out by receiver and by place. Each device holds the fields and vertices of its own
@@ -61,8 +62,8 @@
 //! draws. A device merges again only what something moved near.
 //!
 //! *Bakes on many machines.* A field depends on mesh, lattice, bands, face size and number format. Their hash names its cache file, and
-//! every file is replaced whole. Workers that share a cache folder need no other meeting place. To share out one field, give each worker
-//! a range of its samples, and add up the parts.
+//! every file is replaced whole. [`farm`] cuts bakes and pictures into slices that need no meeting place but a shared folder; a long
+//! bake is cut within a mesh, into ranges of its samples, as [`bake::workers`] does on one machine. `FARM.md` says how it is used.
 //!
 //! *Larger scenes.* Fields that together exceed what a device can bind need several buffers, or only the fields of one neighbourhood
 //! at a time. The cluster lists already name those.
@@ -76,6 +77,7 @@ pub mod bench;
 pub mod check;
 pub mod draw;
 pub mod error;
+pub mod farm;
 pub mod field;
 pub mod files;
 pub mod frame;

@@ -29,6 +29,7 @@ const ORDER: &[&str] = &[
     "truth",
     "check",
     "bench",
+    "farm",
     "view",
     "app",
     "prelude",

@@ -49,6 +49,24 @@ pub struct Arguments {
     gltf: GltfArguments,
 }
 
+impl Arguments {
+    fn options(&self) -> bake::Options {
+        let shortcuts = Shortcuts { symmetry: self.symmetry, faces: self.faces, inside: self.inside };
+        bake::Options { shortcuts, ..self.bake.options() }
+    }
+
+    /// Options that serve every kind of thing that is baked of a mesh.
+    ///
+    /// # Errors
+    /// `Usage` where they say which kind.
+    pub(super) fn of_any_kind(&self) -> Result<bake::Options> {
+        if self.silhouette || self.radiance.is_some() {
+            return Err(Error::Usage("a plan has every kind of field: leave out --silhouette and --radiance".into()));
+        }
+        Ok(self.options())
+    }
+}
+
 /// Parses three numbers with commas between them.
 pub(super) fn color(text: &str) -> std::result::Result<Vec3, String> {
     let numbers: Vec<f32> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
@@ -90,8 +108,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         mesh = shining(mesh, radiance, &arguments.mesh)?;
     }
     let context = Context::new(global)?;
-    let shortcuts = Shortcuts { symmetry: arguments.symmetry, faces: arguments.faces, inside: arguments.inside };
-    let options = bake::Options { shortcuts, ..arguments.bake.options() };
+    let options = arguments.options();
     let (field, report) = context
         .baker
         .field(&mesh, bake::header(&mesh, kind, &options), &|done, all| context.progress.show(&mesh.name, done, all))

@@ -8,6 +8,7 @@ mod compiling;
 mod context;
 mod demo;
 mod devices;
+mod farm;
 mod import;
 mod inspect;
 mod output;
@@ -69,6 +70,9 @@ enum Subcommands {
     /// Write shell completions and manual pages into a folder
     #[command(hide = true)]
     Pages(pages::Arguments),
+    /// Share bakes and pictures out among many machines
+    #[command(subcommand_required = true, arg_required_else_help = true)]
+    Farm(farm::Arguments),
     /// Capture for a bake in another process, which starts this
     #[command(name = crate::bake::workers::COMMAND, hide = true)]
     BakeWorker,
@@ -129,6 +133,7 @@ fn run(cli: &Cli) -> Result<()> {
         Subcommands::View(arguments) => view::run(&cli.global, arguments),
         Subcommands::Devices(arguments) => devices::run(&cli.global, arguments),
         Subcommands::Pages(arguments) => pages::run(arguments),
+        Subcommands::Farm(arguments) => farm::run(&cli.global, arguments),
         Subcommands::BakeWorker => worker::run(&cli.global),
     }
 }

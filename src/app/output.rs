@@ -135,6 +135,11 @@ impl Progress {
         }
     }
 
+    /// Shows that `done` of `all` slices are done.
+    pub fn slices(&self, done: u32, all: u32) {
+        self.bar("slices", "running [{bar:32}] {pos}/{len} {msg}, {eta} left", done, all);
+    }
+
     fn bar(&self, what: &str, template: &str, done: u32, all: u32) {
         if self.hidden {
             return;

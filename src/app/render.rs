@@ -36,6 +36,9 @@ pub struct Arguments {
     /// Number of pictures
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
+    /// Number of the first picture: its time is so many pictures later, and numbered names begin with it
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u32).range(..=10_000_000))]
+    first: u32,
     /// Pictures per second of scene time
     #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
     fps: u16,
@@ -44,7 +47,7 @@ pub struct Arguments {
     time: Option<f64>,
     /// Size of the picture; default: the scene's
     #[arg(long, value_parser = size, value_name = "WxH")]
-    size: Option<[u32; 2]>,
+    pub(super) size: Option<[u32; 2]>,
     /// Also write one row for each lit vertex: entity, position (m) and normal in the world, linear radiosity without emission
     #[arg(long, value_name = "V.csv")]
     vertices: Option<PathBuf>,
@@ -76,6 +79,20 @@ pub struct Arguments {
     bake: BakeArguments,
     #[command(flatten)]
     gltf: GltfArguments,
+}
+
+impl Arguments {
+    /// Fails where something besides numbered pictures is asked for.
+    ///
+    /// # Errors
+    /// `Usage` with what.
+    pub(super) fn pictures_only(&self) -> Result<()> {
+        let others = [&self.exr, &self.vertices, &self.stats, &self.error];
+        if self.frames != 1 || self.first != 0 || others.into_iter().any(Option::is_some) {
+            return Err(Error::Usage("a plan has its own --frames, and writes pictures alone".into()));
+        }
+        Ok(())
+    }
 }
 
 /// Renders a scene.
@@ -159,9 +176,10 @@ impl<'a> Rendering<'a> {
     }
 
     /// Lights and draws one picture; also writes it as EXR where that is asked for.
-    fn draw(&mut self, index: u32, names: &PictureNames) -> Result<Vec<f32>> {
+    fn draw(&mut self, number: u32, names: &PictureNames) -> Result<Vec<f32>> {
         let (arguments, white) = (self.arguments, self.scene.data.output.white());
         let first_s = arguments.time.unwrap_or(self.scene.data.output.time_s);
+        let index = arguments.first + number;
         let time_s = first_s + f64::from(index) / f64::from(arguments.fps);
         let placements = self.scene.at(time_s);
         let start = Instant::now();
@@ -174,13 +192,13 @@ impl<'a> Rendering<'a> {
         };
         self.timings.push((time_s, start.elapsed(), passes));
         let rgb = self.frame.picture();
-        let last = arguments.exr.as_ref().filter(|_| index + 1 == arguments.frames).cloned();
+        let last = arguments.exr.as_ref().filter(|_| number + 1 == arguments.frames).cloned();
         if let Some(path) = names.numbered_exr.as_ref().map(|numbered| numbered.path(index)).or(last) {
             self.frame.redraw(&placements, f32::INFINITY)?;
             let [width, height] = self.options.size;
             picture::write_exr(&path, width, height, &self.frame.picture())?;
         }
-        self.context.progress.pictures(index + 1, arguments.frames);
+        self.context.progress.pictures(number + 1, arguments.frames);
         Ok(rgb)
     }
 
@@ -195,7 +213,8 @@ impl<'a> Rendering<'a> {
         }
         for index in 0..arguments.frames {
             let numbered = names.numbered.as_ref();
-            let path = numbered.map_or_else(|| arguments.output.clone(), |numbered| numbered.path(index));
+            let path =
+                numbered.map_or_else(|| arguments.output.clone(), |numbered| numbered.path(arguments.first + index));
             picture::write_png(&path, width, height, &self.draw(index, names)?, exposure_ev)?;
         }
         Ok(())

@@ -1,6 +1,7 @@
 //! The cache of what is baked: fields, silhouette fields, transfer vectors and self-visibility. Names are hashes of the mesh's content and of everything
 //! else that decides the numbers. One function, `Cache::find`, serves all kinds; a `Shelf` says where one kind is kept.
 
+use super::kinds::Kind;
 pub use super::names::field_name;
 use super::names::{SelfVisibilityHeader, TransferHeader, identity, key, silhouette_identity, silhouette_name};
 use super::partial::Partial;
@@ -11,7 +12,7 @@ use crate::error::Result;
 use crate::field::file::{self, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC};
 use crate::field::quantity::channel_stride;
 use crate::field::silhouette::{SilhouetteField, SilhouetteHeader};
-use crate::field::{FieldHeader, ShadowField, self_visibility};
+use crate::field::{FieldHeader, FieldKind, ShadowField, self_visibility};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -66,6 +67,20 @@ impl Cache {
 
     fn path(&self, key: &str, ending: &str) -> Option<PathBuf> {
         Some(self.folder.as_ref()?.join(format!("{key}.{ending}")))
+    }
+
+    /// The file of what a cancelled bake has kept of one kind of thing, in a cache that has a folder.
+    pub(super) fn unfinished(&self, mesh: &Mesh, options: &Options, kind: Kind) -> Option<PathBuf> {
+        let field = |kind| field_name(&super::header(mesh, kind, options));
+        match kind {
+            Kind::Shadow => self.path(&field(FieldKind::Occlusion), FIELDS.endings[1]),
+            Kind::Light => self.path(&field(FieldKind::Radiance), FIELDS.endings[1]),
+            Kind::Silhouette => self.path(&silhouette_name(mesh, options), SILHOUETTES.endings[1]),
+            Kind::SelfVisibility => {
+                self.path(&key(&SelfVisibilityHeader::new(mesh, options)), SELF_VISIBILITY.endings[1])
+            }
+            Kind::Transfer => self.path(&key(&TransferHeader::new(mesh, options)), TRANSFERS.endings[1]),
+        }
     }
 
     fn exists(&self, key: &str, ending: &str) -> bool {

@@ -16,9 +16,11 @@ pub mod chunk;
 pub mod ensure;
 mod header;
 pub mod inside;
+pub mod kinds;
 mod names;
 
 pub mod partial;
+pub mod parts;
 pub mod project;
 pub mod quality;
 pub mod report;
@@ -256,9 +258,7 @@ impl Baker {
         let started = Instant::now();
         triangles::tell_repeated(mesh);
         let Options { bands, face_px, shortcuts, .. } = *options;
-        let turned = turned_vertices(mesh, face_px, shortcuts.symmetry);
-        let targets: Vec<CaptureTarget> =
-            vertex_targets(mesh).filter(|target| turned[target.job.target as usize].is_none()).collect();
+        let (targets, turned) = transfer_targets(mesh, options);
         let reduction = Reduction::Project { bands, projection: Projection::Transfer };
         let captures = Captures { mesh, reduction, face_px, shortcuts, partial };
         let mut transfer = vec![0.0_f32; mesh.positions.len() * channel_stride(bands)];
@@ -319,6 +319,12 @@ fn vertex_targets(mesh: &Mesh) -> impl Iterator<Item = CaptureTarget> {
         eye: position + TRANSFER_OFFSET * normal,
         job: Job { normal: normal.extend(0.0).to_array(), slots: [0; 6], target: vertex as u32, scale: 1.0 },
     })
+}
+
+/// The vertices whose transfer vector is captured, and how the others are turned from them.
+fn transfer_targets(mesh: &Mesh, options: &Options) -> (Vec<CaptureTarget>, Vec<Option<Turned>>) {
+    let turned = turned_vertices(mesh, options.face_px, options.shortcuts.symmetry);
+    (vertex_targets(mesh).filter(|target| turned[target.job.target as usize].is_none()).collect(), turned)
 }
 
 /// For every vertex the one whose transfer vector is turned for it, or `None` where its own is captured.

@@ -1,10 +1,11 @@
 //! The samples that a bake has done so far. They are kept on disk every few seconds, so that a bake that was cancelled, by Ctrl-C or
 //! by a power cut, goes on from there. The file is replaced whole, so it is never half-written. It is removed when the bake is done.
 
+use crate::error::{Error, Result};
 use crate::field::file;
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -17,6 +18,15 @@ pub struct Partial {
     path: Option<PathBuf>,
     saved: Mutex<Instant>,
     interval: Duration,
+}
+
+/// Writes samples that are all captured, in their places, as a bake would keep them; it then captures none.
+///
+/// # Errors
+/// `Failed` when the file cannot be written.
+pub(super) fn write_done(path: &Path, all: u32, numbers: usize, values: &[u8]) -> Result<()> {
+    file::write(path, MAGIC, &Header { done: all, all, numbers }, values)
+        .map_err(|error| Error::Failed(error.to_string()))
 }
 
 #[derive(Serialize, Deserialize)]

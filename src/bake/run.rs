@@ -6,6 +6,7 @@ use super::workers;
 use super::{BakeReport, Baker, Progress};
 use crate::error::Result;
 use bytemuck::Pod;
+use std::ops::Range;
 
 /// Reduced samples on their way to their places, and how far the bake is.
 struct Gathered<'g, T: Pod> {
@@ -40,6 +41,30 @@ impl<T: Pod> Gathered<'_, T> {
 }
 
 impl Captures<'_> {
+    /// The reduced samples of a run of the targets, one after another, captured by this process alone.
+    ///
+    /// # Errors
+    /// As [`Captures::run`].
+    pub fn run_part(
+        &self,
+        baker: &Baker,
+        targets: &[CaptureTarget],
+        part: Range<usize>,
+        progress: Progress<'_>,
+    ) -> Result<Vec<u8>> {
+        let mut batches = Batches::new(baker, self)?;
+        let (targets, units) = batches.plan(targets, 1);
+        let (mut samples, mut report) = (Vec::new(), BakeReport::default());
+        for unit in units.iter().map(Unit::targets) {
+            let now = unit.start.max(part.start)..unit.end.min(part.end);
+            if !now.is_empty() {
+                progress((now.end - part.start) as u32, part.len() as u32);
+                samples.extend(batches.run_unit(&targets[now], &mut report)?);
+            }
+        }
+        Ok(samples)
+    }
+
     /// Captures every target and puts the reduced samples into `values`, in the order of their numbers. It goes on from what a
     /// cancelled bake has kept.
     pub fn run<T: Pod>(

@@ -61,6 +61,20 @@ pub fn has_magic(path: &Path, magic: [u8; 8]) -> bool {
     File::open(path).and_then(|mut file| file.read_exact(&mut found)).is_ok() && found == magic
 }
 
+/// The header alone of what [`write()`] wrote, without a look at the hash. `None` where there is no such file.
+pub fn read_header<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Option<H> {
+    let mut file = File::open(path).ok()?;
+    let mut prologue = [0; PROLOGUE];
+    file.read_exact(&mut prologue).ok()?;
+    let length = u64::from(u32::from_le_bytes(prologue[12..16].try_into().ok()?));
+    if prologue[..8] != magic || prologue[8..12] != VERSION.to_le_bytes() || length > HEADER_LIMIT {
+        return None;
+    }
+    let mut header = vec![0; length as usize];
+    file.read_exact(&mut header).ok()?;
+    serde_json::from_slice(&header).ok()
+}
+
 /// Reads what [`write()`] wrote. Lengths are checked against the file's size before memory is allocated for them.
 ///
 /// # Errors

@@ -1,0 +1,59 @@
+//! `shadow-fields farm`: bakes and pictures of many machines, cut into slices that share a folder.
+
+mod collect;
+mod plan;
+mod run;
+mod submit;
+
+use super::{Global, output};
+use crate::error::Result;
+use crate::farm::Plan;
+use crate::farm::status::Status;
+use clap::{Args, Subcommand};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Arguments of `farm`.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    command: Commands,
+}
+
+#[derive(Subcommand)]
+enum Commands {
+    /// Cut works into slices of about two minutes and write them, with everything that decides their bytes
+    Plan(plan::Arguments),
+    /// Do one slice; where its result is there and intact, return at once
+    Run(run::Arguments),
+    /// Check all results and make cache files and pictures of them, or say which slices have to run again
+    Collect(collect::Arguments),
+    /// Count what is done and estimate what is left
+    Status(StatusArguments),
+    /// Hand the slices that have no result to an engine
+    Submit(submit::Arguments),
+}
+
+/// Arguments of `farm status`.
+#[derive(Args)]
+pub struct StatusArguments {
+    /// Plan that `farm plan` has written
+    plan: PathBuf,
+}
+
+/// Runs one of the commands.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    match &arguments.command {
+        Commands::Plan(arguments) => plan::run(global, arguments),
+        Commands::Run(arguments) => run::run(global, arguments),
+        Commands::Collect(arguments) => collect::run(global, arguments),
+        Commands::Status(arguments) => status(global, arguments),
+        Commands::Submit(arguments) => submit::run(global, arguments),
+    }
+}
+
+fn status(global: &Global, arguments: &StatusArguments) -> Result<()> {
+    let status = Status::of(&Plan::read(&arguments.plan)?);
+    output::say(if global.json { json!(status).to_string() } else { status.line(32) });
+    Ok(())
+}

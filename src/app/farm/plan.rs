@@ -1,0 +1,197 @@
+//! `shadow-fields farm plan`
+
+use super::super::context::Context;
+use super::super::{Global, output};
+use super::run::{mesh_options, render_words};
+use crate::bake::kinds::Kind;
+use crate::error::{Error, Result};
+use crate::farm::plan::{Cost, DeviceClass, Input, Plan, Task, TaskKind, Work};
+use crate::merge::calibrate;
+use crate::scene::{self, Scene};
+use clap::Args;
+use rayon::prelude::*;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Seconds and MB that a picture is taken to need for each pixel, and for the scene: corrected by what ran.
+const PIXEL_SECONDS: f64 = 1e-7;
+const PICTURE_SECONDS: f64 = 0.05;
+const PIXEL_MB: f64 = 1e-4;
+/// Bytes of a picture's file for each pixel.
+const PIXEL_BYTES: f64 = 1.5;
+/// MB that a process holds for each triangle of a mesh, beside what it holds anyway.
+const TRIANGLE_MB: f64 = 2e-3;
+
+/// Arguments of `farm plan`.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  shadow-fields farm plan meshes/ -o plan.json -- --quality high\n  \
+    shadow-fields farm plan film.toml --frames 240 --pictures out/f_####.png -o film.json -- --size 1280x720")]
+pub struct Arguments {
+    /// What is done: meshes to bake (files, or folders that are searched for .obj, .glb and .gltf), or scenes (.toml) to render
+    #[arg(required = true, value_name = "WORK")]
+    works: Vec<PathBuf>,
+    /// Plan to write
+    #[arg(short, long, value_name = "PLAN.json")]
+    output: PathBuf,
+    /// Shared folder of results, relative to the plan's
+    #[arg(long, default_value = "results", value_name = "DIR")]
+    results: String,
+    /// Number of pictures of each scene
+    #[arg(long, value_name = "N", requires = "pictures", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    frames: Option<u32>,
+    /// Where `farm collect` puts the pictures of a scene: a name with a run of # for the number, relative to the plan's folder. With
+    /// several scenes, $ stands for the scene's name
+    #[arg(long, value_name = "F_####.png")]
+    pictures: Option<String>,
+    /// Options of `bake` or `render` after --, which decide the bytes: --quality, --size and others
+    #[arg(last = true, value_name = "OPTIONS")]
+    words: Vec<String>,
+}
+
+/// A file to plan, read.
+struct Read {
+    input: Input,
+    /// Kinds with what they cost, of a mesh; empty for a scene.
+    kinds: Vec<(Kind, Cost)>,
+    pixels: f64,
+}
+
+/// Plans slices.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let started = Instant::now();
+    output::check_folder(&arguments.output)?;
+    let full = std::path::absolute(&arguments.output).map_err(|e| Error::input(&arguments.output, e))?;
+    let folder = full.parent().unwrap_or(Path::new("/")).to_owned();
+    let context = Context::new(global)?;
+    let mut plan = Plan::new(DeviceClass::of(&context.device), arguments.results.clone());
+    let (meshes, scenes) = find(&arguments.works)?;
+    if !meshes.is_empty() {
+        let options = mesh_options(&arguments.words)?;
+        let work = plan.works.len() as u32;
+        plan.works.push(Work { words: arguments.words.clone(), pictures: None });
+        let read: Vec<Read> =
+            meshes.par_iter().map(|path| read_mesh(path, &folder, &options)).collect::<Result<_>>()?;
+        for Read { input, kinds, .. } in read {
+            let index = plan.inputs.len() as u32;
+            plan.inputs.push(input);
+            for (kind, cost) in kinds {
+                let parts = if kind.is_cut() { Plan::parts(cost.seconds) } else { 1 };
+                let share = f64::from(parts);
+                let cost = Cost { seconds: cost.seconds / share, bytes: cost.bytes / share, ..cost };
+                (0..parts).for_each(|part| plan.add(Task(work, index, TaskKind::Bake(kind), part, parts), cost));
+            }
+        }
+    }
+    if !scenes.is_empty() {
+        let (Some(frames), Some(pictures)) = (arguments.frames, &arguments.pictures) else {
+            return Err(Error::Usage(format!("{}: a scene needs --frames and --pictures", scenes[0].display())));
+        };
+        if scenes.len() > 1 && !pictures.contains('$') {
+            return Err(Error::Usage("--pictures needs a $ for the name of the scene, since there are several".into()));
+        }
+        // Without a variant of its own each machine would take what is fastest there.
+        let mut words = arguments.words.clone();
+        if !words.iter().any(|word| word.starts_with("--variant")) {
+            words.extend(["--variant".into(), calibrate::best_known(&context.device).name.into()]);
+        }
+        render_words(&scenes[0], &words)?;
+        for path in &scenes {
+            let (work, index) = (plan.works.len() as u32, plan.inputs.len() as u32);
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            plan.works.push(Work { words: words.clone(), pictures: Some(pictures.replace('$', &name)) });
+            let read = read_scene(path, &folder, &words)?;
+            plan.inputs.push(read.input);
+            let each = PICTURE_SECONDS + read.pixels * PIXEL_SECONDS;
+            let run = ((crate::farm::plan::SLICE_SECONDS / each) as u32).clamp(1, frames);
+            let mut first = 0;
+            while first < frames {
+                let count = run.min(frames - first);
+                let seconds = f64::from(count) * each;
+                let bytes = f64::from(count) * read.pixels * PIXEL_BYTES;
+                let cost = Cost { seconds, memory_mb: read.pixels * PIXEL_MB, bytes };
+                plan.add(Task(work, index, TaskKind::Frames, first, count), cost);
+                first += count;
+            }
+        }
+    }
+    context.finish()?;
+    plan.write(&arguments.output)?;
+    let seconds: f64 = plan.slices.iter().map(|slice| slice.seconds()).sum();
+    if global.json {
+        output::say(json!({ "slices": plan.slices.len(), "tasks": plan.tasks.len(), "seconds": seconds }).to_string());
+    } else {
+        output::say(format!(
+            "{}: {} slices of {} tasks, about {:.0} s of work, planned in {:.2} s",
+            output::shown(&arguments.output),
+            plan.slices.len(),
+            plan.tasks.len(),
+            seconds,
+            started.elapsed().as_secs_f64()
+        ));
+    }
+    Ok(())
+}
+
+/// Meshes and scenes of the works, in order of their names within a folder.
+fn find(works: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+    let is_mesh = |path: &Path| {
+        path.extension().is_some_and(|e| ["obj", "glb", "gltf"].iter().any(|m| e.eq_ignore_ascii_case(m)))
+    };
+    let (mut meshes, mut scenes) = (Vec::new(), Vec::new());
+    for path in works {
+        if path.is_dir() {
+            let entries =
+                std::fs::read_dir(path).map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+            let mut found: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| is_mesh(p)).collect();
+            if found.is_empty() {
+                return Err(Error::input(path, "a folder without meshes (.obj, .glb, .gltf)"));
+            }
+            found.sort();
+            meshes.extend(found);
+        } else if is_mesh(path) {
+            meshes.push(path.clone());
+        } else {
+            scenes.push(path.clone());
+        }
+    }
+    Ok((meshes, scenes))
+}
+
+/// A path as plans have it.
+fn written(path: &Path, folder: &Path) -> Result<String> {
+    let full = std::path::absolute(path).map_err(|error| Error::input(path, error))?;
+    let short = full.strip_prefix(folder).unwrap_or(&full);
+    short.to_str().map(str::to_owned).ok_or_else(|| Error::input(path, "a plan needs names in UTF-8"))
+}
+
+fn read_mesh(path: &Path, folder: &Path, options: &crate::bake::Options) -> Result<Read> {
+    let (mesh, _) = scene::load_mesh(path)?;
+    let memory_mb = mesh.triangles.len() as f64 * TRIANGLE_MB;
+    let cost = |kind: Kind| Cost {
+        seconds: kind.seconds(&mesh, options),
+        memory_mb,
+        bytes: kind.bytes(&mesh, options) as f64,
+    };
+    let kinds = Kind::of(&mesh).into_iter().map(|kind| (kind, cost(kind))).collect();
+    let input = Input { path: written(path, folder)?, hash: crate::bake::hash_text(&mesh) };
+    Ok(Read { input, kinds, pixels: 0.0 })
+}
+
+fn read_scene(path: &Path, folder: &Path, words: &[String]) -> Result<Read> {
+    let scene = Scene::load(path)?;
+    let size = render_words(path, words)?.unwrap_or([scene.data.output.width, scene.data.output.height]);
+    let input = Input { path: written(path, folder)?, hash: scene_hash(&scene) };
+    Ok(Read { input, kinds: Vec::new(), pixels: f64::from(size[0]) * f64::from(size[1]) })
+}
+
+/// The hash of a scene as it was read: with its meshes and its distant light, not with the way they were written.
+pub(super) fn scene_hash(scene: &Scene) -> String {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(format!("{:?}", scene.data).as_bytes());
+    for mesh in &scene.meshes {
+        hasher.update(&mesh.content_hash());
+    }
+    hasher.update(format!("{:?} {:?}", scene.entities, scene.environment).as_bytes());
+    hasher.finalize().to_hex()[..32].to_owned()
+}

@@ -1,0 +1,181 @@
+//! `shadow-fields farm submit`
+
+use super::super::output::Progress;
+use super::super::{Global, output};
+use crate::error::{Error, Result};
+use crate::farm::Plan;
+use crate::farm::engines::{self, Call};
+use crate::farm::local::{Runner, cannot_start};
+use crate::farm::status::missing;
+use crate::files;
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What runs slices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Engine {
+    /// Processes on this machine; ends when all are done
+    Local,
+    /// A job array of Slurm: PLAN.sbatch is written and handed to sbatch
+    Slurm,
+    /// A Dask cluster: PLAN.dask.py is written and run by python3, which needs the package distributed
+    Dask,
+    /// A line of a command for each slice, for GNU parallel, Nextflow and others
+    Print,
+    /// A job template of Open Job Description, in JSON
+    Openjd,
+}
+
+/// Arguments of `farm submit`.
+#[derive(Args)]
+pub struct Arguments {
+    /// Plan that `farm plan` has written
+    plan: PathBuf,
+    /// What runs the slices
+    #[arg(long, value_enum, value_name = "ENGINE")]
+    engine: Engine,
+    /// Slices at a time: processes of local and of a Dask cluster on this machine (default: one a core), tasks of a Slurm array
+    /// (default: no limit)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    workers: Option<u32>,
+    /// Address of a Dask scheduler; default: a cluster on this machine
+    #[arg(long, value_name = "ADDRESS")]
+    scheduler: Option<String>,
+    /// With Slurm or Dask: write the script only, and say how it is started
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// Hands slices to an engine.
+pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let plan = Plan::read(&arguments.plan)?;
+    let slices = missing(&plan);
+    let full = |path: &Path| std::path::absolute(path).map_err(|error| Error::input(path, error));
+    let program =
+        std::env::current_exe().map_err(|e| Error::Failed(format!("the program's own file is not known: {e}")))?;
+    let (path, words) = (full(&arguments.plan)?, passed_on(global));
+    let call = Call { program: &program, plan: &path, words: &words };
+    if slices.is_empty() && arguments.engine != Engine::Openjd {
+        output::note(global, "all results are there");
+        return Ok(());
+    }
+    match arguments.engine {
+        Engine::Local => {
+            let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
+            let workers = arguments.workers.map_or(cores, |workers| workers as usize);
+            let runner = Runner { program: program.clone(), plan: path.clone(), words: words.clone(), workers };
+            local(global, &runner, &slices)
+        }
+        Engine::Slurm => slurm(arguments, (&plan, &path), &call, &slices),
+        Engine::Dask => dask(arguments, &path, &call, &slices),
+        Engine::Print => {
+            slices.iter().for_each(|slice| output::say(call.line(&slice.to_string())));
+            Ok(())
+        }
+        Engine::Openjd => {
+            let all: Vec<usize> = (0..plan.slices.len()).collect();
+            let template = engines::openjd(&plan, &call, if slices.is_empty() { &all } else { &slices });
+            output::say(format!("{template:#}"));
+            Ok(())
+        }
+    }
+}
+
+/// Options of this command that slices get too. Each slice is one process.
+fn passed_on(global: &Global) -> Vec<String> {
+    let mut words: Vec<String> = ["--jobs", "1", "--no-progress", "--quiet"].map(str::to_owned).into();
+    let mut add = |name: &str, value: String| words.extend([name.to_owned(), value]);
+    if let Some(device) = &global.device {
+        add("--device", device.clone());
+    }
+    for (name, folder) in [("--cache-dir", &global.cache_dir), ("--shader-dir", &global.shader_dir)] {
+        if let Some(folder) = folder {
+            let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.clone());
+            add(name, folder.to_string_lossy().into_owned());
+        }
+    }
+    if global.no_cache {
+        words.push("--no-cache".into());
+    }
+    words
+}
+
+fn local(global: &Global, runner: &Runner, slices: &[usize]) -> Result<()> {
+    let progress = Progress::new(global);
+    let failures = runner.run(slices, &|done| progress.slices(done as u32, slices.len() as u32))?;
+    for (slice, said) in &failures {
+        log::error!("slice {slice}: {said}");
+    }
+    match failures.first() {
+        None => {
+            output::say(format!("{} slices done", slices.len()));
+            Ok(())
+        }
+        Some((slice, said)) => {
+            Err(Error::Failed(format!("{} of {} slices failed; slice {slice}: {said}", failures.len(), slices.len())))
+        }
+    }
+}
+
+/// Writes a file beside the plan, with another ending.
+fn beside(plan: &Path, ending: &str, text: &str) -> Result<PathBuf> {
+    let path = plan.with_extension(ending);
+    files::replace(&path, text.as_bytes())
+        .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))?;
+    Ok(path)
+}
+
+/// A file with the number of a slice in each line.
+fn list(plan: &Path, slices: &[usize]) -> Result<PathBuf> {
+    beside(plan, "slices", &slices.iter().map(|slice| format!("{slice}\n")).collect::<String>())
+}
+
+fn slurm(arguments: &Arguments, (plan, path): (&Plan, &Path), call: &Call<'_>, slices: &[usize]) -> Result<()> {
+    let logs = path.with_extension("logs");
+    std::fs::create_dir_all(&logs)
+        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", logs.display())))?;
+    let list = list(path, slices)?;
+    let script = beside(path, "sbatch", &engines::slurm(plan, call, &list, &logs))?;
+    let limit = arguments.workers.map_or_else(String::new, |workers| format!("%{workers}"));
+    for first in (0..slices.len()).step_by(engines::ARRAY) {
+        let last = (slices.len() - first).min(engines::ARRAY) - 1;
+        let mut command = Command::new("sbatch");
+        command.args([&format!("--array=0-{last}{limit}"), &format!("--export=ALL,FIRST={first}")]).arg(&script);
+        if arguments.dry_run {
+            let words: Vec<_> = command.get_args().map(|word| engines::quoted(&word.to_string_lossy())).collect();
+            output::say(format!("sbatch {}", words.join(" ")));
+            continue;
+        }
+        let done = command.output().map_err(|error| cannot_start(Path::new("sbatch"), &error))?;
+        let said = if done.status.success() { &done.stdout } else { &done.stderr };
+        let said = String::from_utf8_lossy(said).trim().to_owned();
+        if !done.status.success() {
+            return Err(Error::Failed(format!("sbatch: {said}")));
+        }
+        output::say(said);
+    }
+    Ok(())
+}
+
+fn dask(arguments: &Arguments, path: &Path, call: &Call<'_>, slices: &[usize]) -> Result<()> {
+    let script = beside(path, "dask.py", engines::DASK)?;
+    let mut command = Command::new("python3");
+    command.arg(&script);
+    if let Some(address) = &arguments.scheduler {
+        command.args(["--scheduler", address]);
+    }
+    if let Some(workers) = arguments.workers {
+        command.args(["--workers", &workers.to_string()]);
+    }
+    command.arg(list(path, slices)?);
+    // The number of the slice comes last.
+    command.arg(call.program).args(["farm", "run"]).arg(call.plan).args(call.words).arg("--slice");
+    if arguments.dry_run {
+        let words: Vec<_> = command.get_args().map(|word| engines::quoted(&word.to_string_lossy())).collect();
+        output::say(format!("python3 {}", words.join(" ")));
+        return Ok(());
+    }
+    let status = command.status().map_err(|error| cannot_start(Path::new("python3"), &error))?;
+    if status.success() { Ok(()) } else { Err(Error::Failed(format!("dask: not all slices are done ({status})"))) }
+}

@@ -1,0 +1,357 @@
+//! A plan: works cut into slices, and everything that decides the bytes of each.
+
+use crate::bake::kinds::Kind;
+use crate::error::{Error, Result};
+use crate::files;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Version of the form of a plan.
+const FORMAT: u32 = 1;
+/// Longest plan that is read, in bytes.
+const LIMIT_BYTES: u64 = 1 << 30;
+/// Estimated seconds that a slice is made to take: slices of one to five minutes remain so where a machine is half or twice as fast.
+pub const SLICE_SECONDS: f64 = 120.0;
+/// What a process takes without any mesh: the program, the driver and its compiled shaders, in MB.
+const BASE_MB: u32 = 250;
+
+/// The program whose plans and results belong together.
+pub const PROGRAM: &str = concat!("shadow-fields ", env!("CARGO_PKG_VERSION"), " ", env!("SHADOW_FIELDS_REVISION"));
+
+/// Devices that make the same bytes: of one name and one driver.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DeviceClass {
+    /// Name of the device.
+    pub name: String,
+    /// Name and version of the driver.
+    pub driver: String,
+}
+
+impl DeviceClass {
+    /// That of an open device.
+    pub fn of(device: &crate::gpu::Device) -> Self {
+        DeviceClass { name: device.info.name.clone(), driver: device.info.driver.clone() }
+    }
+}
+
+impl std::fmt::Display for DeviceClass {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({})", self.name, self.driver)
+    }
+}
+
+/// What is done with inputs: its options, as words of the command line of `bake` or `render`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Work {
+    /// Words of options.
+    pub words: Vec<String>,
+    /// Where pictures go, with a run of # for the number; `None` for bakes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pictures: Option<String>,
+}
+
+/// A file that tasks read.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Input {
+    /// Its path: relative to the plan's folder where it lies below that, else absolute.
+    pub path: String,
+    /// Hash of its content, and of that of the files that it names.
+    pub hash: String,
+}
+
+/// What a task makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TaskKind {
+    /// A thing that is baked of a mesh: part `first` of `count`.
+    Bake(Kind),
+    /// Pictures of a scene: `count` from the number `first` on.
+    Frames,
+}
+
+/// The least piece of work. In a plan it is a row of these five values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Task(pub u32, pub u32, pub TaskKind, pub u32, pub u32);
+
+impl Task {
+    /// Index of its work.
+    pub fn work(&self) -> usize {
+        self.0 as usize
+    }
+
+    /// Index of its input.
+    pub fn input(&self) -> usize {
+        self.1 as usize
+    }
+}
+
+/// Tasks that run together: index of the first, their number, estimated seconds, memory in MB, bytes of the result in KB.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Slice(pub u32, pub u32, pub f32, pub u32, pub u32);
+
+impl Slice {
+    /// Estimated seconds on two cores of a software device.
+    pub fn seconds(&self) -> f64 {
+        f64::from(self.2)
+    }
+
+    /// Memory that it needs, in MB.
+    pub fn memory_mb(&self) -> u32 {
+        self.3
+    }
+
+    /// Space in the shared folder that its result takes, in KB.
+    pub fn disk_kb(&self) -> u32 {
+        self.4
+    }
+}
+
+/// A plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    format: u32,
+    /// The program that made it, with its version. Another version refuses it.
+    pub program: String,
+    /// The devices that may run it.
+    pub device: DeviceClass,
+    /// Folder of results, relative to the plan's unless it is absolute.
+    pub results: String,
+    /// Options of what is done.
+    pub works: Vec<Work>,
+    /// What is read.
+    pub inputs: Vec<Input>,
+    /// Pieces of work, slice after slice.
+    pub tasks: Vec<Task>,
+    /// What runs together.
+    pub slices: Vec<Slice>,
+    /// The plan's own folder.
+    #[serde(skip)]
+    pub folder: PathBuf,
+}
+
+/// What a task is estimated to take.
+#[derive(Clone, Copy, Debug)]
+pub struct Cost {
+    /// Seconds on two cores of a software device.
+    pub seconds: f64,
+    /// Memory besides that of the process itself, in MB.
+    pub memory_mb: f64,
+    /// Bytes of the result.
+    pub bytes: f64,
+}
+
+impl Plan {
+    /// An empty plan for this program.
+    pub fn new(device: DeviceClass, results: String) -> Self {
+        Plan {
+            format: FORMAT,
+            program: PROGRAM.into(),
+            device,
+            results,
+            works: Vec::new(),
+            inputs: Vec::new(),
+            tasks: Vec::new(),
+            slices: Vec::new(),
+            folder: PathBuf::new(),
+        }
+    }
+
+    /// Adds a task. It joins the last slice while that remains below [`SLICE_SECONDS`].
+    pub fn add(&mut self, task: Task, cost: Cost) {
+        let memory = BASE_MB + cost.memory_mb.ceil() as u32;
+        let kilobytes = (cost.bytes / 1e3).ceil() as u32;
+        let begins = self.slices.last().is_none_or(|slice| slice.seconds() + cost.seconds > SLICE_SECONDS);
+        if begins {
+            self.slices.push(Slice(self.tasks.len() as u32, 0, 0.0, memory, 0));
+        }
+        let slice = self.slices.last_mut().expect("one was there or is new");
+        slice.1 += 1;
+        slice.2 += cost.seconds as f32;
+        slice.3 = slice.3.max(memory);
+        slice.4 += kilobytes;
+        self.tasks.push(task);
+    }
+
+    /// How many parts a task of so many seconds is cut into.
+    pub fn parts(seconds: f64) -> u32 {
+        if seconds <= 1.5 * SLICE_SECONDS { 1 } else { (seconds / SLICE_SECONDS).ceil() as u32 }
+    }
+
+    /// The tasks of a slice.
+    pub fn tasks_of(&self, slice: usize) -> &[Task] {
+        let Slice(first, count, ..) = self.slices[slice];
+        &self.tasks[first as usize..(first + count) as usize]
+    }
+
+    /// The hash of everything that decides the result of a slice, as 32 hexadecimal digits.
+    pub fn key(&self, slice: usize) -> String {
+        let mut hasher = blake3::Hasher::new();
+        let mut add = |text: &str| {
+            hasher.update(&(text.len() as u64).to_le_bytes()).update(text.as_bytes());
+        };
+        [&self.program, &self.device.name, &self.device.driver].into_iter().for_each(|text| add(text));
+        for task in self.tasks_of(slice) {
+            self.works[task.work()].words.iter().for_each(|word| add(word));
+            add(&self.inputs[task.input()].hash);
+            add(&serde_json::to_string(&(task.2, task.3, task.4)).expect("plain data"));
+        }
+        hasher.finalize().to_hex()[..32].to_owned()
+    }
+
+    /// A path of the plan as a file of this machine.
+    pub fn path(&self, text: &str) -> PathBuf {
+        self.folder.join(text)
+    }
+
+    /// Reads a plan and checks that this program made it.
+    ///
+    /// # Errors
+    /// `Input` where it is missing or malformed; `Unsupported`, with both versions, where another program made it.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bad = |what: String| Error::input(path, what);
+        let size = std::fs::metadata(path).map_err(|error| bad(format!("cannot be read: {error}")))?.len();
+        if size > LIMIT_BYTES {
+            return Err(bad(format!("{size} bytes are over the limit of {LIMIT_BYTES} for a plan")));
+        }
+        let bytes = std::fs::read(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
+        // The version comes first: another program's plan may have another form.
+        #[derive(Deserialize)]
+        struct Made {
+            format: u32,
+            program: String,
+        }
+        let made: Made = serde_json::from_slice(&bytes).map_err(|error| bad(format!("not a plan: {error}")))?;
+        if (made.format, made.program.as_str()) != (FORMAT, PROGRAM) {
+            return Err(Error::Unsupported(format!(
+                "{}: a plan of {}, and this is {PROGRAM}; plan again, or use that program",
+                path.display(),
+                made.program
+            )));
+        }
+        let mut plan: Plan = serde_json::from_slice(&bytes).map_err(|error| bad(format!("not a plan: {error}")))?;
+        plan.check().map_err(bad)?;
+        let full = std::path::absolute(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
+        plan.folder = full.parent().unwrap_or(Path::new("/")).to_owned();
+        Ok(plan)
+    }
+
+    /// Whether all indices lead somewhere.
+    fn check(&self) -> std::result::Result<(), String> {
+        let mut next = 0;
+        for (index, Slice(first, count, ..)) in self.slices.iter().enumerate() {
+            if *first != next || *count == 0 {
+                return Err(format!("slice {index} does not begin where the one before it ends"));
+            }
+            next = first.checked_add(*count).ok_or("too many tasks")?;
+        }
+        if next as usize != self.tasks.len() {
+            return Err("its slices hold other tasks than it has".into());
+        }
+        for Task(work, input, kind, first, count) in &self.tasks {
+            let part = matches!(kind, TaskKind::Frames) || first < count;
+            if *work as usize >= self.works.len() || *input as usize >= self.inputs.len() || *count == 0 || !part {
+                return Err("a task leads nowhere".into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the plan, whole or not at all.
+    ///
+    /// # Errors
+    /// `Failed` where it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let bytes = serde_json::to_vec(self).expect("a plan is plain data");
+        files::replace(path, &bytes)
+            .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
+    }
+
+    /// Fails where a device is of another class than the plan's.
+    ///
+    /// # Errors
+    /// `Unsupported` with the names of both.
+    pub fn check_device(&self, device: &DeviceClass) -> Result<()> {
+        if *device == self.device {
+            return Ok(());
+        }
+        Err(Error::Unsupported(format!("the plan is for {}, and this device is {device}", self.device)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(tasks: u32, seconds: f64) -> Plan {
+        let device = DeviceClass { name: "a".into(), driver: "b".into() };
+        let mut plan = Plan::new(device, "results".into());
+        plan.works.push(Work { words: vec!["--quality".into(), "draft".into()], pictures: None });
+        plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
+        for index in 0..tasks {
+            let cost = Cost { seconds, memory_mb: 1.0, bytes: 1e6 };
+            plan.add(Task(0, 0, TaskKind::Bake(Kind::Shadow), index, tasks), cost);
+        }
+        plan
+    }
+
+    #[test]
+    fn small_tasks_share_slices_and_a_plan_is_read_as_it_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.json");
+        let mut plan = plan(10, 50.0);
+        assert_eq!(plan.slices.len(), 5);
+        assert!(plan.slices.iter().all(|slice| slice.seconds() == 100.0 && slice.disk_kb() == 2000));
+        plan.write(&path).unwrap();
+        plan.folder = folder.path().to_owned();
+        assert_eq!(Plan::read(&path).unwrap(), plan);
+        assert_eq!((Plan::parts(150.0), Plan::parts(181.0), Plan::parts(1200.0)), (1, 2, 10));
+    }
+
+    /// Each thing that decides a result is part of its name.
+    #[test]
+    fn names_of_results_differ_where_anything_differs() {
+        let base = plan(2, 100.0);
+        let mut keys = vec![base.key(0), base.key(1)];
+        let edits: [fn(&mut Plan); 5] = [
+            |p| p.program.push('x'),
+            |p| p.device.driver.push('x'),
+            |p| p.works[0].words[1].push('x'),
+            |p| p.inputs[0].hash.push('x'),
+            |p| p.tasks[0].2 = TaskKind::Bake(Kind::Transfer),
+        ];
+        for edit in edits {
+            let mut other = base.clone();
+            edit(&mut other);
+            keys.push(other.key(0));
+        }
+        let distinct: std::collections::HashSet<_> = keys.iter().collect();
+        assert_eq!(distinct.len(), keys.len());
+        let mut moved = base.clone();
+        moved.inputs[0].path = "elsewhere/m.obj".into();
+        assert_eq!(moved.key(0), base.key(0), "where an input lies decides nothing");
+    }
+
+    #[test]
+    fn other_versions_and_broken_plans_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.json");
+        let refused = |edit: &dyn Fn(&mut Plan)| {
+            let mut plan = plan(2, 100.0);
+            edit(&mut plan);
+            plan.write(&path).unwrap();
+            Plan::read(&path).map(|_| ()).unwrap_err()
+        };
+        let older = refused(&|p| p.program = "shadow-fields 0.0.9 abc".into());
+        assert!(
+            older.exit_code() == 3 && older.to_string().contains("0.0.9 abc, and this is shadow-fields"),
+            "{older}"
+        );
+        assert_eq!(refused(&|p| p.slices[0].1 = 9).exit_code(), 4);
+        assert_eq!(refused(&|p| p.tasks[0].1 = 9).exit_code(), 4);
+        std::fs::write(&path, "{").unwrap();
+        assert_eq!(Plan::read(&path).unwrap_err().exit_code(), 4);
+    }
+}

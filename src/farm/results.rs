@@ -1,0 +1,133 @@
+//! Results of slices in a shared folder: named by what decides them, sealed by a hash, replaced whole.
+
+use super::plan::Plan;
+use crate::error::{Error, Result};
+use crate::field::file;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+const MAGIC: [u8; 8] = *b"SHSLICE\n";
+
+/// What a result says of itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct About {
+    /// What it is the result of, see [`Plan::key`].
+    pub key: String,
+    /// Seconds that it took.
+    pub seconds: f64,
+}
+
+/// A file of a result: the index of its task within the slice, its name, its content.
+pub type Entry = (u32, String, Vec<u8>);
+
+/// How the result of a slice stands.
+#[derive(Debug)]
+pub enum Found {
+    /// It is there and intact.
+    Whole(About, Vec<Entry>),
+    /// There is none.
+    Missing,
+    /// It is there, but damaged.
+    Damaged(Error),
+}
+
+/// Where the result of a slice is.
+pub fn path(plan: &Plan, slice: usize) -> PathBuf {
+    let key = plan.key(slice);
+    plan.path(&plan.results).join(&key[..2]).join(format!("{key}.slice"))
+}
+
+/// Looks for the result of a slice and reads it.
+pub fn find(plan: &Plan, slice: usize) -> Found {
+    let path = path(plan, slice);
+    if !path.exists() {
+        return Found::Missing;
+    }
+    let read = file::read::<About>(&path, MAGIC).and_then(|(about, payload)| {
+        if about.key != plan.key(slice) {
+            return Err(Error::input(&path, "it does not fit its name"));
+        }
+        Ok((about, entries(&payload).ok_or_else(|| Error::input(&path, "malformed"))?))
+    });
+    match read {
+        Ok((about, entries)) => Found::Whole(about, entries),
+        Err(error) => Found::Damaged(error),
+    }
+}
+
+/// What a result says of itself, without a look at its content; `None` where there is none.
+pub fn about(plan: &Plan, slice: usize) -> Option<About> {
+    file::read_header(&path(plan, slice), MAGIC)
+}
+
+/// Writes the result of a slice, whole or not at all.
+///
+/// # Errors
+/// `Failed` where the folder cannot be written.
+pub fn write(plan: &Plan, slice: usize, seconds: f64, entries: &[Entry]) -> Result<()> {
+    let mut payload = Vec::new();
+    for (task, name, bytes) in entries {
+        payload.extend(task.to_le_bytes());
+        payload.extend((name.len() as u32).to_le_bytes());
+        payload.extend((bytes.len() as u64).to_le_bytes());
+        payload.extend(name.as_bytes());
+        payload.extend(bytes);
+    }
+    let about = About { key: plan.key(slice), seconds };
+    file::write(&path(plan, slice), MAGIC, &about, &payload).map_err(|error| Error::Failed(error.to_string()))
+}
+
+fn entries(mut rest: &[u8]) -> Option<Vec<Entry>> {
+    let mut out = Vec::new();
+    while !rest.is_empty() {
+        let (head, tail) = rest.split_at_checked(16)?;
+        let word = |at: usize| u32::from_le_bytes(head[at..at + 4].try_into().expect("four bytes"));
+        let length = u64::from_le_bytes(head[8..].try_into().expect("eight bytes"));
+        let (name, tail) = tail.split_at_checked(word(4) as usize)?;
+        let (bytes, tail) = tail.split_at_checked(usize::try_from(length).ok()?)?;
+        let name = String::from_utf8(name.to_vec()).ok()?;
+        // A name is one file's: it leads nowhere else.
+        if name.contains(['/', '\\']) || name.starts_with('.') {
+            return None;
+        }
+        out.push((word(0), name, bytes.to_vec()));
+        rest = tail;
+    }
+    Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::kinds::Kind;
+    use crate::farm::plan::{Cost, DeviceClass, Input, Task, TaskKind, Work};
+
+    #[test]
+    fn results_are_found_missing_and_damaged() {
+        let folder = tempfile::tempdir().unwrap();
+        let device = DeviceClass { name: "a".into(), driver: "b".into() };
+        let mut plan = Plan::new(device, "results".into());
+        plan.folder = folder.path().to_owned();
+        plan.works.push(Work { words: Vec::new(), pictures: None });
+        plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
+        let cost = Cost { seconds: 100.0, memory_mb: 1.0, bytes: 1.0 };
+        (0..2).for_each(|part| plan.add(Task(0, 0, TaskKind::Bake(Kind::Shadow), part, 2), cost));
+        assert!(matches!(find(&plan, 0), Found::Missing) && about(&plan, 0).is_none());
+        let entries = vec![(0, "a.sf".to_owned(), vec![1, 2, 3]), (1, "b".to_owned(), Vec::new())];
+        write(&plan, 0, 2.5, &entries).unwrap();
+        assert!(matches!(find(&plan, 0), Found::Whole(about, found) if about.seconds == 2.5 && found == entries));
+        assert_eq!(about(&plan, 0).unwrap().seconds, 2.5);
+        let good = std::fs::read(path(&plan, 0)).unwrap();
+        for at in (0..good.len()).step_by(7) {
+            let mut bad = good.clone();
+            bad[at] ^= 4;
+            std::fs::write(path(&plan, 0), bad).unwrap();
+            assert!(matches!(find(&plan, 0), Found::Damaged(_)), "byte {at}");
+        }
+        std::fs::create_dir_all(path(&plan, 1).parent().unwrap()).unwrap();
+        std::fs::write(path(&plan, 1), &good).unwrap();
+        assert!(matches!(find(&plan, 1), Found::Damaged(_)), "another slice's");
+        write(&plan, 1, 1.0, &[(0, "../a".to_owned(), Vec::new())]).unwrap();
+        assert!(matches!(find(&plan, 1), Found::Damaged(_)), "a name that leads elsewhere");
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::super::context::Context;
 use super::super::{Global, output};
-use super::run::{mesh_options, render_words};
+use super::run::{mesh_options, render_words, scene_hash};
 use crate::bake::kinds::Kind;
 use crate::error::{Error, Result};
 use crate::farm::plan::{Cost, DeviceClass, Input, Plan, Task, TaskKind, Work};
@@ -64,7 +64,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let full = std::path::absolute(&arguments.output).map_err(|e| Error::input(&arguments.output, e))?;
     let folder = full.parent().unwrap_or(Path::new("/")).to_owned();
     let context = Context::new(global)?;
-    let mut plan = Plan::new(DeviceClass::of(&context.device), arguments.results.clone());
+    let (class, variant) = (DeviceClass::of(&context.device), calibrate::best_known(&context.device).name);
+    // The device is only asked for its names: what it holds is free before work is listed.
+    context.finish()?;
+    let mut plan = Plan::new(class, arguments.results.clone());
     let (meshes, scenes) = find(&arguments.works)?;
     if !meshes.is_empty() {
         let options = mesh_options(&arguments.words)?;
@@ -93,7 +96,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         // Without a variant of its own each machine would take what is fastest there.
         let mut words = arguments.words.clone();
         if !words.iter().any(|word| word.starts_with("--variant")) {
-            words.extend(["--variant".into(), calibrate::best_known(&context.device).name.into()]);
+            words.extend(["--variant".into(), variant.into()]);
         }
         render_words(&scenes[0], &words)?;
         for path in &scenes {
@@ -115,7 +118,6 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             }
         }
     }
-    context.finish()?;
     plan.write(&arguments.output)?;
     let seconds: f64 = plan.slices.iter().map(|slice| slice.seconds()).sum();
     if global.json {
@@ -183,15 +185,4 @@ fn read_scene(path: &Path, folder: &Path, words: &[String]) -> Result<Read> {
     let size = render_words(path, words)?.unwrap_or([scene.data.output.width, scene.data.output.height]);
     let input = Input { path: written(path, folder)?, hash: scene_hash(&scene) };
     Ok(Read { input, kinds: Vec::new(), pixels: f64::from(size[0]) * f64::from(size[1]) })
-}
-
-/// The hash of a scene as it was read: with its meshes and its distant light, not with the way they were written.
-pub(super) fn scene_hash(scene: &Scene) -> String {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(format!("{:?}", scene.data).as_bytes());
-    for mesh in &scene.meshes {
-        hasher.update(&mesh.content_hash());
-    }
-    hasher.update(format!("{:?} {:?}", scene.entities, scene.environment).as_bytes());
-    hasher.finalize().to_hex()[..32].to_owned()
 }

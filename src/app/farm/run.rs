@@ -2,7 +2,6 @@
 
 use super::super::context::Context;
 use super::super::{Cli, Global, Subcommands, output, parse, render};
-use super::plan::scene_hash;
 use crate::asset::Mesh;
 use crate::bake::cache::Cache;
 use crate::bake::parts::{Part, bake, bake_part};
@@ -192,4 +191,15 @@ pub(super) fn render_words(scene: &Path, words: &[String]) -> Result<Option<[u32
     let arguments = render_line(scene, Path::new("#.png"), words)?;
     arguments.pictures_only()?;
     Ok(arguments.size)
+}
+
+/// The hash of a scene as it was read: with its meshes and its distant light, not with the way they were written.
+pub(super) fn scene_hash(scene: &Scene) -> String {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(format!("{:?}", scene.data).as_bytes());
+    for mesh in &scene.meshes {
+        hasher.update(&mesh.content_hash());
+    }
+    hasher.update(format!("{:?} {:?}", scene.entities, scene.environment).as_bytes());
+    hasher.finalize().to_hex()[..32].to_owned()
 }

@@ -1,5 +1,6 @@
 //! A scene made in code, lit and drawn into a PNG: `cargo run --example picture -- picture.png`.
 
+use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::prelude::*;
 
 fn main() -> Result<(), Error> {

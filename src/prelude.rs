@@ -1,7 +1,6 @@
 //! What a program needs to light a scene: `use shadow_fields::prelude::*;`.
 
 pub use crate::asset::Generator;
-pub use crate::asset::environment::EnvironmentData;
 pub use crate::bake::Quality;
 pub use crate::bake::cache::Cache;
 pub use crate::error::Error;

@@ -4,9 +4,10 @@ mod common;
 
 use common::gpu;
 use glam::{Quat, Vec3};
+use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::Gpu;
-use shadow_fields::prelude::{Cache, Camera, DeviceOptions, EntityData, EnvironmentData, Error, Generator, Quality};
+use shadow_fields::prelude::{Cache, Camera, DeviceOptions, EntityData, Error, Generator, Quality};
 use shadow_fields::prelude::{Placement, RenderOptions, Renderer, Scene};
 use shadow_fields::scene::{Lights, Output, SceneBuilder};
 use std::path::Path;

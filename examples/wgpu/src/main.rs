@@ -6,6 +6,7 @@ mod draw;
 use shadow_fields::ash::vk;
 use shadow_fields::asset::picture::{encode_srgb, linear_from_srgb, write_png};
 use shadow_fields::draw::{Antialias, Shading};
+use shadow_fields::asset::environment::EnvironmentData;
 use shadow_fields::prelude::*;
 use wgpu::hal::api::Vulkan;
 

@@ -92,7 +92,8 @@ impl RenderOptions {
     }
 }
 
-/// The light of all entities on the device: four floats a vertex, linear RGB radiance that leaves the surface, without emission, and 0.
+/// The light of all entities on the device: four floats a vertex, linear RGB radiance that leaves the surface, without emission, and a
+/// fourth for the library's own use.
 #[derive(Clone, Debug)]
 pub struct LightBuffer<'r> {
     /// The buffer, of usages storage, uniform, uniform texel, vertex, index, and both transfers. It stays the renderer's and is the same

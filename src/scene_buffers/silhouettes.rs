@@ -22,7 +22,7 @@ const HALVES: u32 = 1 << 31;
 /// The silhouette field of a mesh.
 #[derive(Clone)]
 pub struct SilhouetteSlot {
-    /// First quad of its nodes, and [`HALVES`] where it has maps of halves.
+    /// First quad of its nodes, and bit 31 where it has maps of halves.
     pub first_node: u32,
     /// The field, for the twin.
     pub field: Arc<SilhouetteField>,

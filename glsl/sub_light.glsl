@@ -50,6 +50,13 @@ SeenLight seen_light(vec3 to, Entity shining) {
     return light;
 }
 
+#if PANELS
+// Whether it is a rectangle so long that its parts lie in one row.
+bool is_strip(SeenLight light) {
+    return light.panel > 0.0 && (light.panel * STRIP < 1.0 || light.panel > STRIP);
+}
+#endif
+
 // Place of part k of a whole.
 vec2 corner(SeenLight light, uint k) {
     vec2 place = (k & 1) == 0 ? vec2(CORNER, 0.0) : vec2(0.0, CORNER);
@@ -58,7 +65,7 @@ vec2 corner(SeenLight light, uint k) {
     if (light.panel > 0.0) {
         float along = 0.5 * float(k) - 0.75;
         place = vec2((k & 1) == 0 ? -0.5 : 0.5, (k & 2) == 0 ? -0.5 : 0.5);
-        place = light.panel * STRIP < 1.0 ? vec2(along, 0.0) : light.panel > STRIP ? vec2(0.0, along) : place;
+        place = is_strip(light) ? (light.panel < 1.0 ? vec2(along, 0.0) : vec2(0.0, along)) : place;
     }
 #endif
     return place;
@@ -75,7 +82,7 @@ Block block_of(SeenLight light, uint b) {
         block.middle = corner(light, b - 1);
         block.scale = 0.5;
 #if PANELS
-        block.scale = light.panel > 0.0 && (light.panel * STRIP < 1.0 || light.panel > STRIP) ? 0.25 : 0.5;
+        block.scale = is_strip(light) ? 0.25 : 0.5;
 #endif
         block.area = 0.0625;
         block.weight = light.fine;

@@ -251,23 +251,27 @@ pub fn bake_silhouette(
     let header = silhouette_header(mesh, options);
     header.validate()?;
     let frames = frames(mesh, options.cells);
-    let sides = if header.half_px > 0 { &Side::ALL[..] } else { &Side::ALL[..1] };
-    let all = (frames.len() * sides.len()) as u32;
+    // Sides whose maps have the same size share the pass and its buffers.
+    let sizes: &[&[Side]] =
+        if header.half_px > 0 { &[&[Side::Whole], &[Side::Far, Side::Near]] } else { &[&[Side::Whole]] };
+    let all = (frames.len() * sizes.iter().map(|sides| sides.len()).sum::<usize>()) as u32;
     let (mut maps, mut done, mut report) = (Vec::new(), 0, BakeReport::default());
-    for &side in sides {
-        let map_px = header.edge_px(side) as u32;
+    for sides in sizes {
+        let map_px = header.edge_px(sides[0]) as u32;
         let pass = Silhouette::new(device, library, map_px, options.view_px * map_px / options.map_px)?;
         let buffers = SilhouetteBuffers::new(device, mesh, &frames, map_px)?;
-        let mut first = 0;
-        for batch in frames.chunks(pass.capacity()) {
-            let mut commands = Commands::new(device, "silhouette bake")?;
-            commands.pass("silhouette", |c| pass.record(c, &buffers, (batch, side), first))?;
-            report.add(&commands.submit()?);
-            first += batch.len();
-            done += batch.len() as u32;
-            progress(done, all);
+        for &side in *sides {
+            let mut first = 0;
+            for batch in frames.chunks(pass.capacity()) {
+                let mut commands = Commands::new(device, "silhouette bake")?;
+                commands.pass("silhouette", |c| pass.record(c, &buffers, (batch, side), first))?;
+                report.add(&commands.submit()?);
+                first += batch.len();
+                done += batch.len() as u32;
+                progress(done, all);
+            }
+            maps.push(buffers.maps.download::<u8>(frames.len() * header.texel_bytes(side))?);
         }
-        maps.push(buffers.maps.download::<u8>(frames.len() * header.texel_bytes(side))?);
     }
     report.samples = frames.len() as u32;
     report.total = started.elapsed();

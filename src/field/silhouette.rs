@@ -102,8 +102,10 @@ struct NearMap {
     rows: [DVec3; 2],
     /// Place of the point on the map.
     place: DVec2,
-    /// Depth along the direction of the nearest point of each side's outline, in r from the sphere's centre.
-    depths: [f64; 3],
+    /// Place on the map of the ray's point that is nearest to the sphere's centre.
+    foot: DVec2,
+    /// Depth along the direction of the outline's nearest point, in r from the sphere's centre.
+    depth: f64,
 }
 
 impl NearMap {
@@ -267,13 +269,17 @@ impl SilhouetteField {
             let frame = &self.frames[map];
             let rows = [0, 1].map(|i| frame.axes[i] / frame.half[i]);
             let sign = if mirrored { -1.0 } else { 1.0 };
-            let mut near = NearMap { map, sign, rows, place: frame.place(point), depths: [0.0; 3] };
-            for side in Side::ALL.into_iter().filter(|side| *side == Side::Whole || self.has_halves()) {
-                near.depths[side as usize] = sign * self.sample(map, near.side(side), near.along(toward, -along))[1];
-            }
+            let mut near = NearMap { map, sign, rows, place: frame.place(point), foot: DVec2::ZERO, depth: 0.0 };
+            near.foot = near.along(toward, -along);
+            near.depth = self.depth(&near, Side::Whole);
             near
         });
         Near { point, cell, maps }
+    }
+
+    /// Depth along the direction of the nearest point of a side's outline.
+    fn depth(&self, near: &NearMap, side: Side) -> f64 {
+        near.sign * self.sample(near.map, near.side(side), near.foot)[1]
     }
 
     /// The outline of one side of the object near the ray along the unit vector `direction`. Halves are those of a field that has them.
@@ -281,8 +287,8 @@ impl SilhouetteField {
         let along = near.point.dot(direction);
         let mut found = Outline { distance: 0.0, depth: 0.0 };
         for (map, weight) in near.maps.iter().zip(self.nodes.weights(&near.cell, direction)) {
-            let [distance, depth] =
-                self.sample(map.map, map.side(side), map.along(direction, map.depths[side as usize] - along));
+            let to = if side == Side::Whole { map.depth } else { self.depth(map, side) };
+            let [distance, depth] = self.sample(map.map, map.side(side), map.along(direction, to - along));
             found.distance += weight * distance;
             found.depth += weight * map.sign * depth;
         }

@@ -189,15 +189,7 @@ impl MergeTwin<'_> {
         let light = |&entity: &usize| SharpLight {
             entity,
             emission: self.frame.scene.entities[entity].emission.as_dvec3(),
-            ball_share: match self.frame.light_form(entity) {
-                LightForm::Ball(share) => Some(share),
-                LightForm::Panel(_) => Some(1.0),
-                LightForm::Harmonics | LightForm::Outline => None,
-            },
-            panel: match self.frame.light_form(entity) {
-                LightForm::Panel(panel) => Some(panel),
-                _ => None,
-            },
+            form: self.frame.light_form(entity),
         };
         let lights: Vec<SharpLight> = self.sharp_lights.iter().filter(|l| **l != receiver.index).map(light).collect();
         let occluders: Vec<usize> =

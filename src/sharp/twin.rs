@@ -2,7 +2,8 @@
 
 use crate::field::self_visibility::{self, NODES};
 use crate::field::silhouette::{Near, SilhouetteField};
-use crate::field::sub_light::{BLOCK, Panel, Part, SeenLight};
+use crate::field::sub_light::{BLOCK, Part, SeenLight};
+use crate::scene::LightForm;
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -26,10 +27,8 @@ pub struct SharpLight {
     pub entity: usize,
     /// Linear RGB radiance.
     pub emission: DVec3,
-    /// Share of its parts that shines: of its sphere's disc if it is a ball, 1 for a panel; `None` for one with an outline of its own.
-    pub ball_share: Option<f64>,
-    /// The face that shines, if it shines from one flat side.
-    pub panel: Option<Panel>,
+    /// How its light is computed: as a sharp light's.
+    pub form: LightForm,
 }
 
 /// One receiver under all sharp lights.
@@ -74,10 +73,12 @@ impl Task<'_> {
     fn irradiance(&self, v: usize, point: &SurfacePoint, light: &SharpLight) -> f64 {
         let shining = &self.objects[light.entity];
         let (to, radius) = (shining.centre - point.position, shining.radius_m);
-        let seen = match light.panel {
-            Some(panel) => SeenLight::panel(to, radius, panel, shining.rotation),
-            None if light.ball_share.is_some() => SeenLight::new(to, radius),
-            None => SeenLight::outlined(to, radius),
+        // The light's parts, and the share of each that shines; `None` where its own outline tells.
+        let (seen, share) = match light.form {
+            LightForm::Ball(share) => (SeenLight::new(to, radius), Some(share)),
+            LightForm::Panel(panel) => (SeenLight::panel(to, radius, panel, shining.rotation), Some(1.0)),
+            LightForm::Outline => (SeenLight::outlined(to, radius), None),
+            LightForm::Harmonics => return 0.0,
         };
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
         let occluders: Vec<&Object<'_>> = self.occluders.iter().filter(between).map(|&j| &self.objects[j]).collect();
@@ -93,13 +94,13 @@ impl Task<'_> {
         };
         let block = |(toward, parts): (DVec3, [Part; BLOCK])| -> f64 {
             let between: Vec<Near> = occluders.iter().map(|object| near(object, toward)).collect();
-            let own = light.ball_share.is_none().then(|| near(shining, toward));
+            let own = share.is_none().then(|| near(shining, toward));
             let part = |part: &Part| {
                 let pairs = occluders.iter().zip(&between);
                 let through: f64 =
                     pairs.map(|(object, near)| 1.0 - blocked(object, near, part, part.distance)).product();
-                let covers = light.ball_share.unwrap_or(0.0)
-                    + own.as_ref().map_or(0.0, |near| blocked(shining, near, part, f64::INFINITY));
+                let covers =
+                    share.unwrap_or(0.0) + own.as_ref().map_or(0.0, |near| blocked(shining, near, part, f64::INFINITY));
                 let sees = self.self_maps.map_or(1.0, |maps| {
                     let toward = self.rotation.inverse() * part.toward;
                     self_visibility::visible(&maps[v * NODES..][..NODES], point.own_normal, toward, part.sine)

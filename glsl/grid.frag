@@ -23,27 +23,8 @@ layout(push_constant) uniform Push {
 // edge that is finer than their cells.
 #extension GL_EXT_control_flow_attributes : require
 layout(location = 1) in vec3 at_object; // object's frame, metres
-#include "merge_layout.glsl"
-#define ENTITY_BINDING 2
-#include "entities.glsl"
-#define NODE_BINDING 3
-#include "silhouette_field.glsl"
-layout(binding = 5) uniform utextureBuffer entries;
-uint entry_at(uint i) {
-    return texelFetch(entries, int(i)).x;
-}
-layout(binding = 6) uniform utextureBuffer chains; // of every cluster: first entry, and how many
-layout(binding = 7) uniform textureBuffer soft;    // light on vertices without that of sharp lights
-#include "sharp_light.glsl"
-
-vec3 pixel_light(uvec2 chain) {
-    Entity receiver = ENTITY(push.receiver);
-    Surface surface;
-    surface.position = receiver.albedo.w * to_world(receiver, at_object);
-    surface.normal = to_world(receiver, push.normal.xyz);
-    surface.origin = receiver.centre.xyz;
-    return sharp_sum(surface, chain.x, chain.y) * receiver.albedo.rgb;
-}
+#define FACINGS 1
+#include "pixel_light.glsl"
 #endif
 
 void main() {
@@ -68,10 +49,12 @@ void main() {
                + weight.y * texelFetch(radiosity, int(triangle.y)).rgb
                + weight.z * texelFetch(radiosity, int(triangle.z)).rgb;
 #if PIXEL
-    uvec2 chain = texelFetch(chains, int(push.cluster_first + first / WORKGROUP)).xy;
+    uvec2 chain = chain_of(push.cluster_first, first);
     if (chain.y > 0) {
-        light = weight.x * texelFetch(soft, int(triangle.x)).rgb + weight.y * texelFetch(soft, int(triangle.y)).rgb
-              + weight.z * texelFetch(soft, int(triangle.z)).rgb + pixel_light(chain);
+        Entity receiver = ENTITY(push.receiver);
+        Facing facings[FACINGS];
+        facings[0] = facing_of(receiver, push.normal.xyz, 1.0, NONE, 0);
+        light = soft_light(triangle, weight) + pixel_light(receiver, at_object, facings, chain);
     }
 #endif
     color = vec4(finish(push.emission_white.rgb + light, push.emission_white.w), push.tag);

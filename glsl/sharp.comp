@@ -45,6 +45,7 @@ uint self_cell(uint i) {
 #include "self_visibility.glsl"
 #endif
 #define EDGES
+#define FACINGS 1
 #include "sharp_light.glsl"
 
 void main() {
@@ -57,16 +58,11 @@ void main() {
     uint at = 2 * (cluster.vertex_first + v);
     // World axes, but from the receiver's centre, as in the merge.
     Surface surface;
-    surface.position = receiver.albedo.w * to_world(receiver, vertex_quad(at).xyz);
-    vec3 normal = vertex_quad(at + 1).xyz;
-    surface.normal = to_world(receiver, normal);
+    vec4 place = receiver.albedo.w * vertex_quad(at);
+    surface.position = to_world(receiver, place.xyz);
     surface.origin = receiver.centre.xyz;
-    surface.step = receiver.sharp.z;
-#if SELF
-    surface.self_first = cluster.self_first == NONE ? NONE : cluster.self_first + v * ((SELF_SIDE - 1) * (SELF_SIDE - 1));
-    mat3 frame = self_frame(normal);
-    surface.self_frame = mat3(to_world(receiver, frame[0]), to_world(receiver, frame[1]), surface.normal);
-#endif
+    surface.step = place.w;
+    surface.facings[0] = facing_of(receiver, vertex_quad(at + 1).xyz, 1.0, cluster.self_first, v);
     vec4 sum = soft[cluster.radiosity_first + v];
     if (cluster.sharp_count > 0) {
         sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo.rgb;

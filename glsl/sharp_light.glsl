@@ -7,18 +7,37 @@
 bool edge = false;
 #endif
 
-struct Surface {
-    vec3 position; // world axes, metres from `origin`
-    vec3 normal;   // world
-    vec3 origin;   // world
-#ifdef EDGES
-    float step;    // distance between neighbouring vertices of a grid, metres; 0 on other meshes
-#endif
+// Which way a vertex faces, and what its own mesh leaves of its view.
+struct Facing {
+    vec3 normal;  // world
+    float weight; // of this vertex in the surface's point
 #if SELF
     uint self_first;  // word of its self-visibility, or NONE
     mat3 self_frame;  // about the normal, world
 #endif
 };
+
+struct Surface {
+    vec3 position; // world axes, metres from `origin`
+    vec3 origin;   // world
+    Facing facings[FACINGS];
+#ifdef EDGES
+    float step;    // farthest that a neighbouring vertex is, metres
+#endif
+};
+
+// Of vertex `v` of a mesh, whose normal is given in the object's frame; `self_first`: the word of the mesh's first vertex, or NONE.
+Facing facing_of(Entity receiver, vec3 normal, float weight, uint self_first, uint v) {
+    Facing facing;
+    facing.normal = to_world(receiver, normal);
+    facing.weight = weight;
+#if SELF
+    facing.self_first = self_first == NONE ? NONE : self_first + v * ((SELF_SIDE - 1) * (SELF_SIDE - 1));
+    mat3 frame = self_frame(normal);
+    facing.self_frame = mat3(to_world(receiver, frame[0]), to_world(receiver, frame[1]), facing.normal);
+#endif
+    return facing;
+}
 
 // Rays from a point to the parts of a block, by the light's axes and in an object's r.
 struct Rays {
@@ -130,13 +149,19 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
         vec3 along = along_axes(light, part);
         vec3 direction = axes * along;
         float sine = part_sine(light, block, part, along);
-        share[k] = block.weight * part_light(light, block, part, along) * part_cosine(dot(surface.normal, direction), sine);
+        float sum = 0.0;
+        [[unroll]] for (uint i = 0; i < FACINGS; i++) {
+            Facing facing = surface.facings[i];
+            float cosine = part_cosine(dot(facing.normal, direction), sine);
 #if SELF
-        // A part's radius is small enough for its sine to stand for it.
-        bool shadows = surface.self_first != NONE;
-        float sees = self_visible(shadows ? surface.self_first : 0, surface.self_frame, direction, sine);
-        share[k] *= shadows ? sees : 1.0;
+            // A part's radius is small enough for its sine to stand for it.
+            bool shadows = facing.self_first != NONE;
+            float sees = self_visible(shadows ? facing.self_first : 0, facing.self_frame, direction, sine);
+            cosine *= shadows ? sees : 1.0;
 #endif
+            sum += facing.weight * cosine;
+        }
+        share[k] = block.weight * part_light(light, block, part, along) * sum;
     }
     return share;
 }

@@ -38,7 +38,7 @@ SeenLight seen_light(vec3 to, Entity shining) {
     light.fine = shining.sharp.y > 0.0 ? light.fine : 1.0;
 #endif
 #if PANELS
-    light.panel = shining.sharp.w;
+    light.panel = shining.sharp.z;
     float ratio = light.panel;
     vec2 radii = (ratio > 0.0 ? vec2(1.0, ratio) * inversesqrt(1.0 + ratio * ratio) : vec2(sqrt(abs(ratio)))) / shining.centre.w;
     mat3 axes = mat3(light.toward, light.across, light.down);

@@ -43,6 +43,7 @@ embedded!(
     "merge_cone.glsl",
     "merge_layout.glsl",
     "merge_product.glsl",
+    "pixel_light.glsl",
     "product.comp",
     "product_points.glsl",
     "project.comp",
@@ -64,6 +65,9 @@ embedded!(
     "smooth.vert",
     "srgb.glsl",
     "sub_light.glsl",
+    "triangle.frag",
+    "triangle.vert",
+    "triangle_push.glsl",
 );
 
 /// One compilation of one entry point. It contains everything that changes the compiled code, and all of it is the cache key.

@@ -274,8 +274,8 @@ const PASSES: &[(&str, &str)] = &[
 /// Timers of passes that copy and have no shader.
 const COPIES: &[&str] = &["read back"];
 
-/// Shaders that are no pass of their own: the second half of pass "draw", and what only benches run.
-const OTHER_SHADERS: &[&str] = &["grid", "product", "ceiling", "shadow_map"];
+/// Shaders that are no pass of their own: other parts of pass "draw", and what only benches run.
+const OTHER_SHADERS: &[&str] = &["grid", "triangle", "product", "ceiling", "shadow_map"];
 
 /// Folders whose files record passes for a test or a bench, outside the sequences.
 const NO_SEQUENCE: &[&str] = &["src/bench", "src/check"];
@@ -306,12 +306,16 @@ fn each_pass_is_found_by_one_word() {
         let code = code(&source);
         let type_name: String = word.split('_').map(|part| part[..1].to_uppercase() + &part[1..]).collect();
         assert!(code.contains(&format!("pub struct {type_name} {{")), "{file}: no struct {type_name}");
-        assert!(code.contains(&format!("\"{word}\"")), "{file}: no pipeline has the debug name \"{word}\"");
         let own: Vec<_> = shaders.iter().filter(|shader| stem(shader) == *word).collect();
         assert!(!own.is_empty(), "no shader glsl/{word}.*");
         // A pass in a folder of its own may choose its permutation in another file there.
         let beside =
             if is_module { files(path.parent().unwrap().to_str().unwrap(), &["rs"]) } else { vec![path.into()] };
+        let named = format!("\"{word}\"");
+        assert!(
+            beside.iter().any(|path| text(path).contains(&named)),
+            "{file}: no pipeline has the debug name {named}"
+        );
         for shader in own {
             let name = format!("\"{}\"", shader.file_name().unwrap().to_string_lossy());
             assert!(beside.iter().any(|path| text(path).contains(&name)), "{file} does not use the shader {name}");

@@ -11,6 +11,7 @@ use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
 use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
 use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::smooth::Smooth;
+use shadow_fields::draw::triangles::DrawTriangles;
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::lists::gather::Gather;
 use shadow_fields::lists::skip::Skip;
@@ -60,7 +61,10 @@ fn drawing() -> Vec<ShaderPermutation> {
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].into_iter().flat_map(|display| ways.map(|sharp| DrawGrid::row(display, sharp)));
-    let fragments = flat.into_iter().chain(grids);
+    let triangles = [false, true]
+        .into_iter()
+        .flat_map(|display| sharp.iter().flat_map(move |sharp| DrawTriangles::patch_rows(display, sharp)));
+    let fragments = flat.into_iter().chain(grids).chain(triangles);
     fragments
         .chain([false, true].map(Smooth::fragment))
         .chain(

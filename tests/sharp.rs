@@ -138,33 +138,61 @@ fn each_light_has_the_form_that_its_mesh_gives_it() {
     assert!((1..6).all(|entity| form(entity, Lights::Sh) == LightForm::Harmonics));
 }
 
-/// A picture of a ball over a floor of so many cells, linear RGB.
-fn picture(gpu: &common::Gpu, cells: usize, shading: Shading) -> Vec<f32> {
-    let head = HEAD.replace("cells = 60", &format!("cells = {cells}"));
-    let scene = parse(&format!(
-        "{head}[[entity]]\nmesh = \"ball\"\nposition = [0, 0.6, 0]\n\
-        [[entity]]\nmesh = \"ball\"\nposition = [1.2, 2.6, 0.8]\nscale = 0.1\nemission = [900, 900, 900]\n"
-    ));
+/// A picture of a scene, linear RGB, and the pixels that evaluated lights where the device counts them.
+fn picture(gpu: &common::Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u64>) {
     let options =
         Options { shading: Some(shading), size: [160, 120], antialias: Antialias::None, ..check::sharp_options() };
-    let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), &scene, options, &|_, _, _| ()).unwrap();
-    frame.render(&scene.at(0.0), Some(4.0)).unwrap();
-    frame.picture()
+    let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
+    let timings = frame.render(&scene.at(0.0), Some(4.0)).unwrap();
+    (frame.picture(), frame.pixels_evaluated(&timings))
 }
 
-/// On a floor of few cells pixels show what the vertices of a fine floor show, and the coarse floor's own vertices do not.
+/// On floors and slabs of few cells pixels show what the vertices of fine ones show, and the coarse ones' own vertices do not.
 #[test]
 fn pixels_carry_edges_that_vertices_do_not() {
     let Some(gpu) = gpu() else { return };
-    let fine = picture(&gpu, 300, Shading::Vertex);
-    let rms = |of: &[f32]| {
+    let show = |receiver: &str, cells: usize, shading| {
+        let head = HEAD.replace("plane = { size_m = 6, cells = 60", &format!("{receiver}, cells = {cells}"));
+        let scene = parse(&format!(
+            "{head}[[entity]]\nmesh = \"ball\"\nposition = [0, 0.6, 0]\n\
+            [[entity]]\nmesh = \"ball\"\nposition = [1.2, 2.6, 0.8]\nscale = 0.1\nemission = [900, 900, 900]\n"
+        ));
+        picture(&gpu, &scene, shading).0
+    };
+    let plane = "plane = { size_m = 6";
+    let fine = show(plane, 300, Shading::Vertex);
+    let rms = |of: Vec<f32>| {
         let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
         (of.iter().zip(&fine).map(square).sum::<f64>() / fine.len() as f64).sqrt()
     };
-    let pixels = rms(&picture(&gpu, 12, Shading::Pixel));
-    let vertices = rms(&picture(&gpu, 12, Shading::Vertex));
-    report(&format!("on a floor of 12 cells pixels are off by {pixels:.4}, vertices by {vertices:.4}"));
-    assert!(pixels < 0.2 * vertices && vertices > 0.004, "{pixels} and {vertices}");
+    for receiver in [plane, "cuboid = { size_m = [6, 0.0001, 6]"] {
+        let [pixels, vertices] = [Shading::Pixel, Shading::Vertex].map(|shading| rms(show(receiver, 12, shading)));
+        report(&format!("{receiver}: of 12 cells pixels are off by {pixels:.4}, vertices by {vertices:.4}"));
+        assert!(pixels < 0.2 * vertices && vertices > 0.004, "{receiver}: {pixels} and {vertices}");
+    }
+}
+
+/// Where nothing blocks a light, pixels of a mesh that shadows itself blend what its vertices see, as vertices do: a speck that hangs before
+/// a coarse ring has its pixels evaluate a sun, and only those that it shades differ.
+#[test]
+fn pixels_that_nothing_shades_look_as_vertices_show_them() {
+    let Some(gpu) = gpu() else { return };
+    let scene = parse(
+        "[camera]\neye = [0, 1.5, 3]\ntarget = [0, 0, 0]\n\
+        [environment]\nsun = { toward = [0.6, 1, 0.8], angle_deg = 6, radiance = [90, 80, 70] }\n\
+        [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.9, minor_m = 0.3, segments = 12, sides = 8 }\n\
+        [[mesh]]\nname = \"speck\"\nsphere = { radius_m = 0.04, subdivisions = 1 }\n\
+        [[entity]]\nmesh = \"ring\"\nrotation = { axis = [1, 0, 0], angle_deg = 50 }\n\
+        [[entity]]\nmesh = \"speck\"\nposition = [1.26, 0.6, 0.48]\nreceives = false\n",
+    );
+    let [(vertices, none), (pixels, evaluated)] =
+        [Shading::Vertex, Shading::Pixel].map(|shading| picture(&gpu, &scene, shading));
+    let differ = |(a, b): &(&[f32], &[f32])| a.iter().zip(*b).any(|(a, b)| (a - b).abs() > 0.002);
+    let differing = vertices.chunks_exact(3).zip(pixels.chunks_exact(3)).filter(differ).count() as u64;
+    report(&format!("{evaluated:?} pixels evaluate the sun, {differing} differ"));
+    assert_eq!(none, None);
+    assert!(evaluated.is_none_or(|evaluated| evaluated > 500 && differing < evaluated / 10));
+    assert!(differing > 0, "the speck shades nothing");
 }
 
 /// A ring's bounding sphere stands before a light for many clusters whose rays all pass through its hole or beside it.

@@ -102,8 +102,8 @@ pub struct MergeArguments {
     /// bands of spherical harmonics, as for skies and for lights whose colour varies over their surface)
     #[arg(long, value_enum, default_value = "sharp", value_name = "sh|sharp")]
     pub lights: Lights,
-    /// Where the light of sharp lights is evaluated for pictures: at the pixels of grids wherever something stands before a light, and
-    /// else at vertices; or at vertices alone. Default: pixel with four samples a pixel, vertex with one
+    /// Where the light of sharp lights is evaluated for pictures: at pixels near shadow edges that are finer than the triangles they fall
+    /// on, and else at vertices; or at vertices alone. Default: pixel with four samples a pixel, vertex with one
     #[arg(long, value_enum, value_name = "vertex|pixel")]
     pub shading: Option<Shading>,
     /// Where the lists of the entities that concern each cluster of vertices are made. Default: device, but host for fewer than 128

@@ -122,6 +122,19 @@ impl Mesh {
         self.shape.euler_characteristic
     }
 
+    /// Of each vertex, how far the farthest vertex is that shares a triangle with it, metres.
+    pub fn steps(&self) -> Vec<f32> {
+        let mut steps = vec![0.0_f32; self.positions.len()];
+        for triangle in &self.triangles {
+            for (v, w) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (triangle[i] as usize, triangle[j] as usize)) {
+                let side = self.positions[v].distance(self.positions[w]);
+                steps[v] = steps[v].max(side);
+                steps[w] = steps[w].max(side);
+            }
+        }
+        steps
+    }
+
     /// Total area in square metres.
     pub fn area_m2(&self) -> f64 {
         area_m2(&self.positions, &self.triangles)

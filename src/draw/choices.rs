@@ -48,7 +48,7 @@ impl Antialias {
 pub enum Shading {
     /// At vertices; pixels interpolate.
     Vertex,
-    /// At the pixels of grids near narrow shadow edges; else at vertices.
+    /// At pixels near shadow edges that are narrower than the mesh's triangles there; else at vertices.
     Pixel,
 }
 

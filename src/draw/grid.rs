@@ -105,7 +105,7 @@ struct Push {
     normal: [f32; 4],
 }
 
-/// What grids read whose pixels evaluate sharp lights themselves.
+/// What pixels read that evaluate sharp lights themselves.
 pub struct PixelLight<'d> {
     /// [`crate::layout::Entity`] of every entity.
     pub entities: &'d Buffer,
@@ -113,10 +113,37 @@ pub struct PixelLight<'d> {
     pub silhouettes: [&'d Buffer; 2],
     /// Entries of chains.
     pub entries: &'d Buffer,
-    /// Of every cluster of every grid the first of its entries, and how many they are.
+    /// Of every cluster the first of its entries, and how many they are.
     pub chains: &'d Buffer,
     /// Light on vertices without that of sharp lights.
     pub soft: &'d Buffer,
+    /// Cells of self-visibility.
+    pub self_cells: &'d Buffer,
+    /// Positions and normals of all meshes.
+    pub vertices: &'d Buffer,
+}
+
+impl<'d> PixelLight<'d> {
+    /// What a shader reads that includes `glsl/pixel_light.glsl`: corners and radiosity before it, `others` after it.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn binds(
+        &self,
+        own: &[(&'d Buffer, vk::Format); 2],
+        others: &[(&'d Buffer, vk::Format)],
+    ) -> Result<Vec<Bind<'d>>> {
+        let [nodes, cells] = self.silhouettes;
+        let shared = [
+            (self.entities, FLOATS),
+            (nodes, FLOATS),
+            (cells, vk::Format::R32G32_UINT),
+            (self.entries, vk::Format::R32_UINT),
+            (self.chains, vk::Format::R32G32_UINT),
+            (self.soft, FLOATS),
+        ];
+        texels(&[&own[..], &shared, others].concat())
+    }
 }
 
 /// The pipeline.
@@ -155,7 +182,7 @@ impl DrawGrid {
     /// The row of the fragment shader.
     pub fn row(display: bool, sharp: Option<&SharpPermutation>) -> ShaderPermutation {
         let row = ShaderPermutation::new("grid.frag", 4).define("DISPLAY", display).define("PIXEL", sharp.is_some());
-        sharp.map_or(row.clone(), |sharp| sharp.pixel_row(row))
+        sharp.map_or(row.clone(), |sharp| sharp.pixel_row(row, false))
     }
 
     /// Draws a range of one's indices in the area that was set, lit by the radiosity of all vertices.
@@ -171,7 +198,7 @@ impl DrawGrid {
         white: f32,
     ) -> Result<()> {
         drawing.bind(&self.pipeline, &[(&grid.positions, 0), (&grid.places, 0)], &grid.indices);
-        drawing.resources(&Self::resources(grid, viewport)?)?;
+        drawing.resources(&texels(&Self::own(grid, viewport))?)?;
         Self::finish(drawing, grid, entity, white, indices);
         Ok(())
     }
@@ -191,24 +218,14 @@ impl DrawGrid {
         let Some((pipeline, light)) = self.pixel.as_ref().zip(viewport.pixel.as_ref()) else { return Ok(()) };
         let [positions, places, indices] = &grid.patches;
         drawing.bind(pipeline, &[(positions, 0), (places, 0)], indices);
-        let mut resources = Self::resources(grid, viewport)?;
-        let [nodes, cells] = light.silhouettes;
-        resources.extend([
-            texel(light.entities, FLOATS)?,
-            texel(nodes, FLOATS)?,
-            texel(cells, vk::Format::R32G32_UINT)?,
-            texel(light.entries, vk::Format::R32_UINT)?,
-            texel(light.chains, vk::Format::R32G32_UINT)?,
-            texel(light.soft, FLOATS)?,
-        ]);
-        drawing.resources(&resources)?;
+        drawing.resources(&light.binds(&Self::own(grid, viewport), &[])?)?;
         Self::finish(drawing, grid, entity, white, 0..grid.patch_indices);
         Ok(())
     }
 
     /// What both fragment shaders read.
-    fn resources<'r>(grid: &'r DrawnGrid, viewport: &DrawnViewport<'r>) -> Result<Vec<Bind<'r>>> {
-        Ok(vec![texel(&grid.corners, QUADS)?, texel(viewport.radiosity, FLOATS)?])
+    fn own<'r>(grid: &'r DrawnGrid, viewport: &DrawnViewport<'r>) -> [(&'r Buffer, vk::Format); 2] {
+        [(&grid.corners, QUADS), (viewport.radiosity, FLOATS)]
     }
 
     fn finish(
@@ -225,7 +242,7 @@ impl DrawGrid {
             first: (entity.radiosity_offset / 16) as u32,
             cells: grid.cells,
             receiver: entity.index,
-            cluster_first: entity.cluster_first.unwrap_or(0),
+            cluster_first: entity.by_pixel.map_or(0, |by_pixel| by_pixel.cluster_first),
             spare: [0; 2],
             normal: grid.normal.extend(0.0).to_array(),
         });
@@ -233,6 +250,7 @@ impl DrawGrid {
     }
 }
 
-fn texel(buffer: &Buffer, format: vk::Format) -> Result<Bind<'_>> {
-    TexelView::new(buffer, format).map(Bind::Texel)
+/// Texel views of buffers, in the order of their bindings.
+fn texels<'r>(buffers: &[(&'r Buffer, vk::Format)]) -> Result<Vec<Bind<'r>>> {
+    buffers.iter().map(|&(buffer, format)| TexelView::new(buffer, format).map(Bind::Texel)).collect()
 }

@@ -10,21 +10,22 @@ pub mod grid;
 pub mod patches;
 pub mod show;
 pub mod smooth;
+pub mod triangles;
 
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
 use crate::asset::picture::srgb_from_linear;
 use crate::draw::grid::{DrawGrid, DrawnGrid, PixelLight};
 use crate::draw::smooth::Smooth;
+use crate::draw::triangles::{DrawTriangles, DrawnTriangles};
 use crate::error::Result;
 use crate::gpu::ImageShape;
 use crate::gpu::Target;
-use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsPipeline, GraphicsState, Image};
+use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsState, Image};
 use crate::lists::sight::{Faces, Sight};
-use crate::shaders::{Library, ShaderPermutation};
+use crate::shaders::Library;
 use crate::sharp::SharpPermutation;
 use ash::vk;
-use bytemuck::{Pod, Zeroable};
 pub use choices::{Antialias, Finish, Shading};
 use glam::{Mat4, Vec3};
 use std::ops::Range;
@@ -40,23 +41,10 @@ const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 /// A mesh as it is drawn.
 pub enum DrawnMesh {
     /// The mesh is drawn by its triangles.
-    Triangles {
-        /// Positions in metres from the centre of the bounding sphere.
-        positions: Buffer,
-        /// Linear RGB that is multiplied by the entity's emission.
-        emission: Buffer,
-        /// Three indices a triangle; neighbouring triangles stand together.
-        indices: Buffer,
-        /// The indices in runs, and which way the triangles of each run face.
-        runs: Vec<(Range<u32>, Faces)>,
-    },
+    Triangles(DrawnTriangles),
     /// The mesh is a grid and is drawn as one parallelogram.
     Grid(DrawnGrid, Faces),
 }
-
-/// Triangles in a run. They are few enough that most runs lie on one side of an object, and many enough that a draw call costs
-/// little beside them.
-const RUN_TRIANGLES: usize = 128;
 
 impl DrawnMesh {
     /// Uploads a mesh with its vertices in `order`. The emission pattern of a mesh without colours is white. `vertices` counts the
@@ -76,26 +64,7 @@ impl DrawnMesh {
                 Faces::of(mesh, &mesh.triangles),
             ));
         }
-        let color = |v: usize| mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[v]);
-        let positions: Vec<[f32; 3]> =
-            order.iter().map(|&v| (mesh.positions[v as usize] - centre).to_array()).collect();
-        let emission: Vec<[f32; 3]> = order.iter().map(|&v| color(v as usize).to_array()).collect();
-        let mut triangles = mesh.triangles.clone();
-        triangles.sort_by_cached_key(|t| t.map(|v| place[v as usize]).into_iter().min());
-        let mut runs = Vec::with_capacity(triangles.len().div_ceil(RUN_TRIANGLES));
-        let mut first = 0;
-        for run in triangles.chunks(RUN_TRIANGLES) {
-            let end = first + 3 * run.len() as u32;
-            runs.push((first..end, Faces::of(mesh, run)));
-            first = end;
-        }
-        triangles.iter_mut().flatten().for_each(|v| *v = place[*v as usize]);
-        Ok(DrawnMesh::Triangles {
-            positions: Buffer::with_data(device, "draw positions", &positions)?,
-            emission: Buffer::with_data(device, "draw emission", &emission)?,
-            indices: Buffer::with_data(device, "draw indices", &triangles)?,
-            runs,
-        })
+        DrawnTriangles::new(device, mesh, order, &place).map(DrawnMesh::Triangles)
     }
 }
 
@@ -106,8 +75,8 @@ impl DrawnMesh {
         let mut out: Vec<Range<u32>> = Vec::new();
         match self {
             DrawnMesh::Grid(_, faces) => out.extend(may_see(faces).then_some(0..DrawnGrid::INDEX_COUNT)),
-            DrawnMesh::Triangles { runs, .. } => {
-                for (range, _) in runs.iter().filter(|(_, faces)| may_see(faces)) {
+            DrawnMesh::Triangles(triangles) => {
+                for (range, _) in triangles.runs.iter().filter(|(_, faces)| may_see(faces)) {
                     match out.last_mut() {
                         Some(last) if last.end == range.start => last.end = range.end,
                         _ => out.push(range.clone()),
@@ -123,12 +92,18 @@ impl DrawnMesh {
         if let DrawnMesh::Grid(grid, _) = self { Some(grid) } else { None }
     }
 
+    /// How far a point of a triangle may lie from a vertex of it, metres.
+    pub fn reach_m(&self) -> f32 {
+        match self {
+            DrawnMesh::Triangles(triangles) => triangles.reach_m,
+            DrawnMesh::Grid(grid, _) => grid.reach_m,
+        }
+    }
+
     /// Device memory, bytes.
     pub fn size_bytes(&self) -> u64 {
         match self {
-            DrawnMesh::Triangles { positions, emission, indices, .. } => {
-                positions.size_bytes + emission.size_bytes + indices.size_bytes
-            }
+            DrawnMesh::Triangles(triangles) => triangles.size_bytes(),
             DrawnMesh::Grid(grid, _) => grid.size_bytes(),
         }
     }
@@ -152,8 +127,19 @@ pub struct DrawnEntity<'d> {
     pub tag: f32,
     /// Its number.
     pub index: u32,
-    /// Of a grid whose pixels evaluate sharp lights: its first cluster in [`PixelLight::chains`].
-    pub cluster_first: Option<u32>,
+    /// What its pixels need to evaluate sharp lights, where they may.
+    pub by_pixel: Option<ByPixel>,
+}
+
+/// Where the pixels of an entity find what they evaluate sharp lights by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ByPixel {
+    /// Its first cluster in [`PixelLight::chains`].
+    pub cluster_first: u32,
+    /// The first vertex of its mesh in [`PixelLight::vertices`].
+    pub vertex_first: u32,
+    /// The first word of its mesh in [`PixelLight::self_cells`], or [`crate::layout::NONE`].
+    pub self_first: u32,
 }
 
 /// A region of the picture, and what is drawn there.
@@ -164,26 +150,15 @@ pub struct DrawnViewport<'d> {
     pub entities: Vec<DrawnEntity<'d>>,
     /// Radiosity of their vertices.
     pub radiosity: &'d Buffer,
-    /// What grids read whose pixels evaluate sharp lights; `None` where radiosity of vertices is all that is shown.
+    /// What pixels read that evaluate sharp lights; `None` where radiosity of vertices is all that is shown.
     pub pixel: Option<PixelLight<'d>>,
     /// Which of the lines that pass "smooth" reads belong to this region.
     pub lines: Range<u32>,
 }
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Push {
-    clip_from_object: [f32; 16],
-    emission_white: [f32; 4],
-    tag: f32,
-}
-
 /// The pipelines and their images.
 pub struct Draw {
-    /// Draws both sides of triangles.
-    open: GraphicsPipeline,
-    /// Culls back faces.
-    solid: GraphicsPipeline,
+    triangles: DrawTriangles,
     grid: DrawGrid,
     samples: Option<Image>,
     /// Reversed depth of every sample: 1 at the near plane, 0 at infinity.
@@ -198,7 +173,7 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// For pictures of `width` x `height`; `sharp` where the pixels of grids are to evaluate sharp lights.
+    /// For pictures of `width` x `height`; `sharp` where pixels are to evaluate sharp lights.
     ///
     /// # Errors
     /// `Input` when the picture is larger than the device's images.
@@ -221,19 +196,10 @@ impl Draw {
             keeps_largest: false,
             nearer_steps: 0.0,
         };
-        let vertex = library.shader(&ShaderPermutation::new("draw.vert", 4))?;
-        let fragment =
-            library.shader(&ShaderPermutation::new("draw.frag", 4).define("DISPLAY", finish == Finish::Display))?;
+        let display = finish == Finish::Display;
         Ok(Draw {
-            open: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
-            solid: GraphicsPipeline::new(
-                device,
-                "draw solid",
-                &vertex,
-                &fragment,
-                GraphicsState { cull: vk::CullModeFlags::BACK, ..state },
-            )?,
-            grid: DrawGrid::new(device, library, state, finish == Finish::Display, sharp)?,
+            triangles: DrawTriangles::new(device, library, state, display, sharp)?,
+            grid: DrawGrid::new(device, library, state, display, sharp)?,
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))
                 .transpose()?,
@@ -241,7 +207,7 @@ impl Draw {
             picture: Image::new(device, "picture", shape)?,
             batch_triangles: if device.info.is_software() { 1 << 18 } else { u32::MAX / 3 },
             smooth: (antialias == Antialias::Outlines)
-                .then(|| Smooth::new(device, library, shape, finish == Finish::Display))
+                .then(|| Smooth::new(device, library, shape, display))
                 .transpose()?,
         })
     }
@@ -323,20 +289,13 @@ impl Draw {
                     if bound.is_none_or(|bound| !std::ptr::eq(bound, entity)) {
                         let [left, top, width, height] = viewport.area;
                         drawing.area(left, top, width, height);
-                        if let DrawnMesh::Triangles { positions, emission, indices, .. } = entity.mesh {
-                            let vertices =
-                                [(positions, 0), (emission, 0), (viewport.radiosity, entity.radiosity_offset)];
-                            drawing.bind(if entity.culls { &self.solid } else { &self.open }, &vertices, indices);
-                            drawing.push(&Push {
-                                clip_from_object: entity.clip_from_object.to_cols_array(),
-                                emission_white: entity.emission.extend(white).to_array(),
-                                tag: entity.tag,
-                            });
+                        if let DrawnMesh::Triangles(mesh) = entity.mesh {
+                            self.triangles.bind(drawing, mesh, entity, viewport, white);
                         }
                         bound = Some(entity);
                     }
                     match entity.mesh {
-                        DrawnMesh::Triangles { .. } => drawing.indexed(indices),
+                        DrawnMesh::Triangles(_) => drawing.indexed(indices),
                         DrawnMesh::Grid(grid, _) => {
                             self.grid.record(drawing, (grid, indices), entity, viewport, white)?;
                         }
@@ -350,7 +309,7 @@ impl Draw {
 }
 
 impl Draw {
-    /// Draws the patches of all grids, after everything that may hide them: a pixel of a patch costs most.
+    /// Draws the patches of all grids and triangles, after everything that may hide them: a pixel of a patch costs most.
     fn record_patches<'r>(
         &'r self,
         drawing: &mut Drawing<'_, 'r>,
@@ -364,9 +323,12 @@ impl Draw {
             for viewport in viewports.iter().filter(|viewport| viewport.pixel.is_some()) {
                 let [left, top, width, height] = viewport.area;
                 drawing.area(left, top, width, height);
-                for entity in viewport.entities.iter().filter(|e| e.cluster_first.is_some() && !e.indices.is_empty()) {
-                    if let DrawnMesh::Grid(grid, _) = entity.mesh {
-                        self.grid.record_patches(drawing, grid, entity, viewport, white)?;
+                for entity in viewport.entities.iter().filter(|e| e.by_pixel.is_some() && !e.indices.is_empty()) {
+                    match entity.mesh {
+                        DrawnMesh::Grid(grid, _) => self.grid.record_patches(drawing, grid, entity, viewport, white)?,
+                        DrawnMesh::Triangles(mesh) => {
+                            self.triangles.record_patches(drawing, mesh, entity, viewport, white)?;
+                        }
                     }
                 }
             }

@@ -71,7 +71,16 @@ impl Frame {
     /// `Failed` with the compiler's lines.
     pub fn reload(&mut self, changed: &[String]) -> Result<()> {
         let uses = |entry: &str| self.library.files(entry).iter().any(|file| changed.contains(file));
-        let drawing = ["draw.vert", "draw.frag", "grid.vert", "grid.frag", "smooth.vert", "smooth.frag"];
+        let drawing = [
+            "draw.vert",
+            "draw.frag",
+            "grid.vert",
+            "grid.frag",
+            "triangle.vert",
+            "triangle.frag",
+            "smooth.vert",
+            "smooth.frag",
+        ];
         let [draws, gathers, merges] = [drawing.into_iter().any(uses), uses("gather.comp"), uses("merge.comp")];
         if draws {
             let (Options { size, antialias, .. }, finish) = (self.options, self.picture.draw.finish());

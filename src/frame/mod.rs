@@ -73,7 +73,7 @@ pub struct Frame {
     sharp: Option<Sharp>,
     work: ClusterWork,
     sky: SkyLight,
-    /// Chains of sharp lights for the pixels of grids.
+    /// Chains of sharp lights for pixels.
     pixel: Option<PixelChains>,
     radiosity: Radiosity,
     picture: Picture,

@@ -21,7 +21,7 @@ use std::sync::Arc;
 /// What pictures are drawn by and into.
 pub(super) struct Picture {
     pub draw: Draw,
-    /// What the shader of grids is compiled for whose pixels evaluate sharp lights.
+    /// What the shaders are compiled for whose pixels evaluate sharp lights.
     pub sharp: Option<SharpPermutation>,
     /// Where the host reads a picture.
     pub readback: Buffer,
@@ -140,7 +140,7 @@ impl Frame {
         pixel.prepare(&self.work.lists)
     }
 
-    /// What the pixels of grids read that evaluate sharp lights in a viewport.
+    /// What pixels read that evaluate sharp lights in a viewport.
     fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
         let pixel = self.pixel.as_ref()?;
         let by_pixel = self.shading() == Shading::Pixel && pixel.is_ready();
@@ -151,6 +151,8 @@ impl Frame {
             entries: &pixel.entries,
             chains: &pixel.chains,
             soft: self.radiosity.soft(),
+            self_cells: &self.buffers.self_cells,
+            vertices: &self.buffers.vertices,
         })
     }
 

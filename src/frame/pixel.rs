@@ -1,6 +1,6 @@
-//! Chains of sharp lights for the pixels of grids: every cluster's, merged in this frame or not.
+//! Chains of sharp lights for pixels: every cluster's, merged in this frame or not.
 
-use crate::draw::DrawnMesh;
+use crate::draw::{ByPixel, DrawnMesh};
 use crate::error::Result;
 use crate::gpu::{Device, Upload};
 use crate::layout::{self, CLUSTER_VERTICES};
@@ -16,47 +16,51 @@ pub(super) struct PixelChains {
     pub entities: Upload,
     /// Entries of all chains.
     pub entries: Upload,
-    /// Of every cluster of every grid the first of its entries, and how many they are.
+    /// Of every cluster of the entities below the first of its entries, and how many they are.
     pub chains: Upload,
-    /// Of every entity that is lit and drawn as a grid: its first cluster there, and how far the pixels of a cluster may lie from its
-    /// vertices, metres.
-    grids: Vec<Option<(u32, f32)>>,
+    /// Of every entity that is lit: where its pixels find what they need, and how far the pixels of a cluster may lie from its vertices,
+    /// metres of the mesh's frame.
+    receivers: Vec<Option<(ByPixel, f32)>>,
     /// Entities as they were when the chains were made, and their bounds with what each of them takes part in.
     known: Option<(Vec<layout::Entity>, Vec<EntityBounds>)>,
 }
 
 impl PixelChains {
-    /// For the grids of a scene.
+    /// For what a scene lights.
     ///
     /// # Errors
     /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers) -> Result<Self> {
         let mut clusters = 0;
-        let mut grids = Vec::with_capacity(scene.entities.len());
+        let mut receivers = Vec::with_capacity(scene.entities.len());
         for entity in &scene.entities {
             let device_mesh = &buffers.meshes[entity.mesh];
-            grids.push(match &device_mesh.drawn {
-                DrawnMesh::Grid(grid, _) if entity.receives => {
-                    let first = clusters;
-                    clusters += (device_mesh.vertices.len() as u32).div_ceil(CLUSTER_VERTICES);
-                    Some((first, grid.reach_m))
-                }
-                _ => None,
-            });
+            let fits = match &device_mesh.drawn {
+                DrawnMesh::Grid(..) => true,
+                DrawnMesh::Triangles(triangles) => triangles.fits_views(device, &buffers.vertices, &buffers.self_cells),
+            };
+            let by_pixel = ByPixel {
+                cluster_first: clusters,
+                vertex_first: device_mesh.vertices.start,
+                self_first: device_mesh.self_first,
+            };
+            let lit = entity.receives && fits;
+            receivers.push(lit.then_some((by_pixel, device_mesh.drawn.reach_m())));
+            clusters += if lit { (device_mesh.vertices.len() as u32).div_ceil(CLUSTER_VERTICES) } else { 0 };
         }
         let upload = |name: &str, bytes: usize| Upload::new(device, name, bytes as u64);
         Ok(PixelChains {
             entities: upload("pixel entities", scene.entities.len() * size_of::<layout::Entity>())?,
             entries: upload("pixel entries", 16)?,
             chains: upload("pixel chains", 8 * clusters.max(1) as usize)?,
-            grids,
+            receivers,
             known: None,
         })
     }
 
-    /// The first cluster of an entity among the chains, if its pixels evaluate lights.
-    pub fn cluster_first(&self, entity: usize) -> Option<u32> {
-        self.grids[entity].map(|(first, _)| first)
+    /// Where the pixels of an entity find what they need, if they evaluate lights.
+    pub fn of(&self, entity: usize) -> Option<ByPixel> {
+        self.receivers[entity].map(|(by_pixel, _)| by_pixel)
     }
 
     /// Whether chains have been made.
@@ -78,7 +82,7 @@ impl PixelChains {
             return Ok(());
         }
         let (mut entries, mut chains) = (Vec::new(), Vec::new());
-        for (receiver, reach_m) in self.grids.iter().enumerate().filter_map(|(i, grid)| Some((i, (*grid)?.1))) {
+        for (receiver, reach_m) in self.receivers.iter().enumerate().filter_map(|(i, lit)| Some((i, (*lit)?.1))) {
             let (places, listed) = lists.sharp_chains(receiver, reach_m);
             chains.extend(places.iter().map(|[first, count]| [first + entries.len() as u32, *count]));
             entries.extend(listed);

@@ -113,8 +113,8 @@ impl Frame {
             sharp: [
                 f32::from_bits(device_mesh.silhouette.as_ref().map_or(0, |slot| slot.first_node)),
                 share as f32,
-                device_mesh.drawn.grid().map_or(0.0, |grid| grid.step_m * placement.scale),
                 panel,
+                0.0,
             ],
             blocked_base: device_mesh.blocked.as_ref().map_or(0, base),
             radiance_base: device_mesh.radiance.as_ref().map_or(0, base),

@@ -106,7 +106,7 @@ impl Frame {
                 radiosity_offset: self.radiosity.offsets[index],
                 tag: smooth::tag(index),
                 index: index as u32,
-                cluster_first: self.pixel.as_ref().and_then(|pixel| pixel.cluster_first(index)),
+                by_pixel: self.pixel.as_ref().and_then(|pixel| pixel.of(index)),
             };
             let radius_m = device_mesh.radius_m * f64::from(placement.scale);
             let distance_m = self.centre(index, placement).distance(camera.eye) - radius_m;

@@ -229,6 +229,21 @@ impl<'r> Drawing<'_, 'r> {
         self.commands.push(&pipeline.layout, &pipeline.name, push);
     }
 
+    /// Draws the triangles of a range of corners, three a triangle, with a pipeline whose vertex shader finds corner `gl_VertexIndex` by
+    /// itself.
+    ///
+    /// # Panics
+    /// Before [`Drawing::bind`].
+    pub fn corners(&mut self, range: Range<u32>) {
+        assert!(self.pipeline.is_some(), "a pipeline is bound before drawing");
+        // SAFETY: the pipeline has no vertex inputs, as `bind` checked against the buffers that it was given.
+        unsafe {
+            let count = range.end - range.start;
+            let handle = &self.commands.recording.device.handle;
+            handle.cmd_draw(self.commands.recording.buffer, count, 1, range.start, 0);
+        }
+    }
+
     /// Draws the triangles of a range of indices, three indices per triangle.
     ///
     /// # Panics

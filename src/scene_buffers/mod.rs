@@ -94,7 +94,8 @@ pub struct SceneBuffers {
 
 /// Vertices and transfer vectors of a scene on their way into its buffers.
 struct Packing {
-    /// Two quads a vertex: its position about the centre of the mesh's bounding sphere, and its normal.
+    /// Two quads a vertex: its position about the centre of the mesh's bounding sphere and how far its farthest neighbour is, metres; and
+    /// its normal.
     vertices: Vec<[f32; 4]>,
     transfers: Vec<f32>,
     /// First quad of the transfer vectors of each distinct mesh, by the hash of its content. Equal meshes share theirs.
@@ -140,8 +141,10 @@ impl Packing {
         let (centre, radius_m) = mesh.bounding_sphere();
         let vertex_first = vertices.len() as u32;
         let order = clusters::order(mesh);
+        let drawn = DrawnMesh::new(device, mesh, &order, *drawn)?;
+        let steps = drawn.grid().map_or_else(|| mesh.steps(), |grid| vec![grid.step_m; order.len()]);
         for &v in &order {
-            vertices.push((mesh.positions[v as usize] - centre).extend(0.0).to_array());
+            vertices.push((mesh.positions[v as usize] - centre).extend(steps[v as usize]).to_array());
             vertices.push(mesh.normals[v as usize].extend(0.0).to_array());
         }
         let transfer_first = baked.transfer.as_ref().map_or(NONE, |floats| {
@@ -169,7 +172,7 @@ impl Packing {
             blocked,
             radiance,
             silhouette,
-            drawn: DrawnMesh::new(device, mesh, &order, *drawn)?,
+            drawn,
             order,
             centre_m: centre.as_dvec3(),
             radius_m: f64::from(radius_m),

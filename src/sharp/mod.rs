@@ -19,10 +19,10 @@ use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use std::sync::Arc;
 
-/// How near a shadow's edge must come to a vertex of a grid for pixels around it to evaluate lights, in steps of the grid: more than the
-/// 0.71 that the middle of a cell is away from its corners.
+/// How near a shadow's edge must come to a vertex for pixels around it to evaluate lights, in steps to its neighbours: more than the 0.71
+/// that the middle of a grid's cell is away from its corners.
 const EDGE_REACH: f64 = 0.75;
-/// Half-width, in steps of the grid, of the widest penumbra of a part of a light that pixels evaluate. Light on vertices carries wider
+/// Half-width, in the same steps, of the widest penumbra of a part of a light that pixels evaluate. Light on vertices carries wider
 /// ones: against a picture whose pixels evaluate every edge, those of sphere_over_plane, teapot_lights and small_lights differ by 0.0015,
 /// 0.0022 and 0.0007 relative RMS, by 0.031 of white at most.
 const EDGE_STEPS: f64 = 0.3;
@@ -54,9 +54,9 @@ impl SharpPermutation {
         self.shared(ShaderPermutation::new("sharp.comp", 4)).define("WORKGROUP", CLUSTER_VERTICES)
     }
 
-    /// A fragment shader of grids that evaluates sharp lights. It reads everything through texel views.
-    pub fn pixel_row(&self, row: ShaderPermutation) -> ShaderPermutation {
-        SharpPermutation { texel: true, uniform: false, self_shadows: false, ..*self }
+    /// A fragment shader that evaluates sharp lights. It reads everything through texel views.
+    pub fn pixel_row(&self, row: ShaderPermutation, self_shadows: bool) -> ShaderPermutation {
+        SharpPermutation { texel: true, uniform: false, self_shadows, ..*self }
             .shared(row)
             .define("WORKGROUP", CLUSTER_VERTICES)
     }

@@ -1,0 +1,42 @@
+// Light of sharp lights on a pixel. The shader that includes this defines FACINGS, the vertices whose weighed light the pixel has, and binds
+// corners of cells or triangles at 0 and the radiosity of every vertex at 1.
+#include "merge_layout.glsl"
+const uint NONE = 0xffffffffu;
+#define ENTITY_BINDING 2
+#include "entities.glsl"
+#define NODE_BINDING 3
+#include "silhouette_field.glsl"
+layout(binding = 5) uniform utextureBuffer entries;
+uint entry_at(uint i) {
+    return texelFetch(entries, int(i)).x;
+}
+layout(binding = 6) uniform utextureBuffer chains; // of every cluster: first entry, and how many
+layout(binding = 7) uniform textureBuffer soft;    // light on vertices without that of sharp lights
+#if SELF
+layout(binding = 10) uniform utextureBuffer self_cells;
+uint self_cell(uint i) {
+    return texelFetch(self_cells, int(i)).x;
+}
+#include "self_frame.glsl"
+#include "self_visibility.glsl"
+#endif
+#include "sharp_light.glsl"
+
+// The chain of the cluster that vertex `v` of an entity belongs to.
+uvec2 chain_of(uint cluster_first, uint v) {
+    return texelFetch(chains, int(cluster_first + v / WORKGROUP)).xy;
+}
+
+vec3 soft_light(uvec3 triangle, vec3 weight) {
+    return weight.x * texelFetch(soft, int(triangle.x)).rgb + weight.y * texelFetch(soft, int(triangle.y)).rgb
+         + weight.z * texelFetch(soft, int(triangle.z)).rgb;
+}
+
+// `at`: object's frame, metres.
+vec3 pixel_light(Entity receiver, vec3 at, Facing facings[FACINGS], uvec2 chain) {
+    Surface surface;
+    surface.position = receiver.albedo.w * to_world(receiver, at);
+    surface.origin = receiver.centre.xyz;
+    surface.facings = facings;
+    return sharp_sum(surface, chain.x, chain.y) * receiver.albedo.rgb;
+}

@@ -1,0 +1,33 @@
+#version 460
+#extension GL_EXT_control_flow_attributes : require
+#include "finish.glsl"
+// Shades a point of a triangle that a shadow's edge comes near. Its pixel evaluates sharp lights itself; cosines and self-visibility are
+// blended between the vertices, so that where nothing blocks a light the triangle looks as its neighbours do.
+layout(location = 0) in vec3 at_object;
+layout(location = 1) in vec3 weight;
+layout(location = 2) flat in uvec3 triangle;
+layout(location = 3) in vec3 emission;
+layout(location = 0) out vec4 color; // alpha: the entity's tag
+
+layout(binding = 1) uniform textureBuffer radiosity; // of every vertex of the scene
+layout(binding = 8) uniform textureBuffer vertices;
+#include "triangle_push.glsl"
+#define FACINGS 3
+#include "pixel_light.glsl"
+
+void main() {
+    uvec3 lit = push.first + triangle;
+    vec3 light = weight.x * texelFetch(radiosity, int(lit.x)).rgb + weight.y * texelFetch(radiosity, int(lit.y)).rgb
+               + weight.z * texelFetch(radiosity, int(lit.z)).rgb;
+    uvec2 chain = chain_of(push.cluster_first, min(triangle.x, min(triangle.y, triangle.z)));
+    if (chain.y > 0) {
+        Entity receiver = ENTITY(push.receiver);
+        Facing facings[FACINGS];
+        [[unroll]] for (uint i = 0; i < FACINGS; i++) {
+            vec3 normal = texelFetch(vertices, int(2 * (push.vertex_first + triangle[i]) + 1)).xyz;
+            facings[i] = facing_of(receiver, normal, weight[i], push.self_first, triangle[i]);
+        }
+        light = soft_light(lit, weight) + pixel_light(receiver, at_object, facings, chain);
+    }
+    color = vec4(finish(push.emission_white.rgb * emission + light, push.emission_white.w), push.tag);
+}

@@ -1,0 +1,12 @@
+// Of an entity whose triangles are drawn again, where their pixels evaluate sharp lights.
+layout(push_constant) uniform Push {
+    mat4 clip_from_object;
+    vec4 emission_white; // radiance factor; w = radiance that is shown as white
+    float tag;           // number of the entity, for outlines
+    uint first;          // its first vertex in the radiosity buffer
+    vec2 half_size;      // of the viewport, pixels
+    uint receiver;       // the entity
+    uint cluster_first;  // its first cluster among those whose chains are known
+    uint vertex_first;   // of its mesh, in the vertex buffer
+    uint self_first;     // word of its mesh's first self-visibility, or NONE
+} push;

@@ -10,6 +10,8 @@ use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::field::sub_light::Panel;
 use shadow_fields::frame::{Frame, Options};
 use shadow_fields::lists::gather::Place;
+use shadow_fields::lists::scene_bounds::Counts;
+use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{LightForm, Lights, Scene};
 use shadow_fields::truth::{RayCast, RayMeshes, World, sample_vertices};
 
@@ -195,23 +197,31 @@ fn pixels_that_nothing_shades_look_as_vertices_show_them() {
     assert!(differing > 0, "the speck shades nothing");
 }
 
-/// A ring's bounding sphere stands before a light for many clusters whose rays all pass through its hole or beside it.
+/// A ring's bounding sphere stands before a light for many clusters whose rays all pass through its hole or beside it, and a ball covers a
+/// light from clusters in the middle of its shadow.
 #[test]
-fn occluders_that_all_rays_pass_by_stand_on_no_list_and_change_nothing() {
+fn what_outlines_leave_off_lists_changes_nothing() {
     let Some(gpu) = gpu() else { return };
-    let (_, scene, _) = scenes().swap_remove(1);
-    let placements = scene.at(0.0);
-    let lit = |lists| {
-        let options = Options { lists: Some(lists), ..check::sharp_options() };
-        let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), &scene, options, &|_, _, _| ()).unwrap();
-        frame.render(&placements, None).unwrap();
-        (frame.counts(&placements), frame.radiosity(0).unwrap())
-    };
-    // Lists of the device keep them.
-    let ((counts, host), (_, device)) = (lit(Place::Host), lit(Place::Device));
-    report(&format!("{} of {} lookups are passed by, {} apart", counts.passed_by, counts.considered, counts.apart));
-    assert!(counts.passed_by > 0);
-    assert_eq!(host, device, "what is passed by blocks exactly nothing");
+    let [ball, ring] = [0, 1].map(|i| scenes().swap_remove(i).1);
+    let fine = parse(&HEAD.replace("cells = 60", "cells = 200"));
+    let mut small_clusters = ball.clone();
+    small_clusters.meshes[0] = fine.meshes[0].clone();
+    for (scene, name) in [(ring, "passed"), (small_clusters, "covered")] {
+        let placements = scene.at(0.0);
+        let lit = |lists, skip| {
+            let options = Options { lists: Some(lists), skip, ..check::sharp_options() };
+            let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), &scene, options, &|_, _, _| ()).unwrap();
+            frame.render(&placements, None).unwrap();
+            (frame.counts(&placements), frame.radiosity(0).unwrap())
+        };
+        // Lists of the device keep what outlines would leave off.
+        let ((counts, host), (_, device)) = (lit(Place::Host, Skip::ALL), lit(Place::Device, Skip::ALL));
+        let (without, kept) = lit(Place::Host, Skip::without(name));
+        let left_off = |counts: &Counts| if name == "passed" { counts.passed_by } else { counts.covered };
+        report(&format!("{name}: {} of {} lookups, {} apart", left_off(&counts), counts.considered, counts.apart));
+        assert!(left_off(&counts) > 0 && left_off(&without) == 0, "{name}");
+        assert!(host == device && host == kept, "{name}: what is left off blocks exactly nothing or everything");
+    }
 }
 
 /// A switch that moves nothing still changes what pixels show, and back.

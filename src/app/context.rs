@@ -89,7 +89,7 @@ pub struct MergeArguments {
     /// the sampler of image interpolates less exactly. Default: the fastest of the others on this device, as the first run measures
     #[arg(long, value_name = "NAME", value_parser = Variant::named)]
     pub variant: Option<Variant>,
-    /// Work to leave out: all, none, or a list of horizon, cones, behind, caps, unmoved, hidden. Horizon and cones leave out what
+    /// Work to leave out: all, none, or a list of horizon, cones, behind, caps, passed, covered, unmoved, hidden. Horizon and cones leave out what
     /// true visibility makes zero, which is nearer to ray casting than the stored bands are. Caps looks up no field of an occluder
     /// that is small as seen from a vertex but takes it for a point. Pictures with these three differ a little from those without.
     /// The others change nothing that is shown: hidden leaves unlit what the camera cannot see while things move

@@ -2,6 +2,7 @@
 
 pub mod gather;
 pub mod gathering;
+pub mod host;
 pub mod incremental;
 pub mod scene_bounds;
 pub mod scope;

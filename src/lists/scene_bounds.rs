@@ -206,6 +206,8 @@ pub struct Counts {
     pub below_eps: u64,
     /// Occluders that every ray from the cluster to a sharp light passes by.
     pub passed_by: u64,
+    /// Sharp lights of which one occluder covers all from the cluster, and occluders before them.
+    pub covered: u64,
     /// Occluders that stand on the list as a cap alone.
     pub caps: u64,
     /// Entities that cast shadows or shine by a field of nothing but zeros, and are left off everywhere.
@@ -229,6 +231,7 @@ impl std::ops::AddAssign for Counts {
         self.facing_away += other.facing_away;
         self.below_eps += other.below_eps;
         self.passed_by += other.passed_by;
+        self.covered += other.covered;
         self.caps += other.caps;
         self.empty += other.empty;
         self.unseen += other.unseen;

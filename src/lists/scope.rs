@@ -9,7 +9,7 @@
 //! An entity that is listed for the slack alone adds no light of its own: the weights of cone, horizon and cap in the merge have
 //! faded to exactly zero where the rule without slack ends, and what is bounded below eps stays below eps.
 
-use crate::field::silhouette::{REACH, Side};
+use crate::field::silhouette::{INSIDE, REACH, Side};
 use crate::layout;
 use crate::lists::scene_bounds::{Bounds, EntityBounds, Light, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
@@ -25,7 +25,7 @@ use glam::{DVec2, DVec3};
 /// 0.00035 rad.
 pub const SLACK: f64 = 0.002;
 /// What an outline's distance may be off by, in r: more than the step of a map and what blending four of them errs by.
-const PASSING_MARGIN: f64 = 0.06;
+const OUTLINE_MARGIN: f64 = 0.06;
 /// The weight of what may be anywhere: more than any light makes negligible.
 pub const EVERYTHING: f64 = 1e30;
 
@@ -44,6 +44,8 @@ pub enum CullResult {
     Apart,
     /// Every ray from the cluster to the sharp light passes it by.
     PassedBy,
+    /// It blocks every ray from the cluster to the sharp light, or is such a light.
+    Covered,
     /// No vertex is on the side to which it shines.
     FacingAway,
     /// The radiosity that goes with it is bounded by this, which is below eps.
@@ -221,25 +223,36 @@ impl<'m> Scope<'m> {
         self.of_weight(radiance * view.weight.min(light.weight))
     }
 
-    /// Whether every ray from the cluster to a sharp light (centre in the world, radius) passes an occluder by. All of them stay within
-    /// a cone around the ray between the two middles. They miss the object where its outline is farther from that ray than the cone is
-    /// wide beside the object.
-    pub fn passes_by(&self, occluder: usize, [x, y, z, light_radius]: [f32; 4]) -> bool {
-        let Some(Some(outline)) = self.scene.outlines.get(occluder) else { return false };
+    /// What becomes of an occluder whose cone meets that of a sharp light (centre in the world, radius). All rays from the cluster to the
+    /// light stay within a cone around the ray between the two middles. Where the object's outline is farther from that ray than
+    /// the cone is wide beside the object, all of them miss the object, or all of them meet it.
+    pub fn outline_result(&self, occluder: usize, [x, y, z, light_radius]: [f32; 4]) -> CullResult {
+        let skip = self.scene.skip;
+        let Some(Some(outline)) = self.scene.outlines.get(occluder).filter(|_| skip.passed || skip.covered) else {
+            return CullResult::Listed;
+        };
         let EntityBounds { centre, radius_m, .. } = self.scene.entities[occluder];
         let to_light = DVec3::new(x.into(), y.into(), z.into()) - self.centre;
         let distance = to_light.length().max(1e-15);
         let (toward, radius) = (to_light / distance, self.radius_m + self.slack * (centre - self.centre).length());
         let width = |way: f64| radius + (f64::from(light_radius) - radius) * (way / distance).clamp(0.0, 1.0);
         let along = (centre - self.centre).dot(toward);
-        let widest = width(along - radius_m).max(width(along + radius_m)) / radius_m;
+        let clear = width(along - radius_m).max(width(along + radius_m)) / radius_m + OUTLINE_MARGIN;
         // Maps hold no larger distance.
-        if widest + PASSING_MARGIN > REACH {
-            return false;
+        if clear > REACH {
+            return CullResult::Listed;
         }
         let near =
             outline.field.near(outline.to_object * (self.centre - centre) / radius_m, outline.to_object * toward);
-        outline.field.outline(&near, Side::Whole, outline.to_object * toward).distance < -(widest + PASSING_MARGIN)
+        let found = outline.field.outline(&near, Side::Whole, outline.to_object * toward).distance;
+        // An object covers a light only if all of it lies between.
+        let between = along - INSIDE[1] * radius_m - radius > 0.0
+            && distance - along - INSIDE[1] * radius_m - f64::from(light_radius) > 0.0;
+        match found {
+            found if skip.passed && found < -clear => CullResult::PassedBy,
+            found if skip.covered && between && found > clear => CullResult::Covered,
+            _ => CullResult::Listed,
+        }
     }
 
     /// Whether no member of a crowd matters to any cluster within the bounds: their weight under the brightest light is negligible.

@@ -96,6 +96,10 @@ skips! {
         /// The fields of occluders that are small as seen from a vertex: what they block is taken at one direction ([`CAP_SINES`]), with
         /// the solid angle that a fit of the field's outermost shell has for it ([`crate::field::Area`]).
         caps: Approximate, "lists/scope.rs view", Some("SKIP_CAPS"), true, Some("caps"), AtRest;
+        /// Occluders that every ray from a cluster to a sharp light passes by, on lists that the host makes.
+        passed: Exact, "lists/scope.rs outline_result", None, false, Some("passed_by"), AtRest;
+        /// Sharp lights of which one occluder covers all from a whole cluster, on lists that the host makes.
+        covered: Exact, "lists/scope.rs outline_result", None, false, Some("covered"), AtRest;
         /// Clusters of vertices for which nothing has changed since they were last merged.
         unmoved: Incremental, "lists/incremental.rs update", None, false, None, OneMoves;
         /// Clusters of vertices that the camera cannot see, while things move, in pictures; and drawing what it cannot see.
@@ -104,8 +108,6 @@ skips! {
     always {
         /// Lights whose radiance field is zero on the side of a cluster.
         facing: Exact, "lists/scope.rs light_result", "facing_away";
-        /// Occluders that every ray from a cluster to a sharp light passes by, on lists that the host makes.
-        outlines: Exact, "lists/scope.rs passes_by", "passed_by";
         /// Entities whose field holds nothing but zeros.
         empty: Exact, "frame/pose.rs entity_bounds", "empty";
         /// Entities that nothing but themselves is lit by: their fields are not baked.

@@ -1,0 +1,137 @@
+//! Lists that the host makes, one cluster at a time: the CPU twin of pass "gather" ([`crate::lists::gather`]). They leave off a little more,
+//! as the host looks at outlines too ([`Scope::outline_result`]).
+
+use crate::layout::{self, ListEntry};
+use crate::lists::scene_bounds::{Bounds, Counts, Light, SceneBounds};
+use crate::lists::scope::{CullResult, SLACK, Scope, View};
+
+/// What may matter to any cluster of a group.
+pub struct Candidates {
+    /// Occluders in the order in which they are multiplied ([`SceneBounds::order`]), the receiver left out.
+    occluders: Vec<u32>,
+    /// Lights in the order of entities, the receiver left out.
+    lights: Vec<Light>,
+}
+
+impl Candidates {
+    /// What may matter to any cluster of a group with these bounds, found with twice the slack of the lists.
+    pub fn of_group(scene: &SceneBounds, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Self {
+        let scope = Scope::new(scene, entity, bounds, 2.0 * SLACK);
+        let mut occluders = Vec::new();
+        scene.tree.find(|crowd| scope.leaves_out(crowd), |j| occluders.push(j));
+        Self::new(scene, receiver, occluders, |light| scope.may_list(light.entity as usize))
+    }
+
+    /// Everything.
+    pub fn all(scene: &SceneBounds, receiver: u32) -> Self {
+        Self::new(scene, receiver, scene.occluders.clone(), |_| true)
+    }
+
+    fn new(scene: &SceneBounds, receiver: u32, mut occluders: Vec<u32>, keeps: impl Fn(&Light) -> bool) -> Self {
+        occluders.retain(|&j| j != receiver);
+        occluders.sort_by_cached_key(|&j| scene.order(receiver, j));
+        let lights = scene.lights.iter().filter(|light| light.entity != receiver && keeps(light));
+        Candidates { occluders, lights: lights.copied().collect() }
+    }
+
+    /// How many occluders there are.
+    pub fn occluder_count(&self) -> usize {
+        self.occluders.len()
+    }
+}
+
+/// The CPU twin of the pass for one cluster: appends its entries. `candidates` are those of a group that the cluster belongs to, or all.
+/// Returns how many of them, at the front, are chains of sharp lights.
+pub fn twin(scope: &Scope<'_>, candidates: &Candidates, out: &mut Vec<u32>) -> usize {
+    walk(scope, candidates, out, |_, _| ())
+}
+
+/// What of all that exists is left off the list of one cluster, and why.
+pub fn counts(scope: &Scope<'_>, receiver: u32) -> Counts {
+    let (mut counts, mut dropped) = (Counts::default(), 0.0);
+    walk(scope, &Candidates::all(scope.scene(), receiver), &mut Vec::new(), |result, lookups| {
+        counts.considered += lookups;
+        match result {
+            CullResult::Listed => {}
+            CullResult::Cap => counts.caps += lookups,
+            CullResult::BelowHorizon => counts.below_horizon += lookups,
+            CullResult::BehindLight => counts.behind_light += lookups,
+            CullResult::Apart => counts.apart += lookups,
+            CullResult::PassedBy => counts.passed_by += lookups,
+            CullResult::Covered => counts.covered += lookups,
+            CullResult::FacingAway => counts.facing_away += lookups,
+            CullResult::BelowEps(bound) => {
+                counts.below_eps += lookups;
+                dropped += bound;
+            }
+        }
+    });
+    Counts { dropped_bound: dropped, ..counts }
+}
+
+/// Goes through all chains of a cluster, light by light and at last the sky: appends what is listed, and tells of every entity and
+/// channel what becomes of it.
+fn walk(
+    scope: &Scope<'_>,
+    candidates: &Candidates,
+    out: &mut Vec<u32>,
+    mut tell: impl FnMut(CullResult, u64),
+) -> usize {
+    let (first, mut sharp_count) = (out.len(), 0);
+    let spheres = &scope.scene().spheres;
+    let views: Vec<View> = candidates.occluders.iter().map(|&j| scope.view(spheres[j as usize])).collect();
+    // What becomes of each occluder in a light's chain.
+    let chain = |light: Option<(u32, &View)>, sharp, radiance: f32, results: &mut Vec<CullResult>| {
+        let (light, light_view) = light.unzip();
+        results.clear();
+        results.extend(candidates.occluders.iter().zip(&views).map(|(&occluder, view)| {
+            let result = scope.occluder_result(view, light_view, sharp, radiance);
+            match light.filter(|light| sharp && result == CullResult::Listed && *light != occluder) {
+                Some(light) => scope.outline_result(occluder as usize, spheres[light as usize]),
+                None => result,
+            }
+        }));
+    };
+    let occlude =
+        |light: Option<u32>, sharp, results: &[CullResult], out: &mut Vec<u32>, tell: &mut dyn FnMut(_, _)| {
+            let occluders = candidates.occluders.iter().zip(views.iter().zip(results));
+            for (&entity, (view, &result)) in occluders.filter(|(j, _)| light != Some(**j)) {
+                let listed = result == CullResult::Listed;
+                let (whole, cap) = (view.whole || sharp, view.cap && !sharp);
+                tell(if listed && !whole { CullResult::Cap } else { result }, 1);
+                out.extend((listed && whole).then(|| ListEntry::Occlude { entity, light }.pack()));
+                out.extend((listed && cap).then(|| ListEntry::Cap { entity, light }.pack()));
+            }
+        };
+    let mut results = Vec::with_capacity(views.len());
+    for light in &candidates.lights {
+        let (entity, view) = (light.entity, scope.view(spheres[light.entity as usize]));
+        let (channels, sharp) = (if light.coloured == 0 { 1 } else { 3 }, light.sharp != 0);
+        let mut result = scope.light_result(light, &view);
+        if result == CullResult::Listed {
+            chain(Some((entity, &view)), sharp, light.radiance, &mut results);
+            // One occluder that takes all of its light is enough.
+            result = results.iter().copied().find(|&result| result == CullResult::Covered).unwrap_or(result);
+        }
+        tell(result, channels.into());
+        if result == CullResult::Listed {
+            occlude(Some(entity), sharp, &results, out, &mut tell);
+            out.extend((0..channels).map(|channel| {
+                let last = channel + 1 == channels;
+                ListEntry::Shine { entity, channel: (light.coloured != 0).then_some(channel), last }.pack()
+            }));
+            if sharp {
+                sharp_count = out.len() - first;
+            }
+        } else {
+            // Its occluders go with it; the bound of what is left off counts once.
+            let others = candidates.occluders.iter().filter(|&&j| j != entity).count();
+            tell(if let CullResult::BelowEps(_) = result { CullResult::BelowEps(0.0) } else { result }, others as u64);
+        }
+    }
+    if let Some(sky) = scope.scene().sky {
+        chain(None, false, sky, &mut results);
+        occlude(None, false, &results, out, &mut tell);
+    }
+    sharp_count
+}

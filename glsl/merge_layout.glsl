@@ -61,7 +61,7 @@ struct Cluster {
     uint entry_count;      // at least 1
     uint bounds;          // for the gather
     uint sharp_count;     // of the entries, the first: chains of sharp lights
-    uint self_first;      // word of its first vertex's self-visibility; NONE: it cannot shadow itself
+    uint self_first;      // first cell of its first vertex's self-visibility; NONE: it cannot shadow itself
 };
 
 // An entry: what one lookup is for, as ListEntry::pack puts it together. The first ENTRY_BITS bits: entity. As many more: the light

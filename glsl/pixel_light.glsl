@@ -14,8 +14,8 @@ layout(binding = 6) uniform utextureBuffer chains; // of every cluster: first en
 layout(binding = 7) uniform textureBuffer soft;    // light on vertices without that of sharp lights
 #if SELF
 layout(binding = 10) uniform utextureBuffer self_cells;
-uint self_cell(uint i) {
-    return texelFetch(self_cells, int(i)).x;
+uvec2 self_cell(uint i) {
+    return texelFetch(self_cells, int(i)).xy;
 }
 #include "self_frame.glsl"
 #include "self_visibility.glsl"
@@ -37,6 +37,7 @@ vec3 pixel_light(Entity receiver, vec3 at, Facing facings[FACINGS], uvec2 chain)
     Surface surface;
     surface.position = receiver.albedo.w * to_world(receiver, at);
     surface.origin = receiver.centre.xyz;
+    surface.inverse_radius = receiver.centre.w;
     surface.facings = facings;
     return sharp_sum(surface, chain.x, chain.y) * receiver.albedo.rgb;
 }

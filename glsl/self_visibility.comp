@@ -10,20 +10,26 @@ layout(local_size_x = NODES) in;
 #include "captured.glsl"
 #include "self_frame.glsl"
 
-layout(std430, binding = 2) writeonly buffer Maps { uint maps[]; }; // four nodes a word
+layout(std430, binding = 2) writeonly buffer Maps { uint maps[]; }; // four nodes a word: angles, and then distances
 
 shared uint words[WORDS]; // rows of texels, 32 a word, a bit for each that is free
 shared uint risen[WORDS]; // a bit for each texel above the horizon
 shared uint edges[WORDS]; // a bit for each texel beside an edge
 shared uint busy[WORDS / 32]; // a bit for each word with an edge
-shared int angles[NODES]; // as whole steps
+shared uint bytes[2 * NODES]; // of the map
 
-bool free_at(uint slot, ivec2 at) {
-    return slot == NONE || texelFetch(atlas, slot_origin(slot) + at, 0).r > 0.5;
+// What was captured at a texel of a face: how far away the mesh is, or FREE.
+const uint FREE = 255;
+uint captured_at(uint slot, ivec2 at) {
+    return slot == NONE ? FREE : uint(texelFetch(atlas, slot_origin(slot) + at, 0).r * 255.0 + 0.5);
 }
 
-// Whether the texel that a direction (any length) meets is free.
-bool free_toward(uint job, vec3 d) {
+bool free_at(uint slot, ivec2 at) {
+    return captured_at(slot, at) == FREE;
+}
+
+// What was captured at the texel that a direction (any length) meets.
+uint captured_toward(uint job, vec3 d) {
     vec3 a = abs(d);
     uint face = a.z >= a.x && a.z >= a.y ? (d.z < 0.0 ? 5 : 4) : a.y >= a.x ? (d.y < 0.0 ? 3 : 2) : (d.x < 0.0 ? 1 : 0);
     vec3 right = to_object(face, vec3(1.0, 0.0, 0.0));
@@ -31,7 +37,11 @@ bool free_toward(uint job, vec3 d) {
     vec2 st = vec2(dot(d, right), dot(d, down)) / max(a.x, max(a.y, a.z));
     int px = int(push.face_px);
     ivec2 at = clamp(ivec2((st + 1.0) * 0.5 * float(px)), ivec2(0), ivec2(px - 1));
-    return free_at(jobs[job].slots[face], at);
+    return captured_at(jobs[job].slots[face], at);
+}
+
+bool free_toward(uint job, vec3 d) {
+    return captured_toward(job, d) == FREE;
 }
 
 // Point of a texel's centre on its face: s and t.
@@ -97,11 +107,12 @@ void add_rim(uint job, uint face, uint k, int row_first, int row_end, vec3 up) {
 struct Nearest {
     vec2 free;
     vec2 blocked;
+    uvec3 place; // of the blocked one: face, column and row
 };
 
 // Measures to every texel beside an edge; the node's direction `toward` along the face's axes. Words without an edge are jumped over,
 // and rows are counted by a product: a step of a loop and a division cost more than measuring does.
-void measure(uint count, int row_first, vec3 toward, inout Nearest nearest) {
+void measure(uint face, uint count, int row_first, vec3 toward, inout Nearest nearest) {
     uint across = (push.face_px + 31) / 32;
     float rows = 1.0 / float(across);
     float texel = 2.0 / float(push.face_px);
@@ -119,7 +130,9 @@ void measure(uint count, int row_first, vec3 toward, inout Nearest nearest) {
                 vec2 found = vec2(dot(point, toward) * inverse, 0.5 * texel * inverse * sqrt(inverse));
                 bool free = (state >> bit & 1) == 1;
                 nearest.free = free && found.x > nearest.free.x ? found : nearest.free;
-                nearest.blocked = !free && found.x > nearest.blocked.x ? found : nearest.blocked;
+                bool nearer = !free && found.x > nearest.blocked.x;
+                nearest.blocked = nearer ? found : nearest.blocked;
+                nearest.place = nearer ? uvec3(face, 32 * (i - row * across) + bit, row_first + int(row)) : nearest.place;
             }
         }
     }
@@ -135,7 +148,7 @@ void main() {
     uint node = gl_LocalInvocationID.x;
     vec3 normal = jobs[job].normal.xyz;
     vec3 toward = self_frame(normal) * self_node(node);
-    Nearest nearest = Nearest(vec2(-2.0, 0.0), vec2(-2.0, 0.0));
+    Nearest nearest = Nearest(vec2(-2.0, 0.0), vec2(-2.0, 0.0), uvec3(0));
     int px = int(push.face_px);
     uint across = (push.face_px + 31) / 32;
     int rows = int(WORDS / across) - 2; // and one on either side, whose other neighbours the next rows have
@@ -168,7 +181,7 @@ void main() {
                 atomicOr(busy[i / 32], uint(edges[i] != 0) << i % 32);
             }
             barrier();
-            measure(count, row_first, toward * axes, nearest);
+            measure(face, count, row_first, toward * axes, nearest);
             barrier();
         }
     }
@@ -176,13 +189,16 @@ void main() {
     float to_blocked = angle_to(nearest.blocked);
     bool free = to_free == to_blocked ? free_toward(job, normal) : to_blocked > to_free;
     float angle = free ? max(to_blocked - nearest.blocked.y, 0.0) : -max(to_free - nearest.free.y, 0.0);
-    angles[node] = int(roundEven(clamp(angle / SELF_LIMIT, -1.0, 1.0) * 127.0));
+    bytes[node] = uint(int(roundEven(clamp(angle / SELF_LIMIT, -1.0, 1.0) * 127.0)) & 0xff);
+    uint away = captured_toward(job, toward);
+    uint beside = nearest.blocked.x < -1.5 ? FREE : captured_at(jobs[job].slots[nearest.place.x], ivec2(nearest.place.yz));
+    bytes[NODES + node] = away == FREE ? beside : away;
     barrier();
-    if (node < NODES / 4) {
+    if (node < NODES / 2) {
         uint word = 0;
         for (uint k = 0; k < 4; k++) {
-            word |= uint(angles[4 * node + k] & 0xff) << 8 * k;
+            word |= bytes[4 * node + k] << 8 * k;
         }
-        maps[jobs[job].target * (NODES / 4) + node] = word;
+        maps[jobs[job].target * (NODES / 2) + node] = word;
     }
 }

@@ -32,12 +32,12 @@ layout(std430, binding = 8) readonly buffer Soft { vec4 soft[]; }; // what the m
 #if SELF
 #if TEXEL
 layout(binding = 7) uniform utextureBuffer self_cells;
-uint self_cell(uint i) {
-    return texelFetch(self_cells, int(i)).x;
+uvec2 self_cell(uint i) {
+    return texelFetch(self_cells, int(i)).xy;
 }
 #else
-layout(std430, binding = 7) readonly buffer SelfCells { uint self_cells[]; };
-uint self_cell(uint i) {
+layout(std430, binding = 7) readonly buffer SelfCells { uvec2 self_cells[]; };
+uvec2 self_cell(uint i) {
     return self_cells[i];
 }
 #endif
@@ -61,6 +61,7 @@ void main() {
     vec4 place = receiver.albedo.w * vertex_quad(at);
     surface.position = to_world(receiver, place.xyz);
     surface.origin = receiver.centre.xyz;
+    surface.inverse_radius = receiver.centre.w;
     surface.step = place.w;
     surface.facings[0] = facing_of(receiver, vertex_quad(at + 1).xyz, 1.0, cluster.self_first, v);
     vec4 sum = soft[cluster.radiosity_first + v];

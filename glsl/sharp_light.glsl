@@ -12,7 +12,7 @@ struct Facing {
     vec3 normal;  // world
     float weight; // of this vertex in the surface's point
 #if SELF
-    uint self_first;  // word of its self-visibility, or NONE
+    uint self_first;  // first cell of its self-visibility, or NONE
     mat3 self_frame;  // about the normal, world
 #endif
 };
@@ -20,13 +20,14 @@ struct Facing {
 struct Surface {
     vec3 position; // world axes, metres from `origin`
     vec3 origin;   // world
+    float inverse_radius; // 1 over the bounding radius of its object, 1/m
     Facing facings[FACINGS];
 #ifdef EDGES
     float step;    // farthest that a neighbouring vertex is, metres
 #endif
 };
 
-// Of vertex `v` of a mesh, whose normal is given in the object's frame; `self_first`: the word of the mesh's first vertex, or NONE.
+// Of vertex `v` of a mesh, whose normal is given in the object's frame; `self_first`: the first cell of the mesh's first vertex, or NONE.
 Facing facing_of(Entity receiver, vec3 normal, float weight, uint self_first, uint v) {
     Facing facing;
     facing.normal = to_world(receiver, normal);
@@ -149,6 +150,7 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
         vec3 along = along_axes(light, part);
         vec3 direction = axes * along;
         float sine = part_sine(light, block, part, along);
+        float reach = reach_of(light, part, along) * surface.inverse_radius;
         float sum = 0.0;
         [[unroll]] for (uint i = 0; i < FACINGS; i++) {
             Facing facing = surface.facings[i];
@@ -156,7 +158,7 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
 #if SELF
             // A part's radius is small enough for its sine to stand for it.
             bool shadows = facing.self_first != NONE;
-            float sees = self_visible(shadows ? facing.self_first : 0, facing.self_frame, direction, sine);
+            float sees = self_visible(shadows ? facing.self_first : 0, facing.self_frame, direction, sine, reach);
             cosine *= shadows ? sees : 1.0;
 #endif
             sum += facing.weight * cosine;

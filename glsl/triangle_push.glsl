@@ -8,5 +8,5 @@ layout(push_constant) uniform Push {
     uint receiver;       // the entity
     uint cluster_first;  // its first cluster among those whose chains are known
     uint vertex_first;   // of its mesh, in the vertex buffer
-    uint self_first;     // word of its mesh's first self-visibility, or NONE
+    uint self_first;     // first cell of its mesh's self-visibility, or NONE
 } push;

@@ -58,7 +58,7 @@ pub struct Cluster {
     pub bounds: u32,
     /// Of the entries, those at the front that are chains of sharp lights.
     pub sharp_count: u32,
-    /// First word of its first vertex's self-visibility, or [`NONE`] where the mesh cannot shadow itself.
+    /// First cell of its first vertex's self-visibility, or [`NONE`] where the mesh cannot shadow itself.
     pub self_first: u32,
 }
 

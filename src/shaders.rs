@@ -106,6 +106,8 @@ impl ShaderPermutation {
         self.define("SELF_SIDE", self_visibility::SIDE as u32)
             .number("SELF_RIM", self_visibility::RIM)
             .number("SELF_LIMIT", self_visibility::LIMIT_RAD)
+            .number("SELF_STEPS", self_visibility::DISTANCE_STEPS)
+            .number("SELF_RAMP", self_visibility::RAMP)
     }
 
     /// Adds a macro whose value is an f32.

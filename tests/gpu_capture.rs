@@ -5,7 +5,7 @@ mod common;
 use common::{Gpu, gpu, pot, report};
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::asset::{Mesh, generate};
-use shadow_fields::bake::capture::{Capture, Model, NO_SLOT};
+use shadow_fields::bake::capture::{Capture, CaptureKind, Model, NO_SLOT};
 use shadow_fields::check::capture::{self as check, differing_limit, eyes_outside, faces, texel_index};
 
 const FACE_PX: u32 = 32;
@@ -16,7 +16,7 @@ fn coverage(gpu: &Gpu, mesh: &Mesh, eyes: &[Vec3], cull: bool) -> Vec<[Option<Ve
         255 => false,
         other => panic!("a texel of {other}: neither object nor background"),
     };
-    let found = faces::<u8>(&gpu.baker(), mesh, eyes, (FACE_PX, false, cull)).unwrap();
+    let found = faces::<u8>(&gpu.baker(), mesh, eyes, (FACE_PX, CaptureKind::Cover, cull)).unwrap();
     found
         .iter()
         .map(|faces| faces.each_ref().map(|face| face.as_ref().map(|t| t.iter().map(is_object).collect())))
@@ -134,7 +134,7 @@ fn colours_land_on_their_faces() {
         let mesh = painted_box(inner_first);
         let model = Model::new(&gpu.device, &mesh, true).unwrap();
         let px = 9_u32;
-        let capture = Capture::new(&gpu.device, &gpu.library, px, true).unwrap();
+        let capture = Capture::new(&gpu.device, &gpu.library, px, CaptureKind::Radiance).unwrap();
         let eyes = [Vec3::ZERO, Vec3::new(0.01, -0.02, 0.01)];
         let plan = capture.plan(&model, &eyes);
         let atlas: Vec<[f32; 4]> = gpu.atlas(&capture, &model, &eyes, &plan, false);
@@ -169,7 +169,7 @@ fn culling_keeps_the_near_side() {
     for mesh in [painted, generate::torus_two_colour(0.5, 0.15, 48, 20)] {
         assert!(mesh.is_closed());
         let model = Model::new(&gpu.device, &mesh, true).unwrap();
-        let capture = Capture::new(&gpu.device, &gpu.library, FACE_PX, true).unwrap();
+        let capture = Capture::new(&gpu.device, &gpu.library, FACE_PX, CaptureKind::Radiance).unwrap();
         let eyes = eyes_outside();
         let plan = capture.plan(&model, &eyes);
         assert_eq!(plan.len(), eyes.len());
@@ -192,7 +192,7 @@ fn faces_are_not_mirrored() {
         Mesh::new("graded box", walls.positions.clone(), Vec::new(), Some(colors), walls.triangles.clone()).unwrap();
     let model = Model::new(&gpu.device, &mesh, true).unwrap();
     let px = 8;
-    let capture = Capture::new(&gpu.device, &gpu.library, px, true).unwrap();
+    let capture = Capture::new(&gpu.device, &gpu.library, px, CaptureKind::Radiance).unwrap();
     let eyes = [Vec3::ZERO];
     let plan = capture.plan(&model, &eyes);
     let atlas: Vec<[f32; 4]> = gpu.atlas(&capture, &model, &eyes, &plan, false);
@@ -213,7 +213,7 @@ fn what_does_not_fit_waits_for_the_next_pass() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::sphere(1.0, 1);
     let model = Model::new(&gpu.device, &mesh, false).unwrap();
-    let capture = Capture::new(&gpu.device, &gpu.library, 512, false).unwrap();
+    let capture = Capture::new(&gpu.device, &gpu.library, 512, CaptureKind::Cover).unwrap();
     let eyes = vec![Vec3::new(1.5, 0.0, 0.0); 100];
     let plan = capture.plan(&model, &eyes);
     assert!(!plan.is_empty() && plan.len() < eyes.len(), "{} of {} eyes", plan.len(), eyes.len());
@@ -223,6 +223,7 @@ fn what_does_not_fit_waits_for_the_next_pass() {
     slots.sort_unstable();
     slots.dedup();
     assert_eq!(slots.len(), count, "no two faces share a place");
-    let too_large = Capture::new(&gpu.device, &gpu.library, gpu.device.limits.max_image_dimension2_d, false);
+    let too_large =
+        Capture::new(&gpu.device, &gpu.library, gpu.device.limits.max_image_dimension2_d, CaptureKind::Cover);
     assert_eq!(too_large.err().map(|error| error.exit_code()), Some(4));
 }

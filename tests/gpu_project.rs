@@ -6,6 +6,7 @@ use common::{gpu, pot, report};
 use glam::Vec3;
 use shadow_fields::asset::{Mesh, generate};
 use shadow_fields::bake::assemble::{Source, Sources, twin};
+use shadow_fields::bake::capture::CaptureKind;
 use shadow_fields::bake::capture::NO_SLOT;
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::check::assemble;
@@ -33,15 +34,16 @@ fn projections(bands: usize) {
         worst = worst.max(error);
     };
     for face_px in [8, 32, 64] {
-        let black = Content::new(&baker, &pot, &EYES, (face_px, false, true)).unwrap();
+        let black = Content::new(&baker, &pot, &EYES, (face_px, CaptureKind::Cover, true)).unwrap();
         // From inside a solid, unculled, every texel is black; from far away all but a few are white.
-        let constant = Content::new(&baker, &closed, &[Vec3::new(0.1, 0.05, -0.2)], (face_px, false, false)).unwrap();
+        let constant =
+            Content::new(&baker, &closed, &[Vec3::new(0.1, 0.05, -0.2)], (face_px, CaptureKind::Cover, false)).unwrap();
         for projection in [Projection::Blocked, Projection::Transfer] {
             compare(&black, projection, false);
             // What all of the object hides has no transfer left, at scale 1.
             compare(&constant, projection, projection == Projection::Transfer);
         }
-        let bright = Content::new(&baker, &painted, &EYES, (face_px, true, true)).unwrap();
+        let bright = Content::new(&baker, &painted, &EYES, (face_px, CaptureKind::Radiance, true)).unwrap();
         compare(&bright, Projection::Radiance, false);
     }
     report(&format!("{bands} bands: largest error {worst:.2e}"));
@@ -83,7 +85,7 @@ fn constant_content_has_its_closed_form() {
     let Some(gpu) = gpu() else { return };
     let closed = generate::cuboid(Vec3::ONE, 1);
     let baker = gpu.baker();
-    let content = Content::new(&baker, &closed, &[Vec3::ZERO], (32, false, false)).unwrap();
+    let content = Content::new(&baker, &closed, &[Vec3::ZERO], (32, CaptureKind::Cover, false)).unwrap();
     let project = content.pass(4, Projection::Blocked).unwrap();
     let mut jobs = content.jobs();
     jobs[0].scale = 1.0;

@@ -7,7 +7,7 @@ use common::{Gpu, gpu, library, report};
 use glam::Vec3;
 use shadow_fields::asset::generate;
 use shadow_fields::bake::assemble::Assemble;
-use shadow_fields::bake::capture::{Capture, Model};
+use shadow_fields::bake::capture::{Capture, CaptureKind, Model};
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::field::{FieldKind, Storage};
 use shadow_fields::gpu::image::ImageShape;
@@ -186,7 +186,7 @@ fn the_barrier_of_a_bake_batch_is_missed() {
 fn every_barrier_of_a_picture_is_missed() {
     let Some(gpu) = gpu() else { return };
     let model = Model::new(&gpu.device, &generate::sphere(1.0, 1), false).unwrap();
-    let capture = Capture::new(&gpu.device, &gpu.library, 16, false).unwrap();
+    let capture = Capture::new(&gpu.device, &gpu.library, 16, CaptureKind::Cover).unwrap();
     let eyes = [Vec3::new(1.5, 0.3, 0.2)];
     let plan = capture.plan(&model, &eyes);
     let host = Buffer::new(&gpu.device, "host picture", BufferKind::Readback, 4 << 20).unwrap();

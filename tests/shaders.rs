@@ -4,7 +4,7 @@ mod common;
 
 use common::{library, skip};
 use shadow_fields::bake::assemble::Assemble;
-use shadow_fields::bake::capture::Capture;
+use shadow_fields::bake::capture::{Capture, CaptureKind};
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::bake::self_visibility::SelfVisibility;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
@@ -29,7 +29,8 @@ const PROJECTIONS: [Projection; 3] = [Projection::Blocked, Projection::Radiance,
 fn baking() -> Vec<ShaderPermutation> {
     let project = BANDS.flat_map(|bands| PROJECTIONS.map(|projection| Project::row(bands, projection)));
     let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
-    let capture = [false, true].into_iter().flat_map(Capture::rows);
+    let capture =
+        [CaptureKind::Cover, CaptureKind::Distance, CaptureKind::Radiance].into_iter().flat_map(Capture::rows);
     let own = [SelfVisibility::row()];
     project.chain(own).chain(assemble).chain(capture).chain(Silhouette::permutations(32, 128, 16)).collect()
 }
@@ -274,5 +275,5 @@ fn a_folder_overrides_embedded_files() {
     assert_eq!(overridden.reflection.local_size, [3, 1, 1]);
     // What is not in the folder stays as embedded.
     library.shader(&Assemble::row(Storage::F32)).unwrap();
-    assert!(library.shader(&Capture::rows(false)[0]).is_ok());
+    assert!(library.shader(&Capture::rows(CaptureKind::Cover)[0]).is_ok());
 }

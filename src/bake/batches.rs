@@ -3,7 +3,7 @@
 //! Every face keeps the place in the atlas that the plan of the whole bake gives it, whichever process captures it and in whatever
 //! order. What a face shows depends on nothing else, so the samples are the same bytes however the units are shared out.
 
-use super::capture::{Capture, Model, NO_SLOT, Slots};
+use super::capture::{Capture, CaptureKind, Model, NO_SLOT, Slots};
 use super::partial::Partial;
 use super::project::{Job, Project, Projection};
 use super::self_visibility::SelfVisibility;
@@ -12,7 +12,7 @@ use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::Shortcuts;
 use crate::field::quantity::channel_stride;
-use crate::field::self_visibility::NODES;
+use crate::field::self_visibility::BYTES;
 use crate::gpu::memory::TexelView;
 use crate::gpu::{Buffer, BufferKind, Commands};
 use bytemuck::{Pod, Zeroable};
@@ -41,16 +41,19 @@ pub(super) enum Reduction {
 }
 
 impl Reduction {
-    /// Whether faces hold radiance rather than coverage.
-    fn is_radiance(self) -> bool {
-        matches!(self, Reduction::Project { projection: Projection::Radiance, .. })
+    /// What faces hold.
+    fn captured(self) -> CaptureKind {
+        match self {
+            Reduction::Project { projection, .. } => CaptureKind::of_field(projection == Projection::Radiance),
+            Reduction::SelfVisibility => CaptureKind::Distance,
+        }
     }
 
     /// Numbers of a reduced sample.
     pub fn numbers(self) -> usize {
         match self {
             Reduction::Project { bands, projection } => projection.channels() * channel_stride(bands),
-            Reduction::SelfVisibility => NODES,
+            Reduction::SelfVisibility => BYTES,
         }
     }
 
@@ -163,15 +166,15 @@ impl Batches {
     /// # Errors
     /// As [`Capture::new`]; `Device` when memory ran out.
     pub fn new(baker: &Baker, captures: &Captures<'_>) -> Result<Self> {
-        let radiance = captures.reduction.is_radiance();
+        let kind = captures.reduction.captured();
         let (device, library) = (baker.device(), baker.library());
-        let mut capture = Capture::new(device, library, captures.face_px, radiance)?;
+        let mut capture = Capture::new(device, library, captures.face_px, kind)?;
         capture.skips = captures.shortcuts.faces;
         let sample_bytes = captures.reduction.sample_bytes() as u64;
         let bytes = u64::from(capture.capacity()) * sample_bytes;
         Ok(Batches {
             reduce: Reduce::new(baker, captures, capture.columns)?,
-            model: Model::new(device, captures.mesh, radiance)?,
+            model: Model::new(device, captures.mesh, kind == CaptureKind::Radiance)?,
             jobs: Project::job_buffer(device, capture.capacity())?,
             culls: captures.shortcuts.inside,
             samples: Buffer::new(device, "batch samples", BufferKind::Device, bytes)?,

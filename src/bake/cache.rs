@@ -221,7 +221,7 @@ impl Cache {
         progress: Progress<'_>,
     ) -> Result<Found<Vec<u8>>> {
         let header = SelfVisibilityHeader::new(mesh, options);
-        let bytes = header.vertex_count * self_visibility::NODES;
+        let bytes = header.vertex_count * self_visibility::BYTES;
         self.find(
             &SELF_VISIBILITY,
             key(&header),

@@ -1,7 +1,7 @@
 //! Pass "capture": draws an object as seen from sample points: six cube faces for each point, many points in one render pass.
 //!
 //! Inputs: the mesh in units of its bounding radius around its centre; eyes in the same frame. Output: an atlas of square
-//! faces. Occlusion: R8, white background, black object, no depth. Radiance: RGBA32F, black background, the mesh's colours,
+//! faces. Occlusion: R8, white background, black object, no depth; or with distances in place of black. Radiance: RGBA32F, black background, the mesh's colours,
 //! with depth. A face that the object's bounding sphere does not reach is not drawn and gets no place in the atlas. The other faces
 //! are drawn in chunks of neighbouring triangles. A chunk is left out if its bounding sphere does not reach into the face, or if
 //! the mesh is closed and the eye sees only backs of the chunk.
@@ -10,9 +10,10 @@ use super::chunk::{Chunk, Chunked, chunk, joined, reaches};
 use super::triangles::distinct;
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
+use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::ImageShape;
 use crate::gpu::Target;
-use crate::gpu::{Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image};
+use crate::gpu::{Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image, Keeps};
 use crate::sh::cube::{FACE_COUNT, face_basis, texel_st};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -71,6 +72,24 @@ struct Push {
     forward: [f32; 4],
 }
 
+/// What a capture sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CaptureKind {
+    /// Where the object is: 0 there and 1 elsewhere.
+    Cover,
+    /// How far the object is: [`DISTANCE_STEPS`] bytes an r, and 255 where it is not.
+    Distance,
+    /// The mesh's colours.
+    Radiance,
+}
+
+impl CaptureKind {
+    /// For the samples of a field.
+    pub fn of_field(radiance: bool) -> Self {
+        if radiance { CaptureKind::Radiance } else { CaptureKind::Cover }
+    }
+}
+
 /// Which faces of which eye lie where in the atlas.
 pub type Slots = [u32; FACE_COUNT];
 
@@ -85,30 +104,36 @@ pub struct Capture {
     pub face_px: u32,
     /// Faces in a row of the atlas.
     pub columns: u32,
-    radiance: bool,
+    kind: CaptureKind,
     /// Whether faces and chunks that cannot matter are left out.
     pub skips: bool,
 }
 
 impl Capture {
     /// The rows of the shader table: vertex and fragment.
-    pub fn rows(radiance: bool) -> [ShaderPermutation; 2] {
-        ["capture.vert", "capture.frag"].map(|file| ShaderPermutation::new(file, 4).define("RADIANCE", radiance))
+    pub fn rows(kind: CaptureKind) -> [ShaderPermutation; 2] {
+        ["capture.vert", "capture.frag"].map(|file| {
+            ShaderPermutation::new(file, 4)
+                .define("RADIANCE", kind == CaptureKind::Radiance)
+                .define("DISTANCE", kind == CaptureKind::Distance)
+                .number("DISTANCE_STEPS", DISTANCE_STEPS)
+        })
     }
 
     /// Faces in a row of the atlas.
-    pub fn columns(device: &Device, face_px: u32, radiance: bool) -> u32 {
+    pub fn columns(device: &Device, face_px: u32, kind: CaptureKind) -> u32 {
         let atlas_px = ATLAS_PX.min(device.most_image_px());
         // The texels of a radiance capture, with depth, are 20 times as large. Six faces always fit.
-        (if radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3)
+        (if kind == CaptureKind::Radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3)
     }
 
-    /// Pipelines for faces of `face_px`, for occlusion or `radiance`.
+    /// Pipelines for faces of `face_px`.
     ///
     /// # Errors
     /// `Input` when a face is larger than the device's images.
-    pub fn new(device: &Arc<Device>, library: &Library, face_px: u32, radiance: bool) -> Result<Self> {
-        let columns = Self::columns(device, face_px, radiance);
+    pub fn new(device: &Arc<Device>, library: &Library, face_px: u32, kind: CaptureKind) -> Result<Self> {
+        let columns = Self::columns(device, face_px, kind);
+        let radiance = kind == CaptureKind::Radiance;
         let most = device.most_image_px();
         if columns * face_px > most {
             let edge = columns * face_px;
@@ -119,10 +144,11 @@ impl Capture {
         let color = if radiance { vk::Format::R32G32B32A32_SFLOAT } else { vk::Format::R8_UNORM };
         let depth = radiance.then_some(vk::Format::D32_SFLOAT);
         let shape = ImageShape { format: color, width: columns * face_px, height: columns * face_px, samples: 1 };
-        let [vertex, fragment] = Self::rows(radiance);
+        let [vertex, fragment] = Self::rows(kind);
         let (vertex, fragment) = (library.shader(&vertex)?, library.shader(&fragment)?);
+        let keeps = if kind == CaptureKind::Distance { Keeps::Smallest } else { Keeps::Last };
         let pipeline = |cull| {
-            let state = GraphicsState { color, depth, samples: 1, cull, keeps_largest: false, nearer_steps: 0.0 };
+            let state = GraphicsState { color, depth, samples: 1, cull, keeps, nearer_steps: 0.0 };
             GraphicsPipeline::new(device, "capture", &vertex, &fragment, state)
         };
         Ok(Capture {
@@ -135,7 +161,7 @@ impl Capture {
                 .transpose()?,
             face_px,
             columns,
-            radiance,
+            kind,
             skips: true,
         })
     }
@@ -183,12 +209,13 @@ impl Capture {
         plan: &[Slots],
         cull: bool,
     ) -> Result<()> {
-        let background = if self.radiance { [0.0, 0.0, 0.0, 1.0] } else { [1.0; 4] };
+        let radiance = self.kind == CaptureKind::Radiance;
+        let background = if radiance { [0.0, 0.0, 0.0, 1.0] } else { [1.0; 4] };
         let target = Target { color: &self.atlas, clear: Some(background), depth: self.depth.as_ref(), resolve: None };
         let closed = cull && model.closed;
         let pipeline = if closed { &self.closed } else { &self.open };
         let mut vertices = vec![(&model.positions, 0)];
-        vertices.extend(model.colors.iter().filter(|_| self.radiance).map(|colors| (colors, 0)));
+        vertices.extend(model.colors.iter().filter(|_| radiance).map(|colors| (colors, 0)));
         commands.render(&target, |drawing| {
             drawing.bind(pipeline, &vertices, &model.indices);
             let mut facing: Vec<&Chunk> = Vec::new();
@@ -254,6 +281,17 @@ pub fn twin_colors(
         }
     });
     nearest.into_iter().map(|(_, color)| color).collect()
+}
+
+/// The CPU twin of a capture of distances: how far the nearest triangle is that each ray meets, in r, infinite where it meets none.
+pub fn twin_distances(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: usize, face_px: u32) -> Vec<f64> {
+    let px = face_px as usize;
+    let mut nearest = vec![f64::INFINITY; px * px];
+    rays(positions, triangles, eye, face, face_px, |texel, _, (distance, _)| {
+        let ray = DVec3::new(texel_st(texel % px, px), texel_st(texel / px, px), 1.0);
+        nearest[texel] = nearest[texel].min(distance * ray.length());
+    });
+    nearest
 }
 
 /// Calls a function for every ray and triangle that meet: with the distance in units of the ray's (s, t, 1), and with the point's

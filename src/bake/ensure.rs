@@ -32,7 +32,7 @@ pub struct BakedMesh {
     pub radiance: Option<Arc<ShadowField>>,
     /// Silhouette field.
     pub silhouette: Option<Arc<SilhouetteField>>,
-    /// Self-visibility of every vertex for sharp lights, [`crate::field::self_visibility::NODES`] bytes each in the mesh's order of vertices.
+    /// Self-visibility of every vertex for sharp lights, [`crate::field::self_visibility::BYTES`] each in the mesh's order of vertices.
     pub self_visibility: Option<Arc<Vec<u8>>>,
     /// Transfer vectors in the mesh's order of vertices, or `None` where the cosine lobe of the normal is exact.
     pub transfer: Option<Arc<Vec<f32>>>,

@@ -5,7 +5,7 @@ use super::{Options, bakes_transfer};
 use crate::asset::Mesh;
 use crate::field::FieldKind;
 use crate::field::quantity::channel_stride;
-use crate::field::self_visibility::NODES;
+use crate::field::self_visibility::BYTES;
 use crate::field::silhouette_nodes::NodeGrid;
 use serde::{Deserialize, Serialize};
 
@@ -76,7 +76,7 @@ impl Kind {
                 let map = 16 + 2 * u64::from(options.silhouette.map_px).pow(2);
                 map * NodeGrid::map_count(options.silhouette.cells) as u64
             }
-            Kind::SelfVisibility => vertices * NODES as u64,
+            Kind::SelfVisibility => vertices * BYTES as u64,
             Kind::Transfer => vertices * 4 * channel_stride(options.bands) as u64,
         }
     }

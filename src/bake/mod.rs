@@ -40,7 +40,7 @@ pub mod workers;
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::field::quantity::{FieldKind, channel_stride};
-use crate::field::self_visibility::NODES;
+use crate::field::self_visibility::BYTES;
 use crate::field::{FieldHeader, ShadowField, growth};
 use crate::gpu::memory::TexelView;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
@@ -270,7 +270,7 @@ impl Baker {
         Ok((transfer, report))
     }
 
-    /// Bakes the self-visibility of every vertex, going on from what a cancelled bake of the same has kept: [`NODES`] bytes each, as
+    /// Bakes the self-visibility of every vertex, going on from what a cancelled bake of the same has kept: [`BYTES`] each, as
     /// [`crate::field::self_visibility`] reads them, in the mesh's order of vertices. It decides nothing for a flat or convex mesh.
     /// Every vertex is captured, since a symmetry would turn the nodes of one map beside those of another. The bake takes as long as that
     /// of the teapot's transfer, 10.0 s beside 11.0 s: the same capture, and then 1.9 s of this pass in place of 2.2 s of "project".
@@ -289,7 +289,7 @@ impl Baker {
         let Options { face_px, shortcuts, .. } = *options;
         let targets: Vec<CaptureTarget> = vertex_targets(mesh).collect();
         let captures = Captures { mesh, reduction: Reduction::SelfVisibility, face_px, shortcuts, partial };
-        let mut maps = vec![0_u8; targets.len() * NODES];
+        let mut maps = vec![0_u8; targets.len() * BYTES];
         let mut report = captures.run(self, &targets, &mut maps, progress)?;
         report.samples = targets.len() as u32;
         report.total = started.elapsed();

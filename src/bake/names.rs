@@ -44,6 +44,7 @@ pub(super) struct SelfVisibilityHeader {
     side: usize,
     rim: f64,
     limit_rad: f64,
+    distance_steps: f64,
     pub vertex_count: usize,
 }
 
@@ -58,6 +59,7 @@ impl SelfVisibilityHeader {
             side: self_visibility::SIDE,
             rim: self_visibility::RIM,
             limit_rad: self_visibility::LIMIT_RAD,
+            distance_steps: self_visibility::DISTANCE_STEPS,
             vertex_count: mesh.positions.len(),
         }
     }

@@ -15,7 +15,7 @@ use crate::asset::Mesh;
 use crate::error::{Error, Result};
 use crate::field::FieldHeader;
 use crate::field::quantity::channel_stride;
-use crate::field::self_visibility::NODES;
+use crate::field::self_visibility::BYTES;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -74,7 +74,7 @@ fn captures(baker: &Baker, mesh: &Mesh, options: &Options, kind: Kind) -> Result
             let projection = if kind == Kind::Light { Projection::Radiance } else { Projection::Blocked };
             (targets, Reduction::Project { bands: header.bands, projection }, captured_bytes(&header))
         }
-        Kind::SelfVisibility => (vertex_targets(mesh).collect(), Reduction::SelfVisibility, vertices * NODES as u64),
+        Kind::SelfVisibility => (vertex_targets(mesh).collect(), Reduction::SelfVisibility, vertices * BYTES as u64),
         Kind::Transfer => {
             let reduction = Reduction::Project { bands: options.bands, projection: Projection::Transfer };
             (transfer_targets(mesh, options).0, reduction, 4 * vertices * channel_stride(options.bands) as u64)

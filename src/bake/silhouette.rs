@@ -12,7 +12,7 @@ use crate::field::silhouette::{Frame, REACH, Side, SilhouetteField, SilhouetteHe
 use crate::field::silhouette_nodes::NodeGrid;
 use crate::gpu::{
     Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, GraphicsPipeline, GraphicsState, Image,
-    ImageShape, Target,
+    ImageShape, Keeps, Target,
 };
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -177,7 +177,7 @@ impl Silhouette {
             depth: None,
             samples: 1,
             cull: vk::CullModeFlags::NONE,
-            keeps_largest: true,
+            keeps: Keeps::Largest,
             nearer_steps: 0.0,
         };
         let (vertex, fragment) = (library.shader(&vertex)?, library.shader(&fragment)?);

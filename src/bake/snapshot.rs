@@ -1,6 +1,6 @@
 //! Captured faces as pictures, for `inspect` and its contact sheets.
 
-use super::capture::{Capture, Model, NO_SLOT};
+use super::capture::{Capture, CaptureKind, Model, NO_SLOT};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
@@ -21,7 +21,7 @@ pub fn snapshot(
     face_px: u32,
     radiance: bool,
 ) -> Result<Vec<Vec<f32>>> {
-    let capture = Capture::new(device, library, face_px, radiance)?;
+    let capture = Capture::new(device, library, face_px, CaptureKind::of_field(radiance))?;
     let model = Model::new(device, mesh, radiance)?;
     let eyes: Vec<Vec3> = eyes.iter().map(|eye| eye.as_vec3()).collect();
     let texel_bytes = if radiance { 16 } else { 1 };

@@ -9,7 +9,7 @@ use crate::asset::Mesh;
 use crate::error::Result;
 use crate::gpu::{
     Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, GraphicsPipeline, GraphicsState, Image,
-    ImageShape, Target, Timing,
+    ImageShape, Keeps, Target, Timing,
 };
 use crate::scene::{Placement, Scene};
 use crate::shaders::{Library, ShaderPermutation};
@@ -131,7 +131,7 @@ impl ShadowMaps {
             depth: Some(vk::Format::D32_SFLOAT),
             samples: 1,
             cull: vk::CullModeFlags::NONE,
-            keeps_largest: false,
+            keeps: Keeps::Last,
             nearer_steps: 0.0,
         };
         let mesh = |mesh: &Arc<Mesh>| {

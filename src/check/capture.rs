@@ -3,8 +3,10 @@
 use super::CheckRow;
 use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
-use crate::bake::capture::{self, Capture, Model, NO_SLOT, Slots, unit_positions};
+use crate::bake::capture::{self, Capture, CaptureKind, Model, NO_SLOT, Slots, unit_positions};
+use crate::bake::self_visibility::FREE;
 use crate::error::Result;
+use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::sh::cube::FACE_COUNT;
 use bytemuck::Pod;
@@ -70,10 +72,10 @@ pub fn faces<T: Pod>(
     baker: &Baker,
     mesh: &Mesh,
     eyes: &[Vec3],
-    (face_px, radiance, cull): (u32, bool, bool),
+    (face_px, kind, cull): (u32, CaptureKind, bool),
 ) -> Result<Vec<Faces<T>>> {
-    let model = Model::new(baker.device(), mesh, radiance)?;
-    let capture = Capture::new(baker.device(), baker.library(), face_px, radiance)?;
+    let model = Model::new(baker.device(), mesh, kind == CaptureKind::Radiance)?;
+    let capture = Capture::new(baker.device(), baker.library(), face_px, kind)?;
     let plan = capture.plan(&model, eyes);
     assert_eq!(plan.len(), eyes.len(), "all eyes fit one atlas");
     let atlas: Vec<T> = atlas(baker.device(), &capture, &model, eyes, &plan, cull)?;
@@ -128,7 +130,7 @@ fn is_edge(covered: &[bool], px: usize, x: usize, y: usize) -> bool {
 pub fn coverage(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result<Coverage> {
     let positions = unit_positions(mesh);
     let mut out = Coverage::default();
-    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, false, true))?) {
+    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, CaptureKind::Cover, true))?) {
         for (face, texels) in faces.iter().enumerate() {
             let wanted = capture::twin(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
             let Some(texels) = texels else {
@@ -161,7 +163,7 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
     let white = vec![Vec3::ONE; positions.len()];
     let colors = mesh.colors.as_ref().unwrap_or(&white);
     let (mut texels, mut differing, mut lit) = (0, 0, 0);
-    for (eye, faces) in eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, true, true))?) {
+    for (eye, faces) in eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, CaptureKind::Radiance, true))?) {
         for (face, found) in faces.iter().enumerate() {
             let wanted = capture::twin_colors((&positions, colors), &mesh.triangles, eye.as_dvec3(), face, face_px);
             for (i, wanted) in wanted.iter().enumerate() {
@@ -176,6 +178,29 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
         }
     }
     Ok(if lit == 0 { f64::INFINITY } else { f64::from(differing as u32) / texels as f64 })
+}
+
+/// Share of the texels whose captured distance is more than a step from that of the nearest thing that a ray meets. Infinite where
+/// nothing was seen.
+///
+/// # Errors
+/// As [`Capture::new`].
+pub fn distances(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result<f64> {
+    let positions = unit_positions(mesh);
+    let (mut texels, mut differing, mut seen) = (0, 0, 0);
+    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, CaptureKind::Distance, true))?) {
+        for (face, found) in faces.iter().enumerate() {
+            let wanted = capture::twin_distances(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
+            for (i, &wanted) in wanted.iter().enumerate() {
+                let found = found.as_ref().map_or(FREE, |texels| texels[i]);
+                let step = if wanted.is_finite() { wanted.min(2.0) * DISTANCE_STEPS } else { f64::from(FREE) };
+                differing += usize::from((f64::from(found) - step).abs() > 1.0);
+                seen += usize::from(wanted < 2.0);
+                texels += 1;
+            }
+        }
+    }
+    Ok(if seen == 0 { f64::INFINITY } else { f64::from(differing as u32) / texels as f64 })
 }
 
 /// Eyes all around: on the axes, at odd angles, near and far.
@@ -201,6 +226,8 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     }
     let mesh = generate::torus_two_colour(0.5, 0.15, 32, 16);
     let found = colors(baker, &mesh, &eyes_outside(), 32)?;
+    let found_distances = distances(baker, &mesh, &eyes_outside(), 32)?;
+    add(CheckRow::new("capture", format!("distance, {}", mesh.name), measure, found_distances, 2.0 * limit));
     // Silhouettes and the seams where two colours meet count here too.
     add(CheckRow::new("capture", format!("radiance, {}", mesh.name), measure, found, 2.0 * limit));
     Ok(())

@@ -4,12 +4,12 @@ use super::CheckRow;
 use super::capture::{atlas, texel_index};
 use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
-use crate::bake::capture::{Capture, Model, NO_SLOT, Slots};
+use crate::bake::capture::{Capture, CaptureKind, Model, NO_SLOT, Slots};
 use crate::bake::project::{self, Job, Project, Projection};
 use crate::bake::self_visibility::SelfVisibility;
 use crate::error::Result;
 use crate::field::quantity::channel_stride;
-use crate::field::self_visibility::NODES;
+use crate::field::self_visibility::BYTES;
 use crate::gpu::{Access, Buffer, Commands};
 use glam::Vec3;
 
@@ -40,10 +40,11 @@ impl<'b> Content<'b> {
         baker: &'b Baker,
         mesh: &Mesh,
         eyes: &[Vec3],
-        (face_px, radiance, cull): (u32, bool, bool),
+        (face_px, kind, cull): (u32, CaptureKind, bool),
     ) -> Result<Self> {
+        let radiance = kind == CaptureKind::Radiance;
         let model = Model::new(baker.device(), mesh, radiance)?;
-        let capture = Capture::new(baker.device(), baker.library(), face_px, radiance)?;
+        let capture = Capture::new(baker.device(), baker.library(), face_px, kind)?;
         let plan = capture.plan(&model, eyes);
         assert_eq!(plan.len(), eyes.len(), "all eyes fit one atlas");
         let texels = if radiance {
@@ -126,14 +127,14 @@ impl<'b> Content<'b> {
     pub fn run_self_visibility(&self, jobs: &[Job]) -> Result<Vec<u8>> {
         let (device, library) = (self.baker.device(), self.baker.library());
         let pass = SelfVisibility::new(device, library, self.capture.face_px, self.capture.columns)?;
-        let maps = Buffer::with_data(device, "maps", &vec![0_u8; jobs.len() * NODES])?;
+        let maps = Buffer::with_data(device, "maps", &vec![0_u8; jobs.len() * BYTES])?;
         let mut job_buffer = Project::job_buffer(device, jobs.len() as u32)?;
         job_buffer.write(0, jobs);
         let mut commands = self.captured()?;
         let (atlas, count) = (&self.capture.atlas, jobs.len() as u32);
         commands.pass("self_visibility", |c| pass.record(c, atlas, &job_buffer, &maps, count))?;
         commands.submit()?;
-        maps.download(jobs.len() * NODES)
+        maps.download(jobs.len() * BYTES)
     }
 
     /// Commands that capture the faces for a compute pass that follows.
@@ -185,8 +186,9 @@ pub const EYES: [Vec3; 3] = [Vec3::new(0.9, 0.6, -0.5), Vec3::new(-0.4, 1.3, 2.0
 /// # Errors
 /// As [`Project::new`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
-    let black = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &EYES, (32, false, true))?;
-    let bright = Content::new(baker, &generate::torus_two_colour(0.5, 0.15, 32, 16), &EYES, (32, true, true))?;
+    let black = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &EYES, (32, CaptureKind::Cover, true))?;
+    let bright =
+        Content::new(baker, &generate::torus_two_colour(0.5, 0.15, 32, 16), &EYES, (32, CaptureKind::Radiance, true))?;
     for bands in [4, 7] {
         for (content, projection) in
             [(&black, Projection::Blocked), (&black, Projection::Transfer), (&bright, Projection::Radiance)]
@@ -199,7 +201,7 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     }
     // Faces of this size stand in several rows of the atlas.
     let eyes: Vec<Vec3> = EYES.iter().flat_map(|eye| [*eye, -*eye, 1.5 * *eye, -1.5 * *eye]).collect();
-    let large = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &eyes, (128, false, true))?;
+    let large = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &eyes, (128, CaptureKind::Cover, true))?;
     let rows = large.plan.iter().flatten().any(|slot| *slot != NO_SLOT && *slot >= large.capture.columns);
     let (worst, _) = compare(&large, 4, Projection::Transfer)?;
     let worst = if rows { worst } else { f64::INFINITY };

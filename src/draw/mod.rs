@@ -21,7 +21,7 @@ use crate::draw::triangles::{DrawTriangles, DrawnTriangles};
 use crate::error::Result;
 use crate::gpu::ImageShape;
 use crate::gpu::Target;
-use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsState, Image};
+use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsState, Image, Keeps};
 use crate::lists::sight::{Faces, Sight};
 use crate::shaders::Library;
 use crate::sharp::SharpPermutation;
@@ -138,7 +138,7 @@ pub struct ByPixel {
     pub cluster_first: u32,
     /// The first vertex of its mesh in [`PixelLight::vertices`].
     pub vertex_first: u32,
-    /// The first word of its mesh in [`PixelLight::self_cells`], or [`crate::layout::NONE`].
+    /// The first cell of its mesh in [`PixelLight::self_cells`], or [`crate::layout::NONE`].
     pub self_first: u32,
 }
 
@@ -193,7 +193,7 @@ impl Draw {
             depth: Some(DEPTH),
             samples,
             cull: vk::CullModeFlags::NONE,
-            keeps_largest: false,
+            keeps: Keeps::Last,
             nearer_steps: 0.0,
         };
         let display = finish == Finish::Display;

@@ -4,7 +4,7 @@
 
 use crate::asset::picture::srgb_from_linear;
 use crate::error::Result;
-use crate::gpu::{Bind, Device, Drawing, GraphicsPipeline, GraphicsState, Image};
+use crate::gpu::{Bind, Device, Drawing, GraphicsPipeline, GraphicsState, Image, Keeps};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -34,7 +34,7 @@ impl Show {
             depth: None,
             samples: 1,
             cull: vk::CullModeFlags::NONE,
-            keeps_largest: false,
+            keeps: Keeps::Last,
             nearer_steps: 0.0,
         };
         let vertex = library.shader(&ShaderPermutation::new("show.vert", 4))?;

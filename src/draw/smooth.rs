@@ -12,7 +12,9 @@
 use crate::asset::edges::Line;
 use crate::draw::DrawnViewport;
 use crate::error::Result;
-use crate::gpu::{Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Target, Upload};
+use crate::gpu::{
+    Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Keeps, Target, Upload,
+};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -160,7 +162,7 @@ impl Smooth {
             depth: None,
             samples: 1,
             cull: vk::CullModeFlags::NONE,
-            keeps_largest: false,
+            keeps: Keeps::Last,
             nearer_steps: 0.0,
         };
         let vertex = library.shader(&ShaderPermutation::new("smooth.vert", 4))?;

@@ -76,7 +76,8 @@ impl DrawnTriangles {
     /// Whether a device's texel views hold the mesh, and the vertices and the self-visibility of all meshes, so that its pixels can
     /// evaluate lights.
     pub fn fits_views(&self, device: &Device, vertices: &Buffer, self_cells: &Buffer) -> bool {
-        TexelView::fits(device, vk::Format::R32_UINT, self.indices.size_bytes.max(self_cells.size_bytes))
+        TexelView::fits(device, vk::Format::R32_UINT, self.indices.size_bytes)
+            && TexelView::fits(device, vk::Format::R32G32_UINT, self_cells.size_bytes)
             && TexelView::fits(device, vk::Format::R32_UINT, self.emission.size_bytes)
             && TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, vertices.size_bytes)
     }
@@ -189,7 +190,7 @@ impl DrawTriangles {
             &[
                 (light.vertices, vk::Format::R32G32B32A32_SFLOAT),
                 (&mesh.emission, vk::Format::R32_UINT),
-                (light.self_cells, vk::Format::R32_UINT),
+                (light.self_cells, vk::Format::R32G32_UINT),
             ],
         )?)?;
         let [_, _, width, height] = viewport.area;

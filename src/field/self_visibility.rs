@@ -1,8 +1,9 @@
 //! Self-visibility: what a mesh blocks of its own vertices' view, for lights too small for four SH bands.
 //!
-//! Every vertex has a map of [`SIDE`] x [`SIDE`] signed bytes over the hemisphere about its normal. A node holds the angle from its
-//! direction to the nearest edge of what the vertex sees past its own mesh, positive where that direction is free. A lookup is
-//! bilinear, and the edge counts as straight over a small light ([`blocked_share`]).
+//! Every vertex has a map of [`SIDE`] x [`SIDE`] nodes over the hemisphere about its normal, two bytes each. One is the angle from the
+//! node's direction to the nearest edge of what the vertex sees past its own mesh, positive where that direction is free. The other is
+//! how far away the mesh is there, or at that edge where the direction is free: what lies beyond a light leaves it free. A lookup
+//! is bilinear, and the edge counts as straight over a small light ([`blocked_share`]).
 //!
 //! A direction's place on the map is that of the octahedron |x| + |y| + z = 1, unfolded to a square and enlarged by 1 / [`RIM`]. Light
 //! that comes from lower than the square's rim, 12 to 17 degrees above the horizon, reads the rim: the cosine makes it small, and
@@ -14,7 +15,7 @@
 //!
 //! | light, degrees | 1 | 3 | 8 | 15 | 30 |
 //! |---|---|---|---|---|---|
-//! | map, 64 bytes a vertex | 0.059 | 0.046 | 0.031 | 0.020 | 0.022 |
+//! | map, 128 bytes a vertex | 0.059 | 0.046 | 0.031 | 0.020 | 0.022 |
 //! | SH transfer of 4 bands, 64 bytes in f32 | 0.143 | 0.137 | 0.117 | 0.087 | 0.040 |
 //! | map, other vertices | 0.060 | 0.048 | 0.028 | 0.018 | 0.021 |
 //! | rim on the horizon (1) | 0.071 | 0.058 | 0.038 | 0.025 | 0.024 |
@@ -30,8 +31,15 @@ use glam::{DMat3, DVec2, DVec3};
 
 /// Nodes along an edge of a map.
 pub const SIDE: usize = 8;
-/// Nodes of a map, and its bytes.
+/// Nodes of a map.
 pub const NODES: usize = SIDE * SIDE;
+/// Bytes of a map: the angles of all nodes, row by row, and then the distances.
+pub const BYTES: usize = 2 * NODES;
+/// Steps of a distance's byte to r: 250 of them reach across the mesh.
+pub const DISTANCE_STEPS: f64 = 125.0;
+/// How much nearer than a light, in r, the mesh has to be to block it whole; where it is as much farther it leaves the light free. Several
+/// steps of a distance's byte, and less than what a mesh leaves between a lamp and itself.
+pub const RAMP: f64 = 0.05;
 /// Cells of a map: the squares between four nodes.
 pub const CELLS: usize = (SIDE - 1) * (SIDE - 1);
 /// Largest angle from an edge that a map holds, 45 degrees: steps of 0.35 degrees.
@@ -80,30 +88,33 @@ pub fn decode_angle(byte: u8) -> f64 {
     decode(byte, LIMIT_RAD)
 }
 
-/// Signed angle in radians from a direction (z along the normal) to the edge of what the vertex sees, from the vertex's [`NODES`] bytes.
-pub fn angle(map: &[u8], local: DVec3) -> f64 {
+/// What a map of [`BYTES`] holds at a direction (z along the normal): the signed angle in radians to the edge of what the vertex sees, and
+/// how far away the mesh is, in r.
+pub fn lookup(map: &[u8], local: DVec3) -> [f64; 2] {
     let place = place(local);
     let cell = place.floor().min(DVec2::splat((SIDE - 2) as f64));
     let within = place - cell;
-    let corner = |i, j| decode_angle(map[(cell.y as usize + j) * SIDE + cell.x as usize + i]);
+    let node = |i, j| (cell.y as usize + j) * SIDE + cell.x as usize + i;
+    let corner = |i, j| DVec2::new(decode_angle(map[node(i, j)]), f64::from(map[NODES + node(i, j)]) / DISTANCE_STEPS);
     let row = |j| corner(0, j) * (1.0 - within.x) + corner(1, j) * within.x;
-    row(0) * (1.0 - within.y) + row(1) * within.y
+    (row(0) * (1.0 - within.y) + row(1) * within.y).to_array()
 }
 
-/// Share of a round light that the mesh itself leaves free: 0 to 1. `map` has the vertex's [`NODES`] bytes; its normal and the
-/// light's direction are in the object's frame, the normal as the mesh has it. The light's radius spans `radius_rad`; it should be
-/// small, or one part of a light ([`super::sub_light`]). What the horizon leaves of it is the cosine's affair.
-pub fn visible(map: &[u8], normal: DVec3, direction: DVec3, radius_rad: f64) -> f64 {
-    let local = frame(normal).transpose() * direction;
-    blocked_share(angle(map, local) / radius_rad.max(RADIUS_MINIMUM_RAD))
+/// Share of a round light that the mesh itself leaves free: 0 to 1. `map` has the vertex's [`BYTES`]; its normal and the light's
+/// direction are in the object's frame, the normal as the mesh has it. The light's radius spans `radius_rad`; it should be small, or
+/// one part of a light ([`super::sub_light`]). It is `distance` away, in r. What the horizon leaves of it is the cosine's affair.
+pub fn visible(map: &[u8], normal: DVec3, direction: DVec3, radius_rad: f64, distance: f64) -> f64 {
+    let [angle, away] = lookup(map, frame(normal).transpose() * direction);
+    let blocks = ((distance - away) / (2.0 * RAMP) + 0.5).clamp(0.0, 1.0);
+    1.0 - (1.0 - blocked_share(angle / radius_rad.max(RADIUS_MINIMUM_RAD))) * blocks
 }
 
-/// A map as `glsl/self_visibility.glsl` reads it: a word for each cell, row by row, with the bytes of its corners (0, 0), (1, 0),
-/// (0, 1) and (1, 1), the first in the lowest bits. There is no padding.
-pub fn cells(map: &[u8]) -> [u32; CELLS] {
+/// A map as `glsl/self_visibility.glsl` reads it: two words for each cell, row by row, with the angles and the distances of its corners
+/// (0, 0), (1, 0), (0, 1) and (1, 1), the first in the lowest bits. There is no padding.
+pub fn cells(map: &[u8]) -> [[u32; 2]; CELLS] {
     std::array::from_fn(|cell| {
         let first = cell / (SIDE - 1) * SIDE + cell % (SIDE - 1);
-        u32::from_le_bytes([0, 1, SIDE, SIDE + 1].map(|corner| map[first + corner]))
+        [0, NODES].map(|bytes| u32::from_le_bytes([0, 1, SIDE, SIDE + 1].map(|corner| map[bytes + first + corner])))
     })
 }
 
@@ -147,27 +158,44 @@ mod tests {
     #[test]
     fn cells_hold_the_corners_that_a_lookup_blends() {
         let mut rng = fastrand::Rng::with_seed(6);
-        let map: Vec<u8> = (0..NODES).map(|_| rng.u8(..)).collect();
+        let map: Vec<u8> = (0..BYTES).map(|_| rng.u8(..)).collect();
         let cells = cells(&map);
         for _ in 0..1000 {
             let local = direction(&mut rng);
             let place = place(local);
             let cell = place.floor().min(DVec2::splat((SIDE - 2) as f64));
-            let [a, b, c, d] = cells[cell.y as usize * (SIDE - 1) + cell.x as usize].to_le_bytes().map(decode_angle);
+            let [angles, distances] = cells[cell.y as usize * (SIDE - 1) + cell.x as usize].map(u32::to_le_bytes);
             let within = place - cell;
-            let wanted = (a + (b - a) * within.x) * (1.0 - within.y) + (c + (d - c) * within.x) * within.y;
-            assert!((angle(&map, local) - wanted).abs() < 1e-12);
+            let blend = |[a, b, c, d]: [f64; 4]| {
+                (a + (b - a) * within.x) * (1.0 - within.y) + (c + (d - c) * within.x) * within.y
+            };
+            let wanted =
+                [blend(angles.map(decode_angle)), blend(distances.map(|byte| f64::from(byte) / DISTANCE_STEPS))];
+            assert!(lookup(&map, local).iter().zip(wanted).all(|(found, wanted)| (found - wanted).abs() < 1e-12));
         }
     }
 
     #[test]
     fn a_light_of_no_size_is_seen_or_not() {
-        let free = [encode_angle(0.3); NODES];
-        let blocked = [encode_angle(-0.3); NODES];
+        let free = map(0.3, 0.0);
+        let blocked = map(-0.3, 0.0);
         for radius in [0.0, 1e-300, 0.1] {
-            assert_eq!(visible(&free, DVec3::Y, DVec3::Y, radius), 1.0);
-            assert_eq!(visible(&blocked, DVec3::Y, DVec3::Y, radius), 0.0);
+            assert_eq!(visible(&free, DVec3::Y, DVec3::Y, radius, 1.0), 1.0);
+            assert_eq!(visible(&blocked, DVec3::Y, DVec3::Y, radius, 1.0), 0.0);
         }
-        assert_eq!(visible(&[0; NODES], DVec3::Y, DVec3::new(0.3, 1.0, 0.2), 0.1), 0.5);
+        assert_eq!(visible(&[0; BYTES], DVec3::Y, DVec3::new(0.3, 1.0, 0.2), 0.1, 1.0), 0.5);
+    }
+
+    fn map(angle_rad: f64, distance: f64) -> [u8; BYTES] {
+        let bytes = [encode_angle(angle_rad), (distance * DISTANCE_STEPS).round() as u8];
+        std::array::from_fn(|i| bytes[i / NODES])
+    }
+
+    #[test]
+    fn what_lies_beyond_a_light_leaves_it_free() {
+        let map = map(-0.3, 0.8);
+        let sees = |distance| visible(&map, DVec3::Y, DVec3::Y, 0.1, distance);
+        assert_eq!([0.5, 0.79 - RAMP, 0.81 + RAMP, 1.0, f64::INFINITY].map(sees), [1.0, 1.0, 0.0, 0.0, 0.0]);
+        assert!((sees(0.8) - 0.5).abs() < 1e-9);
     }
 }

@@ -200,6 +200,7 @@ impl MergeTwin<'_> {
             objects: outlines,
             occluders: &occluders,
             rotation: object.rotation,
+            radius_m: object.radius_m,
             self_maps: self_maps.as_deref().map(|maps| &maps[..]),
             lights: &lights,
             leaves: &|v, j, light| leaves(v, j, Some(light)),

@@ -46,7 +46,7 @@ pub use drawing::{Drawing, Target};
 pub use flight::{FLIGHTS, Flight, Timing};
 pub use image::{Image, ImageShape};
 pub use memory::{Buffer, BufferKind, TexelView};
-pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState};
+pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, Keeps};
 pub use shader::{Shader, Stage};
 pub use share::Gpu;
 pub use upload::Upload;

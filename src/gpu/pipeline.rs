@@ -180,6 +180,17 @@ impl ComputePipeline {
     }
 }
 
+/// Which of the values that are drawn at a pixel it keeps, channel by channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keeps {
+    /// The last.
+    Last,
+    /// The smallest, also of what the attachment held before.
+    Smallest,
+    /// The largest, likewise.
+    Largest,
+}
+
 /// Fixed-function state that differs between graphics pipelines. All have filled triangles, counter-clockwise
 /// front faces, and dynamic viewport and scissor.
 #[derive(Clone, Copy, Debug)]
@@ -192,8 +203,8 @@ pub struct GraphicsState {
     pub samples: u32,
     /// Faces that are not drawn.
     pub cull: vk::CullModeFlags,
-    /// Whether a pixel keeps the largest value that was drawn, channel by channel, rather than the last.
-    pub keeps_largest: bool,
+    /// Which value a pixel keeps of those that are drawn there.
+    pub keeps: Keeps,
     /// How much nearer everything is drawn than it is, in steps of the largest depth of its triangle.
     pub nearer_steps: f32,
 }
@@ -249,7 +260,7 @@ impl GraphicsPipeline {
             .depth_test_enable(state.depth.is_some())
             .depth_write_enable(state.depth.is_some())
             .depth_compare_op(vk::CompareOp::GREATER);
-        let blend_attachments = [color_blend(state.keeps_largest)];
+        let blend_attachments = [color_blend(state.keeps)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend_attachments);
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
@@ -302,13 +313,13 @@ fn vertex_layout(
     (inputs.iter().map(binding).collect(), inputs.iter().map(attribute).collect())
 }
 
-/// How what is drawn meets what the attachment holds: the larger of the two, channel by channel, or the new in place of the old.
-fn color_blend(keeps_largest: bool) -> vk::PipelineColorBlendAttachmentState {
+fn color_blend(keeps: Keeps) -> vk::PipelineColorBlendAttachmentState {
+    let operation = if keeps == Keeps::Smallest { vk::BlendOp::MIN } else { vk::BlendOp::MAX };
     vk::PipelineColorBlendAttachmentState::default()
         .color_write_mask(vk::ColorComponentFlags::RGBA)
-        .blend_enable(keeps_largest)
-        .color_blend_op(vk::BlendOp::MAX)
-        .alpha_blend_op(vk::BlendOp::MAX)
+        .blend_enable(keeps != Keeps::Last)
+        .color_blend_op(operation)
+        .alpha_blend_op(operation)
 }
 
 fn attribute_format(components: u32) -> vk::Format {

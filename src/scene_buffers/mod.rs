@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::field::ShadowField;
 use crate::field::extent::Extent;
 use crate::field::quantity::{Storage, channel_stride};
-use crate::field::self_visibility::{self, NODES};
+use crate::field::self_visibility::{self, BYTES};
 use crate::gpu::{Buffer, Device, Volume};
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::Bounds;
@@ -46,7 +46,7 @@ pub struct DeviceMesh {
     pub blocked: Option<FieldSlot>,
     /// Radiance field, if an entity needs one.
     pub radiance: Option<FieldSlot>,
-    /// First word of its self-visibility, or [`NONE`] where it needs none.
+    /// First cell of its self-visibility, or [`NONE`] where it needs none.
     pub self_first: u32,
     /// Self-visibility in the mesh's order of vertices, if it needs any.
     pub self_maps: Option<Arc<Vec<u8>>>,
@@ -74,7 +74,7 @@ pub struct SceneBuffers {
     pub fields: Buffer,
     /// All silhouette fields.
     pub silhouettes: Silhouettes,
-    /// Cells of self-visibility, [`self_visibility::CELLS`] words a vertex of the lit meshes that can shadow themselves.
+    /// Cells of self-visibility, [`self_visibility::CELLS`] of two words a vertex of the lit meshes that can shadow themselves.
     pub self_cells: Buffer,
     /// Transfer vectors of all receivers' meshes.
     pub transfers: Buffer,
@@ -100,8 +100,8 @@ struct Packing {
     transfers: Vec<f32>,
     /// First quad of the transfer vectors of each distinct mesh, by the hash of its content. Equal meshes share theirs.
     transfer_of: HashMap<[u8; 32], u32>,
-    self_cells: Vec<u32>,
-    /// First word of the self-visibility of each distinct mesh.
+    self_cells: Vec<[u32; 2]>,
+    /// First cell of the self-visibility of each distinct mesh.
     self_of: HashMap<[u8; 32], u32>,
     /// Floats of one transfer vector.
     stride: usize,
@@ -157,7 +157,7 @@ impl Packing {
         let self_first = baked.self_visibility.as_ref().map_or(NONE, |maps| {
             *self_of.entry(mesh.content_hash()).or_insert_with(|| {
                 let first = self_cells.len() as u32;
-                let map = |&v: &u32| self_visibility::cells(&maps[v as usize * NODES..][..NODES]);
+                let map = |&v: &u32| self_visibility::cells(&maps[v as usize * BYTES..][..BYTES]);
                 self_cells.extend(order.iter().flat_map(map));
                 first
             })
@@ -194,7 +194,7 @@ impl SceneBuffers {
             meshes.push(packing.add(device, mesh, slots, silhouette, &baked)?);
         }
         let Packing { vertices, mut transfers, mut self_cells, .. } = packing;
-        self_cells.resize(self_cells.len().max(4), 0);
+        self_cells.resize(self_cells.len().max(2), [0; 2]);
         // A buffer may not be empty.
         if transfers.is_empty() {
             transfers.resize(4, 0.0);

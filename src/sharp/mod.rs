@@ -103,7 +103,7 @@ impl SharpPermutation {
 
     /// The permutation, with storage blocks where the device's texel views cannot hold the scene's buffers.
     pub fn fitting(self, device: &Device, [nodes, cells, self_cells]: [&Buffer; 3]) -> Self {
-        let fits = TexelView::fits(device, vk::Format::R32_UINT, self_cells.size_bytes);
+        let fits = TexelView::fits(device, vk::Format::R32G32_UINT, self_cells.size_bytes);
         SharpPermutation { texel: self.texel && fits && Self::fits_views(device, [nodes, cells]), ..self }
     }
 
@@ -175,7 +175,7 @@ impl Sharp {
             read(inputs.cells, vk::Format::R32G32_UINT, texel)?,
             read(inputs.vertices, quads, texel)?,
             Bind::Buffer(radiosity),
-            if self_shadows { read(inputs.self_cells, vk::Format::R32_UINT, texel)? } else { Bind::None },
+            if self_shadows { read(inputs.self_cells, vk::Format::R32G32_UINT, texel)? } else { Bind::None },
             Bind::Buffer(inputs.soft),
         ];
         commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])

@@ -1,6 +1,6 @@
 //! The CPU twin of "sharp", in f64 and vertex by vertex, from the same stored numbers.
 
-use crate::field::self_visibility::{self, NODES};
+use crate::field::self_visibility::{self, BYTES};
 use crate::field::silhouette::{Near, SilhouetteField};
 use crate::field::sub_light::{BLOCK, Part, SeenLight};
 use crate::scene::LightForm;
@@ -39,7 +39,9 @@ pub struct Task<'t> {
     pub occluders: &'t [usize],
     /// Rotation of the receiver to the world.
     pub rotation: DQuat,
-    /// Self-visibility of its points, [`NODES`] bytes each, if it can shadow itself.
+    /// Bounding radius of the receiver after scaling, metres.
+    pub radius_m: f64,
+    /// Self-visibility of its points, [`BYTES`] each, if it can shadow itself.
     pub self_maps: Option<&'t [u8]>,
     /// Lights of the receiver.
     pub lights: &'t [SharpLight],
@@ -103,7 +105,8 @@ impl Task<'_> {
                     share.unwrap_or(0.0) + own.as_ref().map_or(0.0, |near| blocked(shining, near, part, f64::INFINITY));
                 let sees = self.self_maps.map_or(1.0, |maps| {
                     let toward = self.rotation.inverse() * part.toward;
-                    self_visibility::visible(&maps[v * NODES..][..NODES], point.own_normal, toward, part.sine)
+                    let map = &maps[v * BYTES..][..BYTES];
+                    self_visibility::visible(map, point.own_normal, toward, part.sine, part.distance / self.radius_m)
                 });
                 part.share(point.normal) * sees * covers * through
             };

@@ -9,6 +9,7 @@ pub mod gltf;
 pub mod keys;
 pub mod light;
 pub mod motion;
+pub mod single;
 mod sun;
 pub mod values;
 
@@ -76,7 +77,7 @@ impl Scene {
 
     /// Reads a scene and the files that it names, relative to it. If the path does not exist, an embedded scene is read
     /// (`assets/scenes/NAME.toml`, or NAME alone). A `.glb` or `.gltf` file is read as [`gltf`] says; what is left out of it is
-    /// logged.
+    /// logged. An `.obj` file becomes the scene that [`single`] says.
     ///
     /// # Errors
     /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line.
@@ -92,6 +93,9 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn load_with_notes(path: &Path) -> Result<(Self, gltf::Notes)> {
+        if single::is_obj(path) {
+            return Ok((single::load(path)?, gltf::Notes::default()));
+        }
         if !gltf::is_gltf(path) {
             return Ok((Self::load_toml(path)?, gltf::Notes::default()));
         }

@@ -187,6 +187,27 @@ impl Model {
     }
 }
 
+/// Three parts that move, one in another, and two lamps.
+pub fn robot() -> Model {
+    let mut model = Model::default();
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let turn = [0., 0., 0., 1., 0., half, 0., half, 0., 1., 0., 0.];
+    let mut outer = None;
+    for (name, size) in [("body", 0.5), ("arm", 0.3), ("hand", 0.1)] {
+        let mesh = model.cuboid([-size; 3], [size; 3], None);
+        let node = json!({ "name": name, "mesh": mesh, "translation": [0, 1, 0.5] });
+        let node = if let Some(outer) = outer { model.child(outer, node) } else { model.node(node) };
+        model.animate(0, node, "rotation", "LINEAR", &[0., 1., 2.], &turn);
+        outer = Some(node);
+    }
+    for x in [-2, 2] {
+        let light = model.light(json!({ "type": "point", "intensity": 20 }));
+        let extension = json!({ "KHR_lights_punctual": { "light": light } });
+        model.node(json!({ "translation": [x, 3, 1], "extensions": extension }));
+    }
+    model
+}
+
 /// A GLB file of JSON and a binary part, which may be empty.
 pub fn glb(json: &[u8], binary: &[u8]) -> Vec<u8> {
     let mut out = b"glTF\x02\0\0\0\0\0\0\0".to_vec();

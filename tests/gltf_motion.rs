@@ -207,7 +207,7 @@ fn motion_of_nodes_survives_a_scene_file() {
     let mut data = import.data.clone();
     // A mesh has a file or a generator there.
     data.meshes.iter_mut().for_each(|mesh| mesh.file = Some("m.obj".into()));
-    let again = Data::parse(&data.to_toml(), Path::new("again.toml")).unwrap();
+    let again = Data::parse(&data.to_toml().unwrap(), Path::new("again.toml")).unwrap();
     assert_eq!(again, data);
     let entity = "[camera]\neye = [0, 1, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"a\"\nplane = { size_m = 1, cells = 1 }\n\
         [[entity]]\nmesh = \"a\"\nposition = [1, 0, 0]\nmotion = [\n";

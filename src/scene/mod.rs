@@ -35,7 +35,7 @@ pub const MESH_LIMIT: usize = 1024;
 /// Largest scene file in bytes.
 pub const FILE_LIMIT_BYTES: usize = 16 << 20;
 
-/// A checked scene with its meshes.
+/// A checked scene with its meshes. The fields are public to read; methods change them together.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The content of the scene file.
@@ -170,7 +170,20 @@ impl Scene {
     }
 
     /// Replaces the data of an entity; its mesh stays the same.
-    pub fn set_entity(&mut self, index: usize, data: EntityData) {
+    ///
+    /// # Errors
+    /// [`Error::Input`] in one line: a number out of the range that README states for scene files, or no such entity.
+    pub fn set_entity(&mut self, index: usize, data: EntityData) -> Result<()> {
+        if index >= self.data.entities.len() {
+            return Err(Error::Input(format!("there is no entity {index}")));
+        }
+        data::check(format!("entity {index}"), &data)?;
+        self.put_entity(index, data);
+        Ok(())
+    }
+
+    /// As [`Scene::set_entity`], of numbers in range.
+    pub(crate) fn put_entity(&mut self, index: usize, data: EntityData) {
         let mesh = self.entities[index].mesh;
         self.entities[index] = resolve(index, &data, mesh, &self.meshes[mesh]);
         self.data.entities[index] = data;
@@ -188,7 +201,10 @@ impl Scene {
     }
 
     /// The scene file as text, which parses to equal [`Data`]; comments are lost.
-    pub fn to_toml(&self) -> String {
+    ///
+    /// # Errors
+    /// As [`Data::to_toml`].
+    pub fn to_toml(&self) -> Result<String> {
         self.data.to_toml()
     }
 }

@@ -66,7 +66,7 @@ mod tests {
         assert!((12.0..20.0).contains(&half_deg), "{half_deg} of the 20 degrees above the middle");
         // Saved as a scene file beside it, it is the same scene.
         let saved = folder.path().join("saved.toml");
-        std::fs::write(&saved, scene.to_toml()).unwrap();
+        std::fs::write(&saved, scene.to_toml().unwrap()).unwrap();
         let again = Scene::load(&saved).unwrap();
         assert_eq!(again.data, scene.data);
         assert_eq!(again.meshes[0].content_hash(), scene.meshes[0].content_hash());

@@ -6,7 +6,7 @@ mod model;
 use glam::{DMat4, DQuat, DVec3, Vec3};
 use model::{F32, I8, I16, Model, U8, U16, U32, cuboid};
 use serde_json::json;
-use shadow_fields::asset::picture::write_png;
+use shadow_fields::asset::picture::{linear_from_srgb, write_png};
 use shadow_fields::scene::{Scene, gltf};
 use shadow_fields::truth::RayCast;
 use std::path::Path;
@@ -273,8 +273,10 @@ fn buffers_may_stand_within_or_beside() {
     }
 }
 
-/// A square of 2 x 2 m with coordinates of textures, of a material.
-fn square(model: &mut Model, material: serde_json::Value, with_uv: bool) -> usize {
+/// A square of 2 x 2 m with coordinates of textures, of a material that is no metal unless it says so.
+fn square(model: &mut Model, mut material: serde_json::Value, with_uv: bool) -> usize {
+    let metallic = &mut material["pbrMetallicRoughness"]["metallicFactor"];
+    *metallic = if metallic.is_null() { 0.into() } else { metallic.clone() };
     let material = model.push("materials", material);
     let positions = model.positions(&[-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0.]);
     let mut attributes = json!({ "POSITION": positions });
@@ -322,6 +324,42 @@ fn textures_become_means_over_vertices() {
     assert!(close(albedo(3), [0.5, 1.0, 0.5]), "green and white: {}", albedo(3));
     let left_out = import.notes.left_out();
     assert_eq!(left_out, ["left out (4): base colour textures (their mean over the vertices is the albedo)"]);
+}
+
+#[test]
+fn a_jpeg_texture_becomes_its_mean() {
+    let mut model = Model::default();
+    // Two halves of one colour each: blocks of JPEG lie within them.
+    let halves = [[200, 80, 40], [40, 120, 220]];
+    let picture = image::RgbImage::from_fn(64, 32, |x, _| image::Rgb(halves[(x / 32) as usize]));
+    let mut bytes = Vec::new();
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 95).encode_image(&picture).unwrap();
+    let view = model.view(&bytes);
+    let image = model.push("images", json!({ "bufferView": view, "mimeType": "image/jpeg" }));
+    let texture = model.push("textures", json!({ "source": image }));
+    square(&mut model, json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": texture } } }), false);
+    let linear = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
+    let [left, right] = halves.map(|half| Vec3::from(half.map(linear)));
+    let (found, expected) = (load(&model).data.entities[0].albedo, (left + right) / 2.0);
+    // A step of 8 bits is at most 0.009 in linear light at these colours, and JPEG at this quality is wrong by about one.
+    assert!((found - expected).abs().max_element() < 0.01, "{found} for {expected}");
+}
+
+#[test]
+fn metal_and_gloss_are_said_to_be_diffuse() {
+    let mut model = Model::default();
+    for (metallic, roughness) in [(0.0, 1.0), (1.0, 1.0), (0.3, 1.0), (0.0, 0.5)] {
+        let pbr = json!({ "metallicFactor": metallic, "roughnessFactor": roughness });
+        square(&mut model, json!({ "pbrMetallicRoughness": pbr }), false);
+    }
+    // Of a material that is used twice, once; of one that shows its colour as it is, not; of one that says nothing, as metal is the default.
+    let mesh = model.json["nodes"][1]["mesh"].clone();
+    model.node(json!({ "mesh": mesh }));
+    let index = square(&mut model, json!({ "extensions": { "KHR_materials_unlit": {} } }), false);
+    model.json["materials"][index - 1]["pbrMetallicRoughness"]["metallicFactor"] = json!(1);
+    let index = square(&mut model, json!({}), false);
+    model.json["materials"][index - 1] = json!({});
+    assert_eq!(load(&model).notes.left_out(), ["left out (4): metallic or glossy materials (they are diffuse)"]);
 }
 
 #[test]

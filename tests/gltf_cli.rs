@@ -23,7 +23,7 @@ fn folder() -> TempDir {
 fn room() -> Model {
     let mut model = Model::default();
     let (floor, body) = (model.paint([0.6, 0.6, 0.5]), model.paint([0.2, 0.5, 0.8]));
-    let glow = json!({ "emissiveFactor": [1, 0.4, 0.1],
+    let glow = json!({ "emissiveFactor": [1, 0.4, 0.1], "pbrMetallicRoughness": { "metallicFactor": 0 },
         "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 30 } } });
     let glow = model.push("materials", glow);
     let mesh = model.cuboid([-3., -0.1, -3.], [3., 0., 3.], Some(floor));

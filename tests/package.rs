@@ -82,6 +82,11 @@ fn a_package_runs_where_it_is_unpacked() {
         assert!(share.join("doc/shadow-fields").join(file).exists(), "{file}");
     }
 
+    // Each example scene is there with its meshes.
+    let scenes = std::fs::read_dir(share.join("shadow-fields/scenes")).unwrap().map(|entry| entry.unwrap().path());
+    let scenes: Vec<_> = scenes.map(|path| shadow_fields::scene::Scene::load(&path).unwrap()).collect();
+    assert!(scenes.len() >= 6, "{} scenes", scenes.len());
+
     if let Err(error) = common::open() {
         return common::skip(&error.to_string());
     }

@@ -121,7 +121,7 @@ fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {
     };
     slide(ui, "exposure", editor.exposure_ev(), -8.0..=8.0, " EV", Command::SetExposure);
     if let Some(ev) = editor.light_ev() {
-        slide(ui, "light", ev, -4.0..=14.0, " EV", Command::SetLight);
+        slide(ui, "light", ev, -4.0..=24.0, " EV", Command::SetLight);
     }
     slide(ui, "sky", editor.sky(), 0.0..=4.0, "", Command::SetSky);
     slide(ui, "sky turned", editor.sky_turn_deg(), -180.0..=180.0, "°", Command::SetSkyTurn);

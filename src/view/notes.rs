@@ -85,7 +85,7 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
 fn bar(ui: &mut Ui, limit: f64) {
     let scale = ColorScale { scheme: Scheme::Signed, limit };
     let width = ui.available_width().min(420.0);
-    let (response, painter) = ui.allocate_painter(vec2(width, 28.0), Sense::hover());
+    let (response, painter) = ui.allocate_painter(vec2(width, 32.0), Sense::hover());
     let area = response.rect;
     let steps = 64;
     for step in 0..steps {

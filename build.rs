@@ -45,7 +45,12 @@ fn check_shaderc() {
         None => output("cmake", &["--version"]).is_some() || output("pkg-config", &["--exists", "shaderc"]).is_some(),
     };
     if !ends_well {
-        println!("cargo::error=no whole shader compiler (libshaderc) is here; run scripts/setup, then build again");
+        // A program that depends on this crate by its path does not read this folder's .cargo/config.toml.
+        let here = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_else(|_| ".".into());
+        println!(
+            "cargo::error=no whole shader compiler (libshaderc) is here; run {here}/scripts/setup, and to build another program \
+             set SHADERC_LIB_DIR={here}/.build/shaderc"
+        );
     }
 }
 

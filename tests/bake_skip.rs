@@ -2,9 +2,10 @@
 
 mod common;
 
+use common::generate;
 use common::{gpu, report};
 use glam::DVec3;
-use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::capture::unit_positions;
 use shadow_fields::bake::partial::Partial;

@@ -3,10 +3,11 @@
 
 mod common;
 
+use common::generate;
 use common::{gpu, report};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
-use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake::capture::unit_positions;
 use shadow_fields::bake::surface::Surface;
 use shadow_fields::bake::symmetric_samples::{self, CoefficientTurn};

@@ -175,7 +175,7 @@ fn bake_and_inspect_a_sphere() {
     }
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let mesh = shadow_fields::asset::generate::sphere(0.5, 3);
+    let mesh = common::generate::sphere(0.5, 3);
     std::fs::write(folder.join("ball.obj"), shadow_fields::asset::obj::write_obj(&mesh)).unwrap();
     let bake = ["bake", "ball.obj", "-o", "f.sf", "--lattice", "cube:12x6", "--face-px", "32"];
     let ran = good(folder, &bake);

@@ -43,10 +43,7 @@ impl Farm {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("meshes")).unwrap();
-        for (name, mesh) in [
-            ("a", shadow_fields::asset::generate::torus(0.6, 0.2, 12, 8)),
-            ("b", shadow_fields::asset::generate::sphere(1.0, 1)),
-        ] {
+        for (name, mesh) in [("a", common::generate::torus(0.6, 0.2, 12, 8)), ("b", common::generate::sphere(1.0, 1))] {
             let text = shadow_fields::asset::obj::write_obj(&mesh);
             std::fs::write(folder.path().join(format!("meshes/{name}.obj")), text).unwrap();
         }

@@ -1,9 +1,10 @@
 //! Field files: what was written comes back, and nothing else is ever taken for a field.
 
+#[path = "common/generate.rs"]
+mod generate;
 use fastrand::Rng;
 use serde::Serialize;
 use shadow_fields::Error;
-use shadow_fields::asset::generate;
 use shadow_fields::bake;
 use shadow_fields::field::file::{self, FIELD_MAGIC, TRANSFER_MAGIC};
 use shadow_fields::field::{FieldHeader, FieldKind, ShadowField, Storage};

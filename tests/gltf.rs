@@ -1,21 +1,14 @@
-//! glTF as scenes: shapes, placements, materials, lights and cameras of models that the tests make.
+//! glTF as scenes: shapes, placements, lights and cameras of models that the tests make.
 
 #[path = "common/model.rs"]
 mod model;
 
 use glam::{DMat4, DQuat, DVec3, Vec3};
-use model::{F32, I8, I16, Model, U8, U16, U32, cuboid};
+use model::{F32, I8, I16, Model, U8, U16, U32, cuboid, load};
 use serde_json::json;
-use shadow_fields::asset::picture::write_png;
 use shadow_fields::scene::{Scene, gltf};
 use shadow_fields::truth::RayCast;
 use std::path::Path;
-
-/// Reads a model by way of a GLB file.
-fn load(model: &Model) -> gltf::Import {
-    let folder = tempfile::tempdir().unwrap();
-    gltf::load(&model.write(folder.path(), "m")).unwrap_or_else(|error| panic!("{error}"))
-}
 
 /// Vertices of an entity in the world at a time.
 fn world(import: &gltf::Import, entity: usize, time_s: f64) -> Vec<DVec3> {
@@ -273,102 +266,6 @@ fn buffers_may_stand_within_or_beside() {
     }
 }
 
-/// A square of 2 x 2 m with coordinates of textures, of a material.
-fn square(model: &mut Model, material: serde_json::Value, with_uv: bool) -> usize {
-    let material = model.push("materials", material);
-    let positions = model.positions(&[-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0.]);
-    let mut attributes = json!({ "POSITION": positions });
-    if with_uv {
-        // The lower half of the picture.
-        attributes["TEXCOORD_0"] = json!(model.floats(2, &[0.1, 0.9, 0.9, 0.9, 0.9, 0.6, 0.1, 0.6]));
-    }
-    let indices = model.indices(&[0, 1, 2, 0, 2, 3]);
-    let mesh = model.mesh(attributes, Some(indices), Some(material));
-    model.node(json!({ "mesh": mesh }))
-}
-
-/// A texture of 2 x 2 texels in linear colours: red, green; blue, white.
-fn texture(model: &mut Model) -> usize {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("t.png");
-    write_png(&path, 2, 2, &[1., 0., 0., 0., 1., 0., 0., 0., 1., 1., 1., 1.], 0.0).unwrap();
-    let view = model.view(&std::fs::read(path).unwrap());
-    let image = model.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
-    model.push("textures", json!({ "source": image }))
-}
-
-#[test]
-fn textures_become_means_over_vertices() {
-    let mut model = Model::default();
-    let texture = texture(&mut model);
-    let material = |factor: [f32; 4], more: serde_json::Value| {
-        let mut info = json!({ "index": texture });
-        info.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        json!({ "pbrMetallicRoughness": { "baseColorFactor": factor, "baseColorTexture": info } })
-    };
-    square(&mut model, material([1.0, 0.5, 1.0, 1.0], json!({})), true);
-    square(&mut model, material([1.0; 4], json!({})), false);
-    let up = json!({ "extensions": { "KHR_texture_transform": { "offset": [0, -0.5] } } });
-    square(&mut model, material([1.0; 4], up), true);
-    // A quarter turn: what stands below stands at the right, green and white.
-    let turn = json!({ "extensions": { "KHR_texture_transform": { "rotation": std::f32::consts::FRAC_PI_2 } } });
-    square(&mut model, material([1.0; 4], turn), true);
-    let import = load(&model);
-    let albedo = |i: usize| import.data.entities[i].albedo;
-    let close = |a: Vec3, b: [f32; 3]| (a - Vec3::from(b)).length() < 1e-3;
-    assert!(close(albedo(0), [0.5, 0.25, 1.0]), "blue and white: {}", albedo(0));
-    assert!(close(albedo(1), [0.5, 0.5, 0.5]), "the whole picture: {}", albedo(1));
-    assert!(close(albedo(2), [0.5, 0.5, 0.0]), "red and green: {}", albedo(2));
-    assert!(close(albedo(3), [0.5, 1.0, 0.5]), "green and white: {}", albedo(3));
-    let left_out = import.notes.left_out();
-    assert_eq!(left_out, ["left out (4): base colour textures (their mean over the vertices is the albedo)"]);
-}
-
-#[test]
-fn emission_has_its_strength_and_pattern() {
-    let mut model = Model::default();
-    let texture = texture(&mut model);
-    let glow = |more: serde_json::Value| {
-        let mut json = json!({ "emissiveFactor": [1, 0.5, 0.25] });
-        json.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        json
-    };
-    let strong = json!({ "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 40 } } });
-    square(&mut model, glow(json!({})), true);
-    square(&mut model, glow(strong), true);
-    square(&mut model, glow(json!({ "emissiveTexture": { "index": texture } })), true);
-    square(&mut model, json!({ "emissiveTexture": { "index": texture } }), true);
-    let import = load(&model);
-    let entities = &import.data.entities;
-    assert_eq!(entities[0].emission, Vec3::new(1.0, 0.5, 0.25));
-    assert_eq!(entities[1].emission, Vec3::new(40.0, 20.0, 10.0));
-    assert_eq!((entities[2].emission, entities[3].emission), (Vec3::new(1.0, 0.5, 0.25), Vec3::ZERO));
-    // Seen from below: blue at the left, white at the right.
-    let mesh = &import.meshes[2];
-    for (position, color) in mesh.positions.iter().zip(mesh.colors.as_ref().unwrap()) {
-        assert_eq!(*color, if position.x < 0.0 { Vec3::Z } else { Vec3::ONE });
-    }
-    assert!(import.meshes[0].colors.is_none());
-    assert!(import.data.environment.is_empty(), "something shines, so no daylight is added");
-    assert_eq!(import.data.output.exposure_ev, 0.0);
-    let left_out = import.notes.left_out();
-    assert_eq!(left_out, ["left out (1): emissive textures (vertices have their colours)"]);
-}
-
-#[test]
-fn colours_of_vertices_are_a_mean_by_area() {
-    let mut model = Model::default();
-    // A triangle of 3 m^2 in black and one of 1 m^2 in white.
-    let positions = model.positions(&[0., 0., 0., 6., 0., 0., 0., 1., 0., 0., 0., 1., 2., 0., 1., 0., 1., 1.]);
-    let colors =
-        model.accessor(U8, 4, 6, &[[0, 0, 0, 255]; 3].into_iter().chain([[255; 4]; 3]).flatten().collect::<Vec<u8>>());
-    model.json["accessors"][colors]["normalized"] = json!(true);
-    let mesh = model.mesh(json!({ "POSITION": positions, "COLOR_0": colors }), None, None);
-    model.node(json!({ "mesh": mesh }));
-    let import = load(&model);
-    assert!((import.data.entities[0].albedo - Vec3::splat(0.25)).length() < 1e-6);
-}
-
 #[test]
 fn lights_are_balls_of_their_intensity() {
     let mut model = arrows();
@@ -474,34 +371,6 @@ fn the_first_perspective_camera_is_taken() {
     assert!((ahead - Vec3::NEG_X).length() < 1e-5 && (camera.fov_deg - 0.5_f32.to_degrees()).abs() < 1e-4, "{ahead}");
     assert_eq!((import.data.output.width, import.data.output.height), (960, 640));
     assert_eq!(import.notes.left_out(), ["left out (1): cameras without perspective", "left out (1): further cameras"]);
-}
-
-#[test]
-fn what_is_left_out_is_counted() {
-    let mut model = Model::default();
-    for alpha in ["BLEND", "MASK", "OPAQUE"] {
-        square(&mut model, json!({ "alphaMode": alpha }), false);
-    }
-    let glass = json!({ "extensions": { "KHR_materials_transmission": { "transmissionFactor": 1 } } });
-    square(&mut model, glass, false);
-    let texture = texture(&mut model);
-    square(&mut model, json!({ "normalTexture": { "index": texture } }), false);
-    let nodes = model.json["nodes"].as_array().unwrap().len();
-    let skin = model.push("skins", json!({ "joints": [0] }));
-    model.json["nodes"][nodes - 1]["skin"] = json!(skin);
-    let positions = model.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"].clone();
-    model.json["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": positions }]);
-    model.push("scenes", json!({ "nodes": [0] }));
-    assert_eq!(
-        load(&model).notes.left_out(),
-        [
-            "left out (1): further scenes",
-            "left out (1): nodes with a skin (their meshes stand still as they are stored)",
-            "left out (1): primitives with morph targets (they keep the shape that is stored first)",
-            "left out (1): textures of normals, roughness, metal or occlusion",
-            "left out (3): transparent materials (they are opaque)",
-        ]
-    );
 }
 
 #[test]

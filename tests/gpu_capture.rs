@@ -2,9 +2,10 @@
 
 mod common;
 
+use common::generate;
 use common::{Gpu, gpu, pot, report};
 use glam::{DVec3, Quat, Vec3};
-use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake::capture::{Capture, CaptureKind, Model, NO_SLOT};
 use shadow_fields::check::capture::{self as check, differing_limit, eyes_outside, faces, texel_index};
 

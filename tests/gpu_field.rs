@@ -2,11 +2,12 @@
 
 mod common;
 
+use common::generate;
 use common::{Gpu, gpu, library, open, report};
 use fastrand::Rng;
 use glam::{DQuat, DVec3, Vec3};
 use half::f16;
-use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::capture::unit_positions;
 use shadow_fields::bake::inside::{inside, pushed_out};

@@ -35,7 +35,7 @@ fn built_in(name: &str, text: &str) -> Scene {
             *cells = 24;
         }
     }
-    Scene::parse(&scene.data.to_toml(), Path::new(&path), &embedded::read).unwrap()
+    Scene::parse(&scene.data.to_toml().unwrap(), Path::new(&path), &embedded::read).unwrap()
 }
 
 #[test]

@@ -2,9 +2,10 @@
 
 mod common;
 
+use common::generate;
 use common::{gpu, pot, report};
 use glam::Vec3;
-use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake::assemble::{Source, Sources, twin};
 use shadow_fields::bake::capture::CaptureKind;
 use shadow_fields::bake::capture::NO_SLOT;

@@ -3,9 +3,9 @@
 
 mod common;
 
+use common::generate;
 use common::{Gpu, gpu, library, report};
 use glam::Vec3;
-use shadow_fields::asset::generate;
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::{Capture, CaptureKind, Model};
 use shadow_fields::bake::{self, Baker};

@@ -1,8 +1,9 @@
 //! The lattice: sample points, weights, continuity, fall-off, text form. Seeds are fixed; "exactly" means f64 rounding.
 
+#[path = "common/generate.rs"]
+mod generate;
 use fastrand::Rng;
 use glam::DVec3;
-use shadow_fields::asset::generate;
 use shadow_fields::bake;
 use shadow_fields::field::lattice::{
     CELL_WARP, Directions, OUTSIDE_INNER, Spacing, cap_cosine, cap_height, unwarp, warp,

@@ -1,19 +1,21 @@
 //! Meshes: generators against closed forms, derived properties, the enclosing sphere, and OBJ files there and back.
 
+#[path = "common/generate.rs"]
+mod generate;
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
+use generate::{cuboid, library, plane, sphere, torus, torus_two_colour};
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::asset::Generator;
-use shadow_fields::asset::generate::{cuboid, library, plane, sphere, torus, torus_two_colour};
-use shadow_fields::asset::{Mesh, enclose, obj, teapot};
+use shadow_fields::asset::{Mesh, enclose, obj};
 
 /// f32 positions: a few roundings of 6e-8 each, summed over many triangles of either sign.
 const F32: f64 = 1e-6;
 
 fn pot() -> Mesh {
-    teapot::teapot(teapot::CONTROL_TEXT, teapot::DEFAULT_SUBDIVISIONS).unwrap()
+    generate::teapot(10)
 }
 
 fn close(value: f64, expected: f64, relative: f64) {
@@ -111,10 +113,7 @@ fn two_colours_meet_in_a_narrow_blend() {
             assert_eq!(c.x > c.z, p.x > 0.0, "{p}");
         }
     }
-    assert!(
-        colors.contains(&shadow_fields::asset::generate::WARM)
-            && colors.contains(&shadow_fields::asset::generate::COOL)
-    );
+    assert!(colors.contains(&generate::WARM) && colors.contains(&generate::COOL));
 }
 
 #[test]

@@ -64,10 +64,28 @@ fn a_package_runs_where_it_is_unpacked() {
     {
         assert!(licences.contains(part), "no {part:?}");
     }
+    // Each block has a text: a copyright line, or a standard licence that needs none.
+    for block in licences.split("\n==== ").skip(1) {
+        let (head, text) = block.split_once('\n').unwrap();
+        let is_text = text.starts_with("---- ") || head.ends_with("(Debian)");
+        assert!(is_text && text.len() > 200 && !text.contains("[name of crate]"), "{head}: {text}");
+    }
+    let mit = licences
+        .split("==== pulp-wasm-simd-flag ")
+        .nth(1)
+        .expect("a crate with no text of its own")
+        .split("\n====")
+        .next();
+    assert!(mit.unwrap().contains("Copyright (c) sarah qui"), "its authors: {mit:?}");
     assert!(!licences.contains("==== proptest"), "a crate of tests is not linked");
     for file in ["README.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"] {
         assert!(share.join("doc/shadow-fields").join(file).exists(), "{file}");
     }
+
+    // Each example scene is there with its meshes.
+    let scenes = std::fs::read_dir(share.join("shadow-fields/scenes")).unwrap().map(|entry| entry.unwrap().path());
+    let scenes: Vec<_> = scenes.map(|path| shadow_fields::scene::Scene::load(&path).unwrap()).collect();
+    assert!(scenes.len() >= 6, "{} scenes", scenes.len());
 
     if let Err(error) = common::open() {
         return common::skip(&error.to_string());

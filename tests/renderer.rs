@@ -43,7 +43,8 @@ fn refused(builder: SceneBuilder) -> String {
 #[test]
 fn a_scene_made_in_code_is_that_of_its_file() {
     let made = room().build().unwrap();
-    let read = Scene::parse(&made.to_toml(), Path::new("room.toml"), &shadow_fields::asset::embedded::read).unwrap();
+    let read =
+        Scene::parse(&made.to_toml().unwrap(), Path::new("room.toml"), &shadow_fields::asset::embedded::read).unwrap();
     assert_eq!(made.data, read.data);
     assert_eq!(made.entities, read.entities);
     assert!(made.meshes.iter().zip(&read.meshes).all(|(a, b)| a == b && a.content_hash() == b.content_hash()));

@@ -37,7 +37,7 @@ fn embedded_scenes_load_and_read_back() {
     for (name, text) in scenes {
         let path = format!("assets/scenes/{name}.toml");
         let scene = Scene::parse(text, Path::new(&path), &embedded::read).unwrap();
-        let again = Data::parse(&scene.to_toml(), Path::new("again.toml")).unwrap();
+        let again = Data::parse(&scene.to_toml().unwrap(), Path::new("again.toml")).unwrap();
         assert_eq!(again, scene.data, "{name}");
         // From disk it is the same scene.
         let disk = Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(&path)).unwrap();
@@ -202,7 +202,7 @@ fn smooth_keyframes_are_a_spline_through_the_keys() {
         assert!((before - after).abs() < 3e-2 && (after - (2.0 - 5.0) / 3.0).abs() < 2e-2, "{before} {after}");
     }
     // It reads back, and "linear" is what is meant without it.
-    let again = Data::parse(&ring.to_toml(), Path::new("again.toml")).unwrap();
+    let again = Data::parse(&ring.to_toml().unwrap(), Path::new("again.toml")).unwrap();
     assert_eq!(again, ring.data);
     let keys = "keys = [{ time_s = 0 }, { time_s = 1, position = [1, 0, 0] }]";
     let plain = ball(&format!("motion = [{{ keyframes = {{ {keys} }} }}]"));

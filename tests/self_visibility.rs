@@ -2,9 +2,10 @@
 
 mod common;
 
+use common::generate;
 use common::{Gpu, gpu, pot, report};
 use glam::{DVec3, Vec3};
-use shadow_fields::asset::{Mesh, embedded, generate};
+use shadow_fields::asset::{Mesh, embedded};
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::partial::Partial;
 use shadow_fields::bake::{Options, TRANSFER_OFFSET};

@@ -4,9 +4,10 @@
 mod cli;
 mod common;
 
+use common::generate;
 use common::{Gpu, gpu, pot, report};
 use glam::{DVec3, Vec3};
-use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
 use shadow_fields::check::silhouette as check;
 use shadow_fields::field::silhouette::{SilhouetteField, SilhouetteHeader};

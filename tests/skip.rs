@@ -213,7 +213,7 @@ fn what_is_dropped_stays_within_its_bound() {
     for entity in &mut patch.entities[1..] {
         entity.receives = Some(false);
     }
-    let text = patch.to_toml();
+    let text = patch.to_toml().unwrap();
     town = Scene::parse(&text, std::path::Path::new("patch.toml"), &shadow_fields::asset::embedded::read).unwrap();
     let placements = town.at(0.0);
     let mut full = stage.frame(&town, small());

@@ -1,5 +1,7 @@
 //! Ray casting and the exact chain against closed forms, and against each other.
 
+#[path = "common/generate.rs"]
+mod generate;
 use glam::{DVec3, Vec3};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::Scene;
@@ -184,10 +186,10 @@ fn runs_repeat_and_seeds_differ() {
 
 #[test]
 fn a_ray_meets_the_nearest_side_first() {
-    let side = shadow_fields::asset::generate::torus_two_colour(0.5, 0.2, 64, 32);
+    let side = generate::torus_two_colour(0.5, 0.2, 64, 32);
     let shape = shadow_fields::truth::ray_mesh::RayMesh::new(&side);
     // Along x both colours lie behind one another; in units of the bounding radius, 0.7 m.
-    for (sign, color) in [(1.0, shadow_fields::asset::generate::WARM), (-1.0, shadow_fields::asset::generate::COOL)] {
+    for (sign, color) in [(1.0, generate::WARM), (-1.0, generate::COOL)] {
         for height in [0.0, 0.05, 0.15] {
             let origin = Vec3::new(sign * 3.0, height / 0.7, 0.01);
             let direction = Vec3::new(-sign, 0.0, 0.0);
@@ -356,7 +358,7 @@ fn a_tiny_light_far_away_has_its_size() {
 
 #[test]
 fn a_limited_ray_is_blocked_by_what_lies_before_its_end() {
-    let mesh = shadow_fields::asset::generate::torus_two_colour(0.5, 0.2, 64, 32);
+    let mesh = generate::torus_two_colour(0.5, 0.2, 64, 32);
     let shape = shadow_fields::truth::ray_mesh::RayMesh::new(&mesh);
     let mut random = fastrand::Rng::with_seed(5);
     let mut on_sphere = || loop {

@@ -6,145 +6,24 @@ mod common;
 mod room;
 #[path = "common/stage.rs"]
 mod stage;
+#[path = "common/window.rs"]
+mod window;
 
-use common::{Gpu, gpu};
+use common::gpu;
 use room::apart;
-use shadow_fields::asset::picture::srgb_from_linear;
-use shadow_fields::bake::Baker;
-use shadow_fields::bake::cache::Cache;
 use shadow_fields::draw::Antialias;
 use shadow_fields::error::Error;
-use shadow_fields::frame::{Frame, Options};
-use shadow_fields::gpu::{
-    self, Access, Buffer, BufferKind, Commands, Device, FLIGHTS, Image, ImageShape, Overlay, Paint, Target, Validation,
-};
+use shadow_fields::gpu::{Access, Commands, Device, Image, ImageShape, Overlay, Paint, Target};
 use shadow_fields::scene::Scene;
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
-use shadow_fields::view::{Editor, FrameTarget, Setup, Viewer};
-use stage::small;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-
-const SIZE: [u32; 2] = [320, 240];
-const FORMAT: ash::vk::Format = ash::vk::Format::R8G8B8A8_SRGB;
-/// A viewer that draws into an image.
-struct Stand {
-    viewer: Viewer,
-    image: Image,
-    readback: Buffer,
-    options: Options,
-    cache: PathBuf,
-    gpu: Gpu,
-}
-
-impl Stand {
-    fn new(name: &str, shader_dir: Option<&Path>) -> Option<Self> {
-        Self::smoothed(name, shader_dir, small().antialias)
-    }
-
-    fn smoothed(name: &str, shader_dir: Option<&Path>, antialias: Antialias) -> Option<Self> {
-        let gpu = gpu()?;
-        let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("view-{name}"));
-        let _ = std::fs::remove_dir_all(&cache);
-        let mut library = gpu.library.clone();
-        library.shader_dir = shader_dir.map(Path::to_owned);
-        let options = Options { size: SIZE, antialias, ..small() };
-        let setup = Setup {
-            device: gpu.device.clone(),
-            options: gpu::DeviceOptions {
-                device: None,
-                validation: Validation::Core,
-                cache_dir: Some(common::cache_dir()),
-            },
-            workers: None,
-            library,
-            cache: Cache::new(Some(&cache)),
-            frame: options,
-            format: FORMAT,
-            encodes_srgb: true,
-            seed: 1,
-        };
-        // The state and pictures are saved beside the scene's file.
-        let path = room::write(&cache, SIZE, "");
-        let mut editor = Editor::new(room::scene(SIZE), &path);
-        editor.apply(Command::ToggleOverlay);
-        let viewer = Viewer::new(setup, editor, 1.0).unwrap();
-        let [width, height] = SIZE;
-        let image =
-            Image::new(&gpu.device, "window", ImageShape { format: FORMAT, width, height, samples: 1 }).unwrap();
-        let bytes = 4 * u64::from(width) * u64::from(height);
-        let readback = Buffer::new(&gpu.device, "window on the host", BufferKind::Readback, bytes).unwrap();
-        Some(Stand { viewer, image, readback, options, cache, gpu })
-    }
-
-    /// One turn of the window's loop.
-    fn turn(&mut self) {
-        self.viewer.update(0.0).unwrap();
-        let [width, height] = SIZE.map(|s| s as f32);
-        let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
-        let _ = self.viewer.ui(egui::RawInput { screen_rect: Some(screen), ..Default::default() }).unwrap();
-        assert!(self.viewer.draw(FrameTarget::Image(&self.image)).unwrap());
-        assert!(self.gpu.device.flight_count() <= FLIGHTS);
-    }
-
-    /// Turns until `done`, at most a minute.
-    fn until(&mut self, what: &str, done: impl Fn(&Viewer) -> bool) {
-        let start = Instant::now();
-        while !done(&self.viewer) {
-            assert!(start.elapsed() < Duration::from_secs(60), "{what}: {:?}", self.viewer.message());
-            self.turn();
-            std::thread::sleep(Duration::from_millis(2));
-        }
-    }
-
-    fn ready(&mut self) {
-        self.until("a first frame", |viewer| viewer.frame().is_some() && !viewer.is_baking());
-    }
-
-    /// What is shown, RGBA.
-    fn shown(&mut self) -> Vec<[u8; 4]> {
-        self.turn();
-        self.viewer.settle().unwrap();
-        let mut commands = Commands::new(&self.gpu.device, "look").unwrap();
-        commands.copy_image(&self.image, &self.readback);
-        commands.barrier(Access::TransferWrite, Access::HostRead);
-        commands.submit().unwrap();
-        self.readback.read(0, (SIZE[0] * SIZE[1]) as usize)
-    }
-
-    /// The state rendered by a frame of its own, encoded.
-    fn rendered(&self, scene: &Scene) -> Vec<[u8; 4]> {
-        let editor = self.viewer.editor();
-        let baker = Baker::new(&self.gpu.device, &self.gpu.library);
-        let cache = Cache::new(Some(&self.cache));
-        let mut frame = Frame::new(&baker, &cache, scene, self.options, &|_, _, _| ()).unwrap();
-        let white = (-editor.exposure_ev()).exp2();
-        frame.render(&scene.at(editor.time_s()), Some(white)).unwrap();
-        let encode = |c: f32| (255.0 * srgb_from_linear(c / white)).round() as u8;
-        frame.picture().chunks_exact(3).map(|p| [encode(p[0]), encode(p[1]), encode(p[2]), 255]).collect()
-    }
-
-    fn key(&mut self, key: Key) {
-        self.viewer.event(Event::Key { key, control: false, repeat: false }).unwrap();
-    }
-
-    fn letter(&mut self, letter: char) {
-        self.key(Key::Letter(letter));
-    }
-
-    fn drag(&mut self, button: Button, from: [f32; 2], to: [f32; 2]) {
-        for event in [Event::Press(button, from), Event::Move(to), Event::Release(button)] {
-            self.viewer.event(event).unwrap();
-            self.turn();
-        }
-    }
-}
+use window::{FORMAT, SIZE, Stand};
 
 #[test]
 fn what_is_shown_is_what_render_makes_of_the_state() {
-    let Some(mut stand) = Stand::new("state", None) else { return };
+    let Some(mut stand) = Stand::new("state") else { return };
     assert!(stand.viewer.is_baking(), "nothing is cached, so it is baked in the background");
     assert!(stand.viewer.frame().is_none());
     stand.turn();
@@ -228,7 +107,7 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
 
 #[test]
 fn a_scene_that_stands_still_costs_only_its_showing() {
-    let Some(mut stand) = Stand::new("still", None) else { return };
+    let Some(mut stand) = Stand::new("still") else { return };
     stand.ready();
     stand.shown();
     let passes = |stand: &mut Stand| {
@@ -251,7 +130,10 @@ fn a_scene_that_stands_still_costs_only_its_showing() {
 #[test]
 fn a_scene_out_of_sight_is_shown_and_comes_back() {
     for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {
-        let Some(mut stand) = Stand::smoothed(&format!("out-{antialias:?}"), None, antialias) else { return };
+        let Some(mut stand) = Stand::with(&format!("out-{antialias:?}"), |setup| setup.frame.antialias = antialias)
+        else {
+            return;
+        };
         stand.ready();
         let first = stand.shown();
         let away = 100.0 * SIZE[0] as f32;
@@ -271,7 +153,7 @@ fn a_scene_out_of_sight_is_shown_and_comes_back() {
 
 #[test]
 fn the_overlay_and_the_reference_are_drawn() {
-    let Some(mut stand) = Stand::new("overlay", None) else { return };
+    let Some(mut stand) = Stand::new("overlay") else { return };
     stand.ready();
     let plain = stand.shown();
     stand.letter('h');
@@ -279,7 +161,7 @@ fn the_overlay_and_the_reference_are_drawn() {
     let with = stand.shown();
     let covered = apart(&plain, &with);
     assert!(covered > 2000, "the overlay covers {covered} pixels");
-    stand.key(Key::Function(1));
+    stand.letter('h');
     assert_eq!(apart(&plain, &stand.shown()), 0, "and goes again");
 
     stand.letter('g');
@@ -303,7 +185,10 @@ fn the_overlay_and_the_reference_are_drawn() {
 #[test]
 fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
     let folder = tempfile::tempdir().unwrap();
-    let Some(mut stand) = Stand::new("reload", Some(folder.path())) else { return };
+    let Some(mut stand) = Stand::with("reload", |setup| setup.library.shader_dir = Some(folder.path().to_owned()))
+    else {
+        return;
+    };
     stand.ready();
     let plain = stand.shown();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
@@ -384,7 +269,7 @@ fn an_overlay_that_fails_leaves_no_object() {
 /// Whatever ends the window, edits are written first, to a file that did not exist, and the message says where.
 #[test]
 fn a_window_that_fails_saves_edits_first() {
-    let Some(mut stand) = Stand::new("rescue", None) else { return };
+    let Some(mut stand) = Stand::new("rescue") else { return };
     let lost = || Error::Device("vkQueueSubmit2 (frame): ERROR_DEVICE_LOST".into());
     stand.viewer.apply(Command::Orbit([30.0, 10.0])).unwrap();
     let quiet = stand.viewer.rescued(lost());

@@ -4,6 +4,10 @@
 #[path = "common/cli.rs"]
 mod cli;
 mod common;
+#[path = "common/drag.rs"]
+mod drag;
+#[path = "common/model.rs"]
+mod model;
 #[path = "common/room.rs"]
 mod room;
 
@@ -220,7 +224,8 @@ fn a_window_does_what_its_controls_say() {
         ("x", "ToggleError"),
         ("x", "ToggleError"),
         ("h", "ToggleOverlay"),
-        ("F1", "ToggleOverlay"),
+        ("F1", "ToggleKeys"),
+        ("h", "ToggleOverlay"),
         ("Escape", "SelectNone"),
         ("space", "ToggleRunning"),
         ("space", "ToggleRunning"),
@@ -278,6 +283,63 @@ fn a_window_does_what_its_controls_say() {
     let kept = image::open(folder.path().join("scene-001.png")).unwrap().into_rgb8();
     assert!(kept.pixels().zip(&again).all(|(a, b)| a.0 == *b), "F12 writes what `render` does");
     assert!(folder.path().join("scene-001.exr").exists());
+}
+
+/// The names of files in a folder.
+fn names(folder: &Path, ending: &str) -> Vec<PathBuf> {
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    files.filter(|file| file.extension().is_some_and(|e| e == ending)).collect()
+}
+
+/// A GLB file with three parts that move and two lamps: in the window and as a picture, with no scene file. Then other files are dropped on
+/// the window.
+#[test]
+fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let Some(display) = Display::open(folder.path()) else { return };
+    model::robot().write(folder.path(), "robot");
+    let picture = ["render", "robot.glb", "-o", "robot_#.png", "--frames", "3", "--fps", "2"];
+    good(folder.path(), &[&picture[..], &SMALL[..]].concat());
+    let pictures = names(folder.path(), "png").into_iter().map(|file| std::fs::read(file).unwrap());
+    let pictures: std::collections::BTreeSet<Vec<u8>> = pictures.collect();
+    assert_eq!(pictures.len(), 3, "each picture of the motion is another");
+
+    let mut arguments = arguments();
+    arguments[0] = "robot.glb";
+    arguments.retain(|argument| *argument != "--paused");
+    let mut view = View::open(&display, folder.path(), &arguments);
+    let first = display.look(SIZE);
+    std::thread::sleep(Duration::from_millis(700));
+    let second = display.look(SIZE);
+    assert!(room::apart(&first, &second) > 50, "nothing moves in the window");
+    view.key("space", "ToggleRunning");
+    let still = view.picture(SIZE);
+    assert!(names(folder.path(), "toml").is_empty(), "no scene file was written");
+
+    // A dropped file that cannot be opened is a line in the window; the scene stays.
+    let bad = folder.path().join("bad.obj");
+    std::fs::write(&bad, "f 1 2 3\n").unwrap();
+    let window = view.window.parse().unwrap();
+    drag::drop_file(&display.name, window, &bad, [200, 100]);
+    view.hears("message: not opened: ");
+    let told = view.picture(SIZE);
+    assert!(room::apart(&still[..480 * 200], &told[..480 * 200]) < 50, "the scene stays");
+    assert!(room::apart(&still, &told) > 500, "the line is seen");
+    // Another opens, and the window's title names it.
+    let scene = room::write(folder.path(), SIZE.map(|side| side as u32), "");
+    drag::drop_file(&display.name, window, &scene, [200, 100]);
+    view.hears("message: opened ");
+    view.hears("the first picture");
+    let shown = view.picture(SIZE);
+    assert!(room::apart(&told, &shown) > 20_000, "the other scene is seen");
+    assert!(display.xdotool(&["getwindowname", &view.window.clone()]).contains("scene.toml"));
+    display.xdotool(&["key", "ctrl+q"]);
+    let (code, heard) = view.end();
+    assert_eq!(code, 0, "{heard:#?}");
+    assert!(!heard.iter().any(|line| line.contains("validation:")), "{heard:#?}");
 }
 
 #[test]

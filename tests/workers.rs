@@ -6,8 +6,9 @@ mod cli;
 mod common;
 
 use cli::{command, finish, has_device};
+use common::generate;
 use common::{Gpu, gpu, library, report};
-use shadow_fields::asset::{Mesh, generate};
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake::{self, Baker, WorkerOptions, partial::Partial};
 use shadow_fields::field::{FieldKind, ShadowField, Shortcuts};
 use shadow_fields::gpu::Validation;

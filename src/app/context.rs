@@ -42,7 +42,7 @@ pub struct Global {
     /// Show no progress bars
     #[arg(long, global = true)]
     pub no_progress: bool,
-    /// Folder for baked fields and compiled shaders; default: shadow-fields in the XDG cache folder
+    /// Folder for baked fields, compiled shaders and what the window remembers; default: shadow-fields in the XDG cache folder
     #[arg(long, global = true, value_name = "DIR")]
     pub cache_dir: Option<PathBuf>,
     /// Neither read nor write a cache on disk

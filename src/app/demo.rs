@@ -244,7 +244,7 @@ fn pair(context: &Context, arguments: &Arguments) -> Result<Vec<PathBuf>> {
     let lit = |index: usize| !scene.entities[index].occludes;
     bare.entities = bare.entities.iter().enumerate().filter(|(i, _)| lit(*i)).map(|(_, e)| e.clone()).collect();
     let source = format!("assets/scenes/{PAIR_SCENE}.toml");
-    let bare = Scene::parse(&bare.to_toml(), Path::new(&source), &embedded::read)?;
+    let bare = Scene::parse(&bare.to_toml()?, Path::new(&source), &embedded::read)?;
     let alone = arguments.output.join(format!("{PAIR_SCENE}_without_occluder.png"));
     let options = options(arguments, &bare);
     draw(&mut context.frame(&bare, options)?, &bare, options, &alone)?;

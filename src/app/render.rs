@@ -25,7 +25,7 @@ const ANNOUNCED_BYTES: u64 = 1_000_000_000;
 /// Arguments of `render`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Scene file (see assets/scenes for examples), the name of a built-in one, or a glTF file (.glb, .gltf)
+    /// Scene file (see assets/scenes for examples), the name of a built-in one, a glTF file (.glb, .gltf) or an OBJ file
     scene: PathBuf,
     /// Picture to write; with --frames an animated PNG, or pictures numbered from 0 when the name has a run of #: out/f_####.png
     #[arg(short, long, value_name = "P.png")]

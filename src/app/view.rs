@@ -1,6 +1,6 @@
 //! `shadow-fields view`
 
-use super::context::{Context, MergeArguments, size};
+use super::context::{Context, MergeArguments, cache_dir, size};
 use super::quality::BakeArguments;
 use super::source::GltfArguments;
 use super::{Global, output};
@@ -14,7 +14,7 @@ use crate::view::{Editor, FrameTarget, Setup, Viewer};
 use clap::Args;
 use raw_window_handle::HasDisplayHandle;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
@@ -28,6 +28,8 @@ use winit::window::WindowId;
 const NOTCH_PX: f64 = 40.0;
 /// How often a window that shows nothing is asked again.
 const HIDDEN_PERIOD: Duration = Duration::from_millis(200);
+/// File in the cache folder that keeps what the window remembers.
+const SETTINGS: &str = "window.toml";
 /// Smallest window in which the overlay can be read.
 const LEAST_SIZE: PhysicalSize<u32> = PhysicalSize::new(160, 120);
 
@@ -35,7 +37,7 @@ const LEAST_SIZE: PhysicalSize<u32> = PhysicalSize::new(160, 120);
 #[derive(Args)]
 #[command(after_long_help = format!("Controls:\n{}", crate::view::input::help()))]
 pub struct Arguments {
-    /// Scene file, the name of a built-in one, or a glTF file (.glb, .gltf)
+    /// Scene file, the name of a built-in one, a glTF file (.glb, .gltf) or an OBJ file. Another can be dropped on the window (on X11)
     #[arg(default_value = "assets/scenes/teapot_lights.toml")]
     scene: PathBuf,
     /// Size of the window in pixels; default: the scene's
@@ -111,6 +113,11 @@ fn close(shown: Option<Shown>, outcome: Result<()>) -> Result<()> {
     outcome.map_err(|error| shown.viewer.rescued(error))
 }
 
+/// The window's title for a scene's file.
+fn title(scene: &Path) -> String {
+    format!("{} - shadow-fields", scene.display())
+}
+
 fn no_display(error: impl std::fmt::Display) -> Error {
     let text = error.to_string().replace('\n', " ");
     // winit puts the place in its source in front.
@@ -145,6 +152,8 @@ struct Shown {
     egui: egui_winit::State,
     target: Window,
     window: Arc<winit::window::Window>,
+    /// The scene's file that the title names.
+    titled: PathBuf,
     modifiers: ModifiersState,
     pointer: [f32; 2],
     updated: Instant,
@@ -169,7 +178,7 @@ impl App<'_> {
         let device = &self.context.device;
         let [width, height] = self.arguments.size.unwrap_or([scene.data.output.width, scene.data.output.height]);
         let attributes = winit::window::Window::default_attributes()
-            .with_title(format!("{} - shadow-fields", self.arguments.scene.display()))
+            .with_title(title(&self.arguments.scene))
             .with_inner_size(PhysicalSize::new(width, height))
             .with_min_inner_size(LEAST_SIZE);
         let window = Arc::new(events.create_window(attributes).map_err(no_display)?);
@@ -186,6 +195,8 @@ impl App<'_> {
             format: target.format(),
             encodes_srgb: target.encodes_srgb(),
             seed: self.global.seed,
+            strict: self.arguments.gltf.strict,
+            settings: cache_dir(self.global).map(|folder| folder.join(SETTINGS)),
         };
         let mut editor = Editor::new(scene, &self.arguments.scene);
         if self.arguments.paused {
@@ -211,6 +222,7 @@ impl App<'_> {
             egui,
             target,
             window,
+            titled: self.arguments.scene.clone(),
             modifiers: ModifiersState::empty(),
             pointer: [0.0; 2],
             updated: Instant::now(),
@@ -275,6 +287,7 @@ impl Shown {
         }
         match event {
             WindowEvent::CloseRequested => self.viewer.apply(Command::Quit),
+            WindowEvent::DroppedFile(path) => self.viewer.open(path),
             WindowEvent::Resized(size) => {
                 log::info!("resized to {}x{}", size.width, size.height);
                 self.hidden = false;
@@ -326,6 +339,11 @@ impl Shown {
         let output = self.viewer.ui(input)?;
         self.egui.handle_platform_output(&self.window, output);
         self.window.pre_present_notify();
+        let scene = self.viewer.editor().path();
+        if scene != self.titled {
+            self.window.set_title(&title(scene));
+            self.titled = scene.to_owned();
+        }
         let drawn = self.viewer.draw(FrameTarget::Window(&mut self.target))?;
         (self.hidden, self.tried) = (!drawn, Instant::now());
         Ok(())

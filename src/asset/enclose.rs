@@ -14,11 +14,13 @@ const CENTRE_SLACK: f64 = 1.0 + 2e-7;
 /// Bound on the iterations, more than any mesh needs, in case rounding makes the support cycle.
 const TURN_LIMIT: usize = 1000;
 
-/// Centre and radius of the smallest sphere around `positions` (at least one), solved in f64.
+/// Centre and radius of the smallest sphere around `positions`, solved in f64; zeros without any.
 ///
 /// The radius is rounded up so that every position lies inside, measured in f64 and in f32.
 pub fn bounding_sphere(positions: &[Vec3]) -> (Vec3, f32) {
-    assert!(!positions.is_empty(), "no points to enclose");
+    if positions.is_empty() {
+        return (Vec3::ZERO, 0.0);
+    }
     let (low, high) = positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
     let middle = (low.as_dvec3() + high.as_dvec3()) * 0.5;
     let ball = smallest_ball(positions, middle);

@@ -1,6 +1,7 @@
 //! Generated meshes with analytic normals, for the built-in scenes and the tests.
 //!
-//! The functions assert their ranges. [`Generator`](super::Generator) is their form in scene files; it reports bad numbers as errors.
+//! The functions assert their ranges and are the crate's own. [`Generator`](super::Generator) is their public form; it reports bad numbers
+//! as errors.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -11,9 +12,9 @@ use glam::{DVec3, Vec3};
 
 /// Largest number of times that an icosahedron's triangles are divided: 1.3 million triangles.
 pub const SPHERE_SUBDIVISION_LIMIT: u32 = 8;
-/// Emission pattern of the x < 0 half of [`torus_two_colour`], linear RGB.
+/// Emission pattern of the x < 0 half of a torus of two colours, linear RGB.
 pub const COOL: Vec3 = Vec3::new(0.02, 0.12, 1.0);
-/// Emission pattern of the x > 0 half of [`torus_two_colour`], linear RGB.
+/// Emission pattern of the x > 0 half of a torus of two colours, linear RGB.
 pub const WARM: Vec3 = Vec3::new(1.0, 0.12, 0.02);
 /// Half the width of the blend between the two colours, as a share of the major radius. It spans several segments.
 const BLEND: f64 = 0.15;
@@ -176,7 +177,7 @@ pub fn cuboid(size_m: Vec3, cells: u32) -> Mesh {
     finish("cuboid", positions, normals, None, triangles)
 }
 
-/// The meshes of `assets/meshes`, by name: what [`super::embedded`] offers and `scripts/meshes` writes.
+/// The meshes of `assets/meshes`: what [`super::embedded`] offers and `scripts/meshes` writes.
 pub fn library() -> Vec<Mesh> {
     let teapot = teapot::teapot(teapot::CONTROL_TEXT, teapot::DEFAULT_SUBDIVISIONS);
     vec![

@@ -1,6 +1,7 @@
 //! Generated meshes as scene files name them.
 
-use super::generate::{SPHERE_SUBDIVISION_LIMIT, cuboid, plane, sphere, torus, torus_two_colour};
+pub use super::generate::{COOL, SPHERE_SUBDIVISION_LIMIT, WARM, library};
+use super::generate::{cuboid, plane, sphere, torus, torus_two_colour};
 use super::mesh::{COORDINATE_LIMIT_M, Mesh, TRIANGLE_LIMIT};
 use super::{panel, teapot};
 use crate::error::{Error, Result};
@@ -11,21 +12,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Generator {
-    /// See [`plane`].
+    /// A square in y = 0 around the origin with normal +y, edges along x and z.
     Plane {
         /// Edge length in metres.
         size_m: f32,
         /// Squares along an edge.
         cells: u32,
     },
-    /// See [`sphere`].
+    /// A closed sphere around the origin: an icosahedron whose triangles are divided, every vertex on the sphere.
     Sphere {
         /// Radius in metres.
         radius_m: f32,
-        /// Number of times that every triangle of an icosahedron is divided into four.
+        /// Number of times that every triangle is divided into four, at most [`SPHERE_SUBDIVISION_LIMIT`].
         subdivisions: u32,
     },
-    /// See [`torus`].
+    /// A closed ring around the y axis, every vertex on the torus.
     Torus {
         /// Radius in metres of the circle in the middle of the ring.
         major_m: f32,
@@ -36,7 +37,7 @@ pub enum Generator {
         /// Pieces around the cross-section.
         sides: u32,
     },
-    /// See [`torus_two_colour`]; fields as of `torus`.
+    /// The same with the emission pattern [`WARM`] where x > 0 and [`COOL`] where x < 0, with a narrow smooth blend.
     TorusTwoColour {
         /// Radius in metres of the circle in the middle of the ring.
         major_m: f32,
@@ -47,24 +48,24 @@ pub enum Generator {
         /// Pieces around the cross-section.
         sides: u32,
     },
-    /// See [`cuboid`].
+    /// A closed box around the origin; normals are split at the edges, positions agree.
     Cuboid {
         /// Edge lengths in metres along x, y and z.
         size_m: Vec3,
         /// Squares along every edge.
         cells: u32,
     },
-    /// See [`panel::disc`].
+    /// A lamp around the origin that shines towards +y.
     Disc {
         /// Radius in metres.
         radius_m: f32,
     },
-    /// See [`panel::rectangle`].
+    /// A lamp around the origin that shines towards +y.
     Rectangle {
         /// Edge lengths in metres along x and z.
         size_m: [f32; 2],
     },
-    /// See [`teapot::teapot`].
+    /// Martin Newell's teapot: y up, base on y = 0, spout towards +x, 6.5 m from handle to spout and 2.4 m high. It is not closed.
     Teapot {
         /// Squares along an edge of each of the 32 patches.
         subdivisions: u32,

@@ -18,19 +18,19 @@ pub mod environment;
 pub mod equirect;
 #[cfg(feature = "cli")]
 pub mod false_color;
-pub mod generate;
+pub(crate) mod generate;
 pub mod generator;
 pub mod grid;
 #[cfg(feature = "cli")]
 pub mod lettering;
 pub mod mesh;
 pub mod obj;
-pub mod panel;
+pub(crate) mod panel;
 mod peak;
 pub mod picture;
 mod radiance;
 pub mod sky;
-pub mod teapot;
+pub(crate) mod teapot;
 pub mod topology;
 
 pub use generator::Generator;

@@ -31,9 +31,9 @@ pub fn encode_srgb(linear_rgb: &[f32], exposure_ev: f32) -> Vec<u8> {
 /// Writes linear RGB as 8-bit sRGB PNG; a text chunk `Exposure` states the exposure in stops.
 ///
 /// # Errors
-/// [`Error::Failed`] where the path cannot be written.
+/// [`Error::Failed`] where the path cannot be written; [`Error::Input`] where the numbers are too few or too many for the size.
 pub fn write_png(path: &Path, width: u32, height: u32, linear_rgb: &[f32], exposure_ev: f32) -> Result<()> {
-    check_size(width, height, linear_rgb.len());
+    check_size(path, width, height, linear_rgb.len())?;
     let pixels = encode_srgb(linear_rgb, exposure_ev);
     write_whole(path, |file| {
         let mut encoder = rgb8_encoder(file, width, height);
@@ -48,7 +48,7 @@ pub fn write_png(path: &Path, width: u32, height: u32, linear_rgb: &[f32], expos
 /// are requested one by one, and only their compressed form is kept until the file is written.
 ///
 /// # Errors
-/// [`Error::Failed`] where the path cannot be written; [`Error::Usage`] without frames or with zero `fps`; that of a frame.
+/// As [`write_png`]; [`Error::Usage`] without frames or with zero `fps`; that of a frame.
 pub fn write_apng(
     path: &Path,
     width: u32,
@@ -67,7 +67,7 @@ pub fn write_apng(
     let mut writer = encoder.write_header().map_err(fail)?;
     for frame in frames {
         let frame = frame?;
-        check_size(width, height, frame.len());
+        check_size(path, width, height, frame.len())?;
         writer.write_image_data(&frame).map_err(fail)?;
     }
     writer.finish().map_err(fail)?;
@@ -77,9 +77,9 @@ pub fn write_apng(
 /// Writes linear RGB as OpenEXR with 32-bit floats, without any rounding.
 ///
 /// # Errors
-/// [`Error::Failed`] where the path cannot be written.
+/// [`Error::Failed`] where the path cannot be written; [`Error::Input`] where the numbers are too few or too many for the size.
 pub fn write_exr(path: &Path, width: u32, height: u32, linear_rgb: &[f32]) -> Result<()> {
-    check_size(width, height, linear_rgb.len());
+    check_size(path, width, height, linear_rgb.len())?;
     // The encoder seeks, so the file is made in memory.
     let mut bytes = std::io::Cursor::new(Vec::new());
     image::codecs::openexr::OpenExrEncoder::new(&mut bytes)
@@ -96,12 +96,13 @@ fn rgb8_encoder<'a, W: Write>(file: W, width: u32, height: u32) -> png::Encoder<
     encoder
 }
 
-fn check_size(width: u32, height: u32, channel_count: usize) {
-    assert_eq!(
-        channel_count as u64,
-        3 * u64::from(width) * u64::from(height),
-        "channels of a {width} x {height} picture"
-    );
+/// Three channels for each pixel.
+fn check_size(path: &Path, width: u32, height: u32, channel_count: usize) -> Result<()> {
+    if channel_count as u128 != 3 * u128::from(width) * u128::from(height) {
+        let what = format!("{channel_count} numbers are no picture of {width} x {height} pixels of three");
+        return Err(Error::input(path, what));
+    }
+    Ok(())
 }
 
 /// What can go wrong while a file is written.

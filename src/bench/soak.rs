@@ -128,7 +128,7 @@ fn changed(scene: &Scene, state: u64) -> Scene {
     let mut scene = scene.clone();
     let mut ball = scene.data.entities[1].clone();
     ball.albedo = Vec3::new(0.7, 0.7 - 0.15 * state as f32, 0.3);
-    scene.set_entity(1, ball);
+    scene.put_entity(1, ball);
     let mut lamp = scene.data.entities[3].clone();
     match state {
         0 => {}
@@ -136,7 +136,7 @@ fn changed(scene: &Scene, state: u64) -> Scene {
         2 => (lamp.emission, lamp.emits, lamp.occludes) = (Vec3::ZERO, Some(false), Some(true)),
         _ => lamp.scale = 0.2,
     }
-    scene.set_entity(3, lamp);
+    scene.put_entity(3, lamp);
     scene
 }
 

@@ -332,9 +332,11 @@ impl Data {
     }
 
     /// The scene as TOML, which reads back as equal data.
-    pub fn to_toml(&self) -> String {
-        // Every field is a plain value, a table or a list, and TOML can hold these.
-        toml::to_string(self).unwrap_or_else(|e| panic!("scene data does not fit TOML: {e}"))
+    ///
+    /// # Errors
+    /// [`Error::Failed`] where the path of a file is not UTF-8, which TOML cannot hold.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string(self).map_err(|error| Error::Failed(format!("no scene file can hold this scene: {error}")))
     }
 }
 

@@ -36,7 +36,7 @@ pub fn write(data: &Data, meshes: &[Arc<Mesh>], path: &Path, head: &str) -> Resu
     if data.meshes.iter().filter_map(|mesh| mesh.file.as_ref()).any(|file| file.to_str().is_none()) {
         return Err(Error::Failed(format!("{}: a scene file can only name UTF-8 paths", path.display())));
     }
-    let text = format!("# {head}\n\n{}", data.to_toml());
+    let text = format!("# {head}\n\n{}", data.to_toml()?);
     if text.len() > FILE_LIMIT_BYTES {
         return Err(Error::input(path, format!("over the limit of {} MiB for a scene file", FILE_LIMIT_BYTES >> 20)));
     }

@@ -9,6 +9,7 @@ pub mod gltf;
 pub mod keys;
 pub mod light;
 pub mod motion;
+pub mod single;
 mod sun;
 pub mod values;
 
@@ -34,7 +35,7 @@ pub const MESH_LIMIT: usize = 1024;
 /// Largest scene file in bytes.
 pub const FILE_LIMIT_BYTES: usize = 16 << 20;
 
-/// A checked scene with its meshes.
+/// A checked scene with its meshes. The fields are public to read; methods change them together.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The content of the scene file.
@@ -76,7 +77,7 @@ impl Scene {
 
     /// Reads a scene and the files that it names, relative to it. If the path does not exist, an embedded scene is read
     /// (`assets/scenes/NAME.toml`, or NAME alone). A `.glb` or `.gltf` file is read as [`gltf`] says; what is left out of it is
-    /// logged.
+    /// logged. An `.obj` file becomes the scene that [`single`] says.
     ///
     /// # Errors
     /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line.
@@ -92,6 +93,9 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn load_with_notes(path: &Path) -> Result<(Self, gltf::Notes)> {
+        if single::is_obj(path) {
+            return Ok((single::load(path)?, gltf::Notes::default()));
+        }
         if !gltf::is_gltf(path) {
             return Ok((Self::load_toml(path)?, gltf::Notes::default()));
         }
@@ -166,7 +170,20 @@ impl Scene {
     }
 
     /// Replaces the data of an entity; its mesh stays the same.
-    pub fn set_entity(&mut self, index: usize, data: EntityData) {
+    ///
+    /// # Errors
+    /// [`Error::Input`] in one line: a number out of the range that README states for scene files, or no such entity.
+    pub fn set_entity(&mut self, index: usize, data: EntityData) -> Result<()> {
+        if index >= self.data.entities.len() {
+            return Err(Error::Input(format!("there is no entity {index}")));
+        }
+        data::check(format!("entity {index}"), &data)?;
+        self.put_entity(index, data);
+        Ok(())
+    }
+
+    /// As [`Scene::set_entity`], of numbers in range.
+    pub(crate) fn put_entity(&mut self, index: usize, data: EntityData) {
         let mesh = self.entities[index].mesh;
         self.entities[index] = resolve(index, &data, mesh, &self.meshes[mesh]);
         self.data.entities[index] = data;
@@ -184,7 +201,10 @@ impl Scene {
     }
 
     /// The scene file as text, which parses to equal [`Data`]; comments are lost.
-    pub fn to_toml(&self) -> String {
+    ///
+    /// # Errors
+    /// As [`Data::to_toml`].
+    pub fn to_toml(&self) -> Result<String> {
         self.data.to_toml()
     }
 }

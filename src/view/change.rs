@@ -66,7 +66,7 @@ impl Editor {
         };
         self.note_entities(EditKind::Step(step), repeat, &entities);
         for (index, data) in entities.into_iter().zip(after) {
-            self.scene.set_entity(index, data);
+            self.scene.put_entity(index, data);
         }
         Changed { placements: true, ..Changed::default() }.into()
     }
@@ -86,7 +86,7 @@ impl Editor {
             }
             (data.emits, data.occludes) = (Some(true), Some(false));
         }
-        self.scene.set_entity(index, data);
+        self.scene.put_entity(index, data);
         Changed { emission: true, roles: true, ..Changed::default() }.into()
     }
 
@@ -121,7 +121,7 @@ impl Editor {
         for index in lights {
             let mut data = self.scene.data.entities[index].clone();
             data.emission *= factor;
-            self.scene.set_entity(index, data);
+            self.scene.put_entity(index, data);
         }
         Changed { emission: true, ..Changed::default() }.into()
     }
@@ -167,7 +167,7 @@ impl Editor {
             for (index, data) in snapshot.entities {
                 back.entities.push((index, scene.data.entities[index].clone()));
                 let before = scene.entities[index].clone();
-                scene.set_entity(index, data);
+                scene.put_entity(index, data);
                 let after = &scene.entities[index];
                 changed.roles |= (before.emits, before.occludes) != (after.emits, after.occludes);
                 changed.emission |= before.emission != after.emission;

@@ -74,8 +74,10 @@ pub enum Command {
     ToggleReference,
     /// Shows the error in false colour.
     ToggleError,
-    /// Shows the overlay.
+    /// Shows or hides the overlay.
     ToggleOverlay,
+    /// Folds or unfolds the list of keys.
+    ToggleKeys,
     /// Turns the distant light about +y.
     TurnSky {
         /// Angle in degrees, counter-clockwise seen from above.
@@ -163,6 +165,8 @@ pub enum Request {
     Screenshot,
     /// Call [`Editor::save`](super::Editor::save).
     Save,
+    /// Fold or unfold the list of keys.
+    ToggleKeys,
     /// Close the window.
     Quit,
 }

@@ -4,11 +4,9 @@ use super::command::{Changed, Command, Effect, Request};
 use super::history::History;
 use super::orbit_camera::OrbitCamera;
 use super::pick::{EntityDrag, Picker};
-use crate::asset::embedded;
 use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
 use crate::bake;
-use crate::error::Result;
 use crate::field::quantity;
 use crate::scene::{Camera, Data, Placement, Scene};
 use glam::{DVec3, Vec3};
@@ -37,7 +35,7 @@ pub struct Editor {
     pub(super) saved: HashSet<PathBuf>,
     /// The scene as it was opened or saved last.
     pub(super) kept: Data,
-    /// The previous scene, if it was changed.
+    /// The last scene before this one that was changed.
     pub(super) former: Option<Box<Editor>>,
 }
 
@@ -219,6 +217,7 @@ impl Editor {
             }
             Command::Screenshot => Request::Screenshot.into(),
             Command::Save => Request::Save.into(),
+            Command::ToggleKeys => Request::ToggleKeys.into(),
             Command::Quit => Request::Quit.into(),
             edit => self.change(edit),
         }
@@ -291,28 +290,8 @@ impl Editor {
         self.select(Some(next))
     }
 
-    fn next_scene(&mut self) -> Effect {
-        match self.load_next() {
-            Ok((scene, path)) => {
-                let former = self.replace(Editor::new(scene, &path));
-                // Z is easily pressed instead of Ctrl-Z, so the changed scene is kept.
-                self.former = (former.undo_count() > 0).then(|| Box::new(Editor { former: None, ..former }));
-                Changed { scene: true, ..Changed::default() }.into()
-            }
-            Err(error) => Effect { message: Some(error.to_string()), ..Effect::default() },
-        }
-    }
-
-    /// Returns to the previous scene, if that was changed.
-    pub(super) fn return_to_former(&mut self) -> Option<Effect> {
-        let former = self.former.take()?;
-        self.replace(*former);
-        let message = Some(format!("back to {}", self.path.display()));
-        Some(Effect { changed: Changed { scene: true, ..Changed::default() }, message, request: None })
-    }
-
     /// Replaces the scene and keeps the window's state. Returns the old editor.
-    fn replace(&mut self, next: Editor) -> Editor {
+    pub(super) fn replace(&mut self, next: Editor) -> Editor {
         let next = Editor {
             size: self.size,
             running: self.running,
@@ -324,14 +303,5 @@ impl Editor {
             ..next
         };
         std::mem::replace(self, next)
-    }
-
-    /// The next built-in scene; the first one if this is not a built-in scene.
-    fn load_next(&self) -> Result<(Scene, PathBuf)> {
-        let scenes = embedded::scenes();
-        let now = self.path.file_stem().and_then(|stem| scenes.iter().position(|(name, _)| stem == *name));
-        let (name, text) = scenes[now.map_or(0, |now| (now + 1) % scenes.len())];
-        let path = Path::new(embedded::ROOT).join("scenes").join(name).with_extension("toml");
-        Ok((Scene::parse(text, &path, &embedded::read)?, path))
     }
 }

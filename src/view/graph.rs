@@ -1,21 +1,46 @@
 //! Draws the graph of frame times by pass.
 
-use super::status::HISTORY;
+use super::status::{HISTORY, LEAST_TEXT};
 use crate::gpu::Timing;
-use egui::{Align2, Color32, FontId, Rect, RichText, Sense, Stroke, Ui, pos2, vec2};
+use egui::{Align2, Color32, FontId, Rect, RichText, Sense, Stroke, Ui, Vec2, pos2, vec2};
 use std::collections::VecDeque;
 
 /// Colours of the passes in the graph, in their order.
-const PASS_COLORS: [Color32; 4] = [
+const PASS_COLORS: [Color32; 6] = [
     Color32::from_rgb(240, 170, 70),
     Color32::from_rgb(90, 160, 240),
     Color32::from_rgb(120, 200, 130),
     Color32::from_rgb(200, 120, 200),
+    Color32::from_rgb(235, 110, 105),
+    Color32::from_rgb(110, 210, 215),
 ];
+
+/// Height of the graph, points.
+const HEIGHT: f32 = 76.0;
+/// Times of a frame that are marked by lines, in milliseconds, the more important first.
+const MARKS: [(f64, &str); 2] = [(1000.0 / 30.0, "30/s"), (1000.0 / 60.0, "60/s")];
+/// Ranges of the graph, in milliseconds.
+const RANGES: [f64; 9] = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 1280.0];
+
+/// Labels and where they stand: that of the range at the top right, and those of marks on their lines at the left. A mark whose label
+/// would overlap another or leave the graph is left out. `size` measures a text.
+fn labels(area: Rect, top: f64, size: impl Fn(&str) -> Vec2) -> Vec<(Rect, String)> {
+    let range = format!("{top} ms");
+    let corner = Align2::RIGHT_TOP.anchor_size(area.right_top(), size(&range));
+    let mut placed = vec![(corner, range)];
+    for (limit, text) in MARKS {
+        let y = area.bottom() - (limit / top) as f32 * area.height();
+        let place = Align2::LEFT_CENTER.anchor_size(pos2(area.left(), y), size(text));
+        if area.contains_rect(place) && placed.iter().all(|(other, _)| !other.intersects(place)) {
+            placed.push((place, text.to_owned()));
+        }
+    }
+    placed
+}
 
 /// Draws stacked times of the passes in milliseconds, the newest at the right.
 pub(super) fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
-    let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), 64.0), Sense::hover());
+    let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), HEIGHT), Sense::hover());
     let area = response.rect;
     painter.rect_filled(area, 2.0, Color32::from_black_alpha(120));
     let mut names: Vec<&str> = Vec::new();
@@ -24,14 +49,14 @@ pub(super) fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
             names.push(&timing.pass);
         }
     }
-    let order = ["merge", "sharp", "draw", "show"];
+    let order = ["merge", "sharp", "draw", "smooth", "show"];
     names.sort_by_key(|name| order.iter().position(|o| o == name).unwrap_or(order.len()));
     let total = |frame: &Vec<Timing>| frame.iter().map(|t| t.milliseconds).sum::<f64>();
     // The range leaves out the slowest few frames, because the first frame compiles shaders.
     let mut totals: Vec<f64> = timings.iter().map(total).collect();
     totals.sort_by(f64::total_cmp);
     let most = totals.get((totals.len() * 19 / 20).saturating_sub(1)).copied().unwrap_or(0.0);
-    let top = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0].into_iter().find(|t| *t >= most).unwrap_or(1000.0);
+    let top = RANGES.into_iter().find(|t| *t >= most).unwrap_or(RANGES[RANGES.len() - 1]);
     let step = area.width() / HISTORY as f32;
     for (column, frame) in timings.iter().rev().enumerate() {
         let right = area.right() - column as f32 * step;
@@ -44,23 +69,16 @@ pub(super) fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
             bottom -= height;
         }
     }
-    for (limit, text) in [(1000.0 / 60.0, "60/s"), (1000.0 / 30.0, "30/s")] {
-        // Labels that would overlap are left out.
-        if limit < top && limit > top / 5.0 {
-            let y = area.bottom() - (limit / top) as f32 * area.height();
-            painter.hline(area.x_range(), y, Stroke::new(1.0, Color32::from_white_alpha(70)));
-            let label = Rect::from_min_size(pos2(area.left(), y - 12.0), vec2(26.0, 12.0));
-            painter.rect_filled(label, 2.0, Color32::from_black_alpha(230));
-            painter.text(label.center(), Align2::CENTER_CENTER, text, FontId::proportional(9.0), Color32::WHITE);
+    let font = FontId::proportional(LEAST_TEXT);
+    let lay = |text: &str| painter.layout_no_wrap(text.to_owned(), font.clone(), Color32::WHITE);
+    let room = vec2(6.0, 0.0);
+    for (index, (place, text)) in labels(area, top, |text| lay(text).size() + room).into_iter().enumerate() {
+        if index > 0 {
+            painter.hline(area.x_range(), place.center().y, Stroke::new(1.0, Color32::from_white_alpha(70)));
         }
+        painter.rect_filled(place, 2.0, Color32::from_black_alpha(230));
+        painter.galley(place.min + room / 2.0, lay(&text), Color32::WHITE);
     }
-    painter.text(
-        area.right_top() + vec2(-3.0, 1.0),
-        Align2::RIGHT_TOP,
-        format!("{top} ms"),
-        FontId::proportional(9.0),
-        Color32::GRAY,
-    );
     ui.horizontal_wrapped(|ui| {
         for (index, name) in names.iter().enumerate() {
             let of = |frame: &Vec<Timing>| {
@@ -83,6 +101,22 @@ fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn labels_stand_apart_inside_the_graph() {
+        let area = Rect::from_min_size(pos2(100.0, 50.0), vec2(250.0, HEIGHT));
+        // A line of text is at most 1.4 times as high as its size.
+        let size = |text: &str| vec2(0.6 * LEAST_TEXT * text.len() as f32 + 6.0, 1.4 * LEAST_TEXT);
+        let marked: Vec<usize> = RANGES.map(|top| labels(area, top, size).len() - 1).to_vec();
+        assert_eq!(marked, [0, 0, 1, 2, 1, 1, 0, 0, 0], "marks in each range");
+        for top in RANGES {
+            let labels = labels(area, top, size);
+            for (index, (place, text)) in labels.iter().enumerate() {
+                assert!(area.contains_rect(*place), "{text} of {top} ms: {place}");
+                assert!(labels[..index].iter().all(|(other, _)| !other.intersects(*place)), "{text} of {top} ms");
+            }
+        }
+    }
 
     #[test]
     fn the_median_of_nothing_is_nothing() {

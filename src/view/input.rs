@@ -118,7 +118,7 @@ pub const CONTROLS: &[KeyHelp] = &[
     ),
     row("Space", "run, pause", &[(Key::Space, false, Command::ToggleRunning)]),
     row("Z", "next demo scene", &[letter('z', Command::NextScene)]),
-    row("G", "ray-cast reference beside the picture", &[letter('g', Command::ToggleReference)]),
+    row("G", "ray-cast reference on the right", &[letter('g', Command::ToggleReference)]),
     row("X", "error in false colour", &[letter('x', Command::ToggleError)]),
     row("F12", "write PNG and EXR", &[(Key::Function(12), false, Command::Screenshot)]),
     row("Ctrl-S", "write NAME-edited.toml, then -2, -3", &[(Key::Letter('s'), true, Command::Save)]),
@@ -127,11 +127,9 @@ pub const CONTROLS: &[KeyHelp] = &[
         "undo, redo",
         &[(Key::Letter('z'), true, Command::Undo), (Key::Letter('y'), true, Command::Redo)],
     ),
-    row(
-        "H / F1",
-        "this help",
-        &[letter('h', Command::ToggleOverlay), (Key::Function(1), false, Command::ToggleOverlay)],
-    ),
+    row("drop a file", "open a scene, a glTF or an OBJ file", &[]),
+    row("F1", "fold, unfold this list", &[(Key::Function(1), false, Command::ToggleKeys)]),
+    row("H", "hide, show all panels", &[letter('h', Command::ToggleOverlay)]),
     row("Ctrl-Q", "close", &[(Key::Letter('q'), true, Command::Quit)]),
 ];
 

@@ -11,13 +11,19 @@ mod compare;
 pub mod edit;
 pub mod editor;
 #[cfg(feature = "view")]
+mod figures;
+#[cfg(feature = "view")]
 mod follow;
 #[cfg(feature = "view")]
 mod graph;
 pub mod history;
 pub mod input;
 #[cfg(feature = "view")]
+mod messages;
+#[cfg(feature = "view")]
 mod notes;
+#[cfg(feature = "view")]
+mod open;
 pub mod orbit_camera;
 pub mod outline;
 #[cfg(feature = "view")]
@@ -29,9 +35,14 @@ pub mod reference;
 pub mod reload;
 mod rescue;
 mod save;
+mod scenes;
+#[cfg(feature = "view")]
+pub mod settings;
 #[cfg(feature = "view")]
 pub mod status;
 pub mod task;
+#[cfg(feature = "view")]
+mod ui;
 #[cfg(feature = "view")]
 pub mod viewer;
 

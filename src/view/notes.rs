@@ -1,7 +1,7 @@
 //! Text over the picture besides the panels: labels of its halves, messages, the scale of the error.
 
 use super::Editor;
-use super::status::{ERROR, MARGIN, Status, WARNING, grouped};
+use super::status::{ERROR, LEAST_TEXT, MARGIN, Status, WARNING, grouped};
 use crate::asset::false_color::{ColorScale, Scheme};
 use crate::asset::picture::srgb_from_linear;
 use egui::{Align2, Color32, Context, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
@@ -22,10 +22,12 @@ pub(super) fn halves(context: &Context, editor: &Editor) {
     }
 }
 
-/// Draws the notes at the bottom: reference and error, shader errors, messages.
+/// Draws the notes at the bottom: messages, and unless the overlay is hidden, reference and error, and shader errors.
 pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
     let mut lines: Vec<(String, Color32)> = Vec::new();
-    if editor.shows_reference() || editor.shows_error() {
+    let shows = editor.shows_overlay();
+    let shader_error = status.shader_error.filter(|_| shows);
+    if shows && (editor.shows_reference() || editor.shows_error()) {
         lines.push(match status.reference {
             Some((rays, error, true)) => (
                 format!("reference: {rays} rays a vertex, {} % standard error", two_digits(100.0 * error)),
@@ -43,7 +45,7 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
             ));
         }
     }
-    if editor.shows_error() {
+    if shows && editor.shows_error() {
         lines.push(match status.error {
             Some((scale, fresh)) => (
                 format!(
@@ -57,7 +59,7 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
         });
     }
     lines.extend(status.messages.iter().map(|text| ((*text).to_owned(), Color32::WHITE)));
-    if lines.is_empty() && status.shader_error.is_none() {
+    if lines.is_empty() && shader_error.is_none() {
         return;
     }
     egui::Window::new("notes")
@@ -69,10 +71,10 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
             for (text, color) in lines {
                 ui.colored_label(color, text);
             }
-            if let Some((scale, _)) = status.error.filter(|_| editor.shows_error()) {
+            if let Some((scale, _)) = status.error.filter(|_| shows && editor.shows_error()) {
                 bar(ui, scale.limit);
             }
-            if let Some(error) = status.shader_error {
+            if let Some(error) = shader_error {
                 ui.colored_label(WARNING, "a shader does not compile; the previous one stays in use");
                 ui.label(RichText::new(error.trim()).monospace().color(ERROR));
             }
@@ -83,7 +85,7 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
 fn bar(ui: &mut Ui, limit: f64) {
     let scale = ColorScale { scheme: Scheme::Signed, limit };
     let width = ui.available_width().min(420.0);
-    let (response, painter) = ui.allocate_painter(vec2(width, 28.0), Sense::hover());
+    let (response, painter) = ui.allocate_painter(vec2(width, 32.0), Sense::hover());
     let area = response.rect;
     let steps = 64;
     for step in 0..steps {
@@ -100,7 +102,7 @@ fn bar(ui: &mut Ui, limit: f64) {
         (area.center().x, Align2::CENTER_BOTTOM, "0".to_owned()),
         (area.right(), Align2::RIGHT_BOTTOM, format!("too bright +{limit}")),
     ] {
-        painter.text(pos2(x, area.bottom()), align, text, FontId::proportional(11.0), Color32::WHITE);
+        painter.text(pos2(x, area.bottom()), align, text, FontId::proportional(LEAST_TEXT), Color32::WHITE);
     }
 }
 

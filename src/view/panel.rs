@@ -2,31 +2,58 @@
 
 use super::Editor;
 use super::command::Command;
-use super::graph;
+use super::figures::{DETAILS, FIGURES_WIDTH, figures};
 use super::input::CONTROLS;
 use super::notes;
-use super::status::{MARGIN, Status, grouped};
+use super::settings::Settings;
+use super::status::{LEAST_TEXT, MARGIN, Status};
 use super::task::TaskProgress;
-use crate::merge::variant::VARIANTS;
-use crate::scene::light;
 use egui::collapsing_header::CollapsingState;
-use egui::{Align2, Color32, Context, Id, Pos2, RichText, Stroke, Ui, pos2, vec2};
+use egui::{Align2, Color32, Context, FontId, Id, Pos2, RichText, Stroke, TextStyle, Ui, pos2, vec2};
 
-/// Width of the panel of figures, points.
-const FIGURES_WIDTH: f32 = 268.0;
 /// Width of the folded panel of figures, points.
 const FOLDED_WIDTH: f32 = 104.0;
-/// Width of the help, points.
-const HELP_WIDTH: f32 = 350.0;
+/// Width and height of the unfolded list of keys, points, about.
+const KEYS_SIZE: [f32; 2] = [306.0, 460.0];
+/// Height of the unfolded panel of figures without its details, points, about.
+const FIGURES_HEIGHT: f32 = 300.0;
+/// Share of the window in which the panel of figures starts unfolded, together with the list of keys.
+const SHARE: f32 = 0.2;
 const OUTLINE: Color32 = Color32::from_rgb(255, 200, 60);
 
-/// A dark style with translucent panels.
-pub fn visuals() -> egui::Visuals {
-    let mut visuals = egui::Visuals::dark();
-    visuals.window_fill = Color32::from_black_alpha(246);
-    visuals.override_text_color = Some(Color32::from_gray(230));
-    visuals.window_shadow = egui::Shadow::NONE;
-    visuals
+/// Titles of the parts that fold, which are their ids as well.
+const KEYS: &str = "Keys (F1)";
+const FIGURES: &str = "Figures";
+
+/// Sets a dark style with translucent panels, in which no text is smaller than 12 points.
+pub fn style(context: &Context) {
+    context.set_theme(egui::Theme::Dark);
+    context.all_styles_mut(|style| {
+        style.visuals = egui::Visuals::dark();
+        style.visuals.window_fill = Color32::from_black_alpha(246);
+        style.visuals.override_text_color = Some(Color32::from_gray(230));
+        style.visuals.window_shadow = egui::Shadow::NONE;
+        style.text_styles.insert(TextStyle::Small, FontId::proportional(LEAST_TEXT));
+        style.text_styles.insert(TextStyle::Heading, FontId::proportional(14.0));
+    });
+}
+
+/// Whether a part is unfolded; `None` before it was shown.
+fn is_unfolded(context: &Context, title: &str) -> Option<bool> {
+    CollapsingState::load(context, Id::new(title).with("collapsing")).map(|state| state.is_open())
+}
+
+/// Which panels are unfolded; `None` before they were shown. The details keep their state while the figures are folded.
+pub fn unfolded(context: &Context) -> Option<Settings> {
+    let details = is_unfolded(context, DETAILS).unwrap_or_default();
+    Some(Settings { keys: is_unfolded(context, KEYS)?, figures: is_unfolded(context, FIGURES)?, details })
+}
+
+/// Unfolds the list of keys, or folds it unless `must_show`.
+pub fn fold_keys(context: &Context, must_show: bool) {
+    let mut state = CollapsingState::load_with_default_open(context, Id::new(KEYS).with("collapsing"), false);
+    state.set_open(must_show || !state.is_open());
+    state.store(context);
 }
 
 /// Draws the outline of the selected entity, below all panels.
@@ -39,7 +66,8 @@ pub fn outline(context: &Context, lines: &[[Pos2; 2]]) {
     }
 }
 
-/// Lays out the overlay and returns the commands of its widgets. A hidden overlay shows only a bake in progress.
+/// Lays out the overlay and returns the commands of its widgets. A hidden overlay shows only a bake in progress and messages that
+/// must be read.
 pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Command> {
     let mut commands = Vec::new();
     let screen = context.content_rect();
@@ -47,6 +75,7 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
         baking(context, bake);
     }
     if !editor.shows_overlay() {
+        notes::notes(context, editor, status);
         return commands;
     }
     let height = (screen.height() - 2.0 * MARGIN).max(60.0);
@@ -56,17 +85,19 @@ pub fn show(context: &Context, editor: &Editor, status: &Status<'_>) -> Vec<Comm
         window.auto_sized().default_width(width).max_width(width).default_open(open)
     };
     notes::halves(context, editor);
-    // In a narrow window the help starts folded, and in a narrower one the figures do too.
-    let wide = screen.width() >= FIGURES_WIDTH + HELP_WIDTH + 100.0;
-    panel("Controls", screen.left() + MARGIN, HELP_WIDTH, wide).show(context, |ui| {
+    // In a narrow window the keys start folded, and the figures do where both would cover too much.
+    let [keys_width, keys_height] = KEYS_SIZE;
+    let keys = status.unfolded.keys && screen.width() >= FIGURES_WIDTH + keys_width + 100.0;
+    panel(KEYS, screen.left() + MARGIN, keys_width, keys).show(context, |ui| {
         scrolled(ui, height, help);
     });
-    let open = screen.width() >= 2.0 * FIGURES_WIDTH;
+    let covered = FIGURES_WIDTH * FIGURES_HEIGHT + if keys { keys_width * keys_height } else { 0.0 };
+    let open = status.unfolded.figures && covered <= SHARE * screen.area();
     // egui gives a folded window no width, so its position at the right needs a width of its own.
-    let folding = CollapsingState::load_with_default_open(context, Id::new("Figures").with("collapsing"), open);
+    let folding = CollapsingState::load_with_default_open(context, Id::new(FIGURES).with("collapsing"), open);
     let width = if folding.openness(context) > 0.0 { FIGURES_WIDTH } else { FOLDED_WIDTH };
     let x = (screen.right() - MARGIN - width).max(screen.left() + MARGIN);
-    panel("Figures", x, FIGURES_WIDTH, open).show(context, |ui| {
+    panel(FIGURES, x, FIGURES_WIDTH, open).show(context, |ui| {
         scrolled(ui, height, |ui| figures(ui, editor, status, &mut commands));
     });
     notes::notes(context, editor, status);
@@ -79,10 +110,11 @@ fn scrolled(ui: &mut Ui, height: f32, add: impl FnOnce(&mut Ui)) {
 }
 
 fn help(ui: &mut Ui) {
-    egui::Grid::new("controls").num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
+    ui.spacing_mut().interact_size.y = 0.0; // rows as high as their text
+    egui::Grid::new("controls").num_columns(2).spacing([10.0, 1.0]).show(ui, |ui| {
         for row in CONTROLS {
-            ui.label(RichText::new(row.keys).strong().color(OUTLINE));
-            ui.add(egui::Label::new(row.what).wrap());
+            ui.label(RichText::new(row.keys).small().strong().color(OUTLINE));
+            ui.add(egui::Label::new(RichText::new(row.what).small()).wrap());
             ui.end_row();
         }
     });
@@ -99,189 +131,175 @@ fn baking(context: &Context, bake: &TaskProgress) {
     );
 }
 
-fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec<Command>) {
-    ui.set_width(FIGURES_WIDTH - ui.spacing().window_margin.sum().x - 2.0);
-    ui.label(RichText::new(status.device).strong());
-    ui.label(RichText::new(status.driver).small());
-    let [width, height] = status.size;
-    let name = editor.path().file_stem().unwrap_or_default().to_string_lossy();
-    let paused = if editor.is_running() { "" } else { ", paused" };
-    ui.label(format!("{name}, {width} x {height}, {:.2} s{paused}", editor.time_s()));
-    let selected = editor.selection().map_or("all".to_owned(), |i| {
-        let entity = &editor.scene().entities[i];
-        let role = if entity.emits {
-            "light"
-        } else if entity.occludes {
-            "occluder"
-        } else {
-            "receiver"
-        };
-        format!("{} ({role})", entity.name)
-    });
-    ui.label(format!("selected: {selected}"));
-    ui.separator();
-    graph::graph(ui, status.timings);
-    ui.separator();
-    if let Some(counts) = status.counts {
-        let skipped = counts.behind_light + counts.below_horizon + counts.apart + counts.facing_away + counts.below_eps;
-        ui.label(format!(
-            "{} entities, {} lit vertices",
-            editor.scene().entities.len(),
-            grouped(status.vertices as u64)
-        ));
-        let share = 100.0 * skipped as f64 / (counts.considered.max(1)) as f64;
-        ui.label(format!("lookups considered {}, skipped {share:.0} %", grouped(counts.considered)));
-        ui.label(RichText::new("one lookup: a cluster x a product chain x an entity").small());
-        let of = |count: u64| 100.0 * count as f64 / counts.considered.max(1) as f64;
-        ui.label(
-            RichText::new(format!(
-                "behind light {:.0} %, horizon {:.0} %, apart {:.0} %, away {:.0} %, eps {:.0} %",
-                of(counts.behind_light),
-                of(counts.below_horizon),
-                of(counts.apart),
-                of(counts.facing_away),
-                of(counts.below_eps)
-            ))
-            .small(),
-        );
-    }
-    if let Some((merged, all)) = status.merged {
-        ui.label(format!("clusters merged again {} of {}", grouped(merged as u64), grouped(all as u64)));
-    }
-    lights(ui, editor, status);
-    variants(ui, editor, status, commands);
-    ui.separator();
-    sliders(ui, editor, commands);
-}
-
-/// How many lights are computed one way and the other; each with its name where the pointer rests.
-fn lights(ui: &mut Ui, editor: &Editor, status: &Status<'_>) {
-    let listed = light::listed(editor.scene(), status.lights);
-    let sharp = listed.iter().filter(|(_, form)| form.is_sharp()).count();
-    let names: Vec<String> = listed.iter().map(|(name, form)| format!("{name}: {}", form.name())).collect();
-    let label = ui.label(format!("lights: {sharp} sharp, {} in bands", listed.len() - sharp));
-    label.on_hover_text(names.join("\n"));
-}
-
-fn variants(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec<Command>) {
-    ui.horizontal(|ui| {
-        ui.label("merge");
-        let chosen = editor.variant();
-        let text = match (chosen, status.variant) {
-            (_, None) => chosen.unwrap_or("the device's fastest").to_owned(),
-            (Some(_), Some(used)) => used.to_owned(),
-            (None, Some(used)) => format!("fastest: {used}"),
-        };
-        egui::ComboBox::from_id_salt("variant").width(180.0).selected_text(text).show_ui(ui, |ui| {
-            let choices = std::iter::once(None).chain(VARIANTS.iter().map(|v| Some(v.name)));
-            for choice in choices {
-                let picked = ui.selectable_label(chosen == choice, choice.unwrap_or("the device's fastest"));
-                if picked.clicked() && chosen != choice {
-                    commands.push(Command::SetVariant(choice));
-                }
-            }
-        });
-    });
-}
-
-fn sliders(ui: &mut Ui, editor: &Editor, commands: &mut Vec<Command>) {
-    let mut slide = |ui: &mut Ui,
-                     name: &str,
-                     value: f32,
-                     range: std::ops::RangeInclusive<f32>,
-                     unit: &str,
-                     command: fn(f32) -> Command| {
-        let mut now = value;
-        ui.spacing_mut().slider_width = 110.0;
-        let slider = egui::Slider::new(&mut now, range).suffix(unit).text(name).max_decimals(2);
-        let response = ui.add(slider);
-        // The slider rounds its value, so small differences are no changes.
-        if response.changed() && (now - value).abs() > 0.006 {
-            commands.push(command(now));
-        }
-        if response.drag_stopped() || response.lost_focus() {
-            commands.push(Command::EndSlide);
-        }
-    };
-    slide(ui, "exposure", editor.exposure_ev(), -8.0..=8.0, " EV", Command::SetExposure);
-    if let Some(ev) = editor.light_ev() {
-        slide(ui, "light", ev, -4.0..=14.0, " EV", Command::SetLight);
-    }
-    slide(ui, "sky", editor.sky(), 0.0..=4.0, "", Command::SetSky);
-    slide(ui, "sky turned", editor.sky_turn_deg(), -180.0..=180.0, "°", Command::SetSkyTurn);
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::status::ErrorScale;
     use super::*;
+    use crate::gpu::Timing;
+    use crate::lists::gather::Counts;
     use egui::Rect;
     use std::collections::VecDeque;
 
+    /// What is laid out in a window of that size (width and height, points), with every note, turn by turn.
+    struct Stand {
+        context: Context,
+        editor: Editor,
+        screen: Rect,
+        unfolded: Settings,
+        time_s: f64,
+    }
+
+    impl Stand {
+        fn new(size: [f32; 2], unfolded: Settings) -> Self {
+            let path = std::path::Path::new("twelve_instances");
+            let editor = Editor::new(crate::scene::Scene::load(path).unwrap(), path);
+            let (context, screen) = (Context::default(), Rect::from_min_size(Pos2::ZERO, size.into()));
+            style(&context);
+            let mut stand = Stand { context, editor, screen, unfolded, time_s: 0.0 };
+            (0..4).for_each(|_| drop(stand.turn(Vec::new())));
+            stand
+        }
+
+        /// The shapes of one more look at it.
+        fn turn(&mut self, events: Vec<egui::Event>) -> Vec<egui::Shape> {
+            let pass = |pass: &str, milliseconds| Timing { pass: pass.to_owned(), milliseconds, samples: None };
+            let times =
+                |i: usize| ["merge", "sharp", "draw", "show"].map(|name| pass(name, 3.0 + (i % 9) as f64)).to_vec();
+            let timings: VecDeque<Vec<Timing>> = (0..120).map(times).collect();
+            let status = Status {
+                device: "llvmpipe (LLVM 15.0.6, 256 bits)",
+                driver: "llvmpipe, Mesa 22.3.6 (LLVM 15.0.6)",
+                size: [1280, 720],
+                timings: &timings,
+                counts: Some(Counts { considered: 123_456, ..Counts::default() }),
+                merged: Some((1234, 5678)),
+                vertices: 70_269,
+                lights: Default::default(),
+                variant: Some("texel-packed"),
+                bake: Some(TaskProgress { what: "teapot".into(), done: 3, all: 9 }),
+                rays: Some(TaskProgress { what: "rays".into(), done: 3, all: 9 }),
+                reference: Some((16, 0.01, true)),
+                error: Some((ErrorScale { rms: 0.01, limit: 0.1 }, true)),
+                shader_error: Some("draw.frag:3: error"),
+                messages: vec!["wrote scene-edited.toml"],
+                unfolded: self.unfolded,
+            };
+            self.time_s += 0.5;
+            let (screen_rect, time) = (Some(self.screen), Some(self.time_s));
+            let input = egui::RawInput { screen_rect, time, events, ..Default::default() };
+            let mut output = self.context.run_ui(input, |ui| drop(show(ui.ctx(), &self.editor, &status)));
+            output.textures_delta.clear();
+            output.shapes.into_iter().map(|clipped| clipped.shape).collect()
+        }
+
+        fn place(&self, title: &str) -> Rect {
+            self.context.memory(|memory| memory.area_rect(Id::new(title)).unwrap())
+        }
+
+        fn is_folded(&self) -> bool {
+            !is_unfolded(&self.context, FIGURES).unwrap()
+        }
+    }
+
+    /// Sizes of all texts, points.
+    fn text_sizes(shapes: &[egui::Shape]) -> Vec<(f32, String)> {
+        let sizes = |shape: &egui::Shape| match shape {
+            egui::Shape::Vec(shapes) => text_sizes(shapes),
+            egui::Shape::Text(text) => {
+                let job = &text.galley.job;
+                job.sections.iter().map(|section| (section.format.font_id.size, job.text.clone())).collect()
+            }
+            _ => Vec::new(),
+        };
+        shapes.iter().flat_map(sizes).collect()
+    }
+
     #[test]
-    fn numbers_read_in_threes() {
-        assert_eq!(["0", "999", "1 000", "12 345 678"], [0, 999, 1000, 12_345_678].map(grouped)[..]);
+    fn no_text_is_smaller_than_eleven_points() {
+        let all = Settings { keys: true, figures: true, details: true };
+        let mut stand = Stand::new([1280.0, 1000.0], all);
+        stand.editor.apply(Command::ToggleReference);
+        stand.editor.apply(Command::ToggleError);
+        // A window whose content grows shows all of it in the next turn.
+        (0..4).for_each(|_| drop(stand.turn(Vec::new())));
+        let sizes = text_sizes(&stand.turn(Vec::new()));
+        for part in [
+            "123 456",
+            "turn the camera",
+            "60/s",
+            "ms",
+            "too bright",
+            "draw.frag",
+            "exposure",
+            "behind light",
+            "ray cast",
+        ] {
+            assert!(sizes.iter().any(|(_, text)| text.contains(part)), "{part:?} is not shown: {sizes:?}");
+        }
+        assert!(sizes.iter().all(|(size, _)| *size >= 11.0), "{sizes:?}");
+    }
+
+    #[test]
+    fn panels_cover_at_most_a_fifth_of_a_window() {
+        let share = |stand: &Stand| {
+            // The place of a folded panel has no width of its own.
+            let area = |place: Rect| place.width().max(FOLDED_WIDTH) * place.height();
+            let areas = [KEYS, FIGURES].map(|title| area(stand.place(title)));
+            areas.iter().sum::<f32>() / stand.screen.area()
+        };
+        let later = Settings { keys: false, ..Settings::default() };
+        for size in [[1280.0, 720.0], [960.0, 640.0], [640.0, 360.0]] {
+            let stand = Stand::new(size, later);
+            assert!(share(&stand) < 0.2, "{size:?}: {}", share(&stand));
+        }
+        assert!(!Stand::new([1280.0, 720.0], later).is_folded() && !Stand::new([960.0, 640.0], later).is_folded());
+        // The first start shows all keys, and the figures where there is room for both.
+        for (size, folded) in [([1280.0, 720.0], true), ([1920.0, 1080.0], false)] {
+            let first = Stand::new(size, Settings::default());
+            assert_eq!(first.is_folded(), folded, "{size:?}");
+            assert!(share(&first) < 0.2, "{size:?}: {}", share(&first));
+            let keys = first.place(KEYS);
+            assert!(first.screen.contains_rect(keys) && keys.height() > 350.0, "{keys}");
+        }
+    }
+
+    #[test]
+    fn the_key_folds_the_list_and_shows_it() {
+        let mut stand = Stand::new([1280.0, 720.0], Settings::default());
+        let mut after = |fold: &dyn Fn(&Context)| {
+            fold(&stand.context);
+            (0..4).for_each(|_| drop(stand.turn(Vec::new())));
+            unfolded(&stand.context).unwrap()
+        };
+        assert!(after(&|_| ()).keys);
+        assert!(!after(&|context| fold_keys(context, false)).keys);
+        assert!(after(&|context| fold_keys(context, true)).keys && after(&|context| fold_keys(context, true)).keys);
+        assert!(!after(&|context| fold_keys(context, false)).keys);
     }
 
     #[test]
     fn both_panels_can_be_reached_folded_and_open() {
-        let text = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"m\"\nplane = { size_m = 1, cells = 1 }\n\
-                    [[entity]]\nmesh = \"m\"\n";
-        let path = std::path::Path::new("t.toml");
-        let scene = crate::scene::Scene::parse(text, path, &crate::asset::embedded::read).unwrap();
-        let editor = Editor::new(scene, path);
-        let timings = VecDeque::new();
-        let status = Status {
-            device: "a device",
-            driver: "a driver",
-            size: [640, 480],
-            timings: &timings,
-            counts: None,
-            merged: None,
-            vertices: 0,
-            lights: Default::default(),
-            variant: None,
-            bake: None,
-            rays: None,
-            reference: None,
-            error: None,
-            shader_error: None,
-            messages: Vec::new(),
-        };
-        for (size, open) in [([320.0, 240.0], false), ([640.0, 480.0], true), ([1280.0, 720.0], true)] {
-            let context = Context::default();
-            let screen = Rect::from_min_size(Pos2::ZERO, size.into());
-            let mut time = 0.0;
-            let mut turn = |events: Vec<egui::Event>| {
-                time += 0.5;
-                let input =
-                    egui::RawInput { screen_rect: Some(screen), time: Some(time), events, ..Default::default() };
-                context.run_ui(input, |ui| drop(show(ui.ctx(), &editor, &status))).textures_delta.clear();
-            };
-            let folded = |context: &Context| {
-                let id = Id::new("Figures").with("collapsing");
-                !CollapsingState::load(context, id).unwrap().is_open()
-            };
-            (0..4).for_each(|_| turn(Vec::new()));
-            assert_eq!(folded(&context), !open, "{size:?}");
+        for (size, open) in [([320.0, 240.0], false), ([640.0, 360.0], false), ([1280.0, 720.0], true)] {
+            let mut stand = Stand::new(size, Settings { keys: false, ..Settings::default() });
+            assert_eq!(stand.is_folded(), !open, "{size:?}");
             for _ in 0..3 {
-                let place = |title: &str| context.memory(|m| m.area_rect(Id::new(title)).unwrap());
-                let figures = place("Figures");
-                let title_width = if folded(&context) { FOLDED_WIDTH } else { figures.width() };
-                let right = figures.left() + title_width;
-                assert!(right <= screen.right() && right > screen.right() - 2.0 * MARGIN, "{size:?}: {figures}");
+                let figures = stand.place(FIGURES);
+                let title_width = if stand.is_folded() { FOLDED_WIDTH } else { figures.width() };
+                let (right, end) = (figures.left() + title_width, stand.screen.right());
+                assert!(right <= end && right > end - 2.0 * MARGIN, "{size:?}: {figures}");
                 // The triangle before the title folds and unfolds.
-                let (pos, before) = (figures.left_top() + vec2(16.0, 16.0), folded(&context));
+                let (pos, before) = (figures.left_top() + vec2(16.0, 16.0), stand.is_folded());
                 let press = |pressed| egui::Event::PointerButton {
                     pos,
                     button: egui::PointerButton::Primary,
                     pressed,
                     modifiers: egui::Modifiers::NONE,
                 };
-                turn(vec![egui::Event::PointerMoved(pos)]);
-                turn(vec![press(true)]);
-                turn(vec![press(false)]);
-                (0..4).for_each(|_| turn(Vec::new()));
-                assert_ne!(folded(&context), before, "{size:?}: a click at {pos} does nothing");
+                stand.turn(vec![egui::Event::PointerMoved(pos)]);
+                stand.turn(vec![press(true)]);
+                stand.turn(vec![press(false)]);
+                (0..4).for_each(|_| drop(stand.turn(Vec::new())));
+                assert_ne!(stand.is_folded(), before, "{size:?}: a click at {pos} does nothing");
             }
         }
     }

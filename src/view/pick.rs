@@ -148,7 +148,7 @@ impl Editor {
         drag.moved = true;
         let before = || Snapshot { entities: vec![(entity, drag.before.clone())], ..Snapshot::default() };
         self.history.note(EditKind::Drag, Some(entity), joins, before);
-        self.scene.set_entity(entity, after);
+        self.scene.put_entity(entity, after);
         Changed { placements: true, ..Changed::default() }.into()
     }
 }

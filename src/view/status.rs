@@ -1,5 +1,6 @@
 //! What the overlay's panels and notes show of the viewer's state, and their common style.
 
+use super::settings::Settings;
 use super::task::TaskProgress;
 use crate::gpu::Timing;
 use crate::lists::gather::Counts;
@@ -7,6 +8,8 @@ use crate::scene::Lights;
 use egui::Color32;
 use std::collections::VecDeque;
 
+/// Size of the smallest text, points: pixels at a scale of 1.
+pub(super) const LEAST_TEXT: f32 = 12.0;
 /// Margin around panels, points.
 pub(super) const MARGIN: f32 = 8.0;
 /// Colour of warnings.
@@ -57,6 +60,8 @@ pub struct Status<'s> {
     pub shader_error: Option<&'s str>,
     /// Messages for the user, oldest first.
     pub messages: Vec<&'s str>,
+    /// The panels that are unfolded at the start.
+    pub unfolded: Settings,
 }
 
 /// A number with spaces between groups of three digits: 12 345.
@@ -70,4 +75,14 @@ pub(super) fn grouped(number: u64) -> String {
         out.push(digit);
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_in_threes() {
+        assert_eq!(["0", "999", "1 000", "12 345 678"], [0, 999, 1000, 12_345_678].map(grouped)[..]);
+    }
 }

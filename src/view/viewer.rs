@@ -8,7 +8,8 @@ use super::input::{Event, Input};
 use super::panel;
 use super::reference::Reference;
 use super::reload::Watch;
-use super::status::{ErrorScale, Status};
+use super::settings::Settings;
+use super::status::ErrorScale;
 use super::task::{BackgroundTask, TaskProgress};
 use crate::asset::edges::Edges;
 use crate::bake::cache::Cache;
@@ -21,11 +22,10 @@ use crate::lists::gather::Counts;
 use crate::shaders::Library;
 use ash::vk;
 use std::collections::{HashMap, VecDeque};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Seconds for which a message is shown.
-const MESSAGE_S: f64 = 6.0;
 /// Additional radiosity buffers of the frame: the reference, and the colours of the error.
 pub(super) const REFERENCE: usize = 0;
 pub(super) const ERROR: usize = 1;
@@ -50,6 +50,18 @@ pub struct Setup {
     pub encodes_srgb: bool,
     /// Seed of the reference's rays.
     pub seed: u64,
+    /// Whether a glTF file of which something is left out is refused.
+    pub strict: bool,
+    /// File of the [`Settings`]; `None` where nothing is remembered.
+    pub settings: Option<PathBuf>,
+}
+
+/// A line for the user.
+pub(super) struct Message {
+    pub(super) since: Instant,
+    pub(super) text: String,
+    /// It is shown although the overlay is hidden, because something is at stake that the picture does not show.
+    pub(super) insists: bool,
 }
 
 /// An editor with everything that is needed to show it.
@@ -76,10 +88,16 @@ pub struct Viewer {
     pub(super) version: u64,
     pub(super) watch: Option<Watch>,
     pub(super) shader_error: Option<String>,
-    pub(super) messages: VecDeque<(Instant, String)>,
+    pub(super) messages: VecDeque<Message>,
     pub(super) timings: VecDeque<Vec<Timing>>,
     pub(super) edges: HashMap<usize, Edges>,
     pub(super) quit: bool,
+    /// Whether it was said that closing loses edits, since the last edit.
+    pub(super) asked_to_close: bool,
+    /// The settings of this start.
+    pub(super) settings: Settings,
+    /// The panels that are unfolded, once they were shown.
+    pub(super) unfolded: Option<Settings>,
     /// Width and height of the window's picture, pixels.
     pub(super) size: [u32; 2],
     /// Time at which egui wants to be drawn again without an event.
@@ -101,7 +119,7 @@ impl Viewer {
     pub fn new(setup: Setup, editor: Editor, scale: f32) -> Result<Self> {
         let device = &setup.device;
         let egui = egui::Context::default();
-        egui.set_visuals(panel::visuals());
+        panel::style(&egui);
         let mut viewer = Viewer {
             baker: Baker::new(device, &setup.library),
             show: Show::new(device, &setup.library, setup.format, setup.encodes_srgb)?,
@@ -124,6 +142,9 @@ impl Viewer {
             timings: VecDeque::new(),
             edges: HashMap::new(),
             quit: false,
+            asked_to_close: false,
+            settings: setup.settings.as_deref().map(Settings::start).unwrap_or_default(),
+            unfolded: None,
             size: editor.size(),
             repaint_at: Some(Instant::now()),
             told: [None, None],
@@ -194,11 +215,6 @@ impl Viewer {
         self.shader_error.as_deref()
     }
 
-    /// The last message to the user.
-    pub fn message(&self) -> Option<&str> {
-        self.messages.back().map(|(_, text)| text.as_str())
-    }
-
     /// Frames drawn so far.
     pub fn frame_count(&self) -> u64 {
         self.frame_count
@@ -250,6 +266,7 @@ impl Viewer {
             other => other,
         };
         let Effect { mut changed, request, message } = self.editor.apply(command);
+        self.asked_to_close &= !(changed.light() || changed.exposure);
         if command == Command::ToggleReference {
             changed |= self.editor.apply(Command::Resize(self.own_size())).changed;
         }
@@ -257,7 +274,8 @@ impl Viewer {
         self.follow(changed)?;
         match request {
             None => {}
-            Some(Request::Quit) => self.quit = true,
+            Some(Request::Quit) => self.close(),
+            Some(Request::ToggleKeys) => self.toggle_keys()?,
             Some(Request::Save) => {
                 let path = self.editor.save_path();
                 self.editor.apply(Command::Resize(self.size));
@@ -279,11 +297,10 @@ impl Viewer {
     /// # Errors
     /// As [`Viewer::apply`].
     pub fn update(&mut self, dt_s: f64) -> Result<()> {
-        let count = self.messages.len();
-        self.messages.retain(|(since, _)| since.elapsed().as_secs_f64() < MESSAGE_S);
+        let forgot = self.forget_messages();
         let progress =
             [self.bake.as_ref().map(BackgroundTask::progress), self.rays.as_ref().map(BackgroundTask::progress)];
-        if count != self.messages.len() || progress != self.told {
+        if forgot || progress != self.told {
             self.told = progress;
             self.pending.display = true;
         }
@@ -318,33 +335,6 @@ impl Viewer {
         }
     }
 
-    /// Runs the overlay on egui's input and executes the commands of its widgets.
-    ///
-    /// # Errors
-    /// As [`Viewer::apply`].
-    pub fn ui(&mut self, input: egui::RawInput) -> Result<egui::PlatformOutput> {
-        let lines = self.outline();
-        let status = self.status();
-        let context = self.egui.clone();
-        let mut commands = Vec::new();
-        let output = context.run_ui(input, |ui| {
-            panel::outline(ui.ctx(), &lines);
-            commands.extend(panel::show(ui.ctx(), &self.editor, &status));
-        });
-        drop(status);
-        let delay = output.viewport_output.values().map(|v| v.repaint_delay).min();
-        self.repaint_at = delay.and_then(|delay| Instant::now().checked_add(delay));
-        self.paint = Paint {
-            primitives: context.tessellate(output.shapes, output.pixels_per_point),
-            pixels_per_point: output.pixels_per_point,
-        };
-        self.overlay.update(output.textures_delta)?;
-        for command in commands {
-            self.apply(command)?;
-        }
-        Ok(output.platform_output)
-    }
-
     /// Size of the viewport that shows the merged picture: the window's left half beside a reference.
     fn own_size(&self) -> [u32; 2] {
         self.own_size_of(self.size)
@@ -353,46 +343,5 @@ impl Viewer {
     /// The same in a window of another size.
     pub(super) fn own_size_of(&self, [width, height]: [u32; 2]) -> [u32; 2] {
         [if self.editor.shows_reference() { (width / 2).max(1) } else { width }, height]
-    }
-
-    pub(super) fn say(&mut self, message: Option<String>) {
-        if let Some(message) = message {
-            log::info!("message: {message}");
-            self.messages.push_back((Instant::now(), message));
-            self.pending |= Changed { display: true, ..Changed::default() };
-        }
-    }
-
-    /// Returns `Device` and `Unsupported` errors; all other errors become messages.
-    pub(super) fn tolerate<T>(&mut self, outcome: Result<T>) -> Result<Option<T>> {
-        match outcome {
-            Ok(value) => Ok(Some(value)),
-            Err(error @ (Error::Device(_) | Error::Unsupported(_))) => Err(error),
-            Err(error) => {
-                self.say(Some(error.to_string()));
-                Ok(None)
-            }
-        }
-    }
-
-    pub(super) fn status(&self) -> Status<'_> {
-        let info = &self.setup.device.info;
-        Status {
-            device: &info.name,
-            driver: &info.driver,
-            size: self.size,
-            timings: &self.timings,
-            counts: self.counts.as_ref().map(|(_, counts)| *counts),
-            merged: self.frame.as_ref().map(|f| (f.merged().merged_clusters, f.merged().clusters)),
-            vertices: self.frame.as_ref().map_or(0, Frame::receiver_vertex_count),
-            lights: self.setup.frame.lights,
-            variant: self.frame.as_ref().map(|frame| frame.variant().name),
-            bake: self.bake.as_ref().map(BackgroundTask::progress),
-            rays: self.rays.as_ref().filter(|rays| rays.is_running()).map(BackgroundTask::progress),
-            reference: self.reference.as_ref().map(|r| (r.rays, r.error, r.version == self.version)),
-            error: self.error_shown.as_ref().map(|(version, _, scale)| (*scale, *version == self.version)),
-            shader_error: self.shader_error.as_deref(),
-            messages: self.messages.iter().map(|(_, text)| text.as_str()).collect(),
-        }
     }
 }

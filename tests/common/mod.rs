@@ -5,9 +5,11 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
+pub mod generate;
+
 use bytemuck::Pod;
 use glam::Vec3;
-use shadow_fields::asset::{Mesh, teapot};
+use shadow_fields::asset::Mesh;
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::capture::{Capture, Model, Slots};
 use shadow_fields::check;
@@ -94,5 +96,5 @@ impl Gpu {
 
 /// The teapot, cut more coarsely than the default: open, with handle and spout.
 pub fn pot(subdivisions: u32) -> Mesh {
-    teapot::teapot(teapot::CONTROL_TEXT, subdivisions).unwrap()
+    generate::teapot(subdivisions)
 }

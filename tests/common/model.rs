@@ -4,6 +4,7 @@
 
 use base64::Engine as _;
 use serde_json::{Value, json};
+use shadow_fields::scene::gltf;
 use std::path::{Path, PathBuf};
 
 /// Component types of accessors.
@@ -185,6 +186,57 @@ impl Model {
         std::fs::write(&path, self.with_buffer(Some(uri.to_owned()))).unwrap();
         path
     }
+}
+
+/// Reads a model by way of a GLB file.
+pub fn load(model: &Model) -> gltf::Import {
+    let folder = tempfile::tempdir().unwrap();
+    gltf::load(&model.write(folder.path(), "m")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A floor, a stretched box on it that turns, a glowing ball-like box and a lamp.
+pub fn room() -> Model {
+    let mut model = Model::default();
+    let (floor, body) = (model.paint([0.6, 0.6, 0.5]), model.paint([0.2, 0.5, 0.8]));
+    let glow = json!({ "emissiveFactor": [1, 0.4, 0.1], "pbrMetallicRoughness": { "metallicFactor": 0 },
+        "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 30 } } });
+    let glow = model.push("materials", glow);
+    let mesh = model.cuboid([-3., -0.1, -3.], [3., 0., 3.], Some(floor));
+    model.node(json!({ "name": "floor", "mesh": mesh }));
+    let mesh = model.cuboid([-0.4; 3], [0.4; 3], Some(body));
+    let box_ = model.node(json!({ "name": "box", "mesh": mesh, "translation": [0, 0.8, 0], "scale": [1, 1.6, 1] }));
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    model.animate(0, box_, "rotation", "LINEAR", &[0., 1., 2.], &[0., 0., 0., 1., 0., half, 0., half, 0., 1., 0., 0.]);
+    let mesh = model.cuboid([-0.1; 3], [0.1; 3], Some(glow));
+    model.node(json!({ "name": "ember", "mesh": mesh, "translation": [1.2, 0.6, 0.8] }));
+    let light = model.light(json!({ "type": "point", "color": [0.6, 0.8, 1], "intensity": 20 }));
+    let extension = json!({ "KHR_lights_punctual": { "light": light } });
+    model.node(json!({ "name": "lamp", "translation": [-1.5, 2, 1], "extensions": extension }));
+    let camera = json!({ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1, "aspectRatio": 1.5 } });
+    let camera = model.push("cameras", camera);
+    model.node(json!({ "camera": camera, "translation": [0, 1.2, 6], "rotation": [-0.05, 0, 0, 0.99875] }));
+    model
+}
+
+/// Three parts that move, one in another, and two lamps.
+pub fn robot() -> Model {
+    let mut model = Model::default();
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let turn = [0., 0., 0., 1., 0., half, 0., half, 0., 1., 0., 0.];
+    let mut outer = None;
+    for (name, size) in [("body", 0.5), ("arm", 0.3), ("hand", 0.1)] {
+        let mesh = model.cuboid([-size; 3], [size; 3], None);
+        let node = json!({ "name": name, "mesh": mesh, "translation": [0, 1, 0.5] });
+        let node = if let Some(outer) = outer { model.child(outer, node) } else { model.node(node) };
+        model.animate(0, node, "rotation", "LINEAR", &[0., 1., 2.], &turn);
+        outer = Some(node);
+    }
+    for x in [-2, 2] {
+        let light = model.light(json!({ "type": "point", "intensity": 20 }));
+        let extension = json!({ "KHR_lights_punctual": { "light": light } });
+        model.node(json!({ "translation": [x, 3, 1], "extensions": extension }));
+    }
+    model
 }
 
 /// A GLB file of JSON and a binary part, which may be empty.

@@ -31,6 +31,8 @@ pub fn run(folder: &Path) -> Result<()> {
         format: FORMAT,
         encodes_srgb: true,
         seed: 1,
+        strict: false,
+        settings: None,
     };
     let editor = Editor::new(Scene::load(&path)?, &path);
     let mut viewer = Viewer::new(setup, editor, 1.0)?;

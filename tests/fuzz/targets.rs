@@ -1,8 +1,9 @@
 //! Every parser and decoder, with the inputs that mutation starts from.
 
+use super::common::generate;
 use glam::DVec3;
 use shadow_fields::asset::equirect::Equirect;
-use shadow_fields::asset::{Mesh, embedded, generate, picture};
+use shadow_fields::asset::{Mesh, embedded, picture};
 use shadow_fields::bake::{self, partial::Partial};
 use shadow_fields::error::Error;
 use shadow_fields::field::file::{self, FIELD_MAGIC, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC};
@@ -209,7 +210,7 @@ fn scene(bytes: &[u8]) -> Result<()> {
         assert!(finite, "a placement is not finite");
     }
     // What is read can be saved and read again.
-    let saved = scene.to_toml();
+    let saved = scene.to_toml().unwrap();
     Scene::parse(&saved, Path::new(NAME), &read)
         .unwrap_or_else(|error| panic!("what was saved is refused: {error}\n{saved}"));
     Ok(())

@@ -35,7 +35,7 @@ fn every_control_has_its_command() {
         (letter('g'), false, Command::ToggleReference),
         (letter('x'), false, Command::ToggleError),
         (letter('h'), false, Command::ToggleOverlay),
-        (Key::Function(1), false, Command::ToggleOverlay),
+        (Key::Function(1), false, Command::ToggleKeys),
         (Key::Function(12), false, Command::Screenshot),
         (Key::Home, false, Command::Home),
     ] {
@@ -114,9 +114,12 @@ fn the_pointer_clicks_turns_pans_and_drags() {
 #[test]
 fn requests_reach_the_window() {
     let mut editor = from_text(SMALL);
-    for (command, request) in
-        [(Command::Screenshot, Request::Screenshot), (Command::Save, Request::Save), (Command::Quit, Request::Quit)]
-    {
+    for (command, request) in [
+        (Command::Screenshot, Request::Screenshot),
+        (Command::Save, Request::Save),
+        (Command::ToggleKeys, Request::ToggleKeys),
+        (Command::Quit, Request::Quit),
+    ] {
         let effect = editor.apply(command);
         assert!(effect.request == Some(request) && !effect.changed.any());
     }

@@ -40,9 +40,9 @@ fn the_next_scene_comes_round() {
     editor.apply(step(Step::Left));
     editor.apply(Command::ToggleRunning);
     let mut names = Vec::new();
-    for _ in 0..7 {
+    for round in 0..7 {
         let effect = editor.apply(Command::NextScene);
-        assert!(effect.changed.scene && effect.message.is_none());
+        assert_eq!((effect.changed.scene, effect.message.is_some()), (true, round == 0), "the first was edited");
         assert_eq!((editor.size(), editor.undo_count(), editor.selection()), ([300, 200], 0, None));
         assert!(!editor.is_running() && editor.hit([150.0, 120.0]).is_some());
         names.push(editor.path().file_stem().unwrap().to_str().unwrap().to_owned());
@@ -73,6 +73,36 @@ fn the_next_scene_comes_round() {
     // An unchanged scene leaves nothing to go back to.
     own.apply(Command::NextScene);
     assert!(!own.apply(Command::Undo).changed.any());
+}
+
+#[test]
+fn edits_of_every_scene_outlast_those_that_follow() {
+    let open = |editor: &mut Editor, name: &str| {
+        let path = Path::new(name);
+        editor.open(built_in(name).scene().clone(), path)
+    };
+    let mut editor = from_text(SMALL);
+    editor.apply(step(Step::Left));
+    let edited = editor.scene().data.clone();
+    let said = open(&mut editor, "glowing_torus").message.unwrap();
+    assert!(said.contains("t.toml") && said.contains("Ctrl-Z"), "{said}");
+    assert!(open(&mut editor, "small_lights").message.is_none(), "what was not edited needs no word");
+    editor.apply(Command::SetExposure(2.0));
+    assert!(open(&mut editor, "teapot_lights").message.unwrap().contains("small_lights"));
+    assert_eq!(editor.unsaved(), [Path::new("t.toml"), Path::new("small_lights")]);
+    // Back through both, each with its own edits, and the scene that was only looked at is not among them.
+    for (name, ev) in [("small_lights", 2.0), ("t.toml", edited.output.exposure_ev)] {
+        assert!(editor.apply(Command::Undo).changed.scene, "{name}");
+        assert_eq!((editor.path(), editor.exposure_ev()), (Path::new(name), ev));
+        if name == "small_lights" {
+            assert!(editor.apply(Command::Undo).changed.exposure);
+        }
+    }
+    assert_eq!(editor.scene().data, edited);
+    assert_eq!(editor.unsaved(), [Path::new("t.toml")]);
+    let folder = tempfile::tempdir().unwrap();
+    editor.save(&folder.path().join("kept.toml")).unwrap();
+    assert!(editor.unsaved().is_empty());
 }
 
 #[test]

@@ -1,32 +1,10 @@
 //! A glTF file behind the window: it moves, it can be edited, and what is saved is a scene file with its meshes.
 
-use super::model::Model;
+use super::model::robot;
 use super::step;
 use glam::DVec3;
-use serde_json::json;
 use shadow_fields::scene::Scene;
 use shadow_fields::view::{Command, Editor, Step};
-
-/// Three parts that move, one in another, and two lamps.
-fn robot() -> Model {
-    let mut model = Model::default();
-    let half = std::f32::consts::FRAC_1_SQRT_2;
-    let turn = [0., 0., 0., 1., 0., half, 0., half, 0., 1., 0., 0.];
-    let mut outer = None;
-    for (name, size) in [("body", 0.5), ("arm", 0.3), ("hand", 0.1)] {
-        let mesh = model.cuboid([-size; 3], [size; 3], None);
-        let node = json!({ "name": name, "mesh": mesh, "translation": [0, 1, 0.5] });
-        let node = if let Some(outer) = outer { model.child(outer, node) } else { model.node(node) };
-        model.animate(0, node, "rotation", "LINEAR", &[0., 1., 2.], &turn);
-        outer = Some(node);
-    }
-    for x in [-2, 2] {
-        let light = model.light(json!({ "type": "point", "intensity": 20 }));
-        let extension = json!({ "KHR_lights_punctual": { "light": light } });
-        model.node(json!({ "translation": [x, 3, 1], "extensions": extension }));
-    }
-    model
-}
 
 #[test]
 fn a_gltf_file_is_edited_and_saved_as_a_scene_file() {

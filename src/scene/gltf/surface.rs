@@ -112,6 +112,11 @@ pub fn note(json: &Material, notes: &mut Notes) {
         notes.leave_out("transparent materials (they are opaque)");
     }
     let pbr = &json.pbr_metallic_roughness;
+    // A file that says nothing means a metal; an unlit material shows its colour, whatever else it says.
+    let is_unlit = json.extensions.as_ref().is_some_and(|e| e.unlit.is_some());
+    if !is_unlit && (pbr.metallic_factor.0 > 0.0 || pbr.roughness_factor.0 < 1.0) {
+        notes.leave_out("metallic or glossy materials (they are diffuse)");
+    }
     let others =
         [json.normal_texture.is_some(), json.occlusion_texture.is_some(), pbr.metallic_roughness_texture.is_some()];
     let others = others.into_iter().filter(|used| *used).count();

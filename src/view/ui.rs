@@ -1,0 +1,78 @@
+//! Runs the overlay of the viewer.
+
+use super::command::Command;
+use super::panel;
+use super::status::Status;
+use super::task::BackgroundTask;
+use super::viewer::Viewer;
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::gpu::Paint;
+use std::time::Instant;
+
+impl Viewer {
+    /// Runs the overlay on egui's input and executes the commands of its widgets.
+    ///
+    /// # Errors
+    /// As [`Viewer::apply`].
+    pub fn ui(&mut self, input: egui::RawInput) -> Result<egui::PlatformOutput> {
+        let lines = self.outline();
+        let status = self.status();
+        let context = self.egui.clone();
+        let mut commands = Vec::new();
+        let output = context.run_ui(input, |ui| {
+            panel::outline(ui.ctx(), &lines);
+            commands.extend(panel::show(ui.ctx(), &self.editor, &status));
+        });
+        drop(status);
+        let delay = output.viewport_output.values().map(|v| v.repaint_delay).min();
+        self.repaint_at = delay.and_then(|delay| Instant::now().checked_add(delay));
+        self.paint = Paint {
+            primitives: context.tessellate(output.shapes, output.pixels_per_point),
+            pixels_per_point: output.pixels_per_point,
+        };
+        self.overlay.update(output.textures_delta)?;
+        let unfolded = panel::unfolded(&context);
+        if let (Some(now), Some(before)) = (unfolded, self.unfolded)
+            && now != before
+        {
+            self.settings = self.settings.changed(before, now);
+            self.setup.settings.iter().for_each(|file| self.settings.keep(file));
+        }
+        self.unfolded = unfolded;
+        for command in commands {
+            self.apply(command)?;
+        }
+        Ok(output.platform_output)
+    }
+
+    /// Folds or unfolds the list of keys; in a hidden overlay, shows that and unfolds it.
+    pub(super) fn toggle_keys(&mut self) -> Result<()> {
+        let hidden = !self.editor.shows_overlay();
+        panel::fold_keys(&self.egui, hidden);
+        self.pending.display = true;
+        if hidden { self.apply(Command::ToggleOverlay) } else { Ok(()) }
+    }
+
+    fn status(&self) -> Status<'_> {
+        let info = &self.setup.device.info;
+        Status {
+            device: &info.name,
+            driver: &info.driver,
+            size: self.size,
+            timings: &self.timings,
+            counts: self.counts.as_ref().map(|(_, counts)| *counts),
+            merged: self.frame.as_ref().map(|f| (f.merged().merged_clusters, f.merged().clusters)),
+            vertices: self.frame.as_ref().map_or(0, Frame::receiver_vertex_count),
+            lights: self.setup.frame.lights,
+            variant: self.frame.as_ref().map(|frame| frame.variant().name),
+            bake: self.bake.as_ref().map(BackgroundTask::progress),
+            rays: self.rays.as_ref().filter(|rays| rays.is_running()).map(BackgroundTask::progress),
+            reference: self.reference.as_ref().map(|r| (r.rays, r.error, r.version == self.version)),
+            error: self.error_shown.as_ref().map(|(version, _, scale)| (*scale, *version == self.version)),
+            shader_error: self.shader_error.as_deref(),
+            messages: self.messages(),
+            unfolded: self.settings,
+        }
+    }
+}

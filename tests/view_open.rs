@@ -1,0 +1,138 @@
+//! Files that are dropped on the window, its close, and what it remembers, without a window.
+#![cfg(feature = "view")]
+
+mod common;
+#[path = "common/model.rs"]
+mod model;
+#[path = "common/room.rs"]
+mod room;
+#[path = "common/stage.rs"]
+mod stage;
+#[path = "common/window.rs"]
+mod window;
+
+use model::Model;
+use room::apart;
+use shadow_fields::view::command::Command;
+use shadow_fields::view::input::{Event, Key};
+use shadow_fields::view::settings::Settings;
+use window::{SIZE, Stand};
+
+/// A file that is dropped on the window: each kind opens, a bad one changes nothing, and edits are kept.
+#[test]
+fn a_dropped_file_opens_and_edits_outlast_it() {
+    let Some(mut stand) = Stand::new("drop") else { return };
+    stand.ready();
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let said = |stand: &Stand| stand.viewer.message().unwrap().to_owned();
+    let own = stand.viewer.editor().path().to_owned();
+    let plain = stand.shown();
+
+    // What cannot be opened is one line, also while the overlay is hidden, and the scene stays.
+    assert!(!stand.viewer.editor().shows_overlay());
+    for (name, text) in [("bad.toml", "[camera"), ("bad.glb", "glTF"), ("bad.obj", "f 1 2 3"), ("notes.txt", "words")] {
+        stand.viewer.open(&write(name, text.as_bytes())).unwrap();
+        let line = said(&stand);
+        assert!(line.starts_with("not opened: ") && line.contains(name) && line.lines().count() == 1, "{line}");
+        assert_eq!(stand.viewer.editor().path(), own);
+    }
+    stand.viewer.open(&folder.path().join("missing.toml")).unwrap();
+    assert!(said(&stand).contains("missing.toml"));
+    stand.turn();
+    assert!(apart(&plain, &stand.shown()) > 100, "the lines are seen");
+
+    // Each kind of file that opens, edited before: undo leads back through all of them.
+    let pyramid = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    let mut model = Model::default();
+    let mesh = model.cuboid([-0.5; 3], [0.5; 3], None);
+    model.node(serde_json::json!({ "name": "box", "mesh": mesh }));
+    let files = [
+        room::write(folder.path(), SIZE, ""),
+        model.write(folder.path(), "model"),
+        model.write_embedded(folder.path(), "model"),
+        write("pyramid.obj", pyramid),
+    ];
+    let mut paths = vec![own.clone()];
+    for path in &files {
+        stand.letter('q');
+        stand.letter('l');
+        stand.viewer.open(path).unwrap();
+        let line = said(&stand);
+        assert!(line.contains("not saved") && line.contains("Ctrl-Z"), "{line}");
+        stand.ready();
+        assert_eq!(stand.viewer.editor().path(), path);
+        assert!(apart(&plain, &stand.shown()) > 100, "{} is seen", path.display());
+        paths.push(path.to_owned());
+    }
+    // The window does not close over unsaved edits at the first time, and undo leads back to the first scene.
+    stand.viewer.apply(Command::Quit).unwrap();
+    assert!(!stand.viewer.wants_to_quit());
+    let line = said(&stand);
+    assert!(paths[..4].iter().all(|path| line.contains(&path.display().to_string())), "{line}");
+    stand.letter('q');
+    stand.letter('l');
+    stand.viewer.apply(Command::Quit).unwrap();
+    assert!(!stand.viewer.wants_to_quit(), "a new edit is asked for anew");
+    let undo = Event::Key { key: Key::Letter('z'), control: true, repeat: false };
+    for path in paths.iter().rev() {
+        assert_eq!(stand.viewer.editor().path(), path);
+        assert!(stand.viewer.editor().is_edited(), "{}", path.display());
+        stand.viewer.event(undo).unwrap();
+        if *path != own {
+            stand.viewer.event(undo).unwrap();
+        }
+    }
+    assert!(!stand.viewer.editor().is_edited() && stand.viewer.editor().unsaved().is_empty());
+    stand.viewer.apply(Command::Quit).unwrap();
+    assert!(stand.viewer.wants_to_quit());
+}
+
+/// What a dropped glTF file loses is said; where that is not allowed, the file is not opened.
+#[test]
+fn what_a_dropped_file_loses_is_said() {
+    let mut model = Model::default();
+    let mesh = model.cuboid([-0.5; 3], [0.5; 3], None);
+    model.node(serde_json::json!({ "name": "box", "mesh": mesh }));
+    model.json["materials"] = serde_json::json!([{ "alphaMode": "BLEND" }]);
+    model.json["meshes"][0]["primitives"][0]["material"] = 0.into();
+    let folder = tempfile::tempdir().unwrap();
+    let path = model.write(folder.path(), "glass");
+    let Some(mut stand) = Stand::new("lost") else { return };
+    stand.viewer.open(&path).unwrap();
+    let lines = stand.viewer.messages();
+    assert!(lines.iter().any(|line| line.contains("glass") && line.contains("transparen")), "{lines:?}");
+    drop(stand);
+    let Some(mut stand) = Stand::with("strict", |setup| setup.strict = true) else { return };
+    stand.viewer.open(&path).unwrap();
+    let line = stand.viewer.message().unwrap();
+    assert!(line.starts_with("not opened: ") && line.contains("--strict"), "{line}");
+}
+
+/// The list of keys is unfolded at the first start and folded at the next, and what the user folds or unfolds is kept.
+#[test]
+fn the_window_remembers_which_panels_are_folded() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("window.toml");
+    let press = |presses: usize| {
+        let mut stand = Stand::with("settings", |setup| setup.settings = Some(file.clone()))?;
+        // The overlay is hidden: the first press shows it, with the list.
+        for _ in 0..presses {
+            stand.key(Key::Function(1));
+            stand.turn();
+            assert!(stand.viewer.editor().shows_overlay());
+        }
+        Some(Settings::start(&file).keys)
+    };
+    let Some(kept) = press(0) else { return };
+    assert!(!kept, "folded after the first start");
+    assert!(!press(1).unwrap(), "one look is no choice");
+    assert!(!press(2).unwrap() && press(3).unwrap(), "unfolded again");
+    assert!(press(0).unwrap());
+    std::fs::write(&file, "nonsense").unwrap();
+    assert!(!press(0).unwrap(), "a bad file is that of a first start");
+}

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 const FACES: f64 = 4.8;
 /// Share of a lattice's samples that are captured: the others are turned by a symmetry or see nothing.
 const CAPTURED_SHARE: f64 = 0.75;
+
 /// A kind of thing that is baked of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -80,9 +81,7 @@ impl Kind {
             Kind::Transfer => vertices * 4 * channel_stride(options.bands) as u64,
         }
     }
-}
 
-impl Kind {
     /// Its word, as plans have it.
     pub fn name(self) -> &'static str {
         match self {

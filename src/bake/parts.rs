@@ -19,9 +19,6 @@ use crate::field::self_visibility::NODES;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Bytes before the samples of a part: five numbers of eight bytes.
-const PROLOGUE: usize = 40;
-
 /// The part `index` of `count` parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Part {
@@ -83,7 +80,7 @@ fn captures(baker: &Baker, mesh: &Mesh, options: &Options, kind: Kind) -> Result
     })
 }
 
-/// Captures one part of a kind of thing that can be cut. The bytes are for [`join`].
+/// Captures one part of a kind of thing that can be cut: its reduced samples, which are for [`join`].
 ///
 /// # Errors
 /// As [`Baker::field`].
@@ -94,23 +91,17 @@ pub fn bake_part(
     part: Part,
     progress: Progress<'_>,
 ) -> Result<Vec<u8>> {
-    let (targets, reduction, bytes) = captures(baker, mesh, options, kind)?;
+    let (targets, reduction, _) = captures(baker, mesh, options, kind)?;
     let partial = Partial::new(None);
     let Options { face_px, shortcuts, .. } = *options;
     let setup = Captures { mesh, reduction, face_px, shortcuts, partial: &partial };
-    let range = part.of(targets.len());
-    let samples = setup.run_part(baker, &targets, range.clone(), progress)?;
-    let prologue = [targets.len(), range.start, range.len(), reduction.sample_bytes(), bytes as usize];
-    let mut out: Vec<u8> = prologue.iter().flat_map(|number| (*number as u64).to_le_bytes()).collect();
-    out.extend(targets[range].iter().flat_map(|target| target.job.target.to_le_bytes()));
-    out.extend(samples);
-    Ok(out)
+    setup.run_part(baker, &targets, part.of(targets.len()), progress)
 }
 
 /// Bakes a kind of thing from all its parts, in their order, so that the cache holds it then. Nothing is captured.
 ///
 /// # Errors
-/// `Failed` where parts are missing or are not of one whole, or where the cache has no folder or cannot be written.
+/// `Failed` where the parts are not those of this bake, or where the cache has no folder or cannot be written.
 pub fn join(
     baker: &Baker,
     cache: &Cache,
@@ -118,36 +109,21 @@ pub fn join(
     kind: Kind,
     parts: &[Vec<u8>],
 ) -> Result<()> {
-    let broken = || Error::Failed(format!("the parts of {} of {} do not fit together", kind.name(), mesh.name));
     let path = cache.unfinished(mesh, options, kind).ok_or_else(|| Error::Failed("the cache has no folder".into()))?;
-    let number = |part: &[u8], index: usize| {
-        let bytes = part.get(8 * index..8 * index + 8)?;
-        Some(u64::from_le_bytes(bytes.try_into().ok()?) as usize)
+    let (targets, reduction, bytes) = captures(baker, mesh, options, kind)?;
+    let sample_bytes = reduction.sample_bytes();
+    let fits = |(index, samples): (usize, &Vec<u8>)| {
+        let part = Part { index: index as u32, count: parts.len() as u32 };
+        samples.len() == part.of(targets.len()).len() * sample_bytes
     };
-    let mut numbers = [0; 5];
-    for (index, to) in numbers.iter_mut().enumerate() {
-        *to = parts.first().and_then(|part| number(part, index)).ok_or_else(broken)?;
+    if parts.is_empty() || !parts.iter().enumerate().all(fits) {
+        return Err(Error::Failed(format!("the parts of {} of {} do not fit together", kind.name(), mesh.name)));
     }
-    let [all, _, _, sample_bytes, bytes] = numbers;
-    let (mut values, mut next) = (vec![0_u8; bytes], 0);
-    for part in parts {
-        let (first, count) = (number(part, 1).ok_or_else(broken)?, number(part, 2).ok_or_else(broken)?);
-        let same = [0, 3, 4].iter().all(|&index| number(part, index) == Some(numbers[index]));
-        if !same || first != next || part.len() != PROLOGUE + count * (4 + sample_bytes) {
-            return Err(broken());
-        }
-        next += count;
-        let (targets, samples) = part[PROLOGUE..].split_at(4 * count);
-        for (target, sample) in targets.chunks_exact(4).zip(samples.chunks_exact(sample_bytes)) {
-            let target = u32::from_le_bytes(target.try_into().expect("four bytes")) as usize;
-            let place = values.get_mut(target * sample_bytes..(target + 1) * sample_bytes).ok_or_else(broken)?;
-            place.copy_from_slice(sample);
-        }
+    let mut values = vec![0_u8; bytes as usize];
+    for (target, sample) in targets.iter().zip(parts.iter().flat_map(|part| part.chunks_exact(sample_bytes))) {
+        values[target.job.target as usize * sample_bytes..][..sample_bytes].copy_from_slice(sample);
     }
-    if next != all {
-        return Err(broken());
-    }
-    let numbers = if kind == Kind::SelfVisibility { bytes } else { bytes / 4 };
-    partial::write_done(&path, all as u32, numbers, &values)?;
+    let numbers = if kind == Kind::SelfVisibility { values.len() } else { values.len() / 4 };
+    partial::write_done(&path, targets.len() as u32, numbers, &values)?;
     bake(baker, cache, (mesh, options), kind, &|_, _| ())
 }

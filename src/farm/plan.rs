@@ -1,5 +1,7 @@
 //! A plan: works cut into slices, and everything that decides the bytes of each.
 
+use crate::asset;
+pub use crate::bake::PROGRAM;
 use crate::bake::kinds::Kind;
 use crate::error::{Error, Result};
 use crate::files;
@@ -12,11 +14,13 @@ const FORMAT: u32 = 1;
 const LIMIT_BYTES: u64 = 1 << 30;
 /// Estimated seconds that a slice is made to take: slices of one to five minutes remain so where a machine is half or twice as fast.
 pub const SLICE_SECONDS: f64 = 120.0;
+/// Most estimated bytes of a slice's result, which its process holds in memory. Pictures may be 2.7 times as large as estimated: that
+/// is still below the largest result that is read.
+const RESULT_BYTES: f64 = 1e9;
 /// What a process takes without any mesh: the program, the driver and its compiled shaders, in MB.
 const BASE_MB: u32 = 250;
-
-/// The program whose plans and results belong together.
-pub const PROGRAM: &str = concat!("shadow-fields ", env!("CARGO_PKG_VERSION"), " ", env!("SHADOW_FIELDS_REVISION"));
+/// Longest time that a slice is estimated to take: 30 years, beyond which a plan is damaged.
+pub(super) const SECONDS_LIMIT: f32 = 1e9;
 
 /// Devices that make the same bytes: of one name and one driver.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -159,19 +163,30 @@ impl Plan {
         }
     }
 
-    /// Adds a task. It joins the last slice while that remains below [`SLICE_SECONDS`].
+    /// How many tasks like this one a slice may hold, at least one.
+    pub fn fitting(cost: Cost) -> u32 {
+        (SLICE_SECONDS / cost.seconds).min(RESULT_BYTES / cost.bytes).max(1.0) as u32
+    }
+
+    /// Adds a task. It joins the last slice while that remains below [`SLICE_SECONDS`] and its result below 1 GB.
     pub fn add(&mut self, task: Task, cost: Cost) {
         let memory = BASE_MB + cost.memory_mb.ceil() as u32;
         let kilobytes = (cost.bytes / 1e3).ceil() as u32;
-        let begins = self.slices.last().is_none_or(|slice| slice.seconds() + cost.seconds > SLICE_SECONDS);
+        let fits = |slice: &Slice| {
+            let bytes = 1e3 * f64::from(slice.disk_kb()) + cost.bytes;
+            slice.seconds() + cost.seconds <= SLICE_SECONDS && bytes <= RESULT_BYTES
+        };
+        let begins = !self.slices.last().is_some_and(fits);
         if begins {
-            self.slices.push(Slice(self.tasks.len() as u32, 0, 0.0, memory, 0));
+            self.slices.push(Slice(self.tasks.len() as u32, 0, 0.0, 0, 0));
         }
         let slice = self.slices.last_mut().expect("one was there or is new");
         slice.1 += 1;
         slice.2 += cost.seconds as f32;
-        slice.3 = slice.3.max(memory);
-        slice.4 += kilobytes;
+        // Besides what its largest task needs, a process holds the result.
+        let largest = slice.3 - slice.4.div_ceil(1000);
+        slice.4 = slice.4.saturating_add(kilobytes);
+        slice.3 = largest.max(memory) + slice.4.div_ceil(1000);
         self.tasks.push(task);
     }
 
@@ -212,11 +227,7 @@ impl Plan {
     /// `Input` where it is missing or malformed; `Unsupported`, with both versions, where another program made it.
     pub fn read(path: &Path) -> Result<Self> {
         let bad = |what: String| Error::input(path, what);
-        let size = std::fs::metadata(path).map_err(|error| bad(format!("cannot be read: {error}")))?.len();
-        if size > LIMIT_BYTES {
-            return Err(bad(format!("{size} bytes are over the limit of {LIMIT_BYTES} for a plan")));
-        }
-        let bytes = std::fs::read(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
+        let bytes = asset::read_file(path, LIMIT_BYTES)?;
         // The version comes first: another program's plan may have another form.
         #[derive(Deserialize)]
         struct Made {
@@ -238,22 +249,38 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Whether all indices lead somewhere.
+    /// Whether all indices lead somewhere and all numbers make sense.
     fn check(&self) -> std::result::Result<(), String> {
+        if self.slices.is_empty() {
+            return Err("it has no slices".into());
+        }
         let mut next = 0;
-        for (index, Slice(first, count, ..)) in self.slices.iter().enumerate() {
+        for (index, Slice(first, count, seconds, ..)) in self.slices.iter().enumerate() {
             if *first != next || *count == 0 {
                 return Err(format!("slice {index} does not begin where the one before it ends"));
+            }
+            if !(0.0..=SECONDS_LIMIT).contains(seconds) {
+                return Err(format!("slice {index} is estimated to take {seconds} seconds"));
             }
             next = first.checked_add(*count).ok_or("too many tasks")?;
         }
         if next as usize != self.tasks.len() {
             return Err("its slices hold other tasks than it has".into());
         }
-        for Task(work, input, kind, first, count) in &self.tasks {
-            let part = matches!(kind, TaskKind::Frames) || first < count;
-            if *work as usize >= self.works.len() || *input as usize >= self.inputs.len() || *count == 0 || !part {
-                return Err("a task leads nowhere".into());
+        for (index, task) in self.tasks.iter().enumerate() {
+            let Task(work, input, kind, first, count) = *task;
+            let Some(work) = self.works.get(work as usize) else {
+                return Err(format!("task {index} is of a work that is not there"));
+            };
+            if input as usize >= self.inputs.len() {
+                return Err(format!("task {index} has an input that is not there"));
+            }
+            let makes_sense = match kind {
+                TaskKind::Frames => work.pictures.is_some() && count > 0 && first.checked_add(count).is_some(),
+                TaskKind::Bake(kind) => first < count && (count == 1 || kind.is_cut()),
+            };
+            if !makes_sense {
+                return Err(format!("task {index}, {first} of {count}, is none of its kind"));
             }
         }
         Ok(())

@@ -337,6 +337,20 @@ mod tests {
         assert_eq!((Plan::parts(150.0), Plan::parts(181.0), Plan::parts(1200.0)), (1, 2, 10));
     }
 
+    /// A process holds the result of its slice: that is stated, and stays below what is read again.
+    #[test]
+    fn slices_are_short_of_time_and_of_bytes() {
+        let mut plan = plan(1, 1.0);
+        assert_eq!((plan.slices[0].memory_mb(), plan.slices[0].disk_kb()), (BASE_MB + 1 + 1, 1000));
+        let large = Cost { seconds: 1.0, memory_mb: 5.0, bytes: 4e8 };
+        (0..3).for_each(|_| plan.add(plan.tasks[0], large));
+        let stated: Vec<_> = plan.slices.iter().map(|slice| (slice.1, slice.memory_mb(), slice.disk_kb())).collect();
+        assert_eq!(stated, [(3, BASE_MB + 5 + 801, 801_000), (1, BASE_MB + 5 + 400, 400_000)]);
+        assert_eq!(Plan::fitting(large), 2);
+        assert_eq!(Plan::fitting(Cost { bytes: 2e9, ..large }), 1);
+        assert_eq!(Plan::fitting(Cost { bytes: 1.0, ..large }), 120);
+    }
+
     /// Each thing that decides a result is part of its name.
     #[test]
     fn names_of_results_differ_where_anything_differs() {
@@ -376,8 +390,21 @@ mod tests {
             older.exit_code() == 3 && older.to_string().contains("0.0.9 abc, and this is shadow-fields"),
             "{older}"
         );
-        assert_eq!(refused(&|p| p.slices[0].1 = 9).exit_code(), 4);
-        assert_eq!(refused(&|p| p.tasks[0].1 = 9).exit_code(), 4);
+        let edits: [(fn(&mut Plan), &str); 9] = [
+            (|p| p.slices[0].1 = 9, "slice 1 does not begin where the one before it ends"),
+            (|p| p.slices[0].2 = 1e38, "slice 0 is estimated to take"),
+            (|p| p.slices[1].2 = -1.0, "slice 1 is estimated to take -1 seconds"),
+            (|p| p.slices.truncate(1), "its slices hold other tasks than it has"),
+            (|p| p.slices.clear(), "it has no slices"),
+            (|p| p.tasks[0].1 = 9, "task 0 has an input that is not there"),
+            (|p| p.tasks[1].0 = 9, "task 1 is of a work that is not there"),
+            (|p| p.tasks[1].2 = TaskKind::Frames, "task 1, 1 of 2, is none of its kind"),
+            (|p| p.tasks[1].2 = TaskKind::Bake(Kind::Silhouette), "task 1, 1 of 2, is none of its kind"),
+        ];
+        for (edit, what) in edits {
+            let error = refused(&edit);
+            assert!(error.exit_code() == 4 && error.to_string().contains(what), "{error}");
+        }
         std::fs::write(&path, "{").unwrap();
         assert_eq!(Plan::read(&path).unwrap_err().exit_code(), 4);
     }

@@ -1,6 +1,6 @@
 //! The engines of others: Slurm, Dask, OpenJD, and lines of commands.
 
-use super::{Farm, common, finish, has_device, whole};
+use super::{Farm, common, finish, has_device, processes, whole};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -93,18 +93,6 @@ impl Drop for SlurmNode {
     }
 }
 
-/// The process that runs a slice of a plan here, if one does.
-fn runs(plan: &Path, slice: usize) -> Option<u32> {
-    let line =
-        [b"farm\0run\0", plan.as_os_str().as_encoded_bytes(), format!("\0--slice\0{slice}\0").as_bytes()].concat();
-    std::fs::read_dir("/proc").unwrap().find_map(|entry| {
-        let entry = entry.ok()?;
-        let id = entry.file_name().to_str()?.parse().ok()?;
-        let words = std::fs::read(entry.path().join("cmdline")).ok()?;
-        words.windows(line.len()).any(|found| found == line).then_some(id)
-    })
-}
-
 #[test]
 fn slurm_runs_an_array_and_requeues_what_dies() {
     let there = ["slurmctld", "slurmd", "sbatch", "munged"]
@@ -125,10 +113,11 @@ fn slurm_runs_an_array_and_requeues_what_dies() {
     assert!(ran.code == 0 && ran.stdout.starts_with("Submitted batch job "), "{} {}", ran.stdout, ran.stderr);
     let job = ran.stdout.trim().rsplit(' ').next().unwrap().to_owned();
     // The first start of slice 0 is killed; Slurm puts it back into the queue.
+    let first = [farm.path("p.json").as_os_str().as_encoded_bytes(), b"\0--slice\x000\0"].concat();
     let (start, mut killed) = (std::time::Instant::now(), false);
     while farm.results().len() < slices {
         assert!(start.elapsed().as_secs() < 200, "{}", farm.good(&["farm", "status", "p.json"]));
-        if let Some(id) = runs(&farm.path("p.json"), 0).filter(|_| !killed) {
+        if let Some(id) = processes(&first).first().filter(|_| !killed) {
             killed = Command::new("kill").args(["-9", &id.to_string()]).status().unwrap().success();
         }
         if killed {

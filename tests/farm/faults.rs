@@ -1,6 +1,6 @@
 //! What goes wrong on machines: kills, damage, folders that cannot be written. Nothing is lost then, and nothing is wrong.
 
-use super::{Farm, common, finish, has_device, whole};
+use super::{Farm, common, finish, has_device, processes, whole};
 use serde_json::{Value, json};
 use shadow_fields::farm::{Plan, results};
 use std::process::Command;
@@ -138,10 +138,7 @@ fn kills_lose_at_most_the_slice() {
         process.wait().unwrap();
         // Slices of a submitter that was killed go on to their ends.
         let start = std::time::Instant::now();
-        while all
-            .iter()
-            .any(|id| std::fs::read_to_string(format!("/proc/{id}/cmdline")).is_ok_and(|line| line.contains("p.json")))
-        {
+        while !processes(farm.folder.path().as_os_str().as_encoded_bytes()).is_empty() {
             assert!(start.elapsed().as_secs() < 60, "slices of a killed submitter end");
             std::thread::sleep(std::time::Duration::from_millis(20));
         }
@@ -150,8 +147,7 @@ fn kills_lose_at_most_the_slice() {
         let found = farm.run(&["farm", "collect", "p.json", "--into", "cache", "--json"]);
         let said: Value = serde_json::from_str(&found.stdout).unwrap();
         assert_eq!(said["damaged"], serde_json::json!([]), "nothing is wrong: {}", found.stderr);
-        let finished = after.iter().filter(|path| path.extension().is_some_and(|e| e == "slice")).count();
-        assert_eq!(said["missing"].as_array().unwrap().len(), slices - finished);
+        assert_eq!(said["missing"].as_array().unwrap().len(), slices - after.len());
         done += usize::from(found.code == 0);
     }
     farm.good(&["farm", "submit", "p.json", "--engine", "local"]);

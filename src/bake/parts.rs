@@ -13,14 +13,10 @@ use super::samples::FieldSamples;
 use super::{Baker, Options, Progress, captured_bytes, header, transfer_targets, vertex_targets};
 use crate::asset::Mesh;
 use crate::error::{Error, Result};
-use crate::field::FieldHeader;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::BYTES;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
-
-/// Bytes before the samples of a part: five numbers of eight bytes.
-const PROLOGUE: usize = 40;
 
 /// The part `index` of `count` parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -62,28 +58,40 @@ pub fn bake(
     }
 }
 
-/// What is captured for a kind of thing, how it is reduced, and the bytes of all its samples in their places.
-fn captures(baker: &Baker, mesh: &Mesh, options: &Options, kind: Kind) -> Result<(Vec<CaptureTarget>, Reduction, u64)> {
+/// How a kind of thing is reduced, and the bytes of all its samples in their places.
+fn reduction(mesh: &Mesh, options: &Options, kind: Kind) -> Result<(Reduction, u64)> {
     let vertices = mesh.positions.len() as u64;
     Ok(match kind {
         Kind::Shadow | Kind::Light => {
-            let mut header: FieldHeader = header(mesh, kind.field(), options);
+            let header = header(mesh, kind.field(), options);
             header.validate()?;
-            baker.fits(&header)?;
-            let targets = FieldSamples::new(mesh, &mut header)?.targets;
             let projection = if kind == Kind::Light { Projection::Radiance } else { Projection::Blocked };
-            (targets, Reduction::Project { bands: header.bands, projection }, captured_bytes(&header))
+            (Reduction::Project { bands: header.bands, projection }, captured_bytes(&header))
         }
-        Kind::SelfVisibility => (vertex_targets(mesh).collect(), Reduction::SelfVisibility, vertices * BYTES as u64),
+        Kind::SelfVisibility => (Reduction::SelfVisibility, vertices * BYTES as u64),
         Kind::Transfer => {
             let reduction = Reduction::Project { bands: options.bands, projection: Projection::Transfer };
-            (transfer_targets(mesh, options).0, reduction, 4 * vertices * channel_stride(options.bands) as u64)
+            (reduction, 4 * vertices * channel_stride(options.bands) as u64)
         }
         Kind::Silhouette => return Err(Error::Failed("a silhouette field has no parts".into())),
     })
 }
 
-/// Captures one part of a kind of thing that can be cut. The bytes are for [`join`].
+/// What is captured for a kind of thing.
+fn targets(baker: &Baker, mesh: &Mesh, options: &Options, kind: Kind) -> Result<Vec<CaptureTarget>> {
+    Ok(match kind {
+        Kind::SelfVisibility => vertex_targets(mesh).collect(),
+        Kind::Transfer => transfer_targets(mesh, options).0,
+        _ => {
+            let mut header = header(mesh, kind.field(), options);
+            baker.fits(&header)?;
+            FieldSamples::new(mesh, &mut header)?.targets
+        }
+    })
+}
+
+/// Captures one part of a kind of thing that can be cut: for each of its targets the number of its place, in four bytes, and its reduced
+/// sample. The bytes are for [`join`].
 ///
 /// # Errors
 /// As [`Baker::field`].
@@ -94,23 +102,22 @@ pub fn bake_part(
     part: Part,
     progress: Progress<'_>,
 ) -> Result<Vec<u8>> {
-    let (targets, reduction, bytes) = captures(baker, mesh, options, kind)?;
+    let (reduction, _) = reduction(mesh, options, kind)?;
+    let targets = targets(baker, mesh, options, kind)?;
     let partial = Partial::new(None);
     let Options { face_px, shortcuts, .. } = *options;
     let setup = Captures { mesh, reduction, face_px, shortcuts, partial: &partial };
     let range = part.of(targets.len());
     let samples = setup.run_part(baker, &targets, range.clone(), progress)?;
-    let prologue = [targets.len(), range.start, range.len(), reduction.sample_bytes(), bytes as usize];
-    let mut out: Vec<u8> = prologue.iter().flat_map(|number| (*number as u64).to_le_bytes()).collect();
-    out.extend(targets[range].iter().flat_map(|target| target.job.target.to_le_bytes()));
-    out.extend(samples);
-    Ok(out)
+    let samples = samples.chunks_exact(reduction.sample_bytes());
+    let placed = targets[range].iter().zip(samples);
+    Ok(placed.flat_map(|(target, sample)| [&target.job.target.to_le_bytes(), sample].concat()).collect())
 }
 
-/// Bakes a kind of thing from all its parts, in their order, so that the cache holds it then. Nothing is captured.
+/// Bakes a kind of thing from all its parts, so that the cache holds it then. Nothing is captured.
 ///
 /// # Errors
-/// `Failed` where parts are missing or are not of one whole, or where the cache has no folder or cannot be written.
+/// `Failed` where the parts are not those of this bake, or where the cache has no folder or cannot be written.
 pub fn join(
     baker: &Baker,
     cache: &Cache,
@@ -120,34 +127,34 @@ pub fn join(
 ) -> Result<()> {
     let broken = || Error::Failed(format!("the parts of {} of {} do not fit together", kind.name(), mesh.name));
     let path = cache.unfinished(mesh, options, kind).ok_or_else(|| Error::Failed("the cache has no folder".into()))?;
-    let number = |part: &[u8], index: usize| {
-        let bytes = part.get(8 * index..8 * index + 8)?;
-        Some(u64::from_le_bytes(bytes.try_into().ok()?) as usize)
-    };
-    let mut numbers = [0; 5];
-    for (index, to) in numbers.iter_mut().enumerate() {
-        *to = parts.first().and_then(|part| number(part, index)).ok_or_else(broken)?;
-    }
-    let [all, _, _, sample_bytes, bytes] = numbers;
-    let (mut values, mut next) = (vec![0_u8; bytes], 0);
+    let (reduction, bytes) = reduction(mesh, options, kind)?;
+    let (sample_bytes, mut all) = (reduction.sample_bytes(), 0);
+    let mut values = vec![0_u8; bytes as usize];
     for part in parts {
-        let (first, count) = (number(part, 1).ok_or_else(broken)?, number(part, 2).ok_or_else(broken)?);
-        let same = [0, 3, 4].iter().all(|&index| number(part, index) == Some(numbers[index]));
-        if !same || first != next || part.len() != PROLOGUE + count * (4 + sample_bytes) {
+        let placed = part.chunks_exact(4 + sample_bytes);
+        if !placed.remainder().is_empty() {
             return Err(broken());
         }
-        next += count;
-        let (targets, samples) = part[PROLOGUE..].split_at(4 * count);
-        for (target, sample) in targets.chunks_exact(4).zip(samples.chunks_exact(sample_bytes)) {
-            let target = u32::from_le_bytes(target.try_into().expect("four bytes")) as usize;
-            let place = values.get_mut(target * sample_bytes..(target + 1) * sample_bytes).ok_or_else(broken)?;
-            place.copy_from_slice(sample);
+        all += placed.len() as u32;
+        for (number, sample) in placed.map(|bytes| bytes.split_at(4)) {
+            let number = u32::from_le_bytes(number.try_into().expect("four bytes")) as usize;
+            values.chunks_exact_mut(sample_bytes).nth(number).ok_or_else(broken)?.copy_from_slice(sample);
         }
     }
-    if next != all {
-        return Err(broken());
-    }
-    let numbers = if kind == Kind::SelfVisibility { bytes } else { bytes / 4 };
-    partial::write_done(&path, all as u32, numbers, &values)?;
+    let numbers = if kind == Kind::SelfVisibility { values.len() } else { values.len() / 4 };
+    partial::write_done(&path, all, numbers, &values)?;
     bake(baker, cache, (mesh, options), kind, &|_, _| ())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_all_of_it_once() {
+        for (all, count) in [(10, 3), (2, 5), (0, 2), (7, 1)] {
+            let ranges: Vec<_> = (0..count).map(|index| Part { index, count }.of(all)).collect();
+            assert!(ranges.iter().flat_map(Clone::clone).eq(0..all), "{ranges:?}");
+        }
+    }
 }

@@ -58,8 +58,9 @@ impl Captures<'_> {
         for unit in units.iter().map(Unit::targets) {
             let now = unit.start.max(part.start)..unit.end.min(part.end);
             if !now.is_empty() {
-                progress((now.end - part.start) as u32, part.len() as u32);
+                let done = (now.end - part.start) as u32;
                 samples.extend(batches.run_unit(&targets[now], &mut report)?);
+                progress(done, part.len() as u32);
             }
         }
         Ok(samples)

@@ -52,7 +52,7 @@ impl Identity {
     /// That of this process on a device.
     pub fn own(device: &crate::gpu::Device) -> Self {
         Identity {
-            program: concat!("shadow-fields ", env!("CARGO_PKG_VERSION"), " ", env!("SHADOW_FIELDS_REVISION")).into(),
+            program: super::PROGRAM.into(),
             device: device.info.name.clone(),
             driver: device.info.driver.clone(),
         }

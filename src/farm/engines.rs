@@ -3,22 +3,25 @@
 use super::plan::Plan;
 use super::status::ranges;
 use serde_json::{Value, json};
-use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// The script that maps slices over a Dask cluster.
 pub const DASK: &str = include_str!("../../scripts/farm_dask.py");
 /// Most tasks of a Slurm array: the default of `MaxArraySize` is one more.
 pub const ARRAY: usize = 1000;
 
+/// Place of the slice's number among the words of a command.
+const SLICE_AT: usize = 5;
+
 /// How a slice is started on every machine.
-pub struct Call<'c> {
+pub struct Call {
     /// The program.
-    pub program: &'c Path,
+    pub program: PathBuf,
     /// The plan.
-    pub plan: &'c Path,
+    pub plan: PathBuf,
     /// Words of options that every slice gets.
-    pub words: &'c [String],
+    pub words: Vec<String>,
 }
 
 /// A word as a POSIX shell reads it.
@@ -31,17 +34,26 @@ pub fn quoted(word: &str) -> String {
     }
 }
 
-impl Call<'_> {
+impl Call {
+    /// The command that runs a slice on this machine.
+    pub fn command(&self, slice: usize) -> Command {
+        let mut command = Command::new(&self.program);
+        command.args(["farm", "run"]).arg(&self.plan).args(["--slice", &slice.to_string()]).args(&self.words);
+        command
+    }
+
     /// The words of the command that runs a slice, whose number is written as `slice`.
     pub fn words(&self, slice: &str) -> Vec<String> {
         let path = |path: &Path| path.to_string_lossy().into_owned();
-        let own = [path(self.program), "farm".into(), "run".into(), path(self.plan), "--slice".into(), slice.into()];
+        let own = [path(&self.program), "farm".into(), "run".into(), path(&self.plan), "--slice".into(), slice.into()];
         own.into_iter().chain(self.words.iter().cloned()).collect()
     }
 
-    /// The command as a line of a shell script.
+    /// The command as a line of a shell script, in which `slice` stands as it is.
     pub fn line(&self, slice: &str) -> String {
-        self.words(slice).iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+        let words = self.words(slice);
+        let word = |(at, word): (usize, &String)| if at == SLICE_AT { word.clone() } else { quoted(word) };
+        words.iter().enumerate().map(word).collect::<Vec<_>>().join(" ")
     }
 }
 
@@ -55,35 +67,52 @@ fn memory_mb(plan: &Plan) -> u32 {
     plan.slices.iter().map(|slice| slice.memory_mb()).max().unwrap_or(0)
 }
 
-/// The batch script of a Slurm array whose task T runs the slice in line FIRST + T + 1 of the file `list`. A failed task is put back
-/// into the queue twice, with FIRST in its environment as at first.
-pub fn slurm(plan: &Plan, call: &Call<'_>, list: &Path, logs: &Path) -> String {
-    let command = call.line("SLICE").replace("SLICE", "\"$slice\"");
-    let mut text = String::from("#!/bin/sh\n");
-    let _ = writeln!(
-        text,
-        "# Slices of a plan, one a task. FIRST is the line of the list that task 0 takes, counted from 0."
-    );
-    let _ = writeln!(text, "#SBATCH --job-name=shadow-fields");
-    let _ = writeln!(text, "#SBATCH --requeue --open-mode=append");
-    let _ = writeln!(text, "#SBATCH --cpus-per-task=1 --mem={}M --time={}", memory_mb(plan), limit_minutes(plan));
-    let _ = writeln!(text, "#SBATCH --output={}/%A_%a.log", logs.display());
-    let _ =
-        writeln!(text, "slice=$(sed -n \"$((FIRST + SLURM_ARRAY_TASK_ID + 1))p\" {})", quoted(&list.to_string_lossy()));
-    let _ = writeln!(text, "echo \"slice $slice on $(hostname), start ${{SLURM_RESTART_COUNT:-0}}\"");
-    let _ = writeln!(text, "{command} && exit");
-    let _ = writeln!(text, "code=$?");
-    let _ = writeln!(text, "# 2 usage, 3 another device or program, 4 bad input: these would fail again.");
-    let _ = writeln!(text, "case $code in [234]) exit $code ;; esac");
-    let _ = writeln!(text, "if [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt 2 ]; then");
-    let _ = writeln!(text, "    exec scontrol requeue \"${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID\"");
-    let _ = writeln!(text, "fi");
-    let _ = writeln!(text, "exit $code");
-    text
+/// An array of Slurm: the number of the slice that its task 0 would take, and the tasks as `--array` has them.
+pub type Array = (usize, String);
+
+/// Arrays that run these slices, whose numbers increase, together at most `workers` at a time, or one of each array.
+pub fn arrays(slices: &[usize], workers: Option<usize>) -> Vec<Array> {
+    let chunks: Vec<&[usize]> = slices.chunk_by(|a, b| a / ARRAY == b / ARRAY).collect();
+    let limit = workers.map_or_else(String::new, |workers| format!("%{}", (workers / chunks.len()).max(1)));
+    let array = |chunk: &&[usize]| {
+        let tasks: Vec<usize> = chunk.iter().map(|slice| slice % ARRAY).collect();
+        (chunk[0] / ARRAY * ARRAY, format!("{}{limit}", ranges(&tasks)))
+    };
+    chunks.iter().map(array).collect()
+}
+
+/// The batch script of a Slurm array whose task T runs slice FIRST + T. A failed task is put back into the queue twice, with FIRST in
+/// its environment as at first.
+pub fn slurm(plan: &Plan, call: &Call, logs: &Path) -> String {
+    let command = call.line("\"$slice\"");
+    // In a name of a log %A stands for the array and %a for the task, and %% for %.
+    let logs = logs.display().to_string().replace('%', "%%");
+    let (memory, minutes) = (memory_mb(plan), limit_minutes(plan));
+    format!(
+        r#"#!/bin/sh
+# Slices of a plan: task T of an array runs slice FIRST + T.
+#SBATCH --job-name=shadow-fields
+#SBATCH --requeue --open-mode=append
+#SBATCH --cpus-per-task=1 --mem={memory}M --time={minutes}
+#SBATCH --output="{logs}/%A_%a.log"
+slice=$((FIRST + SLURM_ARRAY_TASK_ID))
+echo "slice $slice on $(hostname), start ${{SLURM_RESTART_COUNT:-0}}"
+# A task has one core: llvmpipe draws in the thread that asks for it.
+export LP_NUM_THREADS="${{LP_NUM_THREADS:-0}}"
+{command} && exit
+code=$?
+# 2 usage, 3 another device or program, 4 bad input: these would fail again.
+case $code in [234]) exit $code ;; esac
+if [ "${{SLURM_RESTART_COUNT:-0}}" -lt 2 ]; then
+    exec scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID"
+fi
+exit $code
+"#
+    )
 }
 
 /// A job template of Open Job Description with a task a slice.
-pub fn openjd(plan: &Plan, call: &Call<'_>, slices: &[usize]) -> Value {
+pub fn openjd(plan: &Plan, call: &Call, slices: &[usize]) -> Value {
     let words = call.words("{{Task.Param.Slice}}");
     json!({
         "specificationVersion": "jobtemplate-2023-09",
@@ -107,9 +136,22 @@ mod tests {
     use super::*;
 
     #[test]
+    fn arrays_keep_their_indices_and_share_the_limit() {
+        let slices: Vec<usize> = (3..2002).filter(|slice| *slice != 7).collect();
+        let found = arrays(&slices, Some(7));
+        let expected = [(0, "3-6,8-999%2"), (1000, "0-999%2"), (2000, "0-1%2")];
+        assert_eq!(found, expected.map(|(first, tasks)| (first, tasks.to_owned())));
+        assert_eq!(arrays(&[5, 1000], Some(1)), [(0, "5%1".to_owned()), (1000, "0%1".to_owned())]);
+        assert_eq!(arrays(&[5], None), [(0, "5".to_owned())]);
+    }
+
+    #[test]
     fn words_with_blanks_and_quotes_stay_one() {
-        let words = ["--time=0".to_owned(), "it's here".to_owned()];
-        let call = Call { program: Path::new("/a b/p"), plan: Path::new("plan.json"), words: &words };
+        let words = vec!["--time=0".to_owned(), "it's here".to_owned()];
+        let call = Call { program: "/a b/p".into(), plan: "plan.json".into(), words };
         assert_eq!(call.line("7"), r"'/a b/p' farm run plan.json --slice 7 --time=0 'it'\''s here'");
+        assert_eq!(call.words("7")[SLICE_AT], "7");
+        let call = Call { plan: "$slice/SLICE.json".into(), ..call };
+        assert!(call.line("\"$slice\"").contains("run '$slice/SLICE.json' --slice \"$slice\" --time"));
     }
 }

@@ -12,6 +12,7 @@
 pub mod engines;
 pub mod local;
 pub mod plan;
+mod plan_file;
 pub mod results;
 pub mod status;
 

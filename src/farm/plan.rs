@@ -1,22 +1,22 @@
 //! A plan: works cut into slices, and everything that decides the bytes of each.
 
+pub use crate::bake::PROGRAM;
 use crate::bake::kinds::Kind;
 use crate::error::{Error, Result};
-use crate::files;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Version of the form of a plan.
-const FORMAT: u32 = 1;
-/// Longest plan that is read, in bytes.
-const LIMIT_BYTES: u64 = 1 << 30;
+pub(super) const FORMAT: u32 = 1;
 /// Estimated seconds that a slice is made to take: slices of one to five minutes remain so where a machine is half or twice as fast.
 pub const SLICE_SECONDS: f64 = 120.0;
+/// Most estimated bytes of a slice's result, which its process holds in memory. Pictures may be 2.7 times as large as estimated: that
+/// is still below the largest result that is read.
+const RESULT_BYTES: f64 = 1e9;
 /// What a process takes without any mesh: the program, the driver and its compiled shaders, in MB.
 const BASE_MB: u32 = 250;
-
-/// The program whose plans and results belong together.
-pub const PROGRAM: &str = concat!("shadow-fields ", env!("CARGO_PKG_VERSION"), " ", env!("SHADOW_FIELDS_REVISION"));
+/// Longest time that a slice is estimated to take: 30 years, beyond which a plan is damaged.
+pub(super) const SECONDS_LIMIT: f32 = 1e9;
 
 /// Devices that make the same bytes: of one name and one driver.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -112,7 +112,7 @@ impl Slice {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
-    format: u32,
+    pub(super) format: u32,
     /// The program that made it, with its version. Another version refuses it.
     pub program: String,
     /// The devices that may run it.
@@ -159,19 +159,30 @@ impl Plan {
         }
     }
 
-    /// Adds a task. It joins the last slice while that remains below [`SLICE_SECONDS`].
+    /// How many tasks like this one a slice may hold, at least one.
+    pub fn fitting(cost: Cost) -> u32 {
+        (SLICE_SECONDS / cost.seconds).min(RESULT_BYTES / cost.bytes).max(1.0) as u32
+    }
+
+    /// Adds a task. It joins the last slice while that remains below [`SLICE_SECONDS`] and its result below 1 GB.
     pub fn add(&mut self, task: Task, cost: Cost) {
         let memory = BASE_MB + cost.memory_mb.ceil() as u32;
         let kilobytes = (cost.bytes / 1e3).ceil() as u32;
-        let begins = self.slices.last().is_none_or(|slice| slice.seconds() + cost.seconds > SLICE_SECONDS);
+        let fits = |slice: &Slice| {
+            let bytes = 1e3 * f64::from(slice.disk_kb()) + cost.bytes;
+            slice.seconds() + cost.seconds <= SLICE_SECONDS && bytes <= RESULT_BYTES
+        };
+        let begins = !self.slices.last().is_some_and(fits);
         if begins {
-            self.slices.push(Slice(self.tasks.len() as u32, 0, 0.0, memory, 0));
+            self.slices.push(Slice(self.tasks.len() as u32, 0, 0.0, 0, 0));
         }
         let slice = self.slices.last_mut().expect("one was there or is new");
         slice.1 += 1;
         slice.2 += cost.seconds as f32;
-        slice.3 = slice.3.max(memory);
-        slice.4 += kilobytes;
+        // Besides what its largest task needs, a process holds the result.
+        let largest = slice.3 - slice.4.div_ceil(1000);
+        slice.4 = slice.4.saturating_add(kilobytes);
+        slice.3 = largest.max(memory) + slice.4.div_ceil(1000);
         self.tasks.push(task);
     }
 
@@ -206,69 +217,6 @@ impl Plan {
         self.folder.join(text)
     }
 
-    /// Reads a plan and checks that this program made it.
-    ///
-    /// # Errors
-    /// `Input` where it is missing or malformed; `Unsupported`, with both versions, where another program made it.
-    pub fn read(path: &Path) -> Result<Self> {
-        let bad = |what: String| Error::input(path, what);
-        let size = std::fs::metadata(path).map_err(|error| bad(format!("cannot be read: {error}")))?.len();
-        if size > LIMIT_BYTES {
-            return Err(bad(format!("{size} bytes are over the limit of {LIMIT_BYTES} for a plan")));
-        }
-        let bytes = std::fs::read(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
-        // The version comes first: another program's plan may have another form.
-        #[derive(Deserialize)]
-        struct Made {
-            format: u32,
-            program: String,
-        }
-        let made: Made = serde_json::from_slice(&bytes).map_err(|error| bad(format!("not a plan: {error}")))?;
-        if (made.format, made.program.as_str()) != (FORMAT, PROGRAM) {
-            return Err(Error::Unsupported(format!(
-                "{}: a plan of {}, and this is {PROGRAM}; plan again, or use that program",
-                path.display(),
-                made.program
-            )));
-        }
-        let mut plan: Plan = serde_json::from_slice(&bytes).map_err(|error| bad(format!("not a plan: {error}")))?;
-        plan.check().map_err(bad)?;
-        let full = std::path::absolute(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
-        plan.folder = full.parent().unwrap_or(Path::new("/")).to_owned();
-        Ok(plan)
-    }
-
-    /// Whether all indices lead somewhere.
-    fn check(&self) -> std::result::Result<(), String> {
-        let mut next = 0;
-        for (index, Slice(first, count, ..)) in self.slices.iter().enumerate() {
-            if *first != next || *count == 0 {
-                return Err(format!("slice {index} does not begin where the one before it ends"));
-            }
-            next = first.checked_add(*count).ok_or("too many tasks")?;
-        }
-        if next as usize != self.tasks.len() {
-            return Err("its slices hold other tasks than it has".into());
-        }
-        for Task(work, input, kind, first, count) in &self.tasks {
-            let part = matches!(kind, TaskKind::Frames) || first < count;
-            if *work as usize >= self.works.len() || *input as usize >= self.inputs.len() || *count == 0 || !part {
-                return Err("a task leads nowhere".into());
-            }
-        }
-        Ok(())
-    }
-
-    /// Writes the plan, whole or not at all.
-    ///
-    /// # Errors
-    /// `Failed` where it cannot be written.
-    pub fn write(&self, path: &Path) -> Result<()> {
-        let bytes = serde_json::to_vec(self).expect("a plan is plain data");
-        files::replace(path, &bytes)
-            .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
-    }
-
     /// Fails where a device is of another class than the plan's.
     ///
     /// # Errors
@@ -282,10 +230,11 @@ impl Plan {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn plan(tasks: u32, seconds: f64) -> Plan {
+    /// A plan of one mesh in so many parts.
+    pub fn plan(tasks: u32, seconds: f64) -> Plan {
         let device = DeviceClass { name: "a".into(), driver: "b".into() };
         let mut plan = Plan::new(device, "results".into());
         plan.works.push(Work { words: vec!["--quality".into(), "draft".into()], pictures: None });
@@ -310,6 +259,20 @@ mod tests {
         assert_eq!((Plan::parts(150.0), Plan::parts(181.0), Plan::parts(1200.0)), (1, 2, 10));
     }
 
+    /// A process holds the result of its slice: that is stated, and stays below what is read again.
+    #[test]
+    fn slices_are_short_of_time_and_of_bytes() {
+        let mut plan = plan(1, 1.0);
+        assert_eq!((plan.slices[0].memory_mb(), plan.slices[0].disk_kb()), (BASE_MB + 1 + 1, 1000));
+        let large = Cost { seconds: 1.0, memory_mb: 5.0, bytes: 4e8 };
+        (0..3).for_each(|_| plan.add(plan.tasks[0], large));
+        let stated: Vec<_> = plan.slices.iter().map(|slice| (slice.1, slice.memory_mb(), slice.disk_kb())).collect();
+        assert_eq!(stated, [(3, BASE_MB + 5 + 801, 801_000), (1, BASE_MB + 5 + 400, 400_000)]);
+        assert_eq!(Plan::fitting(large), 2);
+        assert_eq!(Plan::fitting(Cost { bytes: 2e9, ..large }), 1);
+        assert_eq!(Plan::fitting(Cost { bytes: 1.0, ..large }), 120);
+    }
+
     /// Each thing that decides a result is part of its name.
     #[test]
     fn names_of_results_differ_where_anything_differs() {
@@ -332,26 +295,5 @@ mod tests {
         let mut moved = base.clone();
         moved.inputs[0].path = "elsewhere/m.obj".into();
         assert_eq!(moved.key(0), base.key(0), "where an input lies decides nothing");
-    }
-
-    #[test]
-    fn other_versions_and_broken_plans_are_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("p.json");
-        let refused = |edit: &dyn Fn(&mut Plan)| {
-            let mut plan = plan(2, 100.0);
-            edit(&mut plan);
-            plan.write(&path).unwrap();
-            Plan::read(&path).map(|_| ()).unwrap_err()
-        };
-        let older = refused(&|p| p.program = "shadow-fields 0.0.9 abc".into());
-        assert!(
-            older.exit_code() == 3 && older.to_string().contains("0.0.9 abc, and this is shadow-fields"),
-            "{older}"
-        );
-        assert_eq!(refused(&|p| p.slices[0].1 = 9).exit_code(), 4);
-        assert_eq!(refused(&|p| p.tasks[0].1 = 9).exit_code(), 4);
-        std::fs::write(&path, "{").unwrap();
-        assert_eq!(Plan::read(&path).unwrap_err().exit_code(), 4);
     }
 }

@@ -1,6 +1,6 @@
 //! Results of slices in a shared folder: named by what decides them, sealed by a hash, replaced whole.
 
-use super::plan::Plan;
+use super::plan::{Plan, SECONDS_LIMIT};
 use crate::error::{Error, Result};
 use crate::field::file;
 use serde::{Deserialize, Serialize};
@@ -43,11 +43,12 @@ pub fn find(plan: &Plan, slice: usize) -> Found {
     if !path.exists() {
         return Found::Missing;
     }
+    let tasks = plan.tasks_of(slice).len();
     let read = file::read::<About>(&path, MAGIC).and_then(|(about, payload)| {
         if about.key != plan.key(slice) {
             return Err(Error::input(&path, "it does not fit its name"));
         }
-        Ok((about, entries(&payload).ok_or_else(|| Error::input(&path, "malformed"))?))
+        Ok((about, entries(&payload, tasks).ok_or_else(|| Error::input(&path, "malformed"))?))
     });
     match read {
         Ok((about, entries)) => Found::Whole(about, entries),
@@ -55,29 +56,45 @@ pub fn find(plan: &Plan, slice: usize) -> Found {
     }
 }
 
-/// What a result says of itself, without a look at its content; `None` where there is none.
-pub fn about(plan: &Plan, slice: usize) -> Option<About> {
-    file::read_header(&path(plan, slice), MAGIC)
+/// The seconds that a result says it took, without a look at its content; `None` where there is none, or what it says is no time.
+pub fn seconds(plan: &Plan, slice: usize) -> Option<f64> {
+    let about: About = file::read_header(&path(plan, slice), MAGIC)?;
+    Some(about.seconds).filter(|seconds| (0.0..=f64::from(SECONDS_LIMIT)).contains(seconds))
 }
 
-/// Writes the result of a slice, whole or not at all.
-///
-/// # Errors
-/// `Failed` where the folder cannot be written.
-pub fn write(plan: &Plan, slice: usize, seconds: f64, entries: &[Entry]) -> Result<()> {
-    let mut payload = Vec::new();
-    for (task, name, bytes) in entries {
-        payload.extend(task.to_le_bytes());
-        payload.extend((name.len() as u32).to_le_bytes());
-        payload.extend((bytes.len() as u64).to_le_bytes());
-        payload.extend(name.as_bytes());
-        payload.extend(bytes);
+/// The content of a result while its slice is being done.
+#[derive(Default)]
+pub struct Content(Vec<u8>);
+
+impl Content {
+    /// Adds a file that the task with this index within the slice has made.
+    pub fn add(&mut self, task: u32, name: &str, bytes: &[u8]) {
+        self.0.extend(task.to_le_bytes());
+        self.0.extend((name.len() as u32).to_le_bytes());
+        self.0.extend((bytes.len() as u64).to_le_bytes());
+        self.0.extend(name.as_bytes());
+        self.0.extend(bytes);
     }
-    let about = About { key: plan.key(slice), seconds };
-    file::write(&path(plan, slice), MAGIC, &about, &payload).map_err(|error| Error::Failed(error.to_string()))
+
+    /// Writes the result of a slice, whole or not at all.
+    ///
+    /// # Errors
+    /// `Failed` where it is too large to be read, or the folder cannot be written.
+    pub fn write(&self, plan: &Plan, slice: usize, seconds: f64) -> Result<()> {
+        let (path, bytes) = (path(plan, slice), self.0.len() as u64);
+        if bytes > file::PAYLOAD_LIMIT {
+            let limit = file::PAYLOAD_LIMIT;
+            return Err(Error::Failed(format!(
+                "slice {slice}: a result of {bytes} bytes is over the limit of {limit}"
+            )));
+        }
+        let about = About { key: plan.key(slice), seconds };
+        file::write(&path, MAGIC, &about, &self.0).map_err(|error| Error::Failed(error.to_string()))
+    }
 }
 
-fn entries(mut rest: &[u8]) -> Option<Vec<Entry>> {
+/// The entries of a result of so many tasks.
+fn entries(mut rest: &[u8], tasks: usize) -> Option<Vec<Entry>> {
     let mut out = Vec::new();
     while !rest.is_empty() {
         let (head, tail) = rest.split_at_checked(16)?;
@@ -87,7 +104,7 @@ fn entries(mut rest: &[u8]) -> Option<Vec<Entry>> {
         let (bytes, tail) = tail.split_at_checked(usize::try_from(length).ok()?)?;
         let name = String::from_utf8(name.to_vec()).ok()?;
         // A name is one file's: it leads nowhere else.
-        if name.contains(['/', '\\']) || name.starts_with('.') {
+        if name.is_empty() || name.contains(['/', '\\']) || name.starts_with('.') || word(0) as usize >= tasks {
             return None;
         }
         out.push((word(0), name, bytes.to_vec()));
@@ -112,11 +129,16 @@ mod tests {
         plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
         let cost = Cost { seconds: 100.0, memory_mb: 1.0, bytes: 1.0 };
         (0..2).for_each(|part| plan.add(Task(0, 0, TaskKind::Bake(Kind::Shadow), part, 2), cost));
-        assert!(matches!(find(&plan, 0), Found::Missing) && about(&plan, 0).is_none());
-        let entries = vec![(0, "a.sf".to_owned(), vec![1, 2, 3]), (1, "b".to_owned(), Vec::new())];
-        write(&plan, 0, 2.5, &entries).unwrap();
+        let write = |slice, seconds, entries: &[Entry]| {
+            let mut content = Content::default();
+            entries.iter().for_each(|(task, name, bytes)| content.add(*task, name, bytes));
+            content.write(&plan, slice, seconds).unwrap();
+        };
+        assert!(matches!(find(&plan, 0), Found::Missing) && seconds(&plan, 0).is_none());
+        let entries = vec![(0, "a.sf".to_owned(), vec![1, 2, 3]), (0, "b".to_owned(), Vec::new())];
+        write(0, 2.5, &entries);
         assert!(matches!(find(&plan, 0), Found::Whole(about, found) if about.seconds == 2.5 && found == entries));
-        assert_eq!(about(&plan, 0).unwrap().seconds, 2.5);
+        assert_eq!(seconds(&plan, 0), Some(2.5));
         let good = std::fs::read(path(&plan, 0)).unwrap();
         for at in (0..good.len()).step_by(7) {
             let mut bad = good.clone();
@@ -127,7 +149,13 @@ mod tests {
         std::fs::create_dir_all(path(&plan, 1).parent().unwrap()).unwrap();
         std::fs::write(path(&plan, 1), &good).unwrap();
         assert!(matches!(find(&plan, 1), Found::Damaged(_)), "another slice's");
-        write(&plan, 1, 1.0, &[(0, "../a".to_owned(), Vec::new())]).unwrap();
-        assert!(matches!(find(&plan, 1), Found::Damaged(_)), "a name that leads elsewhere");
+        for (task, name) in [(0, "../a"), (0, ""), (0, ".a"), (1, "a")] {
+            write(1, 1.0, &[(task, name.to_owned(), Vec::new())]);
+            assert!(matches!(find(&plan, 1), Found::Damaged(_)), "task {task}, name {name:?}");
+        }
+        for no_time in [-1.0, 1e300, f64::NAN] {
+            write(1, no_time, &[]);
+            assert_eq!(seconds(&plan, 1), None, "{no_time} s");
+        }
     }
 }

@@ -3,7 +3,6 @@
 use super::plan::Plan;
 use super::results;
 use serde::Serialize;
-use std::time::Duration;
 
 /// Most results whose times correct the estimate: each is a file to open.
 const SAMPLES: usize = 200;
@@ -37,8 +36,7 @@ impl Status {
         let estimated = |slice: &usize| plan.slices[*slice].seconds();
         let done = (0..plan.slices.len()).filter(|slice| missing.binary_search(slice).is_err());
         let step = (plan.slices.len() - missing.len()).div_ceil(SAMPLES).max(1);
-        let took =
-            done.step_by(step).filter_map(|slice| Some((results::about(plan, slice)?.seconds, estimated(&slice))));
+        let took = done.step_by(step).filter_map(|slice| Some((results::seconds(plan, slice)?, estimated(&slice))));
         let (took, wanted) = took.fold((0.0, 0.0), |(a, b), (took, wanted)| (a + took, b + wanted));
         let correction = if wanted > 0.0 { took / wanted } else { 1.0 };
         Status {
@@ -55,8 +53,8 @@ impl Status {
     pub fn line(&self, width: usize) -> String {
         let full = (width * self.done).checked_div(self.slices).unwrap_or(width);
         let bar: String = (0..width).map(|at| if at < full { '=' } else { ' ' }).collect();
-        let left = Duration::from_secs_f64(self.left_s.max(0.0).round());
-        let (hours, minutes, seconds) = (left.as_secs() / 3600, left.as_secs() / 60 % 60, left.as_secs() % 60);
+        let left = self.left_s.round() as u64;
+        let (hours, minutes, seconds) = (left / 3600, left / 60 % 60, left % 60);
         let left = match (hours, minutes) {
             (0, 0) => format!("{seconds} s"),
             (0, _) => format!("{minutes} min {seconds} s"),

@@ -29,7 +29,7 @@ pub const VERSION: u32 = 6;
 /// Longest header that is read.
 const HEADER_LIMIT: u64 = 64 << 10;
 /// Largest payload that is read: 4 GiB.
-const PAYLOAD_LIMIT: u64 = 4 << 30;
+pub const PAYLOAD_LIMIT: u64 = 4 << 30;
 const PROLOGUE: usize = 56;
 
 fn seal(prologue: &[u8], header: &[u8], payload: &[u8]) -> [u8; 32] {
@@ -51,8 +51,8 @@ pub fn write<H: Serialize>(path: &Path, magic: [u8; 8], header: &H, payload: &[u
     let hash = seal(&bytes, &header, payload);
     bytes.extend(hash);
     bytes.extend(&header);
-    bytes.extend(payload);
-    crate::files::replace(path, &bytes).map_err(|error| Error::input(path, format!("cannot be written: {error}")))
+    crate::files::replace_parts(path, &[&bytes, payload])
+        .map_err(|error| Error::input(path, format!("cannot be written: {error}")))
 }
 
 /// Whether a file begins as one of that kind does; `false` where it cannot be read.

@@ -55,7 +55,8 @@ pub fn names(folder: &Path) -> Vec<String> {
 
 /// Whether a device is there, as the program sees it.
 pub fn has_device() -> bool {
-    let ran = finish(&mut command(Path::new("."), &["devices"]));
+    static RAN: OnceLock<Ran> = OnceLock::new();
+    let ran = RAN.get_or_init(|| finish(&mut command(Path::new("."), &["devices"])));
     if ran.code != 0 {
         super::common::skip(&ran.stderr);
     }

@@ -5,6 +5,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod farm;
 mod memory;
 mod mutate;
 mod targets;
@@ -135,7 +136,7 @@ impl Target {
 
     /// Whether its seeds have a mark in them that [`targets`] takes out for every second input only.
     fn is_sealed(&self) -> bool {
-        ["sf", "outlines", "selfvis", "part"].contains(&self.name)
+        ["sf", "outlines", "selfvis", "part", "slice"].contains(&self.name)
     }
 }
 

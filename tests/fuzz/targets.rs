@@ -1,6 +1,7 @@
 //! Every parser and decoder, with the inputs that mutation starts from.
 
 use super::common::generate;
+use super::farm;
 use glam::DVec3;
 use shadow_fields::asset::equirect::Equirect;
 use shadow_fields::asset::{Mesh, embedded, picture};
@@ -93,6 +94,8 @@ pub const TARGETS: &[Target] = &[
         parse: calibration,
         reads_file: false,
     },
+    Target { name: "plan", seeds: farm::plans, tokens: farm::TOKENS, parse: farm::plan, reads_file: true },
+    Target { name: "slice", seeds: farm::slices, tokens: farm::TOKENS, parse: farm::slice, reads_file: false },
     Target { name: "options", seeds: options, tokens: OPTIONS, parse: option, reads_file: false },
 ];
 
@@ -217,7 +220,7 @@ fn scene(bytes: &[u8]) -> Result<()> {
 }
 
 /// A file in memory that functions which take paths can read.
-fn with_file<R>(bytes: &[u8], read: impl FnOnce(&Path) -> R) -> R {
+pub fn with_file<R>(bytes: &[u8], read: impl FnOnce(&Path) -> R) -> R {
     thread_local! {
         static FOLDER: tempfile::TempDir = {
             let memory = Path::new("/dev/shm");
@@ -232,7 +235,7 @@ fn with_file<R>(bytes: &[u8], read: impl FnOnce(&Path) -> R) -> R {
 }
 
 /// Lengths and hash as a file has them, so that mutation reaches what is behind them: every second input.
-fn sealed(bytes: &[u8]) -> Vec<u8> {
+pub fn sealed(bytes: &[u8]) -> Vec<u8> {
     let mut out = bytes.to_vec();
     if out.len() < 56 || out.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte)) % 2 == 0 {
         return out;
@@ -255,11 +258,15 @@ fn sealed(bytes: &[u8]) -> Vec<u8> {
 fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
     with_file(&[], |path| {
         write(path);
-        let mut bytes = std::fs::read(path).unwrap();
-        let header = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
-        bytes.insert(56 + header, 0);
-        bytes
+        bordered(std::fs::read(path).unwrap())
     })
+}
+
+/// A file with a zero byte between header and payload.
+pub fn bordered(mut bytes: Vec<u8>) -> Vec<u8> {
+    let header = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    bytes.insert(56 + header, 0);
+    bytes
 }
 
 fn field_of(kind: FieldKind, storage: Storage, lattice: &str) -> ShadowField {

@@ -1,15 +1,15 @@
 //! `shadow-fields farm collect`
 
 use super::super::context::Context;
+use super::super::render::Numbered;
 use super::super::{Global, output};
-use super::run::{mesh, mesh_options};
+use super::run::{files, mesh, mesh_options, scratch};
 use crate::bake::cache::Cache;
 use crate::bake::parts::join;
 use crate::error::{Error, Result};
 use crate::farm::plan::{DeviceClass, Plan, Task, TaskKind};
 use crate::farm::results::{self, Found};
 use crate::farm::status::ranges;
-use crate::files;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -43,19 +43,21 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
                 damaged.push(slice);
                 // With it away, the engines run it again.
                 let path = results::path(&plan, slice);
-                std::fs::remove_file(&path)
-                    .map_err(|error| Error::Failed(format!("{}: cannot be removed: {error}", path.display())))?;
+                match std::fs::remove_file(&path) {
+                    // Another collect was faster.
+                    Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+                    removed => removed
+                        .map_err(|error| Error::Failed(format!("{}: cannot be removed: {error}", path.display())))?,
+                }
             }
             Found::Whole(_, entries) => {
                 for (task, name, bytes) in entries {
-                    let task = plan.tasks_of(slice).get(task as usize);
-                    let task = task.ok_or_else(|| Error::Failed(format!("slice {slice}: a result of no task")))?;
-                    collecting.take(task, &name, bytes)?;
+                    collecting.take(&plan.tasks_of(slice)[task as usize], &name, bytes)?;
                 }
             }
         }
     }
-    let written = collecting.written;
+    let (written, unjoined) = (collecting.written, collecting.parts.len());
     collecting.context.map_or(Ok(()), Context::finish)?;
     if global.json {
         let line = json!({ "slices": plan.slices.len(), "files": written, "missing": missing, "damaged": damaged });
@@ -64,7 +66,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(format!("{written} files of {} slices", plan.slices.len() - missing.len() - damaged.len()));
     }
     if missing.is_empty() && damaged.is_empty() {
-        return Ok(());
+        let broken = || Error::input(&arguments.plan, format!("{unjoined} bakes have parts that are in no slice"));
+        return if unjoined == 0 { Ok(()) } else { Err(broken()) };
     }
     let list = |what: &str, numbers: &[usize]| {
         if numbers.is_empty() { String::new() } else { format!(", {what}: {}", ranges(numbers)) }
@@ -92,9 +95,14 @@ impl Collecting<'_> {
     fn take(&mut self, task: &Task, name: &str, bytes: Vec<u8>) -> Result<()> {
         match *task {
             Task(work, _, TaskKind::Frames, ..) => {
-                let pattern = self.plan.works[work as usize].pictures.as_deref().unwrap_or("####.png");
-                let number: u64 = name.trim_end_matches(".png").parse().unwrap_or(0);
-                self.replace(&self.plan.path(&numbered(pattern, number)), &bytes)
+                let number = name.trim_end_matches(".png").parse();
+                let (Some(pattern), Ok(number)) = (&self.plan.works[work as usize].pictures, number) else {
+                    return Err(Error::Failed(format!("a result of pictures holds a file {name:?}")));
+                };
+                match Numbered::new(Path::new(pattern), "png")? {
+                    Some(numbered) => self.replace(&self.plan.folder.join(numbered.path(number)), &bytes),
+                    None => self.replace(&self.plan.path(pattern), &bytes),
+                }
             }
             Task(.., 1) => {
                 let path = self.cache()?.join("fields").join(name);
@@ -124,7 +132,7 @@ impl Collecting<'_> {
         if std::fs::read(path).is_ok_and(|found| found == bytes) {
             return Ok(());
         }
-        files::replace(path, bytes)
+        crate::files::replace(path, bytes)
             .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
     }
 
@@ -138,25 +146,11 @@ impl Collecting<'_> {
         self.plan.check_device(&DeviceClass::of(&context.device))?;
         let mesh = mesh(self.plan, input as usize)?;
         let options = mesh_options(&self.plan.works[work as usize].words)?;
-        join(&context.baker, &Cache::new(Some(&folder)), (&mesh, &options), kind, parts)?;
-        self.written += 1;
+        // A cache of its own, as for a slice that bakes the whole.
+        let scratch = scratch()?;
+        join(&context.baker, &Cache::new(Some(scratch.path())), (&mesh, &options), kind, parts)?;
         self.context = Some(context);
-        Ok(())
-    }
-}
-
-/// A name whose run of # is replaced by a number.
-fn numbered(pattern: &str, number: u64) -> String {
-    let Some(at) = pattern.find('#') else { return pattern.to_owned() };
-    let digits = pattern[at..].bytes().take_while(|b| *b == b'#').count();
-    format!("{}{number:0digits$}{}", &pattern[..at], &pattern[at + digits..])
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn numbers_take_the_place_of_a_run() {
-        assert_eq!(super::numbered("out/f_####.png", 17), "out/f_0017.png");
-        assert_eq!(super::numbered("f#.png", 123), "f123.png");
+        let fields = folder.join("fields");
+        files(&scratch.path().join("fields"), &mut |name, bytes| self.replace(&fields.join(name), bytes))
     }
 }

@@ -6,7 +6,7 @@ mod run;
 mod submit;
 
 use super::{Global, output};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::farm::Plan;
 use crate::farm::status::Status;
 use clap::{Args, Subcommand};
@@ -43,6 +43,10 @@ pub struct StatusArguments {
 
 /// Runs one of the commands.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    // Results are named by all that decides them, and a plan says nothing of these two.
+    if global.shader_dir.is_some() || global.seed != Global::SEED {
+        return Err(Error::Usage("farm: --shader-dir and --seed are not for farms: a plan does not hold them".into()));
+    }
     match &arguments.command {
         Commands::Plan(arguments) => plan::run(global, arguments),
         Commands::Run(arguments) => run::run(global, arguments),

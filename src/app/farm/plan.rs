@@ -1,6 +1,7 @@
 //! `shadow-fields farm plan`
 
 use super::super::context::Context;
+use super::super::render::Numbered;
 use super::super::{Global, output};
 use super::run::{mesh_options, render_words, scene_hash};
 use crate::bake::kinds::Kind;
@@ -11,6 +12,7 @@ use crate::scene::{self, Scene};
 use clap::Args;
 use rayon::prelude::*;
 use serde_json::json;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -28,7 +30,7 @@ const TRIANGLE_MB: f64 = 2e-3;
 #[command(after_help = "Examples:\n  shadow-fields farm plan meshes/ -o plan.json -- --quality high\n  \
     shadow-fields farm plan film.toml --frames 240 --pictures out/f_####.png -o film.json -- --size 1280x720")]
 pub struct Arguments {
-    /// What is done: meshes to bake (files, or folders that are searched for .obj, .glb and .gltf), or scenes (.toml) to render
+    /// What is done: meshes to bake (.obj, .glb and .gltf files, or folders that hold some), or scenes (.toml) to render
     #[arg(required = true, value_name = "WORK")]
     works: Vec<PathBuf>,
     /// Plan to write
@@ -75,7 +77,12 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         plan.works.push(Work { words: arguments.words.clone(), pictures: None });
         let read: Vec<Read> =
             meshes.par_iter().map(|path| read_mesh(path, &folder, &options)).collect::<Result<_>>()?;
+        let mut known = HashSet::new();
         for Read { input, kinds, .. } in read {
+            // Meshes of equal content share what is baked.
+            if !known.insert(input.hash.clone()) {
+                continue;
+            }
             let index = plan.inputs.len() as u32;
             plan.inputs.push(input);
             for (kind, cost) in kinds {
@@ -86,35 +93,29 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             }
         }
     }
-    if !scenes.is_empty() {
-        let (Some(frames), Some(pictures)) = (arguments.frames, &arguments.pictures) else {
-            return Err(Error::Usage(format!("{}: a scene needs --frames and --pictures", scenes[0].display())));
-        };
-        if scenes.len() > 1 && !pictures.contains('$') {
-            return Err(Error::Usage("--pictures needs a $ for the name of the scene, since there are several".into()));
-        }
+    if let Some(Pictures { frames, patterns }) = pictures(arguments, &scenes)? {
         // Without a variant of its own each machine would take what is fastest there.
         let mut words = arguments.words.clone();
         if !words.iter().any(|word| word.starts_with("--variant")) {
             words.extend(["--variant".into(), variant.into()]);
         }
         render_words(&scenes[0], &words)?;
-        for path in &scenes {
+        for (path, pattern) in scenes.iter().zip(patterns) {
             let (work, index) = (plan.works.len() as u32, plan.inputs.len() as u32);
-            let name = path.file_stem().unwrap_or_default().to_string_lossy();
-            plan.works.push(Work { words: words.clone(), pictures: Some(pictures.replace('$', &name)) });
+            plan.works.push(Work { words: words.clone(), pictures: Some(pattern) });
             let read = read_scene(path, &folder, &words)?;
             plan.inputs.push(read.input);
-            let each = PICTURE_SECONDS + read.pixels * PIXEL_SECONDS;
-            let run = ((crate::farm::plan::SLICE_SECONDS / each) as u32).clamp(1, frames);
-            let mut first = 0;
-            while first < frames {
+            let each = Cost {
+                seconds: PICTURE_SECONDS + read.pixels * PIXEL_SECONDS,
+                memory_mb: read.pixels * PIXEL_MB,
+                bytes: read.pixels * PIXEL_BYTES,
+            };
+            let run = Plan::fitting(each);
+            for first in (0..frames).step_by(run as usize) {
                 let count = run.min(frames - first);
-                let seconds = f64::from(count) * each;
-                let bytes = f64::from(count) * read.pixels * PIXEL_BYTES;
-                let cost = Cost { seconds, memory_mb: read.pixels * PIXEL_MB, bytes };
+                let share = f64::from(count);
+                let cost = Cost { seconds: share * each.seconds, bytes: share * each.bytes, ..each };
                 plan.add(Task(work, index, TaskKind::Frames, first, count), cost);
-                first += count;
             }
         }
     }
@@ -135,6 +136,38 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
+/// How many pictures there are of each scene, and the pattern of their names for each.
+struct Pictures {
+    frames: u32,
+    patterns: Vec<String>,
+}
+
+/// What is said of pictures; `None` where there are no scenes.
+///
+/// # Errors
+/// `Usage` where something is missing, or pictures would overwrite one another.
+fn pictures(arguments: &Arguments, scenes: &[PathBuf]) -> Result<Option<Pictures>> {
+    let wrong = |what: String| Err(Error::Usage(what));
+    let (frames, pictures) = match (scenes.first(), arguments.frames, &arguments.pictures) {
+        (Some(_), Some(frames), Some(pictures)) => (frames, pictures),
+        (Some(scene), ..) => return wrong(format!("{}: a scene needs --frames and --pictures", scene.display())),
+        (None, None, None) => return Ok(None),
+        (None, ..) => return wrong("--frames and --pictures are for scenes, and there is none".into()),
+    };
+    if frames > 1 && Numbered::new(Path::new(pictures), "png")?.is_none() {
+        return wrong(format!("--pictures {pictures}: the name needs a run of # for the number"));
+    }
+    let name = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let patterns: Vec<String> = scenes.iter().map(|path| pictures.replace('$', &name(path))).collect();
+    let distinct: HashSet<&String> = patterns.iter().collect();
+    if distinct.len() < patterns.len() {
+        return wrong(format!(
+            "--pictures {pictures}: the names of all scenes have to differ; $ stands for the scene's name"
+        ));
+    }
+    Ok(Some(Pictures { frames, patterns }))
+}
+
 /// Meshes and scenes of the works, in order of their names within a folder.
 fn find(works: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let is_mesh = |path: &Path| {
@@ -142,10 +175,11 @@ fn find(works: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     };
     let (mut meshes, mut scenes) = (Vec::new(), Vec::new());
     for path in works {
-        if path.is_dir() {
-            let entries =
-                std::fs::read_dir(path).map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
-            let mut found: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| is_mesh(p)).collect();
+        let cannot = |error| Error::input(path, format!("cannot be read: {error}"));
+        if std::fs::metadata(path).map_err(cannot)?.is_dir() {
+            let entries = std::fs::read_dir(path).map_err(cannot)?.map(|entry| entry.map(|e| e.path()));
+            let mut found: Vec<PathBuf> = entries.collect::<std::io::Result<_>>().map_err(cannot)?;
+            found.retain(|path| is_mesh(path));
             if found.is_empty() {
                 return Err(Error::input(path, "a folder without meshes (.obj, .glb, .gltf)"));
             }
@@ -153,8 +187,10 @@ fn find(works: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
             meshes.extend(found);
         } else if is_mesh(path) {
             meshes.push(path.clone());
-        } else {
+        } else if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
             scenes.push(path.clone());
+        } else {
+            return Err(Error::input(path, "expected a folder, a mesh (.obj, .glb, .gltf) or a scene (.toml)"));
         }
     }
     Ok((meshes, scenes))

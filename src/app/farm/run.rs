@@ -8,10 +8,11 @@ use crate::bake::parts::{Part, bake, bake_part};
 use crate::bake::{self, hash_text};
 use crate::error::{Error, Result};
 use crate::farm::plan::{DeviceClass, Plan, Task, TaskKind};
-use crate::farm::results::{self, Entry, Found};
+use crate::farm::results::{self, Content, Found};
 use crate::scene::{self, Scene};
 use clap::Args;
-use std::collections::HashMap;
+use std::ffi::OsString;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -44,71 +45,67 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let started = Instant::now();
     let context = Context::new(global)?;
     plan.check_device(&DeviceClass::of(&context.device))?;
-    let mut running = Running { plan: &plan, global, context: Some(context), meshes: HashMap::new() };
-    let mut entries = Vec::new();
+    let mut running = Running { plan: &plan, global, context: Some(context), mesh: None };
+    let mut content = Content::default();
     for (index, task) in plan.tasks_of(slice).iter().enumerate() {
-        let made = running.task(task)?;
-        entries.extend(made.into_iter().map(|(name, bytes)| (index as u32, name, bytes)));
+        running.task(task, &mut |name, bytes| {
+            content.add(index as u32, name, bytes);
+            Ok(())
+        })?;
     }
     // A result that the validation layer objected to is not written.
     running.context.map_or(Ok(()), Context::finish)?;
     let seconds = started.elapsed().as_secs_f64();
-    write(&plan, slice, seconds, &entries)?;
+    content.write(&plan, slice, seconds)?;
     line(&format!("done in {seconds:.1} s"));
     Ok(())
 }
 
-fn write(plan: &Plan, slice: usize, seconds: f64, entries: &[Entry]) -> Result<()> {
-    results::write(plan, slice, seconds, entries)
-}
-
-/// A file of a result: its name and its content.
-type Made = (String, Vec<u8>);
+/// Takes the name and the content of a file that a task has made.
+pub(super) type Take<'t> = &'t mut dyn FnMut(&str, &[u8]) -> Result<()>;
 
 struct Running<'r> {
     plan: &'r Plan,
     global: &'r Global,
     /// `None` while a picture is rendered, which opens its own.
     context: Option<Context>,
-    /// Meshes that were read, by the index of their input.
-    meshes: HashMap<usize, Mesh>,
+    /// The mesh that was read last, and the index of its input.
+    mesh: Option<(usize, Mesh)>,
 }
 
 impl Running<'_> {
-    fn task(&mut self, task: &Task) -> Result<Vec<Made>> {
+    fn task(&mut self, task: &Task, take: Take<'_>) -> Result<()> {
         let Task(_, _, kind, first, count) = *task;
         let words = &self.plan.works[task.work()].words;
         match kind {
-            TaskKind::Frames => self.frames(task.input(), words, first, count),
+            TaskKind::Frames => self.frames(task.input(), words, first, count, take),
             TaskKind::Bake(kind) => {
                 let options = mesh_options(words)?;
                 if self.context.is_none() {
                     self.context = Some(Context::new(self.global)?);
                 }
-                if !self.meshes.contains_key(&task.input()) {
-                    self.meshes.clear();
-                    self.meshes.insert(task.input(), mesh(self.plan, task.input())?);
+                if self.mesh.as_ref().is_none_or(|(input, _)| *input != task.input()) {
+                    self.mesh = Some((task.input(), mesh(self.plan, task.input())?));
                 }
-                let (Some(context), Some(mesh)) = (&self.context, self.meshes.get(&task.input())) else {
+                let (Some(context), Some((_, mesh))) = (&self.context, &self.mesh) else {
                     unreachable!("both were made above")
                 };
                 let what = format!("{} {}", mesh.name, kind.name());
                 let progress = |done, all| context.progress.show(&what, done, all);
                 let part = Part { index: first, count };
                 if part != Part::WHOLE {
-                    let bytes = bake_part(&context.baker, (mesh, &options), kind, part, &progress)?;
-                    return Ok(vec![("part".into(), bytes)]);
+                    return take("part", &bake_part(&context.baker, (mesh, &options), kind, part, &progress)?);
                 }
                 // A cache of its own: what it holds then is what was baked.
                 let folder = scratch()?;
                 let cache = Cache::new(Some(folder.path()));
                 bake(&context.baker, &cache, (mesh, &options), kind, &progress)?;
-                files(&folder.path().join("fields"))
+                files(&folder.path().join("fields"), take)
             }
         }
     }
 
-    fn frames(&mut self, input: usize, words: &[String], first: u32, count: u32) -> Result<Vec<Made>> {
+    fn frames(&mut self, input: usize, words: &[String], first: u32, count: u32, take: Take<'_>) -> Result<()> {
         let input = &self.plan.inputs[input];
         let path = self.plan.path(&input.path);
         unchanged(&path, &scene_hash(&Scene::load(&path)?), &input.hash)?;
@@ -121,28 +118,32 @@ impl Running<'_> {
         line.extend_from_slice(words);
         let arguments = render_line(&path, &output, &line)?;
         render::run(self.global, &arguments)?;
-        files(folder.path())
+        files(folder.path(), take)
     }
 }
 
 /// A folder for what a slice makes on its way. It is removed at the end, and by the system's sweep after a kill.
-fn scratch() -> Result<tempfile::TempDir> {
+pub(super) fn scratch() -> Result<tempfile::TempDir> {
     tempfile::tempdir().map_err(|error| Error::Failed(format!("no temporary folder can be made: {error}")))
 }
 
-/// The files in a folder, by name.
-fn files(folder: &Path) -> Result<Vec<Made>> {
+/// Hands on the files in a folder, in the order of their names.
+///
+/// # Errors
+/// What `take` returns; `Failed` where there are none: what could not be written was kept in memory.
+pub(super) fn files(folder: &Path, take: Take<'_>) -> Result<()> {
     let cannot = |error| Error::Failed(format!("{}: cannot be read: {error}", folder.display()));
-    let mut out = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(cannot)? {
-        let entry = entry.map_err(cannot)?;
-        out.push((entry.file_name().to_string_lossy().into_owned(), std::fs::read(entry.path()).map_err(cannot)?));
-    }
-    if out.is_empty() {
+    let mut names = match std::fs::read_dir(folder) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
+        entries => {
+            entries.and_then(|all| all.map(|e| Ok(e?.file_name())).collect::<io::Result<_>>()).map_err(cannot)?
+        }
+    };
+    if names.is_empty() {
         return Err(Error::Failed(format!("{}: nothing was written, the disk may be full", folder.display())));
     }
-    out.sort();
-    Ok(out)
+    names.sort();
+    names.iter().try_for_each(|name| take(&name.to_string_lossy(), &std::fs::read(folder.join(name)).map_err(cannot)?))
 }
 
 /// The mesh of an input, which has to be that of the plan.
@@ -167,18 +168,38 @@ fn unchanged(path: &Path, found: &str, planned: &str) -> Result<()> {
 /// # Errors
 /// `Usage` where they are not understood.
 pub(super) fn mesh_options(words: &[String]) -> Result<bake::Options> {
-    let line =
-        ["shadow-fields", "bake", "m.obj", "-o", "m.sf"].map(str::to_owned).into_iter().chain(words.iter().cloned());
-    match parse(line)? {
-        Cli { command: Subcommands::Bake(arguments), .. } => arguments.of_any_kind(),
+    match understood(["shadow-fields", "bake", "m.obj", "-o", "m.sf"].map(OsString::from).into(), words)? {
+        Subcommands::Bake(arguments) => arguments.of_any_kind(),
         _ => Err(Error::Usage("the options after -- are not those of bake".into())),
+    }
+}
+
+/// The subcommand of a line with words behind `--`.
+///
+/// # Errors
+/// `Usage` where they are not understood, or are options of every command, which would decide nothing.
+fn understood(mut line: Vec<OsString>, words: &[String]) -> Result<Subcommands> {
+    let said = |error: Error| {
+        let text = error.to_string();
+        let reason = text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+        Error::Usage(format!("the options after --: {reason}"))
+    };
+    let without = parse(&line).map_err(said)?.global;
+    line.extend(words.iter().map(OsString::from));
+    let Cli { global, command } = parse(&line).map_err(said)?;
+    if format!("{global:?}") == format!("{without:?}") {
+        Ok(command)
+    } else {
+        Err(Error::Usage(
+            "the options after -- are those of bake or render alone; options of every command go before".into(),
+        ))
     }
 }
 
 fn render_line(scene: &Path, output: &Path, words: &[String]) -> Result<render::Arguments> {
     let line = ["shadow-fields".into(), "render".into(), scene.into(), "-o".into(), output.as_os_str().to_owned()];
-    match parse(line.into_iter().chain(words.iter().map(Into::into)))? {
-        Cli { command: Subcommands::Render(arguments), .. } => Ok(arguments),
+    match understood(line.into(), words)? {
+        Subcommands::Render(arguments) => Ok(arguments),
         _ => Err(Error::Usage("the options after -- are not those of render".into())),
     }
 }

@@ -8,6 +8,7 @@ use crate::farm::engines::{self, Call};
 use crate::farm::local::{Runner, cannot_start};
 use crate::farm::status::missing;
 use crate::files;
+use crate::gpu::Validation;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -35,8 +36,8 @@ pub struct Arguments {
     /// What runs the slices
     #[arg(long, value_enum, value_name = "ENGINE")]
     engine: Engine,
-    /// Slices at a time: processes of local and of a Dask cluster on this machine (default: one a core), tasks of a Slurm array
-    /// (default: no limit)
+    /// Slices at a time: processes of local and of a Dask cluster on this machine (default: one a core), tasks of all Slurm arrays, but
+    /// at least one of each (default: no limit)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     workers: Option<u32>,
     /// Address of a Dask scheduler; default: a cluster on this machine
@@ -54,8 +55,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let full = |path: &Path| std::path::absolute(path).map_err(|error| Error::input(path, error));
     let program =
         std::env::current_exe().map_err(|e| Error::Failed(format!("the program's own file is not known: {e}")))?;
-    let (path, words) = (full(&arguments.plan)?, passed_on(global));
-    let call = Call { program: &program, plan: &path, words: &words };
+    let call = Call { program, plan: full(&arguments.plan)?, words: passed_on(global) };
     if slices.is_empty() && arguments.engine != Engine::Openjd {
         output::note(global, "all results are there");
         return Ok(());
@@ -64,11 +64,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         Engine::Local => {
             let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
             let workers = arguments.workers.map_or(cores, |workers| workers as usize);
-            let runner = Runner { program: program.clone(), plan: path.clone(), words: words.clone(), workers };
-            local(global, &runner, &slices)
+            local(global, &Runner { call, workers }, &slices)
         }
-        Engine::Slurm => slurm(arguments, (&plan, &path), &call, &slices),
-        Engine::Dask => dask(arguments, &path, &call, &slices),
+        Engine::Slurm => slurm(arguments, &plan, &call, &slices),
+        Engine::Dask => dask(arguments, &call, &slices),
         Engine::Print => {
             slices.iter().for_each(|slice| output::say(call.line(&slice.to_string())));
             Ok(())
@@ -89,11 +88,12 @@ fn passed_on(global: &Global) -> Vec<String> {
     if let Some(device) = &global.device {
         add("--device", device.clone());
     }
-    for (name, folder) in [("--cache-dir", &global.cache_dir), ("--shader-dir", &global.shader_dir)] {
-        if let Some(folder) = folder {
-            let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.clone());
-            add(name, folder.to_string_lossy().into_owned());
-        }
+    if let Some(folder) = &global.cache_dir {
+        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.clone());
+        add("--cache-dir", folder.to_string_lossy().into_owned());
+    }
+    if global.validation != Validation::Off {
+        add("--validation", format!("{:?}", global.validation).to_lowercase());
     }
     if global.no_cache {
         words.push("--no-cache".into());
@@ -126,25 +126,22 @@ fn beside(plan: &Path, ending: &str, text: &str) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// A file with the number of a slice in each line.
-fn list(plan: &Path, slices: &[usize]) -> Result<PathBuf> {
-    beside(plan, "slices", &slices.iter().map(|slice| format!("{slice}\n")).collect::<String>())
+/// A command as a line of a shell script.
+fn shown(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    words.map(|word| engines::quoted(&word.to_string_lossy())).collect::<Vec<_>>().join(" ")
 }
 
-fn slurm(arguments: &Arguments, (plan, path): (&Plan, &Path), call: &Call<'_>, slices: &[usize]) -> Result<()> {
-    let logs = path.with_extension("logs");
+fn slurm(arguments: &Arguments, plan: &Plan, call: &Call, slices: &[usize]) -> Result<()> {
+    let logs = call.plan.with_extension("logs");
     std::fs::create_dir_all(&logs)
         .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", logs.display())))?;
-    let list = list(path, slices)?;
-    let script = beside(path, "sbatch", &engines::slurm(plan, call, &list, &logs))?;
-    let limit = arguments.workers.map_or_else(String::new, |workers| format!("%{workers}"));
-    for first in (0..slices.len()).step_by(engines::ARRAY) {
-        let last = (slices.len() - first).min(engines::ARRAY) - 1;
+    let script = beside(&call.plan, "sbatch", &engines::slurm(plan, call, &logs))?;
+    for (first, tasks) in engines::arrays(slices, arguments.workers.map(|workers| workers as usize)) {
         let mut command = Command::new("sbatch");
-        command.args([&format!("--array=0-{last}{limit}"), &format!("--export=ALL,FIRST={first}")]).arg(&script);
+        command.args([&format!("--array={tasks}"), &format!("--export=ALL,FIRST={first}")]).arg(&script);
         if arguments.dry_run {
-            let words: Vec<_> = command.get_args().map(|word| engines::quoted(&word.to_string_lossy())).collect();
-            output::say(format!("sbatch {}", words.join(" ")));
+            output::say(shown(&command));
             continue;
         }
         let done = command.output().map_err(|error| cannot_start(Path::new("sbatch"), &error))?;
@@ -158,8 +155,8 @@ fn slurm(arguments: &Arguments, (plan, path): (&Plan, &Path), call: &Call<'_>, s
     Ok(())
 }
 
-fn dask(arguments: &Arguments, path: &Path, call: &Call<'_>, slices: &[usize]) -> Result<()> {
-    let script = beside(path, "dask.py", engines::DASK)?;
+fn dask(arguments: &Arguments, call: &Call, slices: &[usize]) -> Result<()> {
+    let script = beside(&call.plan, "dask.py", engines::DASK)?;
     let mut command = Command::new("python3");
     command.arg(&script);
     if let Some(address) = &arguments.scheduler {
@@ -168,12 +165,12 @@ fn dask(arguments: &Arguments, path: &Path, call: &Call<'_>, slices: &[usize]) -
     if let Some(workers) = arguments.workers {
         command.args(["--workers", &workers.to_string()]);
     }
-    command.arg(list(path, slices)?);
+    let numbers: String = slices.iter().map(|slice| format!("{slice}\n")).collect();
+    command.arg(beside(&call.plan, "slices", &numbers)?);
     // The number of the slice comes last.
-    command.arg(call.program).args(["farm", "run"]).arg(call.plan).args(call.words).arg("--slice");
+    command.arg(&call.program).args(["farm", "run"]).arg(&call.plan).args(&call.words).arg("--slice");
     if arguments.dry_run {
-        let words: Vec<_> = command.get_args().map(|word| engines::quoted(&word.to_string_lossy())).collect();
-        output::say(format!("python3 {}", words.join(" ")));
+        output::say(shown(&command));
         return Ok(());
     }
     let status = command.status().map_err(|error| cannot_start(Path::new("python3"), &error))?;

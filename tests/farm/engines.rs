@@ -1,0 +1,133 @@
+//! The engines of others: Slurm, Dask, OpenJD, and lines of commands.
+
+use super::{Farm, common, finish, has_device, processes, whole};
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Whether the engines of others have to be there.
+fn engine(name: &str, is_there: bool) -> bool {
+    let required = std::env::var_os("SHADOW_FIELDS_REQUIRE_FARM").is_some_and(|value| value == "1");
+    assert!(
+        is_there || !required,
+        "SHADOW_FIELDS_REQUIRE_FARM=1, but {name} is not there: scripts/setup test installs it"
+    );
+    if !is_there {
+        common::report(&format!("skipped: {name} is not installed"));
+    }
+    is_there
+}
+
+/// The path of programs, with those of the virtual environment that `scripts/setup test` makes first.
+fn search_path() -> String {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join(".build/farm/bin");
+    format!("{}:{}:/usr/sbin", own.display(), std::env::var("PATH").unwrap())
+}
+
+fn succeeds(program: &str, arguments: &[&str]) -> bool {
+    let mut command = Command::new("env");
+    command.arg(program).args(arguments).env("PATH", search_path());
+    command.output().is_ok_and(|output| output.status.success())
+}
+
+#[test]
+fn dask_runs_slices_in_two_workers() {
+    if !has_device() || !engine("Dask", succeeds("python3", &["-c", "import distributed"])) {
+        return;
+    }
+    let farm = Farm::new();
+    farm.plan(1);
+    let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", "dask", "--workers", "2", "-q"]);
+    let ran = finish(submit.env("PATH", search_path()));
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(farm.collected() == whole().files);
+}
+
+#[test]
+fn templates_and_commands_are_what_other_farms_take() {
+    if !has_device() {
+        return;
+    }
+    let farm = Farm::new();
+    let slices = farm.plan(1);
+    let commands = farm.good(&["farm", "submit", "p.json", "--engine", "print"]);
+    assert_eq!(commands.lines().count(), slices);
+    assert!(Command::new("sh").args(["-c", commands.lines().next().unwrap()]).output().unwrap().status.success());
+    assert_eq!(farm.results().len(), 1);
+    let template = farm.good(&["farm", "submit", "p.json", "--engine", "openjd"]);
+    let json: Value = serde_json::from_str(&template).unwrap();
+    let range = &json["steps"][0]["parameterSpace"]["taskParameterDefinitions"][0]["range"];
+    assert_eq!(*range, format!("1-{}", slices - 1), "only what is missing");
+    if engine("OpenJD", succeeds("openjd", &["--version"]) || succeeds("openjd", &["--help"])) {
+        let path = farm.path("job.template.json");
+        std::fs::write(&path, template).unwrap();
+        assert!(succeeds("openjd", &["check", path.to_str().unwrap()]));
+        assert!(succeeds("openjd", &["run", path.to_str().unwrap(), "--step", "Slices", "--task-param", "Slice=1"]));
+        assert_eq!(farm.results().len(), 2);
+        std::fs::write(&path, json.to_string().replace("Task.Param.Slice", "Task.Param.Other")).unwrap();
+        assert!(!succeeds("openjd", &["check", path.to_str().unwrap()]), "it tells a broken template");
+    }
+}
+
+/// Slurm of one node, stopped at the end.
+struct SlurmNode(tempfile::TempDir);
+
+impl SlurmNode {
+    fn script(&self, what: &str) -> bool {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/slurm-node");
+        let mut command = Command::new(script);
+        // Its services outlive the script, and hold no pipe of the test.
+        command.arg(self.0.path()).arg(what).env("PATH", search_path());
+        command.stdin(Stdio::null()).stdout(Stdio::null()).status().unwrap().success()
+    }
+
+    /// A command that talks to this Slurm.
+    fn on<'c>(&self, command: &'c mut Command) -> &'c mut Command {
+        command.env("SLURM_CONF", self.0.path().join("slurm.conf")).env("PATH", search_path())
+    }
+}
+
+impl Drop for SlurmNode {
+    fn drop(&mut self) {
+        self.script("stop");
+    }
+}
+
+#[test]
+fn slurm_runs_an_array_and_requeues_what_dies() {
+    let there = ["slurmctld", "slurmd", "sbatch", "munged"]
+        .iter()
+        .all(|name| search_path().split(':').any(|folder| Path::new(folder).join(name).exists()));
+    let root = std::fs::metadata("/proc/self").is_ok_and(|about| std::os::unix::fs::MetadataExt::uid(&about) == 0);
+    if !has_device() || !engine("Slurm", there && root) {
+        return;
+    }
+    let farm = Farm::new();
+    let slices = farm.plan(1);
+    let node = SlurmNode(tempfile::tempdir().unwrap());
+    assert!(node.script("start"));
+    let submit = ["farm", "submit", "p.json", "--engine", "slurm", "--workers", "2"];
+    let dry = finish(node.on(&mut farm.command(&[&submit[..], &["--dry-run"]].concat())));
+    assert!(dry.stdout.contains(&format!("--array=0-{}%2 --export=ALL,FIRST=0", slices - 1)), "{}", dry.stdout);
+    let ran = finish(node.on(&mut farm.command(&submit)));
+    assert!(ran.code == 0 && ran.stdout.starts_with("Submitted batch job "), "{} {}", ran.stdout, ran.stderr);
+    let job = ran.stdout.trim().rsplit(' ').next().unwrap().to_owned();
+    // The first start of slice 0 is killed; Slurm puts it back into the queue.
+    let first = [farm.path("p.json").as_os_str().as_encoded_bytes(), b"\0--slice\x000\0"].concat();
+    let (start, mut killed) = (std::time::Instant::now(), false);
+    while farm.results().len() < slices {
+        assert!(start.elapsed().as_secs() < 200, "{}", farm.good(&["farm", "status", "p.json"]));
+        if let Some(id) = processes(&first).first().filter(|_| !killed) {
+            killed = Command::new("kill").args(["-9", &id.to_string()]).status().unwrap().success();
+        }
+        if killed {
+            // A requeued task waits for two minutes unless it is released.
+            let task = format!("JobId={job}_0");
+            let _ = node.on(Command::new("scontrol").args(["update", &task, "StartTime=now"])).output();
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    assert!(killed && farm.collected() == whole().files);
+    let log = std::fs::read_to_string(farm.path(&format!("p.logs/{job}_0.log"))).unwrap();
+    assert!(log.contains("start 0") && log.contains("start 1"), "{log}");
+}

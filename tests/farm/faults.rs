@@ -1,0 +1,158 @@
+//! What goes wrong on machines: kills, damage, folders that cannot be written. Nothing is lost then, and nothing is wrong.
+
+use super::{Farm, common, finish, has_device, processes, whole};
+use serde_json::{Value, json};
+use shadow_fields::farm::{Plan, results};
+use std::process::Command;
+
+#[test]
+fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
+    if !has_device() {
+        return;
+    }
+    let farm = Farm::new();
+    let slices = farm.plan(1);
+    let mut twice: Vec<_> =
+        (0..2).map(|_| farm.command(&["farm", "run", "p.json", "--slice", "0", "-q"]).spawn().unwrap()).collect();
+    assert!(twice.iter_mut().all(|process| process.wait().unwrap().success()));
+    assert_eq!(farm.results().len(), 1);
+    farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
+    assert!(farm.collected() == whole().files);
+    let plan = Plan::read(&farm.path("p.json")).unwrap();
+    let results: Vec<_> = (0..slices).map(|slice| results::path(&plan, slice)).collect();
+    // One byte is turned, one file is cut, one is another slice's, one is gone.
+    let bytes: Vec<Vec<u8>> = results.iter().map(|path| std::fs::read(path).unwrap()).collect();
+    let mut turned = bytes[0].clone();
+    *turned.last_mut().unwrap() ^= 1;
+    std::fs::write(&results[0], turned).unwrap();
+    std::fs::write(&results[1], &bytes[1][..bytes[1].len() / 2]).unwrap();
+    std::fs::write(&results[2], &bytes[3]).unwrap();
+    std::fs::remove_file(&results[4]).unwrap();
+    let found = farm.run(&["farm", "collect", "p.json", "--into", "cache", "--json"]);
+    assert_eq!(found.code, 1, "{}", found.stderr);
+    let again = format!("4 of {slices} slices have to run again, missing: 4, damaged: 0-2");
+    assert!(found.stderr.contains(&again), "{}", found.stderr);
+    let said: Value = serde_json::from_str(&found.stdout).unwrap();
+    assert_eq!((&said["missing"], &said["damaged"]), (&json!([4]), &json!([0, 1, 2])));
+    farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
+    assert!(farm.collected() == whole().files);
+    // A slice whose result is damaged does it anew by itself.
+    std::fs::write(&results[0], b"not a result").unwrap();
+    let said = farm.good(&["farm", "run", "p.json", "--slice", "0"]);
+    assert!(said.contains("done in"), "{said}");
+    assert!(farm.collected() == whole().files);
+}
+
+/// A full disk, a read-only folder and a limit on the sizes of files: the slice fails with one line, and leaves nothing half-written.
+#[test]
+fn folders_that_cannot_be_written_lose_nothing() {
+    if !has_device() {
+        return;
+    }
+    let farm = Farm::new();
+    farm.plan(1);
+    std::fs::create_dir(farm.path("results")).unwrap();
+    for (words, how) in [
+        (&["unshare", "-m", "sh"][..], "mount -t tmpfs -o size=8k none results"),
+        (&["unshare", "-m", "sh"], "mount -t tmpfs -o ro none results"),
+        (&["sh"], "ulimit -f 4"),
+    ] {
+        let inner = farm.command(&["farm", "run", "p.json", "--slice", "0", "-q"]);
+        let mut outer = Command::new(words[0]);
+        let after = "\"$@\"; code=$?; find results -type f; exit $code";
+        outer.current_dir(farm.folder.path()).args(&words[1..]).args([
+            "-c",
+            &format!("{how} || exit 99; {after}"),
+            "sh",
+        ]);
+        outer.arg(inner.get_program()).args(inner.get_args()).env_remove("RUST_LOG");
+        let ran = finish(&mut outer);
+        if ran.code == 99 {
+            common::report(&format!("not allowed here: {how}"));
+            continue;
+        }
+        assert_eq!((ran.code, ran.stdout.as_str()), (1, ""), "{how}: {}", ran.stderr);
+        // With the limit, the folder that the slice works in is the first that cannot be written.
+        let said = ["cannot be written", "nothing was written"];
+        assert!(said.iter().any(|words| ran.stderr.contains(words)), "{how}: {}", ran.stderr);
+    }
+    farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
+    assert!(farm.collected() == whole().files);
+}
+
+/// Process ids of all that descend from a process, and its own.
+fn descendants(parent: u32) -> Vec<u32> {
+    let parents: Vec<(u32, u32)> = std::fs::read_dir("/proc")
+        .unwrap()
+        .filter_map(|entry| {
+            let entry = entry.ok()?;
+            let id: u32 = entry.file_name().to_str()?.parse().ok()?;
+            let stat = std::fs::read_to_string(entry.path().join("stat")).ok()?;
+            Some((id, stat.rsplit_once(") ")?.1.split(' ').nth(1)?.parse().ok()?))
+        })
+        .collect();
+    let mut all = vec![parent];
+    let mut next = 0;
+    while next < all.len() {
+        let parent = all[next];
+        all.extend(parents.iter().filter(|(_, of)| *of == parent).map(|(id, _)| *id));
+        next += 1;
+    }
+    all
+}
+
+/// Slices, workers and submitters are killed at random moments. Afterwards what is there is whole, and the rest is done.
+#[test]
+fn kills_lose_at_most_the_slice() {
+    if !has_device() {
+        return;
+    }
+    let kills: usize = std::env::var("SHADOW_FIELDS_FARM_KILLS").map_or(4, |text| text.parse().unwrap());
+    let farm = Farm::new();
+    let slices = farm.plan(2);
+    let mut random = fastrand::Rng::with_seed(7);
+    let (mut done, mut killed) = (0, 0);
+    for kill in 0..kills {
+        if kill % 4 == 0 {
+            let _ = std::fs::remove_dir_all(farm.path("results"));
+        }
+        let before = farm.results();
+        let mut command = match kill % 2 {
+            0 => farm.command(&["farm", "submit", "p.json", "--engine", "local", "--workers", "2", "-q"]),
+            _ => farm.command(&["farm", "run", "p.json", "--slice", &random.usize(0..slices).to_string(), "-q"]),
+        };
+        let mut process = command.stdout(std::process::Stdio::null()).spawn().unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(random.u64(50..1500)));
+        let all = descendants(process.id());
+        // The submitter alone, any one of its processes, or all of them as when a machine loses power.
+        let chosen = match random.usize(0..3) {
+            0 => vec![all[0]],
+            1 => vec![all[random.usize(0..all.len())]],
+            _ => all.clone(),
+        };
+        for id in &chosen {
+            let status =
+                Command::new("kill").args(["-9", &id.to_string()]).stderr(std::process::Stdio::null()).status();
+            killed += usize::from(status.unwrap().success());
+        }
+        process.wait().unwrap();
+        // Slices of a submitter that was killed go on to their ends.
+        let start = std::time::Instant::now();
+        while !processes(farm.folder.path().as_os_str().as_encoded_bytes()).is_empty() {
+            assert!(start.elapsed().as_secs() < 60, "slices of a killed submitter end");
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        let after = farm.results();
+        assert!(before.iter().all(|path| after.contains(path)), "nothing is lost");
+        let found = farm.run(&["farm", "collect", "p.json", "--into", "cache", "--json"]);
+        let said: Value = serde_json::from_str(&found.stdout).unwrap();
+        assert_eq!(said["damaged"], serde_json::json!([]), "nothing is wrong: {}", found.stderr);
+        assert_eq!(said["missing"].as_array().unwrap().len(), slices - after.len());
+        done += usize::from(found.code == 0);
+    }
+    farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
+    let _ = std::fs::remove_dir_all(farm.path("cache"));
+    assert!(farm.collected() == whole().files);
+    // What killed slices left is swept by the next that writes to the same folder, and is no result in any case.
+    common::report(&format!("{kills} moments, {killed} processes killed, {done} plans whole then"));
+}

@@ -66,10 +66,9 @@ impl Farm {
         // A name that engines have to quote.
         let folder = tempfile::Builder::new().prefix("a farm's 5%").tempdir().unwrap();
         std::fs::create_dir(folder.path().join("meshes")).unwrap();
-        for (name, mesh) in [
-            ("a", crate::common::generate::torus(0.6, 0.2, 12, 8)),
-            ("b", crate::common::generate::sphere(1.0, 1)),
-        ] {
+        for (name, mesh) in
+            [("a", crate::common::generate::torus(0.6, 0.2, 12, 8)), ("b", crate::common::generate::sphere(1.0, 1))]
+        {
             let text = shadow_fields::asset::obj::write_obj(&mesh);
             std::fs::write(folder.path().join(format!("meshes/{name}.obj")), text).unwrap();
         }

@@ -11,8 +11,7 @@
 
 layout(local_size_x = WORKGROUP) in;
 
-layout(std430, binding = 1) readonly buffer Entries { uint entries[]; };
-layout(std430, binding = 2) readonly buffer Clusters { Cluster clusters[]; };
+#include "lists.glsl"
 const uint NONE = 0xffffffffu;
 
 #define ENTITY_BINDING 0
@@ -70,6 +69,9 @@ struct Vertex {
 
 // Of an occluder in the chain of l, as far as order and skips decide.
 float share(Vertex vertex, uint e, Cone cone, uint l) {
+    if (LIGHTS == 0) {
+        return 1.0;
+    }
     // The sky's chain has no light; any entity will do to keep the read in bounds.
     vec4 light_centre = ENTITY(l == SKY_CHAIN ? e : l).centre;
     light_centre.xyz -= vertex.receiver;
@@ -81,7 +83,7 @@ float share(Vertex vertex, uint e, Cone cone, uint l) {
 void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN], inout vec3 sum) {
     uint e = packed & SKY_CHAIN;
     uint l = (packed >> ENTRY_BITS) & SKY_CHAIN;
-    bool shines = (packed & ENTRY_LIGHT) != 0;
+    bool shines = LIGHTS == 1 && (packed & ENTRY_LIGHT) != 0;
     uint channel = (packed >> ENTRY_CHANNEL) & 3;
     bool of_radiance = shines && channel != 3;
 
@@ -116,7 +118,7 @@ void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN]
     vec3 color = of_radiance ? vec3(channel == 0, channel == 1, channel == 2) : vec3(1.0);
     sum += (shines ? met : 0.0) * color * entity.emission.rgb;
     chain_multiply(t, b);
-    bool anew = (packed & ENTRY_LAST) != 0;
+    bool anew = LIGHTS == 1 && (packed & ENTRY_LAST) != 0;
     [[unroll]] for (uint k = 0; k < CHAIN; k++) {
         t[k] = anew ? t_start[k] : t[k];
     }
@@ -141,7 +143,7 @@ void cover(Vertex vertex, uint packed, inout float t[CHAIN]) {
 #endif
 
 void main() {
-    Cluster cluster = clusters[gl_WorkGroupID.x];
+    Cluster cluster = cluster_at(gl_WorkGroupID.x);
     uint v = gl_LocalInvocationID.x;
     if (v >= cluster.vertex_count) {
         return;
@@ -171,7 +173,7 @@ void main() {
     if (cluster.entry_count > 0) {
         Vertex vertex = Vertex(receiver.centre.xyz, position, normal);
         uint i = 0;
-        uint packed = entries[cluster.entry_first];
+        uint packed = entry_at(cluster.entry_first);
         // Loops are tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the loop. It jumps
         // nowhere else, so entries of either kind run as loops of their own, each in turn as long as there are such entries.
         do {
@@ -180,18 +182,18 @@ void main() {
                 if (!is_cap(packed)) {
                     look(vertex, packed, t_start, t, sum);
                     i++;
-                    packed = entries[cluster.entry_first + min(i, cluster.entry_count - 1)];
+                    packed = entry_at(cluster.entry_first + min(i, cluster.entry_count - 1));
                 }
             } while (i < cluster.entry_count && !is_cap(packed));
             do {
                 if (i < cluster.entry_count && is_cap(packed)) {
                     cover(vertex, packed, t);
                     i++;
-                    packed = entries[cluster.entry_first + min(i, cluster.entry_count - 1)];
+                    packed = entry_at(cluster.entry_first + min(i, cluster.entry_count - 1));
                 }
             } while (i < cluster.entry_count && is_cap(packed));
 #else
-            look(vertex, entries[cluster.entry_first + i], t_start, t, sum);
+            look(vertex, entry_at(cluster.entry_first + i), t_start, t, sum);
             i++;
 #endif
         } while (i < cluster.entry_count);

@@ -9,11 +9,7 @@ layout(local_size_x = WORKGROUP) in;
 const uint NONE = 0xffffffffu;
 #define ENTITY_BINDING 0
 #include "entities.glsl"
-layout(std430, binding = 1) readonly buffer Entries { uint entries[]; };
-uint entry_at(uint i) {
-    return entries[i];
-}
-layout(std430, binding = 2) readonly buffer Clusters { Cluster clusters[]; };
+#include "lists.glsl"
 #define NODE_BINDING 3
 #include "silhouette_field.glsl"
 #if TEXEL
@@ -21,14 +17,21 @@ layout(binding = 5) uniform textureBuffer vertices;
 vec4 vertex_quad(uint i) {
     return texelFetch(vertices, int(i));
 }
+layout(binding = 8) uniform textureBuffer soft; // what the merge has written
+vec4 soft_at(uint i) {
+    return texelFetch(soft, int(i));
+}
 #else
 layout(std430, binding = 5) readonly buffer Vertices { vec4 vertices[]; };
 vec4 vertex_quad(uint i) {
     return vertices[i];
 }
+layout(std430, binding = 8) readonly buffer Soft { vec4 soft[]; };
+vec4 soft_at(uint i) {
+    return soft[i];
+}
 #endif
 layout(std430, binding = 6) writeonly buffer Radiosity { vec4 radiosity[]; };
-layout(std430, binding = 8) readonly buffer Soft { vec4 soft[]; }; // what the merge has written
 #if SELF
 #if TEXEL
 layout(binding = 7) uniform utextureBuffer self_cells;
@@ -49,7 +52,7 @@ uvec2 self_cell(uint i) {
 #include "sharp_light.glsl"
 
 void main() {
-    Cluster cluster = clusters[gl_WorkGroupID.x];
+    Cluster cluster = cluster_at(gl_WorkGroupID.x);
     uint v = gl_LocalInvocationID.x;
     if (v >= cluster.vertex_count) {
         return;
@@ -64,7 +67,7 @@ void main() {
     surface.inverse_radius = receiver.centre.w;
     surface.step = place.w;
     surface.facings[0] = facing_of(receiver, vertex_quad(at + 1).xyz, 1.0, cluster.self_first, v);
-    vec4 sum = soft[cluster.radiosity_first + v];
+    vec4 sum = soft_at(cluster.radiosity_first + v);
     if (cluster.sharp_count > 0) {
         sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo.rgb;
     }

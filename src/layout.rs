@@ -1,5 +1,6 @@
 //! Structs shared with `glsl/merge_layout.glsl`; `tests/layouts.rs` compares names and offsets with the compiled shaders.
 
+use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
 /// One entity of the scene in the form that the merge reads.
@@ -68,6 +69,11 @@ pub const NONE: u32 = u32::MAX;
 /// Vertices of a cluster, which is one workgroup: eight subgroups on llvmpipe, two on most GPUs, and within the limits of
 /// every device.
 pub const CLUSTER_VERTICES: u32 = 64;
+
+/// Texels through which some variants of a pass read entries: one each.
+pub const ENTRY_FORMAT: vk::Format = vk::Format::R32_UINT;
+/// Texels through which they read [`Cluster`]: two of its numbers each.
+pub const CLUSTER_FORMAT: vk::Format = vk::Format::R32G32_UINT;
 
 /// Bits of an entity's number in an entry.
 pub const ENTRY_BITS: u32 = 14;

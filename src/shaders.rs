@@ -38,6 +38,7 @@ embedded!(
     "gather_scope.glsl",
     "grid.frag",
     "grid.vert",
+    "lists.glsl",
     "merge.comp",
     "merge_cap.glsl",
     "merge_cone.glsl",

@@ -100,6 +100,7 @@ fn usual_permutation() -> MergePermutation {
         lattice: Lattice::default().starting_at(1.02),
         lookup: Lookup::Trilinear,
         skip: Skip::ALL,
+        lights: true,
         entity_limit: 48,
     }
 }
@@ -137,6 +138,7 @@ fn merging() -> Vec<ShaderPermutation> {
         permutations.extend(lattices.map(|text| MergePermutation { lattice: lattice(text), lookup, ..usual }));
     }
     permutations.push(MergePermutation { guard: false, ..usual });
+    permutations.push(MergePermutation { lights: false, ..usual });
     permutations.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| MergePermutation {
         bands,
         field_bands,

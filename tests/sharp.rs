@@ -244,6 +244,33 @@ fn pixels_follow_switches_of_entities() {
     assert!(without == show(&mut new(&bare)), "a frame that was made for the other scene shows something else");
 }
 
+/// A merge that was compiled for a scene without lights learns of one that is switched on.
+#[test]
+fn a_light_that_is_switched_on_meets_the_chains() {
+    let Some(gpu) = gpu() else { return };
+    // The sky needs every field and transfer, so that nothing is missing when the ball begins to shine.
+    let scene = parse(&format!(
+        "{HEAD}[[entity]]\nmesh = \"ball\"\nposition = [0, 0.6, 0]\n[[entity]]\nmesh = \"ball\"\nposition = [1.2, 2.6, 0.8]\n\
+         scale = 0.3\nemission = [90, 90, 90]\noccludes = true\n[environment]\nuniform = [0.2, 0.2, 0.2]\n"
+    ));
+    let mut dark = scene.clone();
+    dark.entities[2].emits = false;
+    let options = Options { lights: Lights::Sh, ..check::sharp_options() };
+    let new = |scene: &Scene| Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
+    let light = |frame: &mut Frame| {
+        frame.render(&scene.at(0.0), None).unwrap();
+        frame.radiosity(0).unwrap()
+    };
+    let mut frame = new(&dark);
+    let without = light(&mut frame);
+    assert!(!frame.permutation().lights && frame.covers(&scene));
+    frame.set_scene(&scene).unwrap();
+    let with = light(&mut frame);
+    assert!(with != without && with == light(&mut new(&scene)));
+    frame.set_scene(&dark).unwrap();
+    assert!(without == light(&mut frame), "lights that do not shine change nothing");
+}
+
 /// A frame without sharp lights lacks the pass that a scene with one needs.
 #[test]
 fn a_frame_covers_no_scene_whose_sharp_lights_have_no_pass() {

@@ -117,6 +117,7 @@ fn work(permutation: &MergePermutation, census: &Census) -> Work {
     let texel = |name: &str| match name {
         "field_quads" => texel_bytes(permutation),
         "field_image" => 64,
+        "entries" => 4,
         _ => 16,
     };
     let fetched: u32 = census.fetches.iter().map(|(name, count)| count * texel(name)).sum();

@@ -1,8 +1,10 @@
 //! What may change from frame to frame: the scene's lights and camera, the merge's variant, and shader files.
 
-use super::permutation::{CompiledMerge, usable};
+use super::permutation::{CompiledMerge, harmonic_lights, usable};
 use super::{Frame, Options, forms, permutation};
 use crate::error::Result;
+use crate::gpu::TexelView;
+use crate::layout::ENTRY_FORMAT;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{Camera, Scene};
@@ -23,7 +25,7 @@ impl Frame {
     /// Takes over lights, switches, sky and camera of a scene that has the meshes and receivers that this frame was made for.
     ///
     /// # Errors
-    /// `Device` when memory ran out.
+    /// `Device` when memory ran out, `Failed` when a shader does not compile.
     ///
     /// # Panics
     /// When entities or receivers are others.
@@ -33,6 +35,10 @@ impl Frame {
         let sky = scene.data.environment != self.scene.data.environment;
         self.scene = scene.clone();
         self.forms = forms(scene, self.options.lights);
+        // A shader that knows of lights serves a scene without them as well.
+        if harmonic_lights(scene, &self.forms) && !self.merge.permutation.lights {
+            self.compile_merge(MergePermutation { lights: true, ..self.merge.permutation })?;
+        }
         if sky {
             self.work.lists.renew();
             self.sky.write(scene, self.options.bake.bands)?;
@@ -56,7 +62,34 @@ impl Frame {
     /// `Failed` when its shader does not compile.
     pub fn set_variant(&mut self, variant: Option<Variant>) -> Result<()> {
         let variant = variant.unwrap_or_else(|| calibrate::best_known(&self.device));
-        let wanted = MergePermutation { variant, ..self.merge.permutation };
+        self.compile_merge(MergePermutation { variant, ..self.merge.permutation })
+    }
+
+    /// Goes over to storage blocks for good where texel views cannot hold the lists that the next merge reads.
+    pub(super) fn fit_lists(&mut self) -> Result<()> {
+        if TexelView::fits(&self.device, ENTRY_FORMAT, self.work.entries().size_bytes) {
+            return Ok(());
+        }
+        let MergePermutation { variant, .. } = self.merge.permutation;
+        // Entities name places in an image, so that variant cannot go over; it fails with the view.
+        if variant.texel && !variant.image {
+            let variant = variant.restricted(false, false, false);
+            log::info!("the lists are too long for texel views; using \"{}\"", variant.name);
+            self.merge = CompiledMerge::new(
+                &self.device,
+                &self.library,
+                (MergePermutation { variant, ..self.merge.permutation }, None),
+            )?;
+        }
+        if let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.texel) {
+            let permutation = SharpPermutation { texel: false, ..sharp.permutation };
+            *sharp = Sharp::new(&self.device, &self.library, permutation)?;
+        }
+        Ok(())
+    }
+
+    /// Compiles the merge for what is wanted, as far as the device allows it.
+    fn compile_merge(&mut self, wanted: MergePermutation) -> Result<()> {
         let usable = usable(&self.device, &self.buffers, self.scene.entities.len(), wanted)?;
         if usable.0 != self.merge.permutation {
             self.merge = CompiledMerge::new(&self.device, &self.library, usable)?;

@@ -28,6 +28,7 @@ use crate::bake::{self, Baker, SceneNeeds};
 use crate::draw::Shading;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Timing};
+use crate::layout::{CLUSTER_FORMAT, ENTRY_FORMAT};
 use crate::lists::gather::Place;
 use crate::lists::gathering::Gathering;
 use crate::lists::incremental::{ClusterLists, Merged};
@@ -39,7 +40,7 @@ use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
 use ash::vk;
-use permutation::{CompiledMerge, permutation, usable};
+use permutation::{CompiledMerge, harmonic_lights, permutation, usable};
 use picture::Picture;
 use pixel::PixelChains;
 use radiosity::Radiosity;
@@ -100,10 +101,9 @@ impl Frame {
         let buffers = SceneBuffers::new(device, scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
-        let wanted = permutation(&options, wanted, uniform_entities(device));
-        let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted)?)?;
-
         let forms = forms(scene, options.lights);
+        let wanted = permutation(&options, wanted, harmonic_lights(scene, &forms), uniform_entities(device));
+        let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted)?)?;
         let sharp = permutation::sharp(&options, &merge.permutation, &forms, scene, &buffers)
             .map(|wanted| wanted.fitting(device, buffers.sharp()))
             .map(|permutation| Sharp::new(device, library, permutation))
@@ -231,6 +231,7 @@ impl Frame {
         let (state, sights) = (self.state(placements), self.sights(placements, viewports));
         self.radiosity.replaced = false;
         self.work.prepare(state, sights.as_deref())?;
+        self.fit_lists()?;
         if viewports.is_empty() { Ok(()) } else { self.prepare_pixels() }
     }
 
@@ -275,8 +276,8 @@ impl Frame {
         let CompiledMerge { permutation, image, .. } = &self.merge;
         Ok(Inputs {
             entities: Readable::shared(&self.work.entities, permutation.variant)?,
-            entries: self.work.entries(),
-            clusters: &self.work.clusters,
+            entries: Readable::new(self.work.entries(), permutation.variant, ENTRY_FORMAT)?,
+            clusters: Readable::new(&self.work.clusters, permutation.variant, CLUSTER_FORMAT)?,
             fields: Readable::fields(&self.buffers.fields, image.as_ref(), permutation)?,
             transfers: Readable::new(&self.buffers.transfers, permutation.variant, floats)?,
             vertices: Readable::new(&self.buffers.vertices, permutation.variant, floats)?,

@@ -92,8 +92,13 @@ pub(super) fn sharp(
     })
 }
 
+/// Whether any light of the scene meets the chains of the merge. The sky does in any case.
+pub(super) fn harmonic_lights(scene: &Scene, forms: &[LightForm]) -> bool {
+    scene.entities.iter().zip(forms).any(|(entity, form)| entity.emits && !form.is_sharp())
+}
+
 /// The permutation of the merge shader.
-pub(super) fn permutation(options: &Options, variant: Variant, entity_limit: u32) -> MergePermutation {
+pub(super) fn permutation(options: &Options, variant: Variant, lights: bool, entity_limit: u32) -> MergePermutation {
     MergePermutation {
         variant,
         bands: options.bake.bands,
@@ -103,6 +108,7 @@ pub(super) fn permutation(options: &Options, variant: Variant, entity_limit: u32
         lattice: options.bake.lattice,
         lookup: options.lookup,
         skip: options.skip,
+        lights,
         entity_limit,
     }
 }

@@ -85,12 +85,14 @@ pub fn record<'f>(
             commands.pass("gather", |c| gathering.record(c, work.entities, work.clusters))?;
             // The merge reads the lists, and the host reads how long they are.
             commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
             commands.barrier(Access::ComputeWrite, Access::HostRead);
         }
         commands.pass("merge", |c| work.merge.record(c, &work.inputs, work.soft, work.cluster_count))?;
         if let Some((sharp, inputs)) = &work.sharp {
             // The pass reads what the merge has written.
             commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
             commands.pass("sharp", |c| sharp.record(c, inputs, work.radiosity, work.cluster_count))?;
         }
     }

@@ -70,9 +70,9 @@ pub struct Inputs<'b> {
     /// [`crate::layout::Entity`] of every entity.
     pub entities: Readable<'b>,
     /// Entries of all clusters.
-    pub entries: &'b Buffer,
+    pub entries: Readable<'b>,
     /// [`crate::layout::Cluster`] of every cluster.
-    pub clusters: &'b Buffer,
+    pub clusters: Readable<'b>,
     /// Fields of the scene.
     pub fields: Readable<'b>,
     /// Transfer vectors.
@@ -110,8 +110,8 @@ impl Merge {
     ) -> Result<()> {
         let resources = [
             inputs.entities.bind(),
-            Bind::Buffer(inputs.entries),
-            Bind::Buffer(inputs.clusters),
+            inputs.entries.bind(),
+            inputs.clusters.bind(),
             inputs.fields.bind(),
             inputs.transfers.bind(),
             inputs.vertices.bind(),

@@ -17,7 +17,7 @@ use ash::vk;
 pub struct Variant {
     /// Name on the command line.
     pub name: &'static str,
-    /// Everything but list entries and clusters is read through texel views rather than storage blocks.
+    /// Everything is read through texel views rather than storage blocks.
     pub texel: bool,
     /// Entities are a uniform block; otherwise a storage block or texels like the rest.
     pub uniform: bool,
@@ -100,6 +100,8 @@ pub struct MergePermutation {
     pub lookup: Lookup,
     /// What is left out.
     pub skip: Skip,
+    /// Whether any light meets a chain. Without, there is the sky's chain alone.
+    pub lights: bool,
     /// Entities that uniform blocks hold on the device, [`uniform_entities`].
     pub entity_limit: u32,
 }
@@ -149,6 +151,7 @@ impl MergePermutation {
             .define("IMAGE", self.variant.image && self.fits_image())
             .define("PACKED", self.packed())
             .define("SHIFTED", self.packed() && self.variant.shifted)
+            .define("LIGHTS", self.lights)
             .define("UNIFORM", self.variant.uniform)
             .define("ENTITY_LIMIT", self.entity_limit)
             .define("HALF", self.storage == Storage::F16)
@@ -192,9 +195,9 @@ mod tests {
     use super::*;
     use std::collections::HashSet;
 
-    /// Of one number of bands and one size of lattice there are 4 704: five ways to read halves and three to read floats, with three
+    /// Of one number of bands and one size of lattice there are 9 408: five ways to read halves and three to read floats, with three
     /// lookups and two kinds of directions (48), and the image, which is trilinear and a cube; times three spacings, scaled or not,
-    /// guarded or not, and three skips on or off (96).
+    /// guarded or not, with lights or without, and three skips on or off (192).
     #[test]
     fn there_are_as_many_permutations_as_counted() {
         let mut rows = HashSet::new();
@@ -207,10 +210,10 @@ mod tests {
             for &variant in VARIANTS {
                 for storage in [Storage::F16, Storage::F32] {
                     for lookup in [Lookup::Nearest, Lookup::Radial, Lookup::Trilinear] {
-                        for switches in 0..16 {
+                        for switches in 0..32 {
                             let on = |bit: u32| switches >> bit & 1 == 1;
                             let skip = Skip { horizon: on(0), cones: on(1), caps: on(2), ..Skip::NONE };
-                            let guard = on(3);
+                            let [guard, lights] = [on(3), on(4)];
                             let (bands, field_bands, entity_limit) = (4, 4, 48);
                             let permutation = MergePermutation {
                                 variant,
@@ -221,6 +224,7 @@ mod tests {
                                 lattice,
                                 lookup,
                                 skip,
+                                lights,
                                 entity_limit,
                             };
                             rows.insert(permutation.row());
@@ -229,6 +233,6 @@ mod tests {
                 }
             }
         }
-        assert_eq!(rows.len(), (8 * 3 * 2 + 1) * 3 * 2 * 2 * 8);
+        assert_eq!(rows.len(), (8 * 3 * 2 + 1) * 3 * 2 * 2 * 2 * 8);
     }
 }

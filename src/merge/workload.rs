@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::{Lattice, Lookup};
 use crate::gpu::{Buffer, BufferKind, Commands, Device, Volume};
-use crate::layout::{CLUSTER_VERTICES, Cluster, Entity, ListEntry, NONE};
+use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, ENTRY_FORMAT, Entity, ListEntry, NONE};
 use crate::lists::skip::Skip;
 use crate::merge::shelf::Shelf;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
@@ -143,6 +143,7 @@ impl Workload {
             lattice: self.lattice,
             lookup: Lookup::Trilinear,
             skip: Skip::NONE,
+            lights: false,
             entity_limit: self.entity_limit,
         }
     }
@@ -155,8 +156,8 @@ impl Workload {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         Ok(Inputs {
             entities: Readable::shared(&self.entities, variant)?,
-            entries: &self.entries,
-            clusters: &self.clusters,
+            entries: Readable::new(&self.entries, variant, ENTRY_FORMAT)?,
+            clusters: Readable::new(&self.clusters, variant, CLUSTER_FORMAT)?,
             fields: Readable::fields(&self.fields, variant.image.then_some(&self.image), &self.permutation(variant))?,
             transfers: Readable::new(&self.transfers, variant, floats)?,
             vertices: Readable::new(&self.vertices, variant, floats)?,

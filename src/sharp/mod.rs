@@ -14,7 +14,7 @@ use crate::field::silhouette::{DEEP, INSIDE, LEAST_PENUMBRA, NEAREST, REACH};
 use crate::field::silhouette_nodes::{BEYOND, LEAST_AHEAD};
 use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, STRIP, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
-use crate::layout::{CLUSTER_VERTICES, ENTRY_BITS};
+use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ const EDGE_STEPS: f64 = 0.3;
 /// What the shader is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharpPermutation {
-    /// Whether everything but list entries and clusters is read through texel views rather than storage blocks.
+    /// Whether everything is read through texel views rather than storage blocks.
     pub texel: bool,
     /// Whether entities are a uniform block.
     pub uniform: bool,
@@ -169,14 +169,14 @@ impl Sharp {
         let quads = vk::Format::R32G32B32A32_SFLOAT;
         let resources = [
             read(inputs.entities, quads, texel && !uniform)?,
-            Bind::Buffer(inputs.entries),
-            Bind::Buffer(inputs.clusters),
+            read(inputs.entries, ENTRY_FORMAT, texel)?,
+            read(inputs.clusters, CLUSTER_FORMAT, texel)?,
             read(inputs.nodes, quads, texel)?,
             read(inputs.cells, vk::Format::R32G32_UINT, texel)?,
             read(inputs.vertices, quads, texel)?,
             Bind::Buffer(radiosity),
             if self_shadows { read(inputs.self_cells, vk::Format::R32G32_UINT, texel)? } else { Bind::None },
-            Bind::Buffer(inputs.soft),
+            read(inputs.soft, quads, texel)?,
         ];
         commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])
     }

@@ -83,11 +83,10 @@ FieldPlace field_place(vec3 p, vec4 radial, float edges) {
     float d = sqrt(dot(p, p));
     float near = clamp(d, radial.z, radial.w);
     // c: cosine of the half-angle of the bounding sphere, or of what stands for it inside (Lattice::reach);
-    // h = 1 - c without cancellation.
+    // h = 1 - c without cancellation, where c squared is (near - edge) (near + edge) / reach.
     float edge = min(radial.z, 1.0);
     float reach = near * near + (1.0 - edge * edge);
-    float c = sqrt(max(0.0, (near - edge) * (near + edge) / reach));
-    float h = 1.0 / (reach * (1.0 + c));
+    float h = 1.0 / (reach + sqrt(max(0.0, (near - edge) * (near + edge) * reach)));
     float coordinate = SPACING == 0 ? sqrt(0.5 * h) : SPACING == 1 ? log(near) : near;
     float t = clamp(radial.x * coordinate + radial.y, 0.0, SHELLS - 1.0);
     float beyond = radial.w / max(d, radial.w);

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 pub const STEPS: f64 = 1.0;
 
 /// Share of nodes whose distance may be that of another texel, which is as near the node as the twin's.
-pub const OTHER_DISTANCES: f64 = 0.005;
+pub const OTHER_DISTANCES: f64 = 0.02;
 
 /// Vertices that are compared, or fewer where their faces are too large for one atlas.
 const VERTICES: usize = 48;

@@ -1,6 +1,6 @@
 //! Part of pass "draw": meshes by their triangles, and those triangles again whose pixels evaluate sharp lights.
 //!
-//! A triangle is drawn again where the pass of sharp lights has marked one of its vertices and its sides span [`LEAST_PX`] on the screen.
+//! A triangle is drawn again where the pass of sharp lights has marked one of its vertices and its sides span 4 px on the screen.
 
 use crate::asset::mesh::Mesh;
 use crate::draw::{DrawnEntity, DrawnViewport};

@@ -56,9 +56,9 @@ pub fn compare(baker: &Baker, mesh: &Mesh, face_px: u32) -> Result<Compared> {
     let (found, wanted) = (angles(&maps), angles(&twins));
     let worst = found.iter().zip(&wanted).map(|(map, twin)| (map - twin).abs()).max();
     // Two texels that lie equally near a node may differ in distance.
-    let distances = |map: &[u8]| map[NODES..].to_vec();
-    let pairs = maps.chunks_exact(BYTES).zip(twins.chunks_exact(BYTES));
-    let apart = pairs.flat_map(|(map, twin)| distances(map).into_iter().zip(distances(twin))).filter(|(a, b)| a != b);
+    let distances =
+        |maps: &[u8]| -> Vec<u8> { maps.chunks_exact(BYTES).flat_map(|map| &map[NODES..]).copied().collect() };
+    let apart = distances(&maps).into_iter().zip(distances(&twins)).filter(|(a, b)| a != b);
     Ok(Compared {
         worst_steps: f64::from(worst.unwrap_or(i32::MAX)),
         between: found.iter().filter(|angle| angle.abs() < 127).count(),

@@ -5,9 +5,10 @@
 
 use crate::asset::grid::{Grid, UPWARDS};
 use crate::draw::patches::{BLOCK_CELLS, Patches};
-use crate::draw::{DrawnEntity, DrawnViewport};
+use crate::draw::pixel_light::texels;
+use crate::draw::{DrawnEntity, DrawnViewport, EntityPush};
 use crate::error::Result;
-use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
+use crate::gpu::{Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
 use crate::shaders::{Library, ShaderPermutation};
 use crate::sharp::SharpPermutation;
 use ash::vk;
@@ -94,56 +95,13 @@ impl DrawnGrid {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
-    clip_from_object: [f32; 16],
-    emission_white: [f32; 4],
-    tag: f32,
+    entity: EntityPush,
     first: u32,
     cells: [u32; 2],
     receiver: u32,
     cluster_first: u32,
     spare: [u32; 2],
     normal: [f32; 4],
-}
-
-/// What pixels read that evaluate sharp lights themselves.
-pub struct PixelLight<'d> {
-    /// [`crate::layout::Entity`] of every entity.
-    pub entities: &'d Buffer,
-    /// Nodes and cells of all silhouette fields.
-    pub silhouettes: [&'d Buffer; 2],
-    /// Entries of chains.
-    pub entries: &'d Buffer,
-    /// Of every cluster the first of its entries, and how many they are.
-    pub chains: &'d Buffer,
-    /// Light on vertices without that of sharp lights.
-    pub soft: &'d Buffer,
-    /// Cells of self-visibility.
-    pub self_cells: &'d Buffer,
-    /// Positions and normals of all meshes.
-    pub vertices: &'d Buffer,
-}
-
-impl<'d> PixelLight<'d> {
-    /// What a shader reads that includes `glsl/pixel_light.glsl`: corners and radiosity before it, `others` after it.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    pub fn binds(
-        &self,
-        own: &[(&'d Buffer, vk::Format); 2],
-        others: &[(&'d Buffer, vk::Format)],
-    ) -> Result<Vec<Bind<'d>>> {
-        let [nodes, cells] = self.silhouettes;
-        let shared = [
-            (self.entities, FLOATS),
-            (nodes, FLOATS),
-            (cells, vk::Format::R32G32_UINT),
-            (self.entries, vk::Format::R32_UINT),
-            (self.chains, vk::Format::R32G32_UINT),
-            (self.soft, FLOATS),
-        ];
-        texels(&[&own[..], &shared, others].concat())
-    }
 }
 
 /// The pipeline.
@@ -236,9 +194,7 @@ impl DrawGrid {
         indices: Range<u32>,
     ) {
         drawing.push(&Push {
-            clip_from_object: entity.clip_from_object.to_cols_array(),
-            emission_white: entity.emission.extend(white).to_array(),
-            tag: entity.tag,
+            entity: EntityPush::new(entity, white),
             first: (entity.radiosity_offset / 16) as u32,
             cells: grid.cells,
             receiver: entity.index,
@@ -248,9 +204,4 @@ impl DrawGrid {
         });
         drawing.indexed(indices);
     }
-}
-
-/// Texel views of buffers, in the order of their bindings.
-fn texels<'r>(buffers: &[(&'r Buffer, vk::Format)]) -> Result<Vec<Bind<'r>>> {
-    buffers.iter().map(|&(buffer, format)| TexelView::new(buffer, format).map(Bind::Texel)).collect()
 }

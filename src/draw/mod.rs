@@ -8,6 +8,7 @@ pub mod camera;
 mod choices;
 pub mod grid;
 pub mod patches;
+pub mod pixel_light;
 pub mod show;
 pub mod smooth;
 pub mod triangles;
@@ -15,7 +16,8 @@ pub mod triangles;
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
 use crate::asset::picture::srgb_from_linear;
-use crate::draw::grid::{DrawGrid, DrawnGrid, PixelLight};
+use crate::draw::grid::{DrawGrid, DrawnGrid};
+use crate::draw::pixel_light::{ByPixel, PixelLight};
 use crate::draw::smooth::Smooth;
 use crate::draw::triangles::{DrawTriangles, DrawnTriangles};
 use crate::error::Result;
@@ -26,6 +28,7 @@ use crate::lists::sight::{Faces, Sight};
 use crate::shaders::Library;
 use crate::sharp::SharpPermutation;
 use ash::vk;
+use bytemuck::{Pod, Zeroable};
 pub use choices::{Antialias, Finish, Shading};
 use glam::{Mat4, Vec3};
 use std::ops::Range;
@@ -92,14 +95,6 @@ impl DrawnMesh {
         if let DrawnMesh::Grid(grid, _) = self { Some(grid) } else { None }
     }
 
-    /// How far a point of a triangle may lie from a vertex of it, metres.
-    pub fn reach_m(&self) -> f32 {
-        match self {
-            DrawnMesh::Triangles(triangles) => triangles.reach_m,
-            DrawnMesh::Grid(grid, _) => grid.reach_m,
-        }
-    }
-
     /// Device memory, bytes.
     pub fn size_bytes(&self) -> u64 {
         match self {
@@ -131,15 +126,23 @@ pub struct DrawnEntity<'d> {
     pub by_pixel: Option<ByPixel>,
 }
 
-/// Where the pixels of an entity find what they evaluate sharp lights by.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ByPixel {
-    /// Its first cluster in [`PixelLight::chains`].
-    pub cluster_first: u32,
-    /// The first vertex of its mesh in [`PixelLight::vertices`].
-    pub vertex_first: u32,
-    /// The first cell of its mesh in [`PixelLight::self_cells`], or [`crate::layout::NONE`].
-    pub self_first: u32,
+/// The push constants that all drawing shaders begin with.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct EntityPush {
+    clip_from_object: [f32; 16],
+    emission_white: [f32; 4],
+    tag: f32,
+}
+
+impl EntityPush {
+    fn new(entity: &DrawnEntity<'_>, white: f32) -> Self {
+        EntityPush {
+            clip_from_object: entity.clip_from_object.to_cols_array(),
+            emission_white: entity.emission.extend(white).to_array(),
+            tag: entity.tag,
+        }
+    }
 }
 
 /// A region of the picture, and what is drawn there.

@@ -3,7 +3,7 @@
 //! A triangle is drawn again where the pass of sharp lights has marked one of its vertices and its sides span 4 px on the screen.
 
 use crate::asset::mesh::Mesh;
-use crate::draw::{DrawnEntity, DrawnViewport};
+use crate::draw::{DrawnEntity, DrawnViewport, EntityPush};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
 use crate::lists::sight::Faces;
@@ -33,8 +33,6 @@ pub struct DrawnTriangles {
     pub indices: Buffer,
     /// The indices in runs, and which way the triangles of each run face.
     pub runs: Vec<(Range<u32>, Faces)>,
-    /// Longest side of a triangle, metres.
-    pub reach_m: f32,
 }
 
 impl DrawnTriangles {
@@ -64,7 +62,6 @@ impl DrawnTriangles {
             emission: Buffer::with_data(device, "draw emission", &emission)?,
             indices: Buffer::with_data(device, "draw indices", &triangles)?,
             runs,
-            reach_m: mesh.steps().into_iter().fold(0.0, f32::max),
         })
     }
 
@@ -85,18 +82,8 @@ impl DrawnTriangles {
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-struct Push {
-    clip_from_object: [f32; 16],
-    emission_white: [f32; 4],
-    tag: f32,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
 struct PatchPush {
-    clip_from_object: [f32; 16],
-    emission_white: [f32; 4],
-    tag: f32,
+    entity: EntityPush,
     first: u32,
     half_size: [f32; 2],
     receiver: u32,
@@ -163,11 +150,7 @@ impl DrawTriangles {
     ) {
         let vertices = [(&mesh.positions, 0), (&mesh.emission, 0), (viewport.radiosity, entity.radiosity_offset)];
         drawing.bind(if entity.culls { &self.solid } else { &self.open }, &vertices, &mesh.indices);
-        drawing.push(&Push {
-            clip_from_object: entity.clip_from_object.to_cols_array(),
-            emission_white: entity.emission.extend(white).to_array(),
-            tag: entity.tag,
-        });
+        drawing.push(&EntityPush::new(entity, white));
     }
 
     /// Draws the triangles of an entity again that a shadow's edge comes near. Their pixels evaluate sharp lights themselves.
@@ -195,9 +178,7 @@ impl DrawTriangles {
         )?)?;
         let [_, _, width, height] = viewport.area;
         drawing.push(&PatchPush {
-            clip_from_object: entity.clip_from_object.to_cols_array(),
-            emission_white: entity.emission.extend(white).to_array(),
-            tag: entity.tag,
+            entity: EntityPush::new(entity, white),
             first: (entity.radiosity_offset / 16) as u32,
             half_size: [0.5 * width as f32, 0.5 * height as f32],
             receiver: entity.index,

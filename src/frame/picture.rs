@@ -6,7 +6,7 @@ use super::viewport::{RadiositySource, Viewport};
 use super::{Frame, Options};
 use crate::asset::edges::Edges;
 use crate::asset::picture::linear_from_srgb;
-use crate::draw::grid::PixelLight;
+use crate::draw::pixel_light::PixelLight;
 use crate::draw::smooth::{Lines, Strips};
 use crate::draw::{Antialias, Draw, DrawnViewport, Finish, Shading};
 use crate::error::Result;

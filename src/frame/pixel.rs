@@ -1,6 +1,7 @@
 //! Chains of sharp lights for pixels: every cluster's, merged in this frame or not.
 
-use crate::draw::{ByPixel, DrawnMesh};
+use crate::draw::DrawnMesh;
+use crate::draw::pixel_light::ByPixel;
 use crate::error::Result;
 use crate::gpu::{Device, Upload};
 use crate::layout::{self, CLUSTER_VERTICES};
@@ -45,7 +46,7 @@ impl PixelChains {
                 self_first: device_mesh.self_first,
             };
             let lit = entity.receives && fits;
-            receivers.push(lit.then_some((by_pixel, device_mesh.drawn.reach_m())));
+            receivers.push(lit.then_some((by_pixel, device_mesh.reach_m)));
             clusters += if lit { (device_mesh.vertices.len() as u32).div_ceil(CLUSTER_VERTICES) } else { 0 };
         }
         let upload = |name: &str, bytes: usize| Upload::new(device, name, bytes as u64);

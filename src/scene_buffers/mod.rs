@@ -54,6 +54,8 @@ pub struct DeviceMesh {
     pub silhouette: Option<SilhouetteSlot>,
     /// The mesh as it is drawn.
     pub drawn: DrawnMesh,
+    /// How far a point of a triangle may lie from a vertex of it, metres.
+    pub reach_m: f32,
     /// Centre of the bounding sphere, metres.
     pub centre_m: DVec3,
     /// Bounding radius, metres.
@@ -143,6 +145,8 @@ impl Packing {
         let order = clusters::order(mesh);
         let drawn = DrawnMesh::new(device, mesh, &order, *drawn)?;
         let steps = drawn.grid().map_or_else(|| mesh.steps(), |grid| vec![grid.step_m; order.len()]);
+        let longest = || steps.iter().copied().fold(0.0, f32::max);
+        let reach_m = drawn.grid().map_or_else(longest, |grid| grid.reach_m);
         for &v in &order {
             vertices.push((mesh.positions[v as usize] - centre).extend(steps[v as usize]).to_array());
             vertices.push(mesh.normals[v as usize].extend(0.0).to_array());
@@ -173,6 +177,7 @@ impl Packing {
             radiance,
             silhouette,
             drawn,
+            reach_m,
             order,
             centre_m: centre.as_dvec3(),
             radius_m: f64::from(radius_m),

@@ -1,0 +1,64 @@
+//! What drawing shaders read that include `glsl/pixel_light.glsl`: their pixels evaluate sharp lights.
+
+use crate::error::Result;
+use crate::gpu::{Bind, Buffer, TexelView};
+use ash::vk;
+
+const FLOATS: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+
+/// Where the pixels of an entity find what they evaluate sharp lights by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ByPixel {
+    /// Its first cluster in [`PixelLight::chains`].
+    pub cluster_first: u32,
+    /// The first vertex of its mesh in [`PixelLight::vertices`].
+    pub vertex_first: u32,
+    /// The first cell of its mesh in [`PixelLight::self_cells`], or [`crate::layout::NONE`].
+    pub self_first: u32,
+}
+
+/// What pixels read that evaluate sharp lights themselves.
+pub struct PixelLight<'d> {
+    /// [`crate::layout::Entity`] of every entity.
+    pub entities: &'d Buffer,
+    /// Nodes and cells of all silhouette fields.
+    pub silhouettes: [&'d Buffer; 2],
+    /// Entries of chains.
+    pub entries: &'d Buffer,
+    /// Of every cluster the first of its entries, and how many they are.
+    pub chains: &'d Buffer,
+    /// Light on vertices without that of sharp lights.
+    pub soft: &'d Buffer,
+    /// Cells of self-visibility.
+    pub self_cells: &'d Buffer,
+    /// Positions and normals of all meshes.
+    pub vertices: &'d Buffer,
+}
+
+impl<'d> PixelLight<'d> {
+    /// What a shader reads that includes `glsl/pixel_light.glsl`: corners and radiosity before it, `others` after it.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn binds(
+        &self,
+        own: &[(&'d Buffer, vk::Format); 2],
+        others: &[(&'d Buffer, vk::Format)],
+    ) -> Result<Vec<Bind<'d>>> {
+        let [nodes, cells] = self.silhouettes;
+        let shared = [
+            (self.entities, FLOATS),
+            (nodes, FLOATS),
+            (cells, vk::Format::R32G32_UINT),
+            (self.entries, vk::Format::R32_UINT),
+            (self.chains, vk::Format::R32G32_UINT),
+            (self.soft, FLOATS),
+        ];
+        texels(&[&own[..], &shared, others].concat())
+    }
+}
+
+/// Texel views of buffers, in the order of their bindings.
+pub(super) fn texels<'r>(buffers: &[(&'r Buffer, vk::Format)]) -> Result<Vec<Bind<'r>>> {
+    buffers.iter().map(|&(buffer, format)| TexelView::new(buffer, format).map(Bind::Texel)).collect()
+}

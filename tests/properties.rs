@@ -147,6 +147,7 @@ fn field(lattice: Lattice, seed: u64) -> ShadowField {
         lattice,
         face_px: 8,
         shortcuts: Default::default(),
+        level_texels: 0.0,
         filled_samples: 0,
         captured_samples: 0,
         symmetry: String::new(),

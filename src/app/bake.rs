@@ -6,7 +6,7 @@ use super::source::GltfArguments;
 use super::{Global, output, silhouette};
 use crate::asset::Mesh;
 use crate::asset::environment::RADIANCE_LIMIT;
-use crate::bake;
+use crate::bake::{self, silhouette::SilhouetteOptions};
 use crate::error::{Error, Result};
 use crate::field::{FieldKind, Shortcuts};
 use clap::Args;
@@ -43,6 +43,10 @@ pub struct Arguments {
     /// where they stand, and see all dark
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
     inside: bool,
+    /// Draw fewer and larger triangles of a large mesh in place of those that are far from the eye. What is seen moves by at most 0.25
+    /// texels
+    #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
+    levels: bool,
     #[command(flatten)]
     bake: BakeArguments,
     #[command(flatten)]
@@ -52,7 +56,9 @@ pub struct Arguments {
 impl Arguments {
     fn options(&self) -> bake::Options {
         let shortcuts = Shortcuts { symmetry: self.symmetry, faces: self.faces, inside: self.inside };
-        bake::Options { shortcuts, ..self.bake.options() }
+        let options = self.bake.options();
+        let silhouette = SilhouetteOptions { levels: self.levels, ..options.silhouette };
+        bake::Options { shortcuts, silhouette, levels: self.levels, ..options }
     }
 
     /// Options that serve every kind of thing that is baked of a mesh.
@@ -100,7 +106,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     output::check_ending(&arguments.output, "sf", "a field file")?;
     if arguments.silhouette {
         let mesh = arguments.gltf.mesh(global, &arguments.mesh)?;
-        return silhouette::bake(global, (&mesh, &arguments.mesh), &arguments.output, arguments.bake.quality);
+        return silhouette::bake(global, (&mesh, &arguments.mesh), &arguments.output, arguments.options().silhouette);
     }
     let mut mesh = arguments.gltf.mesh(global, &arguments.mesh)?;
     let kind = if arguments.radiance.is_some() { FieldKind::Radiance } else { FieldKind::Occlusion };

@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::{Global, output};
 use crate::asset::{Mesh, lettering, picture};
-use crate::bake::{Quality, silhouette::bake_silhouette};
+use crate::bake::silhouette::{SilhouetteOptions, bake_silhouette};
 use crate::error::{Result, one_line};
 use crate::field::silhouette::{REACH, Side, SilhouetteField};
 use glam::DVec3;
@@ -11,11 +11,11 @@ use serde_json::json;
 use std::path::Path;
 
 /// Bakes the silhouette field of a mesh that was read from a file, and writes it.
-pub fn bake(global: &Global, (mesh, mesh_file): (&Mesh, &Path), out: &Path, quality: Quality) -> Result<()> {
+pub fn bake(global: &Global, (mesh, mesh_file): (&Mesh, &Path), out: &Path, options: SilhouetteOptions) -> Result<()> {
     let context = Context::new(global)?;
     let told = |done, all| context.progress.show(&mesh.name, done, all);
     let (device, library) = (context.baker.device(), context.baker.library());
-    let (field, report) = bake_silhouette((device, library), mesh, quality.options().silhouette, &told)
+    let (field, report) = bake_silhouette((device, library), mesh, options, &told)
         .map_err(|error| error.context(mesh_file.display()))?;
     let seconds = report.total.as_secs_f64();
     let result = json!({

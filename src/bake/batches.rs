@@ -97,6 +97,8 @@ pub(super) struct Captures<'c> {
     pub reduction: Reduction,
     pub face_px: u32,
     pub shortcuts: Shortcuts,
+    /// Whether levels of detail are drawn.
+    pub levels: bool,
     pub partial: &'c Partial,
 }
 
@@ -174,7 +176,10 @@ impl Batches {
         let bytes = u64::from(capture.capacity()) * sample_bytes;
         Ok(Batches {
             reduce: Reduce::new(baker, captures, capture.columns)?,
-            model: Model::new(device, captures.mesh, kind == CaptureKind::Radiance)?,
+            model: match captures.levels {
+                true => Model::with_levels(device, captures.mesh)?,
+                false => Model::new(device, captures.mesh, kind == CaptureKind::Radiance)?,
+            },
             jobs: Project::job_buffer(device, capture.capacity())?,
             culls: captures.shortcuts.inside,
             samples: Buffer::new(device, "batch samples", BufferKind::Device, bytes)?,

@@ -4,9 +4,10 @@
 //! faces. Occlusion: R8, white background, black object, no depth; or with distances in place of black. Radiance: RGBA32F, black background, the mesh's colours,
 //! with depth. A face that the object's bounding sphere does not reach is not drawn and gets no place in the atlas. The other faces
 //! are drawn in chunks of neighbouring triangles. A chunk is left out if its bounding sphere does not reach into the face, or if
-//! the mesh is closed and the eye sees only backs of the chunk.
+//! the mesh is closed and the eye sees only backs of the chunk. Of a large mesh, chunks of fewer triangles stand for what is far off.
 
 use super::chunk::{Chunk, Chunked, chunk, joined, reaches};
+use super::levels::{Levels, Tolerance, leveled};
 use super::triangles::distinct;
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
@@ -34,6 +35,9 @@ pub struct Model {
     colors: Option<Buffer>,
     indices: Buffer,
     chunks: Vec<Chunk>,
+    /// All chunks, for a mesh without levels.
+    all: Vec<u32>,
+    levels: Option<Levels>,
     closed: bool,
 }
 
@@ -43,17 +47,56 @@ impl Model {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, mesh: &Mesh, with_colors: bool) -> Result<Self> {
-        let colors = with_colors.then(|| mesh.colors.clone().unwrap_or_else(|| vec![Vec3::ONE; mesh.positions.len()]));
         let unit = unit_positions(mesh);
-        let Chunked { vertices, triangles, chunks } = chunk(&unit, &distinct(mesh))?;
+        Self::of(device, mesh, &unit, with_colors, (chunk(&unit, &distinct(mesh))?, None))
+    }
+
+    /// Uploads a mesh and its levels of detail (see [`super::levels`]), for captures that see no colours.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn with_levels(device: &Arc<Device>, mesh: &Mesh) -> Result<Self> {
+        let unit = unit_positions(mesh);
+        let (chunked, levels) = leveled(&unit, &distinct(mesh))?;
+        Self::of(device, mesh, &unit, false, (chunked, Some(levels)))
+    }
+
+    fn of(
+        device: &Arc<Device>,
+        mesh: &Mesh,
+        unit: &[Vec3],
+        with_colors: bool,
+        (chunked, levels): (Chunked, Option<Levels>),
+    ) -> Result<Self> {
+        let Chunked { vertices, triangles, chunks } = chunked;
+        let colors = with_colors.then(|| mesh.colors.clone().unwrap_or_else(|| vec![Vec3::ONE; mesh.positions.len()]));
         let gather = |of: &[Vec3]| -> Vec<[f32; 3]> { vertices.iter().map(|&v| of[v as usize].to_array()).collect() };
         Ok(Model {
-            positions: Buffer::with_data(device, "capture positions", &gather(&unit))?,
+            positions: Buffer::with_data(device, "capture positions", &gather(unit))?,
             colors: colors.map(|colors| Buffer::with_data(device, "capture colors", &gather(&colors))).transpose()?,
             indices: Buffer::with_data(device, "capture indices", &triangles)?,
+            all: (0..chunks.len() as u32).collect(),
             chunks,
+            levels,
             closed: mesh.is_closed(),
         })
+    }
+
+    /// The chunks that an eye is shown in faces of `face_px`. `buffer` holds them where they are chosen for it.
+    fn seen<'m>(&'m self, eye: Vec3, face_px: u32, buffer: &'m mut Vec<u32>) -> impl Iterator<Item = &'m Chunk> + Clone {
+        let chosen = match &self.levels {
+            Some(levels) => {
+                levels.choose(Tolerance::capture(eye, face_px), buffer);
+                buffer.as_slice()
+            }
+            None => &self.all,
+        };
+        chosen.iter().map(|&index| &self.chunks[index as usize])
+    }
+
+    /// Number of triangles that an eye is shown in faces of `face_px`, of all sides of the object.
+    pub fn triangles_seen(&self, eye: Vec3, face_px: u32) -> usize {
+        self.seen(eye, face_px, &mut Vec::new()).map(|chunk| chunk.indices.len() / 3).sum()
     }
 }
 
@@ -175,17 +218,18 @@ impl Capture {
     /// at least one does.
     pub fn plan(&self, model: &Model, eyes: &[Vec3]) -> Vec<Slots> {
         let mut used = 0;
-        let mut out = Vec::new();
+        let (mut out, mut buffer) = (Vec::new(), Vec::new());
         for &eye in eyes {
             // An eye that sees nothing has no face, but it still has a job.
             if used.max(out.len() as u32) + FACE_COUNT as u32 > self.capacity() {
                 break;
             }
             let mut slots = [NO_SLOT; FACE_COUNT];
+            let seen = model.seen(eye, self.face_px, &mut buffer);
             for (face, slot) in slots.iter_mut().enumerate() {
                 let (forward, right, down) = face_axes(face);
                 let whole = reaches(eye, Vec3::ZERO, 1.0, forward, right, down);
-                let reached = || model.chunks.iter().any(|c| reaches(eye, c.centre, c.radius, forward, right, down));
+                let reached = || seen.clone().any(|c| reaches(eye, c.centre, c.radius, forward, right, down));
                 if !self.skips || (whole && reached()) {
                     *slot = used;
                     used += 1;
@@ -218,10 +262,11 @@ impl Capture {
         vertices.extend(model.colors.iter().filter(|_| radiance).map(|colors| (colors, 0)));
         commands.render(&target, |drawing| {
             drawing.bind(pipeline, &vertices, &model.indices);
-            let mut facing: Vec<&Chunk> = Vec::new();
+            let mut buffer = Vec::new();
             for (&eye, slots) in eyes.iter().zip(plan) {
-                facing.clear();
-                facing.extend(model.chunks.iter().filter(|chunk| !(closed && self.skips && chunk.turned_away(eye))));
+                let seen = model.seen(eye, self.face_px, &mut buffer);
+                let facing: Vec<&Chunk> =
+                    seen.filter(|chunk| !(closed && self.skips && chunk.turned_away(eye))).collect();
                 for (face, &slot) in slots.iter().enumerate().filter(|(_, slot)| **slot != NO_SLOT) {
                     let (forward, right, down) = face_axes(face);
                     let px = self.face_px;

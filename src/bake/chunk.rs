@@ -2,11 +2,11 @@
 
 use crate::error::{Error, Result};
 use glam::{DVec3, Vec3};
-use meshopt::{VertexDataAdapter, build_meshlets};
+use meshopt::{VertexDataAdapter, build_meshlets, extract_meshlet_indices};
 use std::ops::Range;
 
 /// Triangles in a chunk. It is small enough to be culled on its own, and large enough that its draw call costs little.
-const CHUNK_TRIANGLES: usize = 128;
+pub(super) const CHUNK_TRIANGLES: usize = 128;
 /// Weight of the distance between normals against the distance between places, when chunks are made.
 const CONE_WEIGHT: f32 = 0.5;
 /// A run of triangles with the sphere around them, in r, and the cone around their normals.
@@ -53,6 +53,7 @@ pub fn sort_spatially(positions: &[Vec3], triangles: &mut [[u32; 3]]) {
 }
 
 /// A mesh cut into chunks, one after another along a space-filling curve.
+#[derive(Default)]
 pub(super) struct Chunked {
     /// The vertices of one chunk after another. A vertex on the rim of a chunk comes again in the neighbouring chunks.
     pub vertices: Vec<u32>,
@@ -60,10 +61,34 @@ pub(super) struct Chunked {
     pub chunks: Vec<Chunk>,
 }
 
+impl Chunked {
+    /// The triangles of a chunk.
+    pub fn triangles_of(&self, chunk: usize) -> &[[u32; 3]] {
+        let Range { start, end } = self.chunks[chunk].indices;
+        &self.triangles[start as usize / 3..end as usize / 3]
+    }
+
+    /// Adds a chunk of triangles that are given by the mesh's vertices.
+    pub fn add(&mut self, positions: &[Vec3], corners: &[u32]) {
+        let (first, start) = (self.vertices.len(), self.triangles.len());
+        let (vertices, local) = extract_meshlet_indices(corners);
+        self.vertices.extend(vertices);
+        self.triangles.extend(local.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|i| (first + usize::from(i)) as u32)));
+        let of_vertex = |i: u32| positions[self.vertices[i as usize] as usize];
+        let triangles: Vec<_> = self.triangles[start..].iter().map(|t| t.map(of_vertex)).collect();
+        self.chunks.push(Chunk::new(3 * start as u32..3 * self.triangles.len() as u32, &triangles));
+    }
+}
+
+/// The positions as meshoptimizer takes them.
+pub(super) fn adapter(positions: &[Vec3]) -> Result<VertexDataAdapter<'_>> {
+    VertexDataAdapter::new(bytemuck::cast_slice(positions), size_of::<Vec3>(), 0)
+        .map_err(|error| Error::Failed(format!("the mesh cannot be cut into chunks: {error}")))
+}
+
 /// Cuts a mesh into chunks of neighbouring triangles that face alike.
 pub(super) fn chunk(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Chunked> {
-    let adapter = VertexDataAdapter::new(bytemuck::cast_slice(positions), size_of::<Vec3>(), 0)
-        .map_err(|error| Error::Failed(format!("the mesh cannot be cut into chunks: {error}")))?;
+    let adapter = adapter(positions)?;
     let flat: &[u32] = bytemuck::cast_slice(triangles);
     let meshlets = build_meshlets(flat, &adapter, CHUNK_TRIANGLES, CHUNK_TRIANGLES, CONE_WEIGHT);
     let mut order: Vec<_> = meshlets.iter().collect();
@@ -71,14 +96,10 @@ pub(super) fn chunk(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Chunke
         let sum: Vec3 = meshlet.vertices.iter().map(|&v| positions[v as usize]).sum();
         morton(sum / meshlet.vertices.len().max(1) as f32)
     });
-    let mut out = Chunked { vertices: Vec::new(), triangles: Vec::new(), chunks: Vec::new() };
+    let mut out = Chunked::default();
     for meshlet in order {
-        let (first, start) = (out.vertices.len() as u32, 3 * out.triangles.len() as u32);
-        let local = || meshlet.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(usize::from));
-        let corners: Vec<_> = local().map(|t| t.map(|i| positions[meshlet.vertices[i] as usize])).collect();
-        out.vertices.extend(meshlet.vertices);
-        out.triangles.extend(local().map(|t| t.map(|i| first + i as u32)));
-        out.chunks.push(Chunk::new(start..3 * out.triangles.len() as u32, &corners));
+        let corners: Vec<u32> = meshlet.triangles.iter().map(|&i| meshlet.vertices[usize::from(i)]).collect();
+        out.add(positions, &corners);
     }
     Ok(out)
 }

@@ -1,6 +1,7 @@
 //! What decides a bake: its options, and the header of the field, which follows from the options and a mesh.
 
 use super::capture::unit_positions;
+use super::levels;
 use super::silhouette::SilhouetteOptions;
 use super::surface::Surface;
 use crate::asset::mesh::Mesh;
@@ -27,6 +28,8 @@ pub struct Options {
     pub shortcuts: Shortcuts,
     /// Silhouette fields.
     pub silhouette: SilhouetteOptions,
+    /// Whether fewer and larger triangles stand for those of a large mesh that are far from the eye (see [`super::levels`]).
+    pub levels: bool,
 }
 
 impl Default for Options {
@@ -41,6 +44,7 @@ impl Default for Options {
             face_px: 64,
             shortcuts: Shortcuts::default(),
             silhouette: SilhouetteOptions::default(),
+            levels: true,
         }
     }
 }
@@ -106,6 +110,7 @@ pub fn header(mesh: &Mesh, kind: FieldKind, options: &Options) -> FieldHeader {
         lattice,
         face_px: options.face_px,
         shortcuts: options.shortcuts,
+        level_texels: levels::texels(mesh, options.levels && kind == FieldKind::Occlusion),
         filled_samples: 0,
         captured_samples: 0,
         symmetry: String::new(),

@@ -17,6 +17,7 @@ pub mod ensure;
 mod header;
 pub mod inside;
 pub mod kinds;
+pub mod levels;
 mod names;
 
 pub mod partial;
@@ -196,9 +197,9 @@ impl Baker {
         triangles::tell_repeated(mesh);
         let FieldSamples { targets, plan, sources } = FieldSamples::new(mesh, &mut header)?;
         let projection = if header.kind == FieldKind::Radiance { Projection::Radiance } else { Projection::Blocked };
-        let FieldHeader { bands, face_px, shortcuts, .. } = header;
+        let FieldHeader { bands, face_px, shortcuts, level_texels, .. } = header;
         let reduction = Reduction::Project { bands, projection };
-        let captures = Captures { mesh, reduction, face_px, shortcuts, partial };
+        let captures = Captures { mesh, reduction, face_px, shortcuts, levels: level_texels > 0.0, partial };
         let mut values = vec![0.0_f32; captured_bytes(&header) as usize / 4];
         let mut report = captures.run(self, &targets, &mut values, progress)?;
         symmetric_samples::spread(&mut values, &plan, &header.lattice, bands, header.kind.channels());
@@ -263,7 +264,8 @@ impl Baker {
         let Options { bands, face_px, shortcuts, .. } = *options;
         let (targets, turned) = transfer_targets(mesh, options);
         let reduction = Reduction::Project { bands, projection: Projection::Transfer };
-        let captures = Captures { mesh, reduction, face_px, shortcuts, partial };
+        let levels = levels::are_used(mesh, options.levels);
+        let captures = Captures { mesh, reduction, face_px, shortcuts, levels, partial };
         let mut transfer = vec![0.0_f32; mesh.positions.len() * channel_stride(bands)];
         let mut report = captures.run(self, &targets, &mut transfer, progress)?;
         symmetric_samples::turn_all(&mut transfer, &turned, bands, 1);
@@ -291,7 +293,8 @@ impl Baker {
         triangles::tell_repeated(mesh);
         let Options { face_px, shortcuts, .. } = *options;
         let targets: Vec<CaptureTarget> = vertex_targets(mesh).collect();
-        let captures = Captures { mesh, reduction: Reduction::SelfVisibility, face_px, shortcuts, partial };
+        let levels = levels::are_used(mesh, options.levels);
+        let captures = Captures { mesh, reduction: Reduction::SelfVisibility, face_px, shortcuts, levels, partial };
         let mut maps = vec![0_u8; targets.len() * BYTES];
         let mut report = captures.run(self, &targets, &mut maps, progress)?;
         report.samples = targets.len() as u32;

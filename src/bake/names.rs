@@ -1,5 +1,6 @@
 //! Names of what the cache keeps: hashes of the mesh's content and of everything else that decides the numbers.
 
+use super::levels;
 use super::silhouette::silhouette_header;
 use super::{Options, TRANSFER_OFFSET};
 use crate::asset::mesh::Mesh;
@@ -16,6 +17,8 @@ pub(super) struct TransferHeader {
     face_px: u32,
     #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
     shortcuts: Shortcuts,
+    #[serde(default, skip_serializing_if = "crate::field::is_zero")]
+    level_texels: f64,
     offset: f32,
     pub vertex_count: usize,
 }
@@ -27,6 +30,7 @@ impl TransferHeader {
             bands: options.bands,
             face_px: options.face_px,
             shortcuts: options.shortcuts,
+            level_texels: levels::texels(mesh, options.levels),
             offset: TRANSFER_OFFSET,
             vertex_count: mesh.positions.len(),
         }
@@ -40,6 +44,8 @@ pub(super) struct SelfVisibilityHeader {
     face_px: u32,
     #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
     shortcuts: Shortcuts,
+    #[serde(default, skip_serializing_if = "crate::field::is_zero")]
+    level_texels: f64,
     offset: f32,
     side: usize,
     rim: f64,
@@ -55,6 +61,7 @@ impl SelfVisibilityHeader {
             face_px: options.face_px,
             // Every vertex is captured, whether the mesh has symmetries or not.
             shortcuts: Shortcuts { symmetry: true, ..options.shortcuts },
+            level_texels: levels::texels(mesh, options.levels),
             offset: TRANSFER_OFFSET,
             side: self_visibility::SIDE,
             rim: self_visibility::RIM,
@@ -117,16 +124,17 @@ mod tests {
     /// Each option that is flipped changes the names of what it decides, and no other names.
     #[test]
     fn every_option_is_part_of_the_names_that_it_decides() {
-        let mesh = generate::torus_two_colour(1.0, 0.3, 12, 6);
+        // Large enough for levels of detail, which radiance fields of many colours are captured without.
+        let mesh = generate::torus_two_colour(1.0, 0.3, 64, 32);
         let base = Options::default();
         // A new option does not compile here until it has a row below.
-        let Options { bands, field_bands, storage, lattice, face_px, shortcuts, silhouette } = base;
+        let Options { bands, field_bands, storage, lattice, face_px, shortcuts, silhouette, levels } = base;
         let Shortcuts { symmetry, faces, inside } = shortcuts;
         assert!(field_bands.is_none() && storage == Storage::F16);
         let shortcuts = |shortcuts| Options { shortcuts, ..base };
         let all = [true, true, true, true, false];
         let silhouettes = |silhouette| Options { silhouette, ..base };
-        let SilhouetteOptions { cells, map_px, view_px } = silhouette;
+        let SilhouetteOptions { cells, map_px, view_px, levels: _ } = silhouette;
         let outlines = [false, false, false, false, true];
         let flipped: Vec<(&str, Options, [bool; 5])> = vec![
             ("bands", Options { bands: bands + 1, ..base }, [true, true, true, false, false]),
@@ -139,6 +147,8 @@ mod tests {
             ("inside", shortcuts(Shortcuts { symmetry, faces, inside: !inside }), all),
             ("cells", silhouettes(SilhouetteOptions { cells: 2 * cells, ..silhouette }), outlines),
             ("map_px", silhouettes(SilhouetteOptions { map_px: 2 * map_px, ..silhouette }), outlines),
+            ("levels", Options { levels: !levels, ..base }, [true, false, true, true, false]),
+            ("levels of outlines", silhouettes(SilhouetteOptions { levels: false, ..silhouette }), outlines),
             ("view_px", silhouettes(SilhouetteOptions { view_px: 2 * view_px, ..silhouette }), outlines),
         ];
         assert_ne!(lattice, flipped[3].1.lattice);

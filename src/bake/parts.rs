@@ -7,6 +7,7 @@
 use super::batches::{CaptureTarget, Captures, Reduction};
 use super::cache::Cache;
 use super::kinds::Kind;
+use super::levels;
 use super::partial::{self, Partial};
 use super::project::Projection;
 use super::samples::FieldSamples;
@@ -106,7 +107,8 @@ pub fn bake_part(
     let targets = targets(baker, mesh, options, kind)?;
     let partial = Partial::new(None);
     let Options { face_px, shortcuts, .. } = *options;
-    let setup = Captures { mesh, reduction, face_px, shortcuts, partial: &partial };
+    let levels = kind != Kind::Light && levels::are_used(mesh, options.levels);
+    let setup = Captures { mesh, reduction, face_px, shortcuts, levels, partial: &partial };
     let range = part.of(targets.len());
     let samples = setup.run_part(baker, &targets, range.clone(), progress)?;
     let samples = samples.chunks_exact(reduction.sample_bytes());

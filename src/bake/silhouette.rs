@@ -5,7 +5,7 @@
 //! depth a pixel; two dispatches reduce every view to its map.
 
 use super::capture::unit_positions;
-use super::{BakeReport, Progress, hash_text};
+use super::{BakeReport, Progress, hash_text, levels};
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::field::silhouette::{Frame, REACH, Side, SilhouetteField, SilhouetteHeader, encode};
@@ -20,6 +20,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, Vec4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -39,12 +40,14 @@ pub struct SilhouetteOptions {
     pub map_px: u32,
     /// Pixels along an edge of the view that a map is reduced from.
     pub view_px: u32,
+    /// Whether a large mesh is drawn with fewer triangles, which miss it by a share of a view's pixel (see [`super::levels`]).
+    pub levels: bool,
 }
 
 impl Default for SilhouetteOptions {
     /// 193 maps of 32 x 32 texels: 389 KiB, and 193 KiB for the halves of a mesh that is not convex.
     fn default() -> Self {
-        SilhouetteOptions { cells: 8, map_px: 32, view_px: 128 }
+        SilhouetteOptions { cells: 8, map_px: 32, view_px: 128, levels: true }
     }
 }
 
@@ -56,6 +59,7 @@ pub fn silhouette_header(mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteH
         map_px: options.map_px,
         view_px: options.view_px,
         half_px: if mesh.is_convex() { 0 } else { options.map_px / 2 },
+        level_pixels: levels::texels(mesh, options.levels),
         centre_m: centre.to_array(),
         radius_m,
         mesh: mesh.name.clone(),
@@ -120,18 +124,23 @@ pub struct SilhouetteBuffers {
 }
 
 impl SilhouetteBuffers {
-    /// Uploads a mesh and the rectangles of its maps.
+    /// Uploads a mesh, of which `triangles` are drawn, and the rectangles of its maps.
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn new(device: &Arc<Device>, mesh: &Mesh, frames: &[Frame], map_px: u32) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        (mesh, triangles): (&Mesh, &[[u32; 3]]),
+        frames: &[Frame],
+        map_px: u32,
+    ) -> Result<Self> {
         let positions: Vec<[f32; 3]> = unit_positions(mesh).iter().map(|p| p.to_array()).collect();
         let halves: Vec<[f32; 2]> = frames.iter().map(|frame| frame.half.as_vec2().to_array()).collect();
         let bytes = 2 * u64::from(map_px * map_px) * frames.len() as u64;
         Ok(SilhouetteBuffers {
             positions: Buffer::with_data(device, "silhouette positions", &positions)?,
-            indices: Buffer::with_data(device, "silhouette indices", &mesh.triangles)?,
-            index_count: 3 * mesh.triangles.len() as u32,
+            indices: Buffer::with_data(device, "silhouette indices", triangles)?,
+            index_count: 3 * triangles.len() as u32,
             halves: Buffer::with_data(device, "silhouette halves", &halves)?,
             maps: Buffer::new(device, "silhouette maps", BufferKind::Device, bytes)?,
         })
@@ -237,6 +246,20 @@ impl Silhouette {
     }
 }
 
+/// The triangles that all views show. With levels of detail they miss the mesh by a share of the smallest pixel.
+fn drawn_triangles<'m>(
+    mesh: &'m Mesh,
+    header: &SilhouetteHeader,
+    frames: &[Frame],
+) -> Result<Cow<'m, [[u32; 3]]>> {
+    if header.level_pixels == 0.0 {
+        return Ok(Cow::Borrowed(&mesh.triangles));
+    }
+    let pixel = frames.iter().map(|frame| 2.0 * frame.half.min_element()).fold(f64::INFINITY, f64::min)
+        / f64::from(header.view_px);
+    levels::within(mesh, header.level_pixels * pixel).map(Cow::Owned)
+}
+
 /// Bakes the silhouette field of a mesh on the device; `progress` hears of maps. Returns the report of the bake too.
 ///
 /// # Errors
@@ -251,6 +274,7 @@ pub fn bake_silhouette(
     let header = silhouette_header(mesh, options);
     header.validate()?;
     let frames = frames(mesh, options.cells);
+    let triangles = drawn_triangles(mesh, &header, &frames)?;
     // Sides whose maps have the same size share the pass and its buffers.
     let sizes: &[&[Side]] =
         if header.half_px > 0 { &[&[Side::Whole], &[Side::Far, Side::Near]] } else { &[&[Side::Whole]] };
@@ -259,7 +283,7 @@ pub fn bake_silhouette(
     for sides in sizes {
         let map_px = header.edge_px(sides[0]) as u32;
         let pass = Silhouette::new(device, library, map_px, options.view_px * map_px / options.map_px)?;
-        let buffers = SilhouetteBuffers::new(device, mesh, &frames, map_px)?;
+        let buffers = SilhouetteBuffers::new(device, (mesh, &triangles), &frames, map_px)?;
         for &side in *sides {
             let mut first = 0;
             for batch in frames.chunks(pass.capacity()) {

@@ -22,7 +22,7 @@ const HEADER_LIMIT: u32 = 64 << 10;
 #[derive(Serialize, Deserialize)]
 pub(super) enum Request {
     /// What the following samples have in common. The mesh's arrays follow.
-    Begin { mesh: MeshShape, reduction: Reduction, face_px: u32, shortcuts: Shortcuts },
+    Begin { mesh: MeshShape, reduction: Reduction, face_px: u32, shortcuts: Shortcuts, levels: bool },
     /// Captures of planned targets, which follow.
     Capture,
 }

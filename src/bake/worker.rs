@@ -57,11 +57,11 @@ fn answer(
     bytes: &[u8],
 ) -> Result<(Answer, Vec<u8>)> {
     match request {
-        Request::Begin { mesh, reduction, face_px, shortcuts } => {
+        Request::Begin { mesh, reduction, face_px, shortcuts, levels } => {
             // What the last mesh took is free before the next takes more.
             *current = None;
             let (mesh, partial) = (mesh.mesh(bytes)?, Partial::new(None));
-            let captures = Captures { mesh: &mesh, reduction, face_px, shortcuts, partial: &partial };
+            let captures = Captures { mesh: &mesh, reduction, face_px, shortcuts, levels, partial: &partial };
             *current = Some((Batches::new(baker, &captures)?, reduction));
             Ok((Answer::Ready, Vec::new()))
         }

@@ -273,8 +273,8 @@ impl Worker {
 
     /// The worker, when it is ready for targets of a mesh.
     fn begin(mut self, setup: &Captures<'_>) -> Result<Self> {
-        let Captures { mesh, reduction, face_px, shortcuts, .. } = *setup;
-        let request = Request::Begin { mesh: MeshShape::of(mesh), reduction, face_px, shortcuts };
+        let Captures { mesh, reduction, face_px, shortcuts, levels, .. } = *setup;
+        let request = Request::Begin { mesh: MeshShape::of(mesh), reduction, face_px, shortcuts, levels };
         match self.ask(&request, &MeshShape::arrays(mesh))? {
             (Answer::Ready, _) => Ok(self),
             _ => Err(Error::Failed("it answers with something else".into())),

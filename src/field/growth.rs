@@ -86,6 +86,7 @@ mod tests {
             lattice,
             face_px: 64,
             shortcuts: Default::default(),
+            level_texels: 0.0,
             filled_samples: 0,
             captured_samples: 0,
             symmetry: String::new(),

@@ -44,6 +44,10 @@ pub struct FieldHeader {
     /// What the bake did in place of capturing everything; left out of files where all shortcuts were taken.
     #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
     pub shortcuts: Shortcuts,
+    /// Share of a texel by which what was captured may miss the mesh, since fewer and larger triangles stood for what was far off; 0
+    /// where all triangles were drawn.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub level_texels: f64,
     /// Number of sample points inside the solid. They hold captures from just outside the nearest surface.
     pub filled_samples: u32,
     /// Number of captured samples; the others follow from these by the mesh's symmetries or from neighbours.
@@ -63,6 +67,10 @@ pub struct FieldHeader {
     pub mesh: String,
     /// Content hash of the mesh, hexadecimal.
     pub mesh_hash: String,
+}
+
+pub(crate) fn is_zero(share: &f64) -> bool {
+    *share == 0.0
 }
 
 impl FieldHeader {

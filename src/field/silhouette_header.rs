@@ -54,6 +54,9 @@ pub struct SilhouetteHeader {
     /// Texels along an edge of the maps of the object's two halves: half of `map_px`, or 0 where a field has none, as of convex meshes.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub half_px: u32,
+    /// Share of a view's pixel by which what was drawn may miss the mesh; 0 where all of its triangles were drawn.
+    #[serde(default, skip_serializing_if = "super::is_zero")]
+    pub level_pixels: f64,
     /// Centre of the bounding sphere in the mesh's own frame, metres.
     pub centre_m: [f32; 3],
     /// Radius of the bounding sphere, metres.

@@ -302,6 +302,7 @@ fn outline_field() -> SilhouetteField {
         map_px: 8,
         view_px: 16,
         half_px: 4,
+        level_pixels: 0.0,
         centre_m: [0.0; 3],
         radius_m: 1.0,
         mesh: "m".into(),

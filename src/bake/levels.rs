@@ -1,0 +1,173 @@
+//! Levels of detail: in place of triangles that are far from the eye, fewer and larger ones are drawn.
+//!
+//! meshoptimizer builds them as in Karis, *Nanite: A Deep Dive*, SIGGRAPH 2021. Neighbouring chunks form a group; a group is simplified
+//! to half of its triangles while the vertices on its rim stay in their places, and what comes out is cut into new chunks for the next
+//! level. A group knows by how much its simplified triangles miss it, and a sphere around it; both grow from level to level. So for
+//! any eye one rule decides each chunk, and what is drawn fits together without a gap: a chunk is drawn if its group may not be
+//! drawn simplified, and if the group that it was simplified from may.
+
+use super::capture::unit_positions;
+use super::chunk::{CHUNK_TRIANGLES, Chunked, adapter};
+use super::symmetric_samples::{TEXEL_SHARE, allowed};
+use super::triangles::distinct;
+use crate::asset::Mesh;
+use crate::error::Result;
+use glam::Vec3;
+use meshopt::{ClodBounds, ClodConfig, ClodMesh, clod_build, clod_build_hierarchy, clod_default_config};
+use std::ops::Range;
+
+/// Triangles from which on a mesh has levels. Below, drawing them all takes less than a third of a bake.
+const FROM_TRIANGLES: usize = 4000;
+/// Chunks of a group. Larger groups simplify better inside their rims, smaller ones follow the distance more closely.
+const GROUP_CHUNKS: usize = 16;
+/// Children of a node of the tree over the groups.
+const NODE_CHILDREN: usize = 8;
+
+/// Whether captures of a mesh draw levels.
+pub fn are_used(mesh: &Mesh, wanted: bool) -> bool {
+    wanted && mesh.triangles.len() >= FROM_TRIANGLES
+}
+
+/// The share of a texel by which captures of a mesh may miss it: [`TEXEL_SHARE`], or 0 where no levels are used.
+pub fn texels(mesh: &Mesh, wanted: bool) -> f64 {
+    if are_used(mesh, wanted) { TEXEL_SHARE } else { 0.0 }
+}
+
+/// The sphere around a group, and the distance by which its simplified triangles miss it, in r.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    centre: Vec3,
+    radius: f32,
+    error: f32,
+}
+
+impl From<ClodBounds> for Bounds {
+    fn from(bounds: ClodBounds) -> Self {
+        Bounds { centre: bounds.center.into(), radius: bounds.radius, error: bounds.error }
+    }
+}
+
+/// By how much what is drawn may miss the mesh.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Tolerance {
+    /// Seen from an eye: this share of the distance.
+    Eye(Vec3, f32),
+    /// Everywhere the same, in r.
+    Parallel(f32),
+}
+
+impl Tolerance {
+    /// That of a capture with faces of `face_px`.
+    pub fn capture(eye: Vec3, face_px: u32) -> Self {
+        Tolerance::Eye(eye, allowed(1.0, face_px) as f32)
+    }
+
+    /// Whether a group may not be drawn simplified.
+    fn forbids(&self, bounds: &Bounds) -> bool {
+        match *self {
+            Tolerance::Eye(eye, share) => {
+                bounds.error > share * (eye.distance(bounds.centre) - bounds.radius).max(0.0)
+            }
+            Tolerance::Parallel(most) => bounds.error > most,
+        }
+    }
+}
+
+/// Chunks that are simplified together.
+struct Group {
+    bounds: Bounds,
+    chunks: Range<u32>,
+}
+
+/// A node of the tree over the groups of one level.
+struct Node {
+    bounds: Bounds,
+    below: Below,
+}
+
+enum Below {
+    Group(usize),
+    Nodes(Range<usize>),
+}
+
+/// Which chunk is drawn in whose place.
+pub(super) struct Levels {
+    groups: Vec<Group>,
+    /// For each chunk the group that it was simplified from, or `None` for the mesh's own triangles.
+    from: Vec<Option<u32>>,
+    /// The first nodes are the roots of the levels.
+    nodes: Vec<Node>,
+    depth: usize,
+}
+
+impl Levels {
+    /// Puts the chunks that are drawn under a tolerance into `chosen`, in order.
+    pub fn choose(&self, tolerance: Tolerance, chosen: &mut Vec<u32>) {
+        chosen.clear();
+        let mut open: Vec<usize> = (0..self.depth).collect();
+        while let Some(node) = open.pop().map(|index| &self.nodes[index]) {
+            if !tolerance.forbids(&node.bounds) {
+                continue;
+            }
+            match &node.below {
+                Below::Nodes(children) => open.extend(children.clone()),
+                Below::Group(group) => chosen.extend(self.groups[*group].chunks.clone().filter(|&chunk| {
+                    let from = self.from[chunk as usize];
+                    !from.is_some_and(|group| tolerance.forbids(&self.groups[group as usize].bounds))
+                })),
+            }
+        }
+        chosen.sort_unstable();
+    }
+}
+
+/// Triangles that miss a mesh by at most `error`, in r, by their corners among its vertices.
+pub(super) fn within(mesh: &Mesh, error: f64) -> Result<Vec<[u32; 3]>> {
+    let (chunked, levels) = leveled(&unit_positions(mesh), &distinct(mesh))?;
+    let mut chosen = Vec::new();
+    levels.choose(Tolerance::Parallel(error as f32), &mut chosen);
+    let drawn = chosen.iter().flat_map(|&chunk| chunked.triangles_of(chunk as usize));
+    Ok(drawn.map(|triangle| triangle.map(|vertex| chunked.vertices[vertex as usize])).collect())
+}
+
+/// Cuts a mesh into chunks of neighbouring triangles, for all of its levels.
+pub(super) fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Levels)> {
+    let adapter = adapter(positions)?;
+    // Vertices at one place become one, so that no group has a rim where only normals differ.
+    let same = meshopt::generate_position_remap(&adapter);
+    let welded = triangles.iter().map(|t| t.map(|vertex| same[vertex as usize]));
+    let welded: Vec<u32> = welded.filter(|[a, b, c]| a != b && b != c && c != a).flatten().collect();
+    let config = ClodConfig {
+        partition_size: GROUP_CHUNKS,
+        partition_sort: true,
+        optimize_clusters: false,
+        // It may tear a surface that stays whole otherwise.
+        simplify_fallback_sloppy: false,
+        ..clod_default_config(CHUNK_TRIANGLES)
+    };
+    let (mut chunked, mut from, mut groups) = (Chunked::default(), Vec::new(), Vec::new());
+    let mut of_groups = Vec::new();
+    clod_build(config, &ClodMesh::new(&welded, &adapter), |group, clusters| {
+        let first = chunked.chunks.len() as u32;
+        for cluster in clusters {
+            chunked.add(positions, cluster.indices);
+            from.push(u32::try_from(cluster.refined).ok());
+        }
+        of_groups.push(group);
+        groups.push(Group { bounds: group.simplified.into(), chunks: first..chunked.chunks.len() as u32 });
+        groups.len() as i32 - 1
+    });
+    let depth = of_groups.iter().map(|group| group.depth as usize + 1).max().unwrap_or(0);
+    let node = |node: meshopt::ClodNode| match usize::try_from(node.group) {
+        Ok(group) => Node { bounds: node.bounds.into(), below: Below::Group(group) },
+        // The margins cover rounding: what is forbidden for a group is forbidden for all nodes above.
+        Err(_) => {
+            let Bounds { centre, radius, error } = node.bounds.into();
+            let bounds = Bounds { centre, radius: 1.0001 * radius + 1e-6, error: 1.0001 * error };
+            let first = node.child_offset as usize;
+            Node { bounds, below: Below::Nodes(first..first + node.child_count as usize) }
+        }
+    };
+    let nodes = clod_build_hierarchy(&of_groups, NODE_CHILDREN, depth).into_iter().map(node).collect();
+    Ok((chunked, Levels { groups, from, nodes, depth }))
+}

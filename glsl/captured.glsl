@@ -4,7 +4,7 @@ struct Job {
     vec4 normal;   // unit surface normal, of vertices
     uint slots[6]; // place of each face in the atlas; NONE where the object does not reach
     uint target;   // sample that is written
-    float scale;   // factor before storing, of coefficients
+    float scale;   // factor before storing, of coefficients; 0 where none are wanted
 };
 
 layout(binding = 0) uniform texture2D atlas;

@@ -26,7 +26,7 @@ void main() {
     }
     uint texel_count = push.face_px * push.face_px;
     for (uint face = 0; face < 6; face++) {
-        uint slot = jobs[job].slots[face];
+        uint slot = jobs[job].scale == 0.0 ? NONE : jobs[job].slots[face];
         if (slot == NONE) {
             continue;
         }
@@ -39,7 +39,7 @@ void main() {
                 continue;
             }
 #else
-            float value = 1.0 - captured.r;
+            float value = float(captured.r < 1.0); // the object is black, or the darker the nearer it is
             if (value == 0.0) {
                 continue;
             }

@@ -13,6 +13,7 @@ use shadow_fields::bake::capture::unit_positions;
 use shadow_fields::bake::inside::{inside, pushed_out};
 use shadow_fields::bake::project::{self, Projection};
 use shadow_fields::bake::surface::Surface;
+use shadow_fields::bake::vertices::Wanted;
 use shadow_fields::bake::{self, Baker, SceneNeeds};
 use shadow_fields::bake::{TRANSFER_OFFSET, capture};
 use shadow_fields::field::quantity::channel_stride;
@@ -482,7 +483,10 @@ fn the_cache_keeps_transfers() {
     let cache = Cache::new(Some(folder.path()));
     let baker = Baker::new(&gpu.device, &gpu.library);
     let options = |bands| bake::Options { bands, face_px: 16, ..Default::default() };
-    let run = |bands| cache.transfer(&baker, &mesh, &options(bands), &quiet).unwrap();
+    let run = |bands| {
+        let found = cache.vertices(&baker, &mesh, &options(bands), Wanted::TRANSFER, &quiet).unwrap();
+        (found.transfer.unwrap(), found.baked)
+    };
     let (first, baked) = run(3);
     assert!(baked.is_some());
     let (second, found) = run(3);
@@ -509,8 +513,8 @@ fn without_a_folder_a_bake_is_kept_in_memory() {
         let cache = Cache::new(None);
         let run = || {
             let (field, baked) = cache.field(&baker, &mesh, &header, &quiet).unwrap();
-            let (transfer, baked_transfer) = cache.transfer(&baker, &mesh, &options, &quiet).unwrap();
-            (field, transfer, [baked.is_some(), baked_transfer.is_some()])
+            let found = cache.vertices(&baker, &mesh, &options, Wanted::TRANSFER, &quiet).unwrap();
+            (field, found.transfer, [baked.is_some(), found.baked.is_some()])
         };
         assert!(!cache.has_field(&header) && !cache.has_transfer(&mesh, &options));
         let (first, second) = (run(), run());

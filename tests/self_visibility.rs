@@ -7,7 +7,7 @@ use common::{Gpu, gpu, pot, report};
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::{Mesh, embedded};
 use shadow_fields::bake::cache::Cache;
-use shadow_fields::bake::partial::Partial;
+use shadow_fields::bake::vertices::Wanted;
 use shadow_fields::bake::{Options, TRANSFER_OFFSET};
 use shadow_fields::check::self_visibility as check;
 use shadow_fields::field::quantity::channel_stride;
@@ -28,7 +28,7 @@ fn options(face_px: u32) -> Options {
 }
 
 fn bake(gpu: &Gpu, mesh: &Mesh, face_px: u32) -> Vec<u8> {
-    gpu.baker().self_visibility_from(&Partial::new(None), mesh, &options(face_px), &|_, _| ()).unwrap().0
+    gpu.baker().self_visibility(mesh, &options(face_px), &|_, _| ()).unwrap().0
 }
 
 #[test]
@@ -206,8 +206,7 @@ fn direct_light_is_that_of_rays() {
     let placement = Placement { position: Vec3::ZERO, rotation: glam::Quat::IDENTITY, scale: 1.0 };
     let world = World::new(&scene, &shapes, &[placement]);
     let (transfer, of_transfer) = gpu.baker().transfer(mesh, &options(64), &|_, _| ()).unwrap();
-    let none = Partial::new(None);
-    let (maps, of_maps) = gpu.baker().self_visibility_from(&none, mesh, &options(64), &|_, _| ()).unwrap();
+    let (maps, of_maps) = gpu.baker().self_visibility(mesh, &options(64), &|_, _| ()).unwrap();
     report(&format!("transfer: {of_transfer:?}"));
     report(&format!("self-visibility: {of_maps:?}"));
     let stride = channel_stride(4);
@@ -251,7 +250,11 @@ fn the_cache_keeps_maps_and_bakes_damaged_ones_anew() {
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::new(Some(folder.path()));
     let (mesh, options) = (generate::torus(1.0, 0.3, 12, 6), options(16));
-    let ensure = |cache: &Cache| cache.self_visibility(&gpu.baker(), &mesh, &options, &|_, _| ()).unwrap();
+    let ensure = |cache: &Cache| {
+        let baker = gpu.baker();
+        let found = cache.vertices(&baker, &mesh, &options, Wanted::SELF_VISIBILITY, &|_, _| ()).unwrap();
+        (found.self_visibility.unwrap(), found.baked)
+    };
     assert!(!cache.has_self_visibility(&mesh, &options));
     let (maps, baked) = ensure(&cache);
     assert_eq!(maps.len(), BYTES * mesh.positions.len());

@@ -196,7 +196,8 @@ fn without_halves(field: &SilhouetteField) -> SilhouetteField {
 #[test]
 fn what_lies_behind_the_receiver_or_the_light_blocks_nothing() {
     let Some(gpu) = gpu() else { return };
-    let field = bake(&gpu, &generate::sphere(0.5, 4), SilhouetteOptions { cells: 4, map_px: 16, view_px: 64, levels: false });
+    let field =
+        bake(&gpu, &generate::sphere(0.5, 4), SilhouetteOptions { cells: 4, map_px: 16, view_px: 64, levels: false });
     let toward = DVec3::new(0.3, 0.9, 0.2).normalize();
     let angle = 2.0_f64.to_radians();
     let blocked = |from: f64, light: f64| field.blocked(&field.near(from * toward, toward), toward, light, angle.tan());

@@ -9,7 +9,7 @@ use cli::{command, finish, has_device};
 use common::generate;
 use common::{Gpu, gpu, library, report};
 use shadow_fields::asset::Mesh;
-use shadow_fields::bake::{self, Baker, WorkerOptions, partial::Partial};
+use shadow_fields::bake::{self, Baker, WorkerOptions, partial::Partial, vertices::Wanted};
 use shadow_fields::field::{FieldKind, ShadowField, Shortcuts};
 use shadow_fields::gpu::Validation;
 use std::cell::RefCell;
@@ -71,9 +71,8 @@ fn every_kind_of_bake_has_the_same_bytes_in_two_and_three_processes() {
     let quiet = |_, _| ();
     let whole = |baker: &Baker| {
         let fields = [FieldKind::Occlusion, FieldKind::Radiance].map(|kind| field(baker, &mesh, kind).unwrap());
-        let transfer = baker.transfer(&mesh, &options, &quiet).unwrap().0;
-        let maps = baker.self_visibility_from(&Partial::new(None), &mesh, &options, &quiet).unwrap().0;
-        (fields, transfer, maps)
+        let of = |wanted| baker.vertices_from(&Partial::new(None), &mesh, &options, wanted, &quiet).unwrap().0;
+        (fields, [Wanted::BOTH, Wanted::TRANSFER, Wanted::SELF_VISIBILITY].map(of))
     };
     let expected = whole(&alone);
     for jobs in [2, 3] {

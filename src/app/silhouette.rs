@@ -15,8 +15,8 @@ pub fn bake(global: &Global, (mesh, mesh_file): (&Mesh, &Path), out: &Path, opti
     let context = Context::new(global)?;
     let told = |done, all| context.progress.show(&mesh.name, done, all);
     let (device, library) = (context.baker.device(), context.baker.library());
-    let (field, report) = bake_silhouette((device, library), mesh, options, &told)
-        .map_err(|error| error.context(mesh_file.display()))?;
+    let (field, report) =
+        bake_silhouette((device, library), mesh, options, &told).map_err(|error| error.context(mesh_file.display()))?;
     let seconds = report.total.as_secs_f64();
     let result = json!({
         "origin": context.origin(global), "file": out.display().to_string(), "triangles": mesh.triangles.len(),

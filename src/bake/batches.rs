@@ -13,7 +13,6 @@ use crate::error::Result;
 use crate::field::Shortcuts;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::BYTES;
-use crate::gpu::memory::TexelView;
 use crate::gpu::{Buffer, BufferKind, Commands};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -38,56 +37,61 @@ pub(super) enum Reduction {
     Project { bands: usize, projection: Projection },
     /// A map of self-visibility, in bytes.
     SelfVisibility,
+    /// The bytes of a transfer vector, and then a map of self-visibility.
+    Vertex { bands: usize },
 }
 
 impl Reduction {
+    /// Bands and kind of its projection, if it has one.
+    fn projection(self) -> Option<(usize, Projection)> {
+        match self {
+            Reduction::Project { bands, projection } => Some((bands, projection)),
+            Reduction::Vertex { bands } => Some((bands, Projection::Transfer)),
+            Reduction::SelfVisibility => None,
+        }
+    }
+
+    fn has_maps(self) -> bool {
+        matches!(self, Reduction::SelfVisibility | Reduction::Vertex { .. })
+    }
+
     /// What faces hold.
     fn captured(self) -> CaptureKind {
         match self {
             Reduction::Project { projection, .. } => CaptureKind::of_field(projection == Projection::Radiance),
-            Reduction::SelfVisibility => CaptureKind::Distance,
-        }
-    }
-
-    /// Numbers of a reduced sample.
-    pub fn numbers(self) -> usize {
-        match self {
-            Reduction::Project { bands, projection } => projection.channels() * channel_stride(bands),
-            Reduction::SelfVisibility => BYTES,
+            _ => CaptureKind::Distance,
         }
     }
 
     /// Bytes of a reduced sample.
     pub fn sample_bytes(self) -> usize {
-        self.numbers() * if self == Reduction::SelfVisibility { 1 } else { 4 }
+        let floats = self.projection().map_or(0, |(bands, kind)| kind.channels() * channel_stride(bands));
+        4 * floats + if self.has_maps() { BYTES } else { 0 }
     }
 }
 
-/// The pass that reduces faces.
-pub(super) enum Reduce {
-    Project(Project),
-    SelfVisibility(SelfVisibility),
+/// A pass that reduces faces, with its samples of one batch.
+pub(super) struct Reduce<P> {
+    pub pass: P,
+    /// Reduced samples on the device.
+    pub samples: Buffer,
+    /// The reduced samples on their way to the host.
+    pub results: Buffer,
+    /// Bytes of a reduced sample.
+    pub sample_bytes: usize,
 }
 
-impl Reduce {
-    fn new(baker: &Baker, captures: &Captures<'_>, columns: u32) -> Result<Self> {
-        let (device, library, face_px) = (baker.device(), baker.library(), captures.face_px);
-        Ok(match captures.reduction {
-            Reduction::Project { bands, projection } => {
-                Reduce::Project(Project::new(device, library, bands, projection, face_px, columns)?)
-            }
-            Reduction::SelfVisibility => {
-                Reduce::SelfVisibility(SelfVisibility::new(device, library, face_px, columns)?)
-            }
-        })
+impl<P> Reduce<P> {
+    fn new(baker: &Baker, pass: P, sample_bytes: usize, capacity: u32) -> Result<Self> {
+        let (device, bytes) = (baker.device(), u64::from(capacity) * sample_bytes as u64);
+        let samples = Buffer::new(device, "batch samples", BufferKind::Device, bytes)?;
+        let results = Buffer::new(device, "batch results", BufferKind::Readback, bytes)?;
+        Ok(Reduce { pass, samples, results, sample_bytes })
     }
 
-    /// The view of texels that a projection records with.
-    fn texel_view(&self) -> Result<Option<TexelView<'_>>> {
-        match self {
-            Reduce::Project(pass) => pass.texel_view().map(Some),
-            Reduce::SelfVisibility(_) => Ok(None),
-        }
+    /// The samples of the first targets, on the host.
+    fn read(&self, count: usize) -> Vec<u8> {
+        self.results.read(0, count * self.sample_bytes)
     }
 }
 
@@ -127,19 +131,14 @@ impl Unit {
 /// What every batch works with.
 pub(super) struct Batches {
     pub capture: Capture,
-    pub reduce: Reduce,
+    pub project: Option<Reduce<Project>>,
+    pub self_visibility: Option<Reduce<SelfVisibility>>,
     pub model: Model,
     pub jobs: Buffer,
     /// Whether backs of closed meshes are left out. Only an eye inside the solid would see them.
     pub culls: bool,
-    /// Reduced samples of one batch on the device.
-    pub samples: Buffer,
-    /// The reduced samples on their way to the host.
-    pub results: Buffer,
-    /// Bytes of a reduced sample.
-    pub sample_bytes: u64,
-    /// Estimated seconds that drawing the mesh around one eye takes.
-    mesh_seconds: f64,
+    /// Estimated seconds that a triangle around an eye takes.
+    triangle_seconds: f64,
     /// And what each face takes besides.
     face_seconds: f64,
 }
@@ -150,10 +149,13 @@ pub(super) struct Batch {
     pub slots: Vec<Slots>,
 }
 
+fn facing_share(mesh: &Mesh) -> f64 {
+    if mesh.is_closed() { FACING_SHARE } else { 1.0 }
+}
+
 /// Estimated seconds of captures on a software device: of `eyes` that see the mesh in `faces` of `face_px`.
 pub(super) fn estimated_seconds(mesh: &Mesh, eyes: u64, faces: u64, face_px: u32) -> f64 {
-    let share = if mesh.is_closed() { FACING_SHARE } else { 1.0 };
-    let triangles = mesh.triangles.len() as f64 * share * eyes as f64;
+    let triangles = mesh.triangles.len() as f64 * facing_share(mesh) * eyes as f64;
     triangles * TRIANGLE_SECONDS + faces as f64 * f64::from(face_px).powi(2) * TEXEL_SECONDS
 }
 
@@ -172,40 +174,50 @@ impl Batches {
         let (device, library) = (baker.device(), baker.library());
         let mut capture = Capture::new(device, library, captures.face_px, kind)?;
         capture.skips = captures.shortcuts.faces;
-        let sample_bytes = captures.reduction.sample_bytes() as u64;
-        let bytes = u64::from(capture.capacity()) * sample_bytes;
+        let Captures { reduction, face_px, .. } = *captures;
+        let (columns, capacity) = (capture.columns, capture.capacity());
+        let maps_bytes = if reduction.has_maps() { BYTES } else { 0 };
+        let project = reduction.projection().map(|(bands, projection)| {
+            let pass = Project::new(device, library, bands, projection, face_px, columns)?;
+            Reduce::new(baker, pass, reduction.sample_bytes() - maps_bytes, capacity)
+        });
+        let self_visibility = reduction
+            .has_maps()
+            .then(|| Reduce::new(baker, SelfVisibility::new(device, library, face_px, columns)?, maps_bytes, capacity));
         Ok(Batches {
-            reduce: Reduce::new(baker, captures, capture.columns)?,
+            project: project.transpose()?,
+            self_visibility: self_visibility.transpose()?,
             model: match captures.levels {
                 true => Model::with_levels(device, captures.mesh)?,
                 false => Model::new(device, captures.mesh, kind == CaptureKind::Radiance)?,
             },
-            jobs: Project::job_buffer(device, capture.capacity())?,
+            jobs: Project::job_buffer(device, capacity)?,
             culls: captures.shortcuts.inside,
-            samples: Buffer::new(device, "batch samples", BufferKind::Device, bytes)?,
-            results: Buffer::new(device, "batch results", BufferKind::Readback, bytes)?,
-            sample_bytes,
-            mesh_seconds: estimated_seconds(captures.mesh, 1, 0, captures.face_px),
-            face_seconds: estimated_seconds(captures.mesh, 0, 1, captures.face_px),
+            triangle_seconds: TRIANGLE_SECONDS * facing_share(captures.mesh),
+            face_seconds: estimated_seconds(captures.mesh, 0, 1, face_px),
             capture,
         })
     }
 
     /// Gives every face of every target its place in the atlas, batch after batch, and cuts the batches into units for so many
-    /// processes.
+    /// processes. Returns the targets that are captured: those whose factor is 0 are left out if they are projected and nothing else.
     pub fn plan(&self, targets: &[CaptureTarget], jobs: usize) -> (Vec<CaptureTarget>, Vec<Unit>) {
         let eyes: Vec<Vec3> = targets.iter().map(|target| target.eye).collect();
-        let (mut planned, mut units) = (targets.to_vec(), Vec::new());
+        let (mut planned, mut units) = (Vec::with_capacity(targets.len()), Vec::new());
         let mut first = 0;
         while first < targets.len() {
             let slots = self.capture.plan(&self.model, &eyes[first..]);
-            let mut unit = Unit { first: first as u32, count: 0, seconds: 0.0 };
-            for (target, slots) in planned[first..].iter_mut().zip(&slots) {
-                target.job.slots = *slots;
+            let mut unit = Unit { first: planned.len() as u32, count: 0, seconds: 0.0 };
+            for (target, slots) in targets[first..].iter().zip(&slots) {
+                if target.job.scale == 0.0 && self.self_visibility.is_none() {
+                    continue;
+                }
+                planned.push(CaptureTarget { job: Job { slots: *slots, ..target.job }, ..*target });
+                let triangles = self.model.triangles_seen(target.eye, self.capture.face_px) as f64;
                 unit.count += 1;
-                unit.seconds += self.mesh_seconds + self.face_seconds * f64::from(drawn(slots));
+                unit.seconds += self.triangle_seconds * triangles + self.face_seconds * f64::from(drawn(slots));
             }
-            units.push(unit);
+            units.extend((unit.count > 0).then_some(unit));
             first += slots.len();
         }
         let seconds: f64 = units.iter().map(|unit| unit.seconds).sum();
@@ -234,12 +246,19 @@ impl Batches {
             eyes: targets.iter().map(|target| target.eye).collect(),
             slots: targets.iter().map(|target| target.job.slots).collect(),
         };
-        let texels = self.reduce.texel_view()?;
-        let mut commands = Commands::new(self.samples.device(), "bake batch")?;
+        let texels = self.project.as_ref().map(|project| project.pass.texel_view()).transpose()?;
+        let mut commands = Commands::new(self.jobs.device(), "bake batch")?;
         super::record_batch(&mut commands, self, &batch, texels.as_ref())?;
         report.add(&commands.submit()?);
         report.faces += batch.slots.iter().map(drawn).sum::<u32>();
-        Ok(self.results.read(0, targets.len() * self.sample_bytes as usize))
+        let count = targets.len();
+        let floats = self.project.as_ref().map_or(Vec::new(), |project| project.read(count));
+        let maps = self.self_visibility.as_ref().map_or(Vec::new(), |maps| maps.read(count));
+        if floats.is_empty() || maps.is_empty() {
+            return Ok([floats, maps].concat());
+        }
+        let pairs = floats.chunks_exact(floats.len() / count).zip(maps.chunks_exact(maps.len() / count));
+        Ok(pairs.flat_map(|(floats, map)| [floats, map].concat()).collect())
     }
 
     /// Most targets that one unit may hold.

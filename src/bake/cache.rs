@@ -1,11 +1,12 @@
 //! The cache of what is baked: fields, silhouette fields, transfer vectors and self-visibility. Names are hashes of the mesh's content and of everything
-//! else that decides the numbers. One function, `Cache::find`, serves all kinds; a `Shelf` says where one kind is kept.
+//! else that decides the numbers. A `Shelf` says where one kind is kept.
 
 use super::kinds::Kind;
 pub use super::names::field_name;
 use super::names::{SelfVisibilityHeader, TransferHeader, identity, key, silhouette_identity, silhouette_name};
 use super::partial::Partial;
 use super::silhouette::{bake_silhouette, silhouette_header};
+use super::vertices::Wanted;
 use super::{BakeReport, Baker, Options, Progress};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
@@ -37,21 +38,33 @@ struct InMemory {
 
 /// Where one kind of content is kept.
 struct Shelf<T> {
-    /// Ending of its files, and of those of a bake that is not done.
-    endings: [&'static str; 2],
+    /// Ending of its files.
+    ending: &'static str,
     /// Its place in memory.
     memory: fn(&mut InMemory) -> &mut HashMap<String, Arc<T>>,
 }
 
-const FIELDS: Shelf<ShadowField> = Shelf { endings: ["sf", "part"], memory: |all| &mut all.fields };
-const SILHOUETTES: Shelf<SilhouetteField> =
-    Shelf { endings: ["outlines", "outlines-part"], memory: |all| &mut all.silhouettes };
-const TRANSFERS: Shelf<Vec<f32>> = Shelf { endings: ["transfer", "transfer-part"], memory: |all| &mut all.transfers };
-const SELF_VISIBILITY: Shelf<Vec<u8>> =
-    Shelf { endings: ["selfvis", "selfvis-part"], memory: |all| &mut all.self_visibility };
+const FIELDS: Shelf<ShadowField> = Shelf { ending: "sf", memory: |all| &mut all.fields };
+const SILHOUETTES: Shelf<SilhouetteField> = Shelf { ending: "outlines", memory: |all| &mut all.silhouettes };
+const TRANSFERS: Shelf<Vec<f32>> = Shelf { ending: "transfer", memory: |all| &mut all.transfers };
+const SELF_VISIBILITY: Shelf<Vec<u8>> = Shelf { ending: "selfvis", memory: |all| &mut all.self_visibility };
+/// Endings of the files of bakes that are not done: of a field, and of vertices.
+const FIELD_PART: &str = "part";
+const VERTICES_PART: &str = "vertices-part";
 
 /// What the cache held or a bake has made, and the report of the bake, if there was one.
 pub type Found<T> = (Arc<T>, Option<BakeReport>);
+
+/// What is baked of the vertices of a mesh, as far as it was wanted.
+#[derive(Clone, Debug, Default)]
+pub struct FoundVertices {
+    /// Transfer vectors.
+    pub transfer: Option<Arc<Vec<f32>>>,
+    /// Self-visibility.
+    pub self_visibility: Option<Arc<Vec<u8>>>,
+    /// What was baked, and the report of that, if the cache did not hold all of it.
+    pub baked: Option<(Wanted, BakeReport)>,
+}
 
 impl Cache {
     /// A cache below `folder`, or in memory if there is none.
@@ -69,18 +82,21 @@ impl Cache {
         Some(self.folder.as_ref()?.join(format!("{key}.{ending}")))
     }
 
-    /// The file of what a cancelled bake has kept of one kind of thing, in a cache that has a folder.
+    /// The file of what a cancelled bake has kept of one kind of thing, in a cache that has a folder. Outlines have none.
     pub(super) fn unfinished(&self, mesh: &Mesh, options: &Options, kind: Kind) -> Option<PathBuf> {
-        let field = |kind| field_name(&super::header(mesh, kind, options));
+        let field = |kind| self.path(&field_name(&super::header(mesh, kind, options)), FIELD_PART);
         match kind {
-            Kind::Shadow => self.path(&field(FieldKind::Occlusion), FIELDS.endings[1]),
-            Kind::Light => self.path(&field(FieldKind::Radiance), FIELDS.endings[1]),
-            Kind::Silhouette => self.path(&silhouette_name(mesh, options), SILHOUETTES.endings[1]),
-            Kind::SelfVisibility => {
-                self.path(&key(&SelfVisibilityHeader::new(mesh, options)), SELF_VISIBILITY.endings[1])
-            }
-            Kind::Transfer => self.path(&key(&TransferHeader::new(mesh, options)), TRANSFERS.endings[1]),
+            Kind::Shadow => field(FieldKind::Occlusion),
+            Kind::Light => field(FieldKind::Radiance),
+            Kind::Silhouette => None,
+            Kind::Vertices => self.unfinished_vertices(mesh, options, Wanted::BOTH),
         }
+    }
+
+    fn unfinished_vertices(&self, mesh: &Mesh, options: &Options, wanted: Wanted) -> Option<PathBuf> {
+        let transfer = wanted.transfer.then(|| TransferHeader::new(mesh, options));
+        let maps = wanted.self_visibility.then(|| SelfVisibilityHeader::new(mesh, options));
+        self.path(&key(&(transfer, maps)), VERTICES_PART)
     }
 
     fn exists(&self, key: &str, ending: &str) -> bool {
@@ -92,34 +108,22 @@ impl Cache {
     }
 
     fn has<T>(&self, shelf: &Shelf<T>, key: &str) -> bool {
-        (shelf.memory)(&mut self.memory()).contains_key(key) || self.exists(key, shelf.endings[0])
+        (shelf.memory)(&mut self.memory()).contains_key(key) || self.exists(key, shelf.ending)
     }
 
-    /// What a shelf holds under `key`, read by `read`; else what `bake` makes, which is kept by `write`, or in memory where it cannot
-    /// be written.
-    fn find<T>(
-        &self,
-        shelf: &Shelf<T>,
-        key: String,
-        read: impl FnOnce(&Path) -> Option<T>,
-        bake: impl FnOnce(&Partial) -> Result<(T, BakeReport)>,
-        write: impl FnOnce(&Path, &T) -> Result<()>,
-    ) -> Result<Found<T>> {
-        let [ending, unfinished] = shelf.endings;
-        let path = self.path(&key, ending);
-        if let Some(found) = (shelf.memory)(&mut self.memory()).get(&key) {
-            return Ok((found.clone(), None));
-        }
-        if let Some(found) = path.as_deref().and_then(read) {
-            return Ok((Arc::new(found), None));
-        }
-        let partial = Partial::new(path.as_ref().map(|path| path.with_extension(unfinished)));
-        let (made, report) = bake(&partial)?;
+    /// What a shelf holds under `key`, read by `read` where it is on disk.
+    fn look<T>(&self, shelf: &Shelf<T>, key: &str, read: impl FnOnce(&Path) -> Option<T>) -> Option<Arc<T>> {
+        let found = (shelf.memory)(&mut self.memory()).get(key).cloned();
+        found.or_else(|| self.path(key, shelf.ending).as_deref().and_then(read).map(Arc::new))
+    }
+
+    /// Puts what was made on a shelf: by `write`, or in memory where it cannot be written.
+    fn keep<T>(&self, shelf: &Shelf<T>, key: String, made: T, write: impl FnOnce(&Path, &T) -> Result<()>) -> Arc<T> {
         let made = Arc::new(made);
-        if !is_kept(path.as_deref(), |path| write(path, &made)) {
+        if !is_kept(self.path(&key, shelf.ending).as_deref(), |path| write(path, &made)) {
             (shelf.memory)(&mut self.memory()).insert(key, made.clone());
         }
-        Ok((made, Some(report)))
+        made
     }
 
     /// Whether the field that `header` describes is there.
@@ -153,13 +157,13 @@ impl Cache {
         header: &FieldHeader,
         progress: Progress<'_>,
     ) -> Result<Found<ShadowField>> {
-        self.find(
-            &FIELDS,
-            field_name(header),
-            |path| read_field(path, header),
-            |partial| baker.field_from(partial, mesh, header.clone(), progress),
-            |path, field| field.write(path),
-        )
+        let name = field_name(header);
+        if let Some(found) = self.look(&FIELDS, &name, |path| read_field(path, header)) {
+            return Ok((found, None));
+        }
+        let partial = Partial::new(self.path(&name, FIELD_PART));
+        let (made, report) = baker.field_from(&partial, mesh, header.clone(), progress)?;
+        Ok((self.keep(&FIELDS, name, made, |path, field| field.write(path)), Some(report)))
     }
 
     /// The silhouette field of a mesh, and the report of its bake, which is `None` if the cache held it.
@@ -173,62 +177,60 @@ impl Cache {
         options: &Options,
         progress: Progress<'_>,
     ) -> Result<Found<SilhouetteField>> {
-        let header = silhouette_header(mesh, options.silhouette);
-        self.find(
-            &SILHOUETTES,
-            silhouette_name(mesh, options),
-            |path| read_silhouette(path, &header),
-            |_| bake_silhouette((baker.device(), baker.library()), mesh, options.silhouette, progress),
-            |path, field| field.write(path),
-        )
+        let (name, options) = (silhouette_name(mesh, options), options.silhouette);
+        let header = silhouette_header(mesh, options);
+        if let Some(found) = self.look(&SILHOUETTES, &name, |path| read_silhouette(path, &header)) {
+            return Ok((found, None));
+        }
+        let (made, report) = bake_silhouette((baker.device(), baker.library()), mesh, options, progress)?;
+        Ok((self.keep(&SILHOUETTES, name, made, |path, field| field.write(path)), Some(report)))
     }
 
-    /// The transfer vectors of a mesh, and the report of their bake, which is `None` if the cache held them.
-    ///
-    /// # Errors
-    /// As [`Baker::transfer`]. A damaged or unreadable cache file is baked anew.
-    pub fn transfer(
-        &self,
-        baker: &Baker,
-        mesh: &Mesh,
-        options: &Options,
-        progress: Progress<'_>,
-    ) -> Result<Found<Vec<f32>>> {
-        let header = TransferHeader::new(mesh, options);
-        let bytes = 4 * header.vertex_count * channel_stride(header.bands);
-        let floats = |payload: Vec<u8>| {
-            payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes"))).collect()
-        };
-        self.find(
-            &TRANSFERS,
-            key(&header),
-            |path| read_payload(path, TRANSFER_MAGIC, &header, bytes).map(floats),
-            |partial| baker.transfer_from(partial, mesh, options, progress),
-            |path, transfer| file::write(path, TRANSFER_MAGIC, &header, bytemuck::cast_slice(transfer)),
-        )
-    }
-
-    /// The self-visibility of a mesh (see [`Baker::self_visibility_from`]), and the report of its bake, which is `None` if the cache
-    /// held it.
+    /// What is wanted of the vertices of a mesh (see [`Baker::vertices_from`]). What the cache does not hold is baked together.
     ///
     /// # Errors
     /// As [`Baker::field`]. A damaged or unreadable cache file is baked anew.
-    pub fn self_visibility(
+    pub fn vertices(
         &self,
         baker: &Baker,
         mesh: &Mesh,
         options: &Options,
+        wanted: Wanted,
         progress: Progress<'_>,
-    ) -> Result<Found<Vec<u8>>> {
-        let header = SelfVisibilityHeader::new(mesh, options);
-        let bytes = header.vertex_count * self_visibility::BYTES;
-        self.find(
-            &SELF_VISIBILITY,
-            key(&header),
-            |path| read_payload(path, SELF_VISIBILITY_MAGIC, &header, bytes),
-            |partial| baker.self_visibility_from(partial, mesh, options, progress),
-            |path, maps| file::write(path, SELF_VISIBILITY_MAGIC, &header, maps),
-        )
+    ) -> Result<FoundVertices> {
+        let (of_transfer, of_maps) = (TransferHeader::new(mesh, options), SelfVisibilityHeader::new(mesh, options));
+        let (transfer_key, maps_key) = (key(&of_transfer), key(&of_maps));
+        let transfer = wanted.transfer.then(|| {
+            let bytes = 4 * of_transfer.vertex_count * channel_stride(of_transfer.bands);
+            let floats = |payload: Vec<u8>| bytemuck::pod_collect_to_vec(&payload);
+            self.look(&TRANSFERS, &transfer_key, |path| {
+                read_payload(path, TRANSFER_MAGIC, &of_transfer, bytes).map(floats)
+            })
+        });
+        let self_visibility = wanted.self_visibility.then(|| {
+            let bytes = of_maps.vertex_count * self_visibility::BYTES;
+            self.look(&SELF_VISIBILITY, &maps_key, |path| read_payload(path, SELF_VISIBILITY_MAGIC, &of_maps, bytes))
+        });
+        let missing =
+            Wanted { transfer: matches!(transfer, Some(None)), self_visibility: matches!(self_visibility, Some(None)) };
+        let mut out =
+            FoundVertices { transfer: transfer.flatten(), self_visibility: self_visibility.flatten(), baked: None };
+        if !missing.transfer && !missing.self_visibility {
+            return Ok(out);
+        }
+        let partial = Partial::new(self.unfinished_vertices(mesh, options, missing));
+        let (made, report) = baker.vertices_from(&partial, mesh, options, missing, progress)?;
+        if missing.transfer {
+            out.transfer = Some(self.keep(&TRANSFERS, transfer_key, made.transfer, |path, floats| {
+                file::write(path, TRANSFER_MAGIC, &of_transfer, bytemuck::cast_slice(floats))
+            }));
+        }
+        if missing.self_visibility {
+            let write = |path: &Path, maps: &Vec<u8>| file::write(path, SELF_VISIBILITY_MAGIC, &of_maps, maps);
+            out.self_visibility = Some(self.keep(&SELF_VISIBILITY, maps_key, made.self_visibility, write));
+        }
+        out.baked = Some((missing, report));
+        Ok(out)
     }
 }
 

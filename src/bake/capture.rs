@@ -83,7 +83,12 @@ impl Model {
     }
 
     /// The chunks that an eye is shown in faces of `face_px`. `buffer` holds them where they are chosen for it.
-    fn seen<'m>(&'m self, eye: Vec3, face_px: u32, buffer: &'m mut Vec<u32>) -> impl Iterator<Item = &'m Chunk> + Clone {
+    fn seen<'m>(
+        &'m self,
+        eye: Vec3,
+        face_px: u32,
+        buffer: &'m mut Vec<u32>,
+    ) -> impl Iterator<Item = &'m Chunk> + Clone {
         let chosen = match &self.levels {
             Some(levels) => {
                 levels.choose(Tolerance::capture(eye, face_px), buffer);

@@ -73,7 +73,8 @@ impl Chunked {
         let (first, start) = (self.vertices.len(), self.triangles.len());
         let (vertices, local) = extract_meshlet_indices(corners);
         self.vertices.extend(vertices);
-        self.triangles.extend(local.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|i| (first + usize::from(i)) as u32)));
+        self.triangles
+            .extend(local.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|i| (first + usize::from(i)) as u32)));
         let of_vertex = |i: u32| positions[self.vertices[i as usize] as usize];
         let triangles: Vec<_> = self.triangles[start..].iter().map(|t| t.map(of_vertex)).collect();
         self.chunks.push(Chunk::new(3 * start as u32..3 * self.triangles.len() as u32, &triangles));

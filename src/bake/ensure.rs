@@ -1,7 +1,8 @@
 //! Bakes or finds in the cache every field and transfer vector that a scene needs. Everything that shows a scene calls [`ensure()`].
 
-use super::cache::{Cache, Found, field_name};
-use super::{BakeReport, Baker, Options, Progress, header};
+use super::cache::{Cache, FoundVertices, field_name};
+use super::vertices::Wanted;
+use super::{BakeReport, Baker, Options, header};
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
@@ -171,48 +172,39 @@ pub fn ensure(
         }
     }
     let BakedScene { meshes, baked } = &mut out;
-    let mut of_meshes = OfMeshes { scene, progress, baked };
-    let found = of_meshes
-        .find("silhouette", &needs.silhouettes, |mesh, done| cache.silhouette(baker, mesh, &needs.options, done))?;
-    meshes.iter_mut().zip(found).for_each(|(to, found)| to.silhouette = found);
-    let found = of_meshes.find("self-visibility", &needs.self_visibility, |mesh, done| {
-        cache.self_visibility(baker, mesh, &needs.options, done)
-    })?;
-    meshes.iter_mut().zip(found).for_each(|(to, found)| to.self_visibility = found);
-    let found =
-        of_meshes.find("transfer", &needs.transfers, |mesh, done| cache.transfer(baker, mesh, &needs.options, done))?;
-    meshes.iter_mut().zip(found).for_each(|(to, found)| to.transfer = found);
+    let mut known = HashMap::<[u8; 32], Arc<SilhouetteField>>::new();
+    for ((mesh, needed), to) in scene.meshes.iter().zip(&needs.silhouettes).zip(&mut *meshes) {
+        if *needed && !known.contains_key(&mesh.content_hash()) {
+            let what = format!("{} silhouette", mesh.name);
+            let done = |now, all| progress(&what, now, all);
+            let (field, report) = cache.silhouette(baker, mesh, &needs.options, &done)?;
+            baked.extend(report.map(|report| Baked { what, report }));
+            known.insert(mesh.content_hash(), field);
+        }
+        to.silhouette = known.get(&mesh.content_hash()).filter(|_| *needed).cloned();
+    }
+    let wanted = |(&self_visibility, &transfer)| Wanted { transfer, self_visibility };
+    let wanted: Vec<Wanted> = needs.self_visibility.iter().zip(&needs.transfers).map(wanted).collect();
+    let mut known = HashMap::<[u8; 32], FoundVertices>::new();
+    for ((mesh, wanted), to) in scene.meshes.iter().zip(wanted).zip(meshes) {
+        // The entities of one mesh may need what those of an equal mesh do not.
+        let found = known.entry(mesh.content_hash()).or_default();
+        let missing = Wanted {
+            transfer: wanted.transfer && found.transfer.is_none(),
+            self_visibility: wanted.self_visibility && found.self_visibility.is_none(),
+        };
+        if missing.transfer || missing.self_visibility {
+            let done = |now, all| progress(&format!("{} {}", mesh.name, missing.name()), now, all);
+            let new = cache.vertices(baker, mesh, &needs.options, missing, &done)?;
+            let what = |(what, report): (Wanted, _)| Baked { what: format!("{} {}", mesh.name, what.name()), report };
+            baked.extend(new.baked.map(what));
+            found.transfer = new.transfer.or(found.transfer.take());
+            found.self_visibility = new.self_visibility.or(found.self_visibility.take());
+        }
+        to.transfer = found.transfer.clone().filter(|_| wanted.transfer);
+        to.self_visibility = found.self_visibility.clone().filter(|_| wanted.self_visibility);
+    }
     // What idle workers hold is free for pictures.
     baker.workers().into_iter().for_each(|workers| workers.dismiss());
     Ok(out)
-}
-
-/// Bakes of which a mesh has one of a kind.
-struct OfMeshes<'e> {
-    scene: &'e Scene,
-    progress: SceneProgress<'e>,
-    baked: &'e mut Vec<Baked>,
-}
-
-impl OfMeshes<'_> {
-    /// What each mesh has of a kind that is `needed`; meshes of equal content share it. `find` looks in the cache or bakes.
-    fn find<T>(
-        &mut self,
-        kind: &str,
-        needed: &[bool],
-        find: impl Fn(&Mesh, Progress<'_>) -> Result<Found<T>>,
-    ) -> Result<Vec<Option<Arc<T>>>> {
-        let mut known = HashMap::<[u8; 32], Arc<T>>::new();
-        let mut all = Vec::with_capacity(needed.len());
-        for (mesh, needed) in self.scene.meshes.iter().zip(needed) {
-            if *needed && !known.contains_key(&mesh.content_hash()) {
-                let what = format!("{} {kind}", mesh.name);
-                let (found, report) = find(mesh, &|now, all| (self.progress)(&what, now, all))?;
-                self.baked.extend(report.map(|report| Baked { what, report }));
-                known.insert(mesh.content_hash(), found);
-            }
-            all.push(known.get(&mesh.content_hash()).filter(|_| *needed).cloned());
-        }
-        Ok(all)
-    }
 }

@@ -24,10 +24,8 @@ pub enum Kind {
     Light,
     /// Silhouette field.
     Silhouette,
-    /// Self-visibility of every vertex.
-    SelfVisibility,
-    /// Transfer vector of every vertex.
-    Transfer,
+    /// Transfer vector and self-visibility of every vertex.
+    Vertices,
 }
 
 impl Kind {
@@ -37,7 +35,7 @@ impl Kind {
         kinds.extend(mesh.colors.is_some().then_some(Kind::Light));
         kinds.push(Kind::Silhouette);
         if bakes_transfer(mesh) {
-            kinds.extend([Kind::SelfVisibility, Kind::Transfer]);
+            kinds.push(Kind::Vertices);
         }
         kinds
     }
@@ -60,7 +58,7 @@ impl Kind {
             Kind::Silhouette => {
                 return estimated_seconds(mesh, NodeGrid::map_count(options.silhouette.cells) as u64, 0, 1);
             }
-            Kind::SelfVisibility | Kind::Transfer => mesh.positions.len() as f64,
+            Kind::Vertices => mesh.positions.len() as f64,
         };
         estimated_seconds(mesh, eyes as u64, (FACES * eyes) as u64, options.face_px)
     }
@@ -78,8 +76,7 @@ impl Kind {
                 let map = 16 + 2 * u64::from(options.silhouette.map_px).pow(2);
                 map * NodeGrid::map_count(options.silhouette.cells) as u64
             }
-            Kind::SelfVisibility => vertices * BYTES as u64,
-            Kind::Transfer => vertices * 4 * channel_stride(options.bands) as u64,
+            Kind::Vertices => vertices * (BYTES + 4 * channel_stride(options.bands)) as u64,
         }
     }
 
@@ -89,8 +86,7 @@ impl Kind {
             Kind::Shadow => "shadow",
             Kind::Light => "light",
             Kind::Silhouette => "silhouette",
-            Kind::SelfVisibility => "self-visibility",
-            Kind::Transfer => "transfer",
+            Kind::Vertices => "vertices",
         }
     }
 }

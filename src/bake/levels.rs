@@ -65,9 +65,7 @@ impl Tolerance {
     /// Whether a group may not be drawn simplified.
     fn forbids(&self, bounds: &Bounds) -> bool {
         match *self {
-            Tolerance::Eye(eye, share) => {
-                bounds.error > share * (eye.distance(bounds.centre) - bounds.radius).max(0.0)
-            }
+            Tolerance::Eye(eye, share) => bounds.error > share * (eye.distance(bounds.centre) - bounds.radius).max(0.0),
             Tolerance::Parallel(most) => bounds.error > most,
         }
     }

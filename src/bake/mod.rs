@@ -3,7 +3,7 @@
 //! ```text
 //! sample points -> capture -> project -> host (all batches) -> turned samples -> assemble -> field
 //! vertices      -> capture -> project -> host (all batches) -> turned vertices -> transfer vectors
-//! vertices      -> capture -> self_visibility -> host (all batches) -> a map for each vertex
+//!                       `---> self_visibility -> host (all batches) -> a map for each vertex
 //! ```
 //!
 //! `record_batch` and `record_assembly` hold every pass and every barrier of a bake in order.
@@ -34,33 +34,30 @@ pub mod surface;
 pub mod symmetric_samples;
 pub mod symmetry;
 pub mod triangles;
+pub mod vertices;
 mod wire;
 pub mod worker;
 pub mod workers;
 
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
-use crate::field::quantity::{FieldKind, channel_stride};
-use crate::field::self_visibility::BYTES;
+use crate::field::quantity::FieldKind;
 use crate::field::{FieldHeader, ShadowField, growth};
 use crate::gpu::memory::TexelView;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
-use batches::{Batch, Batches, CaptureTarget, Captures, Reduce, Reduction};
-use capture::unit_positions;
+use batches::{Batch, Batches, Captures, Reduce, Reduction};
 pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, is_seen, needs};
 pub use header::{Options, first_shell, hash_text, header};
 
 use partial::Partial;
-use project::{Job, Projection};
+use project::Projection;
 pub use quality::Quality;
 pub use report::BakeReport;
 use samples::FieldSamples;
 use std::sync::Arc;
 use std::time::Instant;
-use symmetric_samples::Turned;
-use symmetry::Symmetry;
 pub use workers::{WorkerOptions, Workers};
 
 /// Distance of a transfer capture's eye from the surface along the normal, in r. It is large enough that the surface's own facets
@@ -85,7 +82,7 @@ fn record_batch<'r>(
     batch: &Batch,
     texels: Option<&'r TexelView<'r>>,
 ) -> Result<()> {
-    let Batches { capture, reduce, model, jobs, samples, results, .. } = batches;
+    let Batches { capture, project, self_visibility, model, jobs, .. } = batches;
     let count = batch.eyes.len();
     commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
     if let Some(depth) = capture.depth() {
@@ -94,17 +91,21 @@ fn record_batch<'r>(
     commands.pass("capture", |c| capture.record(c, model, &batch.eyes, &batch.slots, batches.culls))?;
     commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::ComputeSampled);
     let (atlas, jobs_now) = (&capture.atlas, count as u32);
-    match reduce {
-        Reduce::Project(pass) => {
-            let texels = texels.expect("a projection has a view of texels");
-            commands.pass("project", |c| pass.record(c, atlas, jobs, texels, samples, jobs_now))?;
-        }
-        Reduce::SelfVisibility(pass) => {
-            commands.pass("self_visibility", |c| pass.record(c, atlas, jobs, samples, jobs_now))?;
-        }
+    if let Some(Reduce { pass, samples, .. }) = project {
+        let texels = texels.expect("a projection has a view of texels");
+        commands.pass("project", |c| pass.record(c, atlas, jobs, texels, samples, jobs_now))?;
+    }
+    if let Some(Reduce { pass, samples, .. }) = self_visibility {
+        commands.pass("self_visibility", |c| pass.record(c, atlas, jobs, samples, jobs_now))?;
     }
     commands.barrier(Access::ComputeWrite, Access::TransferRead);
-    commands.copy_range(samples, 0..count as u64 * batches.sample_bytes, results, 0);
+    let mut copy = |samples, results, bytes: usize| commands.copy_range(samples, 0..(count * bytes) as u64, results, 0);
+    if let Some(project) = project {
+        copy(&project.samples, &project.results, project.sample_bytes);
+    }
+    if let Some(maps) = self_visibility {
+        copy(&maps.samples, &maps.results, maps.sample_bytes);
+    }
     commands.barrier(Access::TransferWrite, Access::HostRead);
     Ok(())
 }
@@ -239,69 +240,6 @@ impl Baker {
         Ok(assembly.payload.read(0, bytes as usize))
     }
 
-    /// Bakes the transfer vector of every vertex: `channel_stride(bands)` floats each, in the object's frame. A flat or convex mesh
-    /// needs none, since the cosine lobe of the normal is exact there.
-    ///
-    /// # Errors
-    /// As [`Baker::field`].
-    pub fn transfer(&self, mesh: &Mesh, options: &Options, progress: Progress<'_>) -> Result<(Vec<f32>, BakeReport)> {
-        self.transfer_from(&Partial::new(None), mesh, options, progress)
-    }
-
-    /// As [`Baker::transfer`], but goes on from what a cancelled bake of the same transfer has kept.
-    ///
-    /// # Errors
-    /// As [`Baker::field`].
-    pub fn transfer_from(
-        &self,
-        partial: &Partial,
-        mesh: &Mesh,
-        options: &Options,
-        progress: Progress<'_>,
-    ) -> Result<(Vec<f32>, BakeReport)> {
-        let started = Instant::now();
-        triangles::tell_repeated(mesh);
-        let Options { bands, face_px, shortcuts, .. } = *options;
-        let (targets, turned) = transfer_targets(mesh, options);
-        let reduction = Reduction::Project { bands, projection: Projection::Transfer };
-        let levels = levels::are_used(mesh, options.levels);
-        let captures = Captures { mesh, reduction, face_px, shortcuts, levels, partial };
-        let mut transfer = vec![0.0_f32; mesh.positions.len() * channel_stride(bands)];
-        let mut report = captures.run(self, &targets, &mut transfer, progress)?;
-        symmetric_samples::turn_all(&mut transfer, &turned, bands, 1);
-        report.samples = mesh.positions.len() as u32;
-        report.turned = turned.iter().flatten().count() as u32;
-        report.total = started.elapsed();
-        Ok((transfer, report))
-    }
-
-    /// Bakes the self-visibility of every vertex, going on from what a cancelled bake of the same has kept: [`BYTES`] each, as
-    /// [`crate::field::self_visibility`] reads them, in the mesh's order of vertices. It decides nothing for a flat or convex mesh.
-    /// Every vertex is captured, since a symmetry would turn the nodes of one map beside those of another. The bake takes as long as that
-    /// of the teapot's transfer, 10.0 s beside 11.0 s: the same capture, and then 1.9 s of this pass in place of 2.2 s of "project".
-    ///
-    /// # Errors
-    /// As [`Baker::field`].
-    pub fn self_visibility_from(
-        &self,
-        partial: &Partial,
-        mesh: &Mesh,
-        options: &Options,
-        progress: Progress<'_>,
-    ) -> Result<(Vec<u8>, BakeReport)> {
-        let started = Instant::now();
-        triangles::tell_repeated(mesh);
-        let Options { face_px, shortcuts, .. } = *options;
-        let targets: Vec<CaptureTarget> = vertex_targets(mesh).collect();
-        let levels = levels::are_used(mesh, options.levels);
-        let captures = Captures { mesh, reduction: Reduction::SelfVisibility, face_px, shortcuts, levels, partial };
-        let mut maps = vec![0_u8; targets.len() * BYTES];
-        let mut report = captures.run(self, &targets, &mut maps, progress)?;
-        report.samples = targets.len() as u32;
-        report.total = started.elapsed();
-        Ok((maps, report))
-    }
-
     /// Worker processes, if it has any.
     pub fn workers(&self) -> Option<&Arc<Workers>> {
         self.workers.as_ref()
@@ -316,27 +254,4 @@ impl Baker {
     pub fn device(&self) -> &Arc<Device> {
         &self.device
     }
-}
-
-/// A target for every vertex, just off the surface.
-fn vertex_targets(mesh: &Mesh) -> impl Iterator<Item = CaptureTarget> {
-    let vertices = unit_positions(mesh).into_iter().zip(&mesh.normals).enumerate();
-    vertices.map(|(vertex, (position, normal))| CaptureTarget {
-        eye: position + TRANSFER_OFFSET * normal,
-        job: Job { normal: normal.extend(0.0).to_array(), slots: [0; 6], target: vertex as u32, scale: 1.0 },
-    })
-}
-
-/// The vertices whose transfer vector is captured, and how the others are turned from them.
-fn transfer_targets(mesh: &Mesh, options: &Options) -> (Vec<CaptureTarget>, Vec<Option<Turned>>) {
-    let turned = turned_vertices(mesh, options.face_px, options.shortcuts.symmetry);
-    (vertex_targets(mesh).filter(|target| turned[target.job.target as usize].is_none()).collect(), turned)
-}
-
-/// For every vertex the one whose transfer vector is turned for it, or `None` where its own is captured.
-fn turned_vertices(mesh: &Mesh, face_px: u32, symmetry: bool) -> Vec<Option<Turned>> {
-    if !symmetry {
-        return vec![None; mesh.positions.len()];
-    }
-    symmetric_samples::plan_vertices(mesh, &Symmetry::of_vertices(mesh, None), face_px, f64::from(TRANSFER_OFFSET))
 }

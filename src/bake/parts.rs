@@ -11,11 +11,10 @@ use super::levels;
 use super::partial::{self, Partial};
 use super::project::Projection;
 use super::samples::FieldSamples;
-use super::{Baker, Options, Progress, captured_bytes, header, transfer_targets, vertex_targets};
+use super::vertices::{self, Wanted};
+use super::{Baker, Options, Progress, captured_bytes, header};
 use crate::asset::Mesh;
 use crate::error::{Error, Result};
-use crate::field::quantity::channel_stride;
-use crate::field::self_visibility::BYTES;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -54,8 +53,7 @@ pub fn bake(
             cache.field(baker, mesh, &header(mesh, kind.field(), options), progress).map(|_| ())
         }
         Kind::Silhouette => cache.silhouette(baker, mesh, options, progress).map(|_| ()),
-        Kind::SelfVisibility => cache.self_visibility(baker, mesh, options, progress).map(|_| ()),
-        Kind::Transfer => cache.transfer(baker, mesh, options, progress).map(|_| ()),
+        Kind::Vertices => cache.vertices(baker, mesh, options, Wanted::BOTH, progress).map(|_| ()),
     }
 }
 
@@ -69,10 +67,9 @@ fn reduction(mesh: &Mesh, options: &Options, kind: Kind) -> Result<(Reduction, u
             let projection = if kind == Kind::Light { Projection::Radiance } else { Projection::Blocked };
             (Reduction::Project { bands: header.bands, projection }, captured_bytes(&header))
         }
-        Kind::SelfVisibility => (Reduction::SelfVisibility, vertices * BYTES as u64),
-        Kind::Transfer => {
-            let reduction = Reduction::Project { bands: options.bands, projection: Projection::Transfer };
-            (reduction, 4 * vertices * channel_stride(options.bands) as u64)
+        Kind::Vertices => {
+            let reduction = Wanted::BOTH.reduction(options.bands);
+            (reduction, vertices * reduction.sample_bytes() as u64)
         }
         Kind::Silhouette => return Err(Error::Failed("a silhouette field has no parts".into())),
     })
@@ -81,8 +78,7 @@ fn reduction(mesh: &Mesh, options: &Options, kind: Kind) -> Result<(Reduction, u
 /// What is captured for a kind of thing.
 fn targets(baker: &Baker, mesh: &Mesh, options: &Options, kind: Kind) -> Result<Vec<CaptureTarget>> {
     Ok(match kind {
-        Kind::SelfVisibility => vertex_targets(mesh).collect(),
-        Kind::Transfer => transfer_targets(mesh, options).0,
+        Kind::Vertices => vertices::targets(mesh, options, Wanted::BOTH).0,
         _ => {
             let mut header = header(mesh, kind.field(), options);
             baker.fits(&header)?;
@@ -143,7 +139,7 @@ pub fn join(
             values.chunks_exact_mut(sample_bytes).nth(number).ok_or_else(broken)?.copy_from_slice(sample);
         }
     }
-    let numbers = if kind == Kind::SelfVisibility { values.len() } else { values.len() / 4 };
+    let numbers = if kind == Kind::Vertices { values.len() } else { values.len() / 4 };
     partial::write_done(&path, all, numbers, &values)?;
     bake(baker, cache, (mesh, options), kind, &|_, _| ())
 }

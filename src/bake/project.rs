@@ -1,7 +1,7 @@
 //! Pass "project": makes SH coefficients of captured cube faces, with one workgroup for each sample.
 //!
 //! Inputs: the atlas of [`super::capture`], a [`Job`] for each sample, and the texel table. Output: `samples[target]` of `channels` x
-//! `channel_stride(bands)` floats. They hold the blocked part (1 - texel), the radiance, or for transfer the clamped cosine of
+//! `channel_stride(bands)` floats. They hold the blocked part (1 where a texel is below 1), the radiance, or for transfer the clamped cosine of
 //! the normal less the part that the object itself blocks.
 
 use crate::error::{Error, Result};
@@ -48,7 +48,7 @@ pub struct Job {
     pub slots: Slots,
     /// Index of the sample that is written.
     pub target: u32,
-    /// Factor by which coefficients are multiplied.
+    /// Factor by which coefficients are multiplied. Where it is 0, nothing is projected.
     pub scale: f32,
 }
 
@@ -189,8 +189,8 @@ pub fn twin(
             let captured = texel(face, x, y).map(f64::from);
             let values = match projection {
                 Projection::Radiance => captured,
-                Projection::Blocked => [1.0 - captured[0], 0.0, 0.0],
-                Projection::Transfer => [(1.0 - captured[0]) * normal.dot(w).max(0.0), 0.0, 0.0],
+                Projection::Blocked => [f64::from(captured[0] < 1.0), 0.0, 0.0],
+                Projection::Transfer => [f64::from(captured[0] < 1.0) * normal.dot(w).max(0.0), 0.0, 0.0],
             };
             for (channel, value) in values.iter().enumerate().take(projection.channels()) {
                 for (k, y) in basis.iter().enumerate().take(coefficient_count(bands)) {

@@ -75,12 +75,11 @@ impl Captures<'_> {
         values: &mut [T],
         progress: Progress<'_>,
     ) -> Result<BakeReport> {
-        let all = targets.len() as u32;
-        let begun = self.partial.load(values, all);
-        let numbers = self.reduction.numbers();
+        let numbers = self.reduction.sample_bytes() / size_of::<T>();
         assert_eq!(numbers * size_of::<T>(), self.reduction.sample_bytes(), "numbers of another size");
         let mut batches = Batches::new(baker, self)?;
         let (targets, units) = batches.plan(targets, baker.workers().map_or(1, |workers| workers.most()));
+        let begun = self.partial.load(values, targets.len() as u32);
         let done: Vec<bool> = units.iter().map(|unit| unit.targets().end <= begun as usize).collect();
         let count = units.iter().zip(&done).filter(|(_, done)| **done).map(|(unit, _)| unit.count).sum();
         let (mut report, left) =

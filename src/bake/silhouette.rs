@@ -247,11 +247,7 @@ impl Silhouette {
 }
 
 /// The triangles that all views show. With levels of detail they miss the mesh by a share of the smallest pixel.
-fn drawn_triangles<'m>(
-    mesh: &'m Mesh,
-    header: &SilhouetteHeader,
-    frames: &[Frame],
-) -> Result<Cow<'m, [[u32; 3]]>> {
+fn drawn_triangles<'m>(mesh: &'m Mesh, header: &SilhouetteHeader, frames: &[Frame]) -> Result<Cow<'m, [[u32; 3]]>> {
     if header.level_pixels == 0.0 {
         return Ok(Cow::Borrowed(&mesh.triangles));
     }

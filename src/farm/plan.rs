@@ -283,7 +283,7 @@ pub(super) mod tests {
             |p| p.device.driver.push('x'),
             |p| p.works[0].words[1].push('x'),
             |p| p.inputs[0].hash.push('x'),
-            |p| p.tasks[0].2 = TaskKind::Bake(Kind::Transfer),
+            |p| p.tasks[0].2 = TaskKind::Bake(Kind::Vertices),
         ];
         for edit in edits {
             let mut other = base.clone();

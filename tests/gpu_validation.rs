@@ -189,11 +189,12 @@ fn every_barrier_of_a_picture_is_missed() {
     let capture = Capture::new(&gpu.device, &gpu.library, 16, CaptureKind::Cover).unwrap();
     let eyes = [Vec3::new(1.5, 0.3, 0.2)];
     let plan = capture.plan(&model, &eyes);
+    let drawn = capture.choose(&model, &eyes, &plan, true).unwrap();
     let host = Buffer::new(&gpu.device, "host picture", BufferKind::Readback, 4 << 20).unwrap();
     let run = || {
         let mut commands = Commands::new(&gpu.device, "picture")?;
         commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
-        commands.pass("capture", |c| capture.record(c, &model, &eyes, &plan, true))?;
+        commands.pass("capture", |c| capture.record(c, &model, &drawn))?;
         commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
         commands.pass("copy", |c| {
             c.copy_image(&capture.atlas, &host);

@@ -3,7 +3,8 @@
 //! Every face keeps the place in the atlas that the plan of the whole bake gives it, whichever process captures it and in whatever
 //! order. What a face shows depends on nothing else, so the samples are the same bytes however the units are shared out.
 
-use super::capture::{Capture, CaptureKind, Model, NO_SLOT, Slots};
+use super::capture::{Capture, CaptureKind, Drawn, Model, NO_SLOT, Slots};
+use super::levels;
 use super::partial::Partial;
 use super::project::{Job, Project, Projection};
 use super::self_visibility::SelfVisibility;
@@ -143,10 +144,11 @@ pub(super) struct Batches {
     face_seconds: f64,
 }
 
-/// Eyes whose faces fit into one atlas, and where each face lies.
+/// Samples whose faces fit into one atlas, and what is drawn into these.
 pub(super) struct Batch {
-    pub eyes: Vec<Vec3>,
-    pub slots: Vec<Slots>,
+    pub drawn: Drawn,
+    /// Number of samples.
+    pub count: usize,
 }
 
 fn facing_share(mesh: &Mesh) -> f64 {
@@ -154,13 +156,13 @@ fn facing_share(mesh: &Mesh) -> f64 {
 }
 
 /// Estimated seconds of captures on a software device: of `eyes` that see the mesh in `faces` of `face_px`.
-pub(super) fn estimated_seconds(mesh: &Mesh, eyes: u64, faces: u64, face_px: u32) -> f64 {
-    let triangles = mesh.triangles.len() as f64 * facing_share(mesh) * eyes as f64;
+pub(super) fn estimated_seconds(mesh: &Mesh, levels: bool, eyes: u64, faces: u64, face_px: u32) -> f64 {
+    let triangles = levels::estimated_triangles(mesh, levels) * facing_share(mesh) * eyes as f64;
     triangles * TRIANGLE_SECONDS + faces as f64 * f64::from(face_px).powi(2) * TEXEL_SECONDS
 }
 
 /// Faces of a sample that are in the atlas.
-fn drawn(slots: &Slots) -> u32 {
+fn face_count(slots: &Slots) -> u32 {
     slots.iter().filter(|slot| **slot != NO_SLOT).count() as u32
 }
 
@@ -194,7 +196,7 @@ impl Batches {
             jobs: Project::job_buffer(device, capacity)?,
             culls: captures.shortcuts.inside,
             triangle_seconds: TRIANGLE_SECONDS * facing_share(captures.mesh),
-            face_seconds: estimated_seconds(captures.mesh, 0, 1, face_px),
+            face_seconds: estimated_seconds(captures.mesh, captures.levels, 0, 1, face_px),
             capture,
         })
     }
@@ -215,7 +217,7 @@ impl Batches {
                 planned.push(CaptureTarget { job: Job { slots: *slots, ..target.job }, ..*target });
                 let triangles = self.model.triangles_seen(target.eye, self.capture.face_px) as f64;
                 unit.count += 1;
-                unit.seconds += self.triangle_seconds * triangles + self.face_seconds * f64::from(drawn(slots));
+                unit.seconds += self.triangle_seconds * triangles + self.face_seconds * f64::from(face_count(slots));
             }
             units.extend((unit.count > 0).then_some(unit));
             first += slots.len();
@@ -242,15 +244,16 @@ impl Batches {
         let numbered = targets.iter().enumerate();
         let jobs: Vec<Job> = numbered.map(|(i, target)| Job { target: i as u32, ..target.job }).collect();
         self.jobs.write(0, &jobs);
-        let batch = Batch {
-            eyes: targets.iter().map(|target| target.eye).collect(),
-            slots: targets.iter().map(|target| target.job.slots).collect(),
-        };
+        let eyes: Vec<Vec3> = targets.iter().map(|target| target.eye).collect();
+        let slots: Vec<Slots> = targets.iter().map(|target| target.job.slots).collect();
+        let drawn = self.capture.choose(&self.model, &eyes, &slots, self.culls)?;
+        let batch = Batch { drawn, count: targets.len() };
         let texels = self.project.as_ref().map(|project| project.pass.texel_view()).transpose()?;
         let mut commands = Commands::new(self.jobs.device(), "bake batch")?;
         super::record_batch(&mut commands, self, &batch, texels.as_ref())?;
         report.add(&commands.submit()?);
-        report.faces += batch.slots.iter().map(drawn).sum::<u32>();
+        report.faces += slots.iter().map(face_count).sum::<u32>();
+        report.triangles += batch.drawn.triangles();
         let count = targets.len();
         let floats = self.project.as_ref().map_or(Vec::new(), |project| project.read(count));
         let maps = self.self_visibility.as_ref().map_or(Vec::new(), |maps| maps.read(count));

@@ -6,15 +6,15 @@
 //! are drawn in chunks of neighbouring triangles. A chunk is left out if its bounding sphere does not reach into the face, or if
 //! the mesh is closed and the eye sees only backs of the chunk. Of a large mesh, chunks of fewer triangles stand for what is far off.
 
-use super::chunk::{Chunk, Chunked, chunk, joined, reaches};
-use super::levels::{Levels, Tolerance, leveled};
-use super::triangles::distinct;
-use crate::asset::mesh::Mesh;
+use super::chunk::{Chunk, joined, reaches};
+use super::model::DrawnFace;
+pub use super::model::{Drawn, Model};
+pub use super::triangles::unit_positions;
 use crate::error::{Error, Result};
 use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::ImageShape;
 use crate::gpu::Target;
-use crate::gpu::{Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image, Keeps};
+use crate::gpu::{Commands, Device, GraphicsPipeline, GraphicsState, Image, Keeps};
 use crate::sh::cube::{FACE_COUNT, face_basis, texel_st};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -28,88 +28,6 @@ const ATLAS_PX: u32 = 2048;
 const NEAR: f32 = 1e-4;
 /// The slot of a face that is not in the atlas.
 pub const NO_SLOT: u32 = u32::MAX;
-
-/// A mesh on the device, centred and scaled to bounding radius 1, with its triangles in chunks.
-pub struct Model {
-    positions: Buffer,
-    colors: Option<Buffer>,
-    indices: Buffer,
-    chunks: Vec<Chunk>,
-    /// All chunks, for a mesh without levels.
-    all: Vec<u32>,
-    levels: Option<Levels>,
-    closed: bool,
-}
-
-impl Model {
-    /// Uploads a mesh. `with_colors` is for a radiance capture; a mesh without colours is white.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    pub fn new(device: &Arc<Device>, mesh: &Mesh, with_colors: bool) -> Result<Self> {
-        let unit = unit_positions(mesh);
-        Self::of(device, mesh, &unit, with_colors, (chunk(&unit, &distinct(mesh))?, None))
-    }
-
-    /// Uploads a mesh and its levels of detail (see [`super::levels`]), for captures that see no colours.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    pub fn with_levels(device: &Arc<Device>, mesh: &Mesh) -> Result<Self> {
-        let unit = unit_positions(mesh);
-        let (chunked, levels) = leveled(&unit, &distinct(mesh))?;
-        Self::of(device, mesh, &unit, false, (chunked, Some(levels)))
-    }
-
-    fn of(
-        device: &Arc<Device>,
-        mesh: &Mesh,
-        unit: &[Vec3],
-        with_colors: bool,
-        (chunked, levels): (Chunked, Option<Levels>),
-    ) -> Result<Self> {
-        let Chunked { vertices, triangles, chunks } = chunked;
-        let colors = with_colors.then(|| mesh.colors.clone().unwrap_or_else(|| vec![Vec3::ONE; mesh.positions.len()]));
-        let gather = |of: &[Vec3]| -> Vec<[f32; 3]> { vertices.iter().map(|&v| of[v as usize].to_array()).collect() };
-        Ok(Model {
-            positions: Buffer::with_data(device, "capture positions", &gather(unit))?,
-            colors: colors.map(|colors| Buffer::with_data(device, "capture colors", &gather(&colors))).transpose()?,
-            indices: Buffer::with_data(device, "capture indices", &triangles)?,
-            all: (0..chunks.len() as u32).collect(),
-            chunks,
-            levels,
-            closed: mesh.is_closed(),
-        })
-    }
-
-    /// The chunks that an eye is shown in faces of `face_px`. `buffer` holds them where they are chosen for it.
-    fn seen<'m>(
-        &'m self,
-        eye: Vec3,
-        face_px: u32,
-        buffer: &'m mut Vec<u32>,
-    ) -> impl Iterator<Item = &'m Chunk> + Clone {
-        let chosen = match &self.levels {
-            Some(levels) => {
-                levels.choose(Tolerance::capture(eye, face_px), buffer);
-                buffer.as_slice()
-            }
-            None => &self.all,
-        };
-        chosen.iter().map(|&index| &self.chunks[index as usize])
-    }
-
-    /// Number of triangles that an eye is shown in faces of `face_px`, of all sides of the object.
-    pub fn triangles_seen(&self, eye: Vec3, face_px: u32) -> usize {
-        self.seen(eye, face_px, &mut Vec::new()).map(|chunk| chunk.indices.len() / 3).sum()
-    }
-}
-
-/// Positions in units of the bounding radius from the sphere's centre.
-pub fn unit_positions(mesh: &Mesh) -> Vec<Vec3> {
-    let (centre, radius_m) = mesh.bounding_sphere();
-    mesh.positions.iter().map(|p| ((p.as_dvec3() - centre.as_dvec3()) / f64::from(radius_m)).as_vec3()).collect()
-}
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -245,51 +163,54 @@ impl Capture {
         out
     }
 
-    /// Draws every planned face. The atlas must be in the layout of [`crate::gpu::Access::ColorWrite`]. Back faces of closed
-    /// meshes are culled when `cull` is set.
+    /// Chooses what every planned face shows. Back faces of closed meshes are culled when `cull` is set.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn choose(&self, model: &Model, eyes: &[Vec3], plan: &[Slots], cull: bool) -> Result<Drawn> {
+        let closed = cull && model.closed;
+        let (mut buffer, mut faces, mut indices) = (Vec::new(), Vec::new(), Vec::<u32>::new());
+        for (&eye, slots) in eyes.iter().zip(plan) {
+            let seen = model.seen(eye, self.face_px, &mut buffer);
+            let facing: Vec<&Chunk> = seen.filter(|chunk| !(closed && self.skips && chunk.turned_away(eye))).collect();
+            for (face, &slot) in slots.iter().enumerate().filter(|(_, slot)| **slot != NO_SLOT) {
+                let (forward, right, down) = face_axes(face);
+                let reached = |chunk: &&Chunk| reaches(eye, chunk.centre, chunk.radius, forward, right, down);
+                let visible = facing.iter().copied().filter(|chunk| !self.skips || reached(chunk));
+                let runs = match &model.levels {
+                    Some(levels) => levels.gathered(visible.map(|chunk| chunk.indices.clone()), &mut indices),
+                    None => joined(visible.map(|chunk| chunk.indices.clone())),
+                };
+                faces.push(DrawnFace { eye, face, slot, runs });
+            }
+        }
+        Drawn::new(model, faces, &indices, closed)
+    }
+
+    /// Draws what was chosen. The atlas must be in the layout of [`crate::gpu::Access::ColorWrite`].
     ///
     /// # Errors
     /// What recording returns.
-    pub fn record<'r>(
-        &'r self,
-        commands: &mut Commands<'r>,
-        model: &'r Model,
-        eyes: &[Vec3],
-        plan: &[Slots],
-        cull: bool,
-    ) -> Result<()> {
+    pub fn record<'r>(&'r self, commands: &mut Commands<'r>, model: &'r Model, drawn: &'r Drawn) -> Result<()> {
         let radiance = self.kind == CaptureKind::Radiance;
         let background = if radiance { [0.0, 0.0, 0.0, 1.0] } else { [1.0; 4] };
         let target = Target { color: &self.atlas, clear: Some(background), depth: self.depth.as_ref(), resolve: None };
-        let closed = cull && model.closed;
-        let pipeline = if closed { &self.closed } else { &self.open };
+        let pipeline = if drawn.closed { &self.closed } else { &self.open };
         let mut vertices = vec![(&model.positions, 0)];
         vertices.extend(model.colors.iter().filter(|_| radiance).map(|colors| (colors, 0)));
         commands.render(&target, |drawing| {
-            drawing.bind(pipeline, &vertices, &model.indices);
-            let mut buffer = Vec::new();
-            for (&eye, slots) in eyes.iter().zip(plan) {
-                let seen = model.seen(eye, self.face_px, &mut buffer);
-                let facing: Vec<&Chunk> =
-                    seen.filter(|chunk| !(closed && self.skips && chunk.turned_away(eye))).collect();
-                for (face, &slot) in slots.iter().enumerate().filter(|(_, slot)| **slot != NO_SLOT) {
-                    let (forward, right, down) = face_axes(face);
-                    let px = self.face_px;
-                    drawing.area(slot % self.columns * px, slot / self.columns * px, px, px);
-                    drawing.push(&Push {
-                        eye: eye.extend(NEAR).to_array(),
-                        right: right.extend(0.0).to_array(),
-                        down: down.extend(0.0).to_array(),
-                        forward: forward.extend(0.0).to_array(),
-                    });
-                    let visible = facing
-                        .iter()
-                        .filter(|c| !self.skips || reaches(eye, c.centre, c.radius, forward, right, down))
-                        .map(|c| c.indices.clone());
-                    for run in joined(visible) {
-                        drawing.indexed(run);
-                    }
-                }
+            drawing.bind(pipeline, &vertices, drawn.indices.as_ref().unwrap_or(&model.indices));
+            for DrawnFace { eye, face, slot, runs } in &drawn.faces {
+                let (forward, right, down) = face_axes(*face);
+                let px = self.face_px;
+                drawing.area(slot % self.columns * px, slot / self.columns * px, px, px);
+                drawing.push(&Push {
+                    eye: eye.extend(NEAR).to_array(),
+                    right: right.extend(0.0).to_array(),
+                    down: down.extend(0.0).to_array(),
+                    forward: forward.extend(0.0).to_array(),
+                });
+                runs.iter().for_each(|run| drawing.indexed(run.clone()));
             }
             Ok(())
         })

@@ -6,7 +6,7 @@ use meshopt::{VertexDataAdapter, build_meshlets, extract_meshlet_indices};
 use std::ops::Range;
 
 /// Triangles in a chunk. It is small enough to be culled on its own, and large enough that its draw call costs little.
-pub(super) const CHUNK_TRIANGLES: usize = 128;
+const CHUNK_TRIANGLES: usize = 128;
 /// Weight of the distance between normals against the distance between places, when chunks are made.
 const CONE_WEIGHT: f32 = 0.5;
 /// A run of triangles with the sphere around them, in r, and the cone around their normals.

@@ -1,7 +1,7 @@
 //! The kinds of things that are baked of a mesh, and what each of them takes.
 
 use super::batches::estimated_seconds;
-use super::{Options, bakes_transfer};
+use super::{Options, bakes_transfer, levels};
 use crate::asset::Mesh;
 use crate::field::FieldKind;
 use crate::field::quantity::channel_stride;
@@ -56,11 +56,13 @@ impl Kind {
         let eyes = match self {
             Kind::Shadow | Kind::Light => CAPTURED_SHARE * f64::from(options.lattice.starting_at(1.0).sample_count()),
             Kind::Silhouette => {
-                return estimated_seconds(mesh, NodeGrid::map_count(options.silhouette.cells) as u64, 0, 1);
+                let levels = levels::are_used(mesh, options.silhouette.levels);
+                return estimated_seconds(mesh, levels, NodeGrid::map_count(options.silhouette.cells) as u64, 0, 1);
             }
             Kind::Vertices => mesh.positions.len() as f64,
         };
-        estimated_seconds(mesh, eyes as u64, (FACES * eyes) as u64, options.face_px)
+        let levels = self != Kind::Light && levels::are_used(mesh, options.levels);
+        estimated_seconds(mesh, levels, eyes as u64, (FACES * eyes) as u64, options.face_px)
     }
 
     /// Bytes of what it stores, about.

@@ -6,10 +6,9 @@
 //! any eye one rule decides each chunk, and what is drawn fits together without a gap: a chunk is drawn if its group may not be
 //! drawn simplified, and if the group that it was simplified from may.
 
-use super::capture::unit_positions;
-use super::chunk::{CHUNK_TRIANGLES, Chunked, adapter};
-use super::symmetric_samples::{TEXEL_SHARE, allowed};
-use super::triangles::distinct;
+use super::chunk::{Chunked, adapter};
+use super::symmetric_samples::TEXEL_SHARE;
+use super::triangles::{distinct, unit_positions};
 use crate::asset::Mesh;
 use crate::error::Result;
 use glam::Vec3;
@@ -18,8 +17,14 @@ use std::ops::Range;
 
 /// Triangles from which on a mesh has levels. Below, drawing them all takes less than a third of a bake.
 const FROM_TRIANGLES: usize = 4000;
-/// Chunks of a group. Larger groups simplify better inside their rims, smaller ones follow the distance more closely.
-const GROUP_CHUNKS: usize = 16;
+/// Triangles of a chunk, and chunks of a group. Larger groups simplify better inside their rims, smaller ones follow the distance more
+/// closely: of a rough mesh of 69 168 triangles, samples drew 3.8 times fewer triangles with 32 and 8, 1.7 times with 128 and 16.
+const CHUNK_TRIANGLES: usize = 32;
+const GROUP_CHUNKS: usize = 8;
+/// Distance, in r, from which on what is drawn may miss the mesh by no more, though it is seen ever smaller. Simplified bodies are a
+/// little smaller on average, and that changes the same share of a field at every distance. With 0.25 it moves the coefficients of a
+/// torus of 69 696 triangles by 0.0027 (relative RMS), with 0.6 by 0.0043; a rough mesh of 69 168 draws 15 % more triangles.
+const FARTHEST: f32 = 0.25;
 /// Children of a node of the tree over the groups.
 const NODE_CHILDREN: usize = 8;
 
@@ -31,6 +36,13 @@ pub fn are_used(mesh: &Mesh, wanted: bool) -> bool {
 /// The share of a texel by which captures of a mesh may miss it: [`TEXEL_SHARE`], or 0 where no levels are used.
 pub fn texels(mesh: &Mesh, wanted: bool) -> f64 {
     if are_used(mesh, wanted) { TEXEL_SHARE } else { 0.0 }
+}
+
+/// Triangles of a mesh that an eye is estimated to be shown, from fronts and backs: with levels of detail, 80 for each of the square root
+/// of their number. It was 76 with 69 168 triangles and 112 with 8 648.
+pub(super) fn estimated_triangles(mesh: &Mesh, levels: bool) -> f64 {
+    let all = mesh.triangles.len() as f64;
+    if levels { all.min(80.0 * all.sqrt()) } else { all }
 }
 
 /// The sphere around a group, and the distance by which its simplified triangles miss it, in r.
@@ -50,7 +62,7 @@ impl From<ClodBounds> for Bounds {
 /// By how much what is drawn may miss the mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Tolerance {
-    /// Seen from an eye: this share of the distance.
+    /// Seen from an eye: this share of the distance, or of [`FARTHEST`] from there on.
     Eye(Vec3, f32),
     /// Everywhere the same, in r.
     Parallel(f32),
@@ -59,13 +71,15 @@ pub(super) enum Tolerance {
 impl Tolerance {
     /// That of a capture with faces of `face_px`.
     pub fn capture(eye: Vec3, face_px: u32) -> Self {
-        Tolerance::Eye(eye, allowed(1.0, face_px) as f32)
+        Tolerance::Eye(eye, (TEXEL_SHARE * 2.0) as f32 / face_px as f32)
     }
 
     /// Whether a group may not be drawn simplified.
     fn forbids(&self, bounds: &Bounds) -> bool {
         match *self {
-            Tolerance::Eye(eye, share) => bounds.error > share * (eye.distance(bounds.centre) - bounds.radius).max(0.0),
+            Tolerance::Eye(eye, share) => {
+                bounds.error > share * (eye.distance(bounds.centre) - bounds.radius).clamp(0.0, FARTHEST)
+            }
             Tolerance::Parallel(most) => bounds.error > most,
         }
     }
@@ -96,6 +110,8 @@ pub(super) struct Levels {
     /// The first nodes are the roots of the levels.
     nodes: Vec<Node>,
     depth: usize,
+    /// Indices of all chunks.
+    indices: Vec<u32>,
 }
 
 impl Levels {
@@ -116,6 +132,14 @@ impl Levels {
             }
         }
         chosen.sort_unstable();
+    }
+
+    /// Adds the indices of ranges to `indices`, and returns the run that they are there.
+    pub fn gathered(&self, ranges: impl Iterator<Item = Range<u32>>, indices: &mut Vec<u32>) -> Vec<Range<u32>> {
+        let start = indices.len() as u32;
+        ranges.for_each(|range| indices.extend_from_slice(&self.indices[range.start as usize..range.end as usize]));
+        let end = indices.len() as u32;
+        if start < end { vec![start..end] } else { Vec::new() }
     }
 }
 
@@ -167,5 +191,62 @@ pub(super) fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chu
         }
     };
     let nodes = clod_build_hierarchy(&of_groups, NODE_CHILDREN, depth).into_iter().map(node).collect();
-    Ok((chunked, Levels { groups, from, nodes, depth }))
+    let indices = chunked.triangles.as_flattened().to_vec();
+    Ok((chunked, Levels { groups, from, nodes, depth, indices }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate;
+    use std::collections::HashMap;
+
+    /// A closed surface with bumps of several sizes.
+    fn bumpy() -> Mesh {
+        let ball = generate::sphere(1.0, 5);
+        let bump = |p: &Vec3| {
+            let waves = |f: f32| (f * p.x).sin() * (f * p.y + 1.0).sin() * (f * p.z + 2.0).sin();
+            *p * (1.0 + 0.2 * waves(3.0) + 0.05 * waves(11.0) + 0.01 * waves(40.0))
+        };
+        let positions = ball.positions.iter().map(bump).collect();
+        Mesh::new("bumpy", positions, Vec::new(), None, ball.triangles.clone()).unwrap()
+    }
+
+    /// What is drawn under any tolerance is a closed surface: what runs along an edge one way, runs along it the other way too.
+    #[test]
+    fn chunks_of_all_levels_fit_together() {
+        for mesh in [bumpy(), generate::torus(1.0, 0.4, 120, 60)] {
+            let unit = unit_positions(&mesh);
+            let (chunked, levels) = leveled(&unit, &mesh.triangles).unwrap();
+            let drawn = |tolerance: Tolerance| {
+                let mut chosen = Vec::new();
+                levels.choose(tolerance, &mut chosen);
+                let of = |&chunk: &u32| chunked.triangles_of(chunk as usize).to_vec();
+                let triangles: Vec<[u32; 3]> = chosen.iter().flat_map(of).collect();
+                triangles.iter().map(|t| t.map(|vertex| chunked.vertices[vertex as usize])).collect::<Vec<_>>()
+            };
+            let mut rng = fastrand::Rng::with_seed(5);
+            let mut tolerances = [0.0, 1e-4, 1e-3, 1e-2, 0.1].map(Tolerance::Parallel).to_vec();
+            for (away, i) in [2e-3, 0.1, 0.4, 1.0, 3.0, 8.0].into_iter().zip((0..unit.len()).step_by(unit.len() / 6)) {
+                let vertex = unit[i];
+                tolerances.push(Tolerance::capture(vertex + away * mesh.normals[i], [16, 64][rng.usize(..2)]));
+            }
+            let mut fewest = usize::MAX;
+            for tolerance in tolerances {
+                let triangles = drawn(tolerance);
+                fewest = fewest.min(triangles.len());
+                let place = |vertex: u32| unit[vertex as usize].to_array().map(f32::to_bits);
+                let mut sides = HashMap::new();
+                for [a, b, c] in triangles {
+                    for (a, b) in [(a, b), (b, c), (c, a)] {
+                        *sides.entry((place(a), place(b))).or_insert(0) += 1;
+                    }
+                }
+                let whole = sides.iter().all(|((a, b), count)| sides.get(&(*b, *a)) == Some(count));
+                assert!(whole, "{}: gaps under {tolerance:?}", mesh.name);
+            }
+            assert_eq!(drawn(Tolerance::Parallel(0.0)).len(), mesh.triangles.len(), "nothing may be missed");
+            assert!(20 * fewest < mesh.triangles.len(), "{fewest} of {} triangles at least", mesh.triangles.len());
+        }
+    }
 }

@@ -18,6 +18,7 @@ mod header;
 pub mod inside;
 pub mod kinds;
 pub mod levels;
+pub mod model;
 mod names;
 
 pub mod partial;
@@ -79,16 +80,16 @@ fn captured_bytes(header: &FieldHeader) -> u64 {
 fn record_batch<'r>(
     commands: &mut Commands<'r>,
     batches: &'r Batches,
-    batch: &Batch,
+    batch: &'r Batch,
     texels: Option<&'r TexelView<'r>>,
 ) -> Result<()> {
     let Batches { capture, project, self_visibility, model, jobs, .. } = batches;
-    let count = batch.eyes.len();
+    let count = batch.count;
     commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
     if let Some(depth) = capture.depth() {
         commands.image_barrier(depth, None, Access::DepthWrite);
     }
-    commands.pass("capture", |c| capture.record(c, model, &batch.eyes, &batch.slots, batches.culls))?;
+    commands.pass("capture", |c| capture.record(c, model, &batch.drawn))?;
     commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::ComputeSampled);
     let (atlas, jobs_now) = (&capture.atlas, count as u32);
     if let Some(Reduce { pass, samples, .. }) = project {

@@ -12,6 +12,8 @@ pub struct BakeReport {
     pub turned: u32,
     /// Number of cube faces that were drawn: six for each captured sample where none is left out.
     pub faces: u32,
+    /// Number of triangles that were drawn, each as often as faces showed it.
+    pub triangles: u64,
     /// Number of samples inside the solid. They were captured off the nearest surface or, if that sees nothing, filled from neighbours.
     pub filled: u32,
     /// Device time in capture passes, in ms.

@@ -32,12 +32,13 @@ pub fn snapshot(
     while out.len() < eyes.len() {
         let rest = &eyes[out.len()..];
         let plan = capture.plan(&model, rest);
+        let drawn = capture.choose(&model, rest, &plan, true)?;
         let mut commands = Commands::new(device, "snapshot")?;
         commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
         if let Some(depth) = capture.depth() {
             commands.image_barrier(depth, None, Access::DepthWrite);
         }
-        commands.pass("capture", |c| capture.record(c, &model, rest, &plan, true))?;
+        commands.pass("capture", |c| capture.record(c, &model, &drawn))?;
         commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
         commands.copy_image(&capture.atlas, &download);
         commands.barrier(Access::TransferWrite, Access::HostRead);

@@ -1,8 +1,15 @@
-//! Triangles of a mesh that repeat others.
+//! The corners of a mesh in the frame of captures, and its triangles that repeat others.
 
 use crate::asset::Mesh;
+use glam::Vec3;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
+
+/// Positions in units of the bounding radius from the sphere's centre.
+pub fn unit_positions(mesh: &Mesh) -> Vec<Vec3> {
+    let (centre, radius_m) = mesh.bounding_sphere();
+    mesh.positions.iter().map(|p| ((p.as_dvec3() - centre.as_dvec3()) / f64::from(radius_m)).as_vec3()).collect()
+}
 
 /// The triangles of a mesh without those that repeat another: with corners of the same place and colour, the same way around. What is
 /// seen does not change. A tree cannot divide stacked triangles, so each query of a surface would look at every one of them.
@@ -38,7 +45,6 @@ pub(super) fn tell_repeated(mesh: &Mesh) {
 mod tests {
     use super::*;
     use crate::asset::generate;
-    use glam::Vec3;
 
     #[test]
     fn repeated_triangles_count_once_and_backs_stay() {

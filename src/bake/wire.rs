@@ -35,7 +35,7 @@ pub(super) enum Answer {
     /// It is ready for targets of the mesh.
     Ready,
     /// The reduced samples follow; what they took.
-    Samples { capture_ms: f64, project_ms: f64, faces: u32 },
+    Samples { capture_ms: f64, project_ms: f64, faces: u32, triangles: u64 },
     /// It failed with this exit code and message.
     Failed { code: u8, message: String },
 }

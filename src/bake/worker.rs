@@ -76,8 +76,8 @@ fn answer(
             let samples = batches.run_unit(&targets, &mut report)?;
             Messages::into_result(baker.device().take_validation_messages())?;
             debug_assert_eq!(samples.len(), targets.len() * reduction.sample_bytes());
-            let BakeReport { capture_ms, project_ms, faces, .. } = report;
-            Ok((Answer::Samples { capture_ms, project_ms, faces }, samples))
+            let BakeReport { capture_ms, project_ms, faces, triangles, .. } = report;
+            Ok((Answer::Samples { capture_ms, project_ms, faces, triangles }, samples))
         }
     }
 }

@@ -84,6 +84,7 @@ pub(super) fn share(
             report.capture_ms += captured.report.capture_ms;
             report.project_ms += captured.report.project_ms;
             report.faces += captured.report.faces;
+            report.triangles += captured.report.triangles;
             put(unit, &captured.samples);
             Ok::<(), Error>(())
         };
@@ -284,10 +285,11 @@ impl Worker {
     /// Reduced samples of planned targets, each of `sample_bytes`.
     fn capture(&mut self, targets: &[CaptureTarget], sample_bytes: usize) -> Result<Captured> {
         match self.ask(&Request::Capture, &[bytemuck::cast_slice(targets)])? {
-            (Answer::Samples { capture_ms, project_ms, faces }, samples)
+            (Answer::Samples { capture_ms, project_ms, faces, triangles }, samples)
                 if samples.len() == targets.len() * sample_bytes =>
             {
-                Ok(Captured { samples, report: BakeReport { capture_ms, project_ms, faces, ..Default::default() } })
+                let report = BakeReport { capture_ms, project_ms, faces, triangles, ..Default::default() };
+                Ok(Captured { samples, report })
             }
             _ => Err(Error::Failed("it answers with something else".into())),
         }

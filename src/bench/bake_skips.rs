@@ -21,6 +21,8 @@ pub struct BakeTime {
     pub filled_count: u32,
     /// Cube faces that were drawn.
     pub face_count: u32,
+    /// Triangles that were drawn, each as often as faces showed it.
+    pub drawn_triangle_count: u64,
     /// Relative root mean square error of the coefficients against a bake without skips and with faces of twice the edge; for
     /// the large mesh, against the bake without this skip.
     pub error: f64,
@@ -48,13 +50,14 @@ pub struct BakeSkipRow {
 
 const NONE: Shortcuts = Shortcuts { symmetry: false, faces: false, inside: true };
 
-/// The skips by name, with the shortcuts of a bake without them and with them. Samples inside a solid are captured off its surface
+/// The skips by name, with the shortcuts of a bake without them and with them, and whether levels of detail are drawn. Samples inside a solid are captured off its surface
 /// but where that is what is measured.
-const SKIPS: [(&str, [Shortcuts; 2]); 4] = [
-    ("faces", [NONE, Shortcuts { faces: true, ..NONE }]),
-    ("symmetry", [NONE, Shortcuts { symmetry: true, ..NONE }]),
-    ("inside", [Shortcuts { inside: false, ..NONE }, NONE]),
-    ("all", [NONE, Shortcuts { symmetry: true, faces: true, ..NONE }]),
+const SKIPS: [(&str, [(Shortcuts, bool); 2]); 5] = [
+    ("faces", [(NONE, false), (Shortcuts { faces: true, ..NONE }, false)]),
+    ("symmetry", [(NONE, false), (Shortcuts { symmetry: true, ..NONE }, false)]),
+    ("inside", [(Shortcuts { inside: false, ..NONE }, false), (NONE, false)]),
+    ("levels", [(NONE, false), (NONE, true)]),
+    ("all", [(NONE, false), (Shortcuts { symmetry: true, faces: true, ..NONE }, true)]),
 ];
 
 /// Half of the default shells and directions.
@@ -73,7 +76,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Bak
     meshes.retain(|mesh| cases.is_empty() || cases.iter().any(|text| mesh.name.contains(text)));
     let mut rows = Vec::new();
     for mesh in &meshes {
-        let (_, exact) = bake_once(bench, mesh, 128, NONE)?;
+        let (_, exact) = bake_once(bench, mesh, 128, (NONE, false))?;
         for (skip, shortcuts) in SKIPS {
             let (mut sides, rounds) = ([None::<BakeTime>; 2], if bench.quick { 1 } else { 3 });
             for _ in 0..rounds {
@@ -84,6 +87,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Bak
                         captured_count: report.samples + report.filled - report.turned,
                         filled_count: report.filled,
                         face_count: report.faces,
+                        drawn_triangle_count: report.triangles,
                         error: relative(&values, &exact),
                     };
                     *side = Some(side.filter(|before| before.bake_ms < now.bake_ms).unwrap_or(now));
@@ -110,9 +114,14 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Bak
 }
 
 /// An occlusion field in f32.
-fn bake_once(bench: &Bench<'_>, mesh: &Mesh, face_px: u32, shortcuts: Shortcuts) -> Result<(BakeReport, Vec<f32>)> {
+fn bake_once(
+    bench: &Bench<'_>,
+    mesh: &Mesh,
+    face_px: u32,
+    (shortcuts, levels): (Shortcuts, bool),
+) -> Result<(BakeReport, Vec<f32>)> {
     let lattice = LATTICE.parse().expect("a lattice");
-    let options = bake::Options { lattice, storage: Storage::F32, face_px, shortcuts, ..Default::default() };
+    let options = bake::Options { lattice, storage: Storage::F32, face_px, shortcuts, levels, ..Default::default() };
     let header = bake::header(mesh, FieldKind::Occlusion, &options);
     let (field, report) = bench.baker.field(mesh, header, &|_, _| ())?;
     Ok((report, field.payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes"))).collect()))

@@ -41,12 +41,13 @@ pub fn atlas<T: Pod>(
 ) -> Result<Vec<T>> {
     let texels = u64::from(capture.atlas.shape.width) * u64::from(capture.atlas.shape.height);
     let buffer = Buffer::new(device, "atlas on the host", BufferKind::Readback, texels * size_of::<T>() as u64)?;
+    let drawn = capture.choose(model, eyes, plan, cull)?;
     let mut commands = Commands::new(device, "capture to host")?;
     commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
     if let Some(depth) = capture.depth() {
         commands.image_barrier(depth, None, Access::DepthWrite);
     }
-    commands.pass("capture", |c| capture.record(c, model, eyes, plan, cull))?;
+    commands.pass("capture", |c| capture.record(c, model, &drawn))?;
     commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
     commands.copy_image(&capture.atlas, &buffer);
     commands.barrier(Access::TransferWrite, Access::HostRead);

@@ -4,7 +4,7 @@ use super::CheckRow;
 use super::capture::{atlas, texel_index};
 use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
-use crate::bake::capture::{Capture, CaptureKind, Model, NO_SLOT, Slots};
+use crate::bake::capture::{Capture, CaptureKind, Drawn, Model, NO_SLOT, Slots};
 use crate::bake::project::{self, Job, Project, Projection};
 use crate::bake::self_visibility::SelfVisibility;
 use crate::error::Result;
@@ -25,9 +25,8 @@ pub struct Content<'b> {
     /// The pass that captured them.
     pub capture: Capture,
     model: Model,
-    eyes: Vec<Vec3>,
     plan: Vec<Slots>,
-    cull: bool,
+    drawn: Drawn,
     texels: Vec<[f32; 3]>,
 }
 
@@ -54,7 +53,8 @@ impl<'b> Content<'b> {
             let atlas: Vec<u8> = atlas(baker.device(), &capture, &model, eyes, &plan, cull)?;
             atlas.iter().map(|t| [f32::from(*t) / 255.0, 0.0, 0.0]).collect()
         };
-        Ok(Content { baker, capture, model, eyes: eyes.to_vec(), plan, cull, texels })
+        let drawn = capture.choose(&model, eyes, &plan, cull)?;
+        Ok(Content { baker, capture, model, plan, drawn, texels })
     }
 
     /// What was captured at a texel.
@@ -139,13 +139,13 @@ impl<'b> Content<'b> {
 
     /// Commands that capture the faces for a compute pass that follows.
     fn captured(&self) -> Result<Commands<'_>> {
-        let Content { capture, model, eyes, plan, cull, .. } = self;
+        let Content { capture, model, drawn, .. } = self;
         let mut commands = Commands::new(self.baker.device(), "check of captured faces")?;
         commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
         if let Some(depth) = capture.depth() {
             commands.image_barrier(depth, None, Access::DepthWrite);
         }
-        commands.pass("capture", |c| capture.record(c, model, eyes, plan, *cull))?;
+        commands.pass("capture", |c| capture.record(c, model, drawn))?;
         commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::ComputeSampled);
         Ok(commands)
     }

@@ -161,15 +161,15 @@ fn slices_of_bakes_make_the_bytes_of_an_undivided_bake() {
     }
     let farm = Farm::new();
     let slices = farm.plan(3);
-    // A ring: field, self-visibility, transfer in three parts each, silhouettes in one. A convex ball: field and silhouettes.
-    assert_eq!(slices, 10 + 4);
+    // A ring: field and what is baked of vertices in three parts each, silhouettes in one. A convex ball: field and silhouettes.
+    assert_eq!(slices, 7 + 4);
     let status: Value = serde_json::from_str(&farm.good(&["farm", "status", "p.json", "--json"])).unwrap();
-    assert_eq!((&status["slices"], &status["done"], &status["left_s"]), (&14.into(), &0.into(), &70.0.into()));
+    assert_eq!((&status["slices"], &status["done"], &status["left_s"]), (&11.into(), &0.into(), &55.0.into()));
     let early = farm.run(&["farm", "collect", "p.json", "--into", "cache"]);
     assert_eq!(early.code, 1);
-    assert!(early.stderr.contains("14 of 14 slices have to run again, missing: 0-13"), "{}", early.stderr);
+    assert!(early.stderr.contains("11 of 11 slices have to run again, missing: 0-10"), "{}", early.stderr);
     farm.good(&["farm", "submit", "p.json", "--engine", "local", "--workers", "2"]);
-    assert!(farm.good(&["farm", "status", "p.json"]).contains("14 of 14 slices, about 0 s of work left"));
+    assert!(farm.good(&["farm", "status", "p.json"]).contains("11 of 11 slices, about 0 s of work left"));
     assert!(farm.good(&["farm", "run", "p.json", "--slice", "3"]).contains("there and intact"));
     // What another driver left in the cache is replaced, as by results that were not cut.
     farm.collected();

@@ -1,0 +1,124 @@
+//! A mesh as captures draw it, and what they draw of it.
+
+use super::chunk::{Chunk, Chunked, chunk};
+use super::levels::{Levels, Tolerance, leveled};
+use super::triangles::{distinct, unit_positions};
+use crate::asset::Mesh;
+use crate::error::Result;
+use crate::gpu::{Buffer, BufferKind, Device};
+use glam::Vec3;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A mesh on the device, centred and scaled to bounding radius 1, with its triangles in chunks.
+pub struct Model {
+    pub(super) positions: Buffer,
+    pub(super) colors: Option<Buffer>,
+    pub(super) indices: Buffer,
+    chunks: Vec<Chunk>,
+    /// All chunks, for a mesh without levels.
+    all: Vec<u32>,
+    pub(super) levels: Option<Levels>,
+    pub(super) closed: bool,
+}
+
+impl Model {
+    /// Uploads a mesh. `with_colors` is for a radiance capture; a mesh without colours is white.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn new(device: &Arc<Device>, mesh: &Mesh, with_colors: bool) -> Result<Self> {
+        let unit = unit_positions(mesh);
+        Self::of(device, mesh, &unit, with_colors, (chunk(&unit, &distinct(mesh))?, None))
+    }
+
+    /// Uploads a mesh and its levels of detail (see [`super::levels`]), for captures that see no colours.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn with_levels(device: &Arc<Device>, mesh: &Mesh) -> Result<Self> {
+        let unit = unit_positions(mesh);
+        let (chunked, levels) = leveled(&unit, &distinct(mesh))?;
+        Self::of(device, mesh, &unit, false, (chunked, Some(levels)))
+    }
+
+    fn of(
+        device: &Arc<Device>,
+        mesh: &Mesh,
+        unit: &[Vec3],
+        with_colors: bool,
+        (chunked, levels): (Chunked, Option<Levels>),
+    ) -> Result<Self> {
+        let Chunked { vertices, triangles, chunks } = chunked;
+        let colors = with_colors.then(|| mesh.colors.clone().unwrap_or_else(|| vec![Vec3::ONE; mesh.positions.len()]));
+        let gather = |of: &[Vec3]| -> Vec<[f32; 3]> { vertices.iter().map(|&v| of[v as usize].to_array()).collect() };
+        Ok(Model {
+            positions: Buffer::with_data(device, "capture positions", &gather(unit))?,
+            colors: colors.map(|colors| Buffer::with_data(device, "capture colors", &gather(&colors))).transpose()?,
+            indices: Buffer::with_data(device, "capture indices", &triangles)?,
+            all: (0..chunks.len() as u32).collect(),
+            chunks,
+            levels,
+            closed: mesh.is_closed(),
+        })
+    }
+
+    /// The chunks that an eye is shown in faces of `face_px`. `buffer` holds them where they are chosen for it.
+    pub(super) fn seen<'m>(
+        &'m self,
+        eye: Vec3,
+        face_px: u32,
+        buffer: &'m mut Vec<u32>,
+    ) -> impl Iterator<Item = &'m Chunk> + Clone {
+        let chosen = match &self.levels {
+            Some(levels) => {
+                levels.choose(Tolerance::capture(eye, face_px), buffer);
+                buffer.as_slice()
+            }
+            None => &self.all,
+        };
+        chosen.iter().map(|&index| &self.chunks[index as usize])
+    }
+
+    /// Number of triangles that an eye is shown in faces of `face_px`, of all sides of the object.
+    pub fn triangles_seen(&self, eye: Vec3, face_px: u32) -> usize {
+        self.seen(eye, face_px, &mut Vec::new()).map(|chunk| chunk.indices.len() / 3).sum()
+    }
+}
+
+/// What one face shows: runs of indices.
+pub(super) struct DrawnFace {
+    pub eye: Vec3,
+    pub face: usize,
+    pub slot: u32,
+    pub runs: Vec<Range<u32>>,
+}
+
+/// What the faces of a batch show.
+pub struct Drawn {
+    pub(super) faces: Vec<DrawnFace>,
+    /// The indices of a model with levels, face after face; other models have theirs on the device. A face shows hundreds of small chunks
+    /// of levels, and llvmpipe takes 4 us for each draw.
+    pub(super) indices: Option<Buffer>,
+    /// Whether back faces are culled.
+    pub(super) closed: bool,
+}
+
+impl Drawn {
+    pub(super) fn new(model: &Model, faces: Vec<DrawnFace>, gathered: &[u32], closed: bool) -> Result<Self> {
+        let indices = if model.levels.is_some() && !gathered.is_empty() {
+            let bytes = size_of_val(gathered) as u64;
+            let mut buffer = Buffer::new(model.positions.device(), "capture gathered", BufferKind::Upload, bytes)?;
+            buffer.write(0, gathered);
+            Some(buffer)
+        } else {
+            None
+        };
+        Ok(Drawn { faces, indices, closed })
+    }
+
+    /// Triangles that are drawn, each as often as faces show it.
+    pub fn triangles(&self) -> u64 {
+        self.faces.iter().flat_map(|face| &face.runs).map(|run| u64::from(run.end - run.start) / 3).sum()
+    }
+}

@@ -24,6 +24,9 @@ struct SurfaceNode {
     triangles: Range<usize>,
     centre: DVec3,
     radius: f64,
+    /// Corners of the box around them, which fits them more closely.
+    low: DVec3,
+    high: DVec3,
     /// Sum of normals as long as the triangles' areas.
     dipole: DVec3,
     /// Index of the second child; the first child comes next. It is 0 for a leaf.
@@ -59,7 +62,7 @@ impl Surface {
         let radius = within.iter().flatten().map(|p| p.distance(centre)).fold(0.0, f64::max);
         let dipole = within.iter().map(|[a, b, c]| (b - a).cross(c - a) / 2.0).sum();
         let node = self.nodes.len();
-        self.nodes.push(SurfaceNode { triangles: range.clone(), centre, radius, dipole, second: 0 });
+        self.nodes.push(SurfaceNode { triangles: range.clone(), centre, radius, low, high, dipole, second: 0 });
         if range.len() > LEAF_TRIANGLES {
             let middle = range.start + range.len() / 2;
             self.build(range.start..middle);
@@ -79,6 +82,10 @@ impl Surface {
                 continue;
             }
             let node = &self.nodes[index];
+            // The margin covers rounding.
+            if point.clamp(node.low, node.high).distance(point) - 1e-12 >= best.0 {
+                continue;
+            }
             if node.second == 0 {
                 for triangle in &self.triangles[node.triangles.clone()] {
                     let towards = nearest_on_triangle(triangle.map(|corner| corner - point));

@@ -187,8 +187,11 @@ pub fn plan(
         let from = directions.iter().map(|d| places.get(&place(back * *d)).copied()).collect::<Option<_>>()?;
         Some(LatticeOperation { deviation: operation.deviation, turn: operation.matrix, from })
     };
-    let operations = symmetry.operations.iter().filter_map(of_lattice).collect();
-    let limits = (0..lattice.sample_count()).into_par_iter().map(|s| allowed(distance(s), face_px)).collect();
+    let operations: Vec<LatticeOperation> = symmetry.operations.iter().filter_map(of_lattice).collect();
+    let has_turns = symmetry.sphere.is_some() || symmetry.revolution.iter().any(Option::is_some);
+    // Distances take longer to find than all else here.
+    let limit = |s| if has_turns || !operations.is_empty() { allowed(distance(s), face_px) } else { 0.0 };
+    let limits = (0..lattice.sample_count()).into_par_iter().map(limit).collect();
     Planner { lattice, symmetry, directions, operations, limits }.plan()
 }
 

@@ -250,14 +250,15 @@ impl Window {
     }
 
     /// Launches a recording that draws into the shot's image and leaves it as [`Access::Present`](super::Access::Present), and
-    /// shows it. A swapchain that no longer fits is rebuilt by the next [`Window::acquire`].
+    /// shows it. A swapchain that no longer fits is rebuilt by the next [`Window::acquire`]; if it fits so little that nothing is
+    /// shown, the answer is false.
     ///
     /// # Errors
     /// As [`Commands::launch`]; `Device` when the surface was lost.
     ///
     /// # Panics
     /// When the shot belongs to another swapchain, because [`Window::resize`] was called in between.
-    pub fn present(&mut self, commands: Commands<'_>, shot: &Shot) -> Result<Flight> {
+    pub fn present(&mut self, commands: Commands<'_>, shot: &Shot) -> Result<(Flight, bool)> {
         let chain = self.chain.as_ref().expect("a shot is presented before the window changes");
         assert!(Arc::ptr_eq(&chain.images[shot.index as usize], &shot.image), "a shot of another swapchain");
         let drawn = chain.drawn[shot.index as usize].1;
@@ -269,12 +270,14 @@ impl Window {
         // SAFETY: swapchain and semaphore are alive until the queue is idle (`Swapchain`); the queue is locked.
         let outcome = unsafe { chain.handle.loader.queue_present(*queue, &info) };
         drop(queue);
-        match outcome {
-            Ok(false) => {}
-            Ok(true) | Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.chain = None,
-            Err(code) => return Err(code).checked("vkQueuePresentKHR", "window"),
+        let (fits, is_shown) = match outcome {
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => (false, false),
+            other => (!other.checked("vkQueuePresentKHR", "window")?, true),
+        };
+        if !fits {
+            self.chain = None;
         }
-        Ok(flight)
+        Ok((flight, is_shown))
     }
 
     /// Rebuilds the swapchain; false if a side of the window is 0.

@@ -97,11 +97,14 @@ impl Viewer {
         };
         let mut commands = Commands::new(&self.setup.device, "frame")?;
         record(&mut commands, merge.as_ref(), picture.as_ref(), screen)?;
-        let flight = match (canvas, &shot) {
+        let (flight, is_shown) = match (canvas, &shot) {
             (FrameTarget::Window(window), Some(shot)) => window.present(commands, shot)?,
-            _ => commands.launch()?,
+            _ => (commands.launch()?, true),
         };
         self.flights.push_back(flight);
+        if !is_shown {
+            self.repaint_at = Some(Instant::now());
+        }
         if self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0) {
             let soon = Instant::now() + REST;
             self.repaint_at = Some(self.repaint_at.map_or(soon, |at| at.min(soon)));

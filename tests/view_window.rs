@@ -4,189 +4,22 @@
 #[path = "common/cli.rs"]
 mod cli;
 mod common;
+#[path = "common/display.rs"]
+mod display;
 #[path = "common/drag.rs"]
 mod drag;
 #[path = "common/model.rs"]
 mod model;
 #[path = "common/room.rs"]
 mod room;
+#[path = "common/viewing.rs"]
+mod viewing;
 
 use cli::{SMALL, cache, command, finish, good, has_device};
-use std::io::{BufRead, BufReader};
+use display::Display;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
-use std::time::{Duration, Instant};
-
-const SIZE: [usize; 2] = [480, 320];
-const PATIENCE: Duration = Duration::from_secs(60);
-
-/// A program that is ended with the test.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// A virtual display that writes its pixels to a file.
-struct Display {
-    name: String,
-    pixels: PathBuf,
-    _server: Running,
-}
-
-impl Display {
-    /// `None` where Xvfb or xdotool is missing.
-    fn open(folder: &Path) -> Option<Self> {
-        if Command::new("xdotool").arg("version").output().is_err() {
-            common::skip("no xdotool");
-            return None;
-        }
-        // The server picks a free number and tells it.
-        let server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "640x480x24", "-fbdir"])
-            .arg(folder)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn();
-        let Ok(mut server) = server else {
-            common::skip("no Xvfb");
-            return None;
-        };
-        let mut number = String::new();
-        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
-        let name = format!(":{}", number.trim());
-        Some(Display { name, pixels: folder.join("Xvfb_screen0"), _server: Running(server) })
-    }
-
-    fn xdotool(&self, arguments: &[&str]) -> String {
-        let output = Command::new("xdotool").env("DISPLAY", &self.name).args(arguments).output().unwrap();
-        assert!(output.status.success(), "xdotool {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8(output.stdout).unwrap()
-    }
-
-    /// RGB of the top left corner of the screen: X11's window dump format, 32 bits a pixel.
-    fn look(&self, [width, height]: [usize; 2]) -> Vec<[u8; 3]> {
-        let bytes = std::fs::read(&self.pixels).unwrap();
-        let word = |i: usize| u32::from_be_bytes(bytes[4 * i..][..4].try_into().unwrap()) as usize;
-        let (header, little, bits, line, colors) = (word(0), word(7) == 0, word(11), word(12), word(19));
-        assert!(little && bits == 32, "the display's pixels are of another kind");
-        let first = header + 12 * colors;
-        let pixel = |i: usize| {
-            let at = first + i / width * line + i % width * 4;
-            [bytes[at + 2], bytes[at + 1], bytes[at]]
-        };
-        (0..width * height).map(pixel).collect()
-    }
-}
-
-/// The program with its window, and the lines that it logs.
-struct View<'d> {
-    display: &'d Display,
-    child: Running,
-    lines: Receiver<String>,
-    heard: Vec<String>,
-    window: String,
-}
-
-impl<'d> View<'d> {
-    fn open(display: &'d Display, folder: &Path, arguments: &[&str]) -> Self {
-        let mut program = command(folder, &["view"]);
-        program.args(arguments).env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").arg("-v");
-        let mut child = program.stderr(Stdio::piped()).spawn().unwrap();
-        let stderr = child.stderr.take().unwrap();
-        let (sender, lines) = channel();
-        std::thread::spawn(move || {
-            BufReader::new(stderr).lines().map_while(Result::ok).for_each(|line| drop(sender.send(line)));
-        });
-        let mut view = View { display, child: Running(child), lines, heard: Vec::new(), window: String::new() };
-        view.hears("the first picture");
-        view.window = display.xdotool(&["search", "--name", "shadow-fields"]).trim().to_owned();
-        display.xdotool(&["windowfocus", "--sync", &view.window]);
-        view
-    }
-
-    /// Waits until a line with that text is logged.
-    fn hears(&mut self, text: &str) {
-        let end = Instant::now() + PATIENCE;
-        loop {
-            let left = end.saturating_duration_since(Instant::now());
-            match self.lines.recv_timeout(left) {
-                Ok(line) => {
-                    let found = line.contains(text);
-                    self.heard.push(line);
-                    if found {
-                        return;
-                    }
-                }
-                Err(_) => panic!("\"{text}\" was not heard; before: {:#?}", self.heard),
-            }
-        }
-    }
-
-    fn key(&mut self, key: &str, text: &str) {
-        self.display.xdotool(&["key", key]);
-        self.hears(text);
-    }
-
-    fn drag(&mut self, button: &str, from: [i32; 2], to: [i32; 2]) {
-        let places = [from, [(from[0] + to[0]) / 2, (from[1] + to[1]) / 2], to].map(|p| p.map(|c| c.to_string()));
-        let mut arguments = vec!["mousemove", &places[0][0], &places[0][1], "mousedown", button];
-        for place in &places[1..] {
-            arguments.extend(["sleep", "0.05", "mousemove", &place[0], &place[1]]);
-        }
-        arguments.extend(["sleep", "0.05", "mouseup", button]);
-        self.display.xdotool(&arguments);
-    }
-
-    /// Looks until two looks in a row show the same.
-    fn picture(&self, size: [usize; 2]) -> Vec<[u8; 3]> {
-        let end = Instant::now() + PATIENCE;
-        let mut before = Vec::new();
-        loop {
-            let now = self.display.look(size);
-            if now == before {
-                return now;
-            }
-            assert!(Instant::now() < end, "the picture does not settle");
-            before = now;
-            std::thread::sleep(Duration::from_millis(400));
-        }
-    }
-
-    /// Waits for the end; everything that was logged.
-    fn end(mut self) -> (i32, Vec<String>) {
-        let start = Instant::now();
-        let code = loop {
-            if let Some(status) = self.child.0.try_wait().unwrap() {
-                break status.code().expect("it ended by itself");
-            }
-            assert!(start.elapsed() < PATIENCE, "the window does not close: {:#?}", self.heard);
-            std::thread::sleep(Duration::from_millis(20));
-        };
-        self.heard.extend(self.lines.try_iter());
-        (code, std::mem::take(&mut self.heard))
-    }
-}
-
-/// Opens a window on the room, at 480x320.
-fn open<'d>(display: &'d Display, folder: &Path) -> View<'d> {
-    let size = SIZE.map(|side| side as u32);
-    room::write(folder, size, "motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } }]");
-    View::open(display, folder, &arguments())
-}
-
-/// Small bakes, the window's size, samples as `render` takes them.
-fn arguments() -> Vec<&'static str> {
-    let small = &SMALL[..4];
-    ["scene.toml", "--size", "480x320", "--paused", "--no-overlay", "--antialias", "samples", "--validation", "sync"]
-        .into_iter()
-        .chain(small.iter().copied())
-        .collect()
-}
+use std::time::Duration;
+use viewing::{SIZE, View, arguments, open};
 
 #[test]
 fn a_window_does_what_its_controls_say() {

@@ -6,13 +6,14 @@ use super::source::GltfArguments;
 use super::{Global, output};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
-use crate::gpu::{self, Device, PresentMode, Window};
+use crate::gpu::{self, Device, PresentMode, Window, display};
 use crate::scene::Scene;
 use crate::view::command::Command;
 use crate::view::input::{Button, Event, Key};
 use crate::view::{Editor, FrameTarget, Setup, Viewer};
 use clap::Args;
 use raw_window_handle::HasDisplayHandle;
+use std::mem::ManuallyDrop;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -68,12 +69,15 @@ pub struct Arguments {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let scene = arguments.gltf.scene(global, &arguments.scene)?;
     let events = event_loop()?;
-    let display = events.owned_display_handle();
-    let display = display.display_handle().map_err(no_display)?.as_raw();
+    let owned = events.owned_display_handle();
+    let handle = owned.display_handle().map_err(no_display)?.as_raw();
+    let proxy = events.create_proxy();
+    // A loop that has ended need not be woken.
+    let _watch = display::outlive(handle, move || proxy.send_event(()).unwrap_or_default());
     let mut device_options = gpu::DeviceOptions::default();
     let context = Context::with_device(global, |options| {
         device_options = options.clone();
-        Device::for_display(options, display)
+        Device::for_display(options, handle)
     })?;
     let outcome = {
         let mut app = App {
@@ -85,10 +89,18 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             shown: None,
             outcome: Ok(()),
         };
+        // winit panics over the loss of the display, which is told below.
+        let hook = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if !display::is_lost() {
+                hook(panic);
+            }
+        }));
         // Whatever is broken after a panic, the edited scene is data that can be saved.
         let ran = catch_unwind(AssertUnwindSafe(|| events.run_app(&mut app)));
         let App { shown, outcome, .. } = app;
         match ran {
+            _ if display::is_lost() => close_lost(shown, owned),
             Ok(ran) => {
                 let ran = ran.map_err(|error| Error::Failed(format!("the window system: {error}")));
                 close(shown, outcome.and(ran))
@@ -111,6 +123,16 @@ fn close(shown: Option<Shown>, outcome: Result<()>) -> Result<()> {
     // A device that was lost would be waited for in vain.
     let outcome = outcome.and_then(|()| shown.viewer.settle());
     outcome.map_err(|error| shown.viewer.rescued(error))
+}
+
+/// Ends the window whose display is lost. What belongs to it is left to the end of the process, since its calls would fail or wait.
+fn close_lost(shown: Option<Shown>, display: impl Sized) -> Result<()> {
+    let (mut shown, _display) = (ManuallyDrop::new(shown), ManuallyDrop::new(display));
+    let error = display::lost();
+    Err(match &mut *shown {
+        Some(shown) => shown.viewer.rescued(error),
+        None => error,
+    })
 }
 
 /// The window's title for a scene's file.
@@ -250,12 +272,15 @@ impl ApplicationHandler for App<'_> {
     }
 
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
-        let Some(shown) = &mut self.shown else { return };
+        let Some(shown) = self.shown.as_mut().filter(|_| !display::is_lost()) else { return };
         let outcome = shown.window_event(&event);
         self.check(events, outcome);
     }
 
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        if display::is_lost() {
+            return events.exit();
+        }
         let Some(shown) = &mut self.shown else { return };
         let now = Instant::now();
         let passed = now.duration_since(std::mem::replace(&mut shown.updated, now));

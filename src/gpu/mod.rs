@@ -10,6 +10,8 @@ pub mod commands;
 pub mod compiling;
 pub mod descriptors;
 pub mod device;
+#[cfg(feature = "view")]
+pub mod display;
 pub mod drawing;
 pub mod flight;
 mod heap;

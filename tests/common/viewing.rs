@@ -1,0 +1,120 @@
+//! The program with its window on a virtual display.
+
+#![allow(dead_code)] // every test binary uses its own part
+
+use super::cli::{SMALL, command};
+use super::display::{Display, Running};
+use super::room;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::Stdio;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+pub const SIZE: [usize; 2] = [480, 320];
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The program with its window, and the lines that it logs.
+pub struct View<'d> {
+    pub display: &'d Display,
+    pub child: Running,
+    lines: Receiver<String>,
+    pub heard: Vec<String>,
+    pub window: String,
+}
+
+impl<'d> View<'d> {
+    pub fn open(display: &'d Display, folder: &Path, arguments: &[&str]) -> Self {
+        let mut program = command(folder, &["view"]);
+        program.args(arguments).env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").arg("-v");
+        let mut child = program.stderr(Stdio::piped()).spawn().unwrap();
+        let stderr = child.stderr.take().unwrap();
+        let (sender, lines) = channel();
+        std::thread::spawn(move || {
+            BufReader::new(stderr).lines().map_while(Result::ok).for_each(|line| drop(sender.send(line)));
+        });
+        let mut view = View { display, child: Running(child), lines, heard: Vec::new(), window: String::new() };
+        view.hears("the first picture");
+        view.window = display.xdotool(&["search", "--name", "shadow-fields"]).trim().to_owned();
+        display.xdotool(&["windowfocus", "--sync", &view.window]);
+        view
+    }
+
+    /// Waits until a line with that text is logged.
+    pub fn hears(&mut self, text: &str) {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            match self.lines.recv_timeout(left) {
+                Ok(line) => {
+                    let found = line.contains(text);
+                    self.heard.push(line);
+                    if found {
+                        return;
+                    }
+                }
+                Err(_) => panic!("\"{text}\" was not heard; before: {:#?}", self.heard),
+            }
+        }
+    }
+
+    pub fn key(&mut self, key: &str, text: &str) {
+        self.display.xdotool(&["key", key]);
+        self.hears(text);
+    }
+
+    pub fn drag(&mut self, button: &str, from: [i32; 2], to: [i32; 2]) {
+        let places = [from, [(from[0] + to[0]) / 2, (from[1] + to[1]) / 2], to].map(|p| p.map(|c| c.to_string()));
+        let mut arguments = vec!["mousemove", &places[0][0], &places[0][1], "mousedown", button];
+        for place in &places[1..] {
+            arguments.extend(["sleep", "0.05", "mousemove", &place[0], &place[1]]);
+        }
+        arguments.extend(["sleep", "0.05", "mouseup", button]);
+        self.display.xdotool(&arguments);
+    }
+
+    /// Looks until two looks in a row show the same.
+    pub fn picture(&self, size: [usize; 2]) -> Vec<[u8; 3]> {
+        let end = Instant::now() + PATIENCE;
+        let mut before = Vec::new();
+        loop {
+            let now = self.display.look(size);
+            if now == before {
+                return now;
+            }
+            assert!(Instant::now() < end, "the picture does not settle");
+            before = now;
+            std::thread::sleep(Duration::from_millis(400));
+        }
+    }
+
+    /// Waits for the end; everything that was logged.
+    pub fn end(mut self) -> (i32, Vec<String>) {
+        let start = Instant::now();
+        let code = loop {
+            if let Some(status) = self.child.0.try_wait().unwrap() {
+                break status.code().expect("it ended by itself");
+            }
+            assert!(start.elapsed() < PATIENCE, "the window does not close: {:#?}", self.heard);
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        self.heard.extend(self.lines.try_iter());
+        (code, std::mem::take(&mut self.heard))
+    }
+}
+
+/// Opens a window on the room, at 480x320.
+pub fn open<'d>(display: &'d Display, folder: &Path) -> View<'d> {
+    let size = SIZE.map(|side| side as u32);
+    room::write(folder, size, "motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } }]");
+    View::open(display, folder, &arguments())
+}
+
+/// Small bakes, the window's size, samples as `render` takes them.
+pub fn arguments() -> Vec<&'static str> {
+    let small = &SMALL[..4];
+    ["scene.toml", "--size", "480x320", "--paused", "--no-overlay", "--antialias", "samples", "--validation", "sync"]
+        .into_iter()
+        .chain(small.iter().copied())
+        .collect()
+}

@@ -1,0 +1,134 @@
+//! A window at its limits: its display goes away, and an hour of random input.
+#![cfg(all(feature = "view", target_os = "linux"))]
+
+#[path = "common/cli.rs"]
+mod cli;
+mod common;
+#[path = "common/display.rs"]
+mod display;
+#[path = "common/drag.rs"]
+mod drag;
+#[path = "common/room.rs"]
+mod room;
+#[path = "common/viewing.rs"]
+mod viewing;
+
+use cli::has_device;
+use common::report;
+use display::Display;
+use std::time::{Duration, Instant};
+use viewing::{SIZE, View, arguments, open};
+
+/// Xlib would end the process: instead, edits are saved beside the scene, and one line says so.
+#[test]
+fn a_lost_display_saves_edits() {
+    if !has_device() {
+        return;
+    }
+    for is_still in [true, false] {
+        let folder = tempfile::tempdir().unwrap();
+        let Some(display) = Display::open(folder.path()) else { return };
+        let mut view = open(&display, folder.path());
+        view.key("q", "SelectNext");
+        view.key("i", "step: Up");
+        if !is_still {
+            view.key("space", "ToggleRunning");
+        }
+        display.end();
+        let (code, heard) = view.end();
+        assert_eq!(code, 5, "{heard:#?}");
+        let said: Vec<&String> =
+            heard.iter().filter(|line| !line.starts_with('[') && !line.starts_with("note:")).collect();
+        assert_eq!(said, ["shadow-fields: the display was lost; the edited scene was saved as scene-edited.toml"]);
+        let [before, after] = ["scene.toml", "scene-edited.toml"].map(|name| {
+            shadow_fields::scene::Scene::load(&folder.path().join(name)).unwrap().data.entities[0].position
+        });
+        assert!(after.y > before.y, "the step is in the file: {before} {after}");
+    }
+}
+
+/// Memory of the window's process in bytes.
+fn memory(view: &View<'_>) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", view.child.0.id())).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+    1024 * line.split_whitespace().next().unwrap().parse::<u64>().unwrap()
+}
+
+/// Keys that change something, or nothing.
+const KEYS: [&str; 24] = [
+    "q", "a", "j", "l", "i", "k", "o", "p", "n", "m", "r", "t", "c", "v", "e", "ctrl+z", "ctrl+y", "Home", "Escape",
+    "1", "2", "Tab", "shift+q", "w",
+];
+/// Keys that are pressed again before pictures are compared. The first two show panels, on which a pointer would change more.
+const TOGGLES: [&str; 5] = ["h", "F1", "g", "x", "space"];
+
+/// Half a minute of keys, drags, wheels and sizes; then the scene is opened anew.
+fn round(view: &mut View<'_>, random: &mut fastrand::Rng, scene: &std::path::Path) {
+    let end = Instant::now() + Duration::from_secs(30);
+    let mut pressed = [false; TOGGLES.len()];
+    while Instant::now() < end {
+        let place = |random: &mut fastrand::Rng| [random.i32(0..480), random.i32(0..320)];
+        match random.u32(0..10) {
+            0..5 => drop(view.display.xdotool(&["key", random.choice(KEYS).unwrap()])),
+            5 => {
+                let which = random.usize(0..TOGGLES.len());
+                pressed[which] = !pressed[which];
+                view.display.xdotool(&["key", TOGGLES[which]]);
+            }
+            6..9 if pressed[0] || pressed[1] => {}
+            6 | 7 => {
+                let (button, from, to) = (random.choice(["1", "3"]).unwrap(), place(random), place(random));
+                view.drag(button, from, to);
+            }
+            8 => drop(view.display.xdotool(&["click", random.choice(["4", "5"]).unwrap()])),
+            _ => {
+                let [width, height] = [random.u32(200..600), random.u32(150..440)].map(|side| side.to_string());
+                view.display.xdotool(&["windowsize", &view.window, &width, &height]);
+            }
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    for (key, _) in TOGGLES.iter().zip(pressed).filter(|(_, pressed)| *pressed) {
+        view.display.xdotool(&["key", key]);
+    }
+    view.display.xdotool(&["key", "Escape", "windowsize", "--sync", &view.window, "480", "320"]);
+    drag::drop_file(&view.display.name, view.window.parse().unwrap(), scene, [200, 100]);
+    view.hears("message: opened ");
+    view.display.xdotool(&["mousemove", "470", "310"]);
+    // Lines over the picture have gone by then.
+    std::thread::sleep(Duration::from_secs(12));
+}
+
+/// The variable says how many seconds; an hour without it.
+#[test]
+#[ignore = "takes an hour"]
+fn random_input_takes_no_memory_and_changes_no_picture() {
+    if !has_device() {
+        return;
+    }
+    let seconds = std::env::var("VIEW_SOAK_SECONDS").map_or(3600, |text| text.parse().expect("seconds"));
+    let folder = tempfile::tempdir().unwrap();
+    let Some(display) = Display::open(folder.path()) else { return };
+    let scene = room::write(folder.path(), SIZE.map(|side| side as u32), "");
+    let mut words = arguments();
+    // The validation layer keeps what it has seen.
+    words.retain(|word| !["--validation", "sync"].contains(word));
+    let mut view = View::open(&display, folder.path(), &words);
+    let (start, mut random) = (Instant::now(), fastrand::Rng::with_seed(1));
+    let (mut first, mut warm, mut rounds) = (None, None, 0);
+    while start.elapsed() < Duration::from_secs(seconds) {
+        round(&mut view, &mut random, &scene);
+        rounds += 1;
+        let (now, shown) = (memory(&view), view.picture(SIZE));
+        report(&format!("{rounds} rounds, {:.0} s: {:.1} MB", start.elapsed().as_secs_f64(), now as f64 * 1e-6));
+        assert!(*first.get_or_insert_with(|| shown.clone()) == shown, "round {rounds} ends with another picture");
+        // A fifth of the time warms up.
+        if start.elapsed() > Duration::from_secs(seconds / 5) {
+            let warm = *warm.get_or_insert(now);
+            assert!(now as f64 <= 1.02 * warm as f64, "memory grew from {warm} to {now} bytes");
+        }
+    }
+    display.xdotool(&["key", "ctrl+q", "sleep", "1", "key", "ctrl+q"]);
+    let (code, heard) = view.end();
+    assert_eq!(code, 0, "{:#?}", heard.iter().rev().take(20).collect::<Vec<_>>());
+}

@@ -1,6 +1,7 @@
 //! Devices that have less than the one at hand: each is refused with the number, or worked around with the same picture.
 
-use super::layer::{Claims, watch};
+use super::claimed::Claims;
+use super::layer::watch;
 use super::sweep::assert_clean;
 use super::{Place, run};
 use shadow_fields::error::one_line;

@@ -1,12 +1,22 @@
 //! Every Vulkan call that can fail fails once, with every error that the specification allows: no panic, hang or leak, one line with
 //! the right exit code, outputs whole or absent, and the next run in the same process is as if nothing had happened.
 //!
-//! By default a seeded tenth of the calls fails. All of it: `cargo test --test faults -- --ignored --nocapture`.
+//! By default a seeded tenth of the calls fails. All of it: `cargo test --test faults -- --ignored --nocapture`. The variable
+//! FAULTS_JOB leaves one of the [`JOBS`], by name.
 
+#[macro_use]
+mod layer;
+mod calls;
+mod census;
+mod claimed;
 mod claims;
 #[path = "../common/mod.rs"]
 mod common;
-mod layer;
+#[cfg(all(feature = "view", target_os = "linux"))]
+mod display;
+#[path = "../common/display.rs"]
+mod server;
+mod special;
 mod sweep;
 #[cfg(feature = "view")]
 mod window;
@@ -14,7 +24,8 @@ mod window;
 use shadow_fields::{Error, Result, app};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use sweep::Job;
+use std::time::Instant;
+use sweep::{Choice, Job};
 
 /// Of all calls, one in so many fails by default.
 const SHARE: usize = 10;
@@ -63,7 +74,13 @@ fn run(folder: &Path, arguments: &[&str]) -> Result<()> {
 /// A picture of a scene whose fields are baked for it, with all that can be written beside it.
 fn picture(folder: &Path) -> Result<()> {
     let outputs = ["-o", "@p.png", "--exr", "@p.exr", "--vertices", "@v.csv", "--antialias", "outlines"];
-    run(folder, &[&["render", "@scene.toml", "--variant", "storage"], &outputs[..], &SMALL].concat())
+    let how = ["render", "@scene.toml", "--variant", "storage", "--shading", "vertex"];
+    run(folder, &[&how, &outputs[..], &SMALL].concat())
+}
+
+/// The same by pixels, whose pipelines take the driver more than half of a run.
+fn pixels(folder: &Path) -> Result<()> {
+    run(folder, &[&["render", "@scene.toml", "--variant", "storage", "-o", "@x.png"], &SMALL[..]].concat())
 }
 
 /// An animation of two light forms, its fields out of the cache.
@@ -86,18 +103,24 @@ fn window(folder: &Path) -> Result<()> {
     window::run(folder)
 }
 
+/// Where only some calls fail, the others do in a job before.
 const JOBS: &[Job] = &[
-    Job { name: "picture", run: picture, outputs: &["p.png", "p.exr", "v.csv"], cold: &["cache/fields"] },
-    Job { name: "animation", run: animation, outputs: &["a.png"], cold: &[] },
-    Job { name: "bake", run: bake, outputs: &["f.sf"], cold: &[] },
-    Job { name: "silhouettes", run: silhouettes, outputs: &["s.sf"], cold: &[] },
+    Job { name: "picture", run: picture, outputs: &["p.png", "p.exr", "v.csv"], cold: &["cache/fields"], only: None },
+    Job { name: "pixels", run: pixels, outputs: &["x.png"], cold: &[], only: Some(&["Graphics", "ShaderModule"]) },
+    Job { name: "animation", run: animation, outputs: &["a.png"], cold: &[], only: None },
+    Job { name: "bake", run: bake, outputs: &["f.sf"], cold: &[], only: None },
+    Job { name: "silhouettes", run: silhouettes, outputs: &["s.sf"], cold: &[], only: None },
     #[cfg(feature = "view")]
-    Job { name: "window", run: window, outputs: &["w.raw"], cold: &[] },
+    Job { name: "window", run: window, outputs: &["w.raw"], cold: &[], only: None },
+    #[cfg(all(feature = "view", target_os = "linux"))]
+    Job { name: "display", run: display::run, outputs: &["d.raw"], cold: &[], only: Some(&["KHR", "Semaphore"]) },
 ];
 
 /// A folder with inputs, held by one test at a time: the layer is the whole process's.
 struct Place {
     folder: tempfile::TempDir,
+    /// A display for windows, if there is one.
+    display: Option<server::Display>,
     _turn: MutexGuard<'static, ()>,
 }
 
@@ -106,11 +129,12 @@ impl Place {
     fn new() -> Option<Self> {
         static TURN: Mutex<()> = Mutex::new(());
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        layer::keep_drivers();
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
         std::fs::write(folder.path().join("mesh.obj"), MESH).unwrap();
         match run(folder.path(), &["devices"]) {
-            Ok(()) => Some(Place { folder, _turn: turn }),
+            Ok(()) => Some(Place { folder, display: None, _turn: turn }),
             Err(Error::Unsupported(error)) => {
                 common::skip(&error);
                 None
@@ -122,28 +146,66 @@ impl Place {
     fn path(&self) -> &Path {
         self.folder.path()
     }
+
+    /// Whether what a job needs is there.
+    fn has(&mut self, job: &Job) -> bool {
+        if job.name == "display" {
+            self.display = server::Display::alone(self.path());
+            if let Some(display) = &self.display {
+                std::fs::write(self.path().join("display"), &display.name).unwrap();
+            }
+            return self.display.is_some();
+        }
+        true
+    }
 }
 
-fn sweep(share: usize) {
-    let Some(place) = Place::new() else { return };
+fn sweep(choice: Choice) -> Option<usize> {
+    let mut place = Place::new()?;
     let mut all = sweep::Tally::new();
-    for job in JOBS {
-        for (name, count) in job.sweep(place.path(), share, 1) {
+    let wanted = std::env::var("FAULTS_JOB").ok();
+    for job in JOBS.iter().filter(|job| wanted.as_ref().is_none_or(|name| name == job.name)) {
+        if !place.has(job) {
+            continue;
+        }
+        for (name, count) in job.sweep(place.path(), choice) {
             *all.entry(name).or_default() += count;
         }
     }
     let count: usize = all.values().sum();
     common::report(&format!("{count} faults: {all:?}"));
-    assert!(count > 20, "hardly anything failed: {all:?}");
+    Some(count)
 }
 
 #[test]
 fn faults_in_a_tenth_of_all_calls_are_survived() {
-    sweep(SHARE);
+    if let Some(count) = sweep(Choice::Sample { share: SHARE, seed: 1 }) {
+        assert!(count > 20, "hardly anything failed: {count}");
+    }
 }
 
+/// The variable that tells a process of the whole sweep which calls are its own: `REST PARTS`.
+const PART: &str = "FAULTS_PART";
+
+/// This process runs the sweep again in others, one a processor: a run with a fault keeps hardly more than one busy.
 #[test]
-#[ignore = "takes three quarters of an hour; a tenth of the calls fails by default"]
+#[ignore = "takes minutes; a tenth of the calls fails by default"]
 fn every_fault_is_survived() {
-    sweep(1);
+    if let Ok(text) = std::env::var(PART) {
+        let mut numbers = text.split(' ').map(|number| number.parse().expect("a number"));
+        let (rest, parts) = (numbers.next().unwrap(), numbers.next().unwrap());
+        sweep(Choice::All { rest, parts });
+        return;
+    }
+    let start = Instant::now();
+    let parts = std::thread::available_parallelism().map_or(1, usize::from).min(8);
+    let part = |rest: usize| {
+        let words = ["--ignored", "--exact", "every_fault_is_survived", "--nocapture"];
+        let mut command = std::process::Command::new(std::env::current_exe().unwrap());
+        command.args(words).env(PART, format!("{rest} {parts}")).spawn().unwrap()
+    };
+    let processes: Vec<_> = (0..parts).map(part).collect();
+    let ended: Vec<_> = processes.into_iter().map(|mut process| process.wait().unwrap()).collect();
+    common::report(&format!("{parts} processes, {:.0} s", start.elapsed().as_secs_f64()));
+    assert!(ended.iter().all(std::process::ExitStatus::success), "{ended:?}");
 }

@@ -1,7 +1,8 @@
 //! Runs something again and again, and lets one Vulkan call after another fail.
 
+use super::claimed::Claims;
 use super::common::report;
-use super::layer::{Call, Claims, Heard, Plan, watch};
+use super::layer::{Call, Heard, Plan, watch};
 use ash::vk;
 use shadow_fields::{Error, Result};
 use std::collections::BTreeMap;
@@ -22,6 +23,17 @@ pub struct Job {
     pub outputs: &'static [&'static str],
     /// What is removed from the folder before a run, besides its outputs.
     pub cold: &'static [&'static str],
+    /// Parts of the names of the calls that fail, if not all do.
+    pub only: Option<&'static [&'static str]>,
+}
+
+/// Which of all calls fail.
+#[derive(Clone, Copy)]
+pub enum Choice {
+    /// One in so many with one of its errors, picked by a seed; of names for debuggers, which nobody misses, a tenth as many.
+    Sample { share: usize, seed: u64 },
+    /// With all of their errors, those whose number among the job's calls leaves this rest when it is divided by `parts`.
+    All { rest: usize, parts: usize },
 }
 
 /// How many calls were made to fail, by name.
@@ -74,58 +86,68 @@ impl Job {
         (made, heard)
     }
 
-    /// Lets calls fail, each in a run of its own, and runs again without a fault: all of them with all of their errors, or one in
-    /// `share` calls with one of its errors, picked by a seed. Of the latter every eighth is followed by another run, and of names for
-    /// debuggers, which nobody misses, a tenth as many fail.
-    pub fn sweep(&self, folder: &Path, share: usize, seed: u64) -> Tally {
+    /// Calls that are to fail, and their errors.
+    fn faults(&self, choice: Choice, calls: &[Call]) -> Vec<(usize, Vec<usize>)> {
+        let is_wanted = |call: &Call| self.only.is_none_or(|parts| parts.iter().any(|part| call.name.contains(part)));
+        let wanted: Vec<usize> = (0..calls.len()).filter(|at| is_wanted(&calls[*at])).collect();
+        match choice {
+            Choice::All { rest, parts } => {
+                let own = wanted.into_iter().skip(rest).step_by(parts);
+                own.map(|at| (at, (0..calls[at].errors.len()).collect())).collect()
+            }
+            Choice::Sample { share, seed } => {
+                let mut random = fastrand::Rng::with_seed(seed);
+                let one = |at: usize| (at, vec![random.usize(0..calls[at].errors.len())]);
+                let is_name = |(at, _): &(usize, Vec<usize>)| calls[*at].name == "vkSetDebugUtilsObjectNameEXT";
+                let (mut names, mut others): (Vec<_>, Vec<_>) = wanted.into_iter().map(one).partition(is_name);
+                random.shuffle(&mut others);
+                random.shuffle(&mut names);
+                others.truncate(others.len().div_ceil(share));
+                names.truncate(names.len().div_ceil(10 * share));
+                [others, names].concat()
+            }
+        }
+    }
+
+    /// Lets calls fail, each with each error in a run of its own. Runs follow each other in one process, and up to its fault each makes
+    /// the calls of a good one; every so often one without a fault must make what the first did.
+    pub fn sweep(&self, folder: &Path, choice: Choice) -> Tally {
         let start = Instant::now();
         self.good(folder, "the first run");
         self.remove(folder, self.outputs);
         self.remove(folder, self.cold);
         let (expected, heard) = self.good(folder, "the second run");
-        let every = |(at, call): (usize, &Call)| (0..call.errors.len()).map(move |error| (at, error));
-        let mut faults: Vec<(usize, usize)> = heard.calls.iter().enumerate().flat_map(every).collect();
-        let all = faults.len();
-        let mut random = fastrand::Rng::with_seed(seed);
-        if share > 1 {
-            let one = |(at, call): (usize, &Call)| (at, random.usize(0..call.errors.len()));
-            let (mut names, mut others): (Vec<_>, Vec<_>) = heard
-                .calls
-                .iter()
-                .enumerate()
-                .map(one)
-                .partition(|(at, _)| heard.calls[*at].name == "vkSetDebugUtilsObjectNameEXT");
-            random.shuffle(&mut others);
-            random.shuffle(&mut names);
-            others.truncate(others.len().div_ceil(share));
-            names.truncate(names.len().div_ceil(10 * share));
-            faults = [others, names].concat();
-        }
+        let faults = self.faults(choice, &heard.calls);
+        let every = if matches!(choice, Choice::All { .. }) { 4 } else { 8 };
         let mut tally = Tally::new();
-        for (index, (at, error)) in faults.iter().enumerate() {
+        for (index, (at, errors)) in faults.iter().enumerate() {
             let call = heard.calls[*at];
-            let what = format!("{}: call {at}, {} with {:?}", self.name, call.name, call.errors[*error]);
-            self.one(folder, &what, Plan { at: *at, error: *error }, &expected);
-            if share == 1 || index % 8 == 0 {
-                // The same process, and whatever the run left in the cache.
-                self.remove(folder, self.outputs);
-                let (made, _) = self.good(folder, &format!("{what}, the run after it"));
-                assert!(made == expected, "{what}: the run after it makes something else");
+            for &error in errors {
+                let what = format!("{}: call {at}, {} with {:?}", self.name, call.name, call.errors[error]);
+                self.one(folder, &what, Plan { at: *at, error }, call, &expected);
+                *tally.entry(call.name).or_default() += 1;
             }
-            *tally.entry(call.name).or_default() += 1;
+            if index % every == every - 1 || index + 1 == faults.len() {
+                // The same process, and whatever the runs left in the cache.
+                self.remove(folder, self.outputs);
+                let what = format!("the run after faults up to call {at}, {}", call.name);
+                let (made, _) = self.good(folder, &what);
+                assert!(made == expected, "{}: {what} makes something else", self.name);
+            }
         }
         report(&format!(
-            "{}: {} calls can fail, {} of {all} faults were injected, {:.1} s",
+            "{}: {} calls can fail, {} of them did so, in {} ways, {:.1} s",
             self.name,
             heard.calls.len(),
             faults.len(),
+            tally.values().sum::<usize>(),
             start.elapsed().as_secs_f64()
         ));
         tally
     }
 
     /// One run with a fault.
-    fn one(&self, folder: &Path, what: &str, plan: Plan, expected: &[Option<Vec<u8>>]) {
+    fn one(&self, folder: &Path, what: &str, plan: Plan, planned: Call, expected: &[Option<Vec<u8>>]) {
         self.remove(folder, self.outputs);
         self.remove(folder, self.cold);
         let (outcome, heard) = guarded(what, || {
@@ -134,8 +156,9 @@ impl Job {
         let Ok(outcome) = outcome else { panic!("{what}: it panicked") };
         assert_clean(what, &heard);
         let (call, code) = heard.fired.unwrap_or_else(|| panic!("{what}: only {} calls were made", heard.calls.len()));
+        assert_eq!(call, planned, "{what}: the calls before it are others");
         match &outcome {
-            Ok(()) => assert!(is_forgiven(call), "{what}: nobody noticed"),
+            Ok(()) => assert!(is_forgiven(call, code), "{what}: nobody noticed"),
             Err(error) => assert_told(what, call, code, error),
         }
         for ((name, expected), made) in self.outputs.iter().zip(expected).zip(self.made(folder)) {
@@ -152,9 +175,17 @@ pub fn assert_clean(what: &str, heard: &Heard) {
     assert!(heard.wrong.is_empty(), "{what}: {:?}", heard.wrong);
 }
 
-/// Calls whose failure changes nothing that a user asked for: names for debuggers, the pipeline cache, and waiting for what has ended.
-fn is_forgiven(call: Call) -> bool {
-    ["vkSetDebugUtilsObjectNameEXT", "vkGetPipelineCacheData", "vkDeviceWaitIdle", "vkQueueWaitIdle", "vkWaitForFences"]
+/// Calls whose failure changes nothing that a user asked for: names for debuggers, the pipeline cache, and waiting for what has ended;
+/// and a swapchain that no longer fits its window, which is made anew.
+fn is_forgiven(call: Call, code: vk::Result) -> bool {
+    [vk::Result::SUBOPTIMAL_KHR, vk::Result::ERROR_OUT_OF_DATE_KHR].contains(&code)
+        || [
+            "vkSetDebugUtilsObjectNameEXT",
+            "vkGetPipelineCacheData",
+            "vkDeviceWaitIdle",
+            "vkQueueWaitIdle",
+            "vkWaitForFences",
+        ]
         .contains(&call.name)
 }
 

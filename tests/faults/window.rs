@@ -9,27 +9,46 @@ use shadow_fields::view::command::{Command, Step};
 use shadow_fields::view::{Editor, FrameTarget, Setup, Viewer};
 use shadow_fields::{Error, Result, bake, check, frame};
 use std::path::Path;
+use std::sync::Arc;
 
-const SIZE: [u32; 2] = [48, 32];
+pub const SIZE: [u32; 2] = [48, 32];
 const FORMAT: ash::vk::Format = ash::vk::Format::R8G8B8A8_SRGB;
 
 /// Draws frames of a scene that is edited, with the overlay, and writes the last as `w.raw`.
 pub fn run(folder: &Path) -> Result<()> {
-    let cache_dir = folder.join("cache");
-    let options = DeviceOptions { cache_dir: Some(cache_dir.clone()), ..DeviceOptions::default() };
+    let options = device_options(folder);
     let device = Device::new(&options)?;
     let [width, height] = SIZE;
     let image = Image::new(&device, "window", ImageShape { format: FORMAT, width, height, samples: 1 })?;
-    let path = folder.join("scene.toml");
+    let mut viewer = viewer(folder, device.clone(), options, (FORMAT, true))?;
+    show(&mut viewer, &mut |viewer| viewer.draw(FrameTarget::Image(&image)))?;
+    let pixels = look(&device, &image)?;
+    drop(viewer);
+    device.save_pipeline_cache();
+    std::fs::write(folder.join("w.raw"), pixels).map_err(|error| Error::Failed(error.to_string()))
+}
+
+pub fn device_options(folder: &Path) -> DeviceOptions {
+    DeviceOptions { cache_dir: Some(folder.join("cache")), ..DeviceOptions::default() }
+}
+
+/// A viewer of the folder's scene that draws into targets of that format, which encodes sRGB or does not.
+pub fn viewer(
+    folder: &Path,
+    device: Arc<Device>,
+    options: DeviceOptions,
+    (format, encodes_srgb): (ash::vk::Format, bool),
+) -> Result<Viewer> {
+    let (cache_dir, path) = (folder.join("cache"), folder.join("scene.toml"));
     let setup = Setup {
-        device: device.clone(),
+        device,
         options,
         workers: None,
         library: Library { shader_dir: None, cache_dir: Some(cache_dir.clone()) },
         cache: Cache::new(Some(&cache_dir)),
         frame: frame_options(),
-        format: FORMAT,
-        encodes_srgb: true,
+        format,
+        encodes_srgb,
         seed: 1,
         strict: false,
         settings: None,
@@ -42,26 +61,32 @@ pub fn run(folder: &Path) -> Result<()> {
         std::thread::yield_now();
         viewer.update(0.0)?;
     }
-    let turn = |viewer: &mut Viewer| {
+    Ok(viewer)
+}
+
+/// Shows a still scene, then the same edited, then without the overlay. `draw` is called until it answers that a frame is seen.
+pub fn show(viewer: &mut Viewer, draw: &mut dyn FnMut(&mut Viewer) -> Result<bool>) -> Result<()> {
+    let [width, height] = SIZE.map(|side| side as f32);
+    let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
+    let mut turn = |viewer: &mut Viewer| {
         viewer.update(0.0)?;
-        let [width, height] = SIZE.map(|side| side as f32);
-        let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
         let _ = viewer.ui(egui::RawInput { screen_rect: Some(screen), ..Default::default() })?;
-        viewer.draw(FrameTarget::Image(&image)).map(|_| ())
+        draw(viewer)
     };
-    turn(&mut viewer)?;
-    viewer.apply(Command::Step { step: Step::Up, repeat: false })?;
-    turn(&mut viewer)?;
-    viewer.apply(Command::ToggleOverlay)?;
-    turn(&mut viewer)?;
-    viewer.settle()?;
-    if viewer.frame().is_none() {
-        return Err(Error::Failed(viewer.message().unwrap_or("no frame, and nothing is said of it").to_owned()));
+    for command in [None, Some(Command::Step { step: Step::Up, repeat: false }), Some(Command::ToggleOverlay)] {
+        command.map_or(Ok(()), |command| viewer.apply(command))?;
+        for turns in 0.. {
+            assert!(turns < 100, "the window never comes to rest");
+            if turn(viewer)? {
+                break;
+            }
+        }
     }
-    let pixels = look(&device, &image)?;
-    drop(viewer);
-    device.save_pipeline_cache();
-    std::fs::write(folder.join("w.raw"), pixels).map_err(|error| Error::Failed(error.to_string()))
+    viewer.settle()?;
+    match viewer.frame() {
+        Some(_) => Ok(()),
+        None => Err(Error::Failed(viewer.message().unwrap_or("no frame, and nothing is said of it").to_owned())),
+    }
 }
 
 fn frame_options() -> frame::Options {
@@ -76,7 +101,7 @@ fn frame_options() -> frame::Options {
     }
 }
 
-fn look(device: &std::sync::Arc<Device>, image: &Image) -> Result<Vec<u8>> {
+fn look(device: &Arc<Device>, image: &Image) -> Result<Vec<u8>> {
     let bytes = 4 * SIZE[0] * SIZE[1];
     let host = Buffer::new(device, "window on the host", BufferKind::Readback, bytes.into())?;
     let mut commands = Commands::new(device, "look")?;

@@ -1,0 +1,224 @@
+//! Calls whose wrappers do more than fail: those that make instances, memory, pipelines and pictures of a window.
+
+#![allow(unsafe_code)]
+
+use super::claimed::OF_DEVICE;
+use super::layer::{Function, born, device_address, dies, fault, state};
+use ash::vk::{self, Handle};
+use std::ffi::{c_char, c_void};
+use std::sync::OnceLock;
+
+type Allocator<'a> = vk::AllocationCallbacks<'a>;
+
+const OUT_OF_MEMORY: &[vk::Result] = &[vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY];
+
+module! {
+    vkGetDeviceProcAddr: PFN_vkGetDeviceProcAddr(device: vk::Device, name: *const c_char) -> Option<Function> {
+        // SAFETY: the caller keeps the contract of this very function.
+        unsafe { device_address(device, name) }
+    }
+}
+
+module! {
+    vkEnumerateInstanceExtensionProperties: PFN_vkEnumerateInstanceExtensionProperties(
+        layer: *const c_char, count: *mut u32, out: *mut vk::ExtensionProperties
+    ) -> vk::Result {
+        const ERRORS: &[vk::Result] = &[
+            vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_LAYER_NOT_PRESENT,
+        ];
+        if let Some(error) = fault("vkEnumerateInstanceExtensionProperties", ERRORS) {
+            return error;
+        }
+        let has = state().claims.extension;
+        // SAFETY: the caller keeps the contract of this very function.
+        unsafe {
+            let result = REAL.get().expect("wrapped")(layer, count, out);
+            if result == vk::Result::SUCCESS && !out.is_null() {
+                for one in std::slice::from_raw_parts_mut(out, *count as usize) {
+                    if one.extension_name_as_c_str().is_ok_and(|name| !has(name)) {
+                        one.extension_name = [0; 256];
+                    }
+                }
+            }
+            result
+        }
+    }
+}
+
+module! {
+    vkSetDebugUtilsObjectNameEXT: PFN_vkSetDebugUtilsObjectNameEXT(
+        device: vk::Device, info: *const vk::DebugUtilsObjectNameInfoEXT<'_>
+    ) -> vk::Result {
+        if let Some(error) = fault("vkSetDebugUtilsObjectNameEXT", OUT_OF_MEMORY) {
+            return error;
+        }
+        // SAFETY: the caller keeps the contract of this very function.
+        unsafe {
+            if (*info).object_type == vk::ObjectType::DESCRIPTOR_SET {
+                state().heard.wrong.push("a descriptor set was named, which lavapipe of Mesa 22.3 never frees".into());
+            }
+            REAL.get().expect("wrapped")(device, info)
+        }
+    }
+}
+
+module! {
+    vkCreateInstance: PFN_vkCreateInstance(
+        info: *const vk::InstanceCreateInfo<'_>, allocator: *const Allocator<'_>, out: *mut vk::Instance
+    ) -> vk::Result {
+        const ERRORS: &[vk::Result] = &[
+            vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+            vk::Result::ERROR_INITIALIZATION_FAILED, vk::Result::ERROR_LAYER_NOT_PRESENT,
+            vk::Result::ERROR_EXTENSION_NOT_PRESENT, vk::Result::ERROR_INCOMPATIBLE_DRIVER,
+        ];
+        if let Some(error) = fault("vkCreateInstance", ERRORS) {
+            return error;
+        }
+        // SAFETY: the caller keeps the contract of this very function, which writes the handle where it succeeds.
+        unsafe {
+            let result = REAL.get().expect("wrapped")(info, allocator, out);
+            if result == vk::Result::SUCCESS {
+                born(*out);
+                state().instance = *out;
+            }
+            result
+        }
+    }
+}
+
+module! {
+    vkDestroyInstance: PFN_vkDestroyInstance(instance: vk::Instance, allocator: *const Allocator<'_>) {
+        dies(instance);
+        // SAFETY: the caller keeps the contract of this very function.
+        unsafe { REAL.get().expect("wrapped")(instance, allocator) }
+    }
+}
+
+module! {
+    vkDestroyDevice: PFN_vkDestroyDevice(device: vk::Device, allocator: *const Allocator<'_>) {
+        dies(device);
+        // SAFETY: the caller keeps the contract of this very function.
+        unsafe { REAL.get().expect("wrapped")(device, allocator) }
+    }
+}
+
+module! {
+    vkAllocateMemory: PFN_vkAllocateMemory(
+        device: vk::Device, info: *const vk::MemoryAllocateInfo<'_>, allocator: *const Allocator<'_>,
+        out: *mut vk::DeviceMemory
+    ) -> vk::Result {
+        const ERRORS: &[vk::Result] = &[
+            vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_TOO_MANY_OBJECTS,
+        ];
+        if let Some(error) = fault("vkAllocateMemory", ERRORS) {
+            return error;
+        }
+        let splits = state().claims.splits_memory;
+        // SAFETY: the caller keeps the contract of this very function; both claimed types are the driver's only one.
+        unsafe {
+            let mut own = *info;
+            if splits {
+                own.memory_type_index = 0;
+            }
+            let result = REAL.get().expect("wrapped")(device, &raw const own, allocator, out);
+            if result == vk::Result::SUCCESS {
+                born(*out);
+                if splits && (*info).memory_type_index == OF_DEVICE {
+                    state().census.hide(*out);
+                }
+            }
+            result
+        }
+    }
+}
+
+module! {
+    vkMapMemory: PFN_vkMapMemory(
+        device: vk::Device, memory: vk::DeviceMemory, offset: vk::DeviceSize, size: vk::DeviceSize,
+        flags: vk::MemoryMapFlags, data: *mut *mut c_void
+    ) -> vk::Result {
+        const ERRORS: &[vk::Result] = &[
+            vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_MEMORY_MAP_FAILED,
+        ];
+        if let Some(error) = fault("vkMapMemory", ERRORS) {
+            return error;
+        }
+        let mut state = state();
+        if state.census.is_hidden(memory) {
+            state.heard.wrong.push("memory was mapped that the host cannot see".into());
+        }
+        drop(state);
+        // SAFETY: the caller keeps the contract of this very function.
+        unsafe { REAL.get().expect("wrapped")(device, memory, offset, size, flags, data) }
+    }
+}
+
+macro_rules! pipelines {
+    ($name:ident, $pfn:ident, $info:ident) => {
+        module! {
+            $name: $pfn(
+                device: vk::Device, cache: vk::PipelineCache, count: u32, infos: *const vk::$info<'_>,
+                allocator: *const Allocator<'_>, out: *mut vk::Pipeline
+            ) -> vk::Result {
+                if let Some(error) = fault(stringify!($name), OUT_OF_MEMORY) {
+                    // SAFETY: the caller has room for `count` handles, which are null where creation fails.
+                    unsafe { std::slice::from_raw_parts_mut(out, count as usize) }.fill(vk::Pipeline::null());
+                    return error;
+                }
+                // SAFETY: the caller keeps the contract of this very function, which writes all handles.
+                unsafe {
+                    let result = REAL.get().expect("wrapped")(device, cache, count, infos, allocator, out);
+                    let made = std::slice::from_raw_parts(out, count as usize);
+                    made.iter().filter(|pipeline| !pipeline.is_null()).for_each(|pipeline| born(*pipeline));
+                    result
+                }
+            }
+        }
+    };
+}
+
+pipelines!(vkCreateComputePipelines, PFN_vkCreateComputePipelines, ComputePipelineCreateInfo);
+pipelines!(vkCreateGraphicsPipelines, PFN_vkCreateGraphicsPipelines, GraphicsPipelineCreateInfo);
+
+/// What showing a picture may answer; a suboptimal swapchain has shown it all the same.
+const SHOWING: &[vk::Result] = &[
+    vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+    vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+    vk::Result::ERROR_DEVICE_LOST,
+    vk::Result::ERROR_OUT_OF_DATE_KHR,
+    vk::Result::ERROR_SURFACE_LOST_KHR,
+    vk::Result::SUBOPTIMAL_KHR,
+];
+
+/// The answer of a call that shows a picture: `real` is called unless the fault is an error.
+fn shown(name: &'static str, real: impl FnOnce() -> vk::Result) -> vk::Result {
+    match fault(name, SHOWING) {
+        Some(vk::Result::SUBOPTIMAL_KHR) => match real() {
+            vk::Result::SUCCESS => vk::Result::SUBOPTIMAL_KHR,
+            other => other,
+        },
+        Some(error) => error,
+        None => real(),
+    }
+}
+
+module! {
+    vkAcquireNextImageKHR: PFN_vkAcquireNextImageKHR(
+        device: vk::Device, swapchain: vk::SwapchainKHR, timeout: u64, semaphore: vk::Semaphore, fence: vk::Fence,
+        index: *mut u32
+    ) -> vk::Result {
+        shown("vkAcquireNextImageKHR", || {
+            // SAFETY: the caller keeps the contract of this very function.
+            unsafe { REAL.get().expect("wrapped")(device, swapchain, timeout, semaphore, fence, index) }
+        })
+    }
+}
+
+module! {
+    vkQueuePresentKHR: PFN_vkQueuePresentKHR(queue: vk::Queue, info: *const vk::PresentInfoKHR<'_>) -> vk::Result {
+        shown("vkQueuePresentKHR", || {
+            // SAFETY: the caller keeps the contract of this very function.
+            unsafe { REAL.get().expect("wrapped")(queue, info) }
+        })
+    }
+}

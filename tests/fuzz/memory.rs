@@ -1,4 +1,4 @@
-//! An allocator that knows the most memory that was in use at once.
+//! What an input takes: an allocator that knows the most memory that was in use at once, and the processor's time.
 
 #![allow(unsafe_code)]
 
@@ -41,6 +41,22 @@ unsafe impl GlobalAlloc for Counting {
         // SAFETY: as above.
         unsafe { System.realloc(at, layout, bytes) }
     }
+}
+
+/// Time that the process has been on processors, which other processes do not prolong.
+#[cfg(unix)]
+pub fn processor_time() -> std::time::Duration {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: the structure outlives the call.
+    assert_eq!(unsafe { libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &raw mut time) }, 0);
+    std::time::Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
+}
+
+/// Time of the clock.
+#[cfg(not(unix))]
+pub fn processor_time() -> std::time::Duration {
+    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    START.get_or_init(std::time::Instant::now).elapsed()
 }
 
 /// Runs something and answers with the bytes that it had in use beyond what there was before.

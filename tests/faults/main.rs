@@ -184,6 +184,17 @@ fn faults_in_a_tenth_of_all_calls_are_survived() {
     }
 }
 
+/// What an out-of-date swapchain did not show is shown by the next, though nothing else changes.
+#[test]
+#[cfg(all(feature = "view", target_os = "linux"))]
+fn a_picture_that_was_not_shown_is_shown_again() {
+    let Some(mut place) = Place::new() else { return };
+    let job = JOBS.iter().find(|job| job.name == "display").expect("the job");
+    if place.has(job) {
+        job.last(place.path(), "vkQueuePresentKHR", ash::vk::Result::ERROR_OUT_OF_DATE_KHR);
+    }
+}
+
 /// The variable that tells a process of the whole sweep which calls are its own: `REST PARTS`.
 const PART: &str = "FAULTS_PART";
 

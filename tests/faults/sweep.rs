@@ -146,6 +146,16 @@ impl Job {
         tally
     }
 
+    /// Lets the last call of that name fail with that error, which is passed over.
+    pub fn last(&self, folder: &Path, name: &str, code: vk::Result) {
+        self.good(folder, "the first run");
+        let (expected, heard) = self.good(folder, "the second run");
+        let at = heard.calls.iter().rposition(|call| call.name == name).expect("such a call");
+        let call = heard.calls[at];
+        let error = call.errors.iter().position(|error| *error == code).expect("such an error");
+        self.one(folder, &format!("{}: the last {name} with {code:?}", self.name), Plan { at, error }, call, &expected);
+    }
+
     /// One run with a fault.
     fn one(&self, folder: &Path, what: &str, plan: Plan, planned: Call, expected: &[Option<Vec<u8>>]) {
         self.remove(folder, self.outputs);

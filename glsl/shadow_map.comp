@@ -1,6 +1,6 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
-// Adds the light of one ball to every vertex, shadowed through a map of the occluders that is drawn from the ball's centre: by a
+// Adds the light of one ball to every given point, shadowed through a map of the occluders that is drawn from the ball's centre: by a
 // single comparison (TAPS 0), or by percentage-closer soft shadows, Fernando, "Percentage-Closer Soft Shadows" (SIGGRAPH 2005).
 
 layout(local_size_x = 64) in;

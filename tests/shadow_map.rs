@@ -29,14 +29,16 @@ fn light(at: [f64; 3], scale: f64) -> String {
 /// Radiosity of all vertices by maps and by rays.
 fn both(stage: &Stage, scene: &Scene, filter: Filter, map_px: u32) -> [Vec<[f64; 3]>; 2] {
     let placements = scene.at(0.0);
-    let maps = ShadowMaps::new((&stage.gpu.device, &stage.gpu.library), scene, &placements, filter, map_px).unwrap();
+    let shapes = RayMeshes::new(scene);
+    let world = World::new(scene, &shapes, &placements);
+    let points: Vec<_> = receiver_vertices(scene).into_iter().map(|vertex| (vertex, world.view(vertex))).collect();
+    let gpu = (&stage.gpu.device, &stage.gpu.library);
+    let maps = ShadowMaps::new(gpu, scene, &placements, &points, (filter, map_px)).unwrap();
     // Twice: nothing of a run is left to the next.
     maps.run(scene, &placements).unwrap();
     maps.run(scene, &placements).unwrap();
-    let shapes = RayMeshes::new(scene);
-    let world = World::new(scene, &shapes, &placements);
     let cast = RayCast { rays: 512, runs: 1, ..Default::default() };
-    let rays = cast.run(&world, &receiver_vertices(scene)).iter().map(|e| e.radiosity).collect();
+    let rays = cast.run_at(&world, &points).iter().map(|e| e.radiosity).collect();
     [maps.radiosity().unwrap(), rays]
 }
 

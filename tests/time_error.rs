@@ -117,7 +117,7 @@ fn a_scene_of_ones_own() {
     std::fs::write(folder.path().join("my ring.toml"), own_scene(LIGHT)).unwrap();
     let asked = ["bench", "time-error", "my ring.toml", "--quick", "--axis", "lookup", "--out", "out", "--json"];
     let outcome: Value = serde_json::from_str(&good(folder.path(), &asked).stdout).unwrap();
-    for (part, count) in [("budgets", 1), ("pictures", 1), ("comparisons", 2)] {
+    for (part, count) in [("budgets", 1), ("pictures", 1), ("comparisons", 5)] {
         assert_eq!(outcome[part].as_array().unwrap().len(), count, "{part}");
         assert_eq!(outcome[part][0]["case"], "my ring");
     }
@@ -127,9 +127,25 @@ fn a_scene_of_ones_own() {
     assert!(total > 0.01 && total < 0.3, "four bands below a small light: {total}");
     // Sharp lights beside lights in SH, against the same rivals.
     let comparisons = outcome["comparisons"].as_array().unwrap();
-    assert_eq!([&comparisons[0]["lights"], &comparisons[1]["lights"]], ["sharp", "sh"]);
+    let ways: Vec<[&str; 3]> = comparisons
+        .iter()
+        .map(|c| ["place", "lights", "shading"].map(|key| c[key].as_str().expect("a name")))
+        .collect();
+    let [at_vertices, at_pixels] = ["vertices", "pixels"];
+    let by_vertex = [[at_vertices, "sharp", "vertex"], [at_vertices, "sh", "vertex"]];
+    let by_pixel = [[at_pixels, "sharp", "pixel"], [at_pixels, "sharp", "vertex"], [at_pixels, "sh", "vertex"]];
+    assert_eq!(ways, [&by_vertex[..], &by_pixel].concat());
     assert_eq!(comparisons[0]["rival"], comparisons[1]["rival"]);
     let [sharp, sh] = [0, 1].map(|i| rms(&comparisons[i]["merge_error"]));
+    // At pixels the coarse floor's vertices carry no edge; the same rivals stand beside all three, and more rays err less.
+    let [pixel, vertex, pixel_sh] = [2, 3, 4].map(|i| rms(&comparisons[i]["merge_error"]));
+    assert!(pixel < 0.6 * vertex && vertex < pixel_sh, "{pixel}, {vertex}, {pixel_sh}");
+    assert_eq!(comparisons[2]["rival"], comparisons[4]["rival"]);
+    let cast: Vec<f64> = comparisons[2]["rival"].as_array().unwrap().iter().map(|p| rms(&p["error"])).collect();
+    assert!(cast.windows(2).all(|pair| pair[1] < pair[0]) && cast[4] < 0.05, "{cast:?}");
+    assert_eq!(comparisons[2]["maps"].as_array().unwrap().len(), 4);
+    let shown = rms(&outcome["pictures"][0]["pixels"]);
+    assert!((pixel / shown - 1.0).abs() < 0.3, "a sample of pixels, {pixel}, errs as all do, {shown}");
     assert!(sharp < 0.5 * sh && (sh / total - 1.0).abs() < 1e-6, "{sharp} and {sh} of {total}");
     assert!((rms(&outcome["budgets"][0]["sharp_total"]) / sharp - 1.0).abs() < 1e-6);
     // Shadow maps: a hard edge errs more than a soft one, and each has its time.
@@ -145,7 +161,7 @@ fn a_scene_of_ones_own() {
     let pixels = &outcome["pictures"][0]["pixels"];
     assert!(pixels["lit_count"].as_u64().unwrap() > 10_000, "{pixels}");
     assert!(rms(pixels) < 0.15 && pixels["mean_flip_ratio"].as_f64().unwrap() < 0.1, "{pixels}");
-    for name in ["pixels-my-ring.png", "beside-my-ring.png", "error-my-ring.png", "time-error-1.svg"] {
+    for name in ["pixels-my-ring.png", "beside-my-ring.png", "error-my-ring.png", "time-error-my-ring.svg"] {
         assert!(written.iter().any(|found| found == name), "{name} among {written:?}");
     }
     let picture =

@@ -2,6 +2,7 @@
 //! vertex.
 
 use super::cases::Case;
+use super::judged::PIXEL_SIZE;
 use super::{Bench, default_options};
 use crate::asset::false_color::Scheme;
 use crate::asset::picture;
@@ -21,8 +22,6 @@ use std::path::Path;
 const RAYS: [usize; 2] = [8_000_000, 32_000_000];
 /// Size of the pictures in pixels, error pictures without their scale bars.
 const SIZE: [u32; 2] = [720, 480];
-/// Size of the pictures that are compared with ray-cast pixels: each of them costs what a vertex does.
-const PIXEL_SIZE: [u32; 2] = [360, 240];
 
 /// The pictures of a case and what they show.
 #[derive(Clone, Debug, Serialize)]
@@ -132,8 +131,13 @@ fn beside(case: &Case, size: [u32; 2], [left, right]: [&[f32]; 2], path: &Path) 
     Ok((path.display().to_string(), mean_flip(width as usize, &exposed(left), &exposed(right))))
 }
 
-/// `KIND-CASE.png` in a folder, with dashes for what a file's name should not have.
+/// `KIND-CASE.png` in a folder.
 fn named(folder: &Path, kind: &str, case: &Case) -> std::path::PathBuf {
-    let words: Vec<&str> = case.name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty()).collect();
-    folder.join(format!("{kind}-{}.png", words.join("-")))
+    folder.join(format!("{kind}-{}.png", dashed(&case.name)))
+}
+
+/// The name of a case, with dashes for what a file's name should not have.
+pub fn dashed(name: &str) -> String {
+    let words: Vec<&str> = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty()).collect();
+    words.join("-")
 }

@@ -1,31 +1,34 @@
-//! Comparison with the alternatives to shadow fields: soft shadows per vertex by ray casting on all CPU threads, and, where all
-//! lights are balls, by shadow maps on the same device ([`super::shadow_map`]).
+//! Comparison with the alternatives to shadow fields, at vertices and at pixels: soft shadows by ray casting on all CPU threads, and,
+//! where all lights are balls, by shadow maps on the same device ([`super::shadow_map`]).
 //!
 //! The rival is [`RayCast`] in one run. It uses an 8-wide hierarchy per mesh behind a bounding sphere test, scrambled Sobol points,
-//! cosine sampling of the sky and cone sampling of local lights, and leaves out occluders that cannot lie between vertex and light.
+//! cosine sampling of the sky and cone sampling of local lights, and leaves out occluders that cannot lie between point and light.
 //! Rays stop at the light's surface; where along a ray that is, is asked only where an occluder lies beside the light.
-//! Its hierarchies are built beforehand, as fields are baked beforehand.
+//! Its hierarchies are built beforehand, as fields are baked beforehand. At pixels a frame of ours draws its picture, and the rivals
+//! are given what each pixel shows and light that; the time of a plain drawing is added to theirs.
 
 use super::budget::{Truth, device_radiosity};
 use super::cases::Case;
 use super::figures::{Difference, Radiosity, Spread, along, crossing, spread};
+use super::judged::{Judged, PIXEL_SIZE, Place};
 use super::shadow_map::{Filter, ShadowMaps, maps_apply};
 use super::sweep;
 use super::{Bench, default_options, has_sharp_lights};
+use crate::draw::Shading;
 use crate::error::Result;
 use crate::frame::{self, Frame};
 use crate::scene::{Lights, Placement};
-use crate::truth::{RayCast, RayMeshes, World, receiver_vertices};
+use crate::truth::{RayCast, RayMeshes, Vertex, World};
 use serde::Serialize;
 use std::time::Instant;
 
 /// Ray casting with one number of rays.
 #[derive(Clone, Debug, Serialize)]
 pub struct RivalPoint {
-    /// Rays per vertex for the sky and for each light.
+    /// Rays per point for the sky and for each light.
     #[serde(rename = "ray_count")]
     pub rays: u32,
-    /// Wall time for all lit vertices, scaled from the compared ones, milliseconds.
+    /// Wall time for all points, scaled from the compared ones, milliseconds.
     pub wall_ms: Spread,
     /// Difference to T0.
     pub error: Difference,
@@ -38,7 +41,7 @@ pub struct MapPoint {
     pub filter: Filter,
     /// Texels across a view.
     pub map_px: u32,
-    /// Wall time of drawing the maps and lighting all vertices, milliseconds.
+    /// Wall time of drawing the maps and lighting all points, milliseconds.
     pub wall_ms: Spread,
     /// Difference to T0.
     pub error: Difference,
@@ -58,15 +61,19 @@ pub struct Comparison {
     pub case: String,
     /// What lights it, in words.
     pub light: String,
-    /// Lit vertices.
-    #[serde(rename = "vertex_count")]
-    pub vertices: usize,
+    /// What is lit.
+    pub place: Place,
+    /// Points that are lit.
+    #[serde(rename = "point_count")]
+    pub points: usize,
     /// Threads of the ray caster.
     #[serde(rename = "thread_count")]
     pub threads: usize,
     /// How the merge takes the lights; none where no light can be sharp.
     pub lights: Option<Lights>,
-    /// Wall time of a frame of the merge without drawing, milliseconds.
+    /// Where sharp lights are evaluated.
+    pub shading: Shading,
+    /// Wall time of a frame, everything merged anew, milliseconds; at vertices without drawing.
     pub frame_wall_ms: Spread,
     /// Device time of the merge and of sharp lights in it, milliseconds.
     pub merge_ms: Spread,
@@ -93,17 +100,42 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Name of the case with its light, unless the name contains it, and with how lights are taken.
+    /// Name of the case with its light, unless the name contains it, and with where it is lit and how lights are taken.
     pub fn title(&self) -> String {
         let light = if self.case.contains(", (") { String::new() } else { format!(" ({})", self.light) };
-        let lights = if self.lights == Some(Lights::Sh) { ", lights in SH" } else { "" };
-        format!("{}{light}{lights}", self.case)
+        let place = if self.place == Place::Pixels { ", at pixels" } else { "" };
+        format!("{}{light}{place}{}", self.case, self.way().map_or(String::new(), |way| format!(", {way}")))
+    }
+
+    /// How lights are taken, where that is not the usual way of the place.
+    fn way(&self) -> Option<&'static str> {
+        match (self.lights, self.place, self.shading) {
+            (Some(Lights::Sh), ..) => Some("lights in SH"),
+            (Some(Lights::Sharp), Place::Pixels, Shading::Vertex) => Some("sharp lights by vertex"),
+            _ => None,
+        }
+    }
+
+    /// Name of the merge in tables and plots.
+    pub fn merge_title(&self) -> &'static str {
+        self.way().unwrap_or(match (self.lights, self.place) {
+            (Some(_), Place::Pixels) => "sharp lights by pixel",
+            (Some(_), Place::Vertices) => "sharp lights",
+            (None, _) => "merge",
+        })
+    }
+
+    /// Whether its rivals are those of a comparison that stands before it.
+    pub fn repeats_rivals(&self) -> bool {
+        self.way().is_some()
     }
 }
 
 /// The merge with one way to take the lights, and its times in milliseconds, round by round.
 struct Merged {
+    place: Place,
     lights: Option<Lights>,
+    shading: Shading,
     frame: Frame,
     walls: Vec<f64>,
     merges: Vec<f64>,
@@ -111,24 +143,33 @@ struct Merged {
 
 impl Merged {
     /// With sharp lights and without, where a light can be sharp.
-    fn all(bench: &Bench<'_>, case: &Case) -> Result<Vec<Self>> {
-        let both: &[Option<Lights>] = &[Some(Lights::Sharp), Some(Lights::Sh)];
-        let ways = if has_sharp_lights(&case.scene) { both } else { &[None] };
-        let merged = |lights: &Option<Lights>| {
-            let options = frame::Options { lights: lights.unwrap_or_default(), ..default_options() };
+    fn all(bench: &Bench<'_>, case: &Case, place: Place) -> Result<Vec<Self>> {
+        let (sharp, sh) = (Some(Lights::Sharp), Some(Lights::Sh));
+        let ways: &[(Option<Lights>, Shading)] = match (has_sharp_lights(&case.scene), place) {
+            (false, _) => &[(None, Shading::Vertex)],
+            (true, Place::Vertices) => &[(sharp, Shading::Vertex), (sh, Shading::Vertex)],
+            (true, Place::Pixels) => &[(sharp, Shading::Pixel), (sharp, Shading::Vertex), (sh, Shading::Vertex)],
+        };
+        let merged = |(lights, shading): &(Option<Lights>, Shading)| {
+            let usual = default_options();
+            let size = if place == Place::Pixels { PIXEL_SIZE } else { usual.size };
+            let lights_of_frame = lights.unwrap_or_default();
+            let options = frame::Options { lights: lights_of_frame, shading: Some(*shading), size, ..usual };
             let frame = bench.frame(&case.scene, options)?;
-            Ok(Merged { lights: *lights, frame, walls: Vec::new(), merges: Vec::new() })
+            let (walls, merges) = (Vec::new(), Vec::new());
+            Ok(Merged { place, lights: *lights, shading: *shading, frame, walls, merges })
         };
         ways.iter().map(merged).collect()
     }
 
     fn round(&mut self, placements: &[Placement]) -> Result<()> {
+        let white = (self.place == Place::Pixels).then_some(f32::INFINITY);
         // The first frame after ray casting warms up threads and caches.
         for warm in [false, true, true, true] {
             // Everything is merged, as if all entities had moved.
             self.frame.forget();
             let started = Instant::now();
-            let timings = self.frame.render(placements, None)?;
+            let timings = self.frame.render(placements, white)?;
             if warm {
                 self.walls.push(started.elapsed().as_secs_f64() * 1e3);
                 self.merges.push(sweep::merge_ms(&timings));
@@ -137,8 +178,25 @@ impl Merged {
         Ok(())
     }
 
-    fn comparison(&self, case: &Case, truth: &Truth, rival: &[RivalPoint], maps: &[MapPoint]) -> Result<Comparison> {
-        let merge_error = truth.error(&device_radiosity(&self.frame, &truth.vertices)?);
+    /// Wall time of drawing what is lit already, milliseconds.
+    fn redraw_ms(&mut self, placements: &[Placement]) -> Result<f64> {
+        let started = Instant::now();
+        self.frame.redraw(placements, f32::INFINITY)?;
+        Ok(started.elapsed().as_secs_f64() * 1e3)
+    }
+
+    /// Radiosity of the compared points.
+    fn found(&self, judged: &Judged) -> Result<Vec<Radiosity>> {
+        if judged.place == Place::Vertices {
+            return device_radiosity(&self.frame, &judged.keys().collect::<Vec<_>>());
+        }
+        let picture = self.frame.picture();
+        let pixel = |key: Vertex| std::array::from_fn(|c| f64::from(picture[3 * key.index + c]));
+        Ok(judged.keys().map(pixel).collect())
+    }
+
+    fn comparison(&self, case: &Case, judged: &Judged, rival: &[RivalPoint], maps: &[MapPoint]) -> Result<Comparison> {
+        let merge_error = judged.error(&self.found(judged)?);
         let as_good = maps.iter().filter(|p| p.error.rms <= merge_error.rms).map(|p| p.wall_ms.median);
         let errors: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.error.rms)).collect();
         let times: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.wall_ms.median)).collect();
@@ -148,9 +206,11 @@ impl Merged {
         Ok(Comparison {
             case: case.name.clone(),
             light: case.light.clone(),
-            vertices: self.frame.receiver_vertex_count(),
+            place: judged.place,
+            points: judged.points.len(),
             threads: rayon::current_num_threads(),
             lights: self.lights,
+            shading: self.shading,
             merge_error,
             map_ms_at_equal_rms: as_good.min_by(f64::total_cmp),
             maps: maps.to_vec(),
@@ -165,22 +225,34 @@ impl Merged {
     }
 }
 
-/// Measures merge, shadow maps and ray casting in turns: a comparison with sharp lights and one with lights in SH, or one where no
-/// light can be sharp.
+/// Measures merge, shadow maps and ray casting in turns, at vertices and at pixels: where a light can be sharp, with sharp lights and
+/// with lights in SH, at pixels also with sharp lights by vertex.
 ///
 /// # Errors
 /// As [`Frame::new`] and [`Frame::render`].
 pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Vec<Comparison>> {
+    let mut comparisons = Vec::new();
+    for judged in std::iter::once(Judged::vertices(case, truth)).chain(Judged::pixels(bench, case)) {
+        comparisons.extend(compare_at(bench, case, &judged)?);
+    }
+    Ok(comparisons)
+}
+
+fn compare_at(bench: &Bench<'_>, case: &Case, judged: &Judged) -> Result<Vec<Comparison>> {
     let placements = case.scene.at(case.time_s);
-    let mut merged = Merged::all(bench, case)?;
+    let mut merged = Merged::all(bench, case, judged.place)?;
     let shapes = RayMeshes::new(&case.scene);
     let rays: &[u32] = if bench.quick { &[1, 4, 16, 64, 256] } else { &[1, 4, 16, 64, 256, 1024, 4096] };
-    let share = merged[0].frame.receiver_vertex_count() as f64 / truth.vertices.len() as f64;
-    let mut maps = Maps::new(bench, case, truth);
+    let share = judged.points.len() as f64 / judged.chosen.len() as f64;
+    let mut maps = Maps::new(bench, case, judged);
     let mut rival_walls = vec![Vec::new(); rays.len()];
     let mut found: Vec<Vec<Radiosity>> = vec![Vec::new(); rays.len()];
+    let mut redrawn = Vec::new();
     for round in 0..if bench.quick { 3 } else { 7 } {
         merged.iter_mut().try_for_each(|merged| merged.round(&placements))?;
+        if let (Some(last), Place::Pixels) = (merged.last_mut(), judged.place) {
+            redrawn.push(last.redraw_ms(&placements)?);
+        }
         maps.round(&placements)?;
         for (index, &rays) in rays.iter().enumerate() {
             // Long runs need fewer repetitions.
@@ -190,52 +262,51 @@ pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Vec<Comp
             let cast = RayCast { rays, runs: 1, seed: bench.seed + 77, distant: case.distant, ..Default::default() };
             let started = Instant::now();
             let world = World::new(&case.scene, &shapes, &placements);
-            let lit = cast.run(&world, &truth.vertices);
+            found[index] = judged.cast(&world, &cast);
             rival_walls[index].push(started.elapsed().as_secs_f64() * 1e3 * share);
-            found[index] = lit.iter().map(|e| e.radiosity).collect();
         }
     }
-    let rival: Vec<RivalPoint> = rays
-        .iter()
-        .enumerate()
-        .map(|(i, &rays)| RivalPoint { rays, wall_ms: spread(&rival_walls[i]), error: truth.error(&found[i]) })
+    let redraw_ms = spread(&redrawn).median;
+    let with_drawing = |walls: &[f64]| spread(&walls.iter().map(|ms| ms + redraw_ms).collect::<Vec<_>>());
+    let rival = rays.iter().zip(rival_walls).zip(&found);
+    let rival: Vec<RivalPoint> = rival
+        .map(|((&rays, walls), found)| RivalPoint { rays, wall_ms: with_drawing(&walls), error: judged.error(found) })
         .collect();
-    let maps = maps.points();
-    (bench.progress)(&format!("{}: merge against ray casting measured", case.name));
-    merged.iter().map(|merged| merged.comparison(case, truth, &rival, &maps)).collect()
+    let maps = maps.points(with_drawing);
+    let place = if judged.place == Place::Pixels { "pixels" } else { "vertices" };
+    (bench.progress)(&format!("{}: merge against its rivals measured at {place}", case.name));
+    merged.iter().map(|merged| merged.comparison(case, judged, &rival, &maps)).collect()
 }
 
 /// Texels across a view that are measured; a quick run takes every other.
 const MAP_PX: [u32; 4] = [256, 512, 1024, 2048];
-/// Rays of the sky's part, which both the truth and the maps have.
-const SKY_RAYS: u32 = 1024;
 
 /// Shadow maps of all sizes, measured round by round.
 struct Maps<'c> {
     bench: &'c Bench<'c>,
     case: &'c Case,
-    truth: &'c Truth,
-    /// What the sky gives to the compared vertices.
+    judged: &'c Judged,
+    /// What the sky gives to the compared points.
     sky: Vec<Radiosity>,
     /// Filter, size, wall times, and what was found last.
     measured: Vec<(Filter, u32, Vec<f64>, Vec<Radiosity>)>,
 }
 
 impl<'c> Maps<'c> {
-    fn new(bench: &'c Bench<'c>, case: &'c Case, truth: &'c Truth) -> Self {
+    fn new(bench: &'c Bench<'c>, case: &'c Case, judged: &'c Judged) -> Self {
         let sizes = || MAP_PX.into_iter().skip(usize::from(bench.quick)).step_by(1 + usize::from(bench.quick));
         let all = [Filter::Hard, Filter::Pcss].into_iter().flat_map(|filter| sizes().map(move |px| (filter, px)));
         let all = all.filter(|_| maps_apply(&case.scene));
         let measured: Vec<_> = all.map(|(filter, px)| (filter, px, Vec::new(), Vec::new())).collect();
-        let sky = if measured.is_empty() { Vec::new() } else { sky(bench, case, truth) };
-        Maps { bench, case, truth, sky, measured }
+        let sky = if measured.is_empty() { Vec::new() } else { judged.sky(bench, case) };
+        Maps { bench, case, judged, sky, measured }
     }
 
     /// Draws and lights three times with each; the first time warms up.
     fn round(&mut self, placements: &[Placement]) -> Result<()> {
         let gpu = (self.bench.baker.device(), self.bench.baker.library());
         for (filter, px, walls, found) in &mut self.measured {
-            let maps = ShadowMaps::new(gpu, &self.case.scene, placements, *filter, *px)?;
+            let maps = ShadowMaps::new(gpu, &self.case.scene, placements, &self.judged.points, (*filter, *px))?;
             for warm in [false, true, true] {
                 let started = Instant::now();
                 maps.run(&self.case.scene, placements)?;
@@ -243,32 +314,20 @@ impl<'c> Maps<'c> {
                     walls.push(started.elapsed().as_secs_f64() * 1e3);
                 }
             }
-            let (all, lamps) = (receiver_vertices(&self.case.scene), maps.radiosity()?);
-            let of = |(vertex, sky): (_, &Radiosity)| {
-                let lamps = lamps[all.binary_search(vertex).expect("it is lit")];
-                std::array::from_fn(|c| sky[c] + lamps[c])
-            };
-            *found = self.truth.vertices.iter().zip(&self.sky).map(of).collect();
+            let lamps = maps.radiosity()?;
+            let of = |(&i, sky): (&usize, &Radiosity)| std::array::from_fn(|c| sky[c] + lamps[i][c]);
+            *found = self.judged.chosen.iter().zip(&self.sky).map(of).collect();
         }
         Ok(())
     }
 
-    fn points(self) -> Vec<MapPoint> {
+    fn points(self, with_drawing: impl Fn(&[f64]) -> Spread) -> Vec<MapPoint> {
         let point = |(filter, map_px, walls, found): &(Filter, u32, Vec<f64>, Vec<Radiosity>)| MapPoint {
             filter: *filter,
             map_px: *map_px,
-            wall_ms: spread(walls),
-            error: self.truth.error(found),
+            wall_ms: with_drawing(walls),
+            error: self.judged.error(found),
         };
         self.measured.iter().map(point).collect()
     }
-}
-
-/// What the sky alone gives to the compared vertices.
-fn sky(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Vec<Radiosity> {
-    let shapes = RayMeshes::new(&case.scene);
-    let mut world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
-    world.lights.clear();
-    let cast = RayCast { rays: SKY_RAYS, runs: 1, seed: bench.seed, distant: case.distant, ..Default::default() };
-    cast.run(&world, &truth.vertices).iter().map(|e| e.radiosity).collect()
 }

@@ -1,7 +1,7 @@
 //! A rival that games use: shadow maps, hard and percentage-closer soft (PCSS), for lights that are balls.
 //!
 //! For every light the occluders are drawn from its centre, into one view that just holds them all, or into the six faces of a cube
-//! where they surround it. A compute pass then adds the light to every lit vertex of the scene: its irradiance without occluders
+//! where they surround it. A compute pass then adds the light to every given point, a vertex or what a pixel shows: its irradiance without occluders
 //! in closed form, times one comparison with the map, or times the share of 32 taps that 16 taps for blockers have spread. Texels
 //! are compared at their own centres with the receiver's plane, so that hardly any bias is needed. The sky is not its business.
 
@@ -13,7 +13,8 @@ use crate::gpu::{
 };
 use crate::scene::{Placement, Scene};
 use crate::shaders::{Library, ShaderPermutation};
-use crate::truth::receiver_vertices;
+use crate::truth::Vertex;
+use crate::truth::world::VertexView;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec3, DVec4, Vec4};
@@ -34,7 +35,7 @@ const NEAR: f64 = 0.5;
 /// Ratio of the distance of all occluders to the radius of the ball around them from which on one view holds them.
 const OUTSIDE: f64 = 1.15;
 
-/// Distance off its surface from which a vertex of a bent mesh is compared, in bounding radii: facets bulge out of the plane through a
+/// Distance off its surface from which a point of a bent mesh is compared, in bounding radii: facets bulge out of the plane through a
 /// corner.
 const OFFSET: f32 = 4e-3;
 
@@ -111,7 +112,8 @@ impl ShadowMaps {
         [ShaderPermutation::new("shadow_map.vert", 4), ShaderPermutation::new("shadow_map.frag", 4), shade]
     }
 
-    /// Maps of `map_px` texels across a view for a scene to which [`maps_apply`], its entities at `placements`.
+    /// Maps of `map_px` texels across a view for a scene to which [`maps_apply`], its entities at `placements`, and the points to light:
+    /// an entity, and the view from a place on its surface.
     ///
     /// # Errors
     /// `Input` when the device's images are too small, `Device` when memory ran out.
@@ -119,8 +121,8 @@ impl ShadowMaps {
         (device, library): (&Arc<Device>, &Library),
         scene: &Scene,
         placements: &[Placement],
-        filter: Filter,
-        map_px: u32,
+        points: &[(Vertex, VertexView)],
+        (filter, map_px): (Filter, u32),
     ) -> Result<Self> {
         let [vertex, fragment, shade] = Self::permutations(filter, map_px);
         let surrounded = lights(scene, placements).iter().any(|light| light.views.len() > 1);
@@ -139,7 +141,7 @@ impl ShadowMaps {
             let positions = Buffer::with_data(device, "shadow map positions", &positions)?;
             Ok([positions, Buffer::with_data(device, "shadow map indices", &mesh.triangles)?])
         };
-        let vertices = vertices(scene, placements);
+        let vertices = receivers(scene, placements, points);
         let vertex_count = vertices.len() as u32 / 3;
         Ok(ShadowMaps {
             device: device.clone(),
@@ -161,7 +163,7 @@ impl ShadowMaps {
         })
     }
 
-    /// Draws all maps and lights all vertices, and waits.
+    /// Draws all maps and lights all points, and waits.
     ///
     /// # Errors
     /// `Device` when the device was lost.
@@ -219,7 +221,7 @@ impl ShadowMaps {
         Ok(())
     }
 
-    /// Light of the lights on every vertex of [`receiver_vertices`] after a run: linear RGB radiance.
+    /// Light of the lights on every point after a run: linear RGB radiance.
     ///
     /// # Errors
     /// `Device` when memory ran out.
@@ -229,19 +231,17 @@ impl ShadowMaps {
     }
 }
 
-/// Position and entity, normal and offset, and albedo of every lit vertex.
-fn vertices(scene: &Scene, placements: &[Placement]) -> Vec<[f32; 4]> {
-    let lit = receiver_vertices(scene).into_iter();
-    lit.flat_map(|v| {
-        let (entity, place) = (&scene.entities[v.entity], &placements[v.entity]);
+/// Position and entity, normal and offset, and albedo of every point.
+fn receivers(scene: &Scene, placements: &[Placement], points: &[(Vertex, VertexView)]) -> Vec<[f32; 4]> {
+    let of = |(key, view): &(Vertex, VertexView)| {
+        let (entity, place) = (&scene.entities[key.entity], &placements[key.entity]);
         let mesh = &scene.meshes[entity.mesh];
-        let position = place.position + place.rotation * (mesh.positions[v.index] * place.scale);
-        let normal = (place.rotation * mesh.normals[v.index]).normalize();
         let offset_m = if mesh.is_flat() { 0.0 } else { OFFSET * mesh.bounding_sphere().1 * place.scale };
-        let numbers = [(position, v.entity as f32), (normal, offset_m), (entity.albedo, 0.0)];
+        let [position, normal] = [view.position, view.normal].map(DVec3::as_vec3);
+        let numbers = [(position, key.entity as f32), (normal, offset_m), (entity.albedo, 0.0)];
         numbers.map(|(vector, last)| vector.extend(last).to_array())
-    })
-    .collect()
+    };
+    points.iter().flat_map(of).collect()
 }
 
 fn ball(scene: &Scene, placements: &[Placement], entity: usize) -> Ball {

@@ -2,16 +2,14 @@
 
 use super::budget::{Budget, Effort, Truth, budget};
 use super::cases::{self, Case};
-use super::pictures::{CasePicture, pictures};
-use super::plot::{AxisScale, Curve, Dot, Gap, Panel, Plot, PlotColumn, RowGroup, Rows};
+use super::pictures::{CasePicture, dashed, pictures};
 use super::rival::{Comparison, compare};
-use super::shadow_map::Filter;
+use super::rival_plot::{case_plot, rival_plot};
 use super::small_lights::SmallLight;
-use super::sweep::{Point, Variation, pareto, sweep, variations};
+use super::sweep::{Point, Variation, sweep, variations};
 use super::{Bench, default_options, verdict};
 use crate::error::{Error, Result};
-use crate::scene::Lights;
-use crate::text::{csv, three, write};
+use crate::text::{csv, write};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -38,7 +36,7 @@ pub struct TimeErrorOutcome {
     pub pictures: Vec<CasePicture>,
     /// One row per case and variation.
     pub points: Vec<Point>,
-    /// One row per case, and a second with lights in SH where lights can be sharp.
+    /// Rows of each case: at vertices and at pixels, and by every way to take the lights.
     pub comparisons: Vec<Comparison>,
     /// Wall time of the parts of the run, in seconds over all cases.
     pub seconds: BTreeMap<&'static str, f64>,
@@ -52,8 +50,8 @@ impl TimeErrorOutcome {
     }
 }
 
-/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, `time-error.txt`, two pictures per
-/// case, a plot per swept case, and a plot of the comparison with ray casting. `own` is the case of the selected scene file.
+/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, `time-error.txt`, three pictures and
+/// a plot per case, and a plot of the comparison with ray casting. `own` is the case of the selected scene file.
 ///
 /// # Errors
 /// `Usage` when a case or axis does not exist, `Failed` when the folder cannot be written, `Input` when no light reaches any of the
@@ -164,9 +162,8 @@ fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &
     let rivals: Vec<Value> = outcome.comparisons.iter().flat_map(rival_rows).collect();
     write(&folder.join("rival.csv"), &csv(&origin, &rivals))?;
     write(&folder.join("time-error.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
-    for (index, case) in verdict::swept(&outcome.points).iter().enumerate() {
-        let svg = plot(case, outcome).svg();
-        write(&folder.join(format!("time-error-{}.svg", index + 1)), &svg)?;
+    for Budget { case, .. } in &outcome.budgets {
+        write(&folder.join(format!("time-error-{}.svg", dashed(case))), &case_plot(case, outcome).svg())?;
     }
     write(&folder.join("rival.svg"), &rival_plot(&outcome.comparisons).svg())?;
     let page = [
@@ -183,96 +180,15 @@ fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &
 fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     let row = |what: String, wall_ms: f64, error| {
         json!({
-            "case": comparison.case, "light": comparison.light, "what": what, "vertex_count": comparison.vertices, "thread_count": comparison.threads,
-            "wall_ms": wall_ms, "error": error,
+            "case": comparison.case, "light": comparison.light, "place": comparison.place, "what": what,
+            "point_count": comparison.points, "thread_count": comparison.threads, "wall_ms": wall_ms, "error": error,
             "speed_up_at_equal_rms_ratio": comparison.speed_up_at_equal_rms,
             "merge_speed_up_at_equal_rms_ratio": comparison.merge_speed_up_at_equal_rms, "rays_at_equal_rms_count": comparison.rays_at_equal_rms,
         })
     };
-    let lights = comparison.lights.map_or(String::new(), |lights| format!(", lights {lights:?}").to_lowercase());
-    let merge = row(format!("merge{lights}"), comparison.frame_wall_ms.median, comparison.merge_error);
+    let merge = row(comparison.merge_title().into(), comparison.frame_wall_ms.median, comparison.merge_error);
     let cast = comparison.rival.iter().map(|p| row(format!("{} rays", p.rays), p.wall_ms.median, p.error));
     let maps = comparison.maps.iter().map(|p| row(p.title(), p.wall_ms.median, p.error));
-    // A second comparison of a case is with the same rivals.
-    let rivals = cast.chain(maps).filter(|_| comparison.lights != Some(Lights::Sh));
+    let rivals = cast.chain(maps).filter(|_| !comparison.repeats_rivals());
     std::iter::once(merge).chain(rivals).collect()
-}
-
-/// Plot of the settings of a case with their Pareto front, and of that front beside ray casting.
-fn plot(case: &str, outcome: &TimeErrorOutcome) -> Plot {
-    let points: Vec<&Point> = outcome.points.iter().filter(|p| p.case == case).collect();
-    let places: Vec<(f64, f64)> = points.iter().map(|p| (p.merge_ms.median, p.total.rms)).collect();
-    let dot = |p: &&Point| Dot {
-        label: if p.axis == "default" { format!("default: {}", p.name) } else { format!("{}: {}", p.axis, p.name) },
-        group: p.axis.into(),
-        x: p.merge_ms.median,
-        y: p.total.rms,
-        x_range: Some((p.merge_ms.lower, p.merge_ms.upper)),
-    };
-    let own = Panel {
-        title: "Every setting of the merge".into(),
-        x_label: "merge on the device, milliseconds (median, quartiles)".into(),
-        y_label: "RMS error of radiosity against ray casting, relative".into(),
-        dots: points.iter().map(dot).collect(),
-        front: pareto(&places),
-        ..Panel::default()
-    };
-    let rival = outcome.comparisons.iter().find(|c| c.case == case);
-    let beside = Panel {
-        title: "Beside its rivals".into(),
-        x_label: "milliseconds (median); numbers: rays a vertex and light, texels across a map".into(),
-        dots: own.dots.iter().cloned().map(|dot| Dot { x_range: None, ..dot }).collect(),
-        numbered: false,
-        curves: rival.map(rival_curves).unwrap_or_default(),
-        gap: rival.and_then(|c| {
-            let lead = c.speed_up_at_equal_rms?;
-            let (from, to, y) = (c.frame_wall_ms.median, c.rival_ms_at_equal_rms?, c.merge_error.rms);
-            let label = if lead >= 1.0 { "faster" } else { "slower" };
-            let label = format!("a frame: {} times {label}", three(lead.max(1.0 / lead)));
-            Some(Gap { from, to, y, label })
-        }),
-        ..own.clone()
-    };
-    Plot { title: format!("{case}: time against error"), panels: vec![own, beside] }
-}
-
-/// Ray casting, and shadow maps of either filter where there are any.
-fn rival_curves(c: &Comparison) -> Vec<Curve> {
-    let rays = Curve {
-        label: format!("ray casting, {} threads", c.threads),
-        points: c.rival.iter().map(|p| (p.wall_ms.median, p.error.rms)).collect(),
-        notes: c.rival.iter().map(|p| p.rays.to_string()).collect(),
-    };
-    let maps = |(filter, label): (Filter, &str)| {
-        let of = || c.maps.iter().filter(move |p| p.filter == filter);
-        Curve {
-            label: label.into(),
-            points: of().map(|p| (p.wall_ms.median, p.error.rms)).collect(),
-            notes: of().map(|p| p.map_px.to_string()).collect(),
-        }
-    };
-    let maps = [(Filter::Hard, "shadow maps, hard"), (Filter::Pcss, "shadow maps, PCSS")].map(maps);
-    std::iter::once(rays).chain(maps.into_iter().filter(|curve| !curve.points.is_empty())).collect()
-}
-
-/// Plot of every case's times at equal error.
-fn rival_plot(comparisons: &[Comparison]) -> Rows {
-    let column =
-        |x_label: &str, values: &dyn Fn(&Comparison) -> [Option<f64>; 2], limit: Option<(f64, String)>| PlotColumn {
-            x_label: x_label.into(),
-            scale: AxisScale::Log,
-            limit,
-            values: comparisons.iter().map(|c| values(c).to_vec()).collect(),
-        };
-    let times: &dyn Fn(&Comparison) -> [Option<f64>; 2] = &|c| [Some(c.frame_wall_ms.median), c.rival_ms_at_equal_rms];
-    let lead: &dyn Fn(&Comparison) -> [Option<f64>; 2] = &|c| [c.speed_up_at_equal_rms, None];
-    Rows {
-        title: "Merge and ray casting at equal error".into(),
-        series: vec!["merge (a frame without drawing)".into(), "ray casting on as many threads".into()],
-        groups: vec![RowGroup { heading: String::new(), rows: comparisons.iter().map(Comparison::title).collect() }],
-        columns: vec![
-            column("wall time, milliseconds (median)", times, None),
-            column("how many times faster the merge is", lead, Some((1.0, "equal".into()))),
-        ],
-    }
 }

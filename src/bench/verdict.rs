@@ -187,8 +187,8 @@ pub fn defaults(points: &[Point]) -> String {
 pub fn rivals(comparisons: &[Comparison]) -> String {
     let mut text = String::from(
         "How many times faster the merge is than ray casting on all threads at equal error, and shadow maps on the same device\n\
-         (a frame without drawing, everything merged, against the rays a vertex and light that err as little; sky and lights \
-         sampled\ndirectly, hierarchies built beforehand)\n",
+         (a frame, everything merged, against the rays a point and light that err as little; sky and lights sampled directly, \
+         hierarchies\nbuilt beforehand; at vertices without drawing, at pixels with it)\n",
     );
     let (mut losses, mut thin) = (Vec::new(), Vec::new());
     for c in comparisons {

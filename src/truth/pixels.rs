@@ -8,28 +8,28 @@ use crate::scene::{Placement, Scene};
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 
-/// Pixels that show a lit surface, and the linear RGB radiance that leaves it, without emission. `cast` decides the rays a pixel.
-/// Pixels are numbered row by row from the top left. What emits or is not lit is left out, as is the sky.
-pub fn pixels(
-    scene: &Scene,
-    placements: &[Placement],
-    [width, height]: [u32; 2],
-    cast: &RayCast,
-) -> Vec<(usize, Estimate)> {
-    let shapes = RayMeshes::new(scene);
-    let world = World::new(scene, &shapes, placements);
-    let camera = &scene.data.camera;
+/// What the middle of each pixel shows that is lit and does not emit: its entity with the pixel's number, row by row from the top left,
+/// and the view from there.
+pub fn lit_points(world: &World<'_>, [width, height]: [u32; 2]) -> Vec<(Vertex, VertexView)> {
+    let camera = &world.scene.data.camera;
     let eye = camera.eye.as_dvec3();
     let to_world = clip_from_world(camera, f64::from(width) / f64::from(height)).inverse();
     let surface = |pixel: u32| {
         let at = |place: u32, size: u32| 2.0 * (f64::from(place) + 0.5) / f64::from(size) - 1.0;
         let near = to_world * DVec4::new(at(pixel % width, width), at(pixel / width, height), 1.0, 1.0);
         let direction = (near.truncate() / near.w - eye).normalize();
-        let (entity, view) = seen(&world, eye, direction)?;
-        let entity_data = &scene.entities[entity];
+        let (entity, view) = seen(world, eye, direction)?;
+        let entity_data = &world.scene.entities[entity];
         (entity_data.receives && !entity_data.emits).then_some((Vertex { entity, index: pixel as usize }, view))
     };
-    let points: Vec<(Vertex, VertexView)> = (0..width * height).into_par_iter().filter_map(surface).collect();
+    (0..width * height).into_par_iter().filter_map(surface).collect()
+}
+
+/// The pixels of [`lit_points`], and the linear RGB radiance that leaves what they show. `cast` decides the rays a pixel.
+pub fn pixels(scene: &Scene, placements: &[Placement], size: [u32; 2], cast: &RayCast) -> Vec<(usize, Estimate)> {
+    let shapes = RayMeshes::new(scene);
+    let world = World::new(scene, &shapes, placements);
+    let points = lit_points(&world, size);
     let lit = cast.run_at(&world, &points);
     points.iter().zip(lit).map(|((key, _), estimate)| (key.index, estimate)).collect()
 }

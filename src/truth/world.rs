@@ -34,6 +34,7 @@ pub struct World<'s> {
 }
 
 /// A vertex from which the world is seen.
+#[derive(Clone, Copy)]
 pub struct VertexView {
     /// Position in metres.
     pub position: DVec3,

@@ -32,8 +32,8 @@ pub struct Arguments {
     /// Sweep only this axis, with all its settings (each may need bakes of its own); may be given again; an unknown name lists them
     #[arg(long, value_name = "NAME")]
     axis: Vec<String>,
-    /// Folder for budget.csv, sweep.csv, rival.csv, time-error.json, time-error.txt (which setting is the default and why), plots,
-    /// error pictures, and the picture of the merge beside that of ray casting
+    /// Folder for budget.csv, sweep.csv, rival.csv, time-error.json, time-error.txt (which setting is the default and why), a plot of
+    /// time against error for every case, error pictures, and the picture of the merge beside that of ray casting
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
@@ -90,7 +90,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         &rows,
     );
     output::say(
-        "\nFrame against ray casting with as many threads, and against shadow maps: the quickest that errs no more, and what the best errs",
+        "\nFrame against ray casting with as many threads, and against shadow maps: the quickest that errs no more, and what the best errs (without \
+         drawing at vertices, with it at pixels)",
     );
     let rows: Vec<Vec<String>> = outcome
         .comparisons

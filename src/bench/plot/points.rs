@@ -5,7 +5,7 @@ use super::{LETTER, Svg, color, place};
 
 const WIDTH: f64 = 440.0;
 const HEIGHT: f64 = 460.0;
-const MARGIN: f64 = 78.0;
+const MARGIN: f64 = 84.0;
 const TOP: f64 = 74.0;
 const BOTTOM: f64 = TOP + HEIGHT;
 const LEGEND_ROW: f64 = 14.5;
@@ -186,7 +186,7 @@ impl<'p> PanelDrawing<'p> {
         let middle = "text-anchor=\"middle\"";
         svg.text(left, TOP - 10.0, "font-weight=\"bold\"", &panel.title);
         svg.text(left + WIDTH / 2.0, BOTTOM + 40.0, middle, &panel.x_label);
-        let (at_x, at_y) = (left - 52.0, TOP + HEIGHT / 2.0);
+        let (at_x, at_y) = (left - 62.0, TOP + HEIGHT / 2.0);
         svg.text(at_x, at_y, &format!("{middle} transform=\"rotate(-90 {at_x} {at_y})\""), &panel.y_label);
         for (value, name) in self.x.ticks(45.0) {
             let at = self.x.at(value);

@@ -1,0 +1,93 @@
+//! Where the merge and its rivals are compared: at vertices, which the merge lights, and at pixels, which a person sees.
+
+use super::Bench;
+use super::budget::{Effort, Truth};
+use super::cases::Case;
+use super::figures::{Difference, Radiosity, difference, rms};
+use crate::truth::pixels::lit_points;
+use crate::truth::world::VertexView;
+use crate::truth::{RayCast, RayMeshes, Vertex, World, receiver_vertices};
+use serde::Serialize;
+
+/// Size of the pictures that are compared with ray-cast pixels: each of them costs what a vertex does.
+pub const PIXEL_SIZE: [u32; 2] = [360, 240];
+/// Rays of the sky's part, which both the truth and shadow maps have.
+const SKY_RAYS: u32 = 1024;
+
+/// What is lit and compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Place {
+    /// Lit vertices.
+    Vertices,
+    /// Pixels of a picture of [`PIXEL_SIZE`] that show a lit surface.
+    Pixels,
+}
+
+/// All points to light, and the truth of those that are compared.
+pub struct Judged {
+    /// What they are.
+    pub place: Place,
+    /// All points: an entity with the number of its vertex or of the pixel, and the view from there.
+    pub points: Vec<(Vertex, VertexView)>,
+    /// Those that are compared, as indices of `points`.
+    pub chosen: Vec<usize>,
+    /// Their radiosity by rays.
+    t0: Vec<Radiosity>,
+    /// Root mean square of `t0`: the unit of errors.
+    unit: f64,
+}
+
+impl Judged {
+    /// The vertices of a truth.
+    pub fn vertices(case: &Case, truth: &Truth) -> Self {
+        let shapes = RayMeshes::new(&case.scene);
+        let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
+        let points: Vec<_> = receiver_vertices(&case.scene).into_iter().map(|v| (v, world.view(v))).collect();
+        let at = |vertex| points.binary_search_by_key(vertex, |(key, _)| *key).expect("it is lit");
+        let chosen = truth.vertices.iter().map(at).collect();
+        Judged { place: Place::Vertices, points, chosen, t0: truth.t0.clone(), unit: truth.unit }
+    }
+
+    /// Pixels, chosen at random; `None` where the camera sees nothing that is lit.
+    pub fn pixels(bench: &Bench<'_>, case: &Case) -> Option<Self> {
+        let effort = Effort::new(bench.quick);
+        let shapes = RayMeshes::new(&case.scene);
+        let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
+        let points = lit_points(&world, PIXEL_SIZE);
+        let mut chosen: Vec<usize> = (0..points.len()).collect();
+        fastrand::Rng::with_seed(bench.seed).shuffle(&mut chosen);
+        chosen.truncate(effort.vertices);
+        chosen.sort_unstable();
+        let cast = RayCast { rays: effort.t0_rays, seed: bench.seed, distant: case.distant, ..Default::default() };
+        let mut judged = Judged { place: Place::Pixels, points, chosen, t0: Vec::new(), unit: 0.0 };
+        judged.t0 = judged.cast(&world, &cast);
+        judged.unit = rms(&judged.t0);
+        (judged.unit > 0.0).then_some(judged)
+    }
+
+    /// Radiosity of the compared points by rays.
+    pub fn cast(&self, world: &World<'_>, cast: &RayCast) -> Vec<Radiosity> {
+        let points: Vec<_> = self.chosen.iter().map(|&i| self.points[i]).collect();
+        cast.run_at(world, &points).iter().map(|e| e.radiosity).collect()
+    }
+
+    /// What the sky alone gives to the compared points.
+    pub fn sky(&self, bench: &Bench<'_>, case: &Case) -> Vec<Radiosity> {
+        let shapes = RayMeshes::new(&case.scene);
+        let mut world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
+        world.lights.clear();
+        let cast = RayCast { rays: SKY_RAYS, runs: 1, seed: bench.seed, distant: case.distant, ..Default::default() };
+        self.cast(&world, &cast)
+    }
+
+    /// The compared points' keys.
+    pub fn keys(&self) -> impl Iterator<Item = Vertex> {
+        self.chosen.iter().map(|&i| self.points[i].0)
+    }
+
+    /// Difference of the compared points' radiosity to T0, relative to its root mean square.
+    pub fn error(&self, found: &[Radiosity]) -> Difference {
+        difference(found, &self.t0, self.unit)
+    }
+}

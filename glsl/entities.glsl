@@ -3,6 +3,7 @@
 #if UNIFORM
 layout(std140, binding = ENTITY_BINDING) uniform Entities { Entity entities[ENTITY_LIMIT]; };
 #define ENTITY(e) entities[e]
+#define ENTITY_CENTRE(e) entities[e].centre
 #elif TEXEL
 layout(binding = ENTITY_BINDING) uniform textureBuffer entities;
 Entity entity_at(uint e) {
@@ -14,7 +15,9 @@ Entity entity_at(uint e) {
         texelFetch(entities, at + 10));
 }
 #define ENTITY(e) entity_at(e)
+#define ENTITY_CENTRE(e) texelFetch(entities, int(e) * 11)
 #else
 layout(std430, binding = ENTITY_BINDING) readonly buffer Entities { Entity entities[]; };
 #define ENTITY(e) entities[e]
+#define ENTITY_CENTRE(e) entities[e].centre
 #endif

@@ -172,42 +172,134 @@ uint chain_light(uint packed) {
     return packed >> ENTRY_BITS & SKY_CHAIN;
 }
 
-// Irradiance by all lights of `count` entries from `first`.
+SeenLight light_from(Surface surface, Entity shining) {
+    return seen_light(shining.centre.xyz - surface.origin - surface.position, shining);
+}
+
+uint first_block(SeenLight light) {
+    return light.fine >= 1.0 ? 1 : 0;
+}
+
+uint last_block(SeenLight light) {
+    return light.fine <= 0.0 ? 0 : 4;
+}
+
+#if CONES
+bool has_own_outline(Entity shining) {
+#if OUTLINES
+    return shining.sharp.y <= 0.0;
+#else
+    return false;
+#endif
+}
+
+// Whether an entry is an occluder whose ball reaches into the cone around all parts of its chain's light, as far as the light.
+bool may_block(uint packed, Surface surface) {
+    if ((packed & ENTRY_LIGHT) != 0) {
+        return false;
+    }
+    vec4 shining = ENTITY_CENTRE(chain_light(packed)), ball = ENTITY_CENTRE(packed & SKY_CHAIN);
+    vec3 from = surface.origin + surface.position;
+    vec3 to_light = shining.xyz - from, to_ball = ball.xyz - from;
+    float distance = length(to_light);
+    vec3 toward = to_light / max(distance, 1e-30);
+    float sine = min(CONE_WIDER / max(shining.w * distance, 1e-30), MOST_SINE);
+    float radius = BALL_WIDER / ball.w;
+#ifdef EDGES
+    radius += surface.step;
+#endif
+    float along = dot(to_ball, toward);
+    float off = length(to_ball - along * toward);
+    return along > -radius && along - radius < distance + 1.0 / shining.w
+        && off * sqrt(1.0 - sine * sine) - max(along, 0.0) * sine < radius;
+}
+
+// Of the lights of `count` entries from `first`, those that no occluder may block here: their irradiance.
+vec3 open_sum(Surface surface, uint first, uint count) {
+    vec3 sum = vec3(0.0);
+    uint i = 0;
+    do {
+        bool open = true, ends = false;
+        do {
+            uint packed = entry_at(first + i);
+            open = open && !may_block(packed, surface);
+            ends = (packed & ENTRY_LIGHT) != 0;
+            i++;
+        } while (!ends);
+        Entity shining = ENTITY(chain_light(entry_at(first + i - 1)));
+        if (open && !has_own_outline(shining)) {
+            SeenLight light = light_from(surface, shining);
+            float irradiance = 0.0;
+            uint b = first_block(light);
+            do {
+                irradiance += dot(part_shares(surface, light, block_of(light, b)), vec4(shining.sharp.y));
+                b++;
+            } while (b <= last_block(light));
+            sum += irradiance * shining.emission.rgb;
+        }
+    } while (i < count);
+    return sum;
+}
+#endif
+
+// The first entry from `i` on that is evaluated: without cones all are, with them occluders that may block, and lights where they end a
+// chain that is (`within`) or have an outline of their own. What is computed in this loop is read again behind it, since a lane that leaves
+// a loop early may lose on lavapipe what the loop does not carry.
+uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
+#if CONES
+    bool passes = false;
+    do {
+        uint packed = entry_at(first + i);
+        bool ends = (packed & ENTRY_LIGHT) != 0;
+        passes = ends ? !within && !has_own_outline(ENTITY(chain_light(packed))) : !may_block(packed, surface);
+        i += passes ? 1 : 0;
+    } while (passes && i < count);
+#endif
+    return i;
+}
+
+// Irradiance by all lights of `count` entries from `first`. Where a scene has several lights, most are open to most points: those are
+// added up first, because a software device evaluates an occluder for each turn of the loop that evaluates any.
 vec3 sharp_sum(Surface surface, uint first, uint count) {
     vec3 sum = vec3(0.0);
+#if CONES
+    sum = open_sum(surface, first, count);
+#endif
     uint i = 0;
     // Loops are tested at their ends, as in the merge.
     do {
-        Entity shining = ENTITY(chain_light(entry_at(first + i)));
-        SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, shining);
-        uint b = light.fine >= 1.0 ? 1 : 0;
-        uint last = light.fine <= 0.0 ? 0 : 4;
-        float irradiance = 0.0;
-        uint j;
-        do {
-            Block block = block_of(light, b);
-            vec4 share = part_shares(surface, light, block);
-            j = i;
-            uint packed = entry_at(first + j);
+        i = next_entry(surface, first, count, i, false);
+        if (i < count) {
+            Entity shining = ENTITY(chain_light(entry_at(first + i)));
+            SeenLight light = light_from(surface, shining);
+            uint b = first_block(light);
+            float irradiance = 0.0;
+            uint j;
             do {
-                if ((packed & ENTRY_LIGHT) == 0) {
-                    share *= let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
-                    j++;
-                    packed = entry_at(first + j);
-                }
-            } while ((packed & ENTRY_LIGHT) == 0 && j < count);
+                Block block = block_of(light, b);
+                vec4 share = part_shares(surface, light, block);
+                j = i;
+                uint packed = entry_at(first + j);
+                do {
+                    if ((packed & ENTRY_LIGHT) == 0) {
+                        share *= let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
+                        j = next_entry(surface, first, count, j + 1, true);
+                        packed = entry_at(first + j);
+                    }
+                } while ((packed & ENTRY_LIGHT) == 0 && j < count);
 #if OUTLINES
-            // Of a light with an outline of its own, as much of each part shines as the outline covers.
-            vec4 dark = let_through(shining, surface, light, block, false);
-            share *= shining.sharp.y > 0.0 ? vec4(shining.sharp.y) : 1.0 - dark;
+                // Of a light with an outline of its own, as much of each part shines as the outline covers.
+                vec4 dark = let_through(shining, surface, light, block, false);
+                share *= shining.sharp.y > 0.0 ? vec4(shining.sharp.y) : 1.0 - dark;
 #else
-            share *= shining.sharp.y;
+                share *= shining.sharp.y;
 #endif
-            irradiance += dot(share, vec4(1.0));
-            b++;
-        } while (b <= last);
-        i = j + 1;
-        sum += irradiance * shining.emission.rgb;
+                irradiance += dot(share, vec4(1.0));
+                b++;
+            } while (b <= last_block(light));
+            i = j + 1;
+            sum += irradiance * shining.emission.rgb;
+        }
     } while (i < count);
     return sum;
 }

@@ -42,9 +42,11 @@ fn sharp() -> Vec<ShaderPermutation> {
         let silhouette = SilhouetteOptions::default();
         let (texel, uniform, outlines, panels, self_shadows, halves) =
             (on(0), on(1), on(2), on(3), on(4), on(2) != on(3));
-        SharpPermutation { texel, uniform, entity_limit: 48, silhouette, outlines, panels, halves, self_shadows }.row()
+        let cones = on(5);
+        SharpPermutation { texel, uniform, entity_limit: 48, silhouette, outlines, panels, halves, self_shadows, cones }
+            .row()
     };
-    (0..32).map(way).collect()
+    (0..64).map(way).collect()
 }
 
 fn drawing() -> Vec<ShaderPermutation> {
@@ -59,6 +61,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         panels: outlines,
         halves: outlines,
         self_shadows: true,
+        cones: outlines,
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].into_iter().flat_map(|display| ways.map(|sharp| DrawGrid::row(display, sharp)));

@@ -219,6 +219,57 @@ fn what_outlines_leave_off_lists_changes_nothing() {
     }
 }
 
+/// Under several lights points leave out what stands outside a light's cone, under one they do not: lights of all forms add up, and a
+/// light that reaches nothing changes no pixel.
+#[test]
+fn lights_add_up_where_points_leave_out_what_stands_beside() {
+    let Some(gpu) = gpu() else { return };
+    let lamp = "receives = false\noccludes = false\nemission";
+    let at = |height_m: f64| {
+        parse(&format!(
+            "{HEAD}{LAMPS}[[entity]]\nmesh = \"ring\"\nposition = [-0.6, 0.9, 0]\nrotation = {{ axis = [1, 0, 0], angle_deg = 60 }}\n\
+        [[entity]]\nmesh = \"ball\"\nposition = [0.9, 0.5, 0.4]\n\
+        [[entity]]\nmesh = \"ball\"\nposition = [1.2, 3.2, 0.8]\nscale = 0.2\n{lamp} = [200, 100, 100]\n\
+        [[entity]]\nmesh = \"ball\"\nposition = [-1.6, {height_m}, 0]\nscale = 0.9\n{lamp} = [9, 20, 9]\n\
+        [[entity]]\nmesh = \"tube\"\nposition = [0, 3, -1]\nrotation = {{ axis = [1, 0, 0], angle_deg = 170 }}\n{lamp} = [30, 30, 60]\n\
+        [[entity]]\nmesh = \"ring\"\nposition = [0, 3.5, 1]\nscale = 0.5\n{lamp} = [20, 20, 20]\n"
+        ))
+    };
+    let scene = at(3.0);
+    let lights: Vec<usize> = (0..scene.entities.len()).filter(|&j| scene.entities[j].emits).collect();
+    let new =
+        |scene: &Scene, options| Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
+    let under = |shining: &[usize]| {
+        let mut lit = scene.clone();
+        lights.iter().for_each(|&j| lit.entities[j].emits = shining.contains(&j));
+        let mut frame = new(&lit, check::sharp_options());
+        frame.render(&lit.at(0.0), None).unwrap();
+        (0..3).flat_map(|entity| frame.radiosity(entity).unwrap()).flatten().collect::<Vec<f32>>()
+    };
+    let all = under(&lights);
+    let mut sum = vec![0.0; all.len()];
+    for light in &lights {
+        sum.iter_mut().zip(under(&[*light])).for_each(|(sum, of)| *sum += of);
+    }
+    let brightest = all.iter().copied().fold(0.0, f32::max);
+    let apart = all.iter().zip(&sum).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / brightest;
+    report(&format!("{} lights on {} values: {apart:.1e} of the brightest apart", lights.len(), all.len()));
+    assert!(lights.len() == 4 && apart < 2e-6, "{apart}");
+
+    // A lamp below the floor, which alone is lit here.
+    let mut two = at(-3.0);
+    lights[2..].iter().for_each(|&j| two.entities[j].emits = false);
+    two.entities[1..].iter_mut().for_each(|entity| entity.receives = false);
+    let mut one = two.clone();
+    one.entities[lights[1]].emits = false;
+    let [one, two] = [one, two].map(|scene| picture(&gpu, &scene, Shading::Pixel));
+    assert!(one.1.is_none_or(|evaluated| evaluated > 200), "{:?}", one.1);
+    // Pictures are half floats.
+    let differs = |(a, b): (&f32, &f32)| (a - b).abs() > 0.0011 * a.max(*b);
+    let differing: Vec<_> = one.0.iter().zip(&two.0).filter(|pair| differs(*pair)).collect();
+    assert!(differing.is_empty(), "{differing:?}");
+}
+
 /// A switch that moves nothing still changes what pixels show, and back.
 #[test]
 fn pixels_follow_switches_of_entities() {

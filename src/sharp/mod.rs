@@ -27,6 +27,12 @@ const EDGE_REACH: f64 = 0.75;
 /// 0.0022 and 0.0007 relative RMS, by 0.031 of white at most.
 const EDGE_STEPS: f64 = 0.3;
 
+/// Factor on the sine of a light's radius in which all its parts lie: a part's middle lies [`CORNER`] from the light's, its rim half a radius on.
+const CONE_WIDER: f64 = 1.12;
+/// Factor on the radius of an occluder's ball beyond which its outline, which maps of 32 texels blur, takes nothing from a light. With 1.06 a
+/// pixel changed by 0.0009 of the brightest, with 1.1 none did.
+const BALL_WIDER: f64 = 1.15;
+
 /// What the shader is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharpPermutation {
@@ -46,6 +52,9 @@ pub struct SharpPermutation {
     pub halves: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
+    /// Whether every point leaves out the occluders of its lists that stand outside a light's cone: in scenes of several sharp lights. Pixels
+    /// of small_lights then take 0.63 of the time and vertices of teapot_lights 0.75; under one light vertices would take 1.2 times as long.
+    pub cones: bool,
 }
 
 impl SharpPermutation {
@@ -72,6 +81,7 @@ impl SharpPermutation {
             .define("PANELS", self.panels)
             .define("HALVES", self.halves)
             .define("SELF", self.self_shadows)
+            .define("CONES", self.cones)
             .define("NODE_CELLS", self.silhouette.cells)
             .define("MAP", self.silhouette.map_px);
         let numbers = [
@@ -82,6 +92,8 @@ impl SharpPermutation {
             ("INSIDE_TO", INSIDE[1]),
             ("DEEP_FROM", DEEP[0]),
             ("DEEP_TO", DEEP[1]),
+            ("CONE_WIDER", CONE_WIDER),
+            ("BALL_WIDER", BALL_WIDER),
             ("EDGE_REACH", EDGE_REACH),
             ("EDGE_STEPS", EDGE_STEPS),
             ("MOST_SINE", MOST_SINE),

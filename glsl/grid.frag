@@ -1,5 +1,6 @@
 #version 460
 #include "finish.glsl"
+#include "blend.glsl"
 // Shades a point of a grid with the interpolated radiance of its cell's triangle. One fetch finds the triangle and three read its
 // corners, which on a software rasteriser is much cheaper than drawing small triangles.
 layout(binding = 0) uniform utextureBuffer corners;  // vertices of each cell; see asset::grid
@@ -45,16 +46,14 @@ void main() {
     }
     uint first = min(triangle.x, min(triangle.y, triangle.z));
     triangle += push.first;
-    vec3 light = weight.x * texelFetch(radiosity, int(triangle.x)).rgb
-               + weight.y * texelFetch(radiosity, int(triangle.y)).rgb
-               + weight.z * texelFetch(radiosity, int(triangle.z)).rgb;
+    vec3 light = blend(radiosity, triangle, weight);
 #if PIXEL
     uvec2 chain = chain_of(push.cluster_first, first);
     if (chain.y > 0) {
         Entity receiver = ENTITY(push.receiver);
         Facing facings[FACINGS];
         facings[0] = facing_of(receiver, push.normal.xyz, 1.0, NONE, 0);
-        light = soft_light(triangle, weight) + pixel_light(receiver, at_object, facings, chain);
+        light = blend(soft, triangle, weight) + pixel_light(receiver, at_object, facings, chain);
     }
 #endif
     color = vec4(finish(push.emission_white.rgb + light, push.emission_white.w), push.tag);

@@ -27,11 +27,6 @@ uvec2 chain_of(uint cluster_first, uint v) {
     return texelFetch(chains, int(cluster_first + v / WORKGROUP)).xy;
 }
 
-vec3 soft_light(uvec3 triangle, vec3 weight) {
-    return weight.x * texelFetch(soft, int(triangle.x)).rgb + weight.y * texelFetch(soft, int(triangle.y)).rgb
-         + weight.z * texelFetch(soft, int(triangle.z)).rgb;
-}
-
 // `at`: object's frame, metres.
 vec3 pixel_light(Entity receiver, vec3 at, Facing facings[FACINGS], uvec2 chain) {
     Surface surface;

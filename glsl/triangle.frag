@@ -1,6 +1,7 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #include "finish.glsl"
+#include "blend.glsl"
 // Shades a point of a triangle that a shadow's edge comes near. Its pixel evaluates sharp lights itself; cosines and self-visibility are
 // blended between the vertices, so that where nothing blocks a light the triangle looks as its neighbours do.
 layout(location = 0) in vec3 at_object;
@@ -17,8 +18,7 @@ layout(binding = 8) uniform textureBuffer vertices;
 
 void main() {
     uvec3 lit = push.first + triangle;
-    vec3 light = weight.x * texelFetch(radiosity, int(lit.x)).rgb + weight.y * texelFetch(radiosity, int(lit.y)).rgb
-               + weight.z * texelFetch(radiosity, int(lit.z)).rgb;
+    vec3 light = blend(radiosity, lit, weight);
     uvec2 chain = chain_of(push.cluster_first, min(triangle.x, min(triangle.y, triangle.z)));
     if (chain.y > 0) {
         Entity receiver = ENTITY(push.receiver);
@@ -27,7 +27,7 @@ void main() {
             vec3 normal = texelFetch(vertices, int(2 * (push.vertex_first + triangle[i]) + 1)).xyz;
             facings[i] = facing_of(receiver, normal, weight[i], push.self_first, triangle[i]);
         }
-        light = soft_light(lit, weight) + pixel_light(receiver, at_object, facings, chain);
+        light = blend(soft, lit, weight) + pixel_light(receiver, at_object, facings, chain);
     }
     color = vec4(finish(push.emission_white.rgb * emission + light, push.emission_white.w), push.tag);
 }

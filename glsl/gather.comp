@@ -1,7 +1,7 @@
 #version 460
-// The entries of every cluster, a group of neighbouring clusters of one receiver a workgroup. First all invocations look for the
-// occluders that may matter to any of the clusters, by the block and then one by one, and put them into the receiver's order;
-// then each walks its own cluster through what was found, light by light and at last the sky, and writes what it keeps.
+// Makes the list of every cluster. A workgroup has a group of neighbouring clusters of one receiver. First all invocations look for the
+// occluders that may matter to any of the clusters, in blocks and then one by one, and sort them from near to far. Then each invocation
+// goes through these for its own cluster, light by light and at last for the sky, and writes those that it keeps.
 // A group that finds more than there is room for is left to a second round (ROOMY), which keeps what it finds in a buffer.
 // The rule has a slack that is larger than rounding (gather_scope.glsl); only the order has to be the host's to the bit.
 #extension GL_KHR_memory_scope_semantics : enable
@@ -57,7 +57,7 @@ layout(push_constant) uniform Push {
 };
 #include "gather_scope.glsl"
 
-// What is found: distances, occluders, and these in order.
+// The occluders that were found: their distances, their indices, and both in order.
 #if ROOMY
 layout(std430, binding = 7) coherent buffer Room { uint room[]; };
 #define FOUND occluder_count
@@ -80,7 +80,7 @@ shared uint blocks[BLOCKS];
 shared uint nearest, farthest;
 shared uint buckets[BUCKETS + 1]; // where each begins
 
-// All invocations come here, and see what each of them has written.
+// All invocations wait here, and then see what the others have written.
 void meet() {
 #if ROOMY
     controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsShared | gl_StorageSemanticsBuffer,
@@ -154,7 +154,7 @@ void order(uint count, uint lane) {
     }
 }
 #else
-// First into stretches of equal length in bits, then within each.
+// Sorts into buckets by the bits of the distance first, then within each bucket.
 void order(uint count, uint lane) {
     for (uint i = lane; i < count; i += LANES) {
         atomicMin(nearest, KEY(i));

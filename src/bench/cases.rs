@@ -54,7 +54,7 @@ pub const NEAR: f64 = 5.0;
 /// Distance of a disc in the sky, or of a distant sphere light, in bounding radii: its direction changes by 0.25 degrees over the floor.
 pub const FAR: f64 = 1000.0;
 
-/// The items whose name contains any of the texts, in their order; all if there is no text.
+/// The items whose names contain one of the texts, in their order. Without texts all items are returned.
 ///
 /// # Errors
 /// `Usage` with a list of the names when no name contains one of the texts.
@@ -152,9 +152,9 @@ pub fn floor(cells: usize) -> Result<Vec<Case>> {
 /// Path under which the texts of these scenes are read, so that they find `../meshes`.
 pub const PLACE: &str = "assets/scenes/over_floor.toml";
 
-/// Text of a scene without light: a floor of 6 x 6 m with `cells` squares along a side, which alone is lit, and the mesh of
-/// `../meshes/FILE.obj` scaled to a bounding radius of 1 m at a small distance above its middle. A mesh "bulb", a ball of radius 1 m,
-/// stands ready. And the height of the object's centre, metres.
+/// Text of a scene without light, and the height of its object's centre in metres. The floor of 6 x 6 m with `cells` squares along a side
+/// alone is lit. The object is the mesh of `../meshes/FILE.obj`, scaled to a bounding radius of 1 m, at a small distance above the
+/// floor's middle. The scene also has a mesh "bulb", a ball of radius 1 m, which no entity uses yet.
 pub fn over_floor(mesh: &Mesh, file: &str, cells: usize) -> (String, f64) {
     let (centre, radius_m) = mesh.bounding_sphere();
     let (centre, scale) = (centre.as_dvec3(), 1.0 / f64::from(radius_m));

@@ -39,7 +39,7 @@ pub fn contenders(device: &Device) -> Vec<Contender> {
     VARIANTS.iter().map(guarded).chain([unguarded]).collect()
 }
 
-/// The contender of that name.
+/// The contender with a name.
 ///
 /// # Errors
 /// `Usage` that lists the names.
@@ -51,19 +51,19 @@ pub fn named(device: &Device, name: &str) -> Result<Contender> {
     })
 }
 
-/// Median, and what a tenth of the values lies under and over.
+/// Median, and the values below and above which a tenth of all lies.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Tenths {
-    /// A tenth lies below.
+    /// A tenth of the values lies below it.
     pub p10: f64,
     /// The middle value.
     pub median: f64,
-    /// A tenth lies above.
+    /// A tenth of the values lies above it.
     pub p90: f64,
 }
 
 impl Tenths {
-    /// Of some values; 0 of none.
+    /// The spread of some values; all are 0 where there are none.
     pub fn new(values: &[f64]) -> Self {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -97,10 +97,10 @@ pub struct ProfileRow {
     pub variant: String,
     /// Device time.
     pub ms: Tenths,
-    /// Nanoseconds a pair of vertex and occluder; a merge's alone, like all below. None of these where the time is mostly that of
-    /// starting a dispatch (see [`Ceilings::resolve`]).
+    /// Nanoseconds a pair of vertex and occluder. Only merges have this and the values below, and only where the time is not mostly that
+    /// of starting a dispatch (see [`Ceilings::resolve`]).
     pub ns_a_pair: Option<f64>,
-    /// Per pair.
+    /// Work of a pair.
     pub work: Option<Work>,
     /// Multiplications and additions reached, in 10^9 a second.
     pub gflops: Option<f64>,
@@ -108,7 +108,7 @@ pub struct ProfileRow {
     pub gb_s: Option<f64>,
     /// Time that the arithmetic alone would take at the device's ceiling, as a share of the time taken.
     pub arithmetic_share: Option<f64>,
-    /// Time that the reads alone would take likewise.
+    /// Time that the reads alone would take at the device's ceiling, as a share of the time taken.
     pub read_share: Option<f64>,
 }
 
@@ -140,7 +140,7 @@ fn row(
 ) -> ProfileRow {
     let ms = Tenths::new(times);
     let work = work(permutation, census);
-    // Per nanosecond is 10^9 a second.
+    // One a nanosecond is 10^9 a second.
     let ns = ms.median * 1e6 / pairs.max(1) as f64;
     let field = census.fetches.get("field_quads").copied().unwrap_or(0);
     let filtered = census.fetches.get("field_image").copied().unwrap_or(0);
@@ -149,7 +149,7 @@ fn row(
         + f64::from(filtered) / at_best.filtered_giga;
     let loaded: u32 = census.block_bytes.values().sum();
     let reads = f64::from(field) / field_rate + other + f64::from(loaded) / 8.0 / at_best.storage_giga;
-    // A scene of a few vertices tells nothing of rates.
+    // Rates are unknown where a scene has few vertices.
     let rate = |value: f64| (at_best.resolve(ms.median) && pairs > 0).then_some(value);
     ProfileRow {
         case: case.to_owned(),
@@ -284,7 +284,7 @@ pub fn scene(
 /// As [`crate::bake::Baker::field`].
 pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(ProfileRow, Vec<f64>)>> {
     let options = bake::Options::default();
-    // Two shells: the inner one alone may lie inside the solid, where nothing is seen.
+    // Two shells, because an inner one alone may lie inside the solid, where nothing is captured.
     let small = bake::Options { lattice: "cube:2x1".parse().expect("a lattice"), ..options };
     let mut times: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
     let field = |kind: FieldKind, options: &bake::Options| -> Result<bake::BakeReport> {
@@ -314,7 +314,7 @@ pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(ProfileRow
     Ok(times.into_iter().map(row).collect())
 }
 
-/// A row of a pass of which nothing but its time is known.
+/// A row of a pass that has a time and no rates.
 fn plain(case: &str, pass: &str, variant: &str, times: &[f64]) -> ProfileRow {
     ProfileRow {
         case: case.to_owned(),
@@ -330,19 +330,19 @@ fn plain(case: &str, pass: &str, variant: &str, times: &[f64]) -> ProfileRow {
     }
 }
 
-/// What a variant costs before its first run is over, in milliseconds.
+/// Times that a variant takes up to the end of its first run, milliseconds.
 #[derive(Clone, Debug, Serialize)]
 pub struct Start {
     /// Variant.
     pub variant: String,
-    /// GLSL to SPIR-V, and the same from the cache on disk.
+    /// Compilation of GLSL to SPIR-V.
     pub spirv_cold_ms: f64,
-    /// From the cache.
+    /// SPIR-V read from the cache on disk.
     pub spirv_warm_ms: f64,
     /// Pipeline and first dispatch on a device that has not seen the shader in this process. A driver may still know it from
     /// its own cache on disk.
     pub first_cold_ms: f64,
-    /// The same again, from the pipeline cache.
+    /// The same with the pipeline cache.
     pub first_warm_ms: f64,
 }
 

@@ -15,7 +15,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A scene that tries the merge.
+/// A scene that tests the merge.
 pub struct TrialCase {
     /// What is odd about it.
     pub name: String,
@@ -23,7 +23,7 @@ pub struct TrialCase {
     pub scene: Scene,
 }
 
-/// What came of it.
+/// The result of a trial.
 #[derive(Clone, Debug, Serialize)]
 pub struct Trial {
     /// What is odd about it.
@@ -40,13 +40,13 @@ pub struct Trial {
     /// Largest magnitude of a radiosity.
     #[serde(rename = "largest_radiosity")]
     pub largest: f64,
-    /// What it cannot exceed (see [`bound`]).
+    /// Upper bound of that magnitude (see [`bound`]).
     #[serde(rename = "bound_radiosity")]
     pub bound: f64,
     /// Largest difference of the device to its f64 twin, relative to the twin's largest magnitude; 0 where all is dark.
     #[serde(rename = "twin_error_relative")]
     pub twin_error: f64,
-    /// Whether all is as it should be: finite, repeatable, within the bound, and within [`NEAR_TWIN`] of the twin.
+    /// Whether the trial passed: all numbers are finite, repeatable, within the bound, and within [`NEAR_TWIN`] of the twin.
     pub passed: bool,
 }
 
@@ -167,7 +167,7 @@ pub fn cases(longest: usize) -> Result<Vec<TrialCase>> {
     for (name, keeps) in [("one triangle", 1), ("an open mesh", 640)] {
         let between = entity("ball", "position = [0, 0.7, 0]");
         let light = |mesh| entity(mesh, &format!("position = [0.6, 1.8, 0.2]\n{glows}"));
-        // As what blocks, and as what shines.
+        // The mesh occludes in one trial and emits in another.
         for (role, entities) in [("occludes", format!("{between}{}", light("lamp"))), ("shines", light("ball"))] {
             let mut scene = scene(20, "", &format!("{FLOOR}{entities}"))?;
             change(&mut scene, 1, |mesh| mesh.triangles.truncate(keeps))?;
@@ -209,7 +209,7 @@ fn change(scene: &mut Scene, index: usize, how: impl FnOnce(&mut Mesh)) -> Resul
     Ok(())
 }
 
-/// Adds what a careless exporter leaves in a mesh.
+/// Adds faults that exporters leave in meshes.
 fn spoil(mesh: &mut Mesh) {
     let first = mesh.positions.len() as u32;
     let corner = mesh.triangles[7];
@@ -227,7 +227,7 @@ fn spoil(mesh: &mut Mesh) {
     ]);
 }
 
-/// Small patches at every kind of place that a lookup treats apart, around one ball.
+/// Small patches around one ball, one at every kind of place that a lookup treats in a way of its own.
 fn marks() -> Result<Scene> {
     let lattice = Lattice::default().starting_at(crate::field::lattice::OUTSIDE_INNER);
     let directions =
@@ -269,7 +269,7 @@ fn crowd(count: usize, distinct: bool) -> Result<Scene> {
     scene(6, GRADIENT, &entities)
 }
 
-/// What no radiosity of a scene can exceed in magnitude. A guarded chain never lengthens the transfer vector, of which a
+/// Upper bound of the magnitude of every radiosity of a scene. A guarded chain never lengthens the transfer vector, of which a
 /// lobe of the cosine is the longest; by Cauchy and Schwarz light adds at most the length of its own vector times that. A local
 /// light's is at most its brightest emission times that of a whole sky, sqrt(4 pi), and a tenth for what interpolation and the
 /// fit of samples add.
@@ -328,7 +328,7 @@ mod tests {
         let all = cases(64).unwrap();
         assert!(all.len() > TRIALS.len() + 8);
         assert!(all.iter().all(|case| bound(&case.scene, 4) >= 0.0));
-        // A white sky over a white floor: the bound is above the radiosity 1 that it has, but not by much.
+        // The radiosity of a white floor under a white sky is 1, and the bound lies little above that.
         let sky = "[environment]\nuniform = [1, 1, 1]";
         let open = scene(2, sky, &entity("floor", "albedo = [1, 1, 1]")).unwrap();
         let bound = bound(&open, 4);

@@ -1,5 +1,5 @@
-//! The buffers of the gather on the device, and what becomes of lists that do not fit: nothing is merged by half a list, and the
-//! next frame merges again with more room, or with lists that the host makes.
+//! The buffers of the gather on the device. Where a list does not fit, nothing is merged by a part of it: the next frame merges again
+//! with more room, or with lists that the host makes.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Commands, Device, FLIGHTS, Upload};
@@ -8,9 +8,9 @@ use crate::lists::incremental::{ClusterLists, Dirty};
 use crate::shaders::Library;
 use std::sync::Arc;
 
-/// Entries that a list has room for at first, unless it cannot become as long.
+/// Room of a list at first, in entries; less where a list cannot become so long.
 const FIRST_CAPACITY: u64 = 64;
-/// Bytes of all lists: beyond this the host makes them, one behind the other.
+/// Largest size of all lists in bytes. Beyond it the host makes them, packed without room to spare.
 const MOST_BYTES: u64 = 1 << 28;
 
 /// Everything that the pass needs from frame to frame.
@@ -23,19 +23,19 @@ pub(crate) struct Gathering {
     report: Upload,
     /// Entries of all clusters.
     entries: Buffer,
-    /// Entries that every list has room for.
+    /// Room of every list, in entries.
     capacity: u64,
-    /// The lists would take more than [`MOST_BYTES`], or than the pass can go through: the host makes them from now on.
+    /// Whether the lists would take more than [`MOST_BYTES`] or be longer than the pass can walk, so that the host makes them from now on.
     refused: bool,
-    /// What the frame in preparation gathers.
+    /// The work of the frame in preparation.
     packed: Option<(Packed, u32, u32)>,
-    /// Frames that were prepared, and in which of them each report was begun.
+    /// Number of prepared frames, and for each report the frame in which it was begun.
     frames: u64,
     begun: [Option<u64>; FLIGHTS],
 }
 
 impl Gathering {
-    /// For all clusters of a scene of so many entities.
+    /// Buffers for all clusters of a scene with that number of entities.
     ///
     /// # Errors
     /// As [`Gather::new`] and [`Buffer::new`].
@@ -109,7 +109,7 @@ impl Gathering {
         self.pass.record(commands, &inputs, packed, *capacity, *group_count)
     }
 
-    /// Goes on to the next frame of a window: what the flight before the last one reported, if it gathered. It has ended.
+    /// Goes on to the next frame of a window, and reads the report of the flight before the last one, which has ended.
     pub fn next_frame(&mut self) -> Option<Report> {
         self.frames += 1;
         let ended = |begun: &Option<u64>| begun.is_some_and(|frame| frame + FLIGHTS as u64 <= self.frames);
@@ -118,7 +118,7 @@ impl Gathering {
         Some(self.report.at(place).peek(0, 1)[0])
     }
 
-    /// What the last frame reported, if it gathered; everything that was submitted has ended.
+    /// Reads the last frame's report, if it gathered. All submitted work has to have ended.
     pub fn report(&mut self) -> Option<Report> {
         self.packed.as_ref()?;
         self.begun = [None; FLIGHTS];

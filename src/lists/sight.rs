@@ -1,9 +1,9 @@
-//! What the camera may see of a mesh, run of triangles by run: what it cannot see need not be lit while things move, nor drawn.
+//! Which runs of a mesh's triangles the camera may see. What it cannot see is not drawn, and while things move it is not lit.
 //!
-//! Nothing that a pixel shows is ever taken for unseen. A run lies outside where the sphere or the box around it does, by a pixel at
-//! least; its triangles are backs where the cone of their normals says so for every point of that sphere, with an angle to spare.
-//! Backs count as unseen only where the draw culls them, which it does for solid meshes ([`Mesh::is_solid`]) with the eye outside:
-//! whether a pixel at an outline shows a front or a back is then the rasteriser's decision and not this one's.
+//! The test is conservative: it never calls a run unseen that a pixel shows. A run lies outside the picture where the sphere or the box
+//! around it lies outside by at least a pixel. Its triangles are backs where the cone of their normals says so for every point of that
+//! sphere, with a margin of [`BACK_RAD`]. Backs count as unseen only where the draw culls them, which it does for solid meshes
+//! ([`Mesh::is_solid`]) with the eye outside, because at an outline the rasteriser decides whether a pixel shows a front or a back.
 
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
@@ -14,9 +14,9 @@ use rayon::prelude::*;
 /// Angle beyond edge-on from which triangles count as backs: vertices that a rasteriser moves to its grid of 1/256 pixel turn over
 /// no triangle of a third of a pixel or more that is tilted so far.
 const BACK_RAD: f64 = 0.02;
-/// Pixels beyond the picture's edges that still count as seen.
+/// Width in pixels of the margin around the picture that counts as seen.
 const RIM_PX: f64 = 1.0;
-/// Share of lengths that rounding of the matrix and in the vertex shader may make of them, with a factor 8 to spare.
+/// Largest relative error of lengths by rounding, of the matrix and in the vertex shader, times 8 as a margin.
 const ROUNDING: f32 = 4e-6;
 
 /// A run of triangles.
@@ -30,14 +30,14 @@ pub struct Faces {
     half_m: Vec3,
     /// Axis of a cone around their normals.
     axis: Vec3,
-    /// Cosine and sine of its half-angle with [`BACK_RAD`]; the cosine is not positive where they are never all backs.
+    /// Cosine and sine of its half-angle plus [`BACK_RAD`]. Where the cosine is not positive, the triangles are never all backs.
     spread: [f32; 2],
-    /// Whether a grid is lit by them beyond its edges.
+    /// Whether they stand at the rim of a grid, whose light pixels beyond the rim show.
     rim: bool,
 }
 
 impl Faces {
-    /// Triangles that use a vertex of each run of `count` of a mesh's vertices in an order: those by which its light is seen.
+    /// For each run of `count` vertices of a mesh, in a given order, the triangles that use one of them: these show its light.
     pub fn around(mesh: &Mesh, order: &[u32], count: usize) -> Vec<Faces> {
         let runs = order.len().div_ceil(count);
         let mut run_of = vec![0_u32; order.len()];
@@ -48,7 +48,7 @@ impl Faces {
             let [a, b, c] = triangle.map(|v| run_of[v as usize]);
             [Some(a), (b != a).then_some(b), (c != a && c != b).then_some(c)].into_iter().flatten()
         };
-        // Where the triangles of each run begin among all, and then which they are.
+        // First the place where each run's triangles begin, then the triangles.
         let mut ends = vec![0_usize; runs + 1];
         mesh.triangles.iter().flat_map(runs_of).for_each(|run| ends[run as usize + 1] += 1);
         (0..runs).for_each(|run| ends[run + 1] += ends[run]);
@@ -68,12 +68,12 @@ impl Faces {
         faces
     }
 
-    /// Of some triangles of a mesh.
+    /// The run of some triangles of a mesh.
     pub fn of(mesh: &Mesh, triangles: &[[u32; 3]]) -> Faces {
         let (middle, _) = mesh.bounding_sphere();
         let at = |v: u32| mesh.positions[v as usize] - middle;
         let corners: Vec<Vec3> = triangles.iter().flatten().map(|&v| at(v)).collect();
-        // What has no area covers no pixel.
+        // A triangle without area covers no pixel.
         let normal = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| at(v).as_dvec3());
             (b - a).cross(c - a).try_normalize().map(|n| n.as_vec3())
@@ -94,7 +94,7 @@ impl Faces {
         }
     }
 
-    /// Whether only backs of them are seen from a place.
+    /// Whether a place sees only the backs of these triangles.
     ///
     /// The direction to any point of the sphere is within asin(radius / distance) of that to the centre, a normal within the cone
     /// of the axis: all are backs where these two, [`BACK_RAD`] and the angle between axis and direction stay below a right angle
@@ -116,7 +116,7 @@ impl Faces {
 /// How one entity is seen. Places are metres from the centre of its mesh's bounding sphere, in the mesh's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight {
-    /// Planes of the picture's four sides and one through the eye: positive is seen.
+    /// Planes of the picture's four sides and one through the eye. Points on the positive side are seen.
     planes: [Plane; 5],
     /// The eye, where backs are culled.
     eye: Option<Vec3>,
@@ -128,7 +128,7 @@ pub struct Sight {
 struct Plane {
     normal: Vec3,
     offset: f32,
-    /// What is beyond it by no more may be seen.
+    /// Distance beyond a plane up to which points may be seen.
     slack: f32,
 }
 
@@ -148,9 +148,9 @@ pub struct SightCamera {
 }
 
 impl Sight {
-    /// Of an entity whose mesh is `solid` or not, with a bounding radius in its own frame.
+    /// The view of an entity with a bounding radius in its own frame; `solid` says whether its mesh is solid.
     pub fn new(camera: &SightCamera, world_from_object: DMat4, radius_m: f64, solid: bool) -> Self {
-        // As the vertex shader has it.
+        // The vertex shader computes the same.
         let clip = (camera.clip_from_world * world_from_object).as_mat4();
         let [x, y, w] = [clip.row(0), clip.row(1), clip.row(3)].map(|row| row.as_dvec4());
         let [wide, high] = camera.size.map(|pixels| 1.0 + 2.0 * RIM_PX / f64::from(pixels.max(1)));
@@ -173,7 +173,7 @@ impl Sight {
         ];
         let eye = world_from_object.inverse().transform_point3(camera.eye);
         let scale = world_from_object.x_axis.truncate().length();
-        // Where the near plane cuts into it, its inside is seen.
+        // Where the near plane cuts the mesh, the camera sees its inside.
         let outside = eye.length() > (radius_m + camera.near_m / scale) * 1.001;
         Sight { planes, eye: (solid && outside).then(|| eye.as_vec3()), samples: camera.samples }
     }
@@ -185,7 +185,7 @@ impl Sight {
 
     /// Whether any of some triangles may be seen.
     pub fn may_see(&self, faces: &Faces) -> bool {
-        // Light at a pixel's centre beyond the rim of a grid is that of the nearest cell of it, which may be anywhere there.
+        // A pixel whose centre lies beyond the rim of a grid shows the light of the nearest cell, which may be any cell of the rim.
         if self.samples && faces.rim {
             return true;
         }
@@ -203,7 +203,7 @@ mod tests {
     use crate::bake::chunk::morton;
     use glam::dcamera::rh::{proj::vulkan, view};
 
-    /// What is called unseen is outside the picture or turned away, triangle by triangle, and much of what is gets called so.
+    /// Every triangle of an unseen run is outside the picture or turned away, and most runs of which that is true are found.
     #[test]
     fn nothing_that_is_seen_is_called_unseen() {
         let meshes = [

@@ -1,6 +1,13 @@
 // Light that a surface receives from sharp lights, past what is listed before each of them. The twin is src/sharp/twin.rs.
 #include "sub_light.glsl"
 
+// SwiftShader takes minutes and gigabytes to compile what others need unrolled.
+#if ROLLED
+#define EACH [[dont_unroll]]
+#else
+#define EACH [[unroll]]
+#endif
+
 #ifdef EDGES
 // Whether a shadow's edge lies no farther from the surface's point than the next vertex, and is so narrow that the light on vertices around
 // it does not carry it.
@@ -54,9 +61,9 @@ struct Rays {
 void outlines(Rays rays, NodeCell cell, vec4 weights[4], uint side, out vec4 distance, out vec4 away) {
     distance = vec4(0.0);
     away = -rays.offset;
-    [[unroll]] for (uint m = 0; m < 4; m++) {
+    EACH for (uint m = 0; m < 4; m++) {
         NearMap near = near_map(cell, m, side, rays.axes, rays.place - dot(rays.place, rays.middle) * rays.middle);
-        [[unroll]] for (uint k = 0; k < 4; k++) {
+        EACH for (uint k = 0; k < 4; k++) {
             vec2 found = weights[k][m] * outline(near, side, rays.along[k], rays.foot[k]);
             distance[k] += found.x;
             away[k] += found.y;
@@ -85,7 +92,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
     NodeCell cell = node_cell(first & 0x7fffffffu, rays.axes * rays.middle);
     vec4 weights[4];
     vec4 limit, tangent;
-    [[unroll]] for (uint k = 0; k < 4; k++) {
+    EACH for (uint k = 0; k < 4; k++) {
         vec2 part = part_place(light, block, k);
         rays.along[k] = along_axes(light, part);
         rays.offset[k] = dot(rays.place, rays.along[k]);
@@ -99,7 +106,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
 #if HALVES
     // Within the bounding sphere each half of the object counts as far as its outline lies between the point and the light.
     if (before && first > 0x7fffffffu) {
-        [[unroll]] for (uint k = 0; k < 4; k++) {
+        EACH for (uint k = 0; k < 4; k++) {
             float nearest = min(length(rays.place), length(rays.place + limit[k] * rays.along[k]));
             float deep = max(rays.offset[k], -rays.offset[k] - limit[k]);
             inside[k] = clamp((INSIDE_TO - nearest) / (INSIDE_TO - INSIDE_FROM), 0.0, 1.0)
@@ -116,7 +123,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
     do {
         vec4 distance, away, blocks, stands;
         outlines(rays, cell, weights, side, distance, away);
-        [[unroll]] for (uint k = 0; k < 4; k++) {
+        EACH for (uint k = 0; k < 4; k++) {
             blocks[k] = share_blocked(distance[k], away[k], tangent[k]);
             stands[k] = between(away[k], limit[k]);
 #ifdef EDGES
@@ -145,14 +152,14 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
 vec4 part_shares(Surface surface, SeenLight light, Block block) {
     mat3 axes = mat3(light.toward, light.across, light.down);
     vec4 share;
-    [[unroll]] for (uint k = 0; k < 4; k++) {
+    EACH for (uint k = 0; k < 4; k++) {
         vec2 part = part_place(light, block, k);
         vec3 along = along_axes(light, part);
         vec3 direction = axes * along;
         float sine = part_sine(light, block, part, along);
         float reach = reach_of(light, part, along) * surface.inverse_radius;
         float sum = 0.0;
-        [[unroll]] for (uint i = 0; i < FACINGS; i++) {
+        EACH for (uint i = 0; i < FACINGS; i++) {
             Facing facing = surface.facings[i];
             float cosine = part_cosine(dot(facing.normal, direction), sine);
 #if SELF

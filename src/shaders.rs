@@ -20,6 +20,7 @@ macro_rules! embedded {
 
 embedded!(
     "assemble.comp",
+    "blend.glsl",
     "blocked_share.glsl",
     "capture.frag",
     "capture.vert",

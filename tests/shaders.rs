@@ -42,9 +42,20 @@ fn sharp() -> Vec<ShaderPermutation> {
         let silhouette = SilhouetteOptions::default();
         let (texel, uniform, outlines, panels, self_shadows, halves) =
             (on(0), on(1), on(2), on(3), on(4), on(2) != on(3));
-        let cones = on(5);
-        SharpPermutation { texel, uniform, entity_limit: 48, silhouette, outlines, panels, halves, self_shadows, cones }
-            .row()
+        let (cones, rolled) = (on(5), on(5));
+        SharpPermutation {
+            texel,
+            uniform,
+            entity_limit: 48,
+            silhouette,
+            outlines,
+            panels,
+            halves,
+            self_shadows,
+            cones,
+            rolled,
+        }
+        .row()
     };
     (0..64).map(way).collect()
 }
@@ -62,6 +73,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         halves: outlines,
         self_shadows: true,
         cones: outlines,
+        rolled: outlines,
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].into_iter().flat_map(|display| ways.map(|sharp| DrawGrid::row(display, sharp)));

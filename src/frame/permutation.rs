@@ -90,6 +90,7 @@ pub(super) fn sharp(
         halves: buffers.meshes.iter().any(|m| m.silhouette.as_ref().is_some_and(|slot| slot.field.has_halves())),
         self_shadows: buffers.meshes.iter().any(|device_mesh| device_mesh.self_first != NONE),
         cones: scene.entities.iter().zip(forms).filter(|(entity, form)| entity.emits && form.is_sharp()).count() > 1,
+        rolled: false,
     })
 }
 

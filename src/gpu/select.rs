@@ -32,6 +32,11 @@ impl Candidate {
         self.kind == vk::PhysicalDeviceType::CPU
     }
 
+    /// Whether its compiler takes minutes for long shaders without loops.
+    pub fn wants_loops(&self) -> bool {
+        self.name.contains("SwiftShader")
+    }
+
     /// One word for the kind.
     pub fn kind_name(&self) -> &'static str {
         match self.kind {

@@ -55,6 +55,8 @@ pub struct SharpPermutation {
     /// Whether every point leaves out the occluders of its lists that stand outside a light's cone: in scenes of several sharp lights. Pixels
     /// of small_lights then take 0.63 of the time and vertices of teapot_lights 0.75; under one light vertices would take 1.2 times as long.
     pub cones: bool,
+    /// Whether loops over parts and maps stay loops: on SwiftShader, which compiles them unrolled in over 250 s and 8 GB, and rolled in 6 s.
+    pub rolled: bool,
 }
 
 impl SharpPermutation {
@@ -82,6 +84,7 @@ impl SharpPermutation {
             .define("HALVES", self.halves)
             .define("SELF", self.self_shadows)
             .define("CONES", self.cones)
+            .define("ROLLED", self.rolled)
             .define("NODE_CELLS", self.silhouette.cells)
             .define("MAP", self.silhouette.map_px);
         let numbers = [
@@ -113,10 +116,11 @@ impl SharpPermutation {
         numbers.into_iter().fold(row, |row, (name, value)| row.number(name, value)).self_visibility()
     }
 
-    /// The permutation, with storage blocks where the device's texel views cannot hold the scene's buffers.
+    /// The permutation with the loops that the device wants, and with storage blocks where its texel views cannot hold the scene's buffers.
     pub fn fitting(self, device: &Device, [nodes, cells, self_cells]: [&Buffer; 3]) -> Self {
         let fits = TexelView::fits(device, vk::Format::R32G32_UINT, self_cells.size_bytes);
-        SharpPermutation { texel: self.texel && fits && Self::fits_views(device, [nodes, cells]), ..self }
+        let texel = self.texel && fits && Self::fits_views(device, [nodes, cells]);
+        SharpPermutation { texel, rolled: device.info.wants_loops(), ..self }
     }
 
     /// Whether the device's texel views hold nodes and cells of silhouette fields.

@@ -116,6 +116,9 @@ impl Frame {
         }
         let [nodes, cells, _] = buffers.sharp();
         let by_pixel = options.shading != Some(Shading::Vertex) && SharpPermutation::fits_views(device, [nodes, cells]);
+        if options.shading == Some(Shading::Pixel) && sharp.is_some() && !by_pixel {
+            log::warn!("no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields");
+        }
         let by_pixel = sharp.as_ref().map(|sharp| sharp.permutation).filter(|_| by_pixel);
         let pixel = by_pixel.map(|_| PixelChains::new(device, scene, &buffers)).transpose()?;
         let place = options.lists.unwrap_or_else(|| Place::quicker(device, entity_count));

@@ -19,6 +19,9 @@ use crate::sh::rotation::Rotation;
 pub const WIDTH_LIMIT_PX: u32 = 16_384;
 /// Largest amount of memory in bytes that decoding an image may take.
 const DECODE_LIMIT_BYTES: u64 = 2 << 30;
+/// The same for an image of no bytes, and for each of its bytes, so that a short file cannot claim a large picture: deflate packs at most
+/// 1 032 bytes into one.
+const DECODE_LIMIT_BY_SIZE: [u64; 2] = [64 << 20, 4096];
 /// Nodes of the rule along a row's polar angle. SH times the sine are trigonometric polynomials of degree [`MAX_BANDS`]: for
 /// the worst picture, one row from pole to pole, the rule's error is below 1e-9, and for two rows it is below f64 precision.
 const ROW_NODES: usize = 16;
@@ -35,6 +38,16 @@ pub struct Equirect {
     coefficients: [Vec<f64>; 3],
 }
 
+/// Longest edge of the tiles that an OpenEXR file claims, in pixels: the decoder makes room for a tile before it looks at the picture's size.
+fn widest_tile(bytes: &[u8]) -> Option<u32> {
+    const NAME: &[u8] = b"tiles\0tiledesc\0";
+    const HEADER_BYTES: usize = 1 << 16;
+    let header = &bytes[..bytes.len().min(HEADER_BYTES)];
+    let at = header.windows(NAME.len()).position(|window| window == NAME)? + NAME.len() + 4;
+    let edges = header.get(at..at + 8)?;
+    edges.as_chunks::<4>().0.iter().map(|edge| u32::from_le_bytes(*edge)).max()
+}
+
 impl Equirect {
     /// Decodes an HDR, OpenEXR or PNG file and projects it.
     ///
@@ -48,10 +61,14 @@ impl Equirect {
         if !matches!(format, Some(ImageFormat::Hdr | ImageFormat::OpenExr | ImageFormat::Png)) {
             return Err(fail("not an HDR, EXR or PNG file".into()));
         }
+        if widest_tile(bytes).is_some_and(|edge| edge > WIDTH_LIMIT_PX) {
+            return Err(fail(format!("tiles of more than {WIDTH_LIMIT_PX} pixels along an edge")));
+        }
         let mut limits = Limits::default();
         limits.max_image_width = Some(WIDTH_LIMIT_PX);
         limits.max_image_height = Some(WIDTH_LIMIT_PX / 2);
-        limits.max_alloc = Some(DECODE_LIMIT_BYTES);
+        let [least, a_byte] = DECODE_LIMIT_BY_SIZE;
+        limits.max_alloc = Some((least + a_byte * bytes.len() as u64).min(DECODE_LIMIT_BYTES));
         reader.limits(limits);
         let decoded = reader.decode().map_err(|e| {
             let what = e.to_string().replace('\n', " ");

@@ -8,24 +8,28 @@ use rayon::prelude::*;
 use shadow_fields::asset::embedded;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::check::sharp as check;
+use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::frame::{Frame, Options};
 use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::truth::pixels::lit_points;
+use shadow_fields::truth::{RayMeshes, World};
 use std::f64::consts::PI;
 
-/// Rows of vertices of the floor, and vertices in a row.
+/// Rows of vertices of the fine floor, and vertices in a row.
 const SIDE: usize = 100;
+/// Size of pictures in pixels: 100 rows show the floor.
+const PICTURE: [u32; 2] = [100, 180];
 const BALL_RADIUS_M: f64 = 0.5;
 
-/// A floor of 100 x 100 vertices, a ball above it and a ball that shines.
-fn scene() -> Scene {
+/// A floor of that many cells along a side, a ball above it and a ball that shines.
+fn scene(cells: usize) -> Scene {
     let text = format!(
         "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n\
-        [[mesh]]\nname = \"floor\"\nplane = {{ size_m = 6, cells = {} }}\n\
+        [[mesh]]\nname = \"floor\"\nplane = {{ size_m = 6, cells = {cells} }}\n\
         [[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = {BALL_RADIUS_M}, subdivisions = 5 }}\n\
         [[entity]]\nmesh = \"floor\"\nalbedo = [1, 1, 1]\n\
         [[entity]]\nmesh = \"ball\"\nposition = [0, 0.8, 0]\n\
-        [[entity]]\nmesh = \"ball\"\nposition = [0, 3.5, 0]\nemission = [1, 1, 1]\n",
-        SIDE - 1
+        [[entity]]\nmesh = \"ball\"\nposition = [0, 3.5, 0]\nemission = [1, 1, 1]\n"
     );
     Scene::parse(&text, "test.toml".as_ref(), &embedded::read).unwrap()
 }
@@ -33,7 +37,8 @@ fn scene() -> Scene {
 fn frame(gpu: &common::Gpu, scene: &Scene) -> Frame {
     let base = check::sharp_options();
     let bake = shadow_fields::bake::Options { silhouette: Default::default(), ..base.bake };
-    Frame::new(&gpu.baker(), &Cache::new(None), scene, Options { bake, ..base }, &|_, _, _| ()).unwrap()
+    let options = Options { bake, shading: Some(Shading::Pixel), size: PICTURE, antialias: Antialias::None, ..base };
+    Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap()
 }
 
 fn ball(placement: &Placement) -> (DVec3, f64) {
@@ -77,7 +82,7 @@ fn lit(frame: &mut Frame, scene: &Scene, placements: &[Placement], every: usize,
 fn a_light_grows_without_a_step() {
     let Some(gpu) = gpu() else { return };
     const STEPS: usize = 160;
-    let scene = scene();
+    let scene = scene(SIDE - 1);
     let mut frame = frame(&gpu, &scene);
     let mut placements = scene.at(0.0);
     let (mut before, mut worst, mut sum, mut count) = ([Vec::new(), Vec::new()], [0.0_f64; 2], 0.0, 0);
@@ -109,20 +114,42 @@ fn a_light_grows_without_a_step() {
     assert!(found < 1.3 * truth && error < 0.02, "{found} against {truth}, error {error}");
 }
 
-/// 240 frames of slow motion of light and ball: rows of the floor change from frame to frame by at most 1.3 times as much as they should.
-#[test]
-fn nothing_flickers_in_slow_motion() {
-    let Some(gpu) = gpu() else { return };
-    let scene = scene();
-    let mut frame = frame(&gpu, &scene);
-    let mut placements = scene.at(0.0);
-    placements[2].scale = 0.25;
-    let (mut before, mut changes) = (None::<[Vec<f64>; 2]>, vec![[0.0_f64; 2]; SIDE]);
-    for number in 0..240 {
+/// Places of ball and light in 240 frames of slow motion.
+fn in_motion(scene: &Scene) -> impl Iterator<Item = Vec<Placement>> + '_ {
+    (0..240).map(|number| {
+        let mut placements = scene.at(0.0);
         let turn = f64::from(number) / 240.0 * PI;
         placements[1].position =
             DVec3::new(0.6 * turn.cos(), 0.8 + 0.1 * (2.0 * turn).sin(), 0.4 * turn.sin()).as_vec3();
         placements[2].position = DVec3::new(1.2 * turn.sin(), 3.2, 1.2 * turn.cos()).as_vec3();
+        placements[2].scale = 0.25;
+        placements
+    })
+}
+
+/// Sums of changes from frame to frame by rows: found, and exact.
+type RowChanges = Vec<[f64; 2]>;
+
+/// Rows change by at most 1.3 times as much as they should.
+fn assert_calm(what: &str, changes: &RowChanges) {
+    let moved: Vec<_> = changes.iter().filter(|[_, truth]| *truth > 0.0).collect();
+    let ratios: Vec<f64> = moved.iter().map(|[found, truth]| found / truth).collect();
+    let worst = ratios.iter().copied().fold(0.0, f64::max);
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    report(&format!(
+        "{} rows of {what} change {mean:.3} times as much as they should, the worst {worst:.3} times",
+        ratios.len()
+    ));
+    assert!(worst < 1.3, "{what}: {worst}");
+}
+
+#[test]
+fn vertices_do_not_flicker_in_slow_motion() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene(SIDE - 1);
+    let mut frame = frame(&gpu, &scene);
+    let (mut before, mut changes) = (None::<[Vec<f64>; 2]>, vec![[0.0_f64; 2]; SIDE]);
+    for placements in in_motion(&scene) {
         let now = lit(&mut frame, &scene, &placements, 7, 1500);
         if let Some(before) = before {
             for (i, (before, now)) in before.iter().zip(&now).enumerate() {
@@ -133,9 +160,44 @@ fn nothing_flickers_in_slow_motion() {
         }
         before = Some(now);
     }
-    let ratios: Vec<f64> = changes.iter().map(|[found, truth]| found / truth).collect();
-    let worst = ratios.iter().copied().fold(0.0, f64::max);
-    let mean = ratios.iter().sum::<f64>() / SIDE as f64;
-    report(&format!("rows change {mean:.3} times as much as they should on average, the worst {worst:.3} times"));
-    assert!(changes.iter().all(|[_, truth]| *truth > 0.0) && worst < 1.3, "{worst}");
+    assert!(changes.iter().all(|[_, truth]| *truth > 0.0));
+    assert_calm("vertices", &changes);
+}
+
+/// On a floor of few cells some pixels evaluate the light and others have it from vertices, and which do changes as things move.
+#[test]
+fn pixels_do_not_flicker_in_slow_motion() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene(24);
+    let mut frame = frame(&gpu, &scene);
+    let shapes = RayMeshes::new(&scene);
+    let [width, height] = PICTURE.map(|edge| edge as usize);
+    let mut before: Vec<Option<[f64; 2]>> = vec![None; width * height];
+    let mut changes = vec![[0.0_f64; 2]; height];
+    let mut evaluated = 0;
+    for placements in in_motion(&scene) {
+        let timings = frame.render(&placements, Some(f32::INFINITY)).unwrap();
+        evaluated += frame.pixels_evaluated(&timings).unwrap_or(1);
+        let picture = frame.picture();
+        let points = lit_points(&World::new(&scene, &shapes, &placements), PICTURE);
+        let floor = points.into_par_iter().filter(|(key, _)| key.entity == 0 && key.index % 3 == 0);
+        let now: Vec<(usize, [f64; 2])> = floor
+            .map(|(key, view)| {
+                let truth = exact(view.position, ball(&placements[1]), ball(&placements[2]), 1000);
+                (key.index, [f64::from(picture[3 * key.index]), truth])
+            })
+            .collect();
+        let mut seen = vec![None; before.len()];
+        for (pixel, values) in now {
+            if let Some([found, truth]) = before[pixel] {
+                let [a, b]: [f64; 2] = values;
+                let row = &mut changes[pixel / width];
+                *row = [row[0] + f64::abs(a - found), row[1] + f64::abs(b - truth)];
+            }
+            seen[pixel] = Some(values);
+        }
+        before = seen;
+    }
+    assert!(evaluated > 240, "no pixel evaluated the light");
+    assert_calm("pixels", &changes);
 }

@@ -2,7 +2,7 @@
 //!
 //! The test is conservative: it never calls a run unseen that a pixel shows. A run lies outside the picture where the sphere or the box
 //! around it lies outside by at least a pixel. Its triangles are backs where the cone of their normals says so for every point of that
-//! sphere, with a margin of [`BACK_RAD`]. Backs count as unseen only where the draw culls them, which it does for solid meshes
+//! sphere, with a margin of `BACK_RAD`. Backs count as unseen only where the draw culls them, which it does for solid meshes
 //! ([`Mesh::is_solid`]) with the eye outside, because at an outline the rasteriser decides whether a pixel shows a front or a back.
 
 use crate::asset::grid::Grid;

@@ -5,7 +5,6 @@ use super::plot::{AxisScale, Curve, Dot, Gap, Panel, Plot, PlotColumn, RowGroup,
 use super::rival::Comparison;
 use super::shadow_map::Filter;
 use super::sweep::{Point, pareto};
-use super::time_error::TimeErrorOutcome;
 use crate::text::three;
 
 /// Label of the axis of errors.
@@ -13,11 +12,11 @@ const ERROR: &str = "RMS error of radiosity against ray casting, relative";
 
 /// The plot of a case: every way to take the lights beside all rivals, at vertices and at pixels, after the settings of the merge with
 /// their Pareto front where the case was swept.
-pub fn case_plot(case: &str, outcome: &TimeErrorOutcome) -> Plot {
-    let points: Vec<&Point> = outcome.points.iter().filter(|p| p.case == case).collect();
+pub fn case_plot(case: &str, points: &[Point], comparisons: &[Comparison]) -> Plot {
+    let points: Vec<&Point> = points.iter().filter(|p| p.case == case).collect();
     let settings = (!points.is_empty()).then(|| settings(&points));
     let rivals = [Place::Vertices, Place::Pixels].into_iter().filter_map(|place| {
-        let of = outcome.comparisons.iter().filter(|c| c.case == case && c.place == place);
+        let of = comparisons.iter().filter(|c| c.case == case && c.place == place);
         rivals(&of.collect::<Vec<_>>())
     });
     Plot { title: format!("{case}: time against error"), panels: settings.into_iter().chain(rivals).collect() }

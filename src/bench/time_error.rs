@@ -163,7 +163,10 @@ fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &
     write(&folder.join("rival.csv"), &csv(&origin, &rivals))?;
     write(&folder.join("time-error.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
     for Budget { case, .. } in &outcome.budgets {
-        write(&folder.join(format!("time-error-{}.svg", dashed(case))), &case_plot(case, outcome).svg())?;
+        write(
+            &folder.join(format!("time-error-{}.svg", dashed(case))),
+            &case_plot(case, &outcome.points, &outcome.comparisons).svg(),
+        )?;
     }
     write(&folder.join("rival.svg"), &rival_plot(&outcome.comparisons).svg())?;
     let page = [

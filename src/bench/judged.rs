@@ -5,6 +5,7 @@ use super::budget::{Effort, Truth};
 use super::cases::Case;
 use super::figures::{Difference, Radiosity, difference, rms};
 use crate::truth::pixels::lit_points;
+use crate::truth::raycast::Distant;
 use crate::truth::world::VertexView;
 use crate::truth::{RayCast, RayMeshes, Vertex, World, receiver_vertices};
 use serde::Serialize;
@@ -40,28 +41,24 @@ pub struct Judged {
 
 impl Judged {
     /// The vertices of a truth.
-    pub fn vertices(case: &Case, truth: &Truth) -> Self {
-        let shapes = RayMeshes::new(&case.scene);
-        let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
-        let points: Vec<_> = receiver_vertices(&case.scene).into_iter().map(|v| (v, world.view(v))).collect();
+    pub fn vertices(world: &World<'_>, truth: &Truth) -> Self {
+        let points: Vec<_> = receiver_vertices(world.scene).into_iter().map(|v| (v, world.view(v))).collect();
         let at = |vertex| points.binary_search_by_key(vertex, |(key, _)| *key).expect("it is lit");
         let chosen = truth.vertices.iter().map(at).collect();
         Judged { place: Place::Vertices, points, chosen, t0: truth.t0.clone(), unit: truth.unit }
     }
 
     /// Pixels, chosen at random; `None` where the camera sees nothing that is lit.
-    pub fn pixels(bench: &Bench<'_>, case: &Case) -> Option<Self> {
+    pub fn pixels(bench: &Bench<'_>, world: &World<'_>, distant: Distant) -> Option<Self> {
         let effort = Effort::new(bench.quick);
-        let shapes = RayMeshes::new(&case.scene);
-        let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
-        let points = lit_points(&world, PIXEL_SIZE);
+        let points = lit_points(world, PIXEL_SIZE);
         let mut chosen: Vec<usize> = (0..points.len()).collect();
         fastrand::Rng::with_seed(bench.seed).shuffle(&mut chosen);
         chosen.truncate(effort.vertices);
         chosen.sort_unstable();
-        let cast = RayCast { rays: effort.t0_rays, seed: bench.seed, distant: case.distant, ..Default::default() };
+        let cast = RayCast { rays: effort.t0_rays, seed: bench.seed, distant, ..Default::default() };
         let mut judged = Judged { place: Place::Pixels, points, chosen, t0: Vec::new(), unit: 0.0 };
-        judged.t0 = judged.cast(&world, &cast);
+        judged.t0 = judged.cast(world, &cast);
         judged.unit = rms(&judged.t0);
         (judged.unit > 0.0).then_some(judged)
     }
@@ -73,9 +70,8 @@ impl Judged {
     }
 
     /// What the sky alone gives to the compared points.
-    pub fn sky(&self, bench: &Bench<'_>, case: &Case) -> Vec<Radiosity> {
-        let shapes = RayMeshes::new(&case.scene);
-        let mut world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
+    pub fn sky(&self, bench: &Bench<'_>, case: &Case, shapes: &RayMeshes) -> Vec<Radiosity> {
+        let mut world = World::new(&case.scene, shapes, &case.scene.at(case.time_s));
         world.lights.clear();
         let cast = RayCast { rays: SKY_RAYS, runs: 1, seed: bench.seed, distant: case.distant, ..Default::default() };
         self.cast(&world, &cast)

@@ -231,20 +231,21 @@ impl Merged {
 /// # Errors
 /// As [`Frame::new`] and [`Frame::render`].
 pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Vec<Comparison>> {
+    let shapes = RayMeshes::new(&case.scene);
+    let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));
     let mut comparisons = Vec::new();
-    for judged in std::iter::once(Judged::vertices(case, truth)).chain(Judged::pixels(bench, case)) {
-        comparisons.extend(compare_at(bench, case, &judged)?);
+    for judged in std::iter::once(Judged::vertices(&world, truth)).chain(Judged::pixels(bench, &world, case.distant)) {
+        comparisons.extend(compare_at(bench, case, &shapes, &judged)?);
     }
     Ok(comparisons)
 }
 
-fn compare_at(bench: &Bench<'_>, case: &Case, judged: &Judged) -> Result<Vec<Comparison>> {
+fn compare_at(bench: &Bench<'_>, case: &Case, shapes: &RayMeshes, judged: &Judged) -> Result<Vec<Comparison>> {
     let placements = case.scene.at(case.time_s);
     let mut merged = Merged::all(bench, case, judged.place)?;
-    let shapes = RayMeshes::new(&case.scene);
     let rays: &[u32] = if bench.quick { &[1, 4, 16, 64, 256] } else { &[1, 4, 16, 64, 256, 1024, 4096] };
     let share = judged.points.len() as f64 / judged.chosen.len() as f64;
-    let mut maps = Maps::new(bench, case, judged);
+    let mut maps = Maps::new(bench, case, shapes, judged);
     let mut rival_walls = vec![Vec::new(); rays.len()];
     let mut found: Vec<Vec<Radiosity>> = vec![Vec::new(); rays.len()];
     let mut redrawn = Vec::new();
@@ -261,7 +262,7 @@ fn compare_at(bench: &Bench<'_>, case: &Case, judged: &Judged) -> Result<Vec<Com
             }
             let cast = RayCast { rays, runs: 1, seed: bench.seed + 77, distant: case.distant, ..Default::default() };
             let started = Instant::now();
-            let world = World::new(&case.scene, &shapes, &placements);
+            let world = World::new(&case.scene, shapes, &placements);
             found[index] = judged.cast(&world, &cast);
             rival_walls[index].push(started.elapsed().as_secs_f64() * 1e3 * share);
         }
@@ -293,12 +294,12 @@ struct Maps<'c> {
 }
 
 impl<'c> Maps<'c> {
-    fn new(bench: &'c Bench<'c>, case: &'c Case, judged: &'c Judged) -> Self {
+    fn new(bench: &'c Bench<'c>, case: &'c Case, shapes: &RayMeshes, judged: &'c Judged) -> Self {
         let sizes = || MAP_PX.into_iter().skip(usize::from(bench.quick)).step_by(1 + usize::from(bench.quick));
         let all = [Filter::Hard, Filter::Pcss].into_iter().flat_map(|filter| sizes().map(move |px| (filter, px)));
         let all = all.filter(|_| maps_apply(&case.scene));
         let measured: Vec<_> = all.map(|(filter, px)| (filter, px, Vec::new(), Vec::new())).collect();
-        let sky = if measured.is_empty() { Vec::new() } else { judged.sky(bench, case) };
+        let sky = if measured.is_empty() { Vec::new() } else { judged.sky(bench, case, shapes) };
         Maps { bench, case, judged, sky, measured }
     }
 

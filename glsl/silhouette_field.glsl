@@ -36,10 +36,12 @@ uvec2 around(vec2 place, uint first, uint px, out vec4 weights) {
     return cell_at(first + uint(low.y) * (px - 1) + uint(low.x));
 }
 
-// A cell of the node grid, for directions near one another.
+// A cell of the node grid, for directions near one in the middle.
 struct NodeCell {
     uint face;
     vec2 low;
+    vec2 middle; // place of the direction in the middle, 0 to 1
+    vec2 eased;  // by how much other directions count, 0 at the cell's border
     uint first; // quad of its first node
 };
 
@@ -51,14 +53,20 @@ vec2 among_cells(uint face, vec3 toward) {
 NodeCell node_cell(uint first_node, vec3 toward) {
     NodeCell cell;
     cell.face = cube_face(toward);
-    cell.low = clamp(floor(among_cells(cell.face, toward)), 0.0, NODE_CELLS - 1.0);
+    vec2 at = among_cells(cell.face, toward);
+    cell.low = clamp(floor(at), 0.0, NODE_CELLS - 1.0);
+    cell.middle = at - cell.low;
+    // On a cube's edge the lines of both its faces have a kink: so neither axis counts there.
+    vec2 border = min(at, NODE_CELLS - at);
+    cell.eased = clamp(min(min(cell.middle, 1.0 - cell.middle), border.yx) / EASED, 0.0, 1.0);
     cell.first = first_node + 3 * ((cell.face * (NODE_CELLS + 1) + uint(cell.low.y)) * (NODE_CELLS + 1) + uint(cell.low.x));
     return cell;
 }
 
-// Bilinear weights of a cell's nodes for a direction in the cell or around it.
+// Bilinear weights of a cell's nodes for a direction near the one in the middle. They have no step where the cell changes.
 vec4 node_weights(NodeCell cell, vec3 toward) {
-    vec2 f = clamp(among_cells(cell.face, toward) - cell.low, -BEYOND, 1.0 + BEYOND);
+    vec2 off = among_cells(cell.face, toward) - cell.low - cell.middle;
+    vec2 f = clamp(cell.middle + cell.eased * off, -BEYOND, 1.0 + BEYOND);
     return vec4(1.0 - f.x, f.x, 1.0 - f.x, f.x) * vec4(1.0 - f.yy, f.yy);
 }
 

@@ -11,7 +11,7 @@ use crate::bake::silhouette::SilhouetteOptions;
 use crate::error::Result;
 use crate::field::lattice::CELL_WARP;
 use crate::field::silhouette::{DEEP, INSIDE, LEAST_PENUMBRA, NEAREST, REACH};
-use crate::field::silhouette_nodes::{BEYOND, LEAST_AHEAD};
+use crate::field::silhouette_nodes::{BEYOND, EASED, LEAST_AHEAD};
 use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, STRIP, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT};
@@ -105,6 +105,7 @@ impl SharpPermutation {
             ("CORNER", CORNER),
             ("STRIP", STRIP),
             ("BEYOND", BEYOND),
+            ("EASED", EASED),
             ("LEAST_AHEAD", LEAST_AHEAD),
             ("TURNED_X", TURNED_BY[0]),
             ("TURNED_Y", TURNED_BY[1]),

@@ -68,9 +68,10 @@ void main() {
     surface.step = place.w;
     surface.facings[0] = facing_of(receiver, vertex_quad(at + 1).xyz, 1.0, cluster.self_first, v);
     vec4 sum = soft_at(cluster.radiosity_first + v);
+    float soft = dot(sum.rgb, vec3(1.0)), albedo = dot(receiver.albedo.rgb, vec3(1.0));
     if (cluster.sharp_count > 0) {
         sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo.rgb;
     }
-    sum.w = edge ? 1.0 : 0.0;
+    sum.w = EDGE_STEPS * EDGE_STEPS * albedo * missed > albedo * open_light + soft ? 1.0 : 0.0;
     radiosity[cluster.radiosity_first + v] = sum;
 }

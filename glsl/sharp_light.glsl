@@ -9,9 +9,11 @@
 #endif
 
 #ifdef EDGES
-// Whether a shadow's edge lies no farther from the surface's point than the next vertex, and is so narrow that the light on vertices around
-// it does not carry it.
-bool edge = false;
+// Vertices carry a shadow's edge the worse, the narrower its penumbra is beside the way to the next vertex, with the square of the two's
+// ratio, and the more light it takes away.
+float finest;       // that ratio for the narrowest penumbra of the light at hand that comes as near as the next vertex, or 0
+float missed = 0.0; // most, over all lights, of the ratio's square times the light
+float open_light = 0.0; // of all lights, nothing between
 #endif
 
 // Which way a vertex faces, and what its own mesh leaves of its view.
@@ -72,10 +74,17 @@ void outlines(Rays rays, NodeCell cell, vec4 weights[4], uint side, out vec4 dis
 }
 
 #ifdef EDGES
-void mark_edge(float distance, float away, float limit, float tangent, float step) {
-    float penumbra = max(away, NEAREST) * tangent;
+// `penumbra`: half its width from a part; `parts`: how many times as wide the light is.
+void find_edge(float distance, float away, float limit, float penumbra, float parts, float step) {
     bool stands = away > -NEAREST - step && away < limit + NEAREST + step;
-    edge = edge || stands && abs(distance) < penumbra + EDGE_REACH * step && penumbra < EDGE_STEPS * step;
+    bool near = stands && abs(distance) < penumbra + EDGE_REACH * step;
+    finest = max(finest, near ? min(step / (parts * penumbra), MOST_STEPS) : 0.0);
+}
+
+void add_open(float irradiance, Entity shining) {
+    float light = irradiance * dot(shining.emission.rgb, vec3(1.0));
+    open_light += light;
+    missed = max(missed, finest * finest * light);
 }
 #endif
 
@@ -128,7 +137,8 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
             stands[k] = between(away[k], limit[k]);
 #ifdef EDGES
             if (before && (side == WHOLE || inside[k] > 0.0)) {
-                mark_edge(distance[k], away[k], limit[k], tangent[k], surface.step * occluder.centre.w);
+                float penumbra = max(away[k], NEAREST) * max(tangent[k], LEAST_PENUMBRA);
+                find_edge(distance[k], away[k], limit[k], penumbra, inversesqrt(block.area), surface.step * occluder.centre.w);
             }
 #endif
         }
@@ -243,6 +253,10 @@ vec3 open_sum(Surface surface, uint first, uint count) {
                 b++;
             } while (b <= last_block(light));
             sum += irradiance * shining.emission.rgb;
+#ifdef EDGES
+            finest = 0.0;
+            add_open(irradiance, shining);
+#endif
         }
     } while (i < count);
     return sum;
@@ -281,10 +295,17 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
             SeenLight light = light_from(surface, shining);
             uint b = first_block(light);
             float irradiance = 0.0;
+#ifdef EDGES
+            float open = 0.0;
+            finest = 0.0;
+#endif
             uint j;
             do {
                 Block block = block_of(light, b);
                 vec4 share = part_shares(surface, light, block);
+#ifdef EDGES
+                open += dot(share, vec4(1.0));
+#endif
                 j = i;
                 uint packed = entry_at(first + j);
                 do {
@@ -306,6 +327,9 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
             } while (b <= last_block(light));
             i = j + 1;
             sum += irradiance * shining.emission.rgb;
+#ifdef EDGES
+            add_open(open, shining);
+#endif
         }
     } while (i < count);
     return sum;

@@ -77,12 +77,13 @@ void main() {
             here = float(y) + (beside ? 0.5 : 0.0);
             depth = depth_of(a, b);
         }
-        // Rows between the point before and this one belong to the nearer of the two.
+        // Rows between the point before and this one belong to the nearer of the two. The mean of points that are equally near makes
+        // mirrored views mirrored maps.
         while (row < MAP && row_position(row) < here) {
             float at_row = row_position(row);
-            bool before = at_row - last < here - at_row;
-            float distance = min(before ? at_row - last : here - at_row, NOTHING);
-            uint found = packHalf2x16(vec2(distance, before ? last_depth : depth));
+            float before = at_row - last, behind = here - at_row;
+            float found_depth = before < behind ? last_depth : before > behind ? depth : 0.5 * (last_depth + depth);
+            uint found = packHalf2x16(vec2(min(min(before, behind), NOTHING), found_depth));
             nearest[(view * MAP + row) * COLUMN_COUNT + column] = found;
             row++;
         }
@@ -96,16 +97,15 @@ uint texel(uint view, ivec2 at) {
     vec2 pixel = 2.0 * halves[push.map_first + view] / float(VIEW);
     vec2 place = vec2(row_position(at.x), row_position(at.y));
     float least = 3e38;
-    float depth = 0.0;
+    vec2 depth = vec2(0.0); // sum over the nearest points, and their number
     uint first = (view * MAP + uint(at.y)) * COLUMN_COUNT;
     for (int column = 0; column < COLUMN_COUNT; column++) {
         vec2 found = unpackHalf2x16(nearest[first + column]);
         vec2 to = vec2(0.5 * float(column + 1) - place.x, found.x) * pixel;
         float squared = dot(to, to);
-        if (squared < least) {
-            least = squared;
-            depth = found.y;
-        }
+        depth = squared < least ? vec2(0.0) : depth;
+        least = min(least, squared);
+        depth += squared == least ? vec2(found.y, 1.0) : vec2(0.0);
     }
     // Inside where most of the pixels around the texel's centre are covered; 0 where as many are as are not.
     ivec2 low = ivec2(floor(place - 0.25));
@@ -117,7 +117,7 @@ uint texel(uint view, ivec2 at) {
     inside += covered(seen(corner + ivec2(low.x, high.y))) ? 1 : -1;
     inside += covered(seen(corner + high)) ? 1 : -1;
     float signed_distance = sqrt(least) * float(sign(inside));
-    vec2 scaled = clamp(vec2(signed_distance / REACH, depth), -1.0, 1.0) * 127.0;
+    vec2 scaled = clamp(vec2(signed_distance / REACH, depth.x / depth.y), -1.0, 1.0) * 127.0;
     ivec2 bytes = ivec2(roundEven(scaled)) & 0xff;
     return uint(bytes.x | bytes.y << 8);
 }

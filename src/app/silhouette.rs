@@ -31,7 +31,8 @@ pub fn bake(global: &Global, (mesh, mesh_file): (&Mesh, &Path), out: &Path, opti
         let (file, edge, maps) = (output::shown(out), field.header.map_px, field.header.map_count());
         let (triangles, bytes) = (mesh.triangles.len(), field.payload().len());
         output::say(format!(
-            "{file}: {maps} maps of {edge}x{edge}, {triangles} triangles, {bytes} bytes, {seconds:.2} s"
+            "{file}: {maps} maps of {edge}x{edge} ({} captured), {triangles} triangles, {bytes} bytes, {seconds:.2} s",
+            report.samples - report.turned
         ));
     }
     Ok(())

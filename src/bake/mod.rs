@@ -32,6 +32,7 @@ pub mod self_visibility;
 pub mod silhouette;
 pub mod snapshot;
 pub mod surface;
+pub mod symmetric_maps;
 pub mod symmetric_samples;
 pub mod symmetry;
 pub mod triangles;

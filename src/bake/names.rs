@@ -134,7 +134,7 @@ mod tests {
         let shortcuts = |shortcuts| Options { shortcuts, ..base };
         let all = [true, true, true, true, false];
         let silhouettes = |silhouette| Options { silhouette, ..base };
-        let SilhouetteOptions { cells, map_px, view_px, levels: _ } = silhouette;
+        let SilhouetteOptions { cells, map_px, view_px, levels: _, symmetry: _ } = silhouette;
         let outlines = [false, false, false, false, true];
         let flipped: Vec<(&str, Options, [bool; 5])> = vec![
             ("bands", Options { bands: bands + 1, ..base }, [true, true, true, false, false]),
@@ -149,6 +149,7 @@ mod tests {
             ("map_px", silhouettes(SilhouetteOptions { map_px: 2 * map_px, ..silhouette }), outlines),
             ("levels", Options { levels: !levels, ..base }, [true, false, true, true, false]),
             ("levels of outlines", silhouettes(SilhouetteOptions { levels: false, ..silhouette }), outlines),
+            ("symmetry of outlines", silhouettes(SilhouetteOptions { symmetry: false, ..silhouette }), outlines),
             ("view_px", silhouettes(SilhouetteOptions { view_px: 2 * view_px, ..silhouette }), outlines),
         ];
         assert_ne!(lattice, flipped[3].1.lattice);

@@ -6,9 +6,9 @@ use std::time::Duration;
 /// Where the time of a bake went.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct BakeReport {
-    /// Number of samples that stand at their own place.
+    /// Number of samples that stand at their own place, or of maps of a silhouette field.
     pub samples: u32,
-    /// Number of these that were not captured but turned from others (see [`super::symmetric_samples`]).
+    /// Number of these that were not captured but turned from others (see [`super::symmetric_samples`] and [`super::symmetric_maps`]).
     pub turned: u32,
     /// Number of cube faces that were drawn: six for each captured sample where none is left out.
     pub faces: u32,

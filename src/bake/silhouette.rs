@@ -5,6 +5,7 @@
 //! depth a pixel; two dispatches reduce every view to its map.
 
 use super::capture::unit_positions;
+use super::symmetric_maps;
 use super::{BakeReport, Progress, hash_text, levels};
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
@@ -42,12 +43,14 @@ pub struct SilhouetteOptions {
     pub view_px: u32,
     /// Whether a large mesh is drawn with fewer triangles, which miss it by a share of a view's pixel (see [`super::levels`]).
     pub levels: bool,
+    /// Whether maps of a symmetric mesh are copied from those that a symmetry moves onto them.
+    pub symmetry: bool,
 }
 
 impl Default for SilhouetteOptions {
     /// 193 maps of 32 x 32 texels: 389 KiB, and 193 KiB for the halves of a mesh that is not convex.
     fn default() -> Self {
-        SilhouetteOptions { cells: 8, map_px: 32, view_px: 128, levels: true }
+        SilhouetteOptions { cells: 8, map_px: 32, view_px: 128, levels: true, symmetry: true }
     }
 }
 
@@ -60,6 +63,7 @@ pub fn silhouette_header(mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteH
         view_px: options.view_px,
         half_px: if mesh.is_convex() { 0 } else { options.map_px / 2 },
         level_pixels: levels::texels(mesh, options.levels),
+        symmetry: options.symmetry,
         centre_m: centre.to_array(),
         radius_m,
         mesh: mesh.name.clone(),
@@ -246,13 +250,17 @@ impl Silhouette {
     }
 }
 
+/// Edge of the smallest pixel of all views, in r.
+fn smallest_pixel(header: &SilhouetteHeader, frames: &[Frame]) -> f64 {
+    let edges = frames.iter().map(|frame| 2.0 * frame.half.min_element());
+    edges.fold(f64::INFINITY, f64::min) / f64::from(header.view_px)
+}
+
 /// The triangles that all views show. With levels of detail they miss the mesh by a share of the smallest pixel.
-fn drawn_triangles<'m>(mesh: &'m Mesh, header: &SilhouetteHeader, frames: &[Frame]) -> Result<Cow<'m, [[u32; 3]]>> {
+fn drawn_triangles<'m>(mesh: &'m Mesh, header: &SilhouetteHeader, pixel: f64) -> Result<Cow<'m, [[u32; 3]]>> {
     if header.level_pixels == 0.0 {
         return Ok(Cow::Borrowed(&mesh.triangles));
     }
-    let pixel = frames.iter().map(|frame| 2.0 * frame.half.min_element()).fold(f64::INFINITY, f64::min)
-        / f64::from(header.view_px);
     levels::within(mesh, header.level_pixels * pixel).map(Cow::Owned)
 }
 
@@ -269,20 +277,23 @@ pub fn bake_silhouette(
     let started = Instant::now();
     let header = silhouette_header(mesh, options);
     header.validate()?;
-    let frames = frames(mesh, options.cells);
-    let triangles = drawn_triangles(mesh, &header, &frames)?;
+    let mut frames = frames(mesh, options.cells);
+    let pixel = smallest_pixel(&header, &frames);
+    let triangles = drawn_triangles(mesh, &header, pixel)?;
+    let plan = if options.symmetry { symmetric_maps::plan(mesh, &frames, pixel) } else { vec![None; frames.len()] };
+    let captured: Vec<Frame> = frames.iter().zip(&plan).filter(|(_, c)| c.is_none()).map(|(frame, _)| *frame).collect();
     // Sides whose maps have the same size share the pass and its buffers.
     let sizes: &[&[Side]] =
         if header.half_px > 0 { &[&[Side::Whole], &[Side::Far, Side::Near]] } else { &[&[Side::Whole]] };
-    let all = (frames.len() * sizes.iter().map(|sides| sides.len()).sum::<usize>()) as u32;
+    let all = (captured.len() * sizes.iter().map(|sides| sides.len()).sum::<usize>()) as u32;
     let (mut maps, mut done, mut report) = (Vec::new(), 0, BakeReport::default());
     for sides in sizes {
         let map_px = header.edge_px(sides[0]) as u32;
         let pass = Silhouette::new(device, library, map_px, options.view_px * map_px / options.map_px)?;
-        let buffers = SilhouetteBuffers::new(device, (mesh, &triangles), &frames, map_px)?;
+        let buffers = SilhouetteBuffers::new(device, (mesh, &triangles), &captured, map_px)?;
         for &side in *sides {
             let mut first = 0;
-            for batch in frames.chunks(pass.capacity()) {
+            for batch in captured.chunks(pass.capacity()) {
                 let mut commands = Commands::new(device, "silhouette bake")?;
                 commands.pass("silhouette", |c| pass.record(c, &buffers, (batch, side), first))?;
                 report.add(&commands.submit()?);
@@ -290,26 +301,18 @@ pub fn bake_silhouette(
                 done += batch.len() as u32;
                 progress(done, all);
             }
-            maps.push(buffers.maps.download::<u8>(frames.len() * header.texel_bytes(side))?);
+            maps.push(buffers.maps.download::<u8>(captured.len() * header.texel_bytes(side))?);
         }
     }
     report.samples = frames.len() as u32;
+    report.turned = (frames.len() - captured.len()) as u32;
+    for (map, copied) in plan.iter().enumerate() {
+        if let Some(copied) = copied {
+            frames[map] = copied.frame(&frames[map], &frames[copied.of]);
+        }
+    }
     report.total = started.elapsed();
-    Ok((SilhouetteField::new(header, joined(&frames, &maps))?, report))
-}
-
-/// The payload of a field: each map's rectangle before the texels of its sides.
-fn joined(frames: &[Frame], sides: &[Vec<u8>]) -> Vec<u8> {
-    let rectangle = |frame: &Frame| [frame.centre.x, frame.centre.y, frame.half.x, frame.half.y].map(|n| n as f32);
-    let map = |(index, frame): (usize, &Frame)| {
-        let numbers = rectangle(frame).into_iter().flat_map(f32::to_le_bytes);
-        let texels = sides.iter().flat_map(move |side| {
-            let bytes = side.len() / frames.len();
-            side[index * bytes..][..bytes].iter().copied()
-        });
-        numbers.chain(texels).collect::<Vec<u8>>()
-    };
-    frames.iter().enumerate().flat_map(map).collect()
+    Ok((SilhouetteField::new(header.clone(), symmetric_maps::joined(&header, &frames, &plan, &maps))?, report))
 }
 
 /// The CPU twin of the pass for one side of a map, in f64 and by plain search: bytes of distance and depth, row by row.
@@ -332,12 +335,15 @@ pub fn silhouette_twin(mesh: &Mesh, (frame, side): (&Frame, Side), map_px: u32, 
         let at = |i: u32| (f64::from(i) + 0.5) * f64::from(view_px) / f64::from(map_px);
         let place = DVec2::new(at(i % map_px), at(i / map_px));
         let squared = |p: &DVec2| ((*p - place) * pixel).length_squared();
-        let nearest = points.iter().min_by(|a, b| squared(&a.0).total_cmp(&squared(&b.0)));
+        let least = points.iter().map(|(p, _)| squared(p)).fold(f64::INFINITY, f64::min);
+        // Views of a symmetric mesh have points that are equally near.
+        let nearest = points.iter().filter(|(p, _)| squared(p) <= least * (1.0 + 1e-9)).map(|(_, depth)| *depth);
+        let (sum, count) = nearest.fold((0.0, 0.0), |(sum, count), depth| (sum + depth, count + 1.0));
         let around =
             [-0.25, 0.25].map(|dy| [-0.25, 0.25].map(|dx| (place + DVec2::new(dx, dy)).floor().as_usizevec2()));
         let inside: i32 = around.iter().flatten().map(|p| if view[p.y * px + p.x].is_some() { 1 } else { -1 }).sum();
-        let distance = nearest.map_or(f64::MAX, |(p, _)| squared(p).sqrt()) * f64::from(inside.signum());
-        [encode(distance, REACH), encode(nearest.map_or(0.0, |(_, depth)| *depth), 1.0)]
+        let distance = least.sqrt().min(f64::MAX) * f64::from(inside.signum());
+        [encode(distance, REACH), encode(sum / f64::max(count, 1.0), 1.0)]
     };
     (0..map_px * map_px).into_par_iter().map(texel).collect()
 }

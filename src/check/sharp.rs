@@ -68,7 +68,7 @@ emission = [9, 9, 7]
 /// A small frame with sharp lights.
 pub fn sharp_options() -> Options {
     let base = options();
-    let silhouette = SilhouetteOptions { cells: 4, map_px: 16, view_px: 64, levels: false };
+    let silhouette = SilhouetteOptions { cells: 4, map_px: 16, view_px: 64, levels: false, symmetry: true };
     Options { lights: Lights::Sharp, bake: crate::bake::Options { silhouette, ..base.bake }, ..base }
 }
 

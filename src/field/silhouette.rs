@@ -63,9 +63,12 @@ impl Frame {
         Frame { direction, axes, centre: stored((low + high) / 2.0), half: stored((high - low) / 2.0 + MARGIN) }
     }
 
+    /// Turns and mirrors of a cube move the axes of a direction onto those of the moved direction, but for their order and signs: unless
+    /// two of the direction's parts are equally small.
     fn axes_of(direction: DVec3) -> [DVec3; 2] {
-        let (a, b) = direction.any_orthonormal_pair();
-        [a, b]
+        let across = DVec3::AXES[direction.abs().min_position()];
+        let across = (across - across.dot(direction) * direction).normalize();
+        [across, direction.cross(across)]
     }
 
     /// Place of a point on the map, -1 to 1 from edge to edge of the rectangle.

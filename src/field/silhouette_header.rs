@@ -57,6 +57,8 @@ pub struct SilhouetteHeader {
     /// Share of a view's pixel by which what was drawn may miss the mesh; 0 where all of its triangles were drawn.
     #[serde(default, skip_serializing_if = "super::is_zero")]
     pub level_pixels: f64,
+    /// Whether maps of a symmetric mesh were copied from those that a symmetry moves onto them.
+    pub symmetry: bool,
     /// Centre of the bounding sphere in the mesh's own frame, metres.
     pub centre_m: [f32; 3],
     /// Radius of the bounding sphere, metres.

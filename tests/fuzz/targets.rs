@@ -303,6 +303,7 @@ fn outline_field() -> SilhouetteField {
         view_px: 16,
         half_px: 4,
         level_pixels: 0.0,
+        symmetry: true,
         centre_m: [0.0; 3],
         radius_m: 1.0,
         mesh: "m".into(),

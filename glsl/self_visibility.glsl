@@ -1,5 +1,5 @@
 // What a mesh leaves of a light on its own vertices. The twin is src/field/self_visibility.rs. The shader that includes this, after
-// self_frame.glsl and blocked_share.glsl, defines
+// self_frame.glsl, blocked_share.glsl and bytes.glsl, defines
 //   uvec2 self_cell(uint i): cell i of all, as `cells` in that file makes them,
 // and the macros SELF_SIDE, SELF_RIM, SELF_LIMIT, SELF_STEPS and SELF_RAMP (`ShaderPermutation::self_visibility`).
 
@@ -10,9 +10,9 @@ vec2 self_lookup(uint first_cell, mat3 frame, vec3 direction) {
     vec2 cell = min(floor(place), float(SELF_SIDE - 2));
     vec2 within = place - cell;
     uvec2 words = self_cell(first_cell + uint(cell.y) * uint(SELF_SIDE - 1) + uint(cell.x));
-    vec4 angles = unpackSnorm4x8(words.x), distances = unpackUnorm4x8(words.y);
+    vec4 angles = signed_bytes(words.x), distances = unsigned_bytes(words.y);
     vec4 row = mix(vec4(angles.xz, distances.xz), vec4(angles.yw, distances.yw), within.x);
-    return mix(row.xz, row.yw, within.y) * vec2(SELF_LIMIT, 255.0 / SELF_STEPS);
+    return mix(row.xz, row.yw, within.y) * vec2(SELF_LIMIT / 127.0, 1.0 / SELF_STEPS);
 }
 
 // Share of a round light of angular radius `radius` (radians), `distance` away (in r), that the mesh leaves free; `first_cell` is the

@@ -1,8 +1,9 @@
 // A lookup in a silhouette field: what an object blocks of a small round light. The twin is src/field/silhouette.rs, with the same names.
 // NODE_CELLS: cells along a face of the node grid; MAP: texels along a map of the whole object, half as many along those of its halves.
 //
-// Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the map, and half edges of the map's
-// rectangle, its first cell, and -1 where the map is seen from behind. Cells are the four texels around a point between them.
+// Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the map, in texels from the middle of the
+// first; and edges of a texel in r, the map's first cell, and -1 where the map is seen from behind. Cells are the four texels around a point
+// between them: signed bytes of distance and of depth.
 #if TEXEL
 layout(binding = NODE_BINDING) uniform textureBuffer nodes;
 vec4 node_quad(uint i) {
@@ -24,16 +25,21 @@ uvec2 cell_at(uint i) {
 #endif
 #include "cube.glsl"
 #include "blocked_share.glsl"
+#include "bytes.glsl"
 
 const uint WHOLE = 0, FAR = 1, NEAR = 2; // sides of an object: all of it, what lies beyond its centre along a direction, and before it
 
-// The cell around a place on a map (-1 to 1 from edge to edge) of so many texels, and the weights of its corners.
-uvec2 around(vec2 place, uint first, uint px, out vec4 weights) {
-    vec2 at = clamp(0.5 * (place + 1.0) * px - 0.5, 0.0, px - 1.0);
-    vec2 low = min(floor(at), px - 2.0);
-    vec2 f = at - low;
+// The cell around a place on a map whose last texel is `last`, and the weights of its corners. The place lies between texels.
+uvec2 around(vec2 place, uint first, float last, out vec4 weights) {
+    vec2 low = min(floor(place), last - 1.0);
+    vec2 f = place - low;
     weights = vec4(1.0 - f.x, f.x, 1.0 - f.x, f.x) * vec4(1.0 - f.yy, f.yy);
-    return cell_at(first + uint(low.y) * (px - 1) + uint(low.x));
+    return cell_at(first + uint(low.y * last + low.x));
+}
+
+// Between four signed bytes: -1 to 1.
+float between(uint bytes, vec4 weights) {
+    return dot(signed_bytes(bytes), weights) * (1.0 / 127.0);
 }
 
 // A cell of the node grid, for directions near one in the middle.
@@ -74,15 +80,12 @@ vec4 node_weights(NodeCell cell, vec3 toward) {
 struct NearMap {
     float sign;      // -1 where the map is seen from behind
     uint first_cell;
-    vec2 half_edges; // of its rectangle, in r
-    vec2 centre;     // place of the sphere's centre
-    mat3x2 steps;    // on the map, along each of the axes that directions are given in, for a way of r
+    float last;      // texel of a row
+    vec2 texel;      // its edges, in r
+    vec2 centre;     // place of the sphere's centre, in texels
+    mat3x2 steps;    // texels along each of the axes that directions are given in, for a way of r
     float depth;     // of the outline along the direction in the middle
 };
-
-uint map_px(uint side) {
-    return side == WHOLE ? MAP : MAP / 2;
-}
 
 // The map of a side at corner k of a cell. `axes`: those that directions are given in, in the object's frame; `foot`: by those axes, in r, the place
 // on the ray in the middle that is nearest to the sphere's centre. Places on rays are given by such feet, because they stay small where
@@ -98,15 +101,19 @@ NearMap near_map(NodeCell cell, uint k, uint side, mat3 axes, vec3 foot) {
         bool far = (side == FAR) == (map.w > 0.0);
         near.first_cell += (MAP - 1) * (MAP - 1) + (far ? 0 : (MAP / 2 - 1) * (MAP / 2 - 1));
     }
-    near.half_edges = map.xy;
-    near.centre = vec2(right.w, down.w);
+    float scale = side == WHOLE ? 1.0 : 0.5; // texels of a half's map are twice as large
+    near.last = float(MAP) * scale - 1.0;
+    near.texel = map.xy / scale;
+    near.centre = (vec2(right.w, down.w) + 0.5) * scale - 0.5;
+    right.xyz *= scale;
+    down.xyz *= scale;
     near.steps[0] = vec2(dot(right.xyz, axes[0]), dot(down.xyz, axes[0]));
     near.steps[1] = vec2(dot(right.xyz, axes[1]), dot(down.xyz, axes[1]));
     near.steps[2] = vec2(dot(right.xyz, axes[2]), dot(down.xyz, axes[2]));
     // The outline lies off the centre's plane, at this depth: so the map sees it elsewhere.
     vec4 weights;
-    uvec2 around_it = around(near.centre + near.steps * foot, near.first_cell, map_px(side), weights);
-    near.depth = near.sign * dot(unpackSnorm4x8(around_it.y), weights);
+    vec2 place = clamp(near.centre + near.steps * foot, 0.0, near.last);
+    near.depth = near.sign * between(around(place, near.first_cell, near.last, weights).y, weights);
     return near;
 }
 
@@ -115,11 +122,12 @@ NearMap near_map(NodeCell cell, uint k, uint side, mat3 axes, vec3 foot) {
 // point. Object's frame, in r.
 vec2 outline(NearMap near, uint side, vec3 along, vec3 foot) {
     vec2 place = near.centre + near.steps * (foot + near.depth * along);
-    vec2 beyond = (place - clamp(place, -1.0, 1.0)) * near.half_edges;
+    vec2 within = clamp(place, 0.0, near.last);
+    vec2 beyond = (place - within) * near.texel;
     vec4 weights;
-    uvec2 cell = around(place, near.first_cell, map_px(side), weights);
-    float distance = REACH * dot(unpackSnorm4x8(cell.x), weights) - length(beyond);
-    return vec2(distance, near.sign * dot(unpackSnorm4x8(cell.y), weights));
+    uvec2 cell = around(within, near.first_cell, near.last, weights);
+    float distance = REACH * between(cell.x, weights) - length(beyond);
+    return vec2(distance, near.sign * between(cell.y, weights));
 }
 
 // 1 where a length (in r) is positive and 0 where it is negative, with a ramp between.

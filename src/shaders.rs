@@ -22,6 +22,7 @@ embedded!(
     "assemble.comp",
     "blend.glsl",
     "blocked_share.glsl",
+    "bytes.glsl",
     "capture.frag",
     "capture.vert",
     "captured.glsl",

@@ -114,6 +114,7 @@ layout(std430, binding = 2) writeonly buffer Found { vec2 found[]; };
 layout(push_constant) uniform Push { uint count; uint cell_count; } push;
 uvec2 self_cell(uint i) { return cells[i]; }
 #include "blocked_share.glsl"
+#include "bytes.glsl"
 #include "self_frame.glsl"
 #include "self_visibility.glsl"
 void main() {

@@ -138,9 +138,9 @@ pub fn encode(value: f64, most: f64) -> u8 {
     ((value / most).clamp(-1.0, 1.0) * 127.0).round() as i8 as u8
 }
 
-/// Inverse of [`encode`].
+/// Inverse of [`encode`]. The byte that it never gives, -128, lies a 127th beyond `most`.
 pub fn decode(byte: u8, most: f64) -> f64 {
-    f64::from(byte as i8).max(-127.0) / 127.0 * most
+    f64::from(byte as i8) / 127.0 * most
 }
 
 impl SilhouetteField {
@@ -180,14 +180,20 @@ impl SilhouetteField {
         &self.frames
     }
 
-    /// The nodes as `glsl/silhouette_field.glsl` reads them, three quads each; the cells of the field's maps begin at `first_cell`.
+    /// The nodes as `glsl/silhouette_field.glsl` reads them, three quads each, which give places in texels from the middle of a map's first;
+    /// the cells of the field's maps begin at `first_cell`.
     pub fn node_quads(&self, first_cell: u32) -> Vec<[f32; 4]> {
         let map_cells = Side::ALL.iter().map(|side| self.side_cells(*side)).sum::<usize>() as u32;
         let node = |&(map, mirrored): &(usize, bool)| {
             let Frame { axes, centre, half, .. } = self.frames[map];
-            let row = |i: usize| (axes[i] / half[i]).extend(-centre[i] / half[i]).as_vec4().to_array();
+            let px = f64::from(self.header.map_px);
+            let row = |i: usize| {
+                let first = 0.5 * px * (1.0 - centre[i] / half[i]) - 0.5;
+                (0.5 * px * axes[i] / half[i]).extend(first).as_vec4().to_array()
+            };
+            let texel = (2.0 / px * half).as_vec2();
             let cells = f32::from_bits(first_cell + map as u32 * map_cells);
-            [row(0), row(1), [half.x as f32, half.y as f32, cells, if mirrored { -1.0 } else { 1.0 }]]
+            [row(0), row(1), [texel.x, texel.y, cells, if mirrored { -1.0 } else { 1.0 }]]
         };
         self.nodes.nodes().iter().flat_map(node).collect()
     }
@@ -248,20 +254,20 @@ impl SilhouetteField {
         [decode(texel[0], REACH), decode(texel[1], 1.0)]
     }
 
-    /// Distance and depth of a map at a point of the plane, between four texels. Beyond the rectangle, the distance at its rim less
-    /// the way to it.
+    /// Distance and depth of a map at a point of the plane, between four texels. Beyond the middles of the outermost texels, the
+    /// distance there less the way to them.
     fn sample(&self, map: usize, side: Side, place: DVec2) -> [f64; 2] {
-        let frame = &self.frames[map];
-        let within = place.clamp(DVec2::NEG_ONE, DVec2::ONE);
         let px = self.header.edge_px(side);
-        let at = ((within + 1.0) / 2.0 * px as f64 - 0.5).clamp(DVec2::ZERO, DVec2::splat((px - 1) as f64));
+        let beyond = (place + 1.0) / 2.0 * px as f64 - 0.5;
+        let at = beyond.clamp(DVec2::ZERO, DVec2::splat((px - 1) as f64));
         let (x, y) = ((at.x as usize).min(px - 2), (at.y as usize).min(px - 2));
         let (u, v) = (at.x - x as f64, at.y - y as f64);
         let corner = |i, j| DVec2::from_array(self.texel(map, side, x + i, y + j));
         let low = corner(0, 0).lerp(corner(1, 0), u);
         let high = corner(0, 1).lerp(corner(1, 1), u);
         let found = low.lerp(high, v);
-        [found.x - ((place - within) * frame.half).length(), found.y]
+        let way = (beyond - at) * self.frames[map].half * (2.0 / px as f64);
+        [found.x - way.length(), found.y]
     }
 
     /// What the field knows of rays through `point` (object's frame, in r) in directions near `toward`.

@@ -1,7 +1,7 @@
 #version 460
 // One cube face seen from a sample point. Faces are axis-aligned, so right, down and forward are signed unit vectors and the
 // products below are exact.
-layout(location = 0) in vec3 position;
+layout(location = 0) in vec4 position; // in r
 #if RADIANCE
 layout(location = 1) in vec3 color;
 layout(location = 0) out vec3 radiance;
@@ -17,7 +17,7 @@ layout(push_constant) uniform Push {
 } push;
 
 void main() {
-    vec3 q = position - push.eye.xyz;
+    vec3 q = position.xyz - push.eye.xyz;
     float w = dot(push.forward.xyz, q);
     // Moves a vertex off the plane of the eye, where w is in r. To find a triangle's facing, SwiftShader divides by w before it clips; it
     // returns 1 for 1 / 0, and a huge quotient gives a wrong facing.

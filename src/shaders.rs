@@ -50,6 +50,7 @@ embedded!(
     "product.comp",
     "product_points.glsl",
     "project.comp",
+    "raster.comp",
     "self_frame.glsl",
     "self_visibility.comp",
     "self_visibility.glsl",

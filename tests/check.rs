@@ -53,7 +53,12 @@ fn a_wrong_shader_is_found() {
     }
     let folder = tempfile::tempdir().unwrap();
     let wrong = [
-        ("capture.vert", "vec3 q = position - push.eye.xyz;", "vec3 q = position - push.eye.xyz + 0.02;", "capture"),
+        (
+            "capture.vert",
+            "vec3 q = position.xyz - push.eye.xyz;",
+            "vec3 q = position.xyz - push.eye.xyz + 0.02;",
+            "capture",
+        ),
         ("project.comp", "total *= jobs[job].scale;", "total *= 1.0001 * jobs[job].scale;", "project"),
         ("self_visibility.comp", "inverse * sqrt(inverse)", "1.5 * inverse * sqrt(inverse)", "self_visibility"),
         ("assemble.comp", "sum *= push.factor;", "sum *= 1.01 * push.factor;", "assemble"),

@@ -7,17 +7,19 @@ use common::{Gpu, gpu, pot, report};
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::capture::{Capture, CaptureKind, Model, NO_SLOT};
-use shadow_fields::check::capture::{self as check, differing_limit, eyes_outside, faces, texel_index};
+use shadow_fields::check::capture::{self as check, Way, differing_limit, eyes_outside, faces, texel_index};
 
 const FACE_PX: u32 = 32;
+const WAYS: [Way; 2] = [Way::Drawn, Way::Computed];
+
 /// Coverage of every eye's faces, true where the object is; faces without a slot are `None`.
-fn coverage(gpu: &Gpu, mesh: &Mesh, eyes: &[Vec3], cull: bool) -> Vec<[Option<Vec<bool>>; 6]> {
+fn coverage(gpu: &Gpu, mesh: &Mesh, eyes: &[Vec3], cull: bool, way: Way) -> Vec<[Option<Vec<bool>>; 6]> {
     let is_object = |texel: &u8| match texel {
         0 => true,
         255 => false,
         other => panic!("a texel of {other}: neither object nor background"),
     };
-    let found = faces::<u8>(&gpu.baker(), mesh, eyes, (FACE_PX, CaptureKind::Cover, cull)).unwrap();
+    let found = faces::<u8>(&gpu.baker(), mesh, eyes, (FACE_PX, CaptureKind::Cover, cull), way).unwrap();
     found
         .iter()
         .map(|faces| faces.each_ref().map(|face| face.as_ref().map(|t| t.iter().map(is_object).collect())))
@@ -48,13 +50,27 @@ fn coverage_is_what_rays_meet() {
     let Some(gpu) = gpu() else { return };
     for (mesh, more) in scenes() {
         let eyes = [eyes_outside(), more].concat();
-        let found = check::coverage(&gpu.baker(), &mesh, &eyes, FACE_PX).unwrap();
-        report(&format!("{}: {found:?}", mesh.name));
-        assert_eq!(found.off_edge, 0, "{}: texels differ where there is no edge", mesh.name);
-        assert_eq!(found.left_out_wrongly, 0, "{}: a face was left out that shows the object", mesh.name);
-        assert!(found.left_out > 0, "{}: no face was left out", mesh.name);
-        assert!(found.error() < differing_limit(&gpu.device), "{}: {found:?}", mesh.name);
+        for way in WAYS {
+            let found = check::coverage(&gpu.baker(), &mesh, &eyes, FACE_PX, way).unwrap();
+            report(&format!("{}, {way:?}: {found:?}", mesh.name));
+            assert_eq!(found.off_edge, 0, "{}, {way:?}: texels differ where there is no edge", mesh.name);
+            assert_eq!(found.left_out_wrongly, 0, "{}: a face was left out that shows the object", mesh.name);
+            assert!(found.left_out > 0, "{}: no face was left out", mesh.name);
+            assert!(found.error() < differing_limit(&gpu.device), "{}, {way:?}: {found:?}", mesh.name);
+        }
     }
+}
+
+/// Faces that are computed in several bands of rows, of which the last has fewer.
+#[test]
+fn large_faces_are_computed_in_bands() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::torus(1.0, 0.3, 16, 8);
+    let eyes = [Vec3::new(0.7, 0.8, -0.4), Vec3::new(0.2, 0.05, -0.1)];
+    let found = check::coverage(&gpu.baker(), &mesh, &eyes, 200, Way::Computed).unwrap();
+    assert!(found.error() < 1e-3, "{found:?}");
+    let off = check::distances(&gpu.baker(), &mesh, &eyes, 80, Way::Computed).unwrap();
+    assert!(off < 2e-3, "{off} of the texels differ");
 }
 
 #[test]
@@ -63,8 +79,10 @@ fn culling_changes_nothing_on_closed_meshes() {
     let mut compared = 0;
     for (mesh, more) in scenes().into_iter().filter(|(mesh, _)| mesh.is_closed()) {
         let eyes = [eyes_outside(), more].concat();
-        let (with, without) = (coverage(&gpu, &mesh, &eyes, true), coverage(&gpu, &mesh, &eyes, false));
-        assert_eq!(with, without, "{}", mesh.name);
+        for way in WAYS {
+            let [with, without] = [true, false].map(|cull| coverage(&gpu, &mesh, &eyes, cull, way));
+            assert_eq!(with, without, "{}, {way:?}", mesh.name);
+        }
         compared += 1;
     }
     assert_eq!(compared, 3, "sphere, torus and cuboid are closed");
@@ -77,12 +95,14 @@ fn culled_from_inside_a_solid_nothing_is_left() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::cuboid(Vec3::ONE, 1);
     let eyes = [Vec3::new(0.1, 0.2, -0.1)];
-    let covered = |cull| {
-        let faces = &coverage(&gpu, &mesh, &eyes, cull)[0];
-        faces.iter().flatten().flatten().filter(|c| **c).count()
-    };
-    assert_eq!(covered(true), 0);
-    assert_eq!(covered(false), 6 * (FACE_PX * FACE_PX) as usize);
+    for way in WAYS {
+        let covered = |cull| {
+            let faces = &coverage(&gpu, &mesh, &eyes, cull, way)[0];
+            faces.iter().flatten().flatten().filter(|c| **c).count()
+        };
+        assert_eq!(covered(true), 0, "{way:?}");
+        assert_eq!(covered(false), 6 * (FACE_PX * FACE_PX) as usize, "{way:?}");
+    }
 }
 
 /// One colour a direction, all components different.

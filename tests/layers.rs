@@ -274,8 +274,8 @@ const PASSES: &[(&str, &str)] = &[
 /// Timers of passes that copy and have no shader.
 const COPIES: &[&str] = &["read back"];
 
-/// Shaders that are no pass of their own: other parts of pass "draw", and what only benches run.
-const OTHER_SHADERS: &[&str] = &["grid", "triangle", "product", "ceiling", "shadow_map"];
+/// Shaders that are no pass of their own: other parts of pass "draw", pass "capture" by computation, and what only benches run.
+const OTHER_SHADERS: &[&str] = &["grid", "triangle", "raster", "product", "ceiling", "shadow_map"];
 
 /// Folders whose files record passes for a test or a bench, outside the sequences.
 const NO_SEQUENCE: &[&str] = &["src/bench", "src/check"];

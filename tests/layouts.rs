@@ -5,6 +5,7 @@ mod common;
 use bytemuck::Zeroable;
 use common::library;
 use shadow_fields::bake::project::{Job, Project, Projection};
+use shadow_fields::bake::raster::{Face, Raster};
 use shadow_fields::bake::self_visibility::SelfVisibility;
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::gpu::reflect::Reflection;
@@ -113,6 +114,15 @@ fn jobs_of_captured_faces() {
     let reflection = library().shader(&SelfVisibility::row()).unwrap().reflection;
     same_layout!(reflection, Job { normal, slots, target, scale });
     assert_eq!(reflection.strides.get("Job"), Some(&(size_of::<Job>() as u32)));
+}
+
+#[test]
+fn faces_that_are_computed() {
+    for distance in [false, true] {
+        let reflection = library().shader(&Raster::row(distance)).unwrap().reflection;
+        same_layout!(reflection, Face { eye, right, down, forward, slot, run_first, run_count, unused });
+        assert_eq!(reflection.strides.get("Face"), Some(&(size_of::<Face>() as u32)));
+    }
 }
 
 #[test]

@@ -6,6 +6,7 @@ use common::{library, skip};
 use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::{Capture, CaptureKind};
 use shadow_fields::bake::project::{Project, Projection};
+use shadow_fields::bake::raster::Raster;
 use shadow_fields::bake::self_visibility::SelfVisibility;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
 use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
@@ -31,8 +32,15 @@ fn baking() -> Vec<ShaderPermutation> {
     let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
     let capture =
         [CaptureKind::Cover, CaptureKind::Distance, CaptureKind::Radiance].into_iter().flat_map(Capture::rows);
+    let computed = [false, true].map(Raster::row);
     let own = [SelfVisibility::row()];
-    project.chain(own).chain(assemble).chain(capture).chain(Silhouette::permutations(32, 128, 16)).collect()
+    project
+        .chain(own)
+        .chain(computed)
+        .chain(assemble)
+        .chain(capture)
+        .chain(Silhouette::permutations(32, 128, 16))
+        .collect()
 }
 
 /// Every way of the pass of sharp lights.

@@ -9,6 +9,7 @@
 use super::chunk::{Chunk, joined, reaches};
 use super::model::DrawnFace;
 pub use super::model::{Drawn, Model};
+use super::raster::{Raster, face_axes};
 pub use super::triangles::unit_positions;
 use crate::error::{Error, Result};
 use crate::field::self_visibility::DISTANCE_STEPS;
@@ -73,6 +74,9 @@ pub struct Capture {
     kind: CaptureKind,
     /// Whether faces and chunks that cannot matter are left out.
     pub skips: bool,
+    raster: Option<Raster>,
+    /// Whether faces are computed in place of drawn, where they can be. It is so on software devices.
+    pub computes: bool,
 }
 
 impl Capture {
@@ -129,6 +133,10 @@ impl Capture {
             columns,
             kind,
             skips: true,
+            raster: (!radiance && Raster::serves(face_px))
+                .then(|| Raster::new(device, library, kind == CaptureKind::Distance, (face_px, columns)))
+                .transpose()?,
+            computes: device.info.is_software(),
         })
     }
 
@@ -169,6 +177,9 @@ impl Capture {
     /// `Device` when memory ran out.
     pub fn choose(&self, model: &Model, eyes: &[Vec3], plan: &[Slots], cull: bool) -> Result<Drawn> {
         let closed = cull && model.closed;
+        let device = model.positions.device();
+        let computes =
+            self.computes && self.raster.is_some() && Raster::holds(device, &model.positions, &model.indices);
         let (mut buffer, mut faces, mut indices) = (Vec::new(), Vec::new(), Vec::<u32>::new());
         for (&eye, slots) in eyes.iter().zip(plan) {
             let seen = model.seen(eye, self.face_px, &mut buffer);
@@ -178,20 +189,25 @@ impl Capture {
                 let reached = |chunk: &&Chunk| reaches(eye, chunk.centre, chunk.radius, forward, right, down);
                 let visible = facing.iter().copied().filter(|chunk| !self.skips || reached(chunk));
                 let runs = match &model.levels {
-                    Some(levels) => levels.gathered(visible.map(|chunk| chunk.indices.clone()), &mut indices),
-                    None => joined(visible.map(|chunk| chunk.indices.clone())),
+                    Some(levels) if !computes => {
+                        levels.gathered(visible.map(|chunk| chunk.indices.clone()), &mut indices)
+                    }
+                    _ => joined(visible.map(|chunk| chunk.indices.clone())),
                 };
                 faces.push(DrawnFace { eye, face, slot, runs });
             }
         }
-        Drawn::new(model, faces, &indices, closed)
+        if computes { Drawn::computed(model, faces, closed) } else { Drawn::new(model, faces, &indices, closed) }
     }
 
-    /// Draws what was chosen. The atlas must be in the layout of [`crate::gpu::Access::ColorWrite`].
+    /// Draws or computes what was chosen. The atlas must be in the layout of [`Drawn::access`].
     ///
     /// # Errors
     /// What recording returns.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, model: &'r Model, drawn: &'r Drawn) -> Result<()> {
+        if let (Some(raster), Some(faces)) = (&self.raster, &drawn.computed) {
+            return raster.record(commands, (&model.positions, &model.indices), (faces, drawn.closed), &self.atlas);
+        }
         let radiance = self.kind == CaptureKind::Radiance;
         let background = if radiance { [0.0, 0.0, 0.0, 1.0] } else { [1.0; 4] };
         let target = Target { color: &self.atlas, clear: Some(background), depth: self.depth.as_ref(), resolve: None };
@@ -220,12 +236,6 @@ impl Capture {
     pub fn depth(&self) -> Option<&Image> {
         self.depth.as_ref()
     }
-}
-
-/// Forward, right and down of a face as single-precision vectors; their components are 0 and +-1.
-fn face_axes(face: usize) -> (Vec3, Vec3, Vec3) {
-    let (forward, right, down) = face_basis(face);
-    (forward.as_vec3(), right.as_vec3(), down.as_vec3())
 }
 
 /// The CPU twin of an occlusion capture, by another method: it casts a ray through every texel centre of one face. The result is

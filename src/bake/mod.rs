@@ -25,6 +25,7 @@ pub mod partial;
 pub mod parts;
 pub mod project;
 pub mod quality;
+pub mod raster;
 pub mod report;
 mod run;
 mod samples;
@@ -86,12 +87,13 @@ fn record_batch<'r>(
 ) -> Result<()> {
     let Batches { capture, project, self_visibility, model, jobs, .. } = batches;
     let count = batch.count;
-    commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
+    let written = batch.drawn.access();
+    commands.image_barrier(&capture.atlas, None, written);
     if let Some(depth) = capture.depth() {
         commands.image_barrier(depth, None, Access::DepthWrite);
     }
     commands.pass("capture", |c| capture.record(c, model, &batch.drawn))?;
-    commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::ComputeSampled);
+    commands.image_barrier(&capture.atlas, Some(written), Access::ComputeSampled);
     let (atlas, jobs_now) = (&capture.atlas, count as u32);
     if let Some(Reduce { pass, samples, .. }) = project {
         let texels = texels.expect("a projection has a view of texels");

@@ -2,10 +2,11 @@
 
 use super::chunk::{Chunk, Chunked, chunk};
 use super::levels::{Levels, Tolerance, leveled};
+use super::raster::Faces;
 use super::triangles::{distinct, unit_positions};
 use crate::asset::Mesh;
 use crate::error::Result;
-use crate::gpu::{Buffer, BufferKind, Device};
+use crate::gpu::{Access, Buffer, BufferKind, Device};
 use glam::Vec3;
 use std::ops::Range;
 use std::sync::Arc;
@@ -51,10 +52,12 @@ impl Model {
     ) -> Result<Self> {
         let Chunked { vertices, triangles, chunks } = chunked;
         let colors = with_colors.then(|| mesh.colors.clone().unwrap_or_else(|| vec![Vec3::ONE; mesh.positions.len()]));
-        let gather = |of: &[Vec3]| -> Vec<[f32; 3]> { vertices.iter().map(|&v| of[v as usize].to_array()).collect() };
+        let positions: Vec<_> = vertices.iter().map(|&v| unit[v as usize].extend(0.0).to_array()).collect();
+        let corners =
+            |colors: Vec<Vec3>| -> Vec<_> { vertices.iter().map(|&v| colors[v as usize].to_array()).collect() };
         Ok(Model {
-            positions: Buffer::with_data(device, "capture positions", &gather(unit))?,
-            colors: colors.map(|colors| Buffer::with_data(device, "capture colors", &gather(&colors))).transpose()?,
+            positions: Buffer::with_data(device, "capture positions", &positions)?,
+            colors: colors.map(|c| Buffer::with_data(device, "capture colors", &corners(c))).transpose()?,
             indices: Buffer::with_data(device, "capture indices", &triangles)?,
             all: (0..chunks.len() as u32).collect(),
             chunks,
@@ -100,11 +103,21 @@ pub struct Drawn {
     /// The indices of a model with levels, face after face; other models have theirs on the device. A face shows hundreds of small chunks
     /// of levels, and llvmpipe takes 4 us for each draw.
     pub(super) indices: Option<Buffer>,
+    /// The faces for a device that computes them.
+    pub(super) computed: Option<Faces>,
     /// Whether back faces are culled.
     pub(super) closed: bool,
 }
 
 impl Drawn {
+    /// What is computed: faces with runs of the model's own indices.
+    pub(super) fn computed(model: &Model, faces: Vec<DrawnFace>, closed: bool) -> Result<Self> {
+        let shown = faces.iter().map(|face| (face.eye, face.face, face.slot, face.runs.as_slice()));
+        let computed = Some(Faces::new(model.positions.device(), shown)?);
+        Ok(Drawn { faces, indices: None, computed, closed })
+    }
+
+    /// What is drawn: faces with runs of the model's own indices, or of those gathered for them.
     pub(super) fn new(model: &Model, faces: Vec<DrawnFace>, gathered: &[u32], closed: bool) -> Result<Self> {
         let indices = if model.levels.is_some() && !gathered.is_empty() {
             let bytes = size_of_val(gathered) as u64;
@@ -114,7 +127,12 @@ impl Drawn {
         } else {
             None
         };
-        Ok(Drawn { faces, indices, closed })
+        Ok(Drawn { faces, indices, computed: None, closed })
+    }
+
+    /// How the atlas is written.
+    pub fn access(&self) -> Access {
+        if self.computed.is_some() { Access::TransferWrite } else { Access::ColorWrite }
     }
 
     /// Triangles that are drawn, each as often as faces show it.

@@ -34,12 +34,12 @@ pub fn snapshot(
         let plan = capture.plan(&model, rest);
         let drawn = capture.choose(&model, rest, &plan, true)?;
         let mut commands = Commands::new(device, "snapshot")?;
-        commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
+        commands.image_barrier(&capture.atlas, None, drawn.access());
         if let Some(depth) = capture.depth() {
             commands.image_barrier(depth, None, Access::DepthWrite);
         }
         commands.pass("capture", |c| capture.record(c, &model, &drawn))?;
-        commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
+        commands.image_barrier(&capture.atlas, Some(drawn.access()), Access::TransferRead);
         commands.copy_image(&capture.atlas, &download);
         commands.barrier(Access::TransferWrite, Access::HostRead);
         commands.submit()?;

@@ -43,12 +43,12 @@ pub fn atlas<T: Pod>(
     let buffer = Buffer::new(device, "atlas on the host", BufferKind::Readback, texels * size_of::<T>() as u64)?;
     let drawn = capture.choose(model, eyes, plan, cull)?;
     let mut commands = Commands::new(device, "capture to host")?;
-    commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
+    commands.image_barrier(&capture.atlas, None, drawn.access());
     if let Some(depth) = capture.depth() {
         commands.image_barrier(depth, None, Access::DepthWrite);
     }
     commands.pass("capture", |c| capture.record(c, model, &drawn))?;
-    commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::TransferRead);
+    commands.image_barrier(&capture.atlas, Some(drawn.access()), Access::TransferRead);
     commands.copy_image(&capture.atlas, &buffer);
     commands.barrier(Access::TransferWrite, Access::HostRead);
     commands.submit()?;
@@ -65,6 +65,15 @@ pub fn texel_index(capture: &Capture, slot: u32, x: usize, y: usize) -> usize {
 /// Texels of one eye's faces in rows; `None` where the face was not drawn.
 pub type Faces<T> = [Option<Vec<T>>; FACE_COUNT];
 
+/// How faces are captured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// By the device's own rasteriser.
+    Drawn,
+    /// By a compute shader, as on software devices.
+    Computed,
+}
+
 /// Captures every eye's faces.
 ///
 /// # Errors
@@ -74,9 +83,11 @@ pub fn faces<T: Pod>(
     mesh: &Mesh,
     eyes: &[Vec3],
     (face_px, kind, cull): (u32, CaptureKind, bool),
+    way: Way,
 ) -> Result<Vec<Faces<T>>> {
     let model = Model::new(baker.device(), mesh, kind == CaptureKind::Radiance)?;
-    let capture = Capture::new(baker.device(), baker.library(), face_px, kind)?;
+    let mut capture = Capture::new(baker.device(), baker.library(), face_px, kind)?;
+    capture.computes = way == Way::Computed;
     let plan = capture.plan(&model, eyes);
     assert_eq!(plan.len(), eyes.len(), "all eyes fit one atlas");
     let atlas: Vec<T> = atlas(baker.device(), &capture, &model, eyes, &plan, cull)?;
@@ -128,10 +139,10 @@ fn is_edge(covered: &[bool], px: usize, x: usize, y: usize) -> bool {
 ///
 /// # Errors
 /// As [`Capture::new`].
-pub fn coverage(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result<Coverage> {
+pub fn coverage(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32, way: Way) -> Result<Coverage> {
     let positions = unit_positions(mesh);
     let mut out = Coverage::default();
-    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, CaptureKind::Cover, true))?) {
+    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, CaptureKind::Cover, true), way)?) {
         for (face, texels) in faces.iter().enumerate() {
             let wanted = capture::twin(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
             let Some(texels) = texels else {
@@ -164,7 +175,9 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
     let white = vec![Vec3::ONE; positions.len()];
     let colors = mesh.colors.as_ref().unwrap_or(&white);
     let (mut texels, mut differing, mut lit) = (0, 0, 0);
-    for (eye, faces) in eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, CaptureKind::Radiance, true))?) {
+    for (eye, faces) in
+        eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, CaptureKind::Radiance, true), Way::Drawn)?)
+    {
         for (face, found) in faces.iter().enumerate() {
             let wanted = capture::twin_colors((&positions, colors), &mesh.triangles, eye.as_dvec3(), face, face_px);
             for (i, wanted) in wanted.iter().enumerate() {
@@ -186,10 +199,10 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
 ///
 /// # Errors
 /// As [`Capture::new`].
-pub fn distances(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result<f64> {
+pub fn distances(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32, way: Way) -> Result<f64> {
     let positions = unit_positions(mesh);
     let (mut texels, mut differing, mut seen) = (0, 0, 0);
-    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, CaptureKind::Distance, true))?) {
+    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, CaptureKind::Distance, true), way)?) {
         for (face, found) in faces.iter().enumerate() {
             let wanted = capture::twin_distances(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
             for (i, &wanted) in wanted.iter().enumerate() {
@@ -221,15 +234,17 @@ pub fn eyes_outside() -> Vec<Vec3> {
 /// As [`Capture::new`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let (measure, limit) = ("share of texels", differing_limit(baker.device()));
-    for mesh in [generate::sphere(0.5, 3), generate::torus(1.0, 0.3, 32, 16)] {
-        let found = coverage(baker, &mesh, &eyes_outside(), 32)?;
-        add(CheckRow::new("capture", format!("coverage, {}", mesh.name), measure, found.error(), limit));
+    let rings = generate::torus_two_colour(0.5, 0.15, 32, 16);
+    for (way, word) in [(Way::Drawn, "drawn"), (Way::Computed, "computed")] {
+        for mesh in [generate::sphere(0.5, 3), generate::torus(1.0, 0.3, 32, 16)] {
+            let found = coverage(baker, &mesh, &eyes_outside(), 32, way)?;
+            add(CheckRow::new("capture", format!("coverage, {}, {word}", mesh.name), measure, found.error(), limit));
+        }
+        let found = distances(baker, &rings, &eyes_outside(), 32, way)?;
+        add(CheckRow::new("capture", format!("distance, {}, {word}", rings.name), measure, found, 2.0 * limit));
     }
-    let mesh = generate::torus_two_colour(0.5, 0.15, 32, 16);
-    let found = colors(baker, &mesh, &eyes_outside(), 32)?;
-    let found_distances = distances(baker, &mesh, &eyes_outside(), 32)?;
-    add(CheckRow::new("capture", format!("distance, {}", mesh.name), measure, found_distances, 2.0 * limit));
+    let found = colors(baker, &rings, &eyes_outside(), 32)?;
     // Silhouettes and the seams where two colours meet count here too.
-    add(CheckRow::new("capture", format!("radiance, {}", mesh.name), measure, found, 2.0 * limit));
+    add(CheckRow::new("capture", format!("radiance, {}", rings.name), measure, found, 2.0 * limit));
     Ok(())
 }

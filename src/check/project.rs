@@ -141,12 +141,12 @@ impl<'b> Content<'b> {
     fn captured(&self) -> Result<Commands<'_>> {
         let Content { capture, model, drawn, .. } = self;
         let mut commands = Commands::new(self.baker.device(), "check of captured faces")?;
-        commands.image_barrier(&capture.atlas, None, Access::ColorWrite);
+        commands.image_barrier(&capture.atlas, None, drawn.access());
         if let Some(depth) = capture.depth() {
             commands.image_barrier(depth, None, Access::DepthWrite);
         }
         commands.pass("capture", |c| capture.record(c, model, drawn))?;
-        commands.image_barrier(&capture.atlas, Some(Access::ColorWrite), Access::ComputeSampled);
+        commands.image_barrier(&capture.atlas, Some(drawn.access()), Access::ComputeSampled);
         Ok(commands)
     }
 }

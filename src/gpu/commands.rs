@@ -18,6 +18,18 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
+/// The whole of an image beside a buffer with tightly packed rows.
+fn packed(image: &Image) -> vk::BufferImageCopy {
+    let layers = vk::ImageSubresourceLayers {
+        aspect_mask: whole(image.shape.format).aspect_mask,
+        mip_level: 0,
+        base_array_layer: 0,
+        layer_count: 1,
+    };
+    let extent = vk::Extent3D { width: image.shape.width, height: image.shape.height, depth: 1 };
+    vk::BufferImageCopy::default().image_subresource(layers).image_extent(extent)
+}
+
 /// A recording in progress. It borrows every resource that it uses until it is submitted.
 pub struct Commands<'r> {
     pub(super) recording: Recording,
@@ -240,15 +252,6 @@ impl<'r> Commands<'r> {
         let pass = self.pass_name();
         self.tracker.use_image(from.id, &from.name, Access::TransferRead, &pass);
         self.copied_into(to, to.all(), &pass);
-        let range = whole(from.shape.format);
-        let region = vk::BufferImageCopy::default()
-            .image_subresource(vk::ImageSubresourceLayers {
-                aspect_mask: range.aspect_mask,
-                mip_level: 0,
-                base_array_layer: 0,
-                layer_count: 1,
-            })
-            .image_extent(vk::Extent3D { width: from.shape.width, height: from.shape.height, depth: 1 });
         // SAFETY: both are borrowed until the commands have run; the layout is that of a transfer read (tracked).
         unsafe {
             let layout = Access::TransferRead.layout();
@@ -257,7 +260,24 @@ impl<'r> Commands<'r> {
                 from.raw(),
                 layout,
                 to.raw(),
-                &[region],
+                &[packed(from)],
+            );
+        }
+    }
+
+    /// Copies a buffer into the whole of a single-sampled image; rows are tightly packed.
+    pub fn copy_to_image(&mut self, from: &'r Buffer, to: &'r Image) {
+        let pass = self.pass_name();
+        self.tracker.use_range(from.id, &from.name, from.all(), Access::TransferRead, &pass);
+        self.tracker.use_image(to.id, &to.name, Access::TransferWrite, &pass);
+        // SAFETY: both are borrowed until the commands have run; the layout is that of a transfer write (tracked).
+        unsafe {
+            self.recording.device.handle.cmd_copy_buffer_to_image(
+                self.recording.buffer,
+                from.raw(),
+                to.raw(),
+                Access::TransferWrite.layout(),
+                &[packed(to)],
             );
         }
     }

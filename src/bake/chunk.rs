@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use glam::{DVec3, Vec3};
 use meshopt::{VertexDataAdapter, build_meshlets, extract_meshlet_indices};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Triangles in a chunk. It is small enough to be culled on its own, and large enough that its draw call costs little.
@@ -49,7 +50,7 @@ impl Chunk {
 
 /// Sorts triangles along a space-filling curve. Positions lie within the unit sphere.
 pub fn sort_spatially(positions: &[Vec3], triangles: &mut [[u32; 3]]) {
-    triangles.sort_by_cached_key(|t| morton(t.iter().map(|i| positions[*i as usize]).sum::<Vec3>() / 3.0));
+    triangles.par_sort_by_cached_key(|t| morton(t.iter().map(|i| positions[*i as usize]).sum::<Vec3>() / 3.0));
 }
 
 /// A mesh cut into chunks, one after another along a space-filling curve.

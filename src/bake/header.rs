@@ -3,7 +3,7 @@
 use super::capture::unit_positions;
 use super::levels;
 use super::silhouette::SilhouetteOptions;
-use super::surface::Surface;
+use super::surface::depth_at_origin;
 use crate::asset::mesh::Mesh;
 use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
 use crate::field::quantity::{FieldKind, Storage};
@@ -66,11 +66,8 @@ impl Options {
 /// [`ROOMY_INNER`].
 pub fn first_shell(fit: &Fit, positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
     let placed: Vec<Vec3> = positions.iter().map(|p| fit.apply(p.as_dvec3()).as_vec3()).collect();
-    let surface = Surface::new(&placed, triangles);
-    if !surface.encloses(DVec3::ZERO) {
-        return ROOMY_INNER;
-    }
-    let nearest = surface.distance(DVec3::ZERO);
+    let corners: Vec<[DVec3; 3]> = triangles.iter().map(|t| t.map(|i| placed[i as usize].as_dvec3())).collect();
+    let Some(nearest) = depth_at_origin(&corners) else { return ROOMY_INNER };
     let farthest = placed.iter().map(|p| f64::from(p.length())).fold(0.0, f64::max);
     // The facets of a tessellated sphere lie a few percent inside the sphere.
     if nearest > 0.93 * farthest { OUTSIDE_INNER * farthest.max(1.0) } else { nearest.max(ROOMY_INNER) }

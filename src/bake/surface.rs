@@ -8,6 +8,7 @@
 use super::chunk::sort_spatially;
 use super::inside::nearest_on_triangle;
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -140,6 +141,19 @@ impl Surface {
     }
 }
 
+/// The distance of a surface from the origin, if it encloses the origin. One pass over all triangles takes less than a tree does for
+/// one question.
+pub fn depth_at_origin(triangles: &[[DVec3; 3]]) -> Option<f64> {
+    // Shares of a fixed length are summed in order, so that the sum is the same on any number of threads.
+    let share = |part: &[[DVec3; 3]]| {
+        let nearest = part.iter().map(|t| nearest_on_triangle(*t).length()).fold(f64::INFINITY, f64::min);
+        (part.iter().map(|t| solid_angle(*t)).sum::<f64>(), nearest)
+    };
+    let shares: Vec<(f64, f64)> = triangles.par_chunks(4096).map(share).collect();
+    let winding = shares.iter().map(|(angle, _)| angle).sum::<f64>() / (4.0 * PI);
+    (winding > INSIDE).then(|| shares.iter().map(|(_, nearest)| *nearest).fold(f64::INFINITY, f64::min))
+}
+
 fn bounds(triangles: &[[DVec3; 3]]) -> (DVec3, DVec3) {
     triangles.iter().flatten().fold((DVec3::MAX, DVec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)))
 }
@@ -173,6 +187,10 @@ mod tests {
             let exact = corners.iter().map(|t| solid_angle(t.map(|c| c - p))).sum::<f64>() / (4.0 * PI);
             assert!((surface.winding_number(p) - exact).abs() < 0.02, "{p}: {exact}");
             inside += usize::from(exact > 0.5);
+            let moved: Vec<[DVec3; 3]> = corners.iter().map(|t| t.map(|c| c - p)).collect();
+            let depth = depth_at_origin(&moved);
+            assert_eq!(depth.is_some(), exact > 0.5, "{p}");
+            assert!(depth.is_none_or(|depth| (depth - distance).abs() < 1e-12), "{p}");
         }
         assert!((20..480).contains(&inside), "{inside}");
     }

@@ -292,11 +292,14 @@ pub fn turn_all(values: &mut [f32], turned: &[Option<Turned>], bands: usize, cha
 /// whose deviation may not be seen from `distance`, in r.
 pub fn plan_vertices(mesh: &Mesh, symmetry: &Symmetry, face_px: u32, distance: f64) -> Vec<Option<Turned>> {
     let mut turned: Vec<Option<Turned>> = vec![None; mesh.positions.len()];
-    let points = Points::new(mesh, None);
     let limit = allowed(distance, face_px);
-    let fits = symmetry.operations.par_iter().filter(|o| o.deviation <= limit);
+    let fits: Vec<&Operation> = symmetry.operations.iter().filter(|o| o.deviation <= limit).collect();
+    if fits.is_empty() {
+        return turned;
+    }
+    let points = Points::new(mesh, None);
     let maps: Vec<(&Operation, Vec<u32>)> =
-        fits.filter_map(|o| Some((o, points.vertices(o.matrix.transpose(), mesh)?))).collect();
+        fits.into_par_iter().filter_map(|o| Some((o, points.vertices(o.matrix.transpose(), mesh)?))).collect();
     for vertex in 0..turned.len() {
         // `from` leads back: from a vertex to the one that the symmetry carries there.
         turned[vertex] = maps.iter().find_map(|(operation, from)| {

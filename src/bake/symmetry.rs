@@ -14,6 +14,7 @@ use crate::field::Fit;
 use glam::{DMat3, DVec3, IVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
+use std::sync::LazyLock;
 
 /// Farthest that a vertex may lie from where a symmetry wants it, in r. Files with six digits are as exact as this.
 const MATCH: f64 = 2e-5;
@@ -60,8 +61,14 @@ impl Symmetry {
         if varied.is_some() {
             return symmetry;
         }
-        let points = Points::new(mesh, None);
-        let revolution = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| points.revolution(axis, surface));
+        let unit = unit_positions(mesh);
+        let points = LazyLock::new(|| Points::new(mesh, None));
+        let revolution = DVec3::AXES.map(|axis| {
+            let turn = DMat3::from_axis_angle(axis, ANGLES_RAD[0]);
+            // Most meshes fail at once.
+            let may_be = few(&unit).all(|place| surface.distance(turn * place) < USELESS);
+            may_be.then(|| points.revolution(axis, surface)).flatten()
+        });
         let sphere = (mesh.is_closed() && surface.encloses(DVec3::ZERO))
             .then(|| 1.0 - surface.distance(DVec3::ZERO))
             .filter(|deviation| *deviation < USELESS);
@@ -70,12 +77,14 @@ impl Symmetry {
 
     /// Finds only the turns and mirrors of a cube, for the mesh with the colours of its vertices if it has any.
     pub fn of_vertices(mesh: &Mesh, colors: Option<&Vec<Vec3>>) -> Self {
-        let points = Points::new(mesh, colors);
-        let mut operations: Vec<Operation> = cube_group()
-            .into_par_iter()
-            .skip(1)
-            .filter_map(|matrix| Some(Operation { matrix, deviation: points.deviation(matrix, &mut 0)? }))
-            .collect();
+        let unit = unit_positions(mesh);
+        let points = LazyLock::new(|| Points::new(mesh, colors));
+        let find = |matrix| {
+            // Most meshes fail at once: to find a vertex near each of a few places takes less than to order all vertices.
+            let may_be = few(&unit).all(|place| is_at(&unit, matrix * place));
+            Some(Operation { matrix, deviation: may_be.then(|| points.deviation(matrix, &mut 0)).flatten()? })
+        };
+        let mut operations: Vec<Operation> = cube_group().into_par_iter().skip(1).filter_map(find).collect();
         operations.sort_by(|a, b| a.deviation.total_cmp(&b.deviation));
         Symmetry { operations, ..Symmetry::default() }
     }
@@ -197,10 +206,7 @@ impl Points {
     /// How far the moved surface is from the surface. `None` if a vertex has no counterpart, if the surface is too far, or if more than
     /// [`COMPARISONS_A_TRIANGLE`] would be needed. Counts comparisons of triangles in `compared`.
     fn deviation(&self, matrix: DMat3, compared: &mut usize) -> Option<f64> {
-        // Most meshes fail at once.
-        let few = self.places.len().div_ceil(50);
-        let tried = || self.places.iter().zip(&self.colors).step_by(few);
-        if self.triangles.is_empty() || tried().any(|(p, color)| self.find(matrix * *p, *color).is_none()) {
+        if self.triangles.is_empty() {
             return None;
         }
         let image = self.image(matrix)?;
@@ -238,9 +244,6 @@ impl Points {
         if self.places.is_empty() {
             return None;
         }
-        // Most meshes fail at once.
-        let few: Vec<DVec3> = self.places.iter().copied().step_by(self.places.len().div_ceil(50)).collect();
-        farthest(&few, ANGLES_RAD[0])?;
         let middle = |t: &[u32; 3]| t.iter().map(|i| self.places[*i as usize]).sum::<DVec3>() / 3.0;
         let all: Vec<DVec3> = self.places.iter().copied().chain(self.triangles.iter().map(middle)).collect();
         let mut worst = 0.0_f64;
@@ -268,6 +271,17 @@ impl Points {
 
 /// Largest distance of unit normals that count as one.
 const NORMAL_MATCH: f64 = 1e-4;
+
+/// A few of a mesh's vertices, from all over it.
+fn few(unit: &[Vec3]) -> impl Iterator<Item = DVec3> {
+    unit.iter().step_by(unit.len().div_ceil(20).max(1)).map(|place| place.as_dvec3())
+}
+
+/// Whether a vertex lies as near to a place as a symmetry demands.
+fn is_at(unit: &[Vec3], place: DVec3) -> bool {
+    // The margin covers rounding.
+    unit.iter().any(|vertex| vertex.as_dvec3().distance_squared(place) < (1.001 * MATCH).powi(2))
+}
 
 fn cell(place: DVec3) -> IVec3 {
     // Cells are much larger than the distance sought, so that a search looks into one cell and seldom into two.

@@ -13,7 +13,12 @@ pub fn unit_positions(mesh: &Mesh) -> Vec<Vec3> {
 
 /// The triangles of a mesh without those that repeat another: with corners of the same place and colour, the same way around. What is
 /// seen does not change. A tree cannot divide stacked triangles, so each query of a surface would look at every one of them.
+///
+/// Of a closed mesh no triangle repeats another, since along each edge its surface runs once each way.
 pub fn distinct(mesh: &Mesh) -> Cow<'_, [[u32; 3]]> {
+    if mesh.is_closed() {
+        return Cow::Borrowed(&mesh.triangles);
+    }
     let mut first_of = HashMap::with_capacity(mesh.positions.len());
     let first: Vec<u32> = (0..mesh.positions.len())
         .map(|vertex| {
@@ -54,6 +59,11 @@ mod tests {
         assert_eq!(distinct(&mesh).len(), 3, "one is turned around its corners, one is the same, one shows its back");
         let ring = generate::torus(1.0, 0.3, 24, 12);
         assert!(matches!(distinct(&ring), Cow::Borrowed(_)));
+        // A closed mesh of which one triangle is repeated is closed no more.
+        let again = [ring.triangles.as_slice(), &[ring.triangles[7]]].concat();
+        let ring_again = Mesh::new("ring", ring.positions.clone(), Vec::new(), None, again).unwrap();
+        assert!(ring.is_closed() && !ring_again.is_closed());
+        assert_eq!(distinct(&ring_again).len(), ring.triangles.len());
         // Vertices of their own at the same places change nothing; another colour does.
         let twice = |other: Vec3| {
             let positions = [Vec3::ZERO, Vec3::X, Vec3::Y].repeat(2);

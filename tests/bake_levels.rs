@@ -94,7 +94,7 @@ fn outlines_are_those_of_the_whole_mesh() {
     let mesh = scanned(4);
     let bake = |levels| {
         let options = SilhouetteOptions { cells: 2, levels, ..Default::default() };
-        bake_silhouette((&gpu.device, &gpu.library), &mesh, options, &|_, _| ()).unwrap().0
+        bake_silhouette(&gpu.baker(), &mesh, options, &|_, _| ()).unwrap().0
     };
     let (found, wanted) = (bake(true), bake(false));
     assert!(found.header.level_pixels > 0.0 && wanted.header.level_pixels == 0.0);

@@ -20,7 +20,7 @@ fn bake(gpu: &Gpu, mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteField {
 
 /// A field and how many of its maps were captured.
 fn counted(gpu: &Gpu, mesh: &Mesh, options: SilhouetteOptions) -> (SilhouetteField, u32) {
-    let (field, report) = bake_silhouette((&gpu.device, &gpu.library), mesh, options, &|_, _| ()).unwrap();
+    let (field, report) = bake_silhouette(&gpu.baker(), mesh, options, &|_, _| ()).unwrap();
     (field, report.samples - report.turned)
 }
 

@@ -14,9 +14,8 @@ use std::path::Path;
 pub fn bake(global: &Global, (mesh, mesh_file): (&Mesh, &Path), out: &Path, options: SilhouetteOptions) -> Result<()> {
     let context = Context::new(global)?;
     let told = |done, all| context.progress.show(&mesh.name, done, all);
-    let (device, library) = (context.baker.device(), context.baker.library());
     let (field, report) =
-        bake_silhouette((device, library), mesh, options, &told).map_err(|error| error.context(mesh_file.display()))?;
+        bake_silhouette(&context.baker, mesh, options, &told).map_err(|error| error.context(mesh_file.display()))?;
     let seconds = report.total.as_secs_f64();
     let result = json!({
         "origin": context.origin(global), "file": out.display().to_string(), "triangles": mesh.triangles.len(),

@@ -24,10 +24,21 @@ use std::ops::Range;
 const UNIT_SECONDS: f64 = 0.25;
 /// Units that each of several processes has to take at least, where there are so many samples.
 const UNITS_EACH: f64 = 4.0;
-/// Seconds that llvmpipe takes a triangle that is drawn, and a texel that is captured and reduced. They were measured on two cores with
-/// the teapot and a torus of 69 696 triangles; no result depends on them, only how work is shared out.
-const TRIANGLE_SECONDS: f64 = 1.7e-7;
-const TEXEL_SECONDS: f64 = 5.5e-8;
+/// Seconds that llvmpipe takes on two cores a triangle that an eye sees, and a texel that is captured and reduced. No result depends on
+/// them, only how work is shared out.
+#[derive(Clone, Copy)]
+pub(super) struct Cost {
+    triangle: f64,
+    texel: f64,
+}
+
+impl Cost {
+    /// Where faces are drawn, as measured with the teapot and a torus of 69 696 triangles.
+    pub const DRAWN: Cost = Cost { triangle: 1.7e-7, texel: 5.5e-8 };
+    /// Where they are computed, as measured with rough balls of 2 028 and 69 312 triangles.
+    pub const COMPUTED: Cost = Cost { triangle: 2.8e-8, texel: 8e-9 };
+}
+
 /// Share of the triangles of a closed mesh that are drawn, since chunks that show their backs are left out.
 const FACING_SHARE: f64 = 0.5;
 
@@ -156,9 +167,9 @@ fn facing_share(mesh: &Mesh) -> f64 {
 }
 
 /// Estimated seconds of captures on a software device: of `eyes` that see the mesh in `faces` of `face_px`.
-pub(super) fn estimated_seconds(mesh: &Mesh, levels: bool, eyes: u64, faces: u64, face_px: u32) -> f64 {
+pub(super) fn estimated_seconds(cost: Cost, (mesh, levels): (&Mesh, bool), eyes: u64, faces: u64, face_px: u32) -> f64 {
     let triangles = levels::estimated_triangles(mesh, levels) * facing_share(mesh) * eyes as f64;
-    triangles * TRIANGLE_SECONDS + faces as f64 * f64::from(face_px).powi(2) * TEXEL_SECONDS
+    triangles * cost.triangle + faces as f64 * f64::from(face_px).powi(2) * cost.texel
 }
 
 /// Faces of a sample that are in the atlas.
@@ -173,6 +184,7 @@ impl Batches {
     /// As [`Capture::new`]; `Device` when memory ran out.
     pub fn new(baker: &Baker, captures: &Captures<'_>) -> Result<Self> {
         let kind = captures.reduction.captured();
+        let cost = if kind == CaptureKind::Radiance { Cost::DRAWN } else { Cost::COMPUTED };
         let (device, library) = (baker.device(), baker.library());
         let mut capture = Capture::new(device, library, captures.face_px, kind)?;
         capture.skips = captures.shortcuts.faces;
@@ -190,13 +202,13 @@ impl Batches {
             project: project.transpose()?,
             self_visibility: self_visibility.transpose()?,
             model: match captures.levels {
-                true => Model::with_levels(device, captures.mesh)?,
+                true => Model::with_levels(device, captures.mesh, baker.leveled(captures.mesh)?)?,
                 false => Model::new(device, captures.mesh, kind == CaptureKind::Radiance)?,
             },
             jobs: Project::job_buffer(device, capacity)?,
             culls: captures.shortcuts.inside,
-            triangle_seconds: TRIANGLE_SECONDS * facing_share(captures.mesh),
-            face_seconds: estimated_seconds(captures.mesh, captures.levels, 0, 1, face_px),
+            triangle_seconds: cost.triangle * facing_share(captures.mesh),
+            face_seconds: estimated_seconds(cost, (captures.mesh, captures.levels), 0, 1, face_px),
             capture,
         })
     }

@@ -182,7 +182,7 @@ impl Cache {
         if let Some(found) = self.look(&SILHOUETTES, &name, |path| read_silhouette(path, &header)) {
             return Ok((found, None));
         }
-        let (made, report) = bake_silhouette((baker.device(), baker.library()), mesh, options, progress)?;
+        let (made, report) = bake_silhouette(baker, mesh, options, progress)?;
         Ok((self.keep(&SILHOUETTES, name, made, |path, field| field.write(path)), Some(report)))
     }
 

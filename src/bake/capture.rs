@@ -188,9 +188,9 @@ impl Capture {
                 let (forward, right, down) = face_axes(face);
                 let reached = |chunk: &&Chunk| reaches(eye, chunk.centre, chunk.radius, forward, right, down);
                 let visible = facing.iter().copied().filter(|chunk| !self.skips || reached(chunk));
-                let runs = match &model.levels {
-                    Some(levels) if !computes => {
-                        levels.gathered(visible.map(|chunk| chunk.indices.clone()), &mut indices)
+                let runs = match model.gathered_from() {
+                    Some(leveled) if !computes => {
+                        leveled.levels.gathered(visible.map(|chunk| chunk.indices.clone()), &mut indices)
                     }
                     _ => joined(visible.map(|chunk| chunk.indices.clone())),
                 };

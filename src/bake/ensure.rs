@@ -1,8 +1,8 @@
 //! Bakes or finds in the cache every field and transfer vector that a scene needs. Everything that shows a scene calls [`ensure()`].
 
-use super::cache::{Cache, FoundVertices, field_name};
+use super::cache::{Cache, Found, FoundVertices, field_name};
 use super::vertices::Wanted;
-use super::{BakeReport, Baker, Options, header};
+use super::{BakeReport, Baker, Options, Progress, header};
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
@@ -10,6 +10,7 @@ use crate::field::{FieldHeader, FieldKind, ShadowField};
 use crate::scene::light::{self, LightForm, Lights};
 use crate::scene::{Entity, Scene};
 use std::collections::{HashMap, HashSet};
+use std::hash::Hash;
 use std::sync::Arc;
 
 /// A function that is told the name of what is being baked, the samples that are done, and the samples in all.
@@ -142,7 +143,61 @@ pub fn bakes_transfer(mesh: &Mesh) -> bool {
     !mesh.is_flat() && !mesh.is_convex()
 }
 
-/// Bakes or finds in the cache every field and transfer of `needs`, which are those of `scene`. What is baked is kept in the cache.
+/// What a scene has so far. Meshes that are equal under two names share it.
+struct Making<'m> {
+    progress: SceneProgress<'m>,
+    baked: Vec<Baked>,
+    fields: HashMap<String, Arc<ShadowField>>,
+    silhouettes: HashMap<[u8; 32], Arc<SilhouetteField>>,
+    vertices: HashMap<[u8; 32], FoundVertices>,
+}
+
+impl Making<'_> {
+    /// What is known under a key, or what `find` bakes or finds in the cache, under the name `what`.
+    fn once<K: Eq + Hash, T>(
+        &mut self,
+        known: fn(&mut Self) -> &mut HashMap<K, Arc<T>>,
+        (key, what): (K, String),
+        find: impl FnOnce(Progress<'_>) -> Result<Found<T>>,
+    ) -> Result<Arc<T>> {
+        if let Some(found) = known(self).get(&key) {
+            return Ok(found.clone());
+        }
+        let (found, report) = find(&|now, all| (self.progress)(&what, now, all))?;
+        self.baked.extend(report.map(|report| Baked { what, report }));
+        known(self).insert(key, found.clone());
+        Ok(found)
+    }
+
+    /// What is wanted of the vertices of a mesh. The entities of one mesh may need what those of an equal mesh do not.
+    fn vertices(
+        &mut self,
+        mesh: &Mesh,
+        wanted: Wanted,
+        find: impl FnOnce(Wanted, Progress<'_>) -> Result<FoundVertices>,
+    ) -> Result<FoundVertices> {
+        let found = self.vertices.entry(mesh.content_hash()).or_default();
+        let missing = Wanted {
+            transfer: wanted.transfer && found.transfer.is_none(),
+            self_visibility: wanted.self_visibility && found.self_visibility.is_none(),
+        };
+        if missing.transfer || missing.self_visibility {
+            let what = |wanted: Wanted| format!("{} {}", mesh.name, wanted.name());
+            let new = find(missing, &|now, all| (self.progress)(&what(missing), now, all))?;
+            self.baked.extend(new.baked.map(|(baked, report)| Baked { what: what(baked), report }));
+            found.transfer = new.transfer.or(found.transfer.take());
+            found.self_visibility = new.self_visibility.or(found.self_visibility.take());
+        }
+        Ok(FoundVertices {
+            transfer: found.transfer.clone().filter(|_| wanted.transfer),
+            self_visibility: found.self_visibility.clone().filter(|_| wanted.self_visibility),
+            baked: None,
+        })
+    }
+}
+
+/// Bakes or finds in the cache every field and transfer of `needs`, which are those of `scene`, mesh by mesh. What is baked is kept in
+/// the cache.
 ///
 /// # Errors
 /// As [`Baker::field`].
@@ -153,58 +208,29 @@ pub fn ensure(
     needs: &SceneNeeds,
     progress: SceneProgress<'_>,
 ) -> Result<BakedScene> {
-    let mut out = BakedScene { meshes: vec![BakedMesh::default(); scene.meshes.len()], baked: Vec::new() };
-    // Meshes that are equal under two names share what is baked.
-    let mut known = HashMap::<String, Arc<ShadowField>>::new();
-    for ((mesh, headers), to) in scene.meshes.iter().zip(&needs.fields).zip(&mut out.meshes) {
-        for (header, to) in headers.iter().zip([&mut to.blocked, &mut to.radiance]) {
+    let (fields, silhouettes, vertices) = (HashMap::new(), HashMap::new(), HashMap::new());
+    let mut making = Making { progress, baked: Vec::new(), fields, silhouettes, vertices };
+    let (mut meshes, options) = (Vec::with_capacity(scene.meshes.len()), &needs.options);
+    for (index, mesh) in scene.meshes.iter().enumerate() {
+        let mut to = BakedMesh::default();
+        for (header, to) in needs.fields[index].iter().zip([&mut to.blocked, &mut to.radiance]) {
             let Some(header) = header else { continue };
-            let name = field_name(header);
-            if !known.contains_key(&name) {
-                let kind = if header.kind == FieldKind::Radiance { "light" } else { "shadow" };
-                let what = format!("{} {kind}", mesh.name);
-                let done = |now, all| progress(&what, now, all);
-                let (field, report) = cache.field(baker, mesh, header, &done)?;
-                out.baked.extend(report.map(|report| Baked { what, report }));
-                known.insert(name.clone(), field);
-            }
-            *to = known.get(&name).cloned();
+            let word = if header.kind == FieldKind::Radiance { "light" } else { "shadow" };
+            let named = (field_name(header), format!("{} {word}", mesh.name));
+            *to = Some(making.once(|all| &mut all.fields, named, |told| cache.field(baker, mesh, header, told))?);
         }
-    }
-    let BakedScene { meshes, baked } = &mut out;
-    let mut known = HashMap::<[u8; 32], Arc<SilhouetteField>>::new();
-    for ((mesh, needed), to) in scene.meshes.iter().zip(&needs.silhouettes).zip(&mut *meshes) {
-        if *needed && !known.contains_key(&mesh.content_hash()) {
-            let what = format!("{} silhouette", mesh.name);
-            let done = |now, all| progress(&what, now, all);
-            let (field, report) = cache.silhouette(baker, mesh, &needs.options, &done)?;
-            baked.extend(report.map(|report| Baked { what, report }));
-            known.insert(mesh.content_hash(), field);
+        if needs.silhouettes[index] {
+            let named = (mesh.content_hash(), format!("{} silhouette", mesh.name));
+            let find = |told: Progress<'_>| cache.silhouette(baker, mesh, options, told);
+            to.silhouette = Some(making.once(|all| &mut all.silhouettes, named, find)?);
         }
-        to.silhouette = known.get(&mesh.content_hash()).filter(|_| *needed).cloned();
+        let wanted = Wanted { transfer: needs.transfers[index], self_visibility: needs.self_visibility[index] };
+        let find = |missing, told: Progress<'_>| cache.vertices(baker, mesh, options, missing, told);
+        let found = making.vertices(mesh, wanted, find)?;
+        (to.transfer, to.self_visibility) = (found.transfer, found.self_visibility);
+        meshes.push(to);
     }
-    let wanted = |(&self_visibility, &transfer)| Wanted { transfer, self_visibility };
-    let wanted: Vec<Wanted> = needs.self_visibility.iter().zip(&needs.transfers).map(wanted).collect();
-    let mut known = HashMap::<[u8; 32], FoundVertices>::new();
-    for ((mesh, wanted), to) in scene.meshes.iter().zip(wanted).zip(meshes) {
-        // The entities of one mesh may need what those of an equal mesh do not.
-        let found = known.entry(mesh.content_hash()).or_default();
-        let missing = Wanted {
-            transfer: wanted.transfer && found.transfer.is_none(),
-            self_visibility: wanted.self_visibility && found.self_visibility.is_none(),
-        };
-        if missing.transfer || missing.self_visibility {
-            let done = |now, all| progress(&format!("{} {}", mesh.name, missing.name()), now, all);
-            let new = cache.vertices(baker, mesh, &needs.options, missing, &done)?;
-            let what = |(what, report): (Wanted, _)| Baked { what: format!("{} {}", mesh.name, what.name()), report };
-            baked.extend(new.baked.map(what));
-            found.transfer = new.transfer.or(found.transfer.take());
-            found.self_visibility = new.self_visibility.or(found.self_visibility.take());
-        }
-        to.transfer = found.transfer.clone().filter(|_| wanted.transfer);
-        to.self_visibility = found.self_visibility.clone().filter(|_| wanted.self_visibility);
-    }
-    // What idle workers hold is free for pictures.
-    baker.workers().into_iter().for_each(|workers| workers.dismiss());
-    Ok(out)
+    // What is held for further bakes is free for pictures.
+    baker.rest();
+    Ok(BakedScene { meshes, baked: making.baked })
 }

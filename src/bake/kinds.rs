@@ -1,6 +1,6 @@
 //! The kinds of things that are baked of a mesh, and what each of them takes.
 
-use super::batches::estimated_seconds;
+use super::batches::{Cost, estimated_seconds};
 use super::{Options, bakes_transfer, levels};
 use crate::asset::Mesh;
 use crate::field::FieldKind;
@@ -57,12 +57,14 @@ impl Kind {
             Kind::Shadow | Kind::Light => CAPTURED_SHARE * f64::from(options.lattice.starting_at(1.0).sample_count()),
             Kind::Silhouette => {
                 let levels = levels::are_used(mesh, options.silhouette.levels);
-                return estimated_seconds(mesh, levels, NodeGrid::map_count(options.silhouette.cells) as u64, 0, 1);
+                let maps = NodeGrid::map_count(options.silhouette.cells) as u64;
+                return estimated_seconds(Cost::DRAWN, (mesh, levels), maps, 0, 1);
             }
             Kind::Vertices => mesh.positions.len() as f64,
         };
         let levels = self != Kind::Light && levels::are_used(mesh, options.levels);
-        estimated_seconds(mesh, levels, eyes as u64, (FACES * eyes) as u64, options.face_px)
+        let cost = if self == Kind::Light { Cost::DRAWN } else { Cost::COMPUTED };
+        estimated_seconds(cost, (mesh, levels), eyes as u64, (FACES * eyes) as u64, options.face_px)
     }
 
     /// Bytes of what it stores, about.

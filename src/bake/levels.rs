@@ -143,17 +143,29 @@ impl Levels {
     }
 }
 
-/// Triangles that miss a mesh by at most `error`, in r, by their corners among its vertices.
-pub(super) fn within(mesh: &Mesh, error: f64) -> Result<Vec<[u32; 3]>> {
-    let (chunked, levels) = leveled(&unit_positions(mesh), &distinct(mesh))?;
-    let mut chosen = Vec::new();
-    levels.choose(Tolerance::Parallel(error as f32), &mut chosen);
-    let drawn = chosen.iter().flat_map(|&chunk| chunked.triangles_of(chunk as usize));
-    Ok(drawn.map(|triangle| triangle.map(|vertex| chunked.vertices[vertex as usize])).collect())
+/// A mesh cut into the chunks of all of its levels.
+pub(super) struct Leveled {
+    pub chunked: Chunked,
+    pub levels: Levels,
+}
+
+impl Leveled {
+    pub fn new(mesh: &Mesh) -> Result<Self> {
+        let (chunked, levels) = leveled(&unit_positions(mesh), &distinct(mesh))?;
+        Ok(Leveled { chunked, levels })
+    }
+
+    /// Triangles that miss the mesh by at most `error`, in r, by their corners among its vertices.
+    pub fn within(&self, error: f64) -> Vec<[u32; 3]> {
+        let mut chosen = Vec::new();
+        self.levels.choose(Tolerance::Parallel(error as f32), &mut chosen);
+        let drawn = chosen.iter().flat_map(|&chunk| self.chunked.triangles_of(chunk as usize));
+        drawn.map(|triangle| triangle.map(|vertex| self.chunked.vertices[vertex as usize])).collect()
+    }
 }
 
 /// Cuts a mesh into chunks of neighbouring triangles, for all of its levels.
-pub(super) fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Levels)> {
+fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Levels)> {
     let adapter = adapter(positions)?;
     // Vertices at one place become one, so that no group has a rim where only normals differ.
     let same = meshopt::generate_position_remap(&adapter);

@@ -54,12 +54,13 @@ use batches::{Batch, Batches, Captures, Reduce, Reduction};
 pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, is_seen, needs};
 pub use header::{Options, first_shell, hash_text, header};
 
+use levels::Leveled;
 use partial::Partial;
 use project::Projection;
 pub use quality::Quality;
 pub use report::BakeReport;
 use samples::FieldSamples;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 pub use workers::{WorkerOptions, Workers};
 
@@ -146,12 +147,14 @@ pub struct Baker {
     device: Arc<Device>,
     library: Library,
     workers: Option<Arc<Workers>>,
+    /// The levels of the mesh that was baked last, by its hash: all kinds of things of one mesh draw them.
+    leveled: Mutex<Option<([u8; 32], Arc<Leveled>)>>,
 }
 
 impl Baker {
     /// A baker that compiles its shaders from `library` and works in this process alone.
     pub fn new(device: &Arc<Device>, library: &Library) -> Self {
-        Baker { device: device.clone(), library: library.clone(), workers: None }
+        Baker { device: device.clone(), library: library.clone(), workers: None, leveled: Mutex::default() }
     }
 
     /// A baker that shares its captures out among processes, which makes the same bytes in less time.
@@ -200,11 +203,15 @@ impl Baker {
         self.fits(&header)?;
         let started = Instant::now();
         triangles::tell_repeated(mesh);
-        let FieldSamples { targets, plan, sources } = FieldSamples::new(mesh, &mut header)?;
+        let levels = header.level_texels > 0.0;
+        // They take about as long, most of it on one thread each.
+        let ahead = || if levels { self.leveled(mesh).map(|_| ()) } else { Ok(()) };
+        let (samples, ahead) = rayon::join(|| FieldSamples::new(mesh, &mut header), ahead);
+        let (FieldSamples { targets, plan, sources }, ()) = (samples?, ahead?);
         let projection = if header.kind == FieldKind::Radiance { Projection::Radiance } else { Projection::Blocked };
-        let FieldHeader { bands, face_px, shortcuts, level_texels, .. } = header;
+        let FieldHeader { bands, face_px, shortcuts, .. } = header;
         let reduction = Reduction::Project { bands, projection };
-        let captures = Captures { mesh, reduction, face_px, shortcuts, levels: level_texels > 0.0, partial };
+        let captures = Captures { mesh, reduction, face_px, shortcuts, levels, partial };
         let mut values = vec![0.0_f32; captured_bytes(&header) as usize / 4];
         let mut report = captures.run(self, &targets, &mut values, progress)?;
         symmetric_samples::spread(&mut values, &plan, &header.lattice, bands, header.kind.channels());
@@ -242,6 +249,23 @@ impl Baker {
         record_assembly(&mut commands, &assembly, header)?;
         report.add(&commands.submit()?);
         Ok(assembly.payload.read(0, bytes as usize))
+    }
+
+    /// The levels of a mesh, which are made at its first question.
+    fn leveled(&self, mesh: &Mesh) -> Result<Arc<Leveled>> {
+        let mut known = self.leveled.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, leveled)) = known.as_ref().filter(|(hash, _)| *hash == mesh.content_hash()) {
+            return Ok(leveled.clone());
+        }
+        let leveled = Arc::new(Leveled::new(mesh)?);
+        *known = Some((mesh.content_hash(), leveled.clone()));
+        Ok(leveled)
+    }
+
+    /// Gives back what idle workers hold, and what is kept of the last mesh.
+    fn rest(&self) {
+        self.workers.iter().for_each(|workers| workers.dismiss());
+        *self.leveled.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     /// Worker processes, if it has any.

@@ -1,7 +1,7 @@
 //! A mesh as captures draw it, and what they draw of it.
 
 use super::chunk::{Chunk, Chunked, chunk};
-use super::levels::{Levels, Tolerance, leveled};
+use super::levels::{Leveled, Tolerance};
 use super::raster::Faces;
 use super::triangles::{distinct, unit_positions};
 use crate::asset::Mesh;
@@ -11,15 +11,20 @@ use glam::Vec3;
 use std::ops::Range;
 use std::sync::Arc;
 
+/// How a mesh is cut.
+enum Cut {
+    /// Into these chunks.
+    Whole(Vec<Chunk>),
+    /// Into chunks of all levels.
+    Levels(Arc<Leveled>),
+}
+
 /// A mesh on the device, centred and scaled to bounding radius 1, with its triangles in chunks.
 pub struct Model {
     pub(super) positions: Buffer,
     pub(super) colors: Option<Buffer>,
     pub(super) indices: Buffer,
-    chunks: Vec<Chunk>,
-    /// All chunks, for a mesh without levels.
-    all: Vec<u32>,
-    pub(super) levels: Option<Levels>,
+    cut: Cut,
     pub(super) closed: bool,
 }
 
@@ -30,57 +35,62 @@ impl Model {
     /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, mesh: &Mesh, with_colors: bool) -> Result<Self> {
         let unit = unit_positions(mesh);
-        Self::of(device, mesh, &unit, with_colors, (chunk(&unit, &distinct(mesh))?, None))
+        let Chunked { vertices, triangles, chunks } = chunk(&unit, &distinct(mesh))?;
+        let colors = with_colors.then(|| mesh.colors.clone().unwrap_or_else(|| vec![Vec3::ONE; mesh.positions.len()]));
+        let colors: Option<Vec<_>> = colors.map(|c| vertices.iter().map(|&v| c[v as usize].to_array()).collect());
+        let colors = colors.map(|colors| Buffer::with_data(device, "capture colors", &colors));
+        let model = Self::of(device, mesh, (&vertices, &triangles), Cut::Whole(chunks))?;
+        Ok(Model { colors: colors.transpose()?, ..model })
     }
 
     /// Uploads a mesh and its levels of detail (see [`super::levels`]), for captures that see no colours.
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    pub fn with_levels(device: &Arc<Device>, mesh: &Mesh) -> Result<Self> {
-        let unit = unit_positions(mesh);
-        let (chunked, levels) = leveled(&unit, &distinct(mesh))?;
-        Self::of(device, mesh, &unit, false, (chunked, Some(levels)))
+    pub(super) fn with_levels(device: &Arc<Device>, mesh: &Mesh, leveled: Arc<Leveled>) -> Result<Self> {
+        let Chunked { vertices, triangles, .. } = &leveled.chunked;
+        Self::of(device, mesh, (vertices, triangles), Cut::Levels(leveled.clone()))
     }
 
-    fn of(
-        device: &Arc<Device>,
-        mesh: &Mesh,
-        unit: &[Vec3],
-        with_colors: bool,
-        (chunked, levels): (Chunked, Option<Levels>),
-    ) -> Result<Self> {
-        let Chunked { vertices, triangles, chunks } = chunked;
-        let colors = with_colors.then(|| mesh.colors.clone().unwrap_or_else(|| vec![Vec3::ONE; mesh.positions.len()]));
+    fn of(device: &Arc<Device>, mesh: &Mesh, (vertices, triangles): (&[u32], &[[u32; 3]]), cut: Cut) -> Result<Self> {
+        let unit = unit_positions(mesh);
         let positions: Vec<_> = vertices.iter().map(|&v| unit[v as usize].extend(0.0).to_array()).collect();
-        let corners =
-            |colors: Vec<Vec3>| -> Vec<_> { vertices.iter().map(|&v| colors[v as usize].to_array()).collect() };
         Ok(Model {
             positions: Buffer::with_data(device, "capture positions", &positions)?,
-            colors: colors.map(|c| Buffer::with_data(device, "capture colors", &corners(c))).transpose()?,
-            indices: Buffer::with_data(device, "capture indices", &triangles)?,
-            all: (0..chunks.len() as u32).collect(),
-            chunks,
-            levels,
+            colors: None,
+            indices: Buffer::with_data(device, "capture indices", triangles)?,
+            cut,
             closed: mesh.is_closed(),
         })
     }
 
-    /// The chunks that an eye is shown in faces of `face_px`. `buffer` holds them where they are chosen for it.
+    /// The indices of a mesh with levels, which are gathered for each face that is drawn.
+    pub(super) fn gathered_from(&self) -> Option<&Leveled> {
+        match &self.cut {
+            Cut::Whole(_) => None,
+            Cut::Levels(leveled) => Some(leveled),
+        }
+    }
+
+    /// The chunks that an eye is shown in faces of `face_px`. `buffer` holds their numbers.
     pub(super) fn seen<'m>(
         &'m self,
         eye: Vec3,
         face_px: u32,
         buffer: &'m mut Vec<u32>,
     ) -> impl Iterator<Item = &'m Chunk> + Clone {
-        let chosen = match &self.levels {
-            Some(levels) => {
-                levels.choose(Tolerance::capture(eye, face_px), buffer);
-                buffer.as_slice()
+        let (chunks, chosen) = match &self.cut {
+            Cut::Levels(leveled) => {
+                leveled.levels.choose(Tolerance::capture(eye, face_px), buffer);
+                (&leveled.chunked.chunks, buffer.as_slice())
             }
-            None => &self.all,
+            Cut::Whole(chunks) => {
+                buffer.clear();
+                buffer.extend(0..chunks.len() as u32);
+                (chunks, buffer.as_slice())
+            }
         };
-        chosen.iter().map(|&index| &self.chunks[index as usize])
+        chosen.iter().map(|&index| &chunks[index as usize])
     }
 
     /// Number of triangles that an eye is shown in faces of `face_px`, of all sides of the object.
@@ -119,7 +129,7 @@ impl Drawn {
 
     /// What is drawn: faces with runs of the model's own indices, or of those gathered for them.
     pub(super) fn new(model: &Model, faces: Vec<DrawnFace>, gathered: &[u32], closed: bool) -> Result<Self> {
-        let indices = if model.levels.is_some() && !gathered.is_empty() {
+        let indices = if model.gathered_from().is_some() && !gathered.is_empty() {
             let bytes = size_of_val(gathered) as u64;
             let mut buffer = Buffer::new(model.positions.device(), "capture gathered", BufferKind::Upload, bytes)?;
             buffer.write(0, gathered);

@@ -6,7 +6,7 @@
 
 use super::capture::unit_positions;
 use super::symmetric_maps;
-use super::{BakeReport, Progress, hash_text, levels};
+use super::{BakeReport, Baker, Progress, hash_text, levels};
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::field::silhouette::{Frame, REACH, Side, SilhouetteField, SilhouetteHeader, encode};
@@ -257,11 +257,16 @@ fn smallest_pixel(header: &SilhouetteHeader, frames: &[Frame]) -> f64 {
 }
 
 /// The triangles that all views show. With levels of detail they miss the mesh by a share of the smallest pixel.
-fn drawn_triangles<'m>(mesh: &'m Mesh, header: &SilhouetteHeader, pixel: f64) -> Result<Cow<'m, [[u32; 3]]>> {
+fn drawn_triangles<'m>(
+    baker: &Baker,
+    mesh: &'m Mesh,
+    header: &SilhouetteHeader,
+    pixel: f64,
+) -> Result<Cow<'m, [[u32; 3]]>> {
     if header.level_pixels == 0.0 {
         return Ok(Cow::Borrowed(&mesh.triangles));
     }
-    levels::within(mesh, header.level_pixels * pixel).map(Cow::Owned)
+    Ok(Cow::Owned(baker.leveled(mesh)?.within(header.level_pixels * pixel)))
 }
 
 /// Bakes the silhouette field of a mesh on the device; `progress` hears of maps. Returns the report of the bake too.
@@ -269,17 +274,18 @@ fn drawn_triangles<'m>(mesh: &'m Mesh, header: &SilhouetteHeader, pixel: f64) ->
 /// # Errors
 /// `Input` when the options are out of range or a view does not fit the device; `Device` when memory ran out.
 pub fn bake_silhouette(
-    (device, library): (&Arc<Device>, &Library),
+    baker: &Baker,
     mesh: &Mesh,
     options: SilhouetteOptions,
     progress: Progress<'_>,
 ) -> Result<(SilhouetteField, BakeReport)> {
     let started = Instant::now();
+    let (device, library) = (baker.device(), baker.library());
     let header = silhouette_header(mesh, options);
     header.validate()?;
     let mut frames = frames(mesh, options.cells);
     let pixel = smallest_pixel(&header, &frames);
-    let triangles = drawn_triangles(mesh, &header, pixel)?;
+    let triangles = drawn_triangles(baker, mesh, &header, pixel)?;
     let plan = if options.symmetry { symmetric_maps::plan(mesh, &frames, pixel) } else { vec![None; frames.len()] };
     let captured: Vec<Frame> = frames.iter().zip(&plan).filter(|(_, c)| c.is_none()).map(|(frame, _)| *frame).collect();
     // Sides whose maps have the same size share the pass and its buffers.

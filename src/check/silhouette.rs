@@ -42,7 +42,7 @@ impl Apart {
 /// As [`bake_silhouette`].
 pub fn compare(baker: &Baker, mesh: &Mesh) -> Result<Apart> {
     let options = SilhouetteOptions { cells: 2, map_px: 32, view_px: 128, levels: false, symmetry: true };
-    let (field, _) = bake_silhouette((baker.device(), baker.library()), mesh, options, &|_, _| ())?;
+    let (field, _) = bake_silhouette(baker, mesh, options, &|_, _| ())?;
     let sides = if field.has_halves() { &Side::ALL[..] } else { &Side::ALL[..1] };
     let (mut shares, mut sums) = ([0.0; 2], [0_u32; 2]);
     for &side in sides {

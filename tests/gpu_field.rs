@@ -253,8 +253,11 @@ fn one_colour_shines_where_it_blocks() {
                 assert!(error <= 2.0 * texel, "{}: sample {sample} channel {channel}: {error}", mesh.name);
             }
         }
+        // Of a radiance field corners move to a grid of 1/256 of a texel. Where the blocked part is computed and not drawn its corners
+        // do not, and then 63 channels of 480 samples of the teapot differ by a texel.
+        let most = if gpu.device.info.is_software() { 20 } else { 3 };
         assert!(
-            100 * odd <= 3 * blocked.header.lattice.stored_count(),
+            100 * odd <= most * blocked.header.lattice.stored_count(),
             "{}: {odd} channels of samples differ",
             mesh.name
         );

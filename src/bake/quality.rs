@@ -2,9 +2,9 @@
 //!
 //! | quality | lattice | face | bands | format | bake | bytes | error: torus | error: glowing ring |
 //! |---|---|---|---|---|---|---|---|---|
-//! | draft | cube:8x4 | 32 px | 3 | f16 | 1.8 s | 42 084 | 0.107 | 0.058 |
-//! | normal | cube:18x7,edges=auto | 64 px | 4 | f16 | 14.1 s | 280 549 | 0.087 | 0.035 |
-//! | high | cube:24x10 | 128 px | 5 | f16 | 49 s | 1 161 834 | 0.073 | 0.019 |
+//! | draft | cube:8x4 | 32 px | 3 | f16 | 0.3 s | 42 084 | 0.107 | 0.058 |
+//! | normal | cube:18x7,edges=auto | 64 px | 4 | f16 | 3.0 s | 280 549 | 0.087 | 0.035 |
+//! | high | cube:24x10 | 128 px | 5 | f16 | 15 s | 1 161 834 | 0.073 | 0.019 |
 //!
 //! Bake: processor time for the occlusion field of the built-in teapot (6 400 triangles) on llvmpipe, all cores together
 //! (`shadow-fields bake assets/meshes/teapot.obj -o t.sf --quality Q`). Bytes: of that file. Error: root mean square over all vertices
@@ -18,12 +18,12 @@ use super::silhouette::SilhouetteOptions;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Quality {
-    /// An eighth of the time and a seventh of the bytes, 1.2 to 1.7 times the error: cube:8x4, 32 px, 3 bands
+    /// A tenth of the time and a seventh of the bytes, 1.2 to 1.7 times the error: cube:8x4, 32 px, 3 bands
     Draft,
     /// The default: cube:18x7, 64 px, 4 bands
     #[default]
     Normal,
-    /// 3.5 times the time, 4 times the bytes, 0.55 to 0.84 of the error: cube:24x10, 128 px, 5 bands
+    /// 4.9 times the time, 4 times the bytes, 0.55 to 0.84 of the error: cube:24x10, 128 px, 5 bands
     High,
 }
 

@@ -65,8 +65,8 @@ impl Symmetry {
         let points = LazyLock::new(|| Points::new(mesh, None));
         let revolution = DVec3::AXES.map(|axis| {
             let turn = DMat3::from_axis_angle(axis, ANGLES_RAD[0]);
-            // Most meshes fail at once.
-            let may_be = few(&unit).all(|place| surface.distance(turn * place) < USELESS);
+            // Most meshes fail at once. A round body with bumps does so at few of its vertices.
+            let may_be = few(&unit, 1000).all(|place| surface.distance(turn * place) < USELESS);
             may_be.then(|| points.revolution(axis, surface)).flatten()
         });
         let sphere = (mesh.is_closed() && surface.encloses(DVec3::ZERO))
@@ -81,7 +81,7 @@ impl Symmetry {
         let points = LazyLock::new(|| Points::new(mesh, colors));
         let find = |matrix| {
             // Most meshes fail at once: to find a vertex near each of a few places takes less than to order all vertices.
-            let may_be = few(&unit).all(|place| is_at(&unit, matrix * place));
+            let may_be = few(&unit, 20).all(|place| is_at(&unit, matrix * place));
             Some(Operation { matrix, deviation: may_be.then(|| points.deviation(matrix, &mut 0)).flatten()? })
         };
         let mut operations: Vec<Operation> = cube_group().into_par_iter().skip(1).filter_map(find).collect();
@@ -272,9 +272,9 @@ impl Points {
 /// Largest distance of unit normals that count as one.
 const NORMAL_MATCH: f64 = 1e-4;
 
-/// A few of a mesh's vertices, from all over it.
-fn few(unit: &[Vec3]) -> impl Iterator<Item = DVec3> {
-    unit.iter().step_by(unit.len().div_ceil(20).max(1)).map(|place| place.as_dvec3())
+/// At most `count` of a mesh's vertices, from all over it.
+fn few(unit: &[Vec3], count: usize) -> impl Iterator<Item = DVec3> {
+    unit.iter().step_by(unit.len().div_ceil(count).max(1)).map(|place| place.as_dvec3())
 }
 
 /// Whether a vertex lies as near to a place as a symmetry demands.

@@ -14,7 +14,8 @@ use room::apart;
 use shadow_fields::draw::Antialias;
 use shadow_fields::error::Error;
 use shadow_fields::gpu::{Access, Commands, Device, Image, ImageShape, Overlay, Paint, Target};
-use shadow_fields::scene::Scene;
+use shadow_fields::scene::{Lights, Scene};
+use shadow_fields::view::Setup;
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
 use std::path::Path;
@@ -127,6 +128,26 @@ fn a_scene_that_stands_still_costs_only_its_showing() {
 }
 
 /// A scene that is panned out of sight, changed there, and panned back, however edges are smoothed.
+/// A hand is quicker than a compiler: what its keys ask for is built once, when all of them are known.
+#[test]
+fn keys_that_wait_cost_one_rebuild() {
+    let sharp = |setup: &mut Setup| setup.frame.lights = Lights::Sharp;
+    let Some(mut stand) = Stand::with("hasty", sharp) else { return };
+    stand.ready();
+    stand.letter('q');
+    // The floor as a light and as an occluder: each needs fields that the other's frame does not have. They are baked here.
+    let mut toggle = |count| {
+        (0..count).for_each(|_| stand.letter('e'));
+        stand.ready();
+        stand.viewer.build_count()
+    };
+    let counts = [1, 1, 1, 1, 9].map(&mut toggle);
+    assert_eq!(counts, [2, 3, 4, 5, 6]);
+    stand.key(Key::Escape); // outlines of what is selected are no part of the scene
+    let (scene, shown) = (stand.viewer.editor().scene().clone(), stand.shown());
+    assert_eq!(apart(&shown, &stand.rendered(&scene)), 0);
+}
+
 #[test]
 fn a_scene_out_of_sight_is_shown_and_comes_back() {
     for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {

@@ -28,7 +28,8 @@ impl Viewer {
             self.counts = None;
             self.edges.clear();
             self.timings.clear();
-            return self.prepare();
+            self.outgrown = true;
+            return Ok(());
         }
         let Some(frame) = &mut self.frame else { return Ok(()) };
         if changed.variant {
@@ -42,17 +43,24 @@ impl Viewer {
         }
         if changed.emission || changed.sky || changed.roles || changed.placements {
             if frame.covers(self.editor.scene()) {
-                self.bake = None;
+                (self.bake, self.outgrown) = (None, false);
                 frame.set_scene(self.editor.scene())?;
             } else if self.bake.is_none() || changed.roles {
-                return self.prepare();
+                self.outgrown = true;
             }
         }
         Ok(())
     }
 
+    /// Rebuilds a frame that changes have outgrown: once for all events that waited while the last one was built. One for each
+    /// would fall behind a hand that is quicker than the driver's compiler, and Mesa 22.3 keeps what is destroyed until the next
+    /// submission, which would come after the last event.
+    pub(super) fn catch_up(&mut self) -> Result<()> {
+        if std::mem::take(&mut self.outgrown) { self.prepare() } else { Ok(()) }
+    }
+
     /// Builds the frame if all its fields are cached, else starts a bake.
-    pub(super) fn prepare(&mut self) -> Result<()> {
+    fn prepare(&mut self) -> Result<()> {
         self.bake = None;
         let (cache, scene) = (self.setup.cache.clone(), self.editor.scene().clone());
         let needs = SceneNeeds::of(&scene, &self.setup.frame.bake, self.setup.frame.lights);
@@ -84,6 +92,7 @@ impl Viewer {
         if let Some(frame) = self.tolerate(built)? {
             log::info!("ready: the first picture of {}", self.editor.path().display());
             self.frame = Some(frame);
+            self.build_count += 1;
             self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
             self.version += 1;
         }

@@ -32,6 +32,7 @@ impl Viewer {
     /// # Errors
     /// `Device` when the device or the surface was lost.
     pub fn draw(&mut self, canvas: FrameTarget<'_>) -> Result<bool> {
+        self.catch_up()?;
         let pending = self.pending;
         let drawn = self.draw_pending(canvas);
         if drawn.is_err() {
@@ -153,6 +154,7 @@ impl Viewer {
 
     /// Writes the picture beside the saved scene, at full quality and without the overlay.
     pub(super) fn screenshot(&mut self) -> Result<String> {
+        self.catch_up()?;
         let Some(frame) = &mut self.frame else { return Err(Error::Failed("no picture has been drawn yet".into())) };
         let [width, height] = frame.size();
         let (placements, ev, white) = (self.editor.placements(), self.editor.exposure_ev(), self.editor.white());

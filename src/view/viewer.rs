@@ -78,6 +78,8 @@ pub struct Viewer {
     pub(super) flights: VecDeque<Flight>,
     /// Changes that no frame shows yet.
     pub(super) pending: Changed,
+    /// Whether the frame cannot show the editor's scene, and neither rebuild nor bake has begun.
+    pub(super) outgrown: bool,
     pub(super) bake: Option<BackgroundTask<()>>,
     pub(super) rays: Option<BackgroundTask<Reference>>,
     /// Version of the light for which rays are being cast.
@@ -109,6 +111,7 @@ pub struct Viewer {
     /// Time of the next count, which is limited because it visits every cluster and entity.
     pub(super) count_at: Instant,
     pub(super) frame_count: u64,
+    pub(super) build_count: u64,
 }
 
 impl Viewer {
@@ -130,6 +133,7 @@ impl Viewer {
             frame: None,
             flights: VecDeque::new(),
             pending: Changed { scene: true, ..Changed::default() },
+            outgrown: false,
             bake: None,
             rays: None,
             rays_version: 0,
@@ -151,10 +155,12 @@ impl Viewer {
             counts: None,
             count_at: Instant::now(),
             frame_count: 0,
+            build_count: 0,
             editor,
             setup,
         };
         viewer.follow(Changed { scene: true, ..Changed::default() })?;
+        viewer.catch_up()?;
         Ok(viewer)
     }
 
@@ -190,9 +196,9 @@ impl Viewer {
         self.input.is_dragging()
     }
 
-    /// Whether a background bake is running.
+    /// Whether a background bake is running, or may have to.
     pub fn is_baking(&self) -> bool {
-        self.bake.is_some()
+        self.bake.is_some() || self.outgrown
     }
 
     /// The latest reference: rays per vertex, and whether it is up to date.
@@ -218,6 +224,11 @@ impl Viewer {
     /// Frames drawn so far.
     pub fn frame_count(&self) -> u64 {
         self.frame_count
+    }
+
+    /// Scenes prepared for drawing so far, the same one anew where lights became occluders.
+    pub fn build_count(&self) -> u64 {
+        self.build_count
     }
 
     /// Whether a frame would show something new.
@@ -297,6 +308,7 @@ impl Viewer {
     /// # Errors
     /// As [`Viewer::apply`].
     pub fn update(&mut self, dt_s: f64) -> Result<()> {
+        self.catch_up()?;
         let forgot = self.forget_messages();
         let progress =
             [self.bake.as_ref().map(BackgroundTask::progress), self.rays.as_ref().map(BackgroundTask::progress)];

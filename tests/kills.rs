@@ -1,7 +1,7 @@
 //! Killed, crowded and cramped: whenever a command is killed, however many share a cache, and whether or not that can be written,
 //! outputs are whole or absent, the next run is as if nothing had happened, and nothing is left over.
 //!
-//! Some kills run by default. All 60 for each number of processes: `cargo test --test kills -- --ignored --nocapture`.
+//! Some kills run by default. All 60 of every command: `cargo test --test kills -- --ignored --nocapture`.
 #![cfg(unix)]
 
 #[path = "common/cli.rs"]
@@ -41,76 +41,36 @@ motion = [{ spin = { period_s = 3 } }]
 "#;
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
-/// Every kind of command that writes, and what it writes.
-const COMMANDS: [(&[&str], &[&str]); 5] = [
-    (&["bake", "m.obj", "-o", "f.sf", "--lattice", "cube:3x3", "--face-px", "8"], &["f.sf"]),
-    (&["bake", "m.obj", "-o", "s.sf", "--silhouette", "--quality", "draft"], &["s.sf"]),
+/// One triangle.
+const MODEL: &str = r#"{ "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+"meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }], "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+"accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }],
+"buffers": [{ "byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }] }"#;
+
+/// Every kind of command that writes, and what it writes. Those whose files hold times, `bench` and `profile`, write them likewise;
+/// `demo` has a test of its own, and `farm` in `tests/farm`. What the first one writes is an input of others.
+const COMMANDS: [(&str, &[&str]); 8] = [
+    ("bake m.obj -o f.sf --lattice cube:3x3 --face-px 8", &["f.sf"]),
+    ("bake m.obj -o s.sf --silhouette --quality draft", &["s.sf"]),
     (
-        &[
-            "render",
-            "s.toml",
-            "-o",
-            "p.png",
-            "--exr",
-            "p.exr",
-            "--vertices",
-            "v.csv",
-            "--size",
-            "24x16",
-            "--variant",
-            "storage",
-            "--lattice",
-            "cube:2x2",
-            "--face-px",
-            "4",
-            "--quality",
-            "draft",
-        ],
+        "render s.toml -o p.png --exr p.exr --vertices v.csv --size 24x16 --variant storage --lattice cube:2x2 --face-px 4 \
+         --quality draft",
         &["p.png", "p.exr", "v.csv"],
     ),
     (
-        &[
-            "render",
-            "s.toml",
-            "-o",
-            "a.png",
-            "--frames",
-            "4",
-            "--size",
-            "24x16",
-            "--variant",
-            "storage",
-            "--lattice",
-            "cube:2x2",
-            "--face-px",
-            "4",
-            "--lights",
-            "sh",
-        ],
+        "render s.toml -o a.png --frames 4 --size 24x16 --variant storage --lattice cube:2x2 --face-px 4 --lights sh",
         &["a.png"],
     ),
     (
-        &[
-            "render",
-            "s.toml",
-            "-o",
-            "n##.png",
-            "--frames",
-            "3",
-            "--size",
-            "16x16",
-            "--variant",
-            "storage",
-            "--lattice",
-            "cube:2x2",
-            "--face-px",
-            "4",
-            "--lights",
-            "sh",
-        ],
+        "render s.toml -o n##.png --frames 3 --size 16x16 --variant storage --lattice cube:2x2 --face-px 4 --lights sh",
         &["n00.png", "n01.png", "n02.png"],
     ),
+    ("import t.gltf -o i.toml", &["i.toml", "i_meshes/mesh_0.obj"]),
+    ("inspect ../good/f.sf --faces c.png", &["c.png"]),
+    ("compare ../good/a.png ../good/a.png -o d.png", &["d.png"]),
 ];
+/// The place of `render n##.png` among them.
+const NUMBERED: usize = 4;
 
 /// A folder for a command's outputs, with its inputs.
 fn place(inside: &Path, name: &str) -> PathBuf {
@@ -118,12 +78,14 @@ fn place(inside: &Path, name: &str) -> PathBuf {
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::write(folder.join("m.obj"), MESH).unwrap();
     std::fs::write(folder.join("s.toml"), SCENE).unwrap();
+    std::fs::write(folder.join("t.gltf"), MODEL).unwrap();
     folder
 }
 
-fn program(folder: &Path, arguments: &[&str]) -> Command {
+fn program(folder: &Path, arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_shadow-fields"));
-    command.current_dir(folder).args(arguments).args(["--cache-dir", "../cache"]).env_remove("RUST_LOG");
+    command.current_dir(folder).args(arguments.split_whitespace()).args(["--cache-dir", "../cache"]);
+    command.env_remove("RUST_LOG");
     command
 }
 
@@ -182,18 +144,20 @@ impl Good {
 
     /// Every output in the folder is whole.
     fn assert_whole(&self, folder: &Path, all_of: Option<usize>) {
-        for name in names(folder).iter().filter(|name| self.outputs.contains_key(*name)) {
-            assert!(std::fs::read(folder.join(name)).unwrap() == self.outputs[name], "{name} is not what it should be");
+        for (name, whole) in &self.outputs {
+            if let Ok(bytes) = std::fs::read(folder.join(name)) {
+                assert!(bytes == *whole, "{name} is not what it should be");
+            }
         }
         for name in all_of.map_or(&[][..], |index| COMMANDS[index].1) {
             assert!(folder.join(name).is_file(), "there is no {name}");
         }
     }
 
-    /// Kills `crowd` processes at random times, and then runs one to its end.
-    fn kill(&self, random: &mut fastrand::Rng, crowd: usize) {
+    /// Kills `crowd` processes at random times, the first of which does `job`, and then runs each to its end.
+    fn kill(&self, random: &mut fastrand::Rng, crowd: usize, job: usize, tally: &mut Tally) {
         let folders: Vec<_> = (0..crowd).map(|i| place(&self.inside, &format!("crowd-{i}"))).collect();
-        let jobs: Vec<_> = folders.iter().map(|_| random.usize(0..COMMANDS.len())).collect();
+        let jobs: Vec<_> = (0..crowd).map(|i| if i == 0 { job } else { random.usize(0..COMMANDS.len()) }).collect();
         let _ = std::fs::remove_dir_all(self.cache().join("fields"));
         let start = Instant::now();
         let mut running: Vec<_> = folders
@@ -205,35 +169,57 @@ impl Good {
             })
             .collect();
         running.sort_by_key(|(end, _)| *end);
-        for (end, process) in running {
+        for (end, mut process) in running {
             std::thread::sleep(end.saturating_duration_since(Instant::now()));
-            drop(process);
+            tally.started += 1;
+            tally.cut += usize::from(process.0.try_wait().unwrap().is_none());
         }
+        let places: Vec<_> =
+            folders.iter().cloned().chain(["", "fields", "spirv"].map(|name| self.cache().join(name))).collect();
+        tally.left += places.iter().map(|place| unfinished(place).len()).sum::<usize>();
         for (folder, &job) in folders.iter().zip(&jobs) {
             self.assert_whole(folder, None);
             let ran = finish(&mut program(folder, COMMANDS[job].0));
             assert_eq!(ran.code, 0, "{:?}: {}", COMMANDS[job].0, ran.stderr);
             self.assert_whole(folder, Some(job));
         }
-        let places = folders.iter().cloned().chain(["", "fields", "spirv"].map(|name| self.cache().join(name)));
-        for place in places.filter(|place| place.exists()) {
-            let left = names(&place).into_iter().filter(|name| name.starts_with(".unfinished-"));
-            assert_eq!(left.collect::<Vec<_>>(), [""; 0], "{}", place.display());
+        for place in places {
+            assert_eq!(unfinished(&place), [""; 0], "{}", place.display());
         }
         folders.iter().for_each(|folder| std::fs::remove_dir_all(folder).unwrap());
     }
 }
 
-fn kill(times: usize) {
+/// Processes that were started, those that ran when they were killed, and the files that these left until the next run.
+#[derive(Debug, Default)]
+struct Tally {
+    started: usize,
+    cut: usize,
+    left: usize,
+}
+
+/// Names of files that a killed process left half-made in a folder or in those within.
+fn unfinished(folder: &Path) -> Vec<String> {
+    let inside = |name: String| {
+        let path = folder.join(&name);
+        if path.is_dir() { names(&path) } else { vec![name] }
+    };
+    let all = if folder.is_dir() { names(folder) } else { Vec::new() };
+    all.into_iter().flat_map(inside).filter(|name| name.starts_with(".unfinished-")).collect()
+}
+
+/// Kills so many rounds for each number of processes; in each round another command is killed for sure.
+fn kill(rounds: usize) {
     if !has_device() {
         return;
     }
     let (good, mut random) = (Good::get(), fastrand::Rng::with_seed(1));
     for crowd in [1, 2, 4] {
-        let start = Instant::now();
-        (0..times).for_each(|_| good.kill(&mut random, crowd));
+        let (start, mut tally) = (Instant::now(), Tally::default());
+        let first = random.usize(0..COMMANDS.len());
+        (0..rounds).for_each(|round| good.kill(&mut random, crowd, (first + round) % COMMANDS.len(), &mut tally));
         let seconds = start.elapsed().as_secs_f64();
-        common::report(&format!("{crowd} processes on one cache, killed {times} times: {seconds:.1} s"));
+        common::report(&format!("{crowd} processes on one cache, {rounds} rounds: {tally:?}, {seconds:.1} s"));
     }
 }
 
@@ -242,10 +228,64 @@ fn kills_leave_whole_outputs_and_a_cache_that_works() {
     kill(2);
 }
 
+/// The variable says how many rounds each command has; 60 without it.
+fn rounds() -> usize {
+    std::env::var("SHADOW_FIELDS_KILLS").map_or(60, |text| text.parse().expect("a number of rounds"))
+}
+
 #[test]
-#[ignore = "takes minutes; a few kills run by default"]
-fn sixty_kills_of_one_two_and_four_processes() {
-    kill(60);
+#[ignore = "takes an hour; a few kills run by default"]
+fn sixty_kills_of_every_command_by_one_two_and_four_processes() {
+    kill(rounds() * COMMANDS.len());
+}
+
+/// `demo` goes on where it was killed: what it has baked is in the cache.
+#[test]
+#[ignore = "takes an hour; other commands are killed by default"]
+fn sixty_kills_of_demo() {
+    if !has_device() {
+        return;
+    }
+    let inside = Path::new(env!("CARGO_TARGET_TMPDIR")).join("kills-demo");
+    let _ = std::fs::remove_dir_all(&inside);
+    let command = |output: &str| {
+        program(&place(&inside, "work"), &format!("demo -o {output} --size 32x24 --timed-frames 1 --no-progress"))
+    };
+    let run = |output: &str| {
+        let (start, ran) = (Instant::now(), finish(&mut command(output)));
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        start.elapsed()
+    };
+    let pictures = |output: &str| {
+        let folder = inside.join("work").join(output);
+        let all = if folder.is_dir() { names(&folder) } else { Vec::new() };
+        let of = |name: String| (name.clone(), std::fs::read(folder.join(name)).unwrap());
+        all.into_iter().filter(|name| !name.starts_with(".unfinished-")).map(of).collect::<BTreeMap<_, _>>()
+    };
+    let long = run("good");
+    let (short, good, mut random) = (run("good"), pictures("good"), fastrand::Rng::with_seed(1));
+    let (start, mut tally) = (Instant::now(), Tally::default());
+    for round in 0..rounds() {
+        // Every tenth time nothing is baked.
+        let is_new = round % 10 == 0;
+        if is_new {
+            std::fs::remove_dir_all(inside.join("cache/fields")).unwrap();
+        }
+        let _ = std::fs::remove_dir_all(inside.join("work/some"));
+        let mut process = Running::start(&mut command("some"));
+        std::thread::sleep(if is_new { long } else { short }.mul_f64(1.1 * random.f64()));
+        tally.started += 1;
+        tally.cut += usize::from(process.0.try_wait().unwrap().is_none());
+        drop(process);
+        tally.left += unfinished(&inside.join("work")).len() + unfinished(&inside.join("cache")).len();
+        for (name, bytes) in pictures("some") {
+            assert!(good[&name] == bytes, "{name} is not what it should be");
+        }
+    }
+    run("some");
+    assert!(pictures("some") == good, "other pictures than without kills");
+    assert_eq!([unfinished(&inside.join("work")), unfinished(&inside.join("cache"))], [[""; 0]; 2]);
+    common::report(&format!("demo: {tally:?}, {:.1} s", start.elapsed().as_secs_f64()));
 }
 
 /// A cache on a full disk, a read-only one, and a limit on the sizes of files: the work is done all the same.
@@ -260,7 +300,7 @@ fn caches_that_cannot_be_written_lose_nothing() {
     let folder = place(inside.path(), "work");
     std::fs::create_dir(inside.path().join("cache")).unwrap();
     // A shell changes what may be written and becomes the program; mounts are its own.
-    let shell = |words: &[&str], how: &str, arguments: &[&str]| {
+    let shell = |words: &[&str], how: &str, arguments: &str| {
         let inner = program(&folder, arguments);
         let mut outer = Command::new(words[0]);
         outer.current_dir(&folder).args(&words[1..]).args(["-c", &format!("{how} && exec \"$@\""), "sh"]);
@@ -273,15 +313,15 @@ fn caches_that_cannot_be_written_lose_nothing() {
         // Files of at most 4 KiB, which no shader is.
         (&["sh"], "ulimit -f 8"),
     ] {
-        if shell(words, how, &["--version"]).output().is_ok_and(|output| !output.status.success()) {
+        if shell(words, how, "--version").output().is_ok_and(|output| !output.status.success()) {
             common::report(&format!("not allowed here: {how}"));
             continue;
         }
-        let (arguments, written) = COMMANDS[4];
+        let (arguments, written) = COMMANDS[NUMBERED];
         let ran = finish(&mut shell(words, how, arguments));
         assert_eq!(ran.code, 0, "{how}: {}", ran.stderr);
-        good.assert_whole(&folder, Some(4));
+        good.assert_whole(&folder, Some(NUMBERED));
         written.iter().for_each(|name| std::fs::remove_file(folder.join(name)).unwrap());
-        assert_eq!(names(&folder), ["m.obj", "s.toml"], "{how}");
+        assert_eq!(names(&folder), ["m.obj", "s.toml", "t.gltf"], "{how}");
     }
 }

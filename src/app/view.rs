@@ -6,7 +6,7 @@ use super::source::GltfArguments;
 use super::{Global, output};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
-use crate::gpu::{self, Device, PresentMode, Window, display};
+use crate::gpu::{self, Device, PresentMode, Window, display, heap};
 use crate::scene::Scene;
 use crate::view::command::Command;
 use crate::view::input::{Button, Event, Key};
@@ -67,6 +67,7 @@ pub struct Arguments {
 
 /// Opens the window and stays until it is closed.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    heap::share_arena();
     let scene = arguments.gltf.scene(global, &arguments.scene)?;
     let events = event_loop()?;
     let owned = events.owned_display_handle();
@@ -221,11 +222,9 @@ impl App<'_> {
             settings: cache_dir(self.global).map(|folder| folder.join(SETTINGS)),
         };
         let mut editor = Editor::new(scene, &self.arguments.scene);
-        if self.arguments.paused {
-            editor.apply(Command::ToggleRunning);
-        }
-        if self.arguments.no_overlay {
-            editor.apply(Command::ToggleOverlay);
+        let paused = self.arguments.paused.then_some(Command::ToggleRunning);
+        for command in paused.into_iter().chain(self.arguments.no_overlay.then_some(Command::ToggleOverlay)) {
+            editor.apply(command);
         }
         let scale = window.scale_factor() as f32;
         let mut viewer = Viewer::new(setup, editor, scale)?;

@@ -1,4 +1,4 @@
-//! Settings of the host's allocator for a software device.
+//! Settings of the host's allocator for a software device, and for a program that stays.
 
 /// Keeps freed memory in the process. llvmpipe allocates megabytes of transformed vertices and binned triangles for every
 /// draw; by default the C library returns them to the system after every frame, and the page faults of the next frame take
@@ -17,5 +17,19 @@ pub(super) fn keep_freed_memory() {
             libc::mallopt(libc::M_MMAP_THRESHOLD, BYTES);
             libc::mallopt(libc::M_TOP_PAD, PIECE);
         }
+    }
+}
+
+/// Keeps all threads to one arena of the allocator; to be called before there are any.
+///
+/// Each thread would have its own, up to eight for every processor, and keep there what it frees (`keep_freed_memory`). A driver's
+/// and a bake's threads come and go, and each arena grows to what the largest of them needed: a window in which lights were switched
+/// and scenes opened for two minutes held 770 MB, and 320 MB with one arena. Processor time of bakes and frames is the same.
+#[cfg(feature = "view")]
+pub fn share_arena() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: `mallopt` may be called at any time and only changes where later threads find memory.
+    unsafe {
+        libc::mallopt(libc::M_ARENA_MAX, 1);
     }
 }

@@ -14,7 +14,7 @@ pub mod device;
 pub mod display;
 pub mod drawing;
 pub mod flight;
-mod heap;
+pub mod heap;
 pub mod image;
 mod instance;
 #[cfg(feature = "view")]

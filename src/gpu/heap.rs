@@ -33,3 +33,13 @@ pub fn share_arena() {
         libc::mallopt(libc::M_ARENA_MAX, 1);
     }
 }
+
+/// Returns to the system what the process has freed, wherever it lies. Pages that are used again are faulted in once more.
+#[cfg(feature = "view")]
+pub fn give_back() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: `malloc_trim` takes the allocator's own locks and touches no memory that is in use.
+    unsafe {
+        libc::malloc_trim(0);
+    }
+}

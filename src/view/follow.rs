@@ -7,8 +7,8 @@ use crate::bake::{self, Baker, SceneNeeds};
 use crate::draw::show::Show;
 use crate::error::Result;
 use crate::frame::{self, Frame};
-use crate::gpu::Device;
 use crate::gpu::validation::Messages;
+use crate::gpu::{Device, heap};
 use crate::merge::variant::Variant;
 use crate::scene_buffers::limits;
 
@@ -52,6 +52,14 @@ impl Viewer {
         Ok(())
     }
 
+    /// Gives back the memory of the frame before, and of a bake. A driver frees its share when the first picture is submitted.
+    pub(super) fn give_back(&mut self) {
+        if self.drawn_before.is_some_and(|before| self.frame_count > before) {
+            self.drawn_before = None;
+            heap::give_back();
+        }
+    }
+
     /// Rebuilds a frame that changes have outgrown: once for all events that waited while the last one was built. One for each
     /// would fall behind a hand that is quicker than the driver's compiler, and Mesa 22.3 keeps what is destroyed until the next
     /// submission, which would come after the last event.
@@ -93,6 +101,7 @@ impl Viewer {
             log::info!("ready: the first picture of {}", self.editor.path().display());
             self.frame = Some(frame);
             self.build_count += 1;
+            self.drawn_before = Some(self.frame_count);
             self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
             self.version += 1;
         }

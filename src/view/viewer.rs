@@ -112,6 +112,8 @@ pub struct Viewer {
     pub(super) count_at: Instant,
     pub(super) frame_count: u64,
     pub(super) build_count: u64,
+    /// Frames that were drawn before the last build, until what that freed is given back.
+    pub(super) drawn_before: Option<u64>,
 }
 
 impl Viewer {
@@ -156,6 +158,7 @@ impl Viewer {
             count_at: Instant::now(),
             frame_count: 0,
             build_count: 0,
+            drawn_before: None,
             editor,
             setup,
         };
@@ -309,6 +312,7 @@ impl Viewer {
     /// As [`Viewer::apply`].
     pub fn update(&mut self, dt_s: f64) -> Result<()> {
         self.catch_up()?;
+        self.give_back();
         let forgot = self.forget_messages();
         let progress =
             [self.bake.as_ref().map(BackgroundTask::progress), self.rays.as_ref().map(BackgroundTask::progress)];

@@ -58,6 +58,29 @@ emission = [30, 24, 12]
 motion = [{ spin = { period_s = 3 } }, { bob = { amplitude_m = 0.2, period_s = 1 } }]
 "#;
 
+/// A ball over a floor, in daylight from everywhere.
+const SMALLEST_SCENE: &str = r#"
+[camera]
+eye = [0, 1, 4]
+target = [0, 0, 0]
+[output]
+width = 4
+height = 4
+[environment]
+uniform = [0.3, 0.35, 0.4]
+[[mesh]]
+name = "floor"
+plane = { size_m = 4, cells = 1 }
+[[mesh]]
+name = "ball"
+sphere = { radius_m = 0.6, subdivisions = 0 }
+[[entity]]
+mesh = "floor"
+position = [0, -0.6, 0]
+[[entity]]
+mesh = "ball"
+"#;
+
 const MESH: &str = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
 /// Few samples of few texels.
@@ -103,6 +126,14 @@ fn window(folder: &Path) -> Result<()> {
     window::run(folder)
 }
 
+/// The cheapest picture that reads baked fields, of which a run is affordable after every fault.
+fn smallest(folder: &Path) -> Result<()> {
+    let how = ["render", "@smallest.toml", "--variant", "storage", "--shading", "vertex", "--antialias", "none"];
+    run(folder, &[&how[..], &["-o", "@t.png"], &SMALL].concat())
+}
+
+const SMALLEST: Job = Job { name: "smallest", run: smallest, outputs: &["t.png"], cold: &[], only: None };
+
 /// Where only some calls fail, the others do in a job before.
 const JOBS: &[Job] = &[
     Job { name: "picture", run: picture, outputs: &["p.png", "p.exr", "v.csv"], cold: &["cache/fields"], only: None },
@@ -132,6 +163,7 @@ impl Place {
         layer::keep_drivers();
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+        std::fs::write(folder.path().join("smallest.toml"), SMALLEST_SCENE).unwrap();
         std::fs::write(folder.path().join("mesh.obj"), MESH).unwrap();
         match run(folder.path(), &["devices"]) {
             Ok(()) => Some(Place { folder, display: None, _turn: turn }),
@@ -168,7 +200,7 @@ fn sweep(choice: Choice) -> Option<usize> {
         if !place.has(job) {
             continue;
         }
-        for (name, count) in job.sweep(place.path(), choice) {
+        for (name, count) in job.sweep(place.path(), choice, &SMALLEST) {
             *all.entry(name).or_default() += count;
         }
     }

@@ -110,15 +110,19 @@ impl Job {
     }
 
     /// Lets calls fail, each with each error in a run of its own. Runs follow each other in one process, and up to its fault each makes
-    /// the calls of a good one; every so often one without a fault must make what the first did.
-    pub fn sweep(&self, folder: &Path, choice: Choice) -> Tally {
+    /// the calls of a good one. After every so many calls this job runs without a fault, and where all calls fail, the `smallest` one
+    /// after every fault; both must make what they did before.
+    pub fn sweep(&self, folder: &Path, choice: Choice, smallest: &Job) -> Tally {
         let start = Instant::now();
+        smallest.good(folder, "the first run");
+        let (least, _) = smallest.good(folder, "the second run");
         self.good(folder, "the first run");
         self.remove(folder, self.outputs);
         self.remove(folder, self.cold);
         let (expected, heard) = self.good(folder, "the second run");
         let faults = self.faults(choice, &heard.calls);
-        let every = if matches!(choice, Choice::All { .. }) { 4 } else { 8 };
+        let is_whole = matches!(choice, Choice::All { .. });
+        let every = if is_whole { 16 } else { 8 };
         let mut tally = Tally::new();
         for (index, (at, errors)) in faults.iter().enumerate() {
             let call = heard.calls[*at];
@@ -126,13 +130,12 @@ impl Job {
                 let what = format!("{}: call {at}, {} with {:?}", self.name, call.name, call.errors[error]);
                 self.one(folder, &what, Plan { at: *at, error }, call, &expected);
                 *tally.entry(call.name).or_default() += 1;
+                if is_whole {
+                    smallest.again(folder, &what, &least);
+                }
             }
             if index % every == every - 1 || index + 1 == faults.len() {
-                // The same process, and whatever the runs left in the cache.
-                self.remove(folder, self.outputs);
-                let what = format!("the run after faults up to call {at}, {}", call.name);
-                let (made, _) = self.good(folder, &what);
-                assert!(made == expected, "{}: {what} makes something else", self.name);
+                self.again(folder, &format!("faults up to call {at}, {}", call.name), &expected);
             }
         }
         report(&format!(
@@ -144,6 +147,14 @@ impl Job {
             start.elapsed().as_secs_f64()
         ));
         tally
+    }
+
+    /// A run without a fault makes what one did before, in the same process and with whatever the runs since left in the cache.
+    fn again(&self, folder: &Path, since: &str, expected: &[Option<Vec<u8>>]) {
+        self.remove(folder, self.outputs);
+        let what = format!("the run after {since}");
+        let (made, _) = self.good(folder, &what);
+        assert!(made == expected, "{}: {what} makes something else", self.name);
     }
 
     /// Lets the last call of that name fail with that error, which is passed over.

@@ -40,6 +40,7 @@ fn the_authors_program_finds_the_same() {
         ("hues", flat([0.0, 1.0, 0.0]), flat([0.0, 0.0, 1.0]), 1.0, [1.0; 4]),
         ("greys", flat([0.2; 3]), flat([0.25; 3]), 0.1834105, [0.1834094; 4]),
         ("noise", picture(noise), picture(ramp), 0.7454832, [0.9643761, 0.2940456, 0.3923472, 0.5696423]),
+        ("dark", flat([0.001; 3]), flat([0.008; 3]), 0.2092289, [0.2092317; 4]),
         ("black", flat([0.0; 3]), flat([1.0; 3]), 0.9673653, [0.9673883; 4]),
     ];
     for (name, a, b, mean, pixels) in cases {

@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
 use shadow_fields::check::silhouette as check;
-use shadow_fields::field::silhouette::{Side, SilhouetteField, SilhouetteHeader};
+use shadow_fields::field::silhouette::{Side, SilhouetteField, SilhouetteHeader, decode, encode};
 use shadow_fields::field::sub_light::SeenLight;
 use shadow_fields::truth::ray_mesh::RayMesh;
 
@@ -277,6 +277,17 @@ fn a_file_keeps_everything_and_damage_is_told() {
     assert!(SilhouetteField::new(header.clone(), field.payload().to_vec()).is_err(), "maps are missing");
     header.cells = u32::MAX;
     assert!(SilhouetteField::new(header, field.payload().to_vec()).is_err(), "cells are out of range");
+}
+
+/// What is stored lies as near as a byte can to the number.
+#[test]
+fn bytes_are_rounded_to_nearest() {
+    for i in -1000..=1000 {
+        let value = 0.002 * f64::from(i);
+        let stored = decode(encode(value, 2.0), 2.0);
+        assert!((stored - value).abs() <= 1.0 / 127.0 + 1e-12, "{value} is stored as {stored}");
+    }
+    assert_eq!([-3.0, 0.0, 3.0].map(|value| decode(encode(value, 2.0), 2.0)), [-2.0, 0.0, 2.0]);
 }
 
 #[test]

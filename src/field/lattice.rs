@@ -257,12 +257,13 @@ impl Lattice {
         if lookup == Lookup::Nearest {
             t = t.round();
         }
-        let shell = t.floor().min((last - 1.0).max(0.0));
+        let shell = t.floor();
         let radial = t - shell;
         let plane = self.plane(direction, lookup);
         let mut corners = Corners { index: [0; 8], weight: [0.0; 8] };
         for k in 0..8 {
             let (x, y, z) = (k & 1, (k >> 1) & 1, k >> 2);
+            // The shell beyond the last one weighs nothing.
             let base = (shell as u32 + z as u32).min(self.shells - 1) * self.stored_direction_count();
             let side = |fraction: f64, upper: usize| if upper == 1 { fraction } else { 1.0 - fraction };
             corners.index[k] = base + plane.base + plane.y[y] * plane.columns + plane.x[x];

@@ -169,6 +169,23 @@ fn pixels_carry_edges_that_vertices_do_not() {
     }
 }
 
+/// Pixels at the edge of a small light's shadow evaluate it, but not where a bright sky drowns it.
+#[test]
+fn faint_edges_are_left_to_vertices() {
+    let Some(gpu) = gpu() else { return };
+    let evaluated = |flood: &str| {
+        let scene = parse(&format!(
+            "{HEAD}[[entity]]\nmesh = \"ball\"\nposition = [0, 0.6, 0]\n\
+            [[entity]]\nmesh = \"ball\"\nposition = [1.2, 2.6, 0.8]\nscale = 0.1\nemission = [900, 900, 900]\n{flood}"
+        ));
+        picture(&gpu, &scene, Shading::Pixel).1
+    };
+    let Some(alone) = evaluated("") else { return };
+    let drowned = evaluated("[environment]\nuniform = [500, 500, 500]\n").unwrap();
+    report(&format!("{alone} pixels evaluate a light alone, {drowned} under a bright sky"));
+    assert!(alone > 300 && drowned < alone / 10, "{alone} and {drowned}");
+}
+
 /// Where nothing blocks a light, pixels of a mesh that shadows itself blend what its vertices see, as vertices do: a speck that hangs before
 /// a coarse ring has its pixels evaluate a sun, and only those that it shades differ.
 #[test]

@@ -149,8 +149,8 @@ fn turned_fields_are_those_that_were_captured_whole() {
         // Exact symmetries: what is left is which of two texels a corner between them falls to.
         (generate::torus(1.0, 0.3, 48, 24), FieldKind::Occlusion, 1e-3),
         (two, FieldKind::Radiance, 2e-3),
-        // Facets seen as up to a quarter of a texel.
-        (chessman(50), FieldKind::Occlusion, 4e-3),
+        // Facets seen as up to a quarter of a texel: 0.0034 where faces are drawn, 0.0040 where they are computed.
+        (chessman(50), FieldKind::Occlusion, 5e-3),
     ];
     let lattices = ["cube:5x4,outer=8", "cube:5x2,edges,outer=8"];
     for ((mesh, kind, most), text) in cases.iter().flat_map(|case| lattices.map(|text| (case, text))) {

@@ -254,7 +254,7 @@ fn one_colour_shines_where_it_blocks() {
             }
         }
         // Of a radiance field corners move to a grid of 1/256 of a texel. Where the blocked part is computed and not drawn its corners
-        // do not, and then 63 channels of 480 samples of the teapot differ by a texel.
+        // do not, and then 63 channels of the teapot's samples differ by a texel.
         let most = if gpu.device.info.is_software() { 20 } else { 3 };
         assert!(
             100 * odd <= most * blocked.header.lattice.stored_count(),

@@ -35,7 +35,7 @@ pub mod reference;
 pub mod reload;
 mod rescue;
 mod save;
-mod scenes;
+pub mod scenes;
 #[cfg(feature = "view")]
 pub mod settings;
 #[cfg(feature = "view")]

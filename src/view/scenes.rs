@@ -2,22 +2,60 @@
 
 use super::command::{Changed, Effect};
 use super::editor::Editor;
-use crate::asset::embedded;
+use super::pick::Picker;
+use crate::asset::{Mesh, embedded};
 use crate::error::Result;
 use crate::scene::Scene;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Largest number of changed scenes to which undo returns, one after the other.
+pub const FORMER_LIMIT: usize = 16;
 
 impl Editor {
     /// Shows another scene in place of this one. If there are edits of this one that are not saved, the message says how to return.
-    pub fn open(&mut self, scene: Scene, path: &Path) -> Effect {
+    /// Beyond [`FORMER_LIMIT`] scenes the oldest one goes: its edits are saved, and the message says where.
+    pub fn open(&mut self, mut scene: Scene, path: &Path) -> Effect {
+        self.share_meshes(&mut scene);
         let message = self
             .is_edited()
             .then(|| format!("the edits of {} are not saved: Ctrl-Z returns to them", self.path().display()));
-        let former = self.replace(Editor::new(scene, path));
+        let mut former = self.replace(Editor::new(scene, path));
+        former.picker = Picker::new(former.scene.meshes.len());
         // Z is easily pressed instead of Ctrl-Z, and a file dropped by mistake.
         let changed = former.undo_count() > 0 || former.is_edited();
         self.former = if changed { Some(Box::new(former)) } else { former.former };
+        let message = self.let_go_of_oldest().or(message);
         Effect { changed: Changed { scene: true, ..Changed::default() }, message, request: None }
+    }
+
+    /// Takes meshes of this scene for equal ones of the next, as a scene that is opened again has them.
+    fn share_meshes(&self, next: &mut Scene) {
+        for mesh in &mut next.meshes {
+            let is_same = |own: &&Arc<Mesh>| own.content_hash() == mesh.content_hash() && own == &mesh;
+            if let Some(own) = self.scene.meshes.iter().find(is_same) {
+                *mesh = own.clone();
+            }
+        }
+    }
+
+    /// Drops the oldest scene beyond the limit. One whose edits can be saved nowhere stays.
+    fn let_go_of_oldest(&mut self) -> Option<String> {
+        let mut last = self;
+        for _ in 0..FORMER_LIMIT {
+            last = last.former.as_deref_mut()?;
+        }
+        let mut oldest = last.former.take()?;
+        match oldest.rescue() {
+            Ok(paths) => {
+                let path = paths.first()?;
+                Some(format!("the edits of {} were saved as {}", oldest.path().display(), path.display()))
+            }
+            Err(error) => {
+                last.former = Some(oldest);
+                Some(error.to_string())
+            }
+        }
     }
 
     /// The files of scenes, this one and those that undo would return to, with edits that are not saved.

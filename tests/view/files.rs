@@ -4,6 +4,7 @@ use super::{SMALL, built_in, from_text, step};
 use glam::DVec3;
 use shadow_fields::asset::embedded;
 use shadow_fields::scene::Scene;
+use shadow_fields::view::scenes::FORMER_LIMIT;
 use shadow_fields::view::{Command, Editor, Step};
 use std::path::Path;
 
@@ -103,6 +104,34 @@ fn edits_of_every_scene_outlast_those_that_follow() {
     let folder = tempfile::tempdir().unwrap();
     editor.save(&folder.path().join("kept.toml")).unwrap();
     assert!(editor.unsaved().is_empty());
+}
+
+/// Scene after scene is edited and left: those that undo returns to are bounded, and no edit is lost.
+#[test]
+fn the_oldest_of_many_edited_scenes_is_saved_and_let_go() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.toml");
+    std::fs::write(&path, SMALL).unwrap();
+    let scene = || Scene::load(&path).unwrap();
+    let mut editor = Editor::new(scene(), &path);
+    let first = editor.scene().meshes.clone();
+    let mut said = Vec::new();
+    for number in 0..FORMER_LIMIT + 2 {
+        editor.apply(Command::SetExposure(1.0 + number as f32));
+        said.extend(editor.open(scene(), &path).message);
+    }
+    let saved: Vec<&String> = said.iter().filter(|text| text.contains("were saved as")).collect();
+    assert_eq!((saved.len(), editor.unsaved().len()), (2, FORMER_LIMIT), "{said:#?}");
+    for (number, text) in saved.into_iter().enumerate() {
+        let path = text.split(" were saved as ").nth(1).unwrap();
+        assert_eq!(Scene::load(Path::new(path)).unwrap().data.output.exposure_ev, 1.0 + number as f32);
+    }
+    // Undo still returns to the next one, and a mesh that was read again and again is kept once.
+    for _ in 0..FORMER_LIMIT {
+        assert!(editor.apply(Command::Undo).changed.scene || editor.apply(Command::Undo).changed.scene);
+    }
+    assert_eq!(editor.exposure_ev(), 3.0);
+    assert!(editor.scene().meshes.iter().zip(&first).all(|(last, first)| std::sync::Arc::ptr_eq(last, first)));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::plan::{FORMAT, PROGRAM, Plan, SECONDS_LIMIT, Slice, Task, TaskKind};
 use crate::asset;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 use crate::files;
 use serde::Deserialize;
 use std::path::Path;
@@ -24,7 +24,8 @@ impl Plan {
             format: u32,
             program: String,
         }
-        let made: Made = serde_json::from_slice(&bytes).map_err(|error| bad(format!("not a plan: {error}")))?;
+        let made: Made = serde_json::from_slice(&bytes)
+            .map_err(|error| bad(format!("not a plan: {}", one_line(&error.to_string()))))?;
         if (made.format, made.program.as_str()) != (FORMAT, PROGRAM) {
             return Err(Error::Unsupported(format!(
                 "{}: a plan of {}, and this is {PROGRAM}; plan again, or use that program",
@@ -32,7 +33,8 @@ impl Plan {
                 made.program
             )));
         }
-        let mut plan: Plan = serde_json::from_slice(&bytes).map_err(|error| bad(format!("not a plan: {error}")))?;
+        let mut plan: Plan = serde_json::from_slice(&bytes)
+            .map_err(|error| bad(format!("not a plan: {}", one_line(&error.to_string()))))?;
         plan.check().map_err(bad)?;
         let full = std::path::absolute(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
         plan.folder = full.parent().unwrap_or(Path::new("/")).to_owned();

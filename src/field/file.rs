@@ -11,7 +11,7 @@
 //! ```
 
 use super::{FieldHeader, ShadowField};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs::File;
@@ -115,7 +115,8 @@ pub fn read<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Result<(H, Vec<
     if seal(&prologue[..24], &header, &payload) != prologue[24..] {
         return Err(bad("damaged: the hash over header and payload does not match".into()));
     }
-    let header = serde_json::from_slice(&header).map_err(|error| bad(format!("malformed header: {error}")))?;
+    let header = serde_json::from_slice(&header)
+        .map_err(|error| bad(format!("malformed header: {}", one_line(&error.to_string()))))?;
     Ok((header, payload))
 }
 

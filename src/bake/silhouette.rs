@@ -72,10 +72,9 @@ pub fn silhouette_header(mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteH
 }
 
 /// Frames of all maps of a field.
-pub fn frames(mesh: &Mesh, cells: u32) -> Vec<Frame> {
+fn frames(mesh: &Mesh, nodes: &NodeGrid, count: usize) -> Vec<Frame> {
     let positions: Vec<DVec3> = unit_positions(mesh).iter().map(|p| p.as_dvec3()).collect();
-    let nodes = NodeGrid::new(cells);
-    let maps = (0..NodeGrid::map_count(cells)).into_par_iter();
+    let maps = (0..count).into_par_iter();
     maps.map(|map| Frame::around(nodes.map_direction(map), &positions)).collect()
 }
 
@@ -283,10 +282,12 @@ pub fn bake_silhouette(
     let (device, library) = (baker.device(), baker.library());
     let header = silhouette_header(mesh, options);
     header.validate()?;
-    let mut frames = frames(mesh, options.cells);
+    let nodes = NodeGrid::new(options.cells);
+    let mut frames = frames(mesh, &nodes, header.map_count());
     let pixel = smallest_pixel(&header, &frames);
     let triangles = drawn_triangles(baker, mesh, &header, pixel)?;
-    let plan = if options.symmetry { symmetric_maps::plan(mesh, &frames, pixel) } else { vec![None; frames.len()] };
+    let plan =
+        if options.symmetry { symmetric_maps::plan(mesh, &nodes, &frames, pixel) } else { vec![None; frames.len()] };
     let captured: Vec<Frame> = frames.iter().zip(&plan).filter(|(_, c)| c.is_none()).map(|(frame, _)| *frame).collect();
     // Sides whose maps have the same size share the pass and its buffers.
     let sizes: &[&[Side]] =

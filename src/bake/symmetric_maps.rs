@@ -1,13 +1,12 @@
 //! Maps of a silhouette field that need no capture, because a turn or a mirror moves the mesh onto itself and another map onto them.
 
+use super::symmetric_samples::TEXEL_SHARE;
 use super::symmetry::Symmetry;
 use crate::asset::mesh::Mesh;
 use crate::field::silhouette::{Frame, Side, SilhouetteHeader};
+use crate::field::silhouette_nodes::NodeGrid;
 use glam::{DMat3, DVec2, DVec3};
-use std::collections::HashMap;
 
-/// Most that a symmetry may miss the mesh by, in pixels of the views: as much as levels of detail may (see [`super::levels`]).
-const MOST_PIXELS: f64 = 0.25;
 /// Least cosine of the angle between axes that count as one.
 const SAME_AXIS: f64 = 1.0 - 1e-9;
 
@@ -61,18 +60,12 @@ impl Copied {
     }
 }
 
-/// For each map whether it follows from an earlier one, by the mesh's symmetries, and how. `pixel`: edge of the smallest pixel of the
-/// views, in r.
-pub fn plan(mesh: &Mesh, frames: &[Frame], pixel: f64) -> Vec<Option<Copied>> {
-    let key = |direction: DVec3| (direction * f64::from(1 << 20)).round().as_ivec3();
-    let mut maps = HashMap::new();
-    for (map, frame) in frames.iter().enumerate() {
-        maps.insert(key(-frame.direction), (map, true));
-        maps.insert(key(frame.direction), (map, false));
-    }
+/// For each map whether it follows from an earlier one, and how, by symmetries that miss the mesh by at most [`TEXEL_SHARE`] of `pixel`, the
+/// edge of the smallest pixel of the views, in r.
+pub fn plan(mesh: &Mesh, nodes: &NodeGrid, frames: &[Frame], pixel: f64) -> Vec<Option<Copied>> {
     let operations = Symmetry::of_vertices(mesh, None).operations;
     let close: Vec<DMat3> =
-        operations.iter().filter(|o| o.deviation <= MOST_PIXELS * pixel).map(|o| o.matrix).collect();
+        operations.iter().filter(|o| o.deviation <= TEXEL_SHARE * pixel).map(|o| o.matrix).collect();
     let mut plan = vec![None; frames.len()];
     for (of, other) in frames.iter().enumerate() {
         if plan[of].is_some() {
@@ -80,7 +73,7 @@ pub fn plan(mesh: &Mesh, frames: &[Frame], pixel: f64) -> Vec<Option<Copied>> {
         }
         for matrix in &close {
             let moved = other.axes.map(|axis| *matrix * axis);
-            let Some(&(map, behind)) = maps.get(&key(*matrix * other.direction)) else { continue };
+            let Some((map, behind)) = nodes.node_at(*matrix * other.direction) else { continue };
             if map > of && plan[map].is_none() {
                 plan[map] = Copied::new(of, &moved, behind, &frames[map]);
             }

@@ -2,7 +2,7 @@
 
 use super::directions::{unwarp, warp};
 use crate::sh::cube::{FACE_COUNT, direction, face_basis, face_st};
-use glam::{DVec2, DVec3, Vec2Swizzles};
+use glam::{DVec2, DVec3, IVec3, Vec2Swizzles};
 use std::collections::HashMap;
 
 /// Nodes at the corners of `cells` x `cells` cells of almost equal angles on every cube face, edges and corners shared. Opposite
@@ -13,6 +13,13 @@ pub struct NodeGrid {
     /// Map and whether the node is the opposite of the map's direction, by face, row and column.
     nodes: Vec<(usize, bool)>,
     directions: Vec<DVec3>,
+    /// Map of a node and whether it is the opposite of the map's direction, by its rounded direction.
+    known: HashMap<IVec3, (usize, bool)>,
+}
+
+/// Shared nodes come out of several faces with different last digits.
+fn rounded(direction: DVec3) -> IVec3 {
+    (direction * f64::from(1 << 20)).round().as_ivec3()
 }
 
 /// Four neighbouring nodes around a direction.
@@ -50,29 +57,32 @@ impl NodeGrid {
         let mut nodes = Vec::with_capacity(FACE_COUNT * (columns * columns) as usize);
         let mut directions = Vec::with_capacity(Self::map_count(cells));
         let mut known = HashMap::new();
-        // Shared nodes come out of several faces with different last digits.
-        let key = |d: DVec3| (d * f64::from(1 << 20)).round().as_ivec3();
         for face in 0..FACE_COUNT {
             for (y, x) in (0..columns).flat_map(|y| (0..columns).map(move |x| (y, x))) {
                 let st = |i: u32| unwarp(2.0 * f64::from(i) / f64::from(cells) - 1.0);
                 let node = direction(face, st(x), st(y));
-                let found = known.get(&key(node)).copied().unwrap_or_else(|| {
+                let found = known.get(&rounded(node)).copied().unwrap_or_else(|| {
                     let map = directions.len();
                     directions.push(node);
-                    known.insert(key(-node), (map, true));
-                    known.insert(key(node), (map, false));
+                    known.insert(rounded(-node), (map, true));
+                    known.insert(rounded(node), (map, false));
                     (map, false)
                 });
                 nodes.push(found);
             }
         }
         assert_eq!(directions.len(), Self::map_count(cells), "maps of a grid of {cells} cells");
-        NodeGrid { cells, nodes, directions }
+        NodeGrid { cells, nodes, directions, known }
     }
 
     /// Unit direction of a map.
     pub fn map_direction(&self, map: usize) -> DVec3 {
         self.directions[map]
+    }
+
+    /// Map and mirroring of the node in a unit direction, if one is there.
+    pub fn node_at(&self, direction: DVec3) -> Option<(usize, bool)> {
+        self.known.get(&rounded(direction)).copied()
     }
 
     /// Map and mirroring of every node, by face, row and column.

@@ -30,15 +30,13 @@ use sweep::{Choice, Job};
 /// Of all calls, one in so many fails by default.
 const SHARE: usize = 10;
 
-const SCENE: &str = r#"
+/// A ball over a floor as one sees it from before them.
+macro_rules! ball_over_floor {
+    () => {
+        r#"
 [camera]
 eye = [0, 1, 4]
 target = [0, 0, 0]
-[output]
-width = 12
-height = 8
-[environment]
-gradient = { radiance = [0.3, 0.35, 0.4] }
 [[mesh]]
 name = "floor"
 plane = { size_m = 4, cells = 2 }
@@ -50,36 +48,20 @@ mesh = "floor"
 position = [0, -0.6, 0]
 [[entity]]
 mesh = "ball"
-[[entity]]
-mesh = "ball"
-position = [1.2, 1, 0]
-scale = 0.3
-emission = [30, 24, 12]
-motion = [{ spin = { period_s = 3 } }, { bob = { amplitude_m = 0.2, period_s = 1 } }]
-"#;
+"#
+    };
+}
 
-/// A ball over a floor, in daylight from everywhere.
-const SMALLEST_SCENE: &str = r#"
-[camera]
-eye = [0, 1, 4]
-target = [0, 0, 0]
-[output]
-width = 4
-height = 4
-[environment]
-uniform = [0.3, 0.35, 0.4]
-[[mesh]]
-name = "floor"
-plane = { size_m = 4, cells = 1 }
-[[mesh]]
-name = "ball"
-sphere = { radius_m = 0.6, subdivisions = 0 }
-[[entity]]
-mesh = "floor"
-position = [0, -0.6, 0]
-[[entity]]
-mesh = "ball"
-"#;
+const SCENE: &str = concat!(
+    "output = { width = 12, height = 8 }\nenvironment = { gradient = { radiance = [0.3, 0.35, 0.4] } }\n",
+    ball_over_floor!(),
+    "[[entity]]\nmesh = \"ball\"\nposition = [1.2, 1, 0]\nscale = 0.3\nemission = [30, 24, 12]\n",
+    "motion = [{ spin = { period_s = 3 } }, { bob = { amplitude_m = 0.2, period_s = 1 } }]\n"
+);
+
+/// In daylight from everywhere.
+const SMALLEST_SCENE: &str =
+    concat!("output = { width = 4, height = 4 }\nenvironment = { uniform = [0.3, 0.35, 0.4] }\n", ball_over_floor!());
 
 const MESH: &str = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 

@@ -30,7 +30,7 @@ impl Plan {
             return Err(Error::Unsupported(format!(
                 "{}: a plan of {}, and this is {PROGRAM}; plan again, or use that program",
                 path.display(),
-                made.program
+                one_line(&made.program)
             )));
         }
         let mut plan: Plan = serde_json::from_slice(&bytes)
@@ -110,6 +110,8 @@ mod tests {
             older.exit_code() == 3 && older.to_string().contains("0.0.9 abc, and this is shadow-fields"),
             "{older}"
         );
+        let broken = refused(&|p| p.program = "shadow\nfields".into()).to_string();
+        assert!(broken.contains(r"a plan of shadow\nfields, and this is") && !broken.contains('\n'), "{broken}");
         let edits: [(fn(&mut Plan), &str); 9] = [
             (|p| p.slices[0].1 = 9, "slice 1 does not begin where the one before it ends"),
             (|p| p.slices[0].2 = 1e38, "slice 0 is estimated to take"),

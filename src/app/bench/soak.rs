@@ -24,13 +24,13 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if global.json {
         output::say(serde_json::to_value(&outcome).expect("results are plain data").to_string());
     } else {
-        let [first, last] = outcome.quicker_ms;
+        let [first, .., last] = outcome.quicker_ms;
         let memory = outcome.memory_bytes.map_or_else(
             || "memory unknown".to_owned(),
             |[before, most]| format!("memory from {:.1} to {:.1} MB", before as f64 * 1e-6, most as f64 * 1e-6),
         );
         output::say(format!(
-            "{} frames in {:.0} s: {memory}, {} of {} pictures of the same moment differ, quicker frames from {first:.2} to {last:.2} ms",
+            "{} frames in {:.0} s: {memory}, {} of {} pictures of the same moment differ, quicker frames of a tenth from {first:.2} to {last:.2} ms",
             outcome.frames, outcome.seconds, outcome.differing, outcome.compared
         ));
     }

@@ -18,7 +18,7 @@ use common::report;
 use display::Display;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use viewing::{SIZE, View, arguments, open};
+use viewing::{MOTION, SIZE, View, arguments, open};
 
 /// Xlib would end the process: instead, edits are saved beside the scene, and one line says so.
 #[test]
@@ -94,6 +94,30 @@ fn memory(view: &View<'_>) -> u64 {
     1024 * line.split_whitespace().next().unwrap().parse::<u64>().unwrap()
 }
 
+/// Time that the window's process has been on processors, in seconds.
+fn processor_s(view: &View<'_>) -> f64 {
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", view.child.0.id())).unwrap();
+    // Words 14 and 15, in hundredths of a second; the second word is a name in parentheses.
+    let (_, words) = stat.rsplit_once(')').unwrap();
+    words.split_whitespace().skip(11).take(2).map(|ticks| ticks.parse::<f64>().unwrap()).sum::<f64>() / 100.0
+}
+
+/// Processor time of a frame in milliseconds, of those that are drawn while the scene runs for three seconds.
+fn frame_ms(view: &mut View<'_>) -> f64 {
+    let mut frame = || {
+        view.key("space", "ToggleRunning");
+        let line = view.heard.last().unwrap();
+        let (_, words) = line.split_once("frame ").unwrap();
+        let number: f64 = words.split(':').next().unwrap().parse().unwrap();
+        [number, processor_s(view)]
+    };
+    let before = frame();
+    std::thread::sleep(Duration::from_secs(3));
+    let after = frame();
+    assert!(after[0] > before[0] + 10.0, "{} frames in three seconds", after[0] - before[0]);
+    1e3 * (after[1] - before[1]) / (after[0] - before[0])
+}
+
 /// Keys that change the scene, the selection or the camera. Tab would give the keyboard to a panel.
 const KEYS: [&str; 19] =
     ["q", "a", "j", "l", "i", "k", "o", "p", "n", "m", "r", "t", "c", "v", "e", "ctrl+z", "ctrl+y", "Home", "Escape"];
@@ -148,19 +172,22 @@ fn random_input_takes_no_memory_and_changes_no_picture() {
     let seconds = std::env::var("VIEW_SOAK_SECONDS").map_or(3600, |text| text.parse().expect("seconds"));
     let folder = tempfile::tempdir().unwrap();
     let Some(display) = Display::open(folder.path()) else { return };
-    let scene = room::write(folder.path(), SIZE.map(|side| side as u32), "");
+    let scene = room::write(folder.path(), SIZE.map(|side| side as u32), MOTION);
     let mut words = arguments();
     // The validation layer keeps what it has seen.
     words.retain(|word| !["--validation", "sync"].contains(word));
     let mut view = View::open(&display, folder.path(), &words);
     let (start, mut random) = (Instant::now(), fastrand::Rng::with_seed(1));
-    let (mut first, mut memories) = (None, Vec::new());
+    let (mut first, mut memories, mut times) = (None, Vec::new(), Vec::new());
+    report(&format!("at first {:.1} MB", memory(&view) as f64 * 1e-6));
     while start.elapsed() < Duration::from_secs(seconds) {
         round(&mut view, &mut random, &scene);
         let (now, shown) = (memory(&view), view.picture(SIZE));
+        let frame_ms = frame_ms(&mut view);
         memories.push(now);
-        let rounds = memories.len();
-        report(&format!("{rounds} rounds, {:.0} s: {:.1} MB", start.elapsed().as_secs_f64(), now as f64 * 1e-6));
+        times.push((1e3 * frame_ms) as u64);
+        let (rounds, seconds) = (memories.len(), start.elapsed().as_secs_f64());
+        report(&format!("{rounds} rounds, {seconds:.0} s: {:.1} MB, {frame_ms:.2} ms a frame", now as f64 * 1e-6));
         let first: &Vec<[u8; 3]> = first.get_or_insert_with(|| shown.clone());
         if *first != shown {
             let keep = |name: &str, pixels: &[[u8; 3]]| {
@@ -175,13 +202,16 @@ fn random_input_takes_no_memory_and_changes_no_picture() {
         }
     }
     // A fifth of the rounds warms up. What lies unused between what is used goes up and down by some percent from round to round.
-    let fifth = |which: usize| {
-        let mut some = memories[which * memories.len() / 5..((which + 1) * memories.len() / 5).max(1)].to_vec();
+    let fifth = |all: &[u64], which: usize| {
+        let mut some = all[which * all.len() / 5..((which + 1) * all.len() / 5).max(1)].to_vec();
         some.sort_unstable();
-        some[some.len() / 2]
+        some[some.len() / 2] as f64
     };
-    let (warm, end) = (fifth(1), fifth(4));
-    assert!(end as f64 <= 1.02 * warm as f64, "memory grew from {warm} to {end} bytes, medians of a fifth of the time");
+    let [memory, time] = [&memories, &times].map(|all| [fifth(all, 1), fifth(all, 4)]);
+    report(&format!("medians of the second fifth and of the last: {memory:?} bytes, {time:?} microseconds a frame"));
+    assert!(memory[1] <= 1.02 * memory[0], "memory grew: {memory:?} bytes");
+    // A machine changes its own speed by 1.4.
+    assert!(time[1] <= 1.5 * time[0], "frames slowed: {time:?} microseconds of processors");
     display.xdotool(&["key", "ctrl+q", "sleep", "1", "key", "ctrl+q"]);
     let (code, heard) = view.end();
     assert_eq!(code, 0, "{:#?}", heard.iter().rev().take(20).collect::<Vec<_>>());

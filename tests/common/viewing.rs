@@ -12,6 +12,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 pub const SIZE: [usize; 2] = [480, 320];
+/// How the lamp moves while the scene runs.
+pub const MOTION: &str = "motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } }]";
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The program with its window, and the lines that it logs.
@@ -106,7 +108,7 @@ impl<'d> View<'d> {
 /// Opens a window on the room, at 480x320.
 pub fn open<'d>(display: &'d Display, folder: &Path) -> View<'d> {
     let size = SIZE.map(|side| side as u32);
-    room::write(folder, size, "motion = [{ bob = { amplitude_m = 0.2, period_s = 3 } }]");
+    room::write(folder, size, MOTION);
     View::open(display, folder, &arguments())
 }
 

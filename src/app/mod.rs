@@ -25,10 +25,11 @@ mod worker;
 
 use crate::error::{Error, Result, one_line};
 use crate::gpu::signals;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use context::Global;
 use std::ffi::OsString;
 use std::process::ExitCode;
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 /// Precomputed shadow fields: soft shadows of many moving objects under many moving lights, on Vulkan.
 ///
@@ -86,12 +87,17 @@ pub fn run_on<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>)
     run(&parse(arguments)?).and_then(|()| output::written())
 }
 
-/// Whether the command line understands arguments, the first of which is the program's name. Nothing is run.
+/// Whether the command line understands arguments, the first of which is the program's name. Nothing is run. What reads them is made
+/// once, which takes longer than to read with it.
 ///
 /// # Errors
 /// `Usage` as [`run_on`].
 pub fn understand<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<()> {
-    parse(arguments).map(|_| ())
+    static COMMAND: LazyLock<Mutex<clap::Command>> = LazyLock::new(|| Mutex::new(Cli::command()));
+    let usage = |error: clap::Error| Error::Usage(error.to_string());
+    let mut command = COMMAND.lock().unwrap_or_else(PoisonError::into_inner);
+    let matches = command.try_get_matches_from_mut(arguments).map_err(usage)?;
+    Cli::from_arg_matches(&matches).map(|_| ()).map_err(usage)
 }
 
 fn parse<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<Cli> {

@@ -16,15 +16,22 @@ impl Plan {
     /// # Errors
     /// `Input` where it is missing or malformed; `Unsupported`, with both versions, where another program made it.
     pub fn read(path: &Path) -> Result<Self> {
+        Self::parse(&asset::read_file(path, LIMIT_BYTES)?, path)
+    }
+
+    /// As [`Plan::read`], of the bytes of the file `path`.
+    ///
+    /// # Errors
+    /// As [`Plan::read`].
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let bad = |what: String| Error::input(path, what);
-        let bytes = asset::read_file(path, LIMIT_BYTES)?;
         // The version comes first: another program's plan may have another form.
         #[derive(Deserialize)]
         struct Made {
             format: u32,
             program: String,
         }
-        let made: Made = serde_json::from_slice(&bytes)
+        let made: Made = serde_json::from_slice(bytes)
             .map_err(|error| bad(format!("not a plan: {}", one_line(&error.to_string()))))?;
         if (made.format, made.program.as_str()) != (FORMAT, PROGRAM) {
             return Err(Error::Unsupported(format!(
@@ -33,7 +40,7 @@ impl Plan {
                 one_line(&made.program)
             )));
         }
-        let mut plan: Plan = serde_json::from_slice(&bytes)
+        let mut plan: Plan = serde_json::from_slice(bytes)
             .map_err(|error| bad(format!("not a plan: {}", one_line(&error.to_string()))))?;
         plan.check().map_err(bad)?;
         let full = std::path::absolute(path).map_err(|error| bad(format!("cannot be read: {error}")))?;

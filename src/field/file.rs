@@ -80,15 +80,32 @@ pub fn read_header<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Option<H
 /// # Errors
 /// `Input` when the file is missing, truncated, damaged, of another kind or version, or its header is malformed.
 pub fn read<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
-    let bad = |what: String| Error::input(path, what);
-    let mut file = File::open(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
-    let about = file.metadata().map_err(|error| bad(format!("cannot be read: {error}")))?;
+    let unread = |error| Error::input(path, format!("cannot be read: {error}"));
+    let file = File::open(path).map_err(unread)?;
+    let about = file.metadata().map_err(unread)?;
     if about.is_dir() {
-        return Err(bad("cannot be read: Is a directory".into()));
+        return Err(Error::input(path, "cannot be read: Is a directory"));
     }
-    let size = about.len();
+    read_from(file, about.len(), path, magic)
+}
+
+/// As [`read`], of the bytes of the file `path`.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse<H: DeserializeOwned>(bytes: &[u8], path: &Path, magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
+    read_from(bytes, bytes.len() as u64, path, magic)
+}
+
+fn read_from<H: DeserializeOwned>(
+    mut bytes: impl Read,
+    size: u64,
+    path: &Path,
+    magic: [u8; 8],
+) -> Result<(H, Vec<u8>)> {
+    let bad = |what: String| Error::input(path, what);
     let mut prologue = [0; PROLOGUE];
-    file.read_exact(&mut prologue).map_err(|_| bad(format!("{size} bytes are too short for a field file")))?;
+    bytes.read_exact(&mut prologue).map_err(|_| bad(format!("{size} bytes are too short for a field file")))?;
     if prologue[..8] != magic {
         return Err(bad("not a field file of this kind (magic bytes differ)".into()));
     }
@@ -109,8 +126,9 @@ pub fn read<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Result<(H, Vec<
     }
     let mut header = vec![0; header_len as usize];
     let mut payload = vec![0; payload_len as usize];
-    file.read_exact(&mut header)
-        .and_then(|()| file.read_exact(&mut payload))
+    bytes
+        .read_exact(&mut header)
+        .and_then(|()| bytes.read_exact(&mut payload))
         .map_err(|error| bad(format!("cannot be read: {error}")))?;
     if seal(&prologue[..24], &header, &payload) != prologue[24..] {
         return Err(bad("damaged: the hash over header and payload does not match".into()));
@@ -134,11 +152,19 @@ impl ShadowField {
     /// # Errors
     /// As [`read`]; also when the header's numbers are out of range or do not fit the payload.
     pub fn read(path: &Path) -> Result<Self> {
-        let (header, payload): (FieldHeader, _) = read(path, FIELD_MAGIC)?;
-        header.validate().map_err(|error| Error::input(path, error))?;
+        let (header, payload) = read(path, FIELD_MAGIC)?;
+        Self::new(header, payload).map_err(|error| Error::input(path, error))
+    }
+
+    /// A field of what a file holds.
+    ///
+    /// # Errors
+    /// `Input` when the header's numbers are out of range or do not fit the payload.
+    pub fn new(header: FieldHeader, payload: Vec<u8>) -> Result<Self> {
+        header.validate()?;
         if header.payload_bytes() != payload.len() as u64 {
             let (claimed, found) = (header.payload_bytes(), payload.len());
-            return Err(Error::input(path, format!("the header claims {claimed} bytes of samples, {found} are there")));
+            return Err(Error::Input(format!("the header claims {claimed} bytes of samples, {found} are there")));
         }
         Ok(ShadowField { header, payload })
     }

@@ -1,6 +1,6 @@
 //! Plans of farms and results of slices, as any machine may find them in a shared folder.
 
-use super::targets::{bordered, sealed, with_file};
+use super::targets::{NAME, bordered, sealed, with_file};
 use shadow_fields::Result;
 use shadow_fields::bake::kinds::Kind;
 use shadow_fields::error::Error;
@@ -8,7 +8,7 @@ use shadow_fields::farm::engines::{self, Call};
 use shadow_fields::farm::plan::{Cost, DeviceClass, Input, Plan, Task, TaskKind, Work};
 use shadow_fields::farm::results::{self, Content, Found};
 use shadow_fields::farm::status::{Status, missing};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub const TOKENS: &[&str] = &[
     "\"works\":[",
@@ -48,39 +48,42 @@ pub fn plans() -> Vec<Vec<u8>> {
 
 /// What is read goes to all engines.
 pub fn plan(bytes: &[u8]) -> Result<()> {
-    with_file(bytes, |path| {
-        let plan = Plan::read(path)?;
-        let slices = missing(&plan);
-        let call = Call { program: "p".into(), plan: path.to_owned(), words: Vec::new() };
-        let said = engines::slurm(&plan, &call, Path::new("logs")).len() + Status::of(&plan).line(8).len();
-        assert!(said > 0 && engines::openjd(&plan, &call, &slices).is_object());
-        assert!(slices.is_empty() || !engines::arrays(&slices, Some(2)).is_empty());
-        Ok(())
-    })
+    let path = Path::new(NAME);
+    let plan = Plan::parse(bytes, path)?;
+    let slices = missing(&plan);
+    let call = Call { program: "p".into(), plan: path.to_owned(), words: Vec::new() };
+    let said = engines::slurm(&plan, &call, Path::new("logs")).len() + Status::of(&plan).line(8).len();
+    assert!(said > 0 && engines::openjd(&plan, &call, &slices).is_object());
+    assert!(slices.is_empty() || !engines::arrays(&slices, Some(2)).is_empty());
+    Ok(())
 }
 
-/// A plan whose results lie beside the file of inputs.
-fn with_plan<R>(run: impl FnOnce(&Plan) -> R) -> R {
-    with_file(&[], |path| {
-        let mut plan = example();
-        plan.folder = path.parent().unwrap().to_owned();
-        run(&plan)
-    })
+/// A plan whose results lie beside the file of inputs, and the result of its first slice. Naming that takes as long as reading it.
+fn with_plan<R>(run: impl FnOnce(&Plan, &Path) -> R) -> R {
+    thread_local! {
+        static PLAN: (Plan, PathBuf) = {
+            let mut plan = example();
+            plan.folder = with_file(&[], |path| path.parent().unwrap().to_owned());
+            let path = results::path(&plan, 0);
+            (plan, path)
+        };
+    }
+    PLAN.with(|(plan, path)| run(plan, path))
 }
 
 pub fn slices() -> Vec<Vec<u8>> {
-    with_plan(|plan| {
+    with_plan(|plan, path| {
         let mut content = Content::default();
         content.add(0, "a.sf", &[7; 20]);
         content.add(1, "part", &[]);
         content.write(plan, 0, 2.5).unwrap();
-        vec![bordered(std::fs::read(results::path(plan, 0)).unwrap())]
+        vec![bordered(std::fs::read(path).unwrap())]
     })
 }
 
 pub fn slice(bytes: &[u8]) -> Result<()> {
-    with_plan(|plan| {
-        std::fs::write(results::path(plan, 0), sealed(bytes)).unwrap();
+    with_plan(|plan, path| {
+        std::fs::write(path, sealed(bytes)).unwrap();
         assert!(Status::of(plan).line(8).contains("1 of 2 slices"));
         match results::find(plan, 0) {
             Found::Whole(about, entries) => {

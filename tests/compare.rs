@@ -169,6 +169,7 @@ fn the_difference_is_drawn() {
 fn bad_input_is_one_line() {
     let folder = folder();
     write_png(&folder.path().join("small.png"), 2, 2, &[0.5; 12], 0.0).unwrap();
+    write_png(&folder.path().join("low.png"), 48, 2, &[0.5; 288], 0.0).unwrap();
     std::fs::write(folder.path().join("text.png"), "no picture").unwrap();
     let whole = std::fs::read(folder.path().join("a.png")).unwrap();
     std::fs::write(folder.path().join("cut.png"), &whole[..whole.len() / 2]).unwrap();
@@ -185,11 +186,13 @@ fn bad_input_is_one_line() {
     let before = names(folder.path());
     for (arguments, code, parts) in [
         (&["a.png", "small.png"][..], 4, &["small.png: ", "2 x 2 pixels against 48 x 32"][..]),
+        (&["a.png", "low.png"], 4, &["low.png: ", "48 x 2 pixels against 48 x 32"]),
         (&["a.png", "none.png"], 4, &["none.png: ", "o such file"]),
         (&["text.png", "a.png"], 4, &["text.png: ", "expected a picture"]),
         (&["cut.png", "a.png"], 4, &["cut.png: "]),
         (&["bomb.png", "a.png"], 4, &["bomb.png: ", "65535 x 65535 pixels"]),
         (&["a.png", "b.png", "--mask", "small.png"], 4, &["small.png: ", "another size"]),
+        (&["a.png", "b.png", "--mask", "low.png"], 4, &["low.png: ", "another size"]),
         (&["a.png", "b.png", "-o", "d.jpg"], 2, &["d.jpg: ", ".png"]),
         (&["a.png", "b.png", "-o", "no/d.png"], 1, &["no/d.png: ", "no folder no"]),
     ] {

@@ -23,7 +23,7 @@ fn ball(lines: &str) -> Scene {
 fn near(a: Placement, position: Vec3, rotation: Quat) {
     assert!(a.position.distance(position) < 1e-5, "{} is not {position}", a.position);
     // q and -q are the same rotation.
-    assert!(a.rotation.dot(rotation).abs() > 1.0 - 1e-6, "{} is not {rotation}", a.rotation);
+    assert!((a.rotation.dot(rotation).abs() - 1.0).abs() < 1e-6, "{} is not {rotation}", a.rotation);
 }
 
 #[test]
@@ -107,6 +107,15 @@ fn rotations() {
         Vec3::ZERO,
         turned,
     );
+    // Between keys of any length the turn has a constant rate.
+    let (s, c) = 1.0_f64.sin_cos();
+    let turning = format!(
+        "motion = [{{ keyframes = {{ keys = [{{ time_s = 0, rotation = {{ quaternion = [0, 0, 0, 3] }} }}, \
+         {{ time_s = 1, rotation = {{ quaternion = [0, 0, {}, {}] }} }}] }} }}]",
+        3.0 * s,
+        3.0 * c
+    );
+    near(ball(&turning).at(0.25)[0], Vec3::ZERO, turned);
 }
 
 #[test]

@@ -86,6 +86,10 @@ fn symmetries_are_found_and_only_those() {
     let mut dented = ring.positions.clone();
     dented[123] *= 0.9;
     assert_eq!(counts(&Mesh::new("dented", dented, Vec::new(), None, ring.triangles).unwrap()), (0, [false; 3], false));
+    // A ball with a hole is none.
+    let ball = generate::sphere(2.0, 4);
+    let holed = Mesh::new("holed", ball.positions, Vec::new(), None, ball.triangles[1..].to_vec()).unwrap();
+    assert!(!counts(&holed).2);
     // A turned torus has an axis, but none of the lattice's.
     let ring = generate::torus(1.0, 0.3, 48, 24);
     let turn = glam::Quat::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7);

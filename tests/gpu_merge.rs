@@ -7,14 +7,21 @@ mod stage;
 use common::report;
 use shadow_fields::asset::Generator;
 use shadow_fields::asset::embedded;
+use shadow_fields::bake::Baker;
+use shadow_fields::bake::silhouette::SilhouetteOptions;
 use shadow_fields::check::merge::{ARITHMETIC, Agreement, FILTER, LATTICES, MIXED, TIES, against_twin};
+use shadow_fields::check::sharp::sharp_options;
+use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::field::{Lookup, Storage};
 use shadow_fields::frame::{Frame, Options};
+use shadow_fields::gpu::Device;
+use shadow_fields::lists::gather::Place;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{VARIANTS, Variant};
 use shadow_fields::scene::{Placement, Scene};
 use stage::{Stage, scene, small, stage};
 use std::path::Path;
+use std::sync::Arc;
 
 fn agrees_within(tolerance: f64, what: &str, frame: &mut Frame, placements: &[Placement]) {
     let worst = against_twin(frame, placements).unwrap().worst;
@@ -235,6 +242,83 @@ fn ties_go_by_index() {
     // Two occluders equally far: swapping them changes the order of two products that commute but for truncation.
     let again = line(&format!("{block}{light}{block}"));
     assert_eq!(again, before, "of two equal occluders the one behind the light changes nothing");
+}
+
+/// A floor under so many balls, without skips, that its lists are longer than any other buffer: a small light and the sky.
+fn crowd() -> (Scene, Options) {
+    let mut text = "environment = { uniform = [0.1, 0.2, 0.3] }\n\
+        [[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 32 }\n\
+        [[mesh]]\nname = \"box\"\ncuboid = { size_m = [0.2, 0.3, 0.2], cells = 1 }\n\
+        [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.11, subdivisions = 0 }\n\
+        [[entity]]\nmesh = \"floor\"\nposition = [0, -1, 0]\n\
+        [[entity]]\nmesh = \"box\"\nposition = [0.11, -0.3, 0.07]\nreceives = false\n\
+        [[entity]]\nmesh = \"ball\"\nposition = [0.31, 2.07, 0.17]\nreceives = false\nemission = [300, 200, 100]\n"
+        .to_owned();
+    for i in 0..400 {
+        let [x, z] = [i % 20, i / 20].map(|at| 0.27 * f64::from(at) - 2.53);
+        let y = -0.7 + 0.01 * f64::from(i % 7);
+        text += &format!("[[entity]]\nmesh = \"ball\"\nposition = [{x}, {y}, {z}]\nreceives = false\n");
+    }
+    let base = sharp_options();
+    let silhouette = SilhouetteOptions { map_px: 8, ..base.bake.silhouette };
+    let lattice = "cube:4x3".parse().unwrap();
+    let bake = shadow_fields::bake::Options { storage: Storage::F16, lattice, silhouette, ..base.bake };
+    (scene(&text), Options { skip: Skip::NONE, antialias: Antialias::None, bake, ..base })
+}
+
+/// A device whose texel views are shorter than the lists of [`crowd`] and longer than everything else.
+fn short_views() -> Arc<Device> {
+    let mut device = common::open().unwrap();
+    Arc::get_mut(&mut device).unwrap().limits.max_texel_buffer_elements = 8192;
+    device
+}
+
+/// Lists that texel views cannot hold are read from storage blocks, whoever has made them, in the very frame in which they are too long.
+#[test]
+fn lists_too_long_for_texel_views() {
+    let Some(stage) = stage() else { return };
+    let (scene, base) = crowd();
+    let placements = scene.at(0.0);
+    let variant = |name: &str| Some(Variant::named(name).unwrap());
+    let expected = stage.light(&mut stage.frame(&scene, Options { variant: variant("storage"), ..base }), &placements);
+    let device = short_views();
+    let baker = Baker::new(&device, &stage.gpu.library);
+    for (name, lists) in [("texel", Place::Host), ("texel-shifted", Place::Device), ("image", Place::Host)] {
+        let mut frame = stage.frame_on(&baker, &scene, Options { variant: variant(name), lists: Some(lists), ..base });
+        for round in 0..2 {
+            assert_eq!(frame.variant().name, name, "all but the lists has room");
+            let found = stage.light(&mut frame, &placements);
+            assert_eq!(frame.variant().name, "storage", "{name}, round {round}");
+            let (worst, brightest) = stage::difference(&found[0], &expected[0]);
+            assert!(
+                brightest > 0.1 && worst <= 2e-6 * (1.0 + brightest),
+                "{name}, round {round}: {worst:e} of {brightest}"
+            );
+            assert_eq!(stage.light(&mut frame, &placements), found, "{name}: a frame leaves nothing to the next");
+            frame.set_variant(variant(name)).unwrap();
+        }
+    }
+    assert_eq!(device.take_validation_messages(), [""; 0]);
+}
+
+/// Pixels whose chains texel views cannot hold leave sharp lights to vertices.
+#[test]
+fn chains_too_long_for_texel_views() {
+    let Some(stage) = stage() else { return };
+    let (scene, base) = crowd();
+    let device = short_views();
+    let baker = Baker::new(&device, &stage.gpu.library);
+    let picture = |baker: Option<&Baker>, shading: Shading| {
+        let options = Options { shading: Some(shading), size: [96, 64], ..base };
+        let mut frame =
+            baker.map_or_else(|| stage.frame(&scene, options), |baker| stage.frame_on(baker, &scene, options));
+        frame.render(&scene.at(0.0), Some(1.0)).unwrap();
+        frame.picture()
+    };
+    let by_vertex = picture(Some(&baker), Shading::Vertex);
+    assert!(picture(Some(&baker), Shading::Pixel) == by_vertex, "vertices evaluate the light");
+    assert!(picture(None, Shading::Pixel) != by_vertex, "where there is room, pixels evaluate the light");
+    assert_eq!(device.take_validation_messages(), [""; 0]);
 }
 
 /// Every barrier of a frame is needed: left out, the frame is refused with pass and resource named, and nothing runs.

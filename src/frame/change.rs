@@ -3,8 +3,6 @@
 use super::permutation::{CompiledMerge, harmonic_lights, usable};
 use super::{Frame, Options, forms, permutation};
 use crate::error::Result;
-use crate::gpu::TexelView;
-use crate::layout::ENTRY_FORMAT;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{Camera, Scene};
@@ -65,30 +63,27 @@ impl Frame {
         self.compile_merge(MergePermutation { variant, ..self.merge.permutation })
     }
 
-    /// Goes over to storage blocks for good where texel views cannot hold the lists that the next merge reads.
-    pub(super) fn fit_lists(&mut self) -> Result<()> {
-        if TexelView::fits(&self.device, ENTRY_FORMAT, self.work.entries().size_bytes) {
-            return Ok(());
-        }
-        let MergePermutation { variant, .. } = self.merge.permutation;
-        // Entities name places in an image, so that variant cannot go over; it fails with the view.
-        if variant.texel && !variant.image {
-            let variant = variant.restricted(false, false, false);
-            log::info!("the lists are too long for texel views; using \"{}\"", variant.name);
-            self.merge = CompiledMerge::new(
-                &self.device,
-                &self.library,
-                (MergePermutation { variant, ..self.merge.permutation }, None),
-            )?;
+    /// Goes over to storage blocks where texel views cannot hold the clusters and lists that the next merge reads. Returns whether the
+    /// merge was compiled anew, which wants them to be prepared again: entities name their fields by other places than those of an image.
+    pub(super) fn fit_lists(&mut self) -> Result<bool> {
+        if self.work.fits_views(&self.device) {
+            return Ok(false);
         }
         if let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.texel) {
             let permutation = SharpPermutation { texel: false, ..sharp.permutation };
             *sharp = Sharp::new(&self.device, &self.library, permutation)?;
         }
-        Ok(())
+        let MergePermutation { variant, .. } = self.merge.permutation;
+        let without_views = variant.restricted(false, false, false);
+        if variant.texel {
+            log::info!("the lists are too long for texel views; using \"{}\"", without_views.name);
+            self.compile_merge(MergePermutation { variant: without_views, ..self.merge.permutation })?;
+        }
+        Ok(variant.texel)
     }
 
-    /// Compiles the merge for what is wanted, as far as the device allows it.
+    /// Compiles the merge for what is wanted, as far as the device allows it. If it was compiled for something else, every cluster is
+    /// merged again.
     fn compile_merge(&mut self, wanted: MergePermutation) -> Result<()> {
         let usable = usable(&self.device, &self.buffers, self.scene.entities.len(), wanted)?;
         if usable.0 != self.merge.permutation {

@@ -104,18 +104,20 @@ impl Frame {
         let forms = forms(scene, options.lights);
         let wanted = permutation(&options, wanted, harmonic_lights(scene, &forms), uniform_entities(device));
         let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted)?)?;
-        let sharp = permutation::sharp(&options, &merge.permutation, &forms, scene, &buffers)
-            .map(|wanted| wanted.fitting(device, buffers.sharp()))
+        let sharp = permutation::sharp(&options, &merge.permutation, &forms, scene, &buffers);
+        let radiosity = Radiosity::new(device, scene, &buffers, sharp.is_some())?;
+        let sharp = sharp
+            .map(|wanted| wanted.fitting(device, buffers.sharp(), radiosity.soft()))
             .map(|permutation| Sharp::new(device, library, permutation))
             .transpose()?;
-        let radiosity = Radiosity::new(device, scene, &buffers, sharp.is_some())?;
         let mut lists = ClusterLists::default();
         for (index, entity) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
             let device_mesh = &buffers.meshes[entity.mesh];
             lists.add(index, pose::clusters(index, device_mesh, radiosity.offsets[index] / 16, options.bake.bands));
         }
         let [nodes, cells, _] = buffers.sharp();
-        let by_pixel = options.shading != Some(Shading::Vertex) && SharpPermutation::fits_views(device, [nodes, cells]);
+        let by_pixel = options.shading != Some(Shading::Vertex)
+            && SharpPermutation::fits_views(device, [nodes, cells, radiosity.soft()]);
         if options.shading == Some(Shading::Pixel) && sharp.is_some() && !by_pixel {
             log::warn!("no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields");
         }
@@ -231,10 +233,12 @@ impl Frame {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn prepare_light(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
-        let (state, sights) = (self.state(placements), self.sights(placements, viewports));
+        let sights = self.sights(placements, viewports);
         self.radiosity.replaced = false;
-        self.work.prepare(state, sights.as_deref())?;
-        self.fit_lists()?;
+        self.work.prepare(self.state(placements), sights.as_deref())?;
+        if self.fit_lists()? {
+            self.work.prepare(self.state(placements), sights.as_deref())?;
+        }
         if viewports.is_empty() { Ok(()) } else { self.prepare_pixels() }
     }
 

@@ -3,7 +3,7 @@
 use super::Options;
 use crate::error::Result;
 use crate::gpu::{Device, TexelView, Volume};
-use crate::layout::NONE;
+use crate::layout::{Entity, NONE};
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{LightForm, Scene};
@@ -53,9 +53,11 @@ pub(super) fn usable(
     permutation: MergePermutation,
 ) -> Result<(MergePermutation, Option<Volume>)> {
     let floats = vk::Format::R32G32B32A32_SFLOAT;
+    let entity_room = entity_count.max(permutation.entity_limit as usize);
     let fits = TexelView::fits(device, permutation.field_format(), buffers.fields.size_bytes)
         && TexelView::fits(device, floats, buffers.transfers.size_bytes)
-        && TexelView::fits(device, floats, buffers.vertices.size_bytes);
+        && TexelView::fits(device, floats, buffers.vertices.size_bytes)
+        && TexelView::fits(device, floats, (entity_room * size_of::<Entity>()) as u64);
     let image = (permutation.variant.image && permutation.fits_image()).then(|| buffers.image()).transpose()?.flatten();
     let variant =
         permutation.variant.restricted(fits, entity_count <= permutation.entity_limit as usize, image.is_some());

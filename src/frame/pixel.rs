@@ -3,12 +3,13 @@
 use crate::draw::DrawnMesh;
 use crate::draw::pixel_light::ByPixel;
 use crate::error::Result;
-use crate::gpu::{Device, Upload};
-use crate::layout::{self, CLUSTER_VERTICES};
+use crate::gpu::{Device, TexelView, Upload};
+use crate::layout::{self, CLUSTER_VERTICES, ENTRY_FORMAT};
 use crate::lists::gather::EntityBounds;
 use crate::lists::incremental::{ClusterLists, State};
 use crate::scene::Scene;
 use crate::scene_buffers::SceneBuffers;
+use ash::vk;
 use std::sync::Arc;
 
 /// What pixels read that evaluate sharp lights.
@@ -64,9 +65,13 @@ impl PixelChains {
         self.receivers[entity].map(|(by_pixel, _)| by_pixel)
     }
 
-    /// Whether chains have been made.
+    /// Whether chains have been made that pixels can read: a device's texel views may be too short for them, and then vertices evaluate.
     pub fn is_ready(&self) -> bool {
+        let device = self.entries.device();
         self.known.is_some()
+            && TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, self.entities.size_bytes)
+            && TexelView::fits(device, ENTRY_FORMAT, self.entries.size_bytes)
+            && TexelView::fits(device, vk::Format::R32G32_UINT, self.chains.size_bytes)
     }
 
     /// Makes the chains of this moment.

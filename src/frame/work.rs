@@ -1,8 +1,8 @@
 //! The clusters that the next merge lights, and their lists, which the host or the device makes.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Device, Upload};
-use crate::layout;
+use crate::gpu::{Buffer, Device, TexelView, Upload};
+use crate::layout::{self, CLUSTER_FORMAT, ENTRY_FORMAT};
 use crate::lists::gather::Report;
 use crate::lists::gathering::Gathering;
 use crate::lists::incremental::{ClusterLists, Dirty, Merged, State};
@@ -100,6 +100,12 @@ impl ClusterWork {
     /// The lists of all clusters, as the merge reads them.
     pub fn entries(&self) -> &Buffer {
         self.gathering.as_ref().and_then(Gathering::entries).unwrap_or(&self.entries)
+    }
+
+    /// Whether a device's texel views hold the clusters and their lists.
+    pub fn fits_views(&self, device: &Device) -> bool {
+        TexelView::fits(device, ENTRY_FORMAT, self.entries().size_bytes)
+            && TexelView::fits(device, CLUSTER_FORMAT, self.clusters.size_bytes)
     }
 
     /// Whether every list of the last frame had room, once all that was submitted has ended. If not, the next frame merges every

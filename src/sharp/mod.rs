@@ -122,15 +122,16 @@ impl SharpPermutation {
     }
 
     /// The permutation with the loops that the device wants, and with storage blocks where its texel views cannot hold the scene's buffers.
-    pub fn fitting(self, device: &Device, [nodes, cells, self_cells]: [&Buffer; 3]) -> Self {
+    pub fn fitting(self, device: &Device, [nodes, cells, self_cells]: [&Buffer; 3], soft: &Buffer) -> Self {
         let fits = TexelView::fits(device, vk::Format::R32G32_UINT, self_cells.size_bytes);
-        let texel = self.texel && fits && Self::fits_views(device, [nodes, cells]);
+        let texel = self.texel && fits && Self::fits_views(device, [nodes, cells, soft]);
         SharpPermutation { texel, rolled: device.info.wants_loops(), ..self }
     }
 
-    /// Whether the device's texel views hold nodes and cells of silhouette fields.
-    pub fn fits_views(device: &Device, [nodes, cells]: [&Buffer; 2]) -> bool {
-        TexelView::fits(device, vk::Format::R32G32B32A32_SFLOAT, nodes.size_bytes)
+    /// Whether the device's texel views hold nodes and cells of silhouette fields, and a quad of light for every vertex.
+    pub fn fits_views(device: &Device, [nodes, cells, soft]: [&Buffer; 3]) -> bool {
+        let quads = vk::Format::R32G32B32A32_SFLOAT;
+        [nodes, soft].into_iter().all(|buffer| TexelView::fits(device, quads, buffer.size_bytes))
             && TexelView::fits(device, vk::Format::R32G32_UINT, cells.size_bytes)
     }
 }

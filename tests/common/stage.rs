@@ -41,7 +41,12 @@ pub fn small() -> Options {
 impl Stage {
     /// A scene on the device, its fields baked.
     pub fn frame(&self, scene: &Scene, options: Options) -> Frame {
-        Frame::new(&self.baker, &self.cache, scene, options, &|_, _, _| ()).unwrap()
+        self.frame_on(&self.baker, scene, options)
+    }
+
+    /// The same on the device of another baker, by the fields that are baked already.
+    pub fn frame_on(&self, baker: &Baker, scene: &Scene, options: Options) -> Frame {
+        Frame::new(baker, &self.cache, scene, options, &|_, _, _| ()).unwrap()
     }
 
     /// Radiosity of every entity's vertices in turn, red, green and blue.

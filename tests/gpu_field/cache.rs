@@ -1,0 +1,182 @@
+//! Baked fields and transfers through the cache.
+
+use super::common::{generate, gpu, library, open};
+use super::{quiet, small, torus};
+use glam::Vec3;
+use shadow_fields::asset::Mesh;
+use shadow_fields::bake::cache::Cache;
+use shadow_fields::bake::vertices::Wanted;
+use shadow_fields::bake::{self, Baker};
+use shadow_fields::field::{FieldHeader, FieldKind, ShadowField, Storage};
+use shadow_fields::gpu::Device;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder.join("fields")) else { return Vec::new() };
+    let mut paths: Vec<_> = entries.map(|e| e.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|e| e == ending));
+    paths.sort();
+    paths
+}
+
+/// (whether it was baked, header, payload) of a field that comes through the cache.
+fn cached(device: &Arc<Device>, folder: &Path, mesh: &Mesh, header: &mut FieldHeader) -> (bool, Vec<u8>) {
+    let cache = Cache::new(Some(folder));
+    let (field, report) = cache.field(&Baker::new(device, &library()), mesh, header, &quiet).unwrap();
+    *header = field.header.clone();
+    (report.is_some(), field.payload.clone())
+}
+
+#[test]
+fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
+    let Some(gpu) = gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, options) = (torus(), small("cube:10x4", Storage::F16, 4));
+    let fresh = || bake::header(&mesh, FieldKind::Occlusion, &options);
+    let mut header = fresh();
+    let (baked, bytes) = cached(&gpu.device, folder.path(), &mesh, &mut header);
+    assert!(baked && header.filled_samples > 0);
+    // The same header again, now with its count of filled samples, and a fresh one.
+    let mut again = header.clone();
+    assert_eq!(
+        cached(&gpu.device, folder.path(), &mesh, &mut again),
+        (false, bytes.clone()),
+        "the header as it came back"
+    );
+    let mut again = fresh();
+    assert_eq!(cached(&gpu.device, folder.path(), &mesh, &mut again), (false, bytes.clone()));
+    assert_eq!(again, header, "the count of filled samples comes from the file");
+    // The name of a mesh is for people; equal content is found under any name.
+    let mut renamed = mesh.clone();
+    renamed.name = "other".into();
+    let mut header_renamed = bake::header(&renamed, FieldKind::Occlusion, &options);
+    assert!(!cached(&gpu.device, folder.path(), &renamed, &mut header_renamed).0);
+
+    let paths = files(folder.path(), "sf");
+    assert_eq!(paths.len(), 1);
+    let whole = std::fs::read(&paths[0]).unwrap();
+    type Damage<'d> = &'d dyn Fn(&mut Vec<u8>);
+    let damage: [Damage<'_>; 3] = [
+        &|b| {
+            let middle = b.len() / 2;
+            b[middle] ^= 4;
+        },
+        &|b| b.truncate(b.len() - 1),
+        &|b| b.clear(),
+    ];
+    for edit in damage {
+        let mut bad = whole.clone();
+        edit(&mut bad);
+        std::fs::write(&paths[0], bad).unwrap();
+        assert_eq!(cached(&gpu.device, folder.path(), &mesh, &mut fresh()), (true, bytes.clone()), "baked anew");
+        assert!(std::fs::read(&paths[0]).unwrap() == whole, "and replaced");
+    }
+    // Everything that changes a field has a file of its own.
+    let others = [
+        bake::Options { bands: 3, ..options },
+        bake::Options { face_px: 16, ..options },
+        bake::Options { storage: Storage::F32, ..options },
+        small("cube:4x3,outer=7", Storage::F16, 4),
+    ];
+    for (i, other) in others.iter().enumerate() {
+        let mut header = bake::header(&mesh, FieldKind::Occlusion, other);
+        assert!(cached(&gpu.device, folder.path(), &mesh, &mut header).0, "{other:?}");
+        assert_eq!(files(folder.path(), "sf").len(), 2 + i);
+    }
+}
+
+#[test]
+fn a_file_under_another_name_is_not_believed() {
+    let Some(gpu) = gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let options = small("cube:3x2,inner=1.02", Storage::F16, 4);
+    let meshes = [torus(), generate::cuboid(Vec3::ONE, 2)];
+    let run = |mesh: &Mesh| {
+        let mut header = bake::header(mesh, FieldKind::Occlusion, &options);
+        cached(&gpu.device, folder.path(), mesh, &mut header)
+    };
+    let (_, first) = run(&meshes[0]);
+    let name = files(folder.path(), "sf").remove(0);
+    let (_, second) = run(&meshes[1]);
+    assert_ne!(first, second);
+    let other = files(folder.path(), "sf").into_iter().find(|path| *path != name).unwrap();
+    std::fs::copy(&other, &name).unwrap();
+    assert_eq!(run(&meshes[0]), (true, first), "a whole file, but another mesh's");
+}
+
+#[test]
+fn the_cache_keeps_transfers() {
+    let Some(gpu) = gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = generate::torus(1.0, 0.3, 12, 8);
+    let cache = Cache::new(Some(folder.path()));
+    let baker = Baker::new(&gpu.device, &gpu.library);
+    let options = |bands| bake::Options { bands, face_px: 16, ..Default::default() };
+    let run = |bands| {
+        let found = cache.vertices(&baker, &mesh, &options(bands), Wanted::TRANSFER, &quiet).unwrap();
+        (found.transfer.unwrap(), found.baked)
+    };
+    let (first, baked) = run(3);
+    assert!(baked.is_some());
+    let (second, found) = run(3);
+    assert!(found.is_none() && second == first);
+    let paths = files(folder.path(), "transfer");
+    assert_eq!(paths.len(), 1);
+    let mut bytes = std::fs::read(&paths[0]).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    std::fs::write(&paths[0], bytes).unwrap();
+    let (third, again) = run(3);
+    assert!(again.is_some() && third == first);
+    assert!(run(3).1.is_none(), "replaced");
+    assert!(run(4).1.is_some(), "other bands have their own");
+}
+
+#[test]
+fn without_a_folder_a_bake_is_kept_in_memory() {
+    let Some(gpu) = gpu() else { return };
+    let (mesh, options) = (generate::torus(1.0, 0.3, 12, 8), small("cube:2x1", Storage::F16, 2));
+    let baker = Baker::new(&gpu.device, &gpu.library);
+    let header = bake::header(&mesh, FieldKind::Occlusion, &options);
+    for _ in 0..2 {
+        let cache = Cache::new(None);
+        let run = || {
+            let (field, baked) = cache.field(&baker, &mesh, &header, &quiet).unwrap();
+            let found = cache.vertices(&baker, &mesh, &options, Wanted::TRANSFER, &quiet).unwrap();
+            (field, found.transfer, [baked.is_some(), found.baked.is_some()])
+        };
+        assert!(!cache.has_field(&header) && !cache.has_transfer(&mesh, &options));
+        let (first, second) = (run(), run());
+        assert!(cache.has_field(&header) && cache.has_transfer(&mesh, &options));
+        assert_eq!([first.2, second.2], [[true; 2], [false; 2]], "another cache knows nothing of it");
+        assert!(first.0 == second.0 && first.1 == second.1);
+    }
+}
+
+/// As two processes would: each thread has its own instance and device, both the same cache folder.
+#[test]
+fn two_devices_bake_into_one_cache() {
+    let Some(_gpu) = gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, options) = (torus(), small("cube:6x3", Storage::F16, 4));
+    let outcomes = std::thread::scope(|scope| {
+        let threads = [0, 1].map(|_| {
+            scope.spawn(|| {
+                let device = open().unwrap();
+                let mut header = bake::header(&mesh, FieldKind::Occlusion, &options);
+                let (_, bytes) = cached(&device, folder.path(), &mesh, &mut header);
+                device.save_pipeline_cache();
+                (header, bytes, device.take_validation_messages())
+            })
+        });
+        threads.map(|thread| thread.join().unwrap())
+    });
+    assert!(outcomes[0] == outcomes[1], "the same header and bytes");
+    assert_eq!(outcomes[0].2, Vec::<String>::new());
+    let paths = files(folder.path(), "sf");
+    assert_eq!(paths.len(), 1);
+    let kept = ShadowField::read(&paths[0]).unwrap();
+    assert!(kept.payload == outcomes[0].1 && kept.header == outcomes[0].0);
+    assert_eq!(std::fs::read_dir(folder.path().join("fields")).unwrap().count(), 1, "no temporary file is left");
+}

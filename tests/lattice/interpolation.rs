@@ -1,0 +1,219 @@
+//! Which samples a lookup takes, and by what weights.
+
+use super::{LOOKUPS, ROUNDING, interpolate, lattices, noise, store, unit};
+use crate::generate;
+use fastrand::Rng;
+use glam::DVec3;
+use shadow_fields::bake;
+use shadow_fields::field::lattice::Directions;
+use shadow_fields::field::{FieldHeader, FieldKind, Lattice, Lookup, ShadowField, Storage};
+use std::f64::consts::{PI, TAU};
+
+#[test]
+fn weights_are_convex_everywhere() {
+    let mut rng = Rng::with_seed(2);
+    for lattice in lattices() {
+        let radial = (0..3000).map(|_| unit(&mut rng) * 10.0_f64.powf(3.0 * rng.f64() - 1.5));
+        let far = [DVec3::ZERO, DVec3::splat(1e-300), DVec3::splat(-1e6), DVec3::new(1e6, 0.0, 0.0), -1e6 * DVec3::Y];
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|v| [v, -v, 3.0 * v, -0.3 * v]);
+        let corners = (0..8).map(|k| DVec3::new(1.0, f64::from(k & 2) - 1.0, f64::from((k & 1) * 2) - 1.0));
+        let edges = [DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.0, -1.0, 1.0), DVec3::new(-2.0, 0.3, 2.0)];
+        for position in radial.chain(far).chain(axes).chain(corners).chain(edges) {
+            for lookup in LOOKUPS {
+                let found = lattice.corners(position, lookup);
+                assert!(found.weight.iter().all(|w| *w >= 0.0 && w.is_finite()), "{lattice} {position} {found:?}");
+                assert!((found.weight.iter().sum::<f64>() - 1.0).abs() < ROUNDING, "{lattice} {position} {found:?}");
+                assert!(found.index.iter().all(|i| *i < lattice.stored_count()), "{lattice} {position} {found:?}");
+            }
+            let unscale = lattice.unscale(position.length());
+            assert!(unscale.is_finite() && unscale >= 0.0, "{lattice} {position}");
+        }
+    }
+}
+
+#[test]
+fn a_sample_point_gives_its_sample() {
+    let mut rng = Rng::with_seed(3);
+    for lattice in lattices() {
+        let captured = noise(&lattice, &mut rng);
+        let stored = store(&lattice, &captured);
+        for index in 0..lattice.sample_count() {
+            for lookup in LOOKUPS {
+                let value = interpolate(&lattice, &stored, lattice.position(index), lookup);
+                let wanted = captured[index as usize];
+                assert!(
+                    (value - wanted).abs() < ROUNDING,
+                    "{lattice} {lookup:?} sample {index}: {value}, not {wanted}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn nearest_takes_a_near_sample() {
+    let mut rng = Rng::with_seed(4);
+    let lattice: Lattice = "cube:16x8,inner=1.02".parse().unwrap();
+    let directions: Vec<DVec3> = (0..lattice.direction_count()).map(|i| lattice.direction(i)).collect();
+    let index: Vec<f64> = (0..lattice.sample_count()).map(f64::from).collect();
+    let stored = store(&lattice, &index);
+    let mut wrong = 0;
+    for _ in 0..2000 {
+        let direction = unit(&mut rng);
+        let position = direction * (1.02 * (8.0_f64 / 1.02).powf(rng.f64()));
+        // A corner of a border holds a mean: there the value is no index, and any of the three is as near.
+        let value = interpolate(&lattice, &stored, position, Lookup::Nearest);
+        let sample = value.round() as u32 % lattice.direction_count();
+        let best = directions.iter().map(|d| d.angle_between(direction)).fold(4.0, f64::min);
+        // Nearest in the cell coordinate, which the projection skews: it may take a sample a little farther away.
+        wrong += usize::from(directions[sample as usize].angle_between(direction) > best + 2.5_f64.to_radians());
+    }
+    assert!(wrong <= 20, "{wrong} of 2000 lookups took a far sample");
+}
+
+#[test]
+fn linear_in_the_shell_coordinate_is_exact() {
+    let mut rng = Rng::with_seed(5);
+    for lattice in lattices() {
+        let captured: Vec<f64> =
+            (0..lattice.sample_count()).map(|i| 3.0 - 0.25 * f64::from(i / lattice.direction_count())).collect();
+        let stored = store(&lattice, &captured);
+        let (slope, offset) = lattice.radial_map();
+        for _ in 0..500 {
+            let d = lattice.inner + (lattice.outer - lattice.inner) * rng.f64();
+            let wanted = 3.0 - 0.25 * (slope * lattice.coordinate(d) + offset);
+            for lookup in [Lookup::Radial, Lookup::Trilinear] {
+                let value = interpolate(&lattice, &stored, d * unit(&mut rng), lookup);
+                assert!((value - wanted).abs() < ROUNDING, "{lattice} {d}: {value}, not {wanted}");
+            }
+        }
+    }
+}
+
+/// Walks from direction to direction and through the shells; the stored values are noise in [0, 1], so that a wrong border
+/// shows as a jump of the size of the noise.
+///
+/// Bound: along one axis of a cell an interpolated value changes by at most the cell coordinate's change times the range of
+/// the values, 1. A step of angle h moves s or t by at most h sqrt((1 + s^2)(1 + s^2 + t^2)) <= h sqrt 6, u by 4/pi times
+/// that, and a cell coordinate by cells / 2 times that again; there are two such axes. The shell coordinate and the unscale
+/// factor are computed.
+#[test]
+fn interpolation_is_continuous() {
+    let mut rng = Rng::with_seed(6);
+    for lattice in lattices() {
+        let Directions::Cube { cells } = lattice.directions else { continue };
+        let steps_of_row = if lattice.has_edges() { cells + 1 } else { cells };
+        let stored = store(&lattice, &noise(&lattice, &mut rng));
+        let (slope, offset) = lattice.radial_map();
+        let last = f64::from(lattice.shells - 1);
+        let shell_at = |d: f64| (slope * lattice.coordinate(d) + offset).clamp(0.0, last);
+        let at = |p: DVec3| interpolate(&lattice, &stored, p, Lookup::Trilinear) * lattice.unscale(p.length());
+        let mut paths: Vec<(DVec3, DVec3)> = (0..12).map(|_| (unit(&mut rng), unit(&mut rng))).collect();
+        // Across corners, along edges, and along them on either side.
+        paths.push((DVec3::new(1.0, 1.0, 0.9), DVec3::new(1.0, 1.0, 1.2)));
+        paths.push((DVec3::new(1.0, 0.9, 0.8), DVec3::new(0.8, 1.0, 1.1)));
+        paths.push((DVec3::new(-1.0, 1.0, -1.0), DVec3::new(1.0, 1.0, 1.0)));
+        paths.push((DVec3::new(1.0, -1.0 + 1e-9, -0.9), DVec3::new(1.0, -1.0 - 1e-9, 0.9)));
+        let (mut largest, mut steps) = (0.0_f64, 0);
+        for (from, to) in paths {
+            // The distance swings from inside the first shell to beyond the last.
+            let radius = |f: f64| (lattice.outer * 1.5 * (0.5 - 0.5 * (3.0 * TAU * f).cos())).max(0.2 * lattice.inner);
+            let (from, to) = (from.normalize(), to.normalize());
+            let count = 20_000;
+            let point = |i: u32| {
+                let f = f64::from(i) / f64::from(count);
+                radius(f) * from.lerp(to, f).normalize()
+            };
+            let (mut before, mut value) = (point(0), at(point(0)));
+            for i in 1..=count {
+                let next = point(i);
+                let (d0, d1) = (before.length(), next.length());
+                let angle = before.cross(next).length().atan2(before.dot(next));
+                let cell = 2.0 * f64::from(steps_of_row) / 2.0 * 4.0 / PI * 6.0_f64.sqrt() * angle;
+                let shell = (shell_at(d1) - shell_at(d0)).abs();
+                let (u0, u1) = (lattice.unscale(d0), lattice.unscale(d1));
+                let bound = (cell + shell) * u0.max(u1) + (u1 - u0).abs() + 1e-12;
+                let now = at(next);
+                assert!(
+                    (now - value).abs() <= bound,
+                    "{lattice}: {before} to {next} jumps by {}, bound {bound}",
+                    (now - value).abs()
+                );
+                // At d = 1 the chord coordinate is continuous but infinitely steep.
+                if (d0 - 1.0).abs() > 0.05 {
+                    largest = largest.max(bound / u0.max(u1));
+                }
+                steps += 1;
+                (before, value) = (next, now);
+            }
+        }
+        assert!(steps > 100_000, "{steps}");
+        // The test is worth something only where the bound is far below the noise.
+        assert!(largest < 0.3, "{lattice}: a bound of {largest} would let a jump pass");
+    }
+}
+
+#[test]
+fn longitudes_wrap() {
+    let mut rng = Rng::with_seed(7);
+    let lattice: Lattice = "latlon:4x5x7,log,inner=0.3".parse().unwrap();
+    let captured = noise(&lattice, &mut rng);
+    let stored = store(&lattice, &captured);
+    let at = |polar: f64, azimuth: f64| {
+        let p = DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin());
+        interpolate(&lattice, &stored, 1.3 * p, Lookup::Trilinear)
+    };
+    for polar in [0.2, 1.0, 1.6, 3.0] {
+        let count = 40_000;
+        let mut before = at(polar, 0.0);
+        for i in 1..=count {
+            let value = at(polar, TAU * f64::from(i) / f64::from(count));
+            // Seven cells around: a step is 7 / count of a cell, times the noise's range of 1.
+            assert!((value - before).abs() < 7.0 / f64::from(count) + 1e-9, "polar {polar}, step {i}");
+            before = value;
+        }
+        assert!((before - at(polar, 0.0)).abs() < 1e-9, "once around");
+    }
+    // Halfway between the last longitude and the first.
+    let ring = lattice.direction_count() + 2 * 7;
+    let inner_shell = lattice.shell(1);
+    let (polar, azimuth) = (2.5 * PI / 5.0, 6.5 * TAU / 7.0);
+    let p = DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin());
+    let mean = (captured[ring as usize + 6] + captured[ring as usize]) / 2.0;
+    assert!((interpolate(&lattice, &stored, inner_shell * p, Lookup::Trilinear) - mean).abs() < ROUNDING);
+}
+
+#[test]
+fn lookup_of_a_field_is_the_lattice_and_the_factor() {
+    let mut rng = Rng::with_seed(8);
+    let lattice: Lattice = "cube:4x3,inner=1.02".parse().unwrap();
+    let captured = noise(&lattice, &mut rng);
+    let stored = store(&lattice, &captured);
+    let header = FieldHeader {
+        lattice,
+        ..bake::header(&generate::sphere(1.0, 1), FieldKind::Radiance, &bake::Options::default())
+    };
+    let header = FieldHeader { bands: 2, storage: Storage::F32, radiance_scale: 2.5, ..header };
+    // Channel and coefficient as multiples of the value, so that a swapped index shows.
+    let payload = stored
+        .iter()
+        .flat_map(|v| (0..12).map(move |k| (v * f64::from(k + 1)) as f32))
+        .flat_map(f32::to_le_bytes)
+        .collect();
+    let field = ShadowField { header, payload };
+    assert_eq!(field.header.payload_bytes(), field.payload.len() as u64);
+    for _ in 0..300 {
+        let position = unit(&mut rng) * (0.3 + 12.0 * rng.f64());
+        for lookup in LOOKUPS {
+            for channel in 0..3 {
+                let mut out = [0.0; 4];
+                field.lookup(position, lookup, channel, &mut out);
+                let value = 2.5 * interpolate(&lattice, &stored, position, lookup) * lattice.unscale(position.length());
+                for (k, found) in out.into_iter().enumerate() {
+                    let wanted = value * (4 * channel + k + 1) as f64;
+                    assert!((found - wanted).abs() < 1e-6 * wanted.abs() + 1e-9, "{position}: {found}, not {wanted}");
+                }
+            }
+        }
+    }
+}

@@ -21,7 +21,7 @@ use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Edge of the atlas in texels, where the device allows it. It holds 1 024 faces of 64 px, in 4 MB for occlusion.
 const ATLAS_PX: u32 = 2048;
@@ -60,10 +60,13 @@ impl CaptureKind {
 /// Which faces of which eye lie where in the atlas.
 pub type Slots = [u32; FACE_COUNT];
 
-/// The pipelines and the atlas that they draw into.
+/// The pipelines and the atlas that they write. Each is made when faces are first chosen for it: a bake draws all of them, or computes all.
 pub struct Capture {
-    open: GraphicsPipeline,
-    closed: GraphicsPipeline,
+    device: Arc<Device>,
+    library: Library,
+    /// Draw both sides of triangles, and cull the backs of closed meshes.
+    pipelines: [OnceLock<GraphicsPipeline>; 2],
+    raster: OnceLock<Raster>,
     /// Captured faces, row by row.
     pub atlas: Image,
     depth: Option<Image>,
@@ -74,7 +77,6 @@ pub struct Capture {
     kind: CaptureKind,
     /// Whether faces and chunks that cannot matter are left out.
     pub skips: bool,
-    raster: Option<Raster>,
     /// Whether faces are computed in place of drawn, where they can be. It is so on software devices.
     pub computes: bool,
 }
@@ -97,7 +99,7 @@ impl Capture {
         (if kind == CaptureKind::Radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3)
     }
 
-    /// Pipelines for faces of `face_px`.
+    /// For faces of `face_px`.
     ///
     /// # Errors
     /// `Input` when a face is larger than the device's images.
@@ -114,17 +116,11 @@ impl Capture {
         let color = if radiance { vk::Format::R32G32B32A32_SFLOAT } else { vk::Format::R8_UNORM };
         let depth = radiance.then_some(vk::Format::D32_SFLOAT);
         let shape = ImageShape { format: color, width: columns * face_px, height: columns * face_px, samples: 1 };
-        let [vertex, fragment] = Self::rows(kind);
-        let (vertex, fragment) = (library.shader(&vertex)?, library.shader(&fragment)?);
-        let keeps = if kind == CaptureKind::Distance { Keeps::Smallest } else { Keeps::Last };
-        let pipeline = |cull| {
-            let state = GraphicsState { color, depth, samples: 1, cull, keeps, nearer_steps: 0.0 };
-            GraphicsPipeline::new(device, "capture", &vertex, &fragment, state)
-        };
         Ok(Capture {
-            open: pipeline(vk::CullModeFlags::NONE)?,
-            // A cube face is a mirror image, which turns every triangle over, so FRONT removes the object's back faces.
-            closed: pipeline(vk::CullModeFlags::FRONT)?,
+            device: device.clone(),
+            library: library.clone(),
+            pipelines: Default::default(),
+            raster: OnceLock::new(),
             atlas: Image::new(device, "capture atlas", shape)?,
             depth: depth
                 .map(|format| Image::new(device, "capture depth", ImageShape { format, ..shape }))
@@ -133,11 +129,32 @@ impl Capture {
             columns,
             kind,
             skips: true,
-            raster: (!radiance && Raster::serves(face_px))
-                .then(|| Raster::new(device, library, kind == CaptureKind::Distance, (face_px, columns)))
-                .transpose()?,
             computes: device.info.is_software(),
         })
+    }
+
+    /// Makes the pipeline that draws faces.
+    fn make_pipeline(&self, closed: bool) -> Result<GraphicsPipeline> {
+        let [vertex, fragment] = Self::rows(self.kind);
+        let state = GraphicsState {
+            color: self.atlas.shape.format,
+            depth: self.depth.as_ref().map(|image| image.shape.format),
+            samples: 1,
+            // A cube face is a mirror image, which turns every triangle over, so FRONT removes the object's back faces.
+            cull: if closed { vk::CullModeFlags::FRONT } else { vk::CullModeFlags::NONE },
+            keeps: if self.kind == CaptureKind::Distance { Keeps::Smallest } else { Keeps::Last },
+            nearer_steps: 0.0,
+        };
+        let (vertex, fragment) = (self.library.shader(&vertex)?, self.library.shader(&fragment)?);
+        GraphicsPipeline::new(&self.device, "capture", &vertex, &fragment, state)
+    }
+
+    /// Whether faces of a model are computed.
+    fn computes(&self, model: &Model) -> bool {
+        self.computes
+            && self.kind != CaptureKind::Radiance
+            && Raster::serves(self.face_px)
+            && Raster::holds(&self.device, &model.positions, &model.indices)
     }
 
     /// Faces that one render pass can hold.
@@ -174,12 +191,10 @@ impl Capture {
     /// Chooses what every planned face shows. Back faces of closed meshes are culled when `cull` is set.
     ///
     /// # Errors
-    /// `Device` when memory ran out.
+    /// `Device` when memory ran out, `Failed` when a shader does not compile.
     pub fn choose(&self, model: &Model, eyes: &[Vec3], plan: &[Slots], cull: bool) -> Result<Drawn> {
         let closed = cull && model.closed;
-        let device = model.positions.device();
-        let computes =
-            self.computes && self.raster.is_some() && Raster::holds(device, &model.positions, &model.indices);
+        let computes = self.computes(model);
         let (mut buffer, mut faces, mut indices) = (Vec::new(), Vec::new(), Vec::<u32>::new());
         for (&eye, slots) in eyes.iter().zip(plan) {
             let seen = model.seen(eye, self.face_px, &mut buffer);
@@ -197,7 +212,15 @@ impl Capture {
                 faces.push(DrawnFace { eye, face, slot, runs });
             }
         }
-        if computes { Drawn::computed(model, faces, closed) } else { Drawn::new(model, faces, &indices, closed) }
+        if computes {
+            let size = (self.face_px, self.columns);
+            let distance = self.kind == CaptureKind::Distance;
+            once(&self.raster, || Raster::new(&self.device, &self.library, distance, size))?;
+            Drawn::computed(model, faces, closed)
+        } else {
+            once(&self.pipelines[usize::from(closed)], || self.make_pipeline(closed))?;
+            Drawn::new(model, faces, &indices, closed)
+        }
     }
 
     /// Draws or computes what was chosen. The atlas must be in the layout of [`Drawn::access`].
@@ -205,13 +228,13 @@ impl Capture {
     /// # Errors
     /// What recording returns.
     pub fn record<'r>(&'r self, commands: &mut Commands<'r>, model: &'r Model, drawn: &'r Drawn) -> Result<()> {
-        if let (Some(raster), Some(faces)) = (&self.raster, &drawn.computed) {
+        if let (Some(raster), Some(faces)) = (self.raster.get(), &drawn.computed) {
             return raster.record(commands, (&model.positions, &model.indices), (faces, drawn.closed), &self.atlas);
         }
         let radiance = self.kind == CaptureKind::Radiance;
         let background = if radiance { [0.0, 0.0, 0.0, 1.0] } else { [1.0; 4] };
         let target = Target { color: &self.atlas, clear: Some(background), depth: self.depth.as_ref(), resolve: None };
-        let pipeline = if drawn.closed { &self.closed } else { &self.open };
+        let pipeline = self.pipelines[usize::from(drawn.closed)].get().expect("made when the faces were chosen");
         let mut vertices = vec![(&model.positions, 0)];
         vertices.extend(model.colors.iter().filter(|_| radiance).map(|colors| (colors, 0)));
         commands.render(&target, |drawing| {
@@ -236,6 +259,14 @@ impl Capture {
     pub fn depth(&self) -> Option<&Image> {
         self.depth.as_ref()
     }
+}
+
+/// What a cell holds, made by `make` where it holds nothing yet.
+fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
+    if cell.get().is_none() {
+        let _ = cell.set(make()?); // it was empty
+    }
+    Ok(cell.get().expect("just made"))
 }
 
 /// The CPU twin of an occlusion capture, by another method: it casts a ray through every texel centre of one face. The result is

@@ -276,6 +276,9 @@ impl Draw {
             depth: Some(&self.depth),
             resolve: self.samples.as_ref().map(|_| &self.picture),
         };
+        if viewports.iter().any(|viewport| viewport.pixel.is_some()) {
+            commands.count_samples()?;
+        }
         let every =
             viewports.iter().flat_map(|viewport| viewport.entities.iter().map(move |entity| (viewport, entity)));
         let batches = batches(every, 3 * self.batch_triangles);

@@ -92,6 +92,14 @@ impl<'r> Commands<'r> {
         outcome
     }
 
+    /// Lets [`super::Drawing::counted`] count in this recording, on devices that count exactly. Outside a render pass.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn count_samples(&mut self) -> Result<()> {
+        if self.recording.device.info.counts_samples { self.recording.count_samples() } else { Ok(()) }
+    }
+
     /// Writes a timestamp when all commands before it have finished.
     fn stamp(&mut self, query: u32) {
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;

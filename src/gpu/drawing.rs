@@ -163,8 +163,8 @@ impl<'r> Drawing<'_, 'r> {
         self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)
     }
 
-    /// Counts the samples that `record` draws, once a pass; its [`super::Timing`] holds the number. A device that cannot count exactly
-    /// counts nothing.
+    /// Counts the samples that `record` draws, once a pass; its [`super::Timing`] holds the number. Nothing is counted without
+    /// [`Commands::count_samples`] before, or by a device that cannot count exactly.
     ///
     /// # Errors
     /// What `record` returns.
@@ -173,13 +173,13 @@ impl<'r> Drawing<'_, 'r> {
     /// When a pass counts twice.
     pub fn counted(&mut self, record: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
         let recording = &mut self.commands.recording;
-        if !recording.device.info.counts_samples {
+        if recording.samples == vk::QueryPool::null() {
             return record(self);
         }
         let query = recording.passes.len() as u32 - 1;
         assert!(!recording.counted.contains(&query), "{}: a pass counts once", recording.name);
         recording.counted.push(query);
-        // SAFETY: for both calls, the command buffer is recording inside a render pass, and the query was reset at its start.
+        // SAFETY: for both calls, the command buffer is recording inside a render pass, and the query was reset before it.
         unsafe {
             let Recording { device, buffer, samples, .. } = &self.commands.recording;
             device.handle.cmd_begin_query(*buffer, *samples, query, vk::QueryControlFlags::PRECISE);

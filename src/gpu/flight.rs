@@ -43,7 +43,7 @@ pub(super) struct Recording {
     pub buffer: vk::CommandBuffer,
     fence: vk::Fence,
     pub queries: vk::QueryPool,
-    /// Samples written, one query a pass.
+    /// Samples written, one query a pass; null until a pass counts.
     pub samples: vk::QueryPool,
     /// Passes whose query was used.
     pub counted: Vec<u32>,
@@ -73,14 +73,12 @@ impl Recording {
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         let queries =
             vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_PASSES);
-        let samples = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION).query_count(MAX_PASSES);
         // SAFETY: for the whole block, every handle is stored in `recording` as soon as it exists and destroyed in its `Drop`.
         unsafe {
             recording.pool = handle.create_command_pool(&pool, None).checked("vkCreateCommandPool", name)?;
             recording.fence =
                 handle.create_fence(&vk::FenceCreateInfo::default(), None).checked("vkCreateFence", name)?;
             recording.queries = handle.create_query_pool(&queries, None).checked("vkCreateQueryPool", name)?;
-            recording.samples = handle.create_query_pool(&samples, None).checked("vkCreateQueryPool", name)?;
             let allocate = vk::CommandBufferAllocateInfo::default()
                 .command_pool(recording.pool)
                 .level(vk::CommandBufferLevel::PRIMARY)
@@ -89,14 +87,31 @@ impl Recording {
             let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             handle.begin_command_buffer(recording.buffer, &begin).checked("vkBeginCommandBuffer", name)?;
             handle.cmd_reset_query_pool(recording.buffer, recording.queries, 0, 2 * MAX_PASSES);
-            handle.cmd_reset_query_pool(recording.buffer, recording.samples, 0, MAX_PASSES);
         }
         device.name(recording.pool, name);
         device.name(recording.buffer, name);
         device.name(recording.fence, name);
         device.name(recording.queries, name);
-        device.name(recording.samples, name);
         Ok(recording)
+    }
+
+    /// Makes the queries that count samples, if there are none yet. The recording is outside a render pass.
+    ///
+    /// # Errors
+    /// `Device` when memory ran out.
+    pub fn count_samples(&mut self) -> Result<()> {
+        if self.samples != vk::QueryPool::null() {
+            return Ok(());
+        }
+        let create = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION).query_count(MAX_PASSES);
+        // SAFETY: the pool is stored at once and destroyed in `Drop`; the command buffer is recording outside a render pass.
+        unsafe {
+            let handle = &self.device.handle;
+            self.samples = handle.create_query_pool(&create, None).checked("vkCreateQueryPool", &self.name)?;
+            handle.cmd_reset_query_pool(self.buffer, self.samples, 0, MAX_PASSES);
+        }
+        self.device.name(self.samples, &self.name);
+        Ok(())
     }
 
     fn last_pass(&self) -> String {

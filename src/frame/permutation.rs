@@ -79,19 +79,18 @@ pub(super) fn sharp(
     scene: &Scene,
     buffers: &SceneBuffers,
 ) -> Option<SharpPermutation> {
-    let emits = |wanted: &dyn Fn(LightForm) -> bool| {
-        scene.entities.iter().zip(forms).any(|(entity, form)| entity.emits && wanted(*form))
-    };
-    emits(&LightForm::is_sharp).then(|| SharpPermutation {
+    let lit = scene.entities.iter().zip(forms).filter(|(entity, form)| entity.emits && form.is_sharp());
+    let lights: Vec<&LightForm> = lit.map(|(_, form)| form).collect();
+    (!lights.is_empty()).then(|| SharpPermutation {
         texel: merge.variant.texel,
         uniform: merge.variant.uniform,
         entity_limit: merge.entity_limit,
         silhouette: options.bake.silhouette,
-        outlines: emits(&|form| form == LightForm::Outline),
-        panels: emits(&|form| matches!(form, LightForm::Panel(_))),
+        outlines: lights.contains(&&LightForm::Outline),
+        panels: lights.iter().any(|form| matches!(form, LightForm::Panel(_))),
         halves: buffers.meshes.iter().any(|m| m.silhouette.as_ref().is_some_and(|slot| slot.field.has_halves())),
         self_shadows: buffers.meshes.iter().any(|device_mesh| device_mesh.self_first != NONE),
-        cones: scene.entities.iter().zip(forms).filter(|(entity, form)| entity.emits && form.is_sharp()).count() > 1,
+        cones: lights.len() > 1,
         rolled: false,
     })
 }

@@ -9,7 +9,7 @@ use common::report;
 use glam::{Quat, Vec3};
 use shadow_fields::check::merge::{ARITHMETIC, against_twin};
 use shadow_fields::frame::Options;
-use shadow_fields::lists::skip::{Kind, Skip, switches};
+use shadow_fields::lists::skip::{Skip, SkipKind, switches};
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::truth::raycast::RayCast;
 use shadow_fields::truth::{RayMeshes, Vertex, World};
@@ -125,7 +125,7 @@ fn exact_skips_change_nothing() {
     let mut all = stage.frame(&scene, small());
     let expected = stage.light(&mut all, &placements);
     let entries = all.merged().merged_entries;
-    let exact = switches().filter(|row| matches!(row.kind, Kind::Exact | Kind::Incremental));
+    let exact = switches().filter(|row| matches!(row.kind, SkipKind::Exact | SkipKind::Incremental));
     for name in exact.map(|row| row.name) {
         let mut frame = stage.frame(&scene, Options { skip: Skip::without(name), ..small() });
         assert_eq!(stage.light(&mut frame, &placements), expected, "without {name}");

@@ -5,7 +5,7 @@ use crate::asset::decode::Picture;
 use crate::asset::false_color::{ColorScale, NEUTRAL, Scheme};
 use crate::asset::picture::write_png;
 use crate::error::{Error, Result};
-use crate::truth::difference::{Difference, Place, Values};
+use crate::truth::difference::{Difference, PixelDifference, Values};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -145,7 +145,7 @@ fn say(found: &Difference) {
         Values::Srgb => "sRGB values from 0 to 1",
         Values::Linear => "linear values",
     };
-    let at = |place: &Place| {
+    let at = |place: &PixelDifference| {
         let rgb = |c: [f32; 3]| c.map(|c| format!("{c:.4}")).join(" ");
         format!("at x {}, y {}: {} against {}", place.x, place.y, rgb(place.a), rgb(place.b))
     };

@@ -20,16 +20,16 @@ use std::ops::Range;
 
 /// The part `index` of `count` parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Part {
+pub struct BakePart {
     /// 0 to `count` - 1.
     pub index: u32,
     /// At least 1.
     pub count: u32,
 }
 
-impl Part {
+impl BakePart {
     /// The undivided whole.
-    pub const WHOLE: Part = Part { index: 0, count: 1 };
+    pub const WHOLE: BakePart = BakePart { index: 0, count: 1 };
 
     fn of(self, all: usize) -> Range<usize> {
         let at = |part: u32| (all as u64 * u64::from(part) / u64::from(self.count)) as usize;
@@ -96,7 +96,7 @@ pub fn bake_part(
     baker: &Baker,
     (mesh, options): (&Mesh, &Options),
     kind: Kind,
-    part: Part,
+    part: BakePart,
     progress: Progress<'_>,
 ) -> Result<Vec<u8>> {
     let (reduction, _) = reduction(mesh, options, kind)?;
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn parts_are_all_of_it_once() {
         for (all, count) in [(10, 3), (2, 5), (0, 2), (7, 1)] {
-            let ranges: Vec<_> = (0..count).map(|index| Part { index, count }.of(all)).collect();
+            let ranges: Vec<_> = (0..count).map(|index| BakePart { index, count }.of(all)).collect();
             assert!(ranges.iter().flat_map(Clone::clone).eq(0..all), "{ranges:?}");
         }
     }

@@ -18,7 +18,7 @@ const SKY_RAYS: u32 = 1024;
 /// What is lit and compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Place {
+pub enum JudgedAt {
     /// Lit vertices.
     Vertices,
     /// Pixels of a picture of [`PIXEL_SIZE`] that show a lit surface.
@@ -28,7 +28,7 @@ pub enum Place {
 /// All points to light, and the truth of those that are compared.
 pub struct Judged {
     /// What they are.
-    pub place: Place,
+    pub place: JudgedAt,
     /// All points: an entity with the number of its vertex or of the pixel, and the view from there.
     pub points: Vec<(Vertex, VertexView)>,
     /// Those that are compared, as indices of `points`.
@@ -45,7 +45,7 @@ impl Judged {
         let points: Vec<_> = receiver_vertices(world.scene).into_iter().map(|v| (v, world.view(v))).collect();
         let at = |vertex| points.binary_search_by_key(vertex, |(key, _)| *key).expect("it is lit");
         let chosen = truth.vertices.iter().map(at).collect();
-        Judged { place: Place::Vertices, points, chosen, t0: truth.t0.clone(), unit: truth.unit }
+        Judged { place: JudgedAt::Vertices, points, chosen, t0: truth.t0.clone(), unit: truth.unit }
     }
 
     /// Pixels, chosen at random; `None` where the camera sees nothing that is lit.
@@ -57,7 +57,7 @@ impl Judged {
         chosen.truncate(effort.vertices);
         chosen.sort_unstable();
         let cast = RayCast { rays: effort.t0_rays, seed: bench.seed, distant, ..Default::default() };
-        let mut judged = Judged { place: Place::Pixels, points, chosen, t0: Vec::new(), unit: 0.0 };
+        let mut judged = Judged { place: JudgedAt::Pixels, points, chosen, t0: Vec::new(), unit: 0.0 };
         judged.t0 = judged.cast(world, &cast);
         judged.unit = rms(&judged.t0);
         (judged.unit > 0.0).then_some(judged)

@@ -10,7 +10,7 @@
 use super::budget::{Truth, device_radiosity};
 use super::cases::Case;
 use super::figures::{Difference, Radiosity, Spread, along, crossing, spread};
-use super::judged::{Judged, PIXEL_SIZE, Place};
+use super::judged::{Judged, JudgedAt, PIXEL_SIZE};
 use super::shadow_map::{Filter, ShadowMaps, maps_apply};
 use super::sweep;
 use super::{Bench, default_options, has_sharp_lights};
@@ -62,7 +62,7 @@ pub struct Comparison {
     /// What lights it, in words.
     pub light: String,
     /// What is lit.
-    pub place: Place,
+    pub place: JudgedAt,
     /// Points that are lit.
     #[serde(rename = "point_count")]
     pub points: usize,
@@ -103,7 +103,7 @@ impl Comparison {
     /// Name of the case with its light, unless the name contains it, and with where it is lit and how lights are taken.
     pub fn title(&self) -> String {
         let light = if self.case.contains(", (") { String::new() } else { format!(" ({})", self.light) };
-        let place = if self.place == Place::Pixels { ", at pixels" } else { "" };
+        let place = if self.place == JudgedAt::Pixels { ", at pixels" } else { "" };
         format!("{}{light}{place}{}", self.case, self.way().map_or(String::new(), |way| format!(", {way}")))
     }
 
@@ -111,7 +111,7 @@ impl Comparison {
     fn way(&self) -> Option<&'static str> {
         match (self.lights, self.place, self.shading) {
             (Some(Lights::Sh), ..) => Some("lights in SH"),
-            (Some(Lights::Sharp), Place::Pixels, Shading::Vertex) => Some("sharp lights by vertex"),
+            (Some(Lights::Sharp), JudgedAt::Pixels, Shading::Vertex) => Some("sharp lights by vertex"),
             _ => None,
         }
     }
@@ -119,8 +119,8 @@ impl Comparison {
     /// Name of the merge in tables and plots.
     pub fn merge_title(&self) -> &'static str {
         self.way().unwrap_or(match (self.lights, self.place) {
-            (Some(_), Place::Pixels) => "sharp lights by pixel",
-            (Some(_), Place::Vertices) => "sharp lights",
+            (Some(_), JudgedAt::Pixels) => "sharp lights by pixel",
+            (Some(_), JudgedAt::Vertices) => "sharp lights",
             (None, _) => "merge",
         })
     }
@@ -133,7 +133,7 @@ impl Comparison {
 
 /// The merge with one way to take the lights, and its times in milliseconds, round by round.
 struct Merged {
-    place: Place,
+    place: JudgedAt,
     lights: Option<Lights>,
     shading: Shading,
     frame: Frame,
@@ -143,16 +143,16 @@ struct Merged {
 
 impl Merged {
     /// With sharp lights and without, where a light can be sharp.
-    fn all(bench: &Bench<'_>, case: &Case, place: Place) -> Result<Vec<Self>> {
+    fn all(bench: &Bench<'_>, case: &Case, place: JudgedAt) -> Result<Vec<Self>> {
         let (sharp, sh) = (Some(Lights::Sharp), Some(Lights::Sh));
         let ways: &[(Option<Lights>, Shading)] = match (has_sharp_lights(&case.scene), place) {
             (false, _) => &[(None, Shading::Vertex)],
-            (true, Place::Vertices) => &[(sharp, Shading::Vertex), (sh, Shading::Vertex)],
-            (true, Place::Pixels) => &[(sharp, Shading::Pixel), (sharp, Shading::Vertex), (sh, Shading::Vertex)],
+            (true, JudgedAt::Vertices) => &[(sharp, Shading::Vertex), (sh, Shading::Vertex)],
+            (true, JudgedAt::Pixels) => &[(sharp, Shading::Pixel), (sharp, Shading::Vertex), (sh, Shading::Vertex)],
         };
         let merged = |(lights, shading): &(Option<Lights>, Shading)| {
             let usual = default_options();
-            let size = if place == Place::Pixels { PIXEL_SIZE } else { usual.size };
+            let size = if place == JudgedAt::Pixels { PIXEL_SIZE } else { usual.size };
             let lights_of_frame = lights.unwrap_or_default();
             let options = frame::Options { lights: lights_of_frame, shading: Some(*shading), size, ..usual };
             let frame = bench.frame(&case.scene, options)?;
@@ -163,7 +163,7 @@ impl Merged {
     }
 
     fn round(&mut self, placements: &[Placement]) -> Result<()> {
-        let white = (self.place == Place::Pixels).then_some(f32::INFINITY);
+        let white = (self.place == JudgedAt::Pixels).then_some(f32::INFINITY);
         // The first frame after ray casting warms up threads and caches.
         for warm in [false, true, true, true] {
             // Everything is merged, as if all entities had moved.
@@ -187,7 +187,7 @@ impl Merged {
 
     /// Radiosity of the compared points.
     fn found(&self, judged: &Judged) -> Result<Vec<Radiosity>> {
-        if judged.place == Place::Vertices {
+        if judged.place == JudgedAt::Vertices {
             return device_radiosity(&self.frame, &judged.keys().collect::<Vec<_>>());
         }
         let picture = self.frame.picture();
@@ -251,7 +251,7 @@ fn compare_at(bench: &Bench<'_>, case: &Case, shapes: &RayMeshes, judged: &Judge
     let mut redrawn = Vec::new();
     for round in 0..if bench.quick { 3 } else { 7 } {
         merged.iter_mut().try_for_each(|merged| merged.round(&placements))?;
-        if let (Some(last), Place::Pixels) = (merged.last_mut(), judged.place) {
+        if let (Some(last), JudgedAt::Pixels) = (merged.last_mut(), judged.place) {
             redrawn.push(last.redraw_ms(&placements)?);
         }
         maps.round(&placements)?;
@@ -274,7 +274,7 @@ fn compare_at(bench: &Bench<'_>, case: &Case, shapes: &RayMeshes, judged: &Judge
         .map(|((&rays, walls), found)| RivalPoint { rays, wall_ms: with_drawing(&walls), error: judged.error(found) })
         .collect();
     let maps = maps.points(with_drawing);
-    let place = if judged.place == Place::Pixels { "pixels" } else { "vertices" };
+    let place = if judged.place == JudgedAt::Pixels { "pixels" } else { "vertices" };
     (bench.progress)(&format!("{}: merge against its rivals measured at {place}", case.name));
     merged.iter().map(|merged| merged.comparison(case, judged, &rival, &maps)).collect()
 }

@@ -1,6 +1,6 @@
 //! Plots of `bench time-error`: each case's time against error, and all cases beside ray casting.
 
-use super::judged::Place;
+use super::judged::JudgedAt;
 use super::plot::{AxisScale, Curve, Dot, Gap, Panel, Plot, PlotColumn, RowGroup, Rows};
 use super::rival::Comparison;
 use super::shadow_map::Filter;
@@ -15,7 +15,7 @@ const ERROR: &str = "RMS error of radiosity against ray casting, relative";
 pub fn case_plot(case: &str, points: &[Point], comparisons: &[Comparison]) -> Plot {
     let points: Vec<&Point> = points.iter().filter(|p| p.case == case).collect();
     let settings = (!points.is_empty()).then(|| settings(&points));
-    let rivals = [Place::Vertices, Place::Pixels].into_iter().filter_map(|place| {
+    let rivals = [JudgedAt::Vertices, JudgedAt::Pixels].into_iter().filter_map(|place| {
         let of = comparisons.iter().filter(|c| c.case == case && c.place == place);
         rivals(&of.collect::<Vec<_>>())
     });
@@ -45,8 +45,8 @@ fn settings(points: &[&Point]) -> Panel {
 fn rivals(comparisons: &[&Comparison]) -> Option<Panel> {
     let first = comparisons.first()?;
     let (title, includes) = match first.place {
-        Place::Vertices => ("A frame and its rivals, at vertices", "without drawing"),
-        Place::Pixels => ("A picture and its rivals, at pixels", "with drawing"),
+        JudgedAt::Vertices => ("A frame and its rivals, at vertices", "without drawing"),
+        JudgedAt::Pixels => ("A picture and its rivals, at pixels", "with drawing"),
     };
     let gap = first.speed_up_at_equal_rms.zip(first.rival_ms_at_equal_rms).map(|(lead, to)| {
         let label = if lead >= 1.0 { "faster" } else { "slower" };

@@ -55,7 +55,7 @@ pub struct VertexInput {
 }
 
 /// Byte offsets of a struct's members, by name, in order of declaration.
-pub type Layout = Vec<(String, u32)>;
+pub type StructLayout = Vec<(String, u32)>;
 
 /// The declarations of one module.
 #[derive(Clone, Debug, Default)]
@@ -73,7 +73,7 @@ pub struct Reflection {
     /// Vertex inputs by location; empty for other stages.
     pub inputs: Vec<VertexInput>,
     /// Struct name to member offsets.
-    pub structs: BTreeMap<String, Layout>,
+    pub structs: BTreeMap<String, StructLayout>,
     /// Struct name to the stride of arrays of it, where the module has such an array.
     pub strides: BTreeMap<String, u32>,
 }
@@ -196,7 +196,7 @@ impl<'m> Reader<'m> {
     }
 
     fn structure(&self, result: u32, instruction: &Instruction, out: &mut Reflection) {
-        let layout: Layout = (0..instruction.operands.len() as u32)
+        let layout: StructLayout = (0..instruction.operands.len() as u32)
             .filter_map(|member| {
                 let offset = self.member_decoration(result, member, Decoration::Offset)?;
                 let name = self.member_names.get(&(result, member)).copied().unwrap_or("");

@@ -3,7 +3,7 @@
 
 use crate::layout::{self, ListEntry};
 use crate::lists::scene_bounds::{Bounds, Counts, Light, SceneBounds};
-use crate::lists::scope::{CullResult, SLACK, Scope, View};
+use crate::lists::scope::{CullResult, SLACK, Scope, SphereView};
 
 /// What may matter to any cluster of a group.
 pub struct Candidates {
@@ -79,9 +79,9 @@ fn walk(
 ) -> usize {
     let (first, mut sharp_count) = (out.len(), 0);
     let spheres = &scope.scene().spheres;
-    let views: Vec<View> = candidates.occluders.iter().map(|&j| scope.view(spheres[j as usize])).collect();
+    let views: Vec<SphereView> = candidates.occluders.iter().map(|&j| scope.view(spheres[j as usize])).collect();
     // What becomes of each occluder in a light's chain.
-    let chain = |light: Option<(u32, &View)>, sharp, radiance: f32, results: &mut Vec<CullResult>| {
+    let chain = |light: Option<(u32, &SphereView)>, sharp, radiance: f32, results: &mut Vec<CullResult>| {
         let (light, light_view) = light.unzip();
         results.clear();
         results.extend(candidates.occluders.iter().zip(&views).map(|(&occluder, view)| {

@@ -87,7 +87,7 @@ impl Angle {
 }
 
 /// A sphere as seen from a cluster.
-pub struct View {
+pub struct SphereView {
     /// Unit direction from the cluster's centre to the sphere's.
     toward: DVec3,
     /// Least and largest distance of the sphere's centre from a vertex, metres.
@@ -159,7 +159,7 @@ impl<'m> Scope<'m> {
     }
 
     /// A sphere of the scene: centre in the world, radius.
-    pub fn view(&self, [x, y, z, sphere_radius]: [f32; 4]) -> View {
+    pub fn view(&self, [x, y, z, sphere_radius]: [f32; 4]) -> SphereView {
         let (skip, sphere_radius) = (self.scene.skip, f64::from(sphere_radius));
         let to = DVec3::new(x.into(), y.into(), z.into()) - self.centre;
         let distance = to.length().max(1e-15);
@@ -178,11 +178,11 @@ impl<'m> Scope<'m> {
             .map_or(EVERYTHING, |(half, spread)| weight(half, from_axis.cosine_less(self.spread.plus(spread))));
         let whole = !skip.caps || sphere_radius > CAP_SINES[0] * nearest;
         let cap = skip.caps && sphere_radius < CAP_SINES[1] * farthest;
-        View { toward, nearest, farthest, radius: sphere_radius, spread, turn, below, weight, whole, cap }
+        SphereView { toward, nearest, farthest, radius: sphere_radius, spread, turn, below, weight, whole, cap }
     }
 
     /// What becomes of a light.
-    pub fn light_result(&self, light: &Light, view: &View) -> CullResult {
+    pub fn light_result(&self, light: &Light, view: &SphereView) -> CullResult {
         if view.below {
             return CullResult::BelowHorizon;
         }
@@ -206,7 +206,13 @@ impl<'m> Scope<'m> {
     ///
     /// Before a sharp light an occluder counts where any part of it may be nearer than any part of the light's middle plane, and
     /// where their cones meet, without the fade that bands need.
-    pub fn occluder_result(&self, view: &View, light: Option<&View>, sharp: bool, radiance: f32) -> CullResult {
+    pub fn occluder_result(
+        &self,
+        view: &SphereView,
+        light: Option<&SphereView>,
+        sharp: bool,
+        radiance: f32,
+    ) -> CullResult {
         let radiance = f64::from(radiance);
         if view.below {
             return CullResult::BelowHorizon;
@@ -286,7 +292,7 @@ impl<'m> Scope<'m> {
     pub fn lists(&self, index: usize, receiver: u32) -> bool {
         let scene = self.scene;
         let view = scene.entities[index].occludes.then(|| self.view(scene.spheres[index]));
-        let blocks = |light: Option<&View>, sharp, radiance: f32| {
+        let blocks = |light: Option<&SphereView>, sharp, radiance: f32| {
             view.as_ref().is_some_and(|view| self.occluder_result(view, light, sharp, radiance) == CullResult::Listed)
         };
         let mut lights = scene.lights.iter().filter(|light| light.entity != receiver);
@@ -300,7 +306,7 @@ impl<'m> Scope<'m> {
 }
 
 /// Whether no vertex sees the two spheres within that angle of one another.
-fn apart(a: &View, b: &View, fade_rad: f64) -> bool {
+fn apart(a: &SphereView, b: &SphereView, fade_rad: f64) -> bool {
     let (Some(spread_a), Some(spread_b)) = (a.spread, b.spread) else { return false };
     let (sine, cosine) = fade_rad.sin_cos();
     a.toward.dot(b.toward) < spread_a.plus(spread_b.plus(Angle { cosine, sine })).cosine

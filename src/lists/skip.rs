@@ -4,7 +4,7 @@
 
 /// What a skip does to the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum SkipKind {
     /// It changes no number: what it leaves out contributes exactly zero.
     Exact,
     /// It changes numbers a little. `horizon` and `cones` follow from true visibility, which makes what they leave out zero; the
@@ -33,7 +33,7 @@ pub struct SkipRow {
     /// Name on the command line, and the field of [`Skip`]; without a switch it is always on.
     pub name: &'static str,
     /// What it does to the numbers.
-    pub kind: Kind,
+    pub kind: SkipKind,
     /// The file in `src/` and the function that decides it on the host.
     pub host: &'static str,
     /// The macro by which GLSL knows it: in pass "gather" its bit of [`Skip::bits`].
@@ -77,9 +77,9 @@ macro_rules! skips {
 
         /// Every skip: first those with a switch, then those that are always on.
         pub const TABLE: &[SkipRow] = &[
-            $(SkipRow { name: stringify!($name), kind: Kind::$kind, host: $host, glsl: $glsl,
+            $(SkipRow { name: stringify!($name), kind: SkipKind::$kind, host: $host, glsl: $glsl,
                 in_merge: $in_merge, counter: $counter, bench: Some(BenchCase::$bench) },)*
-            $(SkipRow { name: stringify!($always), kind: Kind::$always_kind, host: $always_host, glsl: None,
+            $(SkipRow { name: stringify!($always), kind: SkipKind::$always_kind, host: $always_host, glsl: None,
                 in_merge: false, counter: Some($always_counter), bench: None },)*
         ];
     };

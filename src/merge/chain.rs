@@ -6,7 +6,7 @@ use crate::sh::product::Tensor;
 use crate::sh::product_program::Style;
 
 /// Coefficients, or values at points times the weights; zero past the last.
-pub type State = [f64; MAX_COEFFICIENTS];
+pub type ChainState = [f64; MAX_COEFFICIENTS];
 
 /// How a factor is multiplied into a chain. The merge has factored products; the others are what `bench product` compares with them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
@@ -80,7 +80,7 @@ pub struct Multiplier {
     tensor: Tensor,
     guard: bool,
     /// The basis at each point with the point's weight, where a chain stays at points.
-    points: Option<Vec<(State, f64)>>,
+    points: Option<Vec<(ChainState, f64)>>,
 }
 
 impl Multiplier {
@@ -100,7 +100,7 @@ impl Multiplier {
     }
 
     /// The chain without a factor.
-    pub fn begin(&self, transfer: &[f64]) -> State {
+    pub fn begin(&self, transfer: &[f64]) -> ChainState {
         let mut state = [0.0; MAX_COEFFICIENTS];
         match &self.points {
             None => state[..transfer.len()].copy_from_slice(transfer),
@@ -114,7 +114,7 @@ impl Multiplier {
     }
 
     /// The integral of a chain against a function of as many bands as the transfer.
-    pub fn meet(&self, state: &State, function: &[f64]) -> f64 {
+    pub fn meet(&self, state: &ChainState, function: &[f64]) -> f64 {
         match &self.points {
             None => dot(state, &function[..self.count()]),
             Some(points) => {
@@ -124,7 +124,7 @@ impl Multiplier {
     }
 
     /// Multiplies by 1 - `blocked`.
-    pub fn multiply(&self, state: &mut State, blocked: &[f64]) {
+    pub fn multiply(&self, state: &mut ChainState, blocked: &[f64]) {
         let before = self.parts(state);
         match &self.points {
             None => {
@@ -144,7 +144,7 @@ impl Multiplier {
     }
 
     /// Takes away the chain's value in the direction whose basis is `y`, over a solid angle: `chain_cover`.
-    pub fn cover(&self, state: &mut State, y: &[f64], solid_angle: f64) {
+    pub fn cover(&self, state: &mut ChainState, y: &[f64], solid_angle: f64) {
         let value = self.meet(state, y);
         let [first, _] = self.parts(state);
         let taken = (solid_angle * value.max(0.0)).min(first.max(0.0) / Y00);
@@ -159,20 +159,20 @@ impl Multiplier {
     }
 
     /// Coefficient 0, and the square of the length of the others.
-    fn parts(&self, state: &State) -> [f64; 2] {
+    fn parts(&self, state: &ChainState) -> [f64; 2] {
         match &self.points {
             None => [state[0], dot(&state[1..], &state[1..])],
             Some(points) => {
                 let first = Y00 * state.iter().sum::<f64>();
                 let apart =
-                    |(value, (_, weight)): (&f64, &(State, f64))| (value - weight * Y00 * first).powi(2) / weight;
+                    |(value, (_, weight)): (&f64, &(ChainState, f64))| (value - weight * Y00 * first).powi(2) / weight;
                 [first, state.iter().zip(points).map(apart).sum()]
             }
         }
     }
 
     /// Takes back what no factor between 0 and 1 could have added (see `merge_product.glsl`).
-    fn shorten(&self, state: &mut State, [first_before, rest_before]: [f64; 2]) {
+    fn shorten(&self, state: &mut ChainState, [first_before, rest_before]: [f64; 2]) {
         let [first, rest] = self.parts(state);
         let kept = first.clamp(first_before.min(0.0), first_before.max(0.0));
         let room = (rest_before + (first_before - kept) * (first_before + kept)).max(0.0);

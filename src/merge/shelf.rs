@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// a face's row within each; rows of all six faces along y; shells along z. Boxes stand along z as far as the device's images
 /// reach, then along y.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shelf {
+pub struct ImageShelf {
     lattice: Lattice,
     /// Cells of a face's row as stored, border included.
     columns: u32,
@@ -21,14 +21,14 @@ pub struct Shelf {
     along: [u32; 2],
 }
 
-impl Shelf {
+impl ImageShelf {
     /// A shelf for `channels` channels of `bands` bands; `None` where directions are no cube, or the device's images are too small.
     pub fn new(device: &Device, lattice: Lattice, bands: usize, channels: u32) -> Option<Self> {
         let Directions::Cube { cells } = lattice.directions else { return None };
         let most = Volume::most(device);
         let (columns, quads) = (cells + 2, (channel_stride(bands) / 4) as u32);
         let deep = channels.clamp(1, (most / lattice.shells).max(1));
-        let shelf = Shelf { lattice, columns, quads, along: [deep, channels.max(1).div_ceil(deep)] };
+        let shelf = ImageShelf { lattice, columns, quads, along: [deep, channels.max(1).div_ceil(deep)] };
         shelf.size().iter().all(|&n| n <= most).then_some(shelf)
     }
 

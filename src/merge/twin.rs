@@ -2,7 +2,7 @@
 
 use crate::field::{Area, Lookup, ShadowField};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
-use crate::merge::chain::{Chain, Multiplier, State};
+use crate::merge::chain::{Chain, ChainState, Multiplier};
 use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;
@@ -243,7 +243,7 @@ impl Cap {
     }
 
     /// Takes it out of a chain.
-    pub fn cover(&self, multiplier: &Multiplier, state: &mut State) {
+    pub fn cover(&self, multiplier: &Multiplier, state: &mut ChainState) {
         multiplier.cover(state, &self.y, self.solid_angle);
     }
 }

@@ -7,7 +7,7 @@ use crate::field::{Lattice, Lookup};
 use crate::gpu::{Buffer, BufferKind, Commands, Device, Volume};
 use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, ENTRY_FORMAT, Entity, ListEntry, NONE};
 use crate::lists::skip::Skip;
-use crate::merge::shelf::Shelf;
+use crate::merge::shelf::ImageShelf;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
 use crate::merge::{Inputs, Merge, Readable};
 use crate::sh::rotation::turns;
@@ -92,7 +92,7 @@ impl Workload {
         // Small enough that the running product neither grows without end nor becomes denormal.
         const HALF: u16 = 0x2000;
         let fields = vec![[HALF; 4]; quads];
-        let shelf = Shelf::new(device, lattice, BANDS, 1)
+        let shelf = ImageShelf::new(device, lattice, BANDS, 1)
             .ok_or_else(|| Error::Unsupported("the device's images are too small for one field".into()))?;
         Ok(Workload {
             vertex_count,

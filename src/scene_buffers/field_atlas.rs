@@ -7,7 +7,7 @@ use crate::field::extent::{Extent, extent};
 use crate::field::quantity::channel_stride;
 use crate::field::{Area, FieldHeader, FieldKind, ShadowField};
 use crate::gpu::{Buffer, BufferKind, Device, Volume};
-use crate::merge::shelf::Shelf;
+use crate::merge::shelf::ImageShelf;
 use crate::scene::Scene;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -90,7 +90,7 @@ pub(super) fn download(fields: &Buffer, slot: &FieldSlot) -> Result<ShadowField>
 pub(super) fn image(device: &Arc<Device>, fields: &[ShadowField], bands: usize) -> Result<Option<Volume>> {
     let Some(lattice) = fields.first().map(|field| field.header.lattice) else { return Ok(None) };
     let count = fields.iter().map(|field| field.header.kind.channels() as u32).sum();
-    let Some(shelf) = Shelf::new(device, lattice, bands, count) else { return Ok(None) };
+    let Some(shelf) = ImageShelf::new(device, lattice, bands, count) else { return Ok(None) };
     type Quads<'f> = Box<dyn Fn(usize, usize) -> [u16; 4] + 'f>;
     let channels = fields.iter().flat_map(|field| {
         (0..field.header.kind.channels()).map(move |channel| {

@@ -19,7 +19,7 @@ use std::sync::LazyLock;
 
 use glam::DVec3;
 
-use super::program::{Cost, Program, Term, Value, elements};
+use super::program::{OperationCount, Program, Term, Value, elements};
 
 /// The largest number of bands that these modules support and their tests cover.
 pub const MAX_BANDS: usize = 8;
@@ -171,7 +171,7 @@ fn horner(program: &mut Program, coefficients: &[f64], z: Value, z_squared: Opti
 }
 
 /// Operation counts of one call of [`glsl_basis`]'s function.
-pub fn basis_cost(bands: usize) -> Cost {
+pub fn basis_cost(bands: usize) -> OperationCount {
     basis_program(bands).cost()
 }
 

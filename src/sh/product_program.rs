@@ -15,7 +15,7 @@ use super::basis::{Y00, coefficient_count};
 use super::points;
 pub use super::product::ProductOperation;
 use super::product::Tensor;
-use super::program::{Cost, Program, Term, Value, elements};
+use super::program::{OperationCount, Program, Term, Value, elements};
 
 /// How a product is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -231,7 +231,7 @@ fn matrix_sums(
 }
 
 /// Operation counts of one product of [`product_program`].
-pub fn product_cost(bands: usize, operation: ProductOperation) -> Cost {
+pub fn product_cost(bands: usize, operation: ProductOperation) -> OperationCount {
     product_program(bands, operation).cost()
 }
 

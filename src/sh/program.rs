@@ -44,7 +44,7 @@ struct Instruction {
 
 /// Operation counts of a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Cost {
+pub struct OperationCount {
     /// Multiplications.
     pub multiply_count: usize,
     /// Additions and subtractions.
@@ -111,8 +111,8 @@ impl Program {
     }
 
     /// Operation counts; `fma_count` assumes that the compiler contracts every `x * y + z` of the text.
-    pub fn cost(&self) -> Cost {
-        let mut cost = Cost::default();
+    pub fn cost(&self) -> OperationCount {
+        let mut cost = OperationCount::default();
         for Instruction { accumulate, terms, .. } in &self.instructions {
             let multiplies: usize = terms.iter().map(Term::multiply_count).sum();
             let adds = terms.len() - usize::from(!accumulate);

@@ -14,9 +14,9 @@ pub enum Values {
     Linear,
 }
 
-/// A pixel, counted from 0 at the upper left.
+/// A pixel, counted from 0 at the upper left, and how two pictures differ there.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Place {
+pub struct PixelDifference {
     /// Column.
     pub x: usize,
     /// Row.
@@ -48,9 +48,9 @@ pub struct Difference {
     /// What `rms` and the two places are in.
     pub values: Values,
     /// Where a channel differs most; its difference may be infinite.
-    pub largest: Place,
+    pub largest: PixelDifference,
     /// Where FLIP is largest, with FLIP as the difference.
-    pub largest_flip: Place,
+    pub largest_flip: PixelDifference,
     /// FLIP of every pixel, row by row; 0 where a pixel does not count.
     #[serde(skip)]
     pub flip: Vec<f64>,
@@ -109,7 +109,7 @@ impl Difference {
                 largest_flip = (pixel, flip[pixel]);
             }
         }
-        let place = |(pixel, difference): (usize, f64)| Place {
+        let place = |(pixel, difference): (usize, f64)| PixelDifference {
             x: pixel % width,
             y: pixel / width,
             difference,

@@ -4,7 +4,7 @@ use super::super::context::Context;
 use super::super::{Cli, Global, Subcommands, output, parse, render};
 use crate::asset::Mesh;
 use crate::bake::cache::Cache;
-use crate::bake::parts::{Part, bake, bake_part};
+use crate::bake::parts::{BakePart, bake, bake_part};
 use crate::bake::{self, hash_text};
 use crate::error::{Error, Result};
 use crate::farm::plan::{DeviceClass, Plan, Task, TaskKind};
@@ -92,8 +92,8 @@ impl Running<'_> {
                 };
                 let what = format!("{} {}", mesh.name, kind.name());
                 let progress = |done, all| context.progress.show(&what, done, all);
-                let part = Part { index: first, count };
-                if part != Part::WHOLE {
+                let part = BakePart { index: first, count };
+                if part != BakePart::WHOLE {
                     return take("part", &bake_part(&context.baker, (mesh, &options), kind, part, &progress)?);
                 }
                 // A cache of its own: what it holds then is what was baked.

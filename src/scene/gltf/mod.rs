@@ -47,7 +47,7 @@ pub use notes::Notes;
 use shape::Shape;
 use surface::Surface;
 use texture::Textures;
-use tree::{Parts, Stand};
+use tree::{SplitTransform, Stand};
 
 /// What is said of skins.
 const SKINS: &str = "nodes with a skin (their meshes stand still as they are stored)";
@@ -189,7 +189,7 @@ impl<'a> Builder<'a> {
     fn entity(&mut self, stand: &Stand, mesh: usize, at: usize) -> Result<Option<EntityData>> {
         self.read(mesh, at)?;
         let Some(Some(primitive)) = self.primitives.get(&(mesh, at)) else { return Ok(None) };
-        let Some(parts) = Parts::new(stand.fixed.matrix3) else {
+        let Some(parts) = SplitTransform::new(stand.fixed.matrix3) else {
             self.notes.leave_out("shapes that a scale of 0 makes flat");
             return Ok(None);
         };

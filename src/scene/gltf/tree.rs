@@ -34,14 +34,14 @@ pub struct Stand {
 }
 
 /// A transformation as a placement and what is left of it.
-pub struct Parts {
+pub struct SplitTransform {
     /// Rotation.
     pub rotation: DQuat,
     /// Upper triangular; a multiple of the identity if the scale is uniform.
     pub bend: DMat3,
 }
 
-impl Parts {
+impl SplitTransform {
     /// Splits a linear map by Gram and Schmidt's method; `None` if it squeezes space flat.
     pub fn new(linear: DMat3) -> Option<Self> {
         let longest = linear.to_cols_array_2d().into_iter().map(|c| DVec3::from(c).length()).fold(0.0, f64::max);
@@ -58,7 +58,7 @@ impl Parts {
         let grid = 2.0_f64.powi(longest.log2().ceil() as i32 - 20);
         let round = |column: DVec3| (column / grid).round() * grid;
         let bend = DMat3::from_cols(round(bend.x_axis), round(bend.y_axis), round(bend.z_axis));
-        Some(Parts { rotation: DQuat::from_mat3(&turn).normalize(), bend })
+        Some(SplitTransform { rotation: DQuat::from_mat3(&turn).normalize(), bend })
     }
 
     /// The scale, if it is the same along all axes and mirrors nothing.
@@ -150,7 +150,8 @@ fn placed(
     let mut motion = Vec::new();
     if outer.fixed != DAffine3::IDENTITY {
         let linear = outer.fixed.matrix3;
-        let parts = Parts::new(linear).unwrap_or(Parts { rotation: DQuat::IDENTITY, bend: DMat3::IDENTITY });
+        let parts =
+            SplitTransform::new(linear).unwrap_or(SplitTransform { rotation: DQuat::IDENTITY, bend: DMat3::IDENTITY });
         let size = parts.uniform_scale().unwrap_or_else(|| {
             notes.leave_out(
                 "uneven scales of nodes that carry moving ones (one scale of the same volume stands for them)",
@@ -165,7 +166,7 @@ fn placed(
     }
     motion.extend(outer.motion.iter().cloned());
     // Uneven scales that do not move are left to what the node carries.
-    let even = Parts::new(DMat3::from_diagonal(scale)).and_then(|parts| parts.uniform_scale());
+    let even = SplitTransform::new(DMat3::from_diagonal(scale)).and_then(|parts| parts.uniform_scale());
     let (size, fixed) = match even {
         Some(size) => (size, DAffine3::IDENTITY),
         None if tracks.scale.is_none() => (1.0, DAffine3::from_scale(scale)),

@@ -13,7 +13,7 @@ struct Entity {
     vec4 area_x;       // first axis of its projected area, world; w = the constant term
     vec4 area_y;       // second axis, world; w = factor of u
     vec4 area_terms;   // factors of v, u u, v v, u v
-    vec4 sharp;        // first node of its silhouette field (bits); as a light: share of its disc, 0: it has its own outline; z: as a grid,
+    vec4 sharp;        // first quad of its silhouette field (bits); as a light: share of its disc, 0: it has its own outline; z: as a grid,
                        // distance between neighbouring vertices, metres; w: less than 0 a disc that shines, more a rectangle
 };
 

@@ -97,8 +97,9 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
     rays.place = before ? to * mat3(light.toward, light.across, light.down) : vec3(-light.distance, 0.0, 0.0);
     rays.place *= occluder.centre.w;
     rays.middle = along_axes(light, block.middle);
-    uint first = floatBitsToUint(occluder.sharp.x);
-    NodeCell cell = node_cell(first & 0x7fffffffu, rays.axes * rays.middle);
+    uint first = floatBitsToUint(occluder.sharp.x), field = first & 0x7fffffffu;
+    NodeCell cell = node_cell(field, rays.axes * rays.middle);
+    vec2 in_box = through_box(field, rays.axes * rays.place, rays.axes * rays.middle);
     vec4 weights[4];
     vec4 limit, tangent;
     EACH for (uint k = 0; k < 4; k++) {
@@ -134,7 +135,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         outlines(rays, cell, weights, side, distance, away);
         EACH for (uint k = 0; k < 4; k++) {
             blocks[k] = share_blocked(distance[k], away[k], tangent[k]);
-            stands[k] = between(away[k], limit[k]);
+            stands[k] = between(away[k], limit[k], in_box);
 #ifdef EDGES
             if (before && (side == WHOLE || inside[k] > 0.0)) {
                 float penumbra = max(away[k], NEAREST) * max(tangent[k], LEAST_PENUMBRA);

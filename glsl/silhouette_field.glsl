@@ -1,6 +1,7 @@
 // A lookup in a silhouette field: what an object blocks of a small round light. The twin is src/field/silhouette.rs, with the same names.
 // NODE_CELLS: cells along a face of the node grid; MAP: texels along a map of the whole object, half as many along those of its halves.
 //
+// A field begins with two quads, the least and the largest corner of a box around the object (its frame, in r), then come the nodes.
 // Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the map, in texels from the middle of the
 // first; and edges of a texel in r, the map's first cell, and -1 where the map is seen from behind. Cells are the four texels around a point
 // between them: signed bytes of distance and of depth.
@@ -27,6 +28,7 @@ uvec2 cell_at(uint i) {
 #include "blocked_share.glsl"
 #include "bytes.glsl"
 
+const uint BOX_QUADS = 2;
 const uint WHOLE = 0, FAR = 1, NEAR = 2; // sides of an object: all of it, what lies beyond its centre along a direction, and before it
 
 // The cell around a place on a map whose last texel is `last`, and the weights of its corners. The place lies between texels.
@@ -56,7 +58,7 @@ vec2 among_cells(uint face, vec3 toward) {
     return (cube_warped(face, toward, LEAST_AHEAD) + 1.0) * (0.5 * NODE_CELLS);
 }
 
-NodeCell node_cell(uint first_node, vec3 toward) {
+NodeCell node_cell(uint field, vec3 toward) {
     NodeCell cell;
     cell.face = cube_face(toward);
     vec2 at = among_cells(cell.face, toward);
@@ -65,7 +67,7 @@ NodeCell node_cell(uint first_node, vec3 toward) {
     // On a cube's edge the lines of both its faces have a kink: so neither axis counts there.
     vec2 border = min(at, NODE_CELLS - at);
     cell.eased = clamp(min(min(cell.middle, 1.0 - cell.middle), border.yx) / EASED, 0.0, 1.0);
-    cell.first = first_node + 3 * ((cell.face * (NODE_CELLS + 1) + uint(cell.low.y)) * (NODE_CELLS + 1) + uint(cell.low.x));
+    cell.first = field + BOX_QUADS + 3 * ((cell.face * (NODE_CELLS + 1) + uint(cell.low.y)) * (NODE_CELLS + 1) + uint(cell.low.x));
     return cell;
 }
 
@@ -140,7 +142,27 @@ float share_blocked(float distance, float away, float tangent) {
     return blocked_share(distance / max(max(away, NEAREST) * tangent, LEAST_PENUMBRA));
 }
 
-// Whether an outline counts that lies that far away: one behind the point or beyond the limit does not.
-float between(float away, float limit) {
-    return fade(away) * fade(limit - away);
+// Where a ray enters the box around an object and where it leaves it; without ends where it misses the box.
+vec2 through_box(uint field, vec3 point, vec3 direction) {
+#if BOXES
+    vec3 per_step = 1.0 / mix(direction, vec3(LEAST_STEP), lessThan(abs(direction), vec3(LEAST_STEP)));
+    vec3 one = (node_quad(field).xyz - point) * per_step, other = (node_quad(field + 1).xyz - point) * per_step;
+    vec3 first = min(one, other), last = max(one, other);
+    vec2 ends = vec2(max(max(first.x, first.y), first.z), min(min(last.x, last.y), last.z));
+    return ends.x > ends.y ? vec2(-NO_BOX, NO_BOX) : ends;
+#else
+    return vec2(-NO_BOX, NO_BOX);
+#endif
+}
+
+// Whether an outline counts that lies that far away: one behind the point or beyond the limit does not. Its nearest point may lie off the
+// ray, and the object then stands where the ray passes its box.
+float between(float away, float limit, vec2 in_box) {
+#if BOXES
+    bool apart = in_box[1] < TOUCHING || in_box[0] > limit - TOUCHING;
+    away = min(max(away, in_box[0]), in_box[1]);
+#else
+    const bool apart = false;
+#endif
+    return apart ? 0.0 : fade(away) * fade(limit - away);
 }

@@ -31,7 +31,7 @@ pub struct Entity {
     pub area_y: [f32; 4],
     /// Factors of v (the square of the cosine to the second axis), u u, v v and u v.
     pub area_terms: [f32; 4],
-    /// For sharp lights: the bits of the first node of its silhouette field, 0 without one, and bit 31 where it has maps of halves; of a
+    /// For sharp lights: the bits of the first quad of its silhouette field, 0 without one, and bit 31 where it has maps of halves; of a
     /// light that is a ball the share of its sphere's disc that shines, 0 where its own outline tells; of a light that shines from one flat
     /// side [`crate::field::sub_light::Panel::packed`]; and 0.
     pub sharp: [f32; 4],

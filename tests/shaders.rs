@@ -48,8 +48,8 @@ fn sharp() -> Vec<ShaderPermutation> {
     let way = |bits: u32| {
         let on = |bit: u32| bits >> bit & 1 == 1;
         let silhouette = SilhouetteOptions::default();
-        let (texel, uniform, outlines, panels, self_shadows, halves) =
-            (on(0), on(1), on(2), on(3), on(4), on(2) != on(3));
+        let (texel, uniform, outlines, panels, self_shadows, halves, boxes) =
+            (on(0), on(1), on(2), on(3), on(4), on(2) != on(3), on(2) != on(4));
         let (cones, rolled) = (on(5), on(5));
         SharpPermutation {
             texel,
@@ -59,6 +59,7 @@ fn sharp() -> Vec<ShaderPermutation> {
             outlines,
             panels,
             halves,
+            boxes,
             self_shadows,
             cones,
             rolled,
@@ -79,6 +80,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         outlines,
         panels: outlines,
         halves: outlines,
+        boxes: outlines,
         self_shadows: true,
         cones: outlines,
         rolled: outlines,

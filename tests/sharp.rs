@@ -144,15 +144,14 @@ fn picture(gpu: &common::Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Opt
     (frame.picture(), frame.pixels_evaluated(&timings))
 }
 
-/// On floors and slabs of few cells pixels show what the vertices of fine ones show, and the coarse ones' own vertices do not. The ball does
-/// not receive: a slab in whose bounding sphere it stands darkens some of it wrongly, which is not what is asked here.
+/// On floors and slabs of few cells pixels show what the vertices of fine ones show, and the coarse ones' own vertices do not.
 #[test]
 fn pixels_carry_edges_that_vertices_do_not() {
     let Some(gpu) = gpu() else { return };
     let show = |receiver: &str, cells: usize, shading| {
         let head = HEAD.replace("plane = { size_m = 6, cells = 60", &format!("{receiver}, cells = {cells}"));
         let scene = parse(&format!(
-            "{head}[[entity]]\nmesh = \"ball\"\nposition = [0, 0.6, 0]\nreceives = false\n\
+            "{head}[[entity]]\nmesh = \"ball\"\nposition = [0, 0.6, 0]\n\
             [[entity]]\nmesh = \"ball\"\nposition = [1.2, 2.6, 0.8]\nscale = 0.1\nemission = [900, 900, 900]\n"
         ));
         picture(&gpu, &scene, shading).0

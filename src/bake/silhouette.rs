@@ -66,9 +66,18 @@ pub fn silhouette_header(mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteH
         symmetry: options.symmetry,
         centre_m: centre.to_array(),
         radius_m,
+        extent: extent(mesh),
         mesh: mesh.name.clone(),
         mesh_hash: hash_text(mesh),
     }
+}
+
+/// Least and largest coordinates of a mesh about its bounding sphere's centre, in bounding radii.
+fn extent(mesh: &Mesh) -> [[f32; 3]; 2] {
+    let positions = unit_positions(mesh);
+    let start = (positions[0], positions[0]);
+    let (low, high) = positions.iter().fold(start, |(low, high), p| (low.min(*p), high.max(*p)));
+    [low.to_array(), high.to_array()]
 }
 
 /// Frames of all maps of a field.

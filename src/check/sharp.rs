@@ -16,8 +16,8 @@ use crate::scene::Lights;
 /// half-width of a penumbra, which near an outline is a thousandth of the object's radius.
 pub const PENUMBRA: f64 = 1e-4;
 
-/// What [`MIXED`] has besides: a light with an outline of its own, a small light, a ball that stands beyond it, a ring around it, and
-/// panels of every form.
+/// What [`MIXED`] has besides: a light with an outline of its own, a small light, a ball that stands beyond it, a ring around it, a
+/// thin board in whose bounding sphere others stand, and panels of every form.
 const MORE: &str = r#"
 [[entity]]
 mesh = "ring"
@@ -39,6 +39,13 @@ mesh = "ring"
 position = [0.181, 1.903, -1.497]
 rotation = { axis = [0.2, 0.1, 1], angle_deg = 31 }
 scale = 0.9
+[[mesh]]
+name = "board"
+cuboid = { size_m = [1.7, 0.03, 1.3], cells = 2 }
+[[entity]]
+mesh = "board"
+position = [0.213, 0.917, 0.191]
+rotation = { axis = [0.7, 0.1, 0.3], angle_deg = 13 }
 [[mesh]]
 name = "lamp"
 disc = { radius_m = 0.3 }

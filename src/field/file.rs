@@ -25,7 +25,7 @@ pub const TRANSFER_MAGIC: [u8; 8] = *b"SHTRANS\n";
 /// First bytes of a cached file of self-visibility.
 pub const SELF_VISIBILITY_MAGIC: [u8; 8] = *b"SHSELFV\n";
 /// Version that this program writes and reads. It increases whenever the meaning of header or payload changes.
-pub const VERSION: u32 = 7;
+pub const VERSION: u32 = 8;
 /// Longest header that is read.
 const HEADER_LIMIT: u64 = 64 << 10;
 /// Largest payload that is read: 4 GiB.

@@ -13,6 +13,9 @@
 //! So a mesh that is not convex has maps of its two halves besides ([`Side`]), at half the resolution. Each half counts as far as its
 //! outline lies between receiver and light; where both do, the whole counts. Lights in the middle of a ring err by 0.01 with halves and
 //! by 0.26 without, receivers in it by 0.03 and 0.11; receivers about a teapot by 0.03 and 0.02, at 3 degrees.
+//!
+//! Of a convex mesh that is no ball the field keeps a box instead. A slab's nearest rim may lie before a receiver that stands over the slab: where
+//! the ray enters and leaves the box tells where the object stands. Receivers within a slab's sphere err by 0.05 with it and by 0.19 without.
 
 use super::file;
 pub use super::silhouette_header::{Side, SilhouetteHeader};
@@ -36,6 +39,14 @@ pub const INSIDE: [f64; 2] = [0.9, 1.05];
 /// How deep in the object a receiver or a light lies, along the ray from the centre's plane towards its own end and in r, up to which only
 /// the whole counts, and from which halves do. Nearer to the rim almost all of the object lies between the two.
 pub const DEEP: [f64; 2] = [-0.6, -0.2];
+/// Coordinate in r from which on a convex object reaches so far toward its bounding sphere that a box tells nothing more.
+pub const ROUND: f64 = 0.9;
+/// Half the edge of a box that tells nothing, in r.
+pub const NO_BOX: f64 = 1e6;
+/// How far from a box, in r, a ray's end may lie and yet count as on it: more than rounding moves it.
+pub const TOUCHING: f64 = 1e-5;
+/// Least size of a direction's parts where they divide.
+pub const LEAST_STEP: f64 = 1e-7;
 /// Least half-width of a penumbra, in r: it keeps a light of no size from dividing by nothing.
 pub const LEAST_PENUMBRA: f64 = 1e-9;
 
@@ -93,6 +104,8 @@ pub struct Near {
     point: DVec3,
     cell: Cell,
     maps: [NearMap; 4],
+    /// Where the ray in the middle of those directions enters the box around the object and where it leaves it; without ends where it misses.
+    in_box: [f64; 2],
 }
 
 /// One of the four maps around a direction, as it concerns rays through one point.
@@ -180,8 +193,8 @@ impl SilhouetteField {
         &self.frames
     }
 
-    /// The nodes as `glsl/silhouette_field.glsl` reads them, three quads each, which give places in texels from the middle of a map's first;
-    /// the cells of the field's maps begin at `first_cell`.
+    /// The field as `glsl/silhouette_field.glsl` reads it: two quads of the box around the object, then three of each node, which give places
+    /// in texels from the middle of a map's first; the cells of the field's maps begin at `first_cell`.
     pub fn node_quads(&self, first_cell: u32) -> Vec<[f32; 4]> {
         let map_cells = Side::ALL.iter().map(|side| self.side_cells(*side)).sum::<usize>() as u32;
         let node = |&(map, mirrored): &(usize, bool)| {
@@ -195,7 +208,8 @@ impl SilhouetteField {
             let cells = f32::from_bits(first_cell + map as u32 * map_cells);
             [row(0), row(1), [texel.x, texel.y, cells, if mirrored { -1.0 } else { 1.0 }]]
         };
-        self.nodes.nodes().iter().flat_map(node).collect()
+        let corners = self.extent().map(|corner| corner.extend(0.0).as_vec4().to_array());
+        corners.into_iter().chain(self.nodes.nodes().iter().flat_map(node)).collect()
     }
 
     /// Cells of a side of a map.
@@ -283,7 +297,7 @@ impl SilhouetteField {
             near.depth = self.depth(&near, Side::Whole);
             near
         });
-        Near { point, cell, maps }
+        Near { point, cell, maps, in_box: self.through_box(point, toward) }
     }
 
     /// Depth along the direction of the nearest point of a side's outline.
@@ -319,16 +333,41 @@ impl SilhouetteField {
         sums
     }
 
+    /// Least and largest corner of the box around the object, in r: a boundless one where halves or the bounding sphere tell as much.
+    pub fn extent(&self) -> [DVec3; 2] {
+        let [low, high] = self.header.extent.map(|corner| DVec3::from_array(corner.map(f64::from)));
+        let tells = !self.has_halves() && low.max(-high).max_element() > -ROUND;
+        if tells { [low, high] } else { [DVec3::splat(-NO_BOX), DVec3::splat(NO_BOX)] }
+    }
+
+    /// Whether the box tells what neither the outline nor halves do.
+    pub fn has_box(&self) -> bool {
+        self.extent()[1].x < NO_BOX
+    }
+
+    /// Where a ray enters the box around the object and where it leaves it; without ends where it misses the box.
+    fn through_box(&self, point: DVec3, direction: DVec3) -> [f64; 2] {
+        let least = DVec3::splat(LEAST_STEP);
+        let step = DVec3::select(direction.abs().cmplt(least), least, direction);
+        let [one, other] = self.extent().map(|corner| (corner - point) / step);
+        let ends = [one.min(other).max_element(), one.max(other).min_element()];
+        if ends[0] > ends[1] { [-NO_BOX, NO_BOX] } else { ends }
+    }
+
     /// Share of a small round light that the object blocks, as seen from the point of `near`: the light's middle lies in that
     /// unit direction, `distance` away (in r, infinite for distant light), and `tangent` is that of its angular radius.
     pub fn blocked(&self, near: &Near, direction: DVec3, distance: f64, tangent: f64) -> f64 {
         let along = near.point.dot(direction);
-        // Share that an outline blocks, and whether it counts: one behind the receiver or behind the light blocks nothing.
+        // Share that an outline blocks, and whether it counts: one behind the receiver or behind the light blocks nothing. The outline's nearest
+        // point may lie off the ray, as of a wide thin slab below the receiver, and the object then stands where the ray passes its box.
         let by = |side: Side| {
             let outline = self.outline(near, side, direction);
             let away = outline.depth - along;
             let share = blocked_share(outline.distance / (away.max(NEAREST) * tangent).max(LEAST_PENUMBRA));
-            (share, fade(away) * fade(distance - away))
+            let [enters, leaves] = near.in_box;
+            let apart = leaves < TOUCHING || enters > distance - TOUCHING;
+            let stands = away.max(enters).min(leaves);
+            (share, if apart { 0.0 } else { fade(stands) * fade(distance - stands) })
         };
         let (whole, counts) = by(Side::Whole);
         let nearest = near.point.length().min((near.point + distance.min(1e30) * direction).length());

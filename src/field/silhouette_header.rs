@@ -38,6 +38,9 @@ impl Side {
     }
 }
 
+/// Bound on coordinates in bounding radii: 1 and what rounding adds.
+const MOST_EXTENT: f32 = 1.01;
+
 fn is_zero(number: &u32) -> bool {
     *number == 0
 }
@@ -63,6 +66,8 @@ pub struct SilhouetteHeader {
     pub centre_m: [f32; 3],
     /// Radius of the bounding sphere, metres.
     pub radius_m: f32,
+    /// Least and largest coordinates of the mesh from that centre, in its own frame and in bounding radii.
+    pub extent: [[f32; 3]; 2],
     /// Name of the mesh, for people.
     pub mesh: String,
     /// Content hash of the mesh, hexadecimal.
@@ -124,6 +129,11 @@ impl SilhouetteHeader {
             return bad(format!("maps of halves of {} px beside maps of {} px", self.half_px, self.map_px));
         }
         let usable = self.centre_m.iter().all(|c| c.is_finite()) && self.radius_m > 0.0 && self.radius_m.is_finite();
-        if usable { Ok(()) } else { bad("centre or radius is not a usable number".into()) }
+        if !usable {
+            return bad("centre or radius is not a usable number".into());
+        }
+        let [low, high] = self.extent;
+        let ordered = (0..3).all(|i| low[i] <= high[i] && low[i] >= -MOST_EXTENT && high[i] <= MOST_EXTENT);
+        if ordered { Ok(()) } else { bad(format!("an extent from {low:?} to {high:?} within a sphere of radius 1")) }
     }
 }

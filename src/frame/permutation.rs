@@ -2,6 +2,7 @@
 
 use super::Options;
 use crate::error::Result;
+use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Device, TexelView, Volume};
 use crate::layout::{Entity, NONE};
 use crate::merge::Merge;
@@ -81,6 +82,9 @@ pub(super) fn sharp(
 ) -> Option<SharpPermutation> {
     let lit = scene.entities.iter().zip(forms).filter(|(entity, form)| entity.emits && form.is_sharp());
     let lights: Vec<&LightForm> = lit.map(|(_, form)| form).collect();
+    let any_field = |wanted: fn(&SilhouetteField) -> bool| {
+        buffers.meshes.iter().any(|mesh| mesh.silhouette.as_ref().is_some_and(|slot| wanted(&slot.field)))
+    };
     (!lights.is_empty()).then(|| SharpPermutation {
         texel: merge.variant.texel,
         uniform: merge.variant.uniform,
@@ -88,7 +92,8 @@ pub(super) fn sharp(
         silhouette: options.bake.silhouette,
         outlines: lights.contains(&&LightForm::Outline),
         panels: lights.iter().any(|form| matches!(form, LightForm::Panel(_))),
-        halves: buffers.meshes.iter().any(|m| m.silhouette.as_ref().is_some_and(|slot| slot.field.has_halves())),
+        halves: any_field(SilhouetteField::has_halves),
+        boxes: any_field(SilhouetteField::has_box),
         self_shadows: buffers.meshes.iter().any(|device_mesh| device_mesh.self_first != NONE),
         cones: lights.len() > 1,
         rolled: false,

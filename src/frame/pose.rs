@@ -111,7 +111,7 @@ impl Frame {
             area_y: area_y.extend(terms[1]).to_array(),
             area_terms: [terms[2], terms[3], terms[4], terms[5]],
             sharp: [
-                f32::from_bits(device_mesh.silhouette.as_ref().map_or(0, |slot| slot.first_node)),
+                f32::from_bits(device_mesh.silhouette.as_ref().map_or(0, |slot| slot.first_quad)),
                 share as f32,
                 panel,
                 0.0,

@@ -10,20 +10,20 @@ use std::sync::Arc;
 
 /// The silhouette fields of a scene. Where it has none, the buffers hold a little of nothing.
 pub struct Silhouettes {
-    /// Three quads a node, see `glsl/silhouette_field.glsl`.
+    /// Two quads a field and three a node, see `glsl/silhouette_field.glsl`.
     pub nodes: Buffer,
     /// Two words a cell.
     pub cells: Buffer,
 }
 
-/// Bit of a field's first node that says that it has maps of halves.
+/// Bit of a field's first quad that says that it has maps of halves.
 const HALVES: u32 = 1 << 31;
 
 /// The silhouette field of a mesh.
 #[derive(Clone)]
 pub struct SilhouetteSlot {
-    /// First quad of its nodes, and bit 31 where it has maps of halves.
-    pub first_node: u32,
+    /// Its first quad, and bit 31 where it has maps of halves.
+    pub first_quad: u32,
     /// The field, for the twin.
     pub field: Arc<SilhouetteField>,
 }
@@ -37,14 +37,14 @@ impl Silhouettes {
         let (mut nodes, mut cells) = (Vec::<[f32; 4]>::new(), Vec::<[u32; 2]>::new());
         let mut known = HashMap::<*const SilhouetteField, u32>::new();
         let mut slot = |field: &Arc<SilhouetteField>| {
-            let first_node = *known.entry(Arc::as_ptr(field)).or_insert_with(|| {
+            let first_quad = *known.entry(Arc::as_ptr(field)).or_insert_with(|| {
                 let first = nodes.len() as u32;
                 nodes.extend(field.node_quads(cells.len() as u32));
                 cells.extend(field.cells());
                 first
             });
             let halves = if field.has_halves() { HALVES } else { 0 };
-            SilhouetteSlot { first_node: first_node | halves, field: field.clone() }
+            SilhouetteSlot { first_quad: first_quad | halves, field: field.clone() }
         };
         let slots = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();
         nodes.resize(nodes.len().max(ALIGNMENT as usize / 16), [0.0; 4]);

@@ -10,7 +10,7 @@ pub mod twin;
 use crate::bake::silhouette::SilhouetteOptions;
 use crate::error::Result;
 use crate::field::lattice::CELL_WARP;
-use crate::field::silhouette::{DEEP, INSIDE, LEAST_PENUMBRA, NEAREST, REACH};
+use crate::field::silhouette::{DEEP, INSIDE, LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, REACH, TOUCHING};
 use crate::field::silhouette_nodes::{BEYOND, EASED, LEAST_AHEAD};
 use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, STRIP, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
@@ -53,6 +53,8 @@ pub struct SharpPermutation {
     pub panels: bool,
     /// Whether any silhouette field has maps of halves.
     pub halves: bool,
+    /// Whether any silhouette field has a box that tells more than its outlines: of a convex mesh that is no ball.
+    pub boxes: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
     /// Whether every point leaves out the occluders of its lists that stand outside a light's cone: in scenes of several sharp lights. Pixels
@@ -85,6 +87,7 @@ impl SharpPermutation {
             .define("OUTLINES", self.outlines)
             .define("PANELS", self.panels)
             .define("HALVES", self.halves)
+            .define("BOXES", self.boxes)
             .define("SELF", self.self_shadows)
             .define("CONES", self.cones)
             .define("ROLLED", self.rolled)
@@ -93,6 +96,9 @@ impl SharpPermutation {
         let numbers = [
             ("REACH", REACH),
             ("NEAREST", NEAREST),
+            ("NO_BOX", NO_BOX),
+            ("TOUCHING", TOUCHING),
+            ("LEAST_STEP", LEAST_STEP),
             ("LEAST_PENUMBRA", LEAST_PENUMBRA),
             ("INSIDE_FROM", INSIDE[0]),
             ("INSIDE_TO", INSIDE[1]),

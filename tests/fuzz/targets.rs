@@ -313,6 +313,7 @@ fn outline_field() -> SilhouetteField {
         symmetry: true,
         centre_m: [0.0; 3],
         radius_m: 1.0,
+        extent: [[-0.5; 3], [0.5; 3]],
         mesh: "m".into(),
         mesh_hash: String::new(),
     };

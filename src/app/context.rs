@@ -51,8 +51,8 @@ pub struct Global {
     /// Folder whose shader files are used instead of the built-in ones of the same name
     #[arg(long, global = true, value_name = "DIR")]
     pub shader_dir: Option<PathBuf>,
-    /// Processes that a bake is shared out among; its bytes are the same. Default: on a software device one a core, but one for a
-    /// small mesh; on a GPU one
+    /// Processes that a bake is shared out among; its bytes are the same. Default: one a core where
+    /// a software device draws a radiance field for two seconds or more, else one
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub jobs: Option<u32>,
 }

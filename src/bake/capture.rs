@@ -150,7 +150,7 @@ impl Capture {
     }
 
     /// Whether faces of a model are computed.
-    fn computes(&self, model: &Model) -> bool {
+    pub fn computes(&self, model: &Model) -> bool {
         self.computes
             && self.kind != CaptureKind::Radiance
             && Raster::serves(self.face_px)

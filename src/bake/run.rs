@@ -78,7 +78,8 @@ impl Captures<'_> {
         let numbers = self.reduction.sample_bytes() / size_of::<T>();
         assert_eq!(numbers * size_of::<T>(), self.reduction.sample_bytes(), "numbers of another size");
         let mut batches = Batches::new(baker, self)?;
-        let (targets, units) = batches.plan(targets, baker.workers().map_or(1, |workers| workers.most()));
+        let computes = batches.capture.computes(&batches.model);
+        let (targets, units) = batches.plan(targets, baker.workers().map_or(1, |workers| workers.most(computes)));
         let begun = self.partial.load(values, targets.len() as u32);
         let done: Vec<bool> = units.iter().map(|unit| unit.targets().end <= begun as usize).collect();
         let count = units.iter().zip(&done).filter(|(_, done)| **done).map(|(unit, _)| unit.count).sum();
@@ -87,7 +88,7 @@ impl Captures<'_> {
         let partial = self.partial;
         let mut gathered = Gathered { values, targets: &targets, units: &units, done, count, partial, numbers };
         let seconds = left.iter().map(|&unit| units[unit].seconds).sum();
-        let work = workers::Work { setup: self, targets: &targets, units: &units, left: &left, seconds };
+        let work = workers::Work { setup: self, targets: &targets, units: &units, left: &left, seconds, computes };
         let mut own = |unit: &Unit, report: &mut BakeReport| batches.run_unit(&targets[unit.targets()], report);
         workers::share(baker.workers(), &work, &mut own, &mut report, &mut |unit, samples: &[u8]| {
             gathered.put(unit, samples, progress);

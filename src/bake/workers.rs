@@ -1,7 +1,8 @@
 //! Shares the captures of a bake out among worker processes, each with a device of its own.
 //!
-//! llvmpipe transforms and clips triangles on one thread a device, which takes most of the time of a large mesh while other cores
-//! idle. A second device inside one process crashed that driver, so each worker is a process. The bake's own process captures too.
+//! llvmpipe transforms and clips triangles on one thread a device, so that other cores idle where faces are drawn: those of radiance fields and
+//! of captures too large for [`super::raster`]. What is computed keeps all cores busy by itself, and workers only repeat the host's share: they
+//! made a bake of 70 000 triangles 1.08 times and one of 1 000 000 triangles 1.26 times as long on two cores. A second device inside one process crashed that driver, so each worker is a process. The bake's own process captures too.
 //! Units are dealt out one at a time, so that nobody waits long for another.
 
 use super::BakeReport;
@@ -27,7 +28,7 @@ pub struct WorkerOptions {
     /// The program, which understands the subcommand [`COMMAND`]: that of this package and of this version.
     pub program: PathBuf,
     /// Processes that capture, this one included, however small a mesh is. `None` leaves it to the device and the mesh: one a core
-    /// for a bake on a software device that is estimated to take longer than two seconds, else this process alone.
+    /// where a software device draws faces for an estimated two seconds or more, else this process alone.
     pub jobs: Option<u32>,
     /// Which validation checks run in workers.
     pub validation: Validation,
@@ -49,6 +50,8 @@ pub(super) struct Work<'w> {
     pub left: &'w [usize],
     /// Estimated seconds of what is left.
     pub seconds: f64,
+    /// Whether faces are computed rather than drawn.
+    pub computes: bool,
 }
 
 /// Captures by this process itself.
@@ -141,16 +144,16 @@ impl Workers {
         std::thread::available_parallelism().map_or(1, |cores| cores.get())
     }
 
-    /// Most processes that a bake has, this one included.
-    pub(super) fn most(&self) -> usize {
-        let usual = if self.device.info.is_software() { self.cores() } else { 1 };
+    /// Most processes that a bake has, this one included, whose faces are computed or drawn.
+    pub(super) fn most(&self, computes: bool) -> usize {
+        let usual = if self.device.info.is_software() && !computes { self.cores() } else { 1 };
         self.options.jobs.map_or(usual, |jobs| jobs as usize)
     }
 
     /// Workers that serve some work besides this process.
     fn helpers(&self, work: &Work<'_>) -> usize {
         let worthwhile = self.options.jobs.is_some() || work.seconds > WORTHWHILE_SECONDS;
-        let jobs = if worthwhile { self.most() } else { 1 };
+        let jobs = if worthwhile { self.most(work.computes) } else { 1 };
         jobs.min(work.left.len()).saturating_sub(1)
     }
 
@@ -212,7 +215,7 @@ impl Workers {
         };
         if std::env::var_os("LP_NUM_THREADS").is_none() {
             // Each worker of llvmpipe draws with its share of the cores.
-            command.env("LP_NUM_THREADS", (self.cores() / self.most()).max(1).to_string());
+            command.env("LP_NUM_THREADS", (self.cores() / self.most(false)).max(1).to_string());
         }
         // Ctrl-C in a terminal reaches this process alone, whose end closes the pipes.
         #[cfg(unix)]

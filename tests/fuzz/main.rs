@@ -42,13 +42,28 @@ struct Tally {
     largest: usize,
 }
 
-/// The words of an outcome without its numbers and what it quotes.
+/// Between these a parser quotes its input; between double quotes there may be more of them.
+const QUOTES: [[&str; 2]; 5] = [
+    ["\"", "\""],
+    ["'", "'"],
+    ["unknown field `", "`, expected"],
+    ["unknown variant `", "`, expected"],
+    ["a plan of ", ", and this is"],
+];
+
+/// The words of an outcome's first line without its numbers and what it quotes.
 fn signature(outcome: &shadow_fields::Result<()>) -> String {
     let Err(error) = outcome else { return String::new() };
-    let text = error.to_string();
-    let quoted = text.find('"').zip(text.rfind('"'));
-    let words = quoted.map_or(text.clone(), |(from, to)| format!("{}{}", &text[..from], &text[to..]));
-    words.chars().filter(|c| c.is_ascii_alphabetic() || *c == ' ').take(90).collect()
+    let mut text = error.to_string();
+    text.truncate(text.find('\n').unwrap_or(text.len()));
+    for [before, behind] in QUOTES {
+        if let Some(from) = text.find(before).map(|at| at + before.len())
+            && let Some(length) = if behind == "\"" { text[from..].rfind(behind) } else { text[from..].find(behind) }
+        {
+            text.replace_range(from..from + length, "");
+        }
+    }
+    text.chars().filter(|c| c.is_ascii_alphabetic() || *c == ' ').take(90).collect()
 }
 
 impl Target {

@@ -27,21 +27,31 @@ pub fn pushed_out(surface: &Surface, points: &[DVec3], inside: &[bool]) -> Vec<O
     points.par_iter().zip(inside).map(place).collect()
 }
 
-/// The point of a triangle nearest to the origin (Ericson, *Real-Time Collision Detection*, section 5.1.5, by regions).
+/// The point of a triangle nearest to the origin (Ericson, *Real-Time Collision Detection*, section 5.1.5, by regions). Bakes of large
+/// meshes spend a quarter of their time here, so nothing is left to the inlining of closures.
 pub fn nearest_on_triangle([a, b, c]: [DVec3; 3]) -> DVec3 {
-    let (ab, ac) = (b - a, c - a);
-    let normal = ab.cross(ac);
-    let along = |from: DVec3, edge: DVec3| {
-        let t = (-from.dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        from + t * edge
-    };
-    let sides = [(a, ab), (b, c - b), (c, a - c)];
-    if normal != DVec3::ZERO && sides.iter().all(|(from, edge)| normal.dot(edge.cross(-*from)) >= 0.0) {
+    let (ab, bc, ca) = (b - a, c - b, a - c);
+    let normal = ab.cross(c - a);
+    let faces = normal != DVec3::ZERO
+        && normal.dot(ab.cross(-a)) >= 0.0
+        && normal.dot(bc.cross(-b)) >= 0.0
+        && normal.dot(ca.cross(-c)) >= 0.0;
+    if faces {
         let unit = normal.normalize();
         return a.dot(unit) * unit;
     }
-    let ends = sides.map(|(from, edge)| along(from, edge));
-    ends.into_iter().min_by(|a, b| a.length_squared().total_cmp(&b.length_squared())).expect("three sides")
+    nearer(nearer(nearest_on_side(a, ab), nearest_on_side(b, bc)), nearest_on_side(c, ca))
+}
+
+#[inline]
+fn nearest_on_side(from: DVec3, edge: DVec3) -> DVec3 {
+    let t = (-from.dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    from + t * edge
+}
+
+#[inline]
+fn nearer(a: DVec3, b: DVec3) -> DVec3 {
+    if b.length_squared() < a.length_squared() { b } else { a }
 }
 
 #[cfg(test)]

@@ -88,8 +88,8 @@ impl Surface {
                 continue;
             }
             if node.second == 0 {
-                for triangle in &self.triangles[node.triangles.clone()] {
-                    let towards = nearest_on_triangle(triangle.map(|corner| corner - point));
+                for [a, b, c] in &self.triangles[node.triangles.clone()] {
+                    let towards = nearest_on_triangle([a - point, b - point, c - point]);
                     let distance = towards.length();
                     if distance < best.0 {
                         best = (distance, point + towards);
@@ -97,9 +97,8 @@ impl Surface {
                 }
             } else {
                 // The nearer child is looked into first.
-                let mut children = [(bound(index + 1), index + 1), (bound(node.second), node.second)];
-                children.sort_by(|a, b| b.0.total_cmp(&a.0));
-                open.extend(children);
+                let (first, second) = ((bound(index + 1), index + 1), (bound(node.second), node.second));
+                open.extend(if first.0 < second.0 { [second, first] } else { [first, second] });
             }
         }
         (best.0 < f64::INFINITY).then_some(best.1)
@@ -129,7 +128,7 @@ impl Surface {
                 total += q.dot(node.dipole) / distance.powi(3);
             } else if node.second == 0 {
                 let leaf = &self.triangles[node.triangles.clone()];
-                total += leaf.iter().map(|t| solid_angle(t.map(|corner| corner - point))).sum::<f64>();
+                total += leaf.iter().map(|[a, b, c]| solid_angle([a - point, b - point, c - point])).sum::<f64>();
             } else {
                 open.push(node.second);
                 index += 1;

@@ -351,3 +351,15 @@ fn barriers_of_a_frame_stand_in_its_sequence() {
         assert!(sequence.contains(&format!(".pass(\"{pass}\"")), "the sequence does not record \"{pass}\"");
     }
 }
+
+/// A row whose line was rewritten would change nothing, and so say nothing of the test that is to find it.
+#[test]
+fn every_mutation_has_its_line() {
+    let table = text(Path::new("scripts/mutations.tsv"));
+    let rows = table.lines().filter(|line| !line.starts_with('#')).map(|line| line.split('\t').collect::<Vec<_>>());
+    for row in rows {
+        assert!((4..=5).contains(&row.len()), "{row:?}");
+        let count = text(Path::new(row[0])).lines().filter(|line| line.contains(row[1])).count();
+        assert_eq!(count, 1, "lines of {} with {:?}", row[0], row[1]);
+    }
+}

@@ -142,7 +142,8 @@ float share_blocked(float distance, float away, float tangent) {
     return blocked_share(distance / max(max(away, NEAREST) * tangent, LEAST_PENUMBRA));
 }
 
-// Where a ray enters the box around an object and where it leaves it; without ends where it misses the box.
+// Where a ray enters the box around an object and where it leaves it. If it misses the box, the interval has no ends, and
+// the outline alone decides.
 vec2 through_box(uint field, vec3 point, vec3 direction) {
 #if BOXES
     vec3 per_step = 1.0 / mix(direction, vec3(LEAST_STEP), lessThan(abs(direction), vec3(LEAST_STEP)));

@@ -351,6 +351,21 @@ fn a_frame_covers_no_scene_whose_sharp_lights_have_no_pass() {
     assert!(frame.covers(&dark) && !frame.covers(&scene));
 }
 
+/// A pass that was compiled for balls of light alone would take a disc that is switched on for one.
+#[test]
+fn a_frame_of_balls_of_light_covers_no_panel_that_is_switched_on() {
+    let Some(gpu) = gpu() else { return };
+    let scene = parse(&format!(
+        "{HEAD}[[mesh]]\nname = \"lamp\"\ndisc = {{ radius_m = 0.3 }}\n\
+        [[entity]]\nmesh = \"ball\"\nposition = [1.2, 2.6, 0.8]\nscale = 0.1\nemission = [900, 900, 900]\n\
+        [[entity]]\nmesh = \"lamp\"\nposition = [0, 2, 0]\nemission = [9, 9, 9]\n"
+    ));
+    let mut dark = scene.clone();
+    dark.entities.last_mut().unwrap().emits = false;
+    let frame = Frame::new(&gpu.baker(), &Cache::new(None), &dark, check::sharp_options(), &|_, _, _| ()).unwrap();
+    assert!(frame.covers(&dark) && !frame.covers(&scene));
+}
+
 /// A sun's light on a floor that nothing shades, against its closed form: radiance * sin^2(a / 2) * cosine of a white surface.
 #[test]
 fn a_sun_lights_as_its_closed_form() {

@@ -178,7 +178,7 @@ fn table() -> Mesh {
 }
 
 /// Places within the bounding sphere: in a ring's hole, about a teapot and inside its handle, below a table's board, over a slab and beside a
-/// box. The last two are convex and have no halves; most of their places are kept from the object by a plane of its box.
+/// box. The last two are convex and have no halves; most of the places around them lie outside the object's box.
 #[test]
 fn receivers_and_lights_within_the_bounding_sphere_see_what_lies_between_them() {
     const PAIRS: usize = 400;

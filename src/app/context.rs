@@ -52,7 +52,7 @@ pub struct Global {
     #[arg(long, global = true, value_name = "DIR")]
     pub shader_dir: Option<PathBuf>,
     /// Processes that a bake is shared out among; its bytes are the same. Default: one a core where
-    /// a software device draws a radiance field for two seconds or more, else one
+    /// a software device has to draw faces, as of radiance fields, for an estimated two seconds or more, else one
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub jobs: Option<u32>,
 }

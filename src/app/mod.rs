@@ -87,8 +87,8 @@ pub fn run_on<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>)
     run(&parse(arguments)?).and_then(|()| output::written())
 }
 
-/// Whether the command line understands arguments, the first of which is the program's name. Nothing is run. What reads them is made
-/// once, which takes longer than to read with it.
+/// Whether the command line understands arguments, the first of which is the program's name. Nothing is run. The parser is
+/// made once and kept, because making it takes longer than using it.
 ///
 /// # Errors
 /// `Usage` as [`run_on`].

@@ -60,11 +60,11 @@ impl CaptureKind {
 /// Which faces of which eye lie where in the atlas.
 pub type Slots = [u32; FACE_COUNT];
 
-/// The pipelines and the atlas that they write. Each is made when faces are first chosen for it: a bake draws all of them, or computes all.
+/// The atlas, and the pipelines that write it. A pipeline is made when faces are first chosen for it: a bake draws all of them, or computes all.
 pub struct Capture {
     device: Arc<Device>,
     library: Library,
-    /// Draw both sides of triangles, and cull the backs of closed meshes.
+    /// The first draws both sides of triangles, the second leaves out the backs of closed meshes.
     pipelines: [OnceLock<GraphicsPipeline>; 2],
     raster: OnceLock<Raster>,
     /// Captured faces, row by row.

@@ -2,8 +2,8 @@
 //!
 //! llvmpipe transforms and clips triangles on one thread a device, so that other cores idle where faces are drawn: those of radiance fields and
 //! of captures too large for [`super::raster`]. What is computed keeps all cores busy by itself, and workers only repeat the host's share: they
-//! made a bake of 70 000 triangles 1.08 times and one of 1 000 000 triangles 1.26 times as long on two cores. A second device inside one process crashed that driver, so each worker is a process. The bake's own process captures too.
-//! Units are dealt out one at a time, so that nobody waits long for another.
+//! made a bake of 70 000 triangles 1.08 times and one of 1 000 000 triangles 1.26 times as long on two cores.
+//! A second device inside one process crashed that driver, so each worker is a process. The bake's own process captures too. Units are dealt out one at a time, so that nobody waits long for another.
 
 use super::BakeReport;
 use super::batches::{CaptureTarget, Captures, Unit};

@@ -42,8 +42,8 @@ pub const DEEP: [f64; 2] = [-0.6, -0.2];
 /// Coordinate in r from which on a convex object reaches so far toward its bounding sphere that a box tells nothing more.
 pub const ROUND: f64 = 0.9;
 /// Half the edge of a box that tells nothing, in r.
-pub const NO_BOX: f64 = 1e6;
-/// How far from a box, in r, a ray's end may lie and yet count as on it: more than rounding moves it.
+pub const NO_BOX: f64 = 1e30;
+/// How far from a box, in r, a ray's end may lie and yet count as on it. Rounding moves the end by less within some 80 r of the world's origin.
 pub const TOUCHING: f64 = 1e-5;
 /// Least size of a direction's parts where they divide.
 pub const LEAST_STEP: f64 = 1e-7;
@@ -104,7 +104,7 @@ pub struct Near {
     point: DVec3,
     cell: Cell,
     maps: [NearMap; 4],
-    /// Where the ray in the middle of those directions enters the box around the object and where it leaves it; without ends where it misses.
+    /// Where the ray in the middle of those directions enters the box around the object and where it leaves it, as [`SilhouetteField::through_box`].
     in_box: [f64; 2],
 }
 
@@ -345,7 +345,7 @@ impl SilhouetteField {
         self.extent()[1].x < NO_BOX
     }
 
-    /// Where a ray enters the box around the object and where it leaves it; without ends where it misses the box.
+    /// Where a ray enters the box around the object and where it leaves it. If it misses the box, the interval has no ends, and the outline alone decides.
     fn through_box(&self, point: DVec3, direction: DVec3) -> [f64; 2] {
         let least = DVec3::splat(LEAST_STEP);
         let step = DVec3::select(direction.abs().cmplt(least), least, direction);

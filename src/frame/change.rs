@@ -15,7 +15,8 @@ impl Frame {
         let forms = forms(scene, self.options.lights);
         let wanted = permutation::sharp(&self.options, &self.merge.permutation, &forms, scene, &self.buffers);
         let has = |wanted: SharpPermutation| {
-            self.sharp.as_ref().is_some_and(|sharp| sharp.permutation.outlines || !wanted.outlines)
+            let compiled = self.sharp.as_ref().map(|sharp| sharp.permutation);
+            compiled.is_some_and(|has| (has.outlines || !wanted.outlines) && (has.panels || !wanted.panels))
         };
         self.buffers.covers(scene, self.options.lights) && wanted.is_none_or(has)
     }

@@ -119,7 +119,9 @@ impl Frame {
         let by_pixel = options.shading != Some(Shading::Vertex)
             && SharpPermutation::fits_views(device, [nodes, cells, radiosity.soft()]);
         if options.shading == Some(Shading::Pixel) && sharp.is_some() && !by_pixel {
-            log::warn!("no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields");
+            log::warn!(
+                "no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields or the light of all vertices"
+            );
         }
         let by_pixel = sharp.as_ref().map(|sharp| sharp.permutation).filter(|_| by_pixel);
         let pixel = by_pixel.map(|_| PixelChains::new(device, scene, &buffers)).transpose()?;
@@ -237,6 +239,7 @@ impl Frame {
         self.radiosity.replaced = false;
         self.work.prepare(self.state(placements), sights.as_deref())?;
         if self.fit_lists()? {
+            // The old pipeline has waited for all frames to end, so that every buffer may be written again.
             self.work.prepare(self.state(placements), sights.as_deref())?;
         }
         if viewports.is_empty() { Ok(()) } else { self.prepare_pixels() }

@@ -30,7 +30,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             |[before, most]| format!("memory from {:.1} to {:.1} MB", before as f64 * 1e-6, most as f64 * 1e-6),
         );
         output::say(format!(
-            "{} frames in {:.0} s: {memory}, {} of {} pictures of the same moment differ, quicker frames of a tenth from {first:.2} to {last:.2} ms",
+            "{} frames in {:.0} s: {memory}, {} of {} pictures of the same moment differ, the quicker frames took {first:.2} ms in the first tenth after the warm-up and {last:.2} ms in the last",
             outcome.frames, outcome.seconds, outcome.differing, outcome.compared
         ));
     }

@@ -2,7 +2,8 @@
 //! layout of every struct.
 
 use crate::error::{Error, Result};
-use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::binary::{Consumer, ParseAction, ParseState, parse_words};
+use rspirv::dr::{Instruction, Loader, Module, ModuleHeader, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass};
 use std::collections::{BTreeMap, HashMap};
 
@@ -85,9 +86,35 @@ impl Reflection {
     /// `Failed` when the words are no SPIR-V, or declare something that this layer does not use (other sets than 0,
     /// unknown descriptor kinds).
     pub fn new(spirv: &[u32]) -> Result<Self> {
-        let module =
-            rspirv::dr::load_words(spirv).map_err(|error| Error::Failed(format!("unreadable SPIR-V: {error}")))?;
-        Reader::new(&module).reflect()
+        let mut declarations = Declarations(Loader::new());
+        match parse_words(spirv, &mut declarations) {
+            Ok(()) | Err(ParseState::ConsumerStopRequested) => Reader::new(&declarations.0.module()).reflect(),
+            Err(error) => Err(Error::Failed(format!("unreadable SPIR-V: {error}"))),
+        }
+    }
+}
+
+/// Loads what stands before the first function, where all declarations are; functions are most of a module.
+struct Declarations(Loader);
+
+impl Consumer for Declarations {
+    fn initialize(&mut self) -> ParseAction {
+        self.0.initialize()
+    }
+
+    fn finalize(&mut self) -> ParseAction {
+        self.0.finalize()
+    }
+
+    fn consume_header(&mut self, header: ModuleHeader) -> ParseAction {
+        self.0.consume_header(header)
+    }
+
+    fn consume_instruction(&mut self, instruction: Instruction) -> ParseAction {
+        match instruction.class.opcode {
+            Op::Function => ParseAction::Stop,
+            _ => self.0.consume_instruction(instruction),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 // A lookup in a field: position to stored samples and weights, and their weighted sum. The twin is Lattice::corners and
 // ShadowField::lookup. A quad is four coefficients: vec4, or four halves.
-// DIRECTIONS 0 cube, 1 latitude-longitude; SPACING 0 chord, 1 log, 2 linear; LOOKUP 0 nearest, 1 radial, 2 trilinear. They and the
+// DIRECTIONS 0 cube, 1 latitude-longitude; SPACING 0 chord, 1 linear; LOOKUP 0 nearest, 1 radial, 2 trilinear. They and the
 // other choices are constants in plain conditions, of which the compiler keeps one side; only what a driver must not see is left
 // to the preprocessor: how fields are bound and read.
 
@@ -87,10 +87,10 @@ FieldPlace field_place(vec3 p, vec4 radial, float edges) {
     float edge = min(radial.z, 1.0);
     float reach = near * near + (1.0 - edge * edge);
     float h = 1.0 / (reach + sqrt(max(0.0, (near - edge) * (near + edge) * reach)));
-    float coordinate = SPACING == 0 ? sqrt(0.5 * h) : SPACING == 1 ? log(near) : near;
+    float coordinate = SPACING == 0 ? sqrt(0.5 * h) : near;
     float t = clamp(radial.x * coordinate + radial.y, 0.0, SHELLS - 1.0);
     float beyond = radial.w / max(d, radial.w);
-    float unscale = FIELD_UNIT * (SCALED == 1 ? h : 1.0) * beyond * beyond;
+    float unscale = FIELD_UNIT * (SPACING == 0 ? h : 1.0) * beyond * beyond;
 
     FieldCells cells = field_cells(p, edges);
     FieldPlace place;

@@ -7,7 +7,7 @@ use serde::Serialize;
 use shadow_fields::Error;
 use shadow_fields::bake;
 use shadow_fields::field::file::{self, FIELD_MAGIC, TRANSFER_MAGIC};
-use shadow_fields::field::{FieldHeader, FieldKind, ShadowField, Storage};
+use shadow_fields::field::{FieldHeader, FieldKind, Lattice, ShadowField, Storage};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -52,8 +52,8 @@ fn round_trip() {
     let folder = tempfile::tempdir().unwrap();
     for (i, (kind, storage, lattice)) in [
         (FieldKind::Occlusion, Storage::F16, "cube:3x2,inner=1.02"),
-        (FieldKind::Occlusion, Storage::F32, "cube:3x2,log,raw,inner=0.3,outer=5.5"),
-        (FieldKind::Radiance, Storage::F16, "latlon:3x4x5,linear"),
+        (FieldKind::Occlusion, Storage::F32, "cube:3x2,linear,raw,inner=0.3,outer=5.5"),
+        (FieldKind::Radiance, Storage::F16, "latlon:3x4x5,linear,raw"),
         (FieldKind::Radiance, Storage::F32, "cube:1x1"),
     ]
     .into_iter()
@@ -204,6 +204,27 @@ fn headers_are_not_believed() {
     ] {
         sealed(&path, &header, &good.payload);
     }
+}
+
+/// Files of spacings that a lattice had once are refused by name, and the headers of the others are what they were: names in the cache
+/// are hashes of them.
+#[test]
+fn spacings_that_went_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("old.sf");
+    let good = small();
+    let pair = |spacing: &str, scaled: bool| {
+        let mut header = serde_json::to_value(&good.header).unwrap();
+        (header["lattice"]["spacing"], header["lattice"]["scaled"]) = (spacing.into(), scaled.into());
+        sealed(&path, &header, &good.payload)
+    };
+    assert!(pair("log", true).contains("`log`, expected `chord` or `linear`"));
+    for (spacing, scaled) in [("chord", false), ("linear", true)] {
+        let said = pair(spacing, scaled);
+        assert!(said.contains("\"chord\" goes with \"scaled\"") && said.contains("baked anew"), "{said}");
+    }
+    let text = r#"{"shells":18,"inner":0.0,"outer":8.0,"spacing":"chord","directions":{"cube":{"cells":7}},"scaled":true,"fit":null,"edges":null}"#;
+    assert_eq!(serde_json::to_string(&Lattice::default()).unwrap(), text);
 }
 
 #[test]

@@ -151,9 +151,7 @@ fn merging() -> Vec<ShaderPermutation> {
         });
     }
     let lattices = [
-        "cube:16x8,log,inner=0.25",
-        "cube:16x8,linear,inner=0.25",
-        "cube:16x8,raw,inner=0.25",
+        "cube:16x8,linear,raw,inner=0.25",
         "cube:1x1,inner=1.02",
         "latlon:8x4x4,linear,raw,inner=0.2",
         "latlon:1x1x1,inner=1.02",
@@ -171,7 +169,7 @@ fn merging() -> Vec<ShaderPermutation> {
     }));
     permutations.push(MergePermutation {
         variant: Variant::named("texel-shifted").unwrap(),
-        lattice: lattice("latlon:8x4x4,log,raw,inner=0.2"),
+        lattice: lattice("latlon:8x4x4,linear,raw,inner=0.2"),
         lookup: Lookup::Nearest,
         ..usual
     });

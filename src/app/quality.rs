@@ -20,9 +20,9 @@ pub struct BakeArguments {
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "Baking, each part of --quality by itself")]
 struct SingleArguments {
-    /// Sample points: cube:SHELLSxCELLS or latlon:SHELLSxLATITUDESxLONGITUDES, then optionally ,chord|log|linear (spacing of
-    /// shells) ,scaled|raw (what is interpolated) ,inner=R ,outer=R (in bounding radii) ,edges (samples on the edges of a cube's faces,
-    /// shared by them: finer steps in as many bytes; not for boxes) ,edges=auto (by the mesh)
+    /// Sample points: cube:SHELLSxCELLS or latlon:SHELLSxLATITUDESxLONGITUDES, then optionally ,linear,raw (equal steps
+    /// between shells, as in the paper) ,inner=R ,outer=R (in bounding radii) ,edges (samples on the edges of a cube's faces, shared by
+    /// them: finer steps in as many bytes; not for boxes) ,edges=auto (by the mesh)
     #[arg(long, value_name = "LATTICE")]
     lattice: Option<Lattice>,
     /// Edge of a captured cube face in texels

@@ -134,7 +134,7 @@ pub fn against_twin(frame: &mut Frame, placements: &[Placement]) -> Result<Agree
 pub const LATTICES: [(&str, f64); 5] = [
     ("latlon:5x4x6", ANGLES),
     ("latlon:4x1x3,linear,raw", ANGLES),
-    ("cube:5x3,log,raw,inner=0.5,outer=5", ARITHMETIC),
+    ("cube:5x3,linear,raw,inner=0.5,outer=5", ARITHMETIC),
     ("cube:1x1", ARITHMETIC),
     ("cube:5x3,edges", ARITHMETIC),
 ];

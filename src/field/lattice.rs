@@ -21,11 +21,9 @@ pub const MAX_SAMPLES: u64 = 4_000_000;
 pub enum Spacing {
     /// q = sin(theta / 2), where theta is the half-angle under which the bounding sphere is seen: cos theta = c(d) of
     /// [`cap_cosine`], taken at [`Lattice::reach`]. The steps of half-angle are nearly equal, and shells are dense around d = 1,
-    /// where the blocked part varies fastest. A shader needs two square roots for it.
+    /// where the blocked part varies fastest. A shader needs two square roots for it. b / (1 - c) is stored.
     Chord,
-    /// ln d.
-    Log,
-    /// d itself, as in the paper of Zhou et al. (2005).
+    /// d itself, as in the paper of Zhou et al. (2005). b is stored.
     Linear,
 }
 
@@ -58,7 +56,8 @@ pub struct Lattice {
     pub spacing: Spacing,
     /// Directions of every shell.
     pub directions: Directions,
-    /// Whether b / (1 - c) is what is stored and interpolated rather than b itself: [`cap_height`] at [`Lattice::reach`].
+    /// Whether b / (1 - c) is what is stored and interpolated rather than b itself: [`cap_height`] at [`Lattice::reach`]. The spacing
+    /// decides it; files and names in the cache hold both.
     pub scaled: bool,
     /// Where the lattice lies around the object. `None` leaves that to the bake and counts as round until then.
     pub fit: Option<Fit>,
@@ -122,7 +121,6 @@ impl Spacing {
     pub fn coordinate(self, d: f64) -> f64 {
         match self {
             Spacing::Chord => (cap_height(d) / 2.0).sqrt(),
-            Spacing::Log => d.max(1e-30).ln(),
             Spacing::Linear => d,
         }
     }
@@ -133,7 +131,6 @@ impl Spacing {
                 let half_angle = 2.0 * coordinate.clamp(0.0, 1.0).asin();
                 if half_angle <= FRAC_PI_2 { 1.0 / half_angle.sin() } else { half_angle.sin() }
             }
-            Spacing::Log => coordinate.exp(),
             Spacing::Linear => coordinate,
         }
     }
@@ -159,7 +156,7 @@ impl Lattice {
         let distance = self.spacing.distance((f64::from(index) - offset) / slope);
         match self.spacing {
             Spacing::Chord => (distance * distance - self.room()).max(0.0).sqrt(),
-            Spacing::Log | Spacing::Linear => distance,
+            Spacing::Linear => distance,
         }
     }
 
@@ -272,10 +269,11 @@ impl Lattice {
         corners
     }
 
-    /// Checks counts and radii.
+    /// Checks counts and radii, and that what is stored goes with the spacing.
     ///
     /// # Errors
-    /// `Input` when a count is 0, radii are not increasing and finite, or the samples are more than [`MAX_SAMPLES`].
+    /// `Input` when a count is 0, radii are not increasing and finite, the samples are more than [`MAX_SAMPLES`], or what is stored is the
+    /// other spacing's.
     pub fn validate(&self) -> Result<()> {
         let bad = |what: String| Err(Error::Input(format!("lattice {self}: {what}")));
         let directions = match self.directions {
@@ -297,6 +295,9 @@ impl Lattice {
         let radii = inner.is_finite() && self.outer.is_finite() && inner >= 0.0 && self.outer > inner;
         if !radii || self.outer > 1e4 {
             return bad(format!("shells from {inner} to {} r", self.outer));
+        }
+        if self.scaled != (self.spacing == Spacing::Chord) {
+            return bad("\"chord\" goes with \"scaled\" and \"linear\" with \"raw\"; a file of another pair has to be baked anew".into());
         }
         if !self.fit().is_usable() {
             return bad("its centre or stretch is out of range".into());

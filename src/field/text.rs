@@ -14,7 +14,6 @@ impl std::fmt::Display for Lattice {
         }
         let spacing = match self.spacing {
             Spacing::Chord => "chord",
-            Spacing::Log => "log",
             Spacing::Linear => "linear",
         };
         let stored = if self.scaled { "scaled" } else { "raw" };
@@ -40,13 +39,13 @@ impl std::fmt::Display for Lattice {
 impl std::str::FromStr for Lattice {
     type Err = String;
 
-    /// `cube:SHELLSxCELLS` or `latlon:SHELLSxLATITUDESxLONGITUDES`, then any of `,chord` `,log` `,linear` `,scaled`
-    /// `,raw` `,inner=R` `,outer=R` `,edges` `,edges=auto` `,round`, or `,centre=X:Y:Z` and `,stretch=X:Y:Z`.
+    /// `cube:SHELLSxCELLS` or `latlon:SHELLSxLATITUDESxLONGITUDES`, then `,chord,scaled` or `,linear,raw`, and any of
+    /// `,inner=R` `,outer=R` `,edges` `,edges=auto` `,round`, or `,centre=X:Y:Z` and `,stretch=X:Y:Z`.
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let explain = || {
             format!(
-                "cannot read lattice \"{text}\" (cube:18x7 or latlon:8x4x4, then optionally ,chord|log|linear \
-                 ,scaled|raw ,inner=R ,outer=R ,edges ,edges=auto ,round)"
+                "cannot read lattice \"{text}\" (cube:18x7 or latlon:8x4x4, then optionally ,linear,raw ,inner=R \
+                 ,outer=R ,edges ,edges=auto ,round)"
             )
         };
         let mut words = text.split(',');
@@ -72,7 +71,6 @@ impl std::str::FromStr for Lattice {
                 }
                 _ => match word {
                     "chord" => lattice.spacing = Spacing::Chord,
-                    "log" => lattice.spacing = Spacing::Log,
                     "linear" => lattice.spacing = Spacing::Linear,
                     "scaled" => lattice.scaled = true,
                     "raw" => lattice.scaled = false,

@@ -70,7 +70,6 @@ pub const TARGETS: &[Target] = &[
             "latlon:",
             "x",
             ",chord",
-            ",log",
             ",linear",
             ",scaled",
             ",raw",
@@ -282,7 +281,7 @@ fn field_of(kind: FieldKind, storage: Storage, lattice: &str) -> ShadowField {
 
 fn fields() -> Vec<Vec<u8>> {
     let one = field_of(FieldKind::Occlusion, Storage::F16, "cube:2x2");
-    let other = field_of(FieldKind::Radiance, Storage::F32, "latlon:2x2x2,log,raw,inner=0.3,outer=5");
+    let other = field_of(FieldKind::Radiance, Storage::F32, "latlon:2x2x2,linear,raw,inner=0.3,outer=5");
     [one, other].map(|field| written(|path| field.write(path).unwrap())).into()
 }
 
@@ -393,7 +392,7 @@ fn decode(bytes: &[u8]) -> Result<()> {
 fn lattices() -> Vec<Vec<u8>> {
     [
         "cube:18x7",
-        "latlon:8x4x4,log,raw,inner=0.9,outer=5,edges",
+        "latlon:8x4x4,linear,raw,inner=0.9,outer=5,edges",
         "cube:2x2,round",
         "cube:3x3,centre=0:1:0,stretch=1:1:2,edges=auto",
     ]

@@ -156,7 +156,7 @@ fn interpolation_is_continuous() {
 #[test]
 fn longitudes_wrap() {
     let mut rng = Rng::with_seed(7);
-    let lattice: Lattice = "latlon:4x5x7,log,inner=0.3".parse().unwrap();
+    let lattice: Lattice = "latlon:4x5x7,inner=0.3".parse().unwrap();
     let captured = noise(&lattice, &mut rng);
     let stored = store(&lattice, &captured);
     let at = |polar: f64, azimuth: f64| {

@@ -47,7 +47,6 @@ uvec2 self_cell(uint i) {
 #include "self_frame.glsl"
 #include "self_visibility.glsl"
 #endif
-#define EDGES
 #define FACINGS 1
 #include "sharp_light.glsl"
 
@@ -65,13 +64,19 @@ void main() {
     surface.position = to_world(receiver, place.xyz);
     surface.origin = receiver.centre.xyz;
     surface.inverse_radius = receiver.centre.w;
+#if EDGES
     surface.step = place.w;
+#endif
     surface.facings[0] = facing_of(receiver, vertex_quad(at + 1).xyz, 1.0, cluster.self_first, v);
     vec4 sum = soft_at(cluster.radiosity_first + v);
+#if EDGES
     float soft = dot(sum.rgb, vec3(1.0)), albedo = dot(receiver.albedo.rgb, vec3(1.0));
+#endif
     if (cluster.sharp_count > 0) {
         sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo.rgb;
     }
+#if EDGES
     sum.w = EDGE_STEPS * EDGE_STEPS * albedo * missed > albedo * open_light + soft ? 1.0 : 0.0;
+#endif
     radiosity[cluster.radiosity_first + v] = sum;
 }

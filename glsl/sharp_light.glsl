@@ -8,7 +8,7 @@
 #define EACH [[unroll]]
 #endif
 
-#ifdef EDGES
+#if EDGES
 // Vertices carry a shadow's edge the worse, the narrower its penumbra is beside the way to the next vertex, with the square of the two's
 // ratio, and the more light it takes away.
 float finest;       // that ratio for the narrowest penumbra of the light at hand that comes as near as the next vertex, or 0
@@ -31,7 +31,7 @@ struct Surface {
     vec3 origin;   // world
     float inverse_radius; // 1 over the bounding radius of its object, 1/m
     Facing facings[FACINGS];
-#ifdef EDGES
+#if EDGES
     float step;    // farthest that a neighbouring vertex is, metres
 #endif
 };
@@ -73,7 +73,7 @@ void outlines(Rays rays, NodeCell cell, vec4 weights[4], uint side, out vec4 dis
     }
 }
 
-#ifdef EDGES
+#if EDGES
 // `penumbra`: half its width from a part; `parts`: how many times as wide the light is.
 void find_edge(float distance, float away, float limit, float penumbra, float parts, float step) {
     bool stands = away > -NEAREST - step && away < limit + NEAREST + step;
@@ -136,7 +136,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         EACH for (uint k = 0; k < 4; k++) {
             blocks[k] = share_blocked(distance[k], away[k], tangent[k]);
             stands[k] = between(away[k], limit[k], in_box);
-#ifdef EDGES
+#if EDGES
             if (before && (side == WHOLE || inside[k] > 0.0)) {
                 float penumbra = max(away[k], NEAREST) * max(tangent[k], LEAST_PENUMBRA);
                 find_edge(distance[k], away[k], limit[k], penumbra, inversesqrt(block.area), surface.step * occluder.centre.w);
@@ -223,7 +223,7 @@ bool may_block(uint packed, Surface surface) {
     vec3 toward = to_light / max(distance, 1e-30);
     float sine = min(CONE_WIDER / max(shining.w * distance, 1e-30), MOST_SINE);
     float radius = BALL_WIDER / ball.w;
-#ifdef EDGES
+#if EDGES
     radius += surface.step;
 #endif
     float along = dot(to_ball, toward);
@@ -254,7 +254,7 @@ vec3 open_sum(Surface surface, uint first, uint count) {
                 b++;
             } while (b <= last_block(light));
             sum += irradiance * shining.emission.rgb;
-#ifdef EDGES
+#if EDGES
             finest = 0.0;
             add_open(irradiance, shining);
 #endif
@@ -296,7 +296,7 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
             SeenLight light = light_from(surface, shining);
             uint b = first_block(light);
             float irradiance = 0.0;
-#ifdef EDGES
+#if EDGES
             float open = 0.0;
             finest = 0.0;
 #endif
@@ -304,7 +304,7 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
             do {
                 Block block = block_of(light, b);
                 vec4 share = part_shares(surface, light, block);
-#ifdef EDGES
+#if EDGES
                 open += dot(share, vec4(1.0));
 #endif
                 j = i;
@@ -328,7 +328,7 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
             } while (b <= last_block(light));
             i = j + 1;
             sum += irradiance * shining.emission.rgb;
-#ifdef EDGES
+#if EDGES
             add_open(open, shining);
 #endif
         }

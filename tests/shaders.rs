@@ -50,7 +50,7 @@ fn sharp() -> Vec<ShaderPermutation> {
         let silhouette = SilhouetteOptions::default();
         let (texel, uniform, outlines, panels, self_shadows, halves, boxes) =
             (on(0), on(1), on(2), on(3), on(4), on(2) != on(3), on(2) != on(4));
-        let (cones, rolled) = (on(5), on(5));
+        let (cones, edges, rolled) = (on(5), on(0) == on(2), on(5));
         SharpPermutation {
             texel,
             uniform,
@@ -62,6 +62,7 @@ fn sharp() -> Vec<ShaderPermutation> {
             boxes,
             self_shadows,
             cones,
+            edges,
             rolled,
         }
         .row()
@@ -83,6 +84,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         boxes: outlines,
         self_shadows: true,
         cones: outlines,
+        edges: true,
         rolled: outlines,
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];

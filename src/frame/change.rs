@@ -1,7 +1,7 @@
 //! What may change from frame to frame: the scene's lights and camera, the merge's variant, and shader files.
 
 use super::permutation::{CompiledMerge, harmonic_lights, usable};
-use super::{Frame, Options, forms, permutation};
+use super::{Frame, forms, permutation};
 use crate::error::Result;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant};
@@ -83,6 +83,18 @@ impl Frame {
         Ok(variant.texel)
     }
 
+    /// Has the pass of sharp lights mark the edges of shadows where pixels by now read the marks, and leave them out where none does. Where
+    /// they are new, every cluster is merged again.
+    pub(super) fn fit_edges(&mut self) -> Result<()> {
+        let edges = self.pixel.is_some() && self.options.evaluates_pixels();
+        let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.edges != edges) else { return Ok(()) };
+        *sharp = Sharp::new(&self.device, &self.library, SharpPermutation { edges, ..sharp.permutation })?;
+        if edges {
+            self.forget();
+        }
+        Ok(())
+    }
+
     /// Compiles the merge for what is wanted, as far as the device allows it. If it was compiled for something else, every cluster is
     /// merged again.
     fn compile_merge(&mut self, wanted: MergePermutation) -> Result<()> {
@@ -112,8 +124,7 @@ impl Frame {
         ];
         let [draws, gathers, merges] = [drawing.into_iter().any(uses), uses("gather.comp"), uses("merge.comp")];
         if draws {
-            let (Options { size, antialias, .. }, finish) = (self.options, self.picture.draw.finish());
-            self.picture.draw = self.draw(size, antialias, finish)?;
+            self.picture.draw = self.draw(&self.options, self.picture.draw.finish())?;
         }
         if gathers {
             self.work.rebuild(&self.library, self.scene.entities.len())?;

@@ -106,10 +106,6 @@ impl Frame {
         let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted)?)?;
         let sharp = permutation::sharp(&options, &merge.permutation, &forms, scene, &buffers);
         let radiosity = Radiosity::new(device, scene, &buffers, sharp.is_some())?;
-        let sharp = sharp
-            .map(|wanted| wanted.fitting(device, buffers.sharp(), radiosity.soft()))
-            .map(|permutation| Sharp::new(device, library, permutation))
-            .transpose()?;
         let mut lists = ClusterLists::default();
         for (index, entity) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
             let device_mesh = &buffers.meshes[entity.mesh];
@@ -123,6 +119,11 @@ impl Frame {
                 "no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields or the light of all vertices"
             );
         }
+        let edges = by_pixel && options.evaluates_pixels();
+        let sharp = sharp
+            .map(|wanted| wanted.fitting(device, buffers.sharp(), radiosity.soft()))
+            .map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting }))
+            .transpose()?;
         let by_pixel = sharp.as_ref().map(|sharp| sharp.permutation).filter(|_| by_pixel);
         let pixel = by_pixel.map(|_| PixelChains::new(device, scene, &buffers)).transpose()?;
         let place = options.lists.unwrap_or_else(|| Place::quicker(device, entity_count));
@@ -235,6 +236,7 @@ impl Frame {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn prepare_light(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
+        self.fit_edges()?;
         let sights = self.sights(placements, viewports);
         self.radiosity.replaced = false;
         self.work.prepare(self.state(placements), sights.as_deref())?;
@@ -336,11 +338,6 @@ impl Frame {
         let order = |entity: usize| &self.buffers.meshes[self.scene.entities[entity].mesh].order[..];
         let entities = radiosity.iter().map(|(entity, values)| (*entity, order(*entity), &values[..]));
         self.radiosity.compare(place, entities, rest)
-    }
-
-    /// Where pictures evaluate sharp lights.
-    fn shading(&self) -> Shading {
-        self.options.shading.unwrap_or_else(|| Shading::usual(self.options.antialias))
     }
 
     /// The scene that the frame was built for.

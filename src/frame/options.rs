@@ -36,6 +36,13 @@ pub struct Options {
     pub antialias: Antialias,
 }
 
+impl Options {
+    /// Whether pixels of pictures evaluate sharp lights, where the device can.
+    pub fn evaluates_pixels(&self) -> bool {
+        self.shading.unwrap_or_else(|| Shading::usual(self.antialias)) == Shading::Pixel
+    }
+}
+
 impl Default for Options {
     /// What `shadow-fields render` does without options, in 960 x 640 pixels.
     fn default() -> Self {

@@ -96,6 +96,7 @@ pub(super) fn sharp(
         boxes: any_field(SilhouetteField::has_box),
         self_shadows: buffers.meshes.iter().any(|device_mesh| device_mesh.self_first != NONE),
         cones: lights.len() > 1,
+        edges: false,
         rolled: false,
     })
 }

@@ -8,7 +8,7 @@ use crate::asset::edges::Edges;
 use crate::asset::picture::linear_from_srgb;
 use crate::draw::pixel_light::PixelLight;
 use crate::draw::smooth::{Lines, Strips};
-use crate::draw::{Antialias, Draw, DrawnViewport, Finish, Shading};
+use crate::draw::{Antialias, Draw, DrawnViewport, Finish};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image, Timing};
 use crate::scene::Placement;
@@ -45,7 +45,7 @@ impl Picture {
         sharp: Option<SharpPermutation>,
     ) -> Result<Self> {
         Ok(Picture {
-            draw: Draw::new(device, library, options.size, options.antialias, Finish::Linear, sharp.as_ref())?,
+            draw: draw(device, library, options, Finish::Linear, sharp)?,
             sharp,
             readback: readback(device, options.size)?,
             lines: Lines::new(device)?,
@@ -66,6 +66,18 @@ impl Picture {
         let halves: Vec<f16> = self.readback.read(0, 4 * pixels);
         halves.chunks_exact(4).flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
     }
+}
+
+/// The pass "draw" for pictures as options want them.
+fn draw(
+    device: &Arc<Device>,
+    library: &Library,
+    options: &Options,
+    finish: Finish,
+    sharp: Option<SharpPermutation>,
+) -> Result<Draw> {
+    let sharp = sharp.filter(|_| options.evaluates_pixels());
+    Draw::new(device, library, options.size, options.antialias, finish, sharp.as_ref())
 }
 
 /// Room for a picture of either finish.
@@ -129,13 +141,13 @@ impl Frame {
     }
 
     /// The pass "draw" for pictures of another kind.
-    pub(super) fn draw(&self, size: [u32; 2], antialias: Antialias, finish: Finish) -> Result<Draw> {
-        Draw::new(&self.device, &self.library, size, antialias, finish, self.picture.sharp.as_ref())
+    pub(super) fn draw(&self, options: &Options, finish: Finish) -> Result<Draw> {
+        draw(&self.device, &self.library, options, finish, self.picture.sharp)
     }
 
     /// Makes the chains of the moment that was merged last, for pictures whose pixels evaluate sharp lights.
     pub(super) fn prepare_pixels(&mut self) -> Result<()> {
-        let shows = self.shading() == Shading::Pixel && self.work.lists.is_updated();
+        let shows = self.options.evaluates_pixels() && self.work.lists.is_updated();
         let Some(pixel) = self.pixel.as_mut().filter(|_| shows) else { return Ok(()) };
         pixel.prepare(&self.work.lists)
     }
@@ -143,7 +155,7 @@ impl Frame {
     /// What pixels read that evaluate sharp lights in a viewport.
     fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
         let pixel = self.pixel.as_ref()?;
-        let by_pixel = self.shading() == Shading::Pixel && pixel.is_ready();
+        let by_pixel = self.options.evaluates_pixels() && pixel.is_ready();
         let shown = by_pixel && viewport.radiosity == RadiositySource::Merged && !viewport.by_vertex;
         shown.then(|| PixelLight {
             entities: &pixel.entities,
@@ -169,10 +181,10 @@ impl Frame {
     /// `Input` when it is larger than the device's images.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
         if size != self.options.size {
-            let finish = self.picture.draw.finish();
-            self.picture.draw = self.draw(size, self.options.antialias, finish)?;
+            let options = Options { size, ..self.options };
+            self.picture.draw = self.draw(&options, self.picture.draw.finish())?;
             self.picture.readback = readback(&self.device, size)?;
-            self.options.size = size;
+            self.options = options;
         }
         Ok(())
     }
@@ -183,8 +195,9 @@ impl Frame {
     /// `Failed` when a shader does not compile.
     pub fn set_finish(&mut self, finish: Finish, antialias: Antialias) -> Result<()> {
         if (finish, antialias) != (self.picture.draw.finish(), self.options.antialias) {
-            self.picture.draw = self.draw(self.options.size, antialias, finish)?;
-            self.options.antialias = antialias;
+            let options = Options { antialias, ..self.options };
+            self.picture.draw = self.draw(&options, finish)?;
+            self.options = options;
         }
         Ok(())
     }
@@ -196,11 +209,11 @@ impl Frame {
     /// As [`Frame::render`].
     pub fn still(&mut self, placements: &[Placement], white: f32) -> Result<Vec<f32>> {
         self.device.settle();
-        let fine = self.draw(self.options.size, Antialias::Samples, Finish::Linear)?;
-        let usual = std::mem::replace(&mut self.picture.draw, fine);
-        let antialias = std::mem::replace(&mut self.options.antialias, Antialias::Samples);
+        let options = Options { antialias: Antialias::Samples, ..self.options };
+        let fine = self.draw(&options, Finish::Linear)?;
+        let usual = (std::mem::replace(&mut self.picture.draw, fine), std::mem::replace(&mut self.options, options));
         let outcome = self.render(placements, Some(white)).map(|_| self.picture());
-        (self.picture.draw, self.options.antialias) = (usual, antialias);
+        (self.picture.draw, self.options) = usual;
         outcome
     }
 }

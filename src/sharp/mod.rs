@@ -3,7 +3,8 @@
 //! Inputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and vertices (position and
 //! normal, object frame, two quads each). A light is cut into parts ([`crate::field::sub_light`]); in each part the visibilities past
 //! all occluders are multiplied. Output: `radiosity`, as
-//! [`crate::merge`] has it, and albedo / pi times the irradiance of sharp lights.
+//! [`crate::merge`] has it, and albedo / pi times the irradiance of sharp lights. Where pixels read them, the fourth number is 1 on vertices
+//! that a shadow's edge comes near.
 
 pub mod twin;
 
@@ -60,6 +61,8 @@ pub struct SharpPermutation {
     /// Whether every point leaves out the occluders of its lists that stand outside a light's cone: in scenes of several sharp lights. Pixels
     /// of small_lights then take 0.63 of the time and vertices of teapot_lights 0.75; under one light vertices would take 1.2 times as long.
     pub cones: bool,
+    /// Whether vertices that a shadow's edge comes near are marked, for pixels that evaluate lights there.
+    pub edges: bool,
     /// Whether loops over parts and maps stay loops: on SwiftShader, which compiles them unrolled in over 250 s and 8 GB, and rolled in 6 s.
     pub rolled: bool,
 }
@@ -72,7 +75,7 @@ impl SharpPermutation {
 
     /// A fragment shader that evaluates sharp lights. It reads everything through texel views.
     pub fn pixel_row(&self, row: ShaderPermutation, self_shadows: bool) -> ShaderPermutation {
-        SharpPermutation { texel: true, uniform: false, self_shadows, ..*self }
+        SharpPermutation { texel: true, uniform: false, self_shadows, edges: false, ..*self }
             .shared(row)
             .define("WORKGROUP", CLUSTER_VERTICES)
     }
@@ -90,6 +93,7 @@ impl SharpPermutation {
             .define("BOXES", self.boxes)
             .define("SELF", self.self_shadows)
             .define("CONES", self.cones)
+            .define("EDGES", self.edges)
             .define("ROLLED", self.rolled)
             .define("NODE_CELLS", self.silhouette.cells)
             .define("MAP", self.silhouette.map_px);

@@ -124,7 +124,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         }
     }
 #endif
-    // Of each side, the share that it blocks and whether its outline counts. Arrays, because lavapipe may lose what a lane has computed in a
+    // Of each side, the share that it blocks and how far its outline counts. Arrays, because lavapipe may lose what a lane has computed in a
     // loop that it left before others did, unless it is stored.
     vec4 share[3], counts[3];
     uint side = WHOLE;
@@ -135,7 +135,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         outlines(rays, cell, weights, side, distance, away);
         EACH for (uint k = 0; k < 4; k++) {
             blocks[k] = share_blocked(distance[k], away[k], tangent[k]);
-            stands[k] = between(away[k], limit[k], in_box);
+            stands[k] = counts_between(away[k], limit[k], in_box);
 #if EDGES
             if (before && (side == WHOLE || inside[k] > 0.0)) {
                 float penumbra = max(away[k], NEAREST) * max(tangent[k], LEAST_PENUMBRA);

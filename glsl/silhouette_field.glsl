@@ -156,9 +156,9 @@ vec2 through_box(uint field, vec3 point, vec3 direction) {
 #endif
 }
 
-// Whether an outline counts that lies that far away: one behind the point or beyond the limit does not. Its nearest point may lie off the
-// ray, and the object then stands where the ray passes its box.
-float between(float away, float limit, vec2 in_box) {
+// How far an outline counts that lies that far away: 0 behind the point or beyond the limit, 1 between them. Its nearest point may lie off
+// the ray, and the object then stands where the ray passes its box.
+float counts_between(float away, float limit, vec2 in_box) {
 #if BOXES
     bool apart = in_box[1] < TOUCHING || in_box[0] > limit - TOUCHING;
     away = min(max(away, in_box[0]), in_box[1]);

@@ -358,16 +358,12 @@ impl SilhouetteField {
     /// unit direction, `distance` away (in r, infinite for distant light), and `tangent` is that of its angular radius.
     pub fn blocked(&self, near: &Near, direction: DVec3, distance: f64, tangent: f64) -> f64 {
         let along = near.point.dot(direction);
-        // Share that an outline blocks, and whether it counts: one behind the receiver or behind the light blocks nothing. The outline's nearest
-        // point may lie off the ray, as of a wide thin slab below the receiver, and the object then stands where the ray passes its box.
+        // Share that an outline blocks, and how far it counts.
         let by = |side: Side| {
             let outline = self.outline(near, side, direction);
             let away = outline.depth - along;
             let share = blocked_share(outline.distance / (away.max(NEAREST) * tangent).max(LEAST_PENUMBRA));
-            let [enters, leaves] = near.in_box;
-            let apart = leaves < TOUCHING || enters > distance - TOUCHING;
-            let stands = away.max(enters).min(leaves);
-            (share, if apart { 0.0 } else { fade(stands) * fade(distance - stands) })
+            (share, counts_between(away, distance, near.in_box))
         };
         let (whole, counts) = by(Side::Whole);
         let nearest = near.point.length().min((near.point + distance.min(1e30) * direction).length());
@@ -381,6 +377,14 @@ impl SilhouetteField {
         let halves = beyond * before * whole + beyond * (1.0 - before) * far + before * (1.0 - beyond) * near;
         whole * counts + inside * (halves - whole * counts)
     }
+}
+
+/// How far an outline counts that lies that far away (in r): one behind the receiver or beyond the limit blocks nothing. Its nearest point
+/// may lie off the ray, as of a wide thin slab below the receiver, and the object then stands where the ray passes its box.
+fn counts_between(away: f64, limit: f64, [enters, leaves]: [f64; 2]) -> f64 {
+    let apart = leaves < TOUCHING || enters > limit - TOUCHING;
+    let stands = away.max(enters).min(leaves);
+    if apart { 0.0 } else { fade(stands) * fade(limit - stands) }
 }
 
 /// 1 where a length (in r) is positive and 0 where it is negative, with a ramp between that hides the depth's own steps.

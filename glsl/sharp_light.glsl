@@ -190,18 +190,6 @@ uint chain_light(uint packed) {
     return packed >> ENTRY_BITS & SKY_CHAIN;
 }
 
-SeenLight light_from(Surface surface, Entity shining) {
-    return seen_light(shining.centre.xyz - surface.origin - surface.position, shining);
-}
-
-uint first_block(SeenLight light) {
-    return light.fine >= 1.0 ? 1 : 0;
-}
-
-uint last_block(SeenLight light) {
-    return light.fine <= 0.0 ? 0 : 4;
-}
-
 #if CONES
 bool has_own_outline(Entity shining) {
 #if OUTLINES
@@ -232,36 +220,6 @@ bool may_block(uint packed, Surface surface) {
         && off * sqrt(1.0 - sine * sine) - max(along, 0.0) * sine < radius;
 }
 
-// Of the lights of `count` entries from `first`, those that no occluder may block here: their irradiance.
-vec3 open_sum(Surface surface, uint first, uint count) {
-    vec3 sum = vec3(0.0);
-    uint i = 0;
-    do {
-        bool open = true, ends = false;
-        do {
-            uint packed = entry_at(first + i);
-            open = open && !may_block(packed, surface);
-            ends = (packed & ENTRY_LIGHT) != 0;
-            i++;
-        } while (!ends);
-        Entity shining = ENTITY(chain_light(entry_at(first + i - 1)));
-        if (open && !has_own_outline(shining)) {
-            SeenLight light = light_from(surface, shining);
-            float irradiance = 0.0;
-            uint b = first_block(light);
-            do {
-                irradiance += dot(part_shares(surface, light, block_of(light, b)), vec4(shining.sharp.y));
-                b++;
-            } while (b <= last_block(light));
-            sum += irradiance * shining.emission.rgb;
-#if EDGES
-            finest = 0.0;
-            add_open(irradiance, shining);
-#endif
-        }
-    } while (i < count);
-    return sum;
-}
 #endif
 
 // The first entry from `i` on that is evaluated: without cones all are, with them occluders that may block, and lights where they end a
@@ -280,6 +238,77 @@ uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
     return i;
 }
 
+// Irradiance by the light that ends the chain from entry `i` on, past what is listed before it; past nothing where it is `open`, a constant,
+// of which the compiler keeps one side. `i` becomes the entry behind the light.
+vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint count, inout uint i) {
+    SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, shining);
+    uint b = light.fine >= 1.0 ? 1 : 0, last = light.fine <= 0.0 ? 0 : 4;
+    uint j = i;
+    float irradiance = 0.0;
+#if EDGES
+    float unblocked = 0.0;
+    finest = 0.0;
+#endif
+    // Loops are tested at their ends, as in the merge.
+    do {
+        Block block = block_of(light, b);
+        vec4 share = part_shares(surface, light, block);
+#if EDGES
+        unblocked += dot(share, vec4(1.0));
+#endif
+        if (!open) {
+            j = i;
+            uint packed = entry_at(first + j);
+            do {
+                if ((packed & ENTRY_LIGHT) == 0) {
+                    share *= let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
+                    j = next_entry(surface, first, count, j + 1, true);
+                    packed = entry_at(first + j);
+                }
+            } while ((packed & ENTRY_LIGHT) == 0 && j < count);
+        }
+        vec4 shines = vec4(shining.sharp.y);
+#if OUTLINES
+        if (!open) {
+            // Of a light with an outline of its own, as much of each part shines as the outline covers.
+            vec4 dark = let_through(shining, surface, light, block, false);
+            shines = shining.sharp.y > 0.0 ? shines : 1.0 - dark;
+        }
+#endif
+        irradiance += dot(share, shines);
+        b++;
+    } while (b <= last);
+    i = j + 1;
+#if EDGES
+    add_open(unblocked, shining);
+#endif
+    return irradiance * shining.emission.rgb;
+}
+
+#if CONES
+// Of the lights of `count` entries from `first`, those that no occluder may block here: their irradiance.
+vec3 open_sum(Surface surface, uint first, uint count) {
+    vec3 sum = vec3(0.0);
+    uint i = 0;
+    do {
+        bool open = true, ends = false;
+        do {
+            uint packed = entry_at(first + i);
+            open = open && !may_block(packed, surface);
+            ends = (packed & ENTRY_LIGHT) != 0;
+            i += ends ? 0 : 1;
+        } while (!ends);
+        Entity shining = ENTITY(chain_light(entry_at(first + i)));
+        if (open && !has_own_outline(shining)) {
+            sum += chain_sum(surface, shining, true, first, count, i);
+        } else {
+            i++;
+        }
+    } while (i < count);
+    return sum;
+}
+#endif
+
 // Irradiance by all lights of `count` entries from `first`. Where a scene has several lights, most are open to most points: those are
 // added up first, because a software device evaluates an occluder for each turn of the loop that evaluates any.
 vec3 sharp_sum(Surface surface, uint first, uint count) {
@@ -288,49 +317,10 @@ vec3 sharp_sum(Surface surface, uint first, uint count) {
     sum = open_sum(surface, first, count);
 #endif
     uint i = 0;
-    // Loops are tested at their ends, as in the merge.
     do {
         i = next_entry(surface, first, count, i, false);
         if (i < count) {
-            Entity shining = ENTITY(chain_light(entry_at(first + i)));
-            SeenLight light = light_from(surface, shining);
-            uint b = first_block(light);
-            float irradiance = 0.0;
-#if EDGES
-            float open = 0.0;
-            finest = 0.0;
-#endif
-            uint j;
-            do {
-                Block block = block_of(light, b);
-                vec4 share = part_shares(surface, light, block);
-#if EDGES
-                open += dot(share, vec4(1.0));
-#endif
-                j = i;
-                uint packed = entry_at(first + j);
-                do {
-                    if ((packed & ENTRY_LIGHT) == 0) {
-                        share *= let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
-                        j = next_entry(surface, first, count, j + 1, true);
-                        packed = entry_at(first + j);
-                    }
-                } while ((packed & ENTRY_LIGHT) == 0 && j < count);
-#if OUTLINES
-                // Of a light with an outline of its own, as much of each part shines as the outline covers.
-                vec4 dark = let_through(shining, surface, light, block, false);
-                share *= shining.sharp.y > 0.0 ? vec4(shining.sharp.y) : 1.0 - dark;
-#else
-                share *= shining.sharp.y;
-#endif
-                irradiance += dot(share, vec4(1.0));
-                b++;
-            } while (b <= last_block(light));
-            i = j + 1;
-            sum += irradiance * shining.emission.rgb;
-#if EDGES
-            add_open(open, shining);
-#endif
+            sum += chain_sum(surface, ENTITY(chain_light(entry_at(first + i))), false, first, count, i);
         }
     } while (i < count);
     return sum;

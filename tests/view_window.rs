@@ -102,10 +102,7 @@ fn a_window_does_what_its_controls_say() {
     view.key("ctrl+s", "wrote");
     view.key("F12", "wrote");
     let shown = view.picture(SIZE);
-    display.xdotool(&["key", "ctrl+q"]);
-    let (code, heard) = view.end();
-    assert_eq!(code, 0, "{heard:#?}");
-    assert!(!heard.iter().any(|line| line.contains("validation:")), "{heard:#?}");
+    let heard = view.close();
     let swapchains = heard.iter().filter(|line| line.contains("swapchain of")).count();
     assert!(swapchains >= 8, "{swapchains} swapchains for ten sizes");
     good(folder.path(), &[&["render", "scene-edited.toml", "-o", "again.png"], &SMALL[..4]].concat());
@@ -169,10 +166,7 @@ fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
     let shown = view.picture(SIZE);
     assert!(room::apart(&told, &shown) > 20_000, "the other scene is seen");
     assert!(display.xdotool(&["getwindowname", &view.window.clone()]).contains("scene.toml"));
-    display.xdotool(&["key", "ctrl+q"]);
-    let (code, heard) = view.end();
-    assert_eq!(code, 0, "{heard:#?}");
-    assert!(!heard.iter().any(|line| line.contains("validation:")), "{heard:#?}");
+    view.close();
 }
 
 #[test]
@@ -185,9 +179,7 @@ fn the_next_scene_is_baked_and_shown_and_closing_ends_a_bake() {
     let mut view = open(&display, folder.path());
     view.key("z", "command NextScene");
     // In the middle of what may be its bake.
-    display.xdotool(&["key", "ctrl+q"]);
-    let (code, heard) = view.end();
-    assert_eq!(code, 0, "{heard:#?}");
+    view.close();
 }
 
 #[test]

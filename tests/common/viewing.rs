@@ -90,6 +90,16 @@ impl<'d> View<'d> {
         }
     }
 
+    /// Closes the window by its key: the program ends well, and the validation layers have said nothing. Everything that was logged.
+    pub fn close(self) -> Vec<String> {
+        self.display.xdotool(&["key", "ctrl+q"]);
+        let (code, heard) = self.end();
+        let last = &heard[heard.len().saturating_sub(40)..];
+        assert_eq!(code, 0, "{last:#?}");
+        assert!(!heard.iter().any(|line| line.contains("validation:")), "{heard:#?}");
+        heard
+    }
+
     /// Waits for the end; everything that was logged.
     pub fn end(mut self) -> (i32, Vec<String>) {
         let start = Instant::now();

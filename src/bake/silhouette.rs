@@ -1,6 +1,6 @@
 //! Pass "silhouette": an object as parallel light sees it from every node of a grid, reduced to maps of distance and depth.
 //!
-//! Inputs: the mesh in units of its bounding radius around its centre; a [`Frame`] for each map. Output: two bytes a texel and
+//! Inputs: the mesh in units of its bounding radius around its centre; a [`MapFrame`] for each map. Output: two bytes a texel and
 //! map, see [`crate::field::silhouette`]. Views of `view_px` are drawn side by side into an atlas of the farthest and the nearest
 //! depth a pixel; two dispatches reduce every view to its map.
 
@@ -9,7 +9,7 @@ use super::symmetric_maps;
 use super::{BakeReport, Baker, Progress, hash_text, levels};
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};
-use crate::field::silhouette::{Frame, REACH, Side, SilhouetteField, SilhouetteHeader, encode};
+use crate::field::silhouette::{MapFrame, REACH, Side, SilhouetteField, SilhouetteHeader, encode};
 use crate::field::silhouette_nodes::NodeGrid;
 use crate::gpu::{
     Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, GraphicsPipeline, GraphicsState, Image,
@@ -81,10 +81,10 @@ fn extent(mesh: &Mesh) -> [[f32; 3]; 2] {
 }
 
 /// Frames of all maps of a field.
-fn frames(mesh: &Mesh, nodes: &NodeGrid, count: usize) -> Vec<Frame> {
+fn frames(mesh: &Mesh, nodes: &NodeGrid, count: usize) -> Vec<MapFrame> {
     let positions: Vec<DVec3> = unit_positions(mesh).iter().map(|p| p.as_dvec3()).collect();
     let maps = (0..count).into_par_iter();
-    maps.map(|map| Frame::around(nodes.map_direction(map), &positions)).collect()
+    maps.map(|map| MapFrame::around(nodes.map_direction(map), &positions)).collect()
 }
 
 #[repr(C)]
@@ -96,7 +96,7 @@ struct ViewPush {
 }
 
 impl ViewPush {
-    fn new(frame: &Frame, side: Side) -> Self {
+    fn new(frame: &MapFrame, side: Side) -> Self {
         let row = |axis: DVec3, centre: f64, half: f64| (axis / half).extend(-centre / half).as_vec4().to_array();
         let [a, b] = frame.axes;
         ViewPush {
@@ -143,7 +143,7 @@ impl SilhouetteBuffers {
     pub fn new(
         device: &Arc<Device>,
         (mesh, triangles): (&Mesh, &[[u32; 3]]),
-        frames: &[Frame],
+        frames: &[MapFrame],
         map_px: u32,
     ) -> Result<Self> {
         let positions: Vec<[f32; 3]> = unit_positions(mesh).iter().map(|p| p.to_array()).collect();
@@ -230,7 +230,7 @@ impl Silhouette {
         &'r self,
         commands: &mut Commands<'r>,
         buffers: &'r SilhouetteBuffers,
-        (frames, side): (&[Frame], Side),
+        (frames, side): (&[MapFrame], Side),
         map_first: usize,
     ) -> Result<()> {
         assert!(frames.len() <= self.capacity(), "{} views in an atlas of {}", frames.len(), self.capacity());
@@ -259,7 +259,7 @@ impl Silhouette {
 }
 
 /// Edge of the smallest pixel of all views, in r.
-fn smallest_pixel(header: &SilhouetteHeader, frames: &[Frame]) -> f64 {
+fn smallest_pixel(header: &SilhouetteHeader, frames: &[MapFrame]) -> f64 {
     let edges = frames.iter().map(|frame| 2.0 * frame.half.min_element());
     edges.fold(f64::INFINITY, f64::min) / f64::from(header.view_px)
 }
@@ -297,7 +297,7 @@ pub fn bake_silhouette(
     let triangles = drawn_triangles(baker, mesh, &header, pixel)?;
     let plan =
         if options.symmetry { symmetric_maps::plan(mesh, &nodes, &frames, pixel) } else { vec![None; frames.len()] };
-    let captured: Vec<Frame> = frames.iter().zip(&plan).filter(|(_, c)| c.is_none()).map(|(frame, _)| *frame).collect();
+    let captured: Vec<MapFrame> = frames.iter().zip(&plan).filter(|(_, c)| c.is_none()).map(|(frame, _)| *frame).collect();
     // Sides whose maps have the same size share the pass and its buffers.
     let sizes: &[&[Side]] =
         if header.half_px > 0 { &[&[Side::Whole], &[Side::Far, Side::Near]] } else { &[&[Side::Whole]] };
@@ -332,7 +332,7 @@ pub fn bake_silhouette(
 }
 
 /// The CPU twin of the pass for one side of a map, in f64 and by plain search: bytes of distance and depth, row by row.
-pub fn silhouette_twin(mesh: &Mesh, (frame, side): (&Frame, Side), map_px: u32, view_px: u32) -> Vec<[u8; 2]> {
+pub fn silhouette_twin(mesh: &Mesh, (frame, side): (&MapFrame, Side), map_px: u32, view_px: u32) -> Vec<[u8; 2]> {
     let view = drawn(mesh, (frame, side), view_px as usize);
     let px = view_px as usize;
     let pixel = 2.0 * frame.half / px as f64;
@@ -365,7 +365,7 @@ pub fn silhouette_twin(mesh: &Mesh, (frame, side): (&Frame, Side), map_px: u32, 
 }
 
 /// Nearest and farthest depth of every covered pixel.
-fn drawn(mesh: &Mesh, (frame, side): (&Frame, Side), px: usize) -> Vec<Option<(f64, f64)>> {
+fn drawn(mesh: &Mesh, (frame, side): (&MapFrame, Side), px: usize) -> Vec<Option<(f64, f64)>> {
     let positions: Vec<DVec3> = unit_positions(mesh).iter().map(|p| p.as_dvec3()).collect();
     let mut view: Vec<Option<(f64, f64)>> = vec![None; px * px];
     for triangle in &mesh.triangles {

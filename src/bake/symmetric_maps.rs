@@ -3,7 +3,7 @@
 use super::symmetric_samples::TEXEL_SHARE;
 use super::symmetry::Symmetry;
 use crate::asset::mesh::Mesh;
-use crate::field::silhouette::{Frame, Side, SilhouetteHeader};
+use crate::field::silhouette::{MapFrame, Side, SilhouetteHeader};
 use crate::field::silhouette_nodes::NodeGrid;
 use glam::{DMat3, DVec2, DVec3};
 
@@ -25,7 +25,7 @@ pub struct Copied {
 
 impl Copied {
     /// How `frame` follows from map `of`, whose frame a symmetry moves: not at all, unless axes fall on axes.
-    fn new(of: usize, moved: &[DVec3; 2], behind: bool, frame: &Frame) -> Option<Self> {
+    fn new(of: usize, moved: &[DVec3; 2], behind: bool, frame: &MapFrame) -> Option<Self> {
         let along = |axis: DVec3| {
             let dots = moved.map(|m| m.dot(axis));
             (0..2).find(|i| dots[*i].abs() > SAME_AXIS).map(|i| (i, dots[i].signum()))
@@ -35,10 +35,10 @@ impl Copied {
     }
 
     /// The map's rectangle, from that of the other map.
-    pub fn frame(&self, frame: &Frame, other: &Frame) -> Frame {
+    pub fn frame(&self, frame: &MapFrame, other: &MapFrame) -> MapFrame {
         let [a, b] = self.axes;
         let centre = DVec2::from_array(self.signs) * DVec2::new(other.centre[a], other.centre[b]);
-        Frame { centre, half: DVec2::new(other.half[a], other.half[b]), ..*frame }
+        MapFrame { centre, half: DVec2::new(other.half[a], other.half[b]), ..*frame }
     }
 
     /// The other map's side that shows a side of this one.
@@ -62,7 +62,7 @@ impl Copied {
 
 /// For each map whether it follows from an earlier one, and how, by symmetries that miss the mesh by at most [`TEXEL_SHARE`] of `pixel`, the
 /// edge of the smallest pixel of the views, in r.
-pub fn plan(mesh: &Mesh, nodes: &NodeGrid, frames: &[Frame], pixel: f64) -> Vec<Option<Copied>> {
+pub fn plan(mesh: &Mesh, nodes: &NodeGrid, frames: &[MapFrame], pixel: f64) -> Vec<Option<Copied>> {
     let operations = Symmetry::of_vertices(mesh, None).operations;
     let close: Vec<DMat3> =
         operations.iter().filter(|o| o.deviation <= TEXEL_SHARE * pixel).map(|o| o.matrix).collect();
@@ -83,7 +83,7 @@ pub fn plan(mesh: &Mesh, nodes: &NodeGrid, frames: &[Frame], pixel: f64) -> Vec<
 }
 
 /// The payload of a field: each map's rectangle before the texels of its sides, of which `sides` holds those of captured maps.
-pub fn joined(header: &SilhouetteHeader, frames: &[Frame], plan: &[Option<Copied>], sides: &[Vec<u8>]) -> Vec<u8> {
+pub fn joined(header: &SilhouetteHeader, frames: &[MapFrame], plan: &[Option<Copied>], sides: &[Vec<u8>]) -> Vec<u8> {
     let mut place = Vec::with_capacity(plan.len());
     let mut count = 0;
     for copied in plan {

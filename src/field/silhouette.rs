@@ -52,7 +52,7 @@ pub const LEAST_PENUMBRA: f64 = 1e-9;
 
 /// Where a map lies: the plane through the sphere's centre at right angles to its direction, and a rectangle in that plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub struct MapFrame {
     /// Unit direction of the parallel light.
     pub direction: DVec3,
     /// Unit axes of the plane; with the direction a right-handed frame.
@@ -63,7 +63,7 @@ pub struct Frame {
     pub half: DVec2,
 }
 
-impl Frame {
+impl MapFrame {
     /// The frame of a direction whose rectangle encloses all positions, with [`MARGIN`].
     pub fn around(direction: DVec3, positions: &[DVec3]) -> Self {
         let axes = Self::axes_of(direction);
@@ -71,7 +71,7 @@ impl Frame {
         let (low, high) = places.fold((DVec2::MAX, DVec2::MIN), |(low, high), p| (low.min(p), high.max(p)));
         // What is stored is f32, and what was captured must be what is looked up.
         let stored = |v: DVec2| v.as_vec2().as_dvec2();
-        Frame { direction, axes, centre: stored((low + high) / 2.0), half: stored((high - low) / 2.0 + MARGIN) }
+        MapFrame { direction, axes, centre: stored((low + high) / 2.0), half: stored((high - low) / 2.0 + MARGIN) }
     }
 
     /// Turns and mirrors of a cube move the axes of a direction onto those of the moved direction, but for their order and signs: unless
@@ -142,7 +142,7 @@ pub struct SilhouetteField {
     /// Parameters.
     pub header: SilhouetteHeader,
     nodes: NodeGrid,
-    frames: Vec<Frame>,
+    frames: Vec<MapFrame>,
     payload: Vec<u8>,
 }
 
@@ -178,7 +178,7 @@ impl SilhouetteField {
                 return Err(Error::Input(format!("the rectangle of map {index} is not usable")));
             }
             let direction = nodes.map_direction(index);
-            frames.push(Frame { direction, axes: Frame::axes_of(direction), centre, half });
+            frames.push(MapFrame { direction, axes: MapFrame::axes_of(direction), centre, half });
         }
         Ok(SilhouetteField { header, nodes, frames, payload })
     }
@@ -189,7 +189,7 @@ impl SilhouetteField {
     }
 
     /// Where each map lies.
-    pub fn frames(&self) -> &[Frame] {
+    pub fn frames(&self) -> &[MapFrame] {
         &self.frames
     }
 
@@ -198,7 +198,7 @@ impl SilhouetteField {
     pub fn node_quads(&self, first_cell: u32) -> Vec<[f32; 4]> {
         let map_cells = Side::ALL.iter().map(|side| self.side_cells(*side)).sum::<usize>() as u32;
         let node = |&(map, mirrored): &(usize, bool)| {
-            let Frame { axes, centre, half, .. } = self.frames[map];
+            let MapFrame { axes, centre, half, .. } = self.frames[map];
             let px = f64::from(self.header.map_px);
             let row = |i: usize| {
                 let first = 0.5 * px * (1.0 - centre[i] / half[i]) - 0.5;

@@ -80,7 +80,7 @@ impl SilhouetteHeader {
         NodeGrid::map_count(self.cells)
     }
 
-    /// Bytes of one map: four floats of its [`Frame`](super::silhouette::Frame)'s rectangle, then two bytes a texel of the whole object and
+    /// Bytes of one map: four floats of its [`MapFrame`](super::silhouette::MapFrame)'s rectangle, then two bytes a texel of the whole object and
     /// of its halves.
     pub fn map_bytes(&self) -> usize {
         16 + self.texel_bytes(Side::Whole) + 2 * self.texel_bytes(Side::Far)

@@ -13,7 +13,7 @@ use shadow_fields::field::ShadowField;
 use shadow_fields::frame::Frame;
 use shadow_fields::lists::gather::{EntityBounds, SceneBounds};
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::merge::twin::{Object, Task};
+use shadow_fields::merge::twin::{MergeObject, MergeTwin};
 use shadow_fields::scene::Scene;
 use stage::{Stage, scene, small, stage};
 use std::collections::BTreeMap;
@@ -53,7 +53,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
         let device_mesh = &frame.buffers.meshes[entity.mesh];
         let rotation = place.turn();
         let scale = f64::from(place.scale);
-        Object {
+        MergeObject {
             centre: place.position.as_dvec3() + rotation * (device_mesh.centre_m * scale),
             rotation,
             scale,
@@ -65,7 +65,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
             radiance: None,
         }
     };
-    let objects: Vec<Object<'_>> = scene.entities.iter().zip(&placements).map(object).collect();
+    let objects: Vec<MergeObject<'_>> = scene.entities.iter().zip(&placements).map(object).collect();
     let sky = scene.environment.coefficients(4);
     let mesh = &scene.meshes[0];
     let (mut out, mut orders) = (Vec::new(), BTreeMap::new());
@@ -77,7 +77,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
         *orders.entry(all).or_default() += 1;
         let mut occluders: Vec<usize> = (2..objects.len()).collect();
         sorted(&distance, &mut occluders);
-        let task = Task {
+        let twin = MergeTwin {
             objects: &objects,
             receiver: 0,
             occluders: &occluders,
@@ -92,7 +92,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
             skip: small().skip,
             leaves: &|_, _, _| false,
         };
-        out.extend(task.run());
+        out.extend(twin.run());
     }
     (out, orders)
 }

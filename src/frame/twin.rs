@@ -6,11 +6,11 @@ use crate::field::{Area, ShadowField};
 use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
 use crate::lists::gather::{self, Candidates, Counts, SLACK, Scope};
 use crate::lists::incremental::State;
-use crate::merge::twin::{Object, Task};
+use crate::merge::twin::{MergeObject, MergeTwin};
 use crate::scene::{Entity, LightForm, Placement, Scene};
 use crate::scene_buffers;
 use crate::scene_buffers::DeviceMesh;
-use crate::sharp::twin::{self as sharp, SharpLight, SurfacePoint};
+use crate::sharp::twin::{SharpLight, SharpObject, SharpTwin, SurfacePoint};
 use glam::DVec3;
 use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
@@ -40,7 +40,7 @@ impl Frame {
     /// # Errors
     /// `Device` when memory ran out.
     pub fn twin(&self, placements: &[Placement]) -> Result<Vec<(usize, Vec<[f64; 3]>)>> {
-        Ok(self.merge_twin(placements)?.run())
+        Ok(self.frame_twin(placements)?.run())
     }
 
     /// Lights whose form is wanted.
@@ -53,7 +53,7 @@ impl Frame {
     ///
     /// # Errors
     /// `Device` when memory ran out.
-    fn merge_twin<'f>(&'f self, placements: &'f [Placement]) -> Result<MergeTwin<'f>> {
+    fn frame_twin<'f>(&'f self, placements: &'f [Placement]) -> Result<FrameTwin<'f>> {
         let mut fields: Vec<[Option<ShadowField>; 2]> = Vec::new();
         for device_mesh in &self.buffers.meshes {
             let load = |slot: &Option<scene_buffers::FieldSlot>| {
@@ -80,7 +80,7 @@ impl Frame {
                 listed: (self.options.eps > 0.0).then(|| listed(&state, index, device_mesh)),
             });
         }
-        Ok(MergeTwin {
+        Ok(FrameTwin {
             frame: self,
             placements,
             fields,
@@ -93,7 +93,7 @@ impl Frame {
 }
 
 /// The CPU twin of a merge, ready to run.
-struct MergeTwin<'f> {
+struct FrameTwin<'f> {
     frame: &'f Frame,
     placements: &'f [Placement],
     /// Occlusion and radiance by mesh.
@@ -104,7 +104,7 @@ struct MergeTwin<'f> {
     sky: [Vec<f64>; 3],
 }
 
-/// What is lit: an entity with what its task borrows.
+/// What is lit: an entity with what its twin borrows.
 struct Receiver {
     index: usize,
     occluders: Vec<usize>,
@@ -114,14 +114,14 @@ struct Receiver {
     listed: Option<Listed>,
 }
 
-impl MergeTwin<'_> {
+impl FrameTwin<'_> {
     /// Radiosity of every receiver's vertices, by entity, on all threads.
     pub fn run(&self) -> Vec<(usize, Vec<[f64; 3]>)> {
         let Frame { scene, buffers, options, .. } = self.frame;
         let object = |(index, placement): (usize, &Placement)| {
             let entity = &scene.entities[index];
             let [blocked, radiance] = &self.fields[entity.mesh];
-            Object {
+            MergeObject {
                 centre: self.frame.centre(index, placement),
                 rotation: placement.turn(),
                 scale: placement.scale.into(),
@@ -133,8 +133,8 @@ impl MergeTwin<'_> {
                 radiance: radiance.as_ref().filter(|_| entity.emits),
             }
         };
-        let objects: Vec<Object<'_>> = self.placements.iter().enumerate().map(object).collect();
-        let outlines: Vec<sharp::Object<'_>> = objects.iter().enumerate().map(|o| self.outline(o)).collect();
+        let objects: Vec<MergeObject<'_>> = self.placements.iter().enumerate().map(object).collect();
+        let outlines: Vec<SharpObject<'_>> = objects.iter().enumerate().map(|o| self.outline(o)).collect();
         let lit = |receiver: &Receiver| {
             let leaves = |v: usize, j: usize, light: Option<usize>| {
                 let Some((cluster_of, listed)) = &receiver.listed else { return false };
@@ -142,7 +142,7 @@ impl MergeTwin<'_> {
             };
             let with_field = |j: &usize| objects[*j].blocked.is_some();
             let occluders: Vec<usize> = receiver.occluders.iter().copied().filter(with_field).collect();
-            let task = Task {
+            let twin = MergeTwin {
                 objects: &objects,
                 receiver: receiver.index,
                 occluders: &occluders,
@@ -157,7 +157,7 @@ impl MergeTwin<'_> {
                 guard: options.guard,
                 leaves: &leaves,
             };
-            let mut lit = task.run();
+            let mut lit = twin.run();
             self.add_sharp(receiver, &objects[receiver.index], &outlines, &leaves, &mut lit);
             (receiver.index, lit)
         };
@@ -165,11 +165,11 @@ impl MergeTwin<'_> {
     }
 }
 
-impl MergeTwin<'_> {
+impl FrameTwin<'_> {
     /// An object as the pass of sharp lights sees it.
-    fn outline<'o>(&'o self, (index, object): (usize, &Object<'o>)) -> sharp::Object<'o> {
+    fn outline<'o>(&'o self, (index, object): (usize, &MergeObject<'o>)) -> SharpObject<'o> {
         let device_mesh = &self.frame.buffers.meshes[self.frame.scene.entities[index].mesh];
-        sharp::Object {
+        SharpObject {
             centre: object.centre,
             rotation: object.rotation,
             radius_m: object.radius_m,
@@ -181,8 +181,8 @@ impl MergeTwin<'_> {
     fn add_sharp(
         &self,
         receiver: &Receiver,
-        object: &Object<'_>,
-        outlines: &[sharp::Object<'_>],
+        object: &MergeObject<'_>,
+        outlines: &[SharpObject<'_>],
         leaves: &(dyn Fn(usize, usize, Option<usize>) -> bool + Sync),
         lit: &mut [[f64; 3]],
     ) {
@@ -196,7 +196,7 @@ impl MergeTwin<'_> {
             receiver.occluders.iter().copied().filter(|j| outlines[*j].silhouette.is_some()).collect();
         let mesh = self.frame.scene.entities[receiver.index].mesh;
         let self_maps = &self.frame.buffers.meshes[mesh].self_maps;
-        let task = sharp::Task {
+        let twin = SharpTwin {
             objects: outlines,
             occluders: &occluders,
             rotation: object.rotation,
@@ -212,7 +212,7 @@ impl MergeTwin<'_> {
         };
         let points: Vec<SurfacePoint> = receiver.positions.iter().zip(&receiver.normals).map(point).collect();
         let albedo = self.frame.scene.entities[receiver.index].albedo.as_dvec3();
-        for (to, from) in lit.iter_mut().zip(task.run(&points)) {
+        for (to, from) in lit.iter_mut().zip(twin.run(&points)) {
             *to = (DVec3::from_array(*to) + albedo * from).to_array();
         }
     }

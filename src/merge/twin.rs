@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// One object, as the merge sees it.
-pub struct Object<'f> {
+pub struct MergeObject<'f> {
     /// Centre of the bounding sphere in the world, metres.
     pub centre: DVec3,
     /// Rotation to the world.
@@ -33,9 +33,9 @@ pub struct Object<'f> {
 }
 
 /// One receiver under all lights.
-pub struct Task<'t> {
+pub struct MergeTwin<'t> {
     /// All objects.
-    pub objects: &'t [Object<'t>],
+    pub objects: &'t [MergeObject<'t>],
     /// Index of the one that is lit.
     pub receiver: usize,
     /// Occluders in the order in which they are multiplied.
@@ -65,7 +65,7 @@ pub struct Task<'t> {
 
 type Coefficients = [f64; MAX_COEFFICIENTS];
 
-impl Task<'_> {
+impl MergeTwin<'_> {
     /// Radiosity of every vertex: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self) -> Vec<[f64; 3]> {
         let field_bands = self.field_bands();

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// One object, as the pass sees it.
-pub struct Object<'f> {
+pub struct SharpObject<'f> {
     /// Centre of the bounding sphere in the world, metres.
     pub centre: DVec3,
     /// Rotation to the world.
@@ -32,9 +32,9 @@ pub struct SharpLight {
 }
 
 /// One receiver under all sharp lights.
-pub struct Task<'t> {
+pub struct SharpTwin<'t> {
     /// All objects.
-    pub objects: &'t [Object<'t>],
+    pub objects: &'t [SharpObject<'t>],
     /// Those that occlude the receiver.
     pub occluders: &'t [usize],
     /// Rotation of the receiver to the world.
@@ -60,7 +60,7 @@ pub struct SurfacePoint {
     pub own_normal: DVec3,
 }
 
-impl Task<'_> {
+impl SharpTwin<'_> {
     /// Irradiance of every vertex over pi: to be multiplied by the albedo.
     pub fn run(&self, points: &[SurfacePoint]) -> Vec<DVec3> {
         points.par_iter().enumerate().map(|(v, point)| self.vertex(v, point)).collect()
@@ -83,13 +83,13 @@ impl Task<'_> {
             LightForm::Harmonics => return 0.0,
         };
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
-        let occluders: Vec<&Object<'_>> = self.occluders.iter().filter(between).map(|&j| &self.objects[j]).collect();
-        let near = |object: &Object<'_>, toward: DVec3| {
+        let occluders: Vec<&SharpObject<'_>> = self.occluders.iter().filter(between).map(|&j| &self.objects[j]).collect();
+        let near = |object: &SharpObject<'_>, toward: DVec3| {
             let field = object.silhouette.expect("what blocks or shines by its outline has a silhouette field");
             let local = |v: DVec3| object.rotation.inverse() * v;
             field.near(local(point.position - object.centre) / object.radius_m, local(toward))
         };
-        let blocked = |object: &Object<'_>, near: &Near, part: &Part, distance_m: f64| {
+        let blocked = |object: &SharpObject<'_>, near: &Near, part: &Part, distance_m: f64| {
             let field = object.silhouette.expect("as in `near`");
             let toward = object.rotation.inverse() * part.toward;
             field.blocked(near, toward, distance_m / object.radius_m, part.tangent())

@@ -3,10 +3,10 @@
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-/// One entity of the scene in the form that the merge reads.
+/// One entity of the scene at a moment, in the form that passes read: `Entity` of the shaders.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct Entity {
+pub struct DeviceEntity {
     /// Centre of the bounding sphere in the world, metres; w = 1 / (scale x bounding radius).
     pub centre: [f32; 4],
     /// Cosine and sine of alpha and of beta; the rotation to the world is Rz(alpha) Ry(beta) Rz(gamma).

@@ -9,7 +9,8 @@ use shadow_fields::bake::raster::{Face, Raster};
 use shadow_fields::bake::self_visibility::SelfVisibility;
 use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::gpu::reflect::Reflection;
-use shadow_fields::layout::{Cluster, Entity};
+// In a shader there is no other entity.
+use shadow_fields::layout::{Cluster, DeviceEntity as Entity};
 use shadow_fields::lists::gather::{Bounds, Gather, Group, Report};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{MergePermutation, VARIANTS, Variant};

@@ -5,7 +5,7 @@ use super::CheckRow;
 use crate::bake::Baker;
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
-use crate::layout::{Cluster, Entity, ListEntry};
+use crate::layout::{Cluster, DeviceEntity, ListEntry};
 use crate::lists::gather::{
     self, Bounds, Candidates, EntityBounds, GROUP_CLUSTERS, Gather, Group, Inputs, Packed, Report, SLACK, SceneBounds,
     Scope,
@@ -23,7 +23,7 @@ pub struct Crowded {
     /// Which of them is lit.
     pub receiver: u32,
     /// It, as shaders see it.
-    pub entity: Entity,
+    pub entity: DeviceEntity,
     /// Bounds of its clusters.
     pub clusters: Vec<Bounds>,
 }
@@ -81,7 +81,7 @@ impl Crowded {
         let rotation = DQuat::from_axis_angle(random_direction(rng), 6.0 * rng.f64());
         let turns = turns(rotation).map(|x| x as f32);
         let own = bounds[receiver as usize];
-        let entity = Entity {
+        let entity = DeviceEntity {
             centre: own.centre.as_vec3().extend(1.0 / own.radius_m as f32).to_array(),
             alpha_beta: [turns[0], turns[1], turns[2], turns[3]],
             gamma: [turns[4], turns[5]],
@@ -150,7 +150,7 @@ impl Crowded {
         bounds.push(Bounds::union(&self.clusters));
         let cluster = |i: u32| Cluster { receiver: self.receiver, vertex_count: 64, bounds: i, ..Default::default() };
         let clusters: Vec<Cluster> = (0..count).map(cluster).collect();
-        let mut entities = vec![Entity::default(); self.scene_bounds.spheres.len()];
+        let mut entities = vec![DeviceEntity::default(); self.scene_bounds.spheres.len()];
         entities[self.receiver as usize] = self.entity;
         // Two groups, the second of one cluster that is bounded by itself.
         let groups = [

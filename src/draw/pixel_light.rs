@@ -19,7 +19,7 @@ pub struct ByPixel {
 
 /// What pixels read that evaluate sharp lights themselves.
 pub struct PixelLight<'d> {
-    /// [`crate::layout::Entity`] of every entity.
+    /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: &'d Buffer,
     /// Nodes and cells of all silhouette fields.
     pub silhouettes: [&'d Buffer; 2],

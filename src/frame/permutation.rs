@@ -4,7 +4,7 @@ use super::Options;
 use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Device, TexelView, Volume};
-use crate::layout::{Entity, NONE};
+use crate::layout::{DeviceEntity, NONE};
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::scene::{LightForm, Scene};
@@ -58,7 +58,7 @@ pub(super) fn usable(
     let fits = TexelView::fits(device, permutation.field_format(), buffers.fields.size_bytes)
         && TexelView::fits(device, floats, buffers.transfers.size_bytes)
         && TexelView::fits(device, floats, buffers.vertices.size_bytes)
-        && TexelView::fits(device, floats, (entity_room * size_of::<Entity>()) as u64);
+        && TexelView::fits(device, floats, (entity_room * size_of::<DeviceEntity>()) as u64);
     let image = (permutation.variant.image && permutation.fits_image()).then(|| buffers.image()).transpose()?.flatten();
     let variant =
         permutation.variant.restricted(fits, entity_count <= permutation.entity_limit as usize, image.is_some());

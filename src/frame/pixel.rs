@@ -24,7 +24,7 @@ pub(super) struct PixelChains {
     /// metres of the mesh's frame.
     receivers: Vec<Option<(ByPixel, f32)>>,
     /// Entities as they were when the chains were made, and their bounds with what each of them takes part in.
-    known: Option<(Vec<layout::Entity>, Vec<EntityBounds>)>,
+    known: Option<(Vec<layout::DeviceEntity>, Vec<EntityBounds>)>,
 }
 
 impl PixelChains {
@@ -52,7 +52,7 @@ impl PixelChains {
         }
         let upload = |name: &str, bytes: usize| Upload::new(device, name, bytes as u64);
         Ok(PixelChains {
-            entities: upload("pixel entities", scene.entities.len() * size_of::<layout::Entity>())?,
+            entities: upload("pixel entities", scene.entities.len() * size_of::<layout::DeviceEntity>())?,
             entries: upload("pixel entries", 16)?,
             chains: upload("pixel chains", 8 * clusters.max(1) as usize)?,
             receivers,

@@ -71,7 +71,7 @@ impl Frame {
         }
     }
 
-    fn entity(&self, index: usize, placement: &Placement) -> layout::Entity {
+    fn entity(&self, index: usize, placement: &Placement) -> layout::DeviceEntity {
         let entity = &self.scene.entities[index];
         let device_mesh = &self.buffers.meshes[entity.mesh];
         let rotation = placement.turn();
@@ -99,7 +99,7 @@ impl Frame {
             LightForm::Harmonics | LightForm::Outline => (0.0, 0.0),
         };
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());
-        layout::Entity {
+        layout::DeviceEntity {
             centre: centre.extend((1.0 / radius_m) as f32).to_array(),
             alpha_beta: [cos_a, sin_a, cos_b, sin_b],
             gamma: [cos_c, sin_c],

@@ -41,7 +41,7 @@ impl ClusterWork {
         let upload = |name: &str, bytes: usize| Upload::new(device, name, bytes as u64);
         Ok(ClusterWork {
             gathering,
-            entities: upload("entities", entity_room * size_of::<layout::Entity>())?,
+            entities: upload("entities", entity_room * size_of::<layout::DeviceEntity>())?,
             clusters: upload("clusters", lists.clusters.len() * size_of::<layout::Cluster>())?,
             entries: upload("entries", 4 * lists.clusters.len())?,
             merged: Merged::default(),

@@ -178,7 +178,7 @@ impl Packed {
 pub struct Inputs<'b> {
     /// [`Packed::quads`].
     pub scene_quads: &'b Buffer,
-    /// [`layout::Entity`] of every entity.
+    /// [`layout::DeviceEntity`] of every entity.
     pub entities: &'b Buffer,
     /// [`Bounds`] of clusters and groups.
     pub bounds: &'b Buffer,

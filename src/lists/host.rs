@@ -15,7 +15,7 @@ pub struct Candidates {
 
 impl Candidates {
     /// What may matter to any cluster of a group with these bounds, found with twice the slack of the lists.
-    pub fn of_group(scene: &SceneBounds, receiver: u32, entity: &layout::Entity, bounds: &Bounds) -> Self {
+    pub fn of_group(scene: &SceneBounds, receiver: u32, entity: &layout::DeviceEntity, bounds: &Bounds) -> Self {
         let scope = Scope::new(scene, entity, bounds, 2.0 * SLACK);
         let mut occluders = Vec::new();
         scene.tree.find(|crowd| scope.leaves_out(crowd), |j| occluders.push(j));

@@ -22,7 +22,7 @@ pub(crate) struct State {
     /// What the lists are made from.
     pub scene_bounds: SceneBounds,
     /// The entities as shaders read them.
-    pub entities: Vec<layout::Entity>,
+    pub entities: Vec<layout::DeviceEntity>,
     /// Where the entities are; all of the above follows from this.
     pub placements: Vec<Placement>,
 }

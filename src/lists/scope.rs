@@ -138,7 +138,7 @@ pub struct Scope<'m> {
 
 impl<'m> Scope<'m> {
     /// Places bounds of a receiver's mesh in the world.
-    pub fn new(scene: &'m SceneBounds, receiver: &layout::Entity, bounds: &Bounds, slack: f64) -> Self {
+    pub fn new(scene: &'m SceneBounds, receiver: &layout::DeviceEntity, bounds: &Bounds, slack: f64) -> Self {
         let scale = f64::from(receiver.albedo[3]);
         let [x, y, z, _] = receiver.centre;
         let vector = |[x, y, z]: [f32; 3]| DVec3::new(x.into(), y.into(), z.into());
@@ -313,7 +313,7 @@ fn apart(a: &SphereView, b: &SphereView, fade_rad: f64) -> bool {
 }
 
 /// The rotation of an entity, as `to_world` in `merge_layout.glsl`.
-fn to_world(entity: &layout::Entity, p: DVec3) -> DVec3 {
+fn to_world(entity: &layout::DeviceEntity, p: DVec3) -> DVec3 {
     let turn = |cosine: f32, sine: f32, a: f64, b: f64| DVec2::new(cosine.into(), sine.into()).rotate(DVec2::new(a, b));
     let ([cos_a, sin_a, cos_b, sin_b], [cos_c, sin_c]) = (entity.alpha_beta, entity.gamma);
     let first = turn(cos_c, sin_c, p.x, p.y);

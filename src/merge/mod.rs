@@ -67,7 +67,7 @@ impl<'b> Readable<'b> {
 
 /// Everything that a merge reads.
 pub struct Inputs<'b> {
-    /// [`crate::layout::Entity`] of every entity.
+    /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: Readable<'b>,
     /// Entries of all clusters.
     pub entries: Readable<'b>,

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::field::lattice::{CELL_WARP, Directions, Lattice, Lookup, Spacing};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::gpu::Device;
-use crate::layout::{CLUSTER_VERTICES, ENTRY_BITS, Entity};
+use crate::layout::{CLUSTER_VERTICES, ENTRY_BITS, DeviceEntity};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::merge::chain::Product;
 use crate::sh::basis::Y00;
@@ -78,7 +78,7 @@ impl Variant {
 
 /// Entities that a uniform block of the device holds, at most 512 (48 KiB; most devices bind 64).
 pub fn uniform_entities(device: &Device) -> u32 {
-    (device.limits.max_uniform_buffer_range / size_of::<Entity>() as u32).min(512)
+    (device.limits.max_uniform_buffer_range / size_of::<DeviceEntity>() as u32).min(512)
 }
 
 /// What the merge shader is compiled for: a variant, the shape of the fields, and what is left out.

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::{Lattice, Lookup};
 use crate::gpu::{Buffer, BufferKind, Commands, Device, Volume};
-use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, ENTRY_FORMAT, Entity, ListEntry, NONE};
+use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, ENTRY_FORMAT, DeviceEntity, ListEntry, NONE};
 use crate::lists::skip::Skip;
 use crate::merge::shelf::ImageShelf;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
@@ -48,7 +48,7 @@ impl Workload {
         let (slope, offset) = lattice.radial_map();
         let entity_limit = uniform_entities(device);
         let count = (1 + occluder_count).max(entity_limit) as usize;
-        let mut entities = vec![Entity::default(); count];
+        let mut entities = vec![DeviceEntity::default(); count];
         for (i, entity) in entities.iter_mut().enumerate().take(1 + occluder_count as usize) {
             // Golden-angle spiral over the floor, so that all faces and shells of the fields are read. Entity 0 is the floor.
             let (angle, at) = (2.4 * i as f64, i as f64 / f64::from(occluder_count.max(1)));
@@ -56,7 +56,7 @@ impl Workload {
             let [a, b, c, d, e, f] = turns(if i == 0 { DQuat::IDENTITY } else { rotation }).map(|x| x as f32);
             let radius = 3.5 * at.sqrt();
             let height = if i == 0 { 0.0 } else { 1.5 };
-            *entity = Entity {
+            *entity = DeviceEntity {
                 centre: [(radius * angle.cos()) as f32, height, (radius * angle.sin()) as f32, 1.0],
                 alpha_beta: [a, b, c, d],
                 gamma: [e, f],

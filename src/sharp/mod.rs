@@ -148,7 +148,7 @@ impl SharpPermutation {
 
 /// Everything that the pass reads.
 pub struct Inputs<'b> {
-    /// [`crate::layout::Entity`] of every entity.
+    /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: &'b Buffer,
     /// Entries of all clusters.
     pub entries: &'b Buffer,

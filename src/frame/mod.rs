@@ -41,7 +41,7 @@ use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
 use ash::vk;
 use permutation::{CompiledMerge, harmonic_lights, permutation, usable};
-use picture::Picture;
+use picture::FramePicture;
 use pixel::PixelChains;
 use radiosity::Radiosity;
 use sky::SkyLight;
@@ -77,7 +77,7 @@ pub struct Frame {
     /// Chains of sharp lights for pixels.
     pixel: Option<PixelChains>,
     radiosity: Radiosity,
-    picture: Picture,
+    picture: FramePicture,
 }
 
 impl Frame {
@@ -143,7 +143,7 @@ impl Frame {
             work: ClusterWork::new(device, lists, gathering, entity_room)?,
             sky,
             radiosity,
-            picture: Picture::new(device, library, &options, by_pixel)?,
+            picture: FramePicture::new(device, library, &options, by_pixel)?,
             pixel,
             buffers,
         })

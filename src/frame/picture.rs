@@ -19,7 +19,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// What pictures are drawn by and into.
-pub(super) struct Picture {
+pub(super) struct FramePicture {
     pub draw: Draw,
     /// What the shaders are compiled for whose pixels evaluate sharp lights.
     pub sharp: Option<SharpPermutation>,
@@ -33,7 +33,7 @@ pub(super) struct Picture {
     pub edges: Vec<Edges>,
 }
 
-impl Picture {
+impl FramePicture {
     /// For linear pictures of the size that `options` states.
     ///
     /// # Errors
@@ -44,7 +44,7 @@ impl Picture {
         options: &Options,
         sharp: Option<SharpPermutation>,
     ) -> Result<Self> {
-        Ok(Picture {
+        Ok(FramePicture {
             draw: draw(device, library, options, Finish::Linear, sharp)?,
             sharp,
             readback: readback(device, options.size)?,

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use fastrand::Rng;
 use glam::DVec3;
-use shadow_fields::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, Y00, coefficient_count, evaluate, evaluate_program};
+use shadow_fields::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, Y00, basis_program, coefficient_count, evaluate};
 use shadow_fields::sh::quadrature::{icosahedral_rule, sphere_rule};
 
 /// A uniform direction: all octants, no axes.
@@ -158,7 +158,7 @@ fn the_program_that_is_printed_equals_evaluation() {
         for _ in 0..20 {
             let d = random_direction(&mut rng);
             let mut out = vec![f64::NAN; coefficient_count(bands)];
-            evaluate_program(bands, d, &mut out);
+            basis_program(bands).evaluate(&d.to_array(), &mut out);
             for (index, (value, expected)) in out.iter().zip(basis(bands, d)).enumerate() {
                 // Horner's rule in z^2 cancels coefficients of up to 1e2 at 8 bands.
                 assert!((value - expected).abs() < 1e-13, "bands {bands} coefficient {index}: {value} {expected}");

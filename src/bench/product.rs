@@ -9,7 +9,7 @@ use crate::merge::product::{Products, Push, Shape, twin};
 use crate::sh::basis::coefficient_count;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::points;
-use crate::sh::product_program::{ProductOperation, styled_program};
+use crate::sh::product_program::product_program;
 use crate::text::{csv, write};
 use glam::DVec3;
 use serde::Serialize;
@@ -142,7 +142,7 @@ fn timed(product: &'static str, shape: Shape, error: f64, times: &[f64]) -> Time
         cost
     } else {
         let style = shape.chain.product.style(BANDS, shape.field_bands);
-        styled_program(style, BANDS, shape.field_bands, ProductOperation::Subtract).cost()
+        product_program(style, BANDS, shape.field_bands).cost()
     };
     let ns_per_product = spread(times);
     let caps = cap(shape.field_bands, DVec3::new(0.5, 0.75_f64.sqrt(), 0.0), 30_f64.to_radians());

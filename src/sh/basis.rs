@@ -19,7 +19,7 @@ use std::sync::LazyLock;
 
 use glam::DVec3;
 
-use super::program::{OperationCount, Program, Term, Value, elements};
+use super::program::{Program, Term, Value, elements};
 
 /// The largest number of bands that these modules support and their tests cover.
 pub const MAX_BANDS: usize = 8;
@@ -119,7 +119,7 @@ fn polynomial(l: usize, m: usize) -> Vec<f64> {
 }
 
 /// The basis as a program of the inputs x, y, z: Q_lm by Horner's rule in z^2, shared between the two signs of m.
-fn basis_program(bands: usize) -> Program {
+pub fn basis_program(bands: usize) -> Program {
     assert!((1..=MAX_BANDS).contains(&bands), "bands must be 1 to {MAX_BANDS}, not {bands}");
     let mut program = Program::new(["d.x", "d.y", "d.z"].map(String::from).to_vec());
     let [x, y, z] = [0, 1, 2].map(Value::Input);
@@ -168,16 +168,6 @@ fn horner(program: &mut Program, coefficients: &[f64], z: Value, z_squared: Opti
         sum = Term::new(1.0, &[program.define(vec![sum])]);
     }
     sum
-}
-
-/// Operation counts of one call of [`glsl_basis`]'s function.
-pub fn basis_cost(bands: usize) -> OperationCount {
-    basis_program(bands).cost()
-}
-
-/// As [`evaluate`], by the program that [`glsl_basis`] prints; slow, for tests.
-pub fn evaluate_program(bands: usize, direction: DVec3, out: &mut [f64]) {
-    basis_program(bands).evaluate(&direction.to_array(), out);
 }
 
 /// GLSL 460 text of `void sh_basis(vec3 d, out float y[N])`, N = bands^2: [`evaluate`] as straight-line f32 code.

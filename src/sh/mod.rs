@@ -44,6 +44,5 @@ pub mod rotation;
 
 pub use basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate, glsl_basis};
 pub use product::Tensor;
-pub use product_program::{glsl_product, product_cost};
 pub use project::project;
 pub use rotation::{Rotation, glsl_rotate};

@@ -11,7 +11,6 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
-use super::product::ProductOperation;
 use super::program::{Program, Term, Value, elements};
 use super::quadrature::icosahedral_rule;
 
@@ -145,27 +144,18 @@ fn project(
 }
 
 /// The product program by evaluation at the points, multiplication and projection.
-pub(super) fn product_program(bands: usize, operation: ProductOperation) -> Program {
+pub(super) fn product_program(bands: usize) -> Program {
     let count = coefficient_count(bands);
-    let [left, target] = if operation == ProductOperation::Product { ["a", "c"] } else { ["t", "t"] };
-    let mut program = Program::new([elements(left, count), elements("b", count)].concat());
-    let mut sums = vec![None; count];
-    let sign = match operation {
-        ProductOperation::Product => 1.0,
-        ProductOperation::Subtract => {
-            for (k, sum) in sums.iter_mut().enumerate() {
-                *sum = Some(program.define(vec![Term::new(1.0, &[Value::Input(k)])]));
-            }
-            -1.0
-        }
-    };
+    let mut program = Program::new([elements("t", count), elements("b", count)].concat());
+    let mut sums: Vec<Option<Value>> =
+        (0..count).map(|k| Some(program.define(vec![Term::new(1.0, &[Value::Input(k)])]))).collect();
     for set in reflected_points() {
         let a = at_points(&mut program, &set, bands, Value::Input);
         let b = at_points(&mut program, &set, bands, |k| Value::Input(count + k));
         let products = a.into_iter().zip(b).map(|(a, b)| program.define(vec![Term::new(1.0, &[a, b])])).collect();
-        project(&mut program, &set, bands, products, sign * set.weight, &mut sums);
+        project(&mut program, &set, bands, products, -set.weight, &mut sums);
     }
-    for (text, sum) in elements(target, count).into_iter().zip(sums) {
+    for (text, sum) in elements("t", count).into_iter().zip(sums) {
         program.output(text, sum.expect("every coefficient has a term"));
     }
     program

@@ -10,21 +10,6 @@ use super::quadrature::sphere_rule;
 /// bands, and the errors of the sums are below 1e-14.
 const ZERO: f64 = 1e-9;
 
-/// The operation that code of a product computes (see [`super::product_program`]).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ProductOperation {
-    /// `c = product(a, b)`: inputs a then b, outputs c.
-    Product,
-    /// `t -= product(t, b)`, multiplication by 1 - b: inputs t then b, outputs t.
-    Subtract,
-}
-
-impl ProductOperation {
-    pub(super) fn sign(self) -> f64 {
-        if self == ProductOperation::Product { 1.0 } else { -1.0 }
-    }
-}
-
 /// One non-zero entry of a tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
@@ -167,7 +152,8 @@ fn pair_up(entries: &[Entry]) -> (Vec<Pair>, Vec<(u8, f64)>) {
     (pairs, targets)
 }
 
-/// Eigenvalues, ascending, of a symmetric row-major matrix, by cyclic Jacobi rotations (to about 1e-14 of the largest).
+/// Eigenvalues, ascending, of a symmetric row-major matrix, by cyclic Jacobi rotations (to about 1e-14 of the largest). Multiplying by
+/// a factor whose [`Tensor::matrix`] it is lengthens no expansion by more than the largest magnitude among them.
 pub fn eigenvalues(matrix: &[f64]) -> Vec<f64> {
     let n = matrix.len().isqrt();
     assert_eq!(n * n, matrix.len(), "the matrix must be square");
@@ -207,11 +193,4 @@ fn rotate_away(a: &mut [f64], n: usize, [p, q]: [usize; 2]) {
         let (pk, qk) = (a[p * n + k], a[q * n + k]);
         (a[p * n + k], a[q * n + k]) = (cos * pk - sin * qk, sin * pk + cos * qk);
     }
-}
-
-/// The largest eigenvalue of a symmetric row-major matrix, such as [`Tensor::matrix`] of a factor.
-///
-/// Multiplying by the factor lengthens no expansion by more than the largest *magnitude* among [`eigenvalues`].
-pub fn largest_eigenvalue(matrix: &[f64]) -> f64 {
-    eigenvalues(matrix).last().copied().unwrap_or(f64::NAN)
 }

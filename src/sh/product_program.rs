@@ -1,4 +1,5 @@
-//! The SH product as straight-line code, in several [`Style`]s that compute the same numbers.
+//! Multiplication by 1 - b as straight-line code, `t -= product(t, b)`, in several [`Style`]s that compute the same numbers. A program has
+//! the inputs t, here called a, and b, and the outputs t.
 //!
 //! "pairs" forms `p_ij = a_i b_j + a_j b_i` once for every unordered pair, then `c_k += G_ijk p_ij`; products with coefficient
 //! 0 scale by Y00, which is applied once to `a_0` and `b_0`. "factored" also forms `p + ratio q` once where several `c_k`
@@ -13,9 +14,8 @@ use std::collections::BTreeMap;
 
 use super::basis::{Y00, coefficient_count};
 use super::points;
-pub use super::product::ProductOperation;
 use super::product::Tensor;
-use super::program::{OperationCount, Program, Term, Value, elements};
+use super::program::{Program, Term, Value, elements};
 
 /// How a product is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -111,8 +111,6 @@ struct Emitter<'a> {
     linear: &'a Linear,
     values: Vec<Option<Value>>,
     sums: &'a mut [Option<Value>],
-    /// Sign of the tensor's part of the result: 1 or -1.
-    sign: f64,
 }
 
 impl Emitter<'_> {
@@ -121,7 +119,7 @@ impl Emitter<'_> {
         self.values[column] = Some(value);
         for (row, sum) in self.linear.rows.iter().zip(self.sums.iter_mut()) {
             if let Some(coefficient) = row.get(&column) {
-                self.program.accumulate(sum, vec![Term::new(self.sign * coefficient, &[value])]);
+                self.program.accumulate(sum, vec![Term::new(-coefficient, &[value])]);
             }
         }
         for (next, definition) in self.linear.columns.iter().enumerate().skip(column + 1) {
@@ -134,31 +132,25 @@ impl Emitter<'_> {
     }
 }
 
-/// The product of expansions of `bands` bands as a program.
-pub fn product_program(bands: usize, operation: ProductOperation) -> Program {
-    styled_program(Style::Factored, bands, bands, operation)
-}
-
-/// The product of an expansion of `a_bands` by one of `b_bands`, cut to `a_bands`, in a style that [`Style::fits`] them.
-pub fn styled_program(style: Style, a_bands: usize, b_bands: usize, operation: ProductOperation) -> Program {
+/// The multiplication of an expansion of `a_bands` by one of `b_bands`, cut to `a_bands`, in a style that [`Style::fits`] them.
+pub fn product_program(style: Style, a_bands: usize, b_bands: usize) -> Program {
     assert!(style.fits(a_bands, b_bands), "{style:?} cannot multiply {a_bands} bands by {b_bands}");
     if style == Style::Points {
-        return points::product_program(a_bands, operation);
+        return points::product_program(a_bands);
     }
     let counts = [a_bands, b_bands].map(coefficient_count);
-    let [left, target] = if operation == ProductOperation::Product { ["a", "c"] } else { ["t", "t"] };
-    let mut program = Program::new([elements(left, counts[0]), elements("b", counts[1])].concat());
+    let mut program = Program::new([elements("t", counts[0]), elements("b", counts[1])].concat());
     let sums = match style {
-        Style::Matrix => matrix_sums(&mut program, a_bands, b_bands, operation),
-        _ => pair_sums(&mut program, a_bands, operation, style == Style::Factored),
+        Style::Matrix => matrix_sums(&mut program, a_bands, b_bands),
+        _ => pair_sums(&mut program, a_bands, style == Style::Factored),
     };
-    for (text, sum) in elements(target, counts[0]).into_iter().zip(sums) {
+    for (text, sum) in elements("t", counts[0]).into_iter().zip(sums) {
         program.output(text, sum.expect("every coefficient has a term"));
     }
     program
 }
 
-fn pair_sums(program: &mut Program, bands: usize, operation: ProductOperation, factored: bool) -> Vec<Option<Value>> {
+fn pair_sums(program: &mut Program, bands: usize, factored: bool) -> Vec<Option<Value>> {
     let count = coefficient_count(bands);
     let (a, b) = (Value::Input, |j: usize| Value::Input(count + j));
     let mut linear = Linear::new(bands);
@@ -166,20 +158,15 @@ fn pair_sums(program: &mut Program, bands: usize, operation: ProductOperation, f
         linear.factor();
     }
     // The terms of coefficient 0: c_0 = Y00 a_0 b_0, c_k = Y00 (a_0 b_k + a_k b_0).
-    let sign = operation.sign();
     let a_0 = program.define(vec![Term::new(Y00, &[a(0)])]);
-    let b_0 = scaled_first(program, b(0), operation);
+    let b_0 = first_factor(program, b(0));
     let mut sums = vec![None; count];
-    let first = match operation {
-        ProductOperation::Product => Term::new(1.0, &[a_0, b(0)]),
-        ProductOperation::Subtract => Term::new(1.0, &[a(0), b_0]),
-    };
-    program.accumulate(&mut sums[0], vec![first]);
+    program.accumulate(&mut sums[0], vec![Term::new(1.0, &[a(0), b_0])]);
     for (k, sum) in sums.iter_mut().enumerate().skip(1) {
-        program.accumulate(sum, vec![Term::new(1.0, &[a(k), b_0]), Term::new(sign, &[a_0, b(k)])]);
+        program.accumulate(sum, vec![Term::new(1.0, &[a(k), b_0]), Term::new(-1.0, &[a_0, b(k)])]);
     }
     let values = vec![None; linear.columns.len()];
-    let mut emitter = Emitter { program, linear: &linear, values, sums: &mut sums, sign };
+    let mut emitter = Emitter { program, linear: &linear, values, sums: &mut sums };
     for (column, definition) in linear.columns.iter().enumerate() {
         if let &Column::Pair(i, j) = definition {
             let mut terms = vec![Term::new(1.0, &[a(i), b(j)])];
@@ -192,20 +179,12 @@ fn pair_sums(program: &mut Program, bands: usize, operation: ProductOperation, f
     sums
 }
 
-/// The factor with which coefficient 0 of b scales all of a: Y00 b_0, or 1 - Y00 b_0 where the product is subtracted.
-fn scaled_first(program: &mut Program, b_0: Value, operation: ProductOperation) -> Value {
-    match operation {
-        ProductOperation::Product => program.define(vec![Term::new(Y00, &[b_0])]),
-        ProductOperation::Subtract => program.define(vec![Term::new(1.0, &[]), Term::new(-Y00, &[b_0])]),
-    }
+/// The factor with which coefficient 0 of b scales all of a: 1 - Y00 b_0.
+fn first_factor(program: &mut Program, b_0: Value) -> Value {
+    program.define(vec![Term::new(1.0, &[]), Term::new(-Y00, &[b_0])])
 }
 
-fn matrix_sums(
-    program: &mut Program,
-    a_bands: usize,
-    b_bands: usize,
-    operation: ProductOperation,
-) -> Vec<Option<Value>> {
+fn matrix_sums(program: &mut Program, a_bands: usize, b_bands: usize) -> Vec<Option<Value>> {
     let count = coefficient_count(a_bands);
     let (a, b) = (Value::Input, |j: usize| Value::Input(count + j));
     let mut elements: BTreeMap<(usize, usize), Vec<(usize, f64)>> = BTreeMap::new();
@@ -214,7 +193,7 @@ fn matrix_sums(
             elements.entry((entry.i, entry.k)).or_default().push((entry.j, entry.value));
         }
     }
-    let b_0 = scaled_first(program, b(0), operation);
+    let b_0 = first_factor(program, b(0));
     let mut sums = vec![None; count];
     for (k, sum) in sums.iter_mut().enumerate() {
         program.accumulate(sum, vec![Term::new(1.0, &[a(k), b_0])]);
@@ -222,34 +201,18 @@ fn matrix_sums(
     for ((i, k), row) in elements {
         let terms = row.into_iter().map(|(j, value)| Term::new(value, &[b(j)])).collect();
         let element = program.define(terms);
-        program.accumulate(&mut sums[k], vec![Term::new(operation.sign(), &[element, a(i)])]);
+        program.accumulate(&mut sums[k], vec![Term::new(-1.0, &[element, a(i)])]);
         if i != k {
-            program.accumulate(&mut sums[i], vec![Term::new(operation.sign(), &[element, a(k)])]);
+            program.accumulate(&mut sums[i], vec![Term::new(-1.0, &[element, a(k)])]);
         }
     }
     sums
-}
-
-/// Operation counts of one product of [`product_program`].
-pub fn product_cost(bands: usize, operation: ProductOperation) -> OperationCount {
-    product_program(bands, operation).cost()
-}
-
-/// GLSL 460 text of two functions, N = bands^2:
-///
-/// - `void sh_product(float a[N], float b[N], out float c[N])`: c = product(a, b);
-/// - the function of [`glsl_subtract`] for two factors with that number of bands.
-pub fn glsl_product(bands: usize) -> String {
-    let count = coefficient_count(bands);
-    let body = product_program(bands, ProductOperation::Product).glsl_body();
-    format!("void sh_product(float a[{count}], float b[{count}], out float c[{count}]) {{\n{body}}}\n")
-        + &glsl_subtract(Style::Factored, bands, bands)
 }
 
 /// GLSL 460 text of `void sh_subtract_product(inout float t[N], float b[M])`, N = a_bands^2, M = b_bands^2:
 /// t -= product(t, b), multiplication by the visibility 1 - b of a factor that is stored as its blocked part b.
 pub fn glsl_subtract(style: Style, a_bands: usize, b_bands: usize) -> String {
     let [a_count, b_count] = [a_bands, b_bands].map(coefficient_count);
-    let body = styled_program(style, a_bands, b_bands, ProductOperation::Subtract).glsl_body();
+    let body = product_program(style, a_bands, b_bands).glsl_body();
     format!("void sh_subtract_product(inout float t[{a_count}], float b[{b_count}]) {{\n{body}}}\n")
 }

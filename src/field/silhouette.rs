@@ -20,7 +20,6 @@
 use super::file;
 pub use super::silhouette_header::{Side, SilhouetteHeader};
 use super::silhouette_nodes::{Cell, NodeGrid};
-use super::sub_light::SeenLight;
 use crate::error::{Error, Result};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -316,21 +315,6 @@ impl SilhouetteField {
             found.depth += weight * map.sign * depth;
         }
         found
-    }
-
-    /// Light of a round light of radiance 1 that the object blocks: irradiance at `point` (object's frame) on a surface with
-    /// `normal`, and what it is without the object. The light's centre is at `to` from the point, in r.
-    pub fn blocked_light(&self, point: DVec3, normal: DVec3, light: &SeenLight) -> [f64; 2] {
-        let mut sums = [0.0, 0.0];
-        for (toward, parts) in light.blocks() {
-            let near = self.near(point, toward);
-            for part in parts {
-                let share = part.share(normal);
-                sums[0] += share * self.blocked(&near, part.toward, part.distance, part.tangent());
-                sums[1] += share;
-            }
-        }
-        sums
     }
 
     /// Least and largest corner of the box around the object, in r: a boundless one where halves or the bounding sphere tell as much.

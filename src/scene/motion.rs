@@ -185,11 +185,6 @@ impl Node {
         Node { position, rotation, scale, position_keys: None, rotation_keys: None, scale_keys: None }
     }
 
-    /// Whether no keys move it.
-    pub fn is_still(&self) -> bool {
-        self.key_count() == 0
-    }
-
     /// How many keys it has.
     pub fn key_count(&self) -> usize {
         self.position_keys.as_ref().map_or(0, Keys::count)

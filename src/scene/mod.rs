@@ -100,12 +100,7 @@ impl Scene {
             return Ok((Self::load_toml(path)?, gltf::Notes::default()));
         }
         let gltf::Import { data, meshes, notes } = gltf::load(path)?;
-        let entity = |(i, entity): (usize, &EntityData)| {
-            let mesh = data.meshes.iter().position(|mesh| mesh.name == entity.mesh);
-            let mesh = mesh.ok_or_else(|| Error::input(path, format!("there is no mesh {:?}", entity.mesh)))?;
-            Ok(resolve(i, entity, mesh, &meshes[mesh]))
-        };
-        let entities = data.entities.iter().enumerate().map(entity).collect::<Result<Vec<_>>>()?;
+        let entities = resolve_all(&data, &meshes, |_, what| Error::input(path, what))?;
         let environment = Environment::new(&data.environment, &read_named).map_err(|e| e.context(path.display()))?;
         Ok((Self::assemble(data, meshes, entities, environment), notes))
     }
@@ -146,13 +141,7 @@ impl Scene {
             let built = mesh.build(folder, &read).map_err(|e| at(format!("mesh {:?}: {e}", mesh.name)))?;
             meshes.push(Arc::new(built));
         }
-        let entity = |(i, entity): (usize, &EntityData)| {
-            let mesh = data.meshes.iter().position(|m| m.name == entity.mesh);
-            let mesh = mesh
-                .ok_or_else(|| Error::input_at(path, lines.entity(i), format!("there is no mesh {:?}", entity.mesh)))?;
-            Ok(resolve(i, entity, mesh, &meshes[mesh]))
-        };
-        let entities = data.entities.iter().enumerate().map(entity).collect::<Result<Vec<_>>>()?;
+        let entities = resolve_all(&data, &meshes, |i, what| Error::input_at(path, lines.entity(i), what))?;
         let environment =
             Environment::new(&data.environment, &read).map_err(|e| Error::input_at(path, lines.environment(), e))?;
         Ok(Self::assemble(data, meshes, entities, environment))
@@ -207,6 +196,16 @@ impl Scene {
     pub fn to_toml(&self) -> Result<String> {
         self.data.to_toml()
     }
+}
+
+/// The entities of `data` with their meshes found by name. `fail` is given the number of an entity that names none, and the message.
+fn resolve_all(data: &Data, meshes: &[Arc<Mesh>], fail: impl Fn(usize, String) -> Error) -> Result<Vec<Entity>> {
+    let entity = |(i, entity): (usize, &EntityData)| {
+        let mesh = data.meshes.iter().position(|mesh| mesh.name == entity.mesh);
+        let mesh = mesh.ok_or_else(|| fail(i, format!("there is no mesh {:?}", entity.mesh)))?;
+        Ok(resolve(i, entity, mesh, &meshes[mesh]))
+    };
+    data.entities.iter().enumerate().map(entity).collect()
 }
 
 /// Resolves the switches. By default, an entity emits if it has emission, occludes unless it emits or is flat, and receives.

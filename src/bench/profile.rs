@@ -7,6 +7,7 @@ use crate::bake;
 use crate::draw::{Antialias, Finish};
 use crate::error::{Error, Result};
 use crate::field::FieldKind;
+use crate::frame::{self, Frame};
 use crate::gpu::Device;
 use crate::gpu::census::{Census, disassemble};
 use crate::merge::Merge;
@@ -213,11 +214,9 @@ pub fn scene(
     runs: u32,
     at_best: &Ceilings,
 ) -> Result<Vec<(ProfileRow, Vec<f64>)>> {
-    let library = bench.baker.library();
-    let mut rows = Vec::new();
-    let mut frames = Vec::new();
+    let (mut rows, mut frames) = (Vec::new(), Vec::new());
     for contender in chosen {
-        let options = crate::frame::Options {
+        let options = frame::Options {
             guard: contender.guard,
             variant: Some(contender.variant),
             // A pair of the merge is one of harmonics; sharp lights are timed by themselves below.
@@ -240,41 +239,44 @@ pub fn scene(
             *pairs = 64 * frame.merged().merged_entries as u64;
         }
     }
-    let sharp = bench.pass_times(scene, crate::frame::Options { size, ..super::default_options() }, "sharp", runs)?;
+    let sharp = bench.pass_times(scene, frame::Options { size, ..super::default_options() }, "sharp", runs)?;
     if !sharp.is_empty() {
         others.insert("sharp".into(), sharp);
     }
     for (contender, frame, times, pairs) in &frames {
         let permutation = frame.permutation();
-        let census = Census::new(&library.shader(&permutation.row())?)?;
+        let census = Census::new(&bench.baker.library().shader(&permutation.row())?)?;
         rows.push((row(name, &contender.name, *pairs, times, &permutation, &census, at_best), times.clone()));
     }
     let mut add = |pass: &str, variant: &str, times: Vec<f64>| rows.push((plain(name, pass, variant, &times), times));
     others.into_iter().for_each(|(pass, times)| add(&pass, "", times));
     let Some((_, frame, ..)) = frames.first_mut() else { return Ok(rows) };
     for (finish, word) in [(Finish::Display, "screen"), (Finish::Linear, "file")] {
-        for (antialias, samples) in [
-            (Antialias::Samples, "4 samples"),
-            (Antialias::Outlines, "1 sample, outlines"),
-            (Antialias::None, "1 sample"),
-        ] {
+        let ways = [Antialias::Samples, Antialias::Outlines, Antialias::None];
+        for (antialias, samples) in ways.into_iter().zip(["4 samples", "1 sample, outlines", "1 sample"]) {
             frame.set_finish(finish, antialias)?;
-            let (mut draws, mut walls) = (Vec::new(), Vec::new());
-            for run in 0..=runs {
-                let start = Instant::now();
-                let passes = frame.show(&scene.at(f64::from(run) / 30.0), 1.0)?;
-                if run > 0 {
-                    walls.push(start.elapsed().as_secs_f64() * 1e3);
-                    let drawn = passes.iter().filter(|t| ["draw", "smooth"].contains(&t.pass.as_str()));
-                    draws.push(drawn.map(|t| t.milliseconds).sum::<f64>());
-                }
-            }
+            let [draws, walls] = frame_times(frame, scene, runs)?;
             let variant = format!("{word}, {samples}");
             add("draw", &variant, draws);
             add("frame", &variant, walls);
         }
     }
     Ok(rows)
+}
+
+/// Times of pictures while a scene moves, milliseconds: of their drawing, and of whole frames.
+fn frame_times(frame: &mut Frame, scene: &Scene, runs: u32) -> Result<[Vec<f64>; 2]> {
+    let mut times = [Vec::new(), Vec::new()];
+    for run in 0..=runs {
+        let start = Instant::now();
+        let passes = frame.show(&scene.at(f64::from(run) / 30.0), 1.0)?;
+        if run > 0 {
+            let drawn = passes.iter().filter(|t| ["draw", "smooth"].contains(&t.pass.as_str()));
+            times[0].push(drawn.map(|t| t.milliseconds).sum());
+            times[1].push(start.elapsed().as_secs_f64() * 1e3);
+        }
+    }
+    Ok(times)
 }
 
 /// Bakes a mesh's occlusion field, radiance field and transfers a few times, at most three, after a small one that compiles, and

@@ -4,7 +4,7 @@ use super::common::start;
 use crate::app::source::GltfArguments;
 use crate::app::{Global, output};
 use crate::bench::cases::Case;
-use crate::bench::time_error::{self, Selection};
+use crate::bench::time_error::{self, Selection, TimeErrorOutcome};
 use crate::error::Result;
 use crate::text::three;
 use clap::Args;
@@ -52,6 +52,15 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(serde_json::to_value(&outcome).expect("results are plain data").to_string());
         return context.finish();
     }
+    say_budgets(&outcome);
+    say_comparisons(&outcome);
+    let folder = output::shown(&arguments.out);
+    output::say(format!("\n{folder}: {} settings measured, {}", outcome.points.len(), outcome.took()));
+    output::say(format!("{folder}/time-error.txt says which setting is the default and why"));
+    context.finish()
+}
+
+fn say_budgets(outcome: &TimeErrorOutcome) {
     output::say(
         "Relative RMS error over vertices, by cause (p99 and max of the total); mean FLIP of the picture lit by vertex; error and mean FLIP at pixels",
     );
@@ -89,6 +98,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ],
         &rows,
     );
+}
+
+fn say_comparisons(outcome: &TimeErrorOutcome) {
     output::say(
         "\nFrame against ray casting with as many threads, and against shadow maps: the quickest that errs no more, and what the best errs (without \
          drawing at vertices, with it at pixels)",
@@ -111,8 +123,4 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         &["scene", "frame ms", "error", "rays", "rays ms", "times faster", "merge alone", "map ms", "best map error"],
         &rows,
     );
-    let folder = output::shown(&arguments.out);
-    output::say(format!("\n{folder}: {} settings measured, {}", outcome.points.len(), outcome.took()));
-    output::say(format!("{folder}/time-error.txt says which setting is the default and why"));
-    context.finish()
 }

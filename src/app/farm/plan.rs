@@ -72,26 +72,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let mut plan = Plan::new(class, arguments.results.clone());
     let (meshes, scenes) = find(&arguments.works)?;
     if !meshes.is_empty() {
-        let options = mesh_options(&arguments.words)?;
-        let work = plan.works.len() as u32;
-        plan.works.push(Work { words: arguments.words.clone(), pictures: None });
-        let read: Vec<Read> =
-            meshes.par_iter().map(|path| read_mesh(path, &folder, &options)).collect::<Result<_>>()?;
-        let mut known = HashSet::new();
-        for Read { input, kinds, .. } in read {
-            // Meshes of equal content share what is baked.
-            if !known.insert(input.hash.clone()) {
-                continue;
-            }
-            let index = plan.inputs.len() as u32;
-            plan.inputs.push(input);
-            for (kind, cost) in kinds {
-                let parts = if kind.is_cut() { Plan::parts(cost.seconds) } else { 1 };
-                let share = f64::from(parts);
-                let cost = Cost { seconds: cost.seconds / share, bytes: cost.bytes / share, ..cost };
-                (0..parts).for_each(|part| plan.add(Task(work, index, TaskKind::Bake(kind), part, parts), cost));
-            }
-        }
+        add_bakes(&mut plan, &arguments.words, &meshes, &folder)?;
     }
     if let Some(Pictures { frames, patterns }) = pictures(arguments, &scenes)? {
         // Without a variant of its own each machine would take what is fastest there.
@@ -101,22 +82,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         }
         render_words(&scenes[0], &words)?;
         for (path, pattern) in scenes.iter().zip(patterns) {
-            let (work, index) = (plan.works.len() as u32, plan.inputs.len() as u32);
-            plan.works.push(Work { words: words.clone(), pictures: Some(pattern) });
-            let read = read_scene(path, &folder, &words)?;
-            plan.inputs.push(read.input);
-            let each = Cost {
-                seconds: PICTURE_SECONDS + read.pixels * PIXEL_SECONDS,
-                memory_mb: read.pixels * PIXEL_MB,
-                bytes: read.pixels * PIXEL_BYTES,
-            };
-            let run = Plan::fitting(each);
-            for first in (0..frames).step_by(run as usize) {
-                let count = run.min(frames - first);
-                let share = f64::from(count);
-                let cost = Cost { seconds: share * each.seconds, bytes: share * each.bytes, ..each };
-                plan.add(Task(work, index, TaskKind::Frames, first, count), cost);
-            }
+            add_pictures(&mut plan, read_scene(path, &folder, &words)?, (words.clone(), pattern), frames);
         }
     }
     plan.write(&arguments.output)?;
@@ -134,6 +100,48 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Adds the bakes of meshes. Those of equal content share what is baked.
+fn add_bakes(plan: &mut Plan, words: &[String], meshes: &[PathBuf], folder: &Path) -> Result<()> {
+    let options = mesh_options(words)?;
+    let work = plan.works.len() as u32;
+    plan.works.push(Work { words: words.to_vec(), pictures: None });
+    let read: Vec<Read> = meshes.par_iter().map(|path| read_mesh(path, folder, &options)).collect::<Result<_>>()?;
+    let mut known = HashSet::new();
+    for Read { input, kinds, .. } in read {
+        if !known.insert(input.hash.clone()) {
+            continue;
+        }
+        let index = plan.inputs.len() as u32;
+        plan.inputs.push(input);
+        for (kind, cost) in kinds {
+            let parts = if kind.is_cut() { Plan::parts(cost.seconds) } else { 1 };
+            let share = f64::from(parts);
+            let cost = Cost { seconds: cost.seconds / share, bytes: cost.bytes / share, ..cost };
+            (0..parts).for_each(|part| plan.add(Task(work, index, TaskKind::Bake(kind), part, parts), cost));
+        }
+    }
+    Ok(())
+}
+
+/// Adds the pictures of a scene, `words` being those of `render`, in runs that fit into a slice.
+fn add_pictures(plan: &mut Plan, read: Read, (words, pattern): (Vec<String>, String), frames: u32) {
+    let (work, index) = (plan.works.len() as u32, plan.inputs.len() as u32);
+    plan.works.push(Work { words, pictures: Some(pattern) });
+    plan.inputs.push(read.input);
+    let each = Cost {
+        seconds: PICTURE_SECONDS + read.pixels * PIXEL_SECONDS,
+        memory_mb: read.pixels * PIXEL_MB,
+        bytes: read.pixels * PIXEL_BYTES,
+    };
+    let run = Plan::fitting(each);
+    for first in (0..frames).step_by(run as usize) {
+        let count = run.min(frames - first);
+        let share = f64::from(count);
+        let cost = Cost { seconds: share * each.seconds, bytes: share * each.bytes, ..each };
+        plan.add(Task(work, index, TaskKind::Frames, first, count), cost);
+    }
 }
 
 /// How many pictures there are of each scene, and the pattern of their names for each.

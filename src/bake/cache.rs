@@ -19,8 +19,8 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A folder of what is baked. Where there is no folder or no room on disk, they are kept in memory as long as any
-/// clone of the cache exists. Nothing is baked twice.
+/// A folder of what is baked. Where there is no folder or no room on disk, it is kept in memory as long as any clone of the cache
+/// exists. Nothing is baked twice.
 #[derive(Clone, Default)]
 pub struct Cache {
     folder: Option<PathBuf>,

@@ -20,7 +20,6 @@ pub mod kinds;
 pub mod levels;
 pub mod model;
 mod names;
-
 pub mod partial;
 pub mod parts;
 pub mod project;
@@ -53,7 +52,6 @@ use assemble::{Assemble, Sources};
 use batches::{Batch, Batches, Captures, Reduce, Reduction};
 pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, is_seen, needs};
 pub use header::{Options, first_shell, hash_text, header};
-
 use levels::Leveled;
 use partial::Partial;
 use project::Projection;

@@ -9,7 +9,7 @@ use shadow_fields::asset::Mesh;
 use shadow_fields::bake::partial::Partial;
 use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
 use shadow_fields::bake::vertices::Wanted;
-use shadow_fields::bake::{self, BakeReport, Options};
+use shadow_fields::bake::{self, BakeReport};
 use shadow_fields::field::{FieldKind, Shortcuts, Storage};
 
 /// Most that levels may move coefficients, relative root mean square: as much as faces of 64 texels round a binary cap's by.
@@ -30,9 +30,9 @@ fn scanned(subdivisions: u32) -> Mesh {
     Mesh::new("scanned", positions, Vec::new(), None, ball.triangles.clone()).unwrap()
 }
 
-fn options(levels: bool) -> Options {
+fn options(levels: bool) -> bake::Options {
     let shortcuts = Shortcuts { symmetry: false, ..Default::default() };
-    Options { lattice: "cube:9x2".parse().unwrap(), storage: Storage::F32, shortcuts, levels, ..Default::default() }
+    bake::Options { lattice: "cube:9x2".parse().unwrap(), storage: Storage::F32, shortcuts, levels, ..Default::default() }
 }
 
 fn off(found: &[f32], wanted: &[f32]) -> f64 {
@@ -74,7 +74,7 @@ fn vertices_see_what_they_see_of_the_whole_mesh() {
     let Some(gpu) = gpu() else { return };
     let mesh = scanned(4);
     let bake = |levels| {
-        let options = Options { face_px: 32, ..options(levels) };
+        let options = bake::Options { face_px: 32, ..options(levels) };
         gpu.baker().vertices_from(&Partial::new(None), &mesh, &options, Wanted::BOTH, &|_, _| ()).unwrap()
     };
     let ((found, with), (wanted, without)) = (bake(true), bake(false));
@@ -112,7 +112,7 @@ fn transfer_and_self_visibility_share_their_captures() {
     let mesh = generate::torus(1.0, 0.4, 24, 12);
     for symmetry in [false, true] {
         let shortcuts = Shortcuts { symmetry, ..Default::default() };
-        let options = Options { face_px: 32, shortcuts, ..Default::default() };
+        let options = bake::Options { face_px: 32, shortcuts, ..Default::default() };
         let bake =
             |wanted| gpu.baker().vertices_from(&Partial::new(None), &mesh, &options, wanted, &|_, _| ()).unwrap();
         let [(both, of_both), (transfer, _), (maps, of_maps)] =

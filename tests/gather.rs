@@ -8,7 +8,7 @@ mod stage;
 
 use common::report;
 use shadow_fields::check::gather::Crowded;
-use shadow_fields::frame::{Options, PictureTarget, record};
+use shadow_fields::frame::{self, PictureTarget, record};
 use shadow_fields::gpu::{Commands, FLIGHTS};
 use shadow_fields::layout::{Cluster, ENTRY_ENTITIES, ListEntry};
 use shadow_fields::lists::gather::{
@@ -180,9 +180,9 @@ fn frames_are_the_same_by_either() {
     let Some(stage) = stage() else { return };
     for (edge, eps) in [(4, 1e-3), (10, 0.0)] {
         let scene = town(edge);
-        let options = Options { eps, ..small() };
-        let mut by_host = stage.frame(&scene, Options { lists: Some(Place::Host), ..options });
-        let mut by_device = stage.frame(&scene, Options { lists: Some(Place::Device), ..options });
+        let options = frame::Options { eps, ..small() };
+        let mut by_host = stage.frame(&scene, frame::Options { lists: Some(Place::Host), ..options });
+        let mut by_device = stage.frame(&scene, frame::Options { lists: Some(Place::Device), ..options });
         let mut placements = scene.at(0.0);
         for round in 0..4 {
             if round > 0 {
@@ -206,19 +206,19 @@ fn frames_are_the_same_by_either() {
 }
 
 /// A town whose every ball is near one that is lit, more than a group has room for, with the light that lists of the host bring.
-fn crowd(stage: &Stage, lights: usize) -> (shadow_fields::scene::Scene, Options, Vec<[f32; 3]>) {
+fn crowd(stage: &Stage, lights: usize) -> (shadow_fields::scene::Scene, frame::Options, Vec<[f32; 3]>) {
     let mut scene = town(34);
     for (i, entity) in scene.entities.iter_mut().enumerate() {
         entity.receives = i == 100;
         // With more lights llvmpipe's loops could not go through them all.
         entity.emits &= i < lights * 13;
     }
-    let options = Options { eps: 0.0, ..small() };
-    let mut by_host = stage.frame(&scene, Options { lists: Some(Place::Host), ..options });
+    let options = frame::Options { eps: 0.0, ..small() };
+    let mut by_host = stage.frame(&scene, frame::Options { lists: Some(Place::Host), ..options });
     by_host.render(&scene.at(0.0), None).unwrap();
     assert!(by_host.merged().merged_entries > FOUND * by_host.merged().clusters);
     let light = by_host.radiosity(100).unwrap();
-    (scene, Options { lists: Some(Place::Device), ..options }, light)
+    (scene, frame::Options { lists: Some(Place::Device), ..options }, light)
 }
 
 #[test]

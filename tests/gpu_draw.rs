@@ -7,15 +7,15 @@ mod stage;
 use common::report;
 use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::draw::{Antialias, Finish};
-use shadow_fields::frame::{Options, PictureMemory};
+use shadow_fields::frame::{self, PictureMemory};
 use shadow_fields::scene::{Placement, Scene};
 use stage::{at, scene, small, stage};
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 64;
 
-fn options(antialias: Antialias) -> Options {
-    Options { size: [WIDTH as u32, HEIGHT as u32], antialias, ..small() }
+fn options(antialias: Antialias) -> frame::Options {
+    frame::Options { size: [WIDTH as u32, HEIGHT as u32], antialias, ..small() }
 }
 
 /// Balls of radius .4 m that shine and are not lit, seen from z = 5 m along -z.

@@ -7,19 +7,19 @@ mod stage;
 use common::report;
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::bake;
-use shadow_fields::frame::Options;
+use shadow_fields::frame;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Placement, Scene};
 use stage::{at, difference, scene, small, stage};
 
 /// A denser lattice for comparisons with closed forms, f32.
-fn fine() -> Options {
-    Options { bake: bake::Options { lattice: "cube:12x6".parse().unwrap(), face_px: 32, ..small().bake }, ..small() }
+fn fine() -> frame::Options {
+    frame::Options { bake: bake::Options { lattice: "cube:12x6".parse().unwrap(), face_px: 32, ..small().bake }, ..small() }
 }
 
 /// The lattice and faces that the command line bakes by default, in f32.
-fn defaults() -> Options {
-    Options { bake: bake::Options { storage: small().bake.storage, ..Default::default() }, ..small() }
+fn defaults() -> frame::Options {
+    frame::Options { bake: bake::Options { storage: small().bake.storage, ..Default::default() }, ..small() }
 }
 
 /// The same radiance 1 from everywhere.
@@ -32,7 +32,7 @@ fn entity(mesh: &str, more: &str) -> String {
     format!("[[entity]]\nmesh = \"{mesh}\"\nalbedo = [1, 1, 1]\n{more}\n")
 }
 
-fn lit(scene: &Scene, options: Options, stage: &stage::Stage) -> Vec<Vec<[f32; 3]>> {
+fn lit(scene: &Scene, options: frame::Options, stage: &stage::Stage) -> Vec<Vec<[f32; 3]>> {
     stage.light(&mut stage.frame(scene, options), &scene.at(0.0))
 }
 
@@ -64,7 +64,7 @@ fn occluder_from_zenith_to_nadir() {
         scene(&format!("{WHITE_SKY}{PATCH}{BALL}{}{}", entity("patch", ""), entity("ball", "receives = false")));
     let middle = scene.meshes[0].positions.iter().position(|p| *p == Vec3::ZERO).unwrap();
     for skip in [Skip::NONE, Skip::ALL] {
-        let mut frame = stage.frame(&scene, Options { skip, ..fine() });
+        let mut frame = stage.frame(&scene, frame::Options { skip, ..fine() });
         carry_around(skip, &mut |distance, angle| {
             let ball = at((distance * angle.sin()) as f32, (distance * angle.cos()) as f32, 0.0);
             f64::from(stage.light(&mut frame, &[at(0.0, 0.0, 0.0), ball])[0][middle][0])

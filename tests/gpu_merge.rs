@@ -13,7 +13,7 @@ use shadow_fields::check::merge::{ARITHMETIC, Agreement, FILTER, LATTICES, MIXED
 use shadow_fields::check::sharp::sharp_options;
 use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::field::{Lookup, Storage};
-use shadow_fields::frame::{Frame, Options};
+use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::Device;
 use shadow_fields::lists::gather::Place;
 use shadow_fields::lists::skip::Skip;
@@ -53,7 +53,7 @@ fn built_in_scenes() {
     for (name, text) in scenes {
         let scene = built_in(name, text);
         let options =
-            Options { bake: shadow_fields::bake::Options { storage: Storage::F16, ..small().bake }, ..small() };
+            frame::Options { bake: shadow_fields::bake::Options { storage: Storage::F16, ..small().bake }, ..small() };
         let mut frame = stage.frame(&scene, options);
         for time_s in [0.0, 1.7] {
             agrees(&format!("{name} at {time_s} s"), &mut frame, &scene.at(time_s));
@@ -69,7 +69,7 @@ fn variants_lookups_lattices_and_bands() {
     let base = small();
     let mut first: Option<Vec<Vec<[f32; 3]>>> = None;
     for &variant in VARIANTS.iter().filter(|variant| !variant.image) {
-        let mut frame = stage.frame(&scene, Options { variant: Some(variant), ..base });
+        let mut frame = stage.frame(&scene, frame::Options { variant: Some(variant), ..base });
         assert_eq!(frame.variant(), variant, "the scene is small enough for each");
         agrees(variant.name, &mut frame, &placements);
         let light = stage.light(&mut frame, &placements);
@@ -80,23 +80,23 @@ fn variants_lookups_lattices_and_bands() {
         }
     }
     for skip in [Skip::NONE].into_iter().chain(["cones", "horizon", "caps"].map(Skip::without)) {
-        let mut frame = stage.frame(&scene, Options { skip, ..base });
+        let mut frame = stage.frame(&scene, frame::Options { skip, ..base });
         agrees(&format!("{skip:?}"), &mut frame, &placements);
     }
     for lookup in [Lookup::Nearest, Lookup::Radial] {
-        let mut frame = stage.frame(&scene, Options { lookup, ..base });
+        let mut frame = stage.frame(&scene, frame::Options { lookup, ..base });
         let Agreement { worst, off, .. } = against_twin(&mut frame, &placements).unwrap();
         report(&format!("{lookup:?}: {worst:.1e}, {:.2} % of vertices beyond {ARITHMETIC:e}", 1e2 * off));
         assert!(off < TIES, "{lookup:?}: {off} of the vertices differ");
     }
     for (lattice, tolerance) in LATTICES {
         let bake = shadow_fields::bake::Options { lattice: lattice.parse().unwrap(), ..base.bake };
-        let mut frame = stage.frame(&scene, Options { bake, ..base });
+        let mut frame = stage.frame(&scene, frame::Options { bake, ..base });
         agrees_within(tolerance, lattice, &mut frame, &placements);
     }
     for bands in [2, 3, 5] {
         let bake = shadow_fields::bake::Options { bands, ..base.bake };
-        agrees(&format!("{bands} bands"), &mut stage.frame(&scene, Options { bake, ..base }), &placements);
+        agrees(&format!("{bands} bands"), &mut stage.frame(&scene, frame::Options { bake, ..base }), &placements);
     }
 }
 
@@ -111,7 +111,7 @@ fn a_sampler_interpolates() {
     {
         let (name, instead) = ("image", "texel-packed");
         let variant = Some(Variant::named(name).unwrap());
-        let mut frame = stage.frame(&scene, Options { variant, bake: halves, ..base });
+        let mut frame = stage.frame(&scene, frame::Options { variant, bake: halves, ..base });
         assert_eq!(frame.variant().name, name);
         agrees_within(FILTER, name, &mut frame, &placements);
         let exact = Variant::named("texel-packed").unwrap();
@@ -120,10 +120,10 @@ fn a_sampler_interpolates() {
         frame.set_variant(variant).unwrap();
         agrees_within(FILTER, &format!("{name} again"), &mut frame, &placements);
         for options in [
-            Options { variant, ..base },
-            Options { variant, lookup: Lookup::Radial, bake: halves, ..base },
-            Options { variant, bake: shadow_fields::bake::Options { field_bands: Some(5), ..halves }, ..base },
-            Options {
+            frame::Options { variant, ..base },
+            frame::Options { variant, lookup: Lookup::Radial, bake: halves, ..base },
+            frame::Options { variant, bake: shadow_fields::bake::Options { field_bands: Some(5), ..halves }, ..base },
+            frame::Options {
                 variant,
                 bake: shadow_fields::bake::Options { lattice: LATTICES[0].0.parse().unwrap(), ..halves },
                 ..base
@@ -142,11 +142,11 @@ fn guards_and_field_bands() {
     let placements = scene.at(0.0);
     let base = small();
     for guard in [true, false] {
-        agrees(&format!("guard {guard}"), &mut stage.frame(&scene, Options { guard, ..base }), &placements);
+        agrees(&format!("guard {guard}"), &mut stage.frame(&scene, frame::Options { guard, ..base }), &placements);
     }
     for (bands, field_bands) in [(4, 5), (4, 7), (3, 4), (4, 3)] {
         let bake = shadow_fields::bake::Options { bands, field_bands: Some(field_bands), ..base.bake };
-        let mut frame = stage.frame(&scene, Options { bake, ..base });
+        let mut frame = stage.frame(&scene, frame::Options { bake, ..base });
         agrees(&format!("{bands} bands of transfer, {field_bands} of visibility"), &mut frame, &placements);
     }
 }
@@ -245,7 +245,7 @@ fn ties_go_by_index() {
 }
 
 /// A floor under so many balls, without skips, that its lists are longer than any other buffer: a small light and the sky.
-fn crowd() -> (Scene, Options) {
+fn crowd() -> (Scene, frame::Options) {
     let mut text = "environment = { uniform = [0.1, 0.2, 0.3] }\n\
         [[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 32 }\n\
         [[mesh]]\nname = \"box\"\ncuboid = { size_m = [0.2, 0.3, 0.2], cells = 1 }\n\
@@ -263,7 +263,7 @@ fn crowd() -> (Scene, Options) {
     let silhouette = SilhouetteOptions { map_px: 8, ..base.bake.silhouette };
     let lattice = "cube:4x3".parse().unwrap();
     let bake = shadow_fields::bake::Options { storage: Storage::F16, lattice, silhouette, ..base.bake };
-    (scene(&text), Options { skip: Skip::NONE, antialias: Antialias::None, bake, ..base })
+    (scene(&text), frame::Options { skip: Skip::NONE, antialias: Antialias::None, bake, ..base })
 }
 
 /// A device whose texel views are shorter than the lists of [`crowd`] and longer than everything else.
@@ -280,11 +280,11 @@ fn lists_too_long_for_texel_views() {
     let (scene, base) = crowd();
     let placements = scene.at(0.0);
     let variant = |name: &str| Some(Variant::named(name).unwrap());
-    let expected = stage.light(&mut stage.frame(&scene, Options { variant: variant("storage"), ..base }), &placements);
+    let expected = stage.light(&mut stage.frame(&scene, frame::Options { variant: variant("storage"), ..base }), &placements);
     let device = short_views();
     let baker = Baker::new(&device, &stage.gpu.library);
     for (name, lists) in [("texel", Place::Host), ("texel-shifted", Place::Device), ("image", Place::Host)] {
-        let mut frame = stage.frame_on(&baker, &scene, Options { variant: variant(name), lists: Some(lists), ..base });
+        let mut frame = stage.frame_on(&baker, &scene, frame::Options { variant: variant(name), lists: Some(lists), ..base });
         for round in 0..2 {
             assert_eq!(frame.variant().name, name, "all but the lists has room");
             let found = stage.light(&mut frame, &placements);
@@ -309,7 +309,7 @@ fn chains_too_long_for_texel_views() {
     let device = short_views();
     let baker = Baker::new(&device, &stage.gpu.library);
     let picture = |baker: Option<&Baker>, shading: Shading| {
-        let options = Options { shading: Some(shading), size: [96, 64], ..base };
+        let options = frame::Options { shading: Some(shading), size: [96, 64], ..base };
         let mut frame =
             baker.map_or_else(|| stage.frame(&scene, options), |baker| stage.frame_on(baker, &scene, options));
         frame.render(&scene.at(0.0), Some(1.0)).unwrap();

@@ -8,7 +8,7 @@ mod stage;
 use common::report;
 use glam::{Quat, Vec3};
 use shadow_fields::draw::{Antialias, Finish};
-use shadow_fields::frame::{Frame, Options};
+use shadow_fields::frame::{self, Frame};
 use shadow_fields::lists::gather::Place;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Camera, Placement, Scene};
@@ -49,8 +49,8 @@ fn picture(frame: &mut Frame, placements: &[Placement]) -> Vec<u32> {
     frame.picture().into_iter().map(f32::to_bits).collect()
 }
 
-fn pair(stage: &Stage, scene: &Scene, options: Options) -> [Frame; 2] {
-    let without = Options { skip: Skip::without("hidden"), ..options };
+fn pair(stage: &Stage, scene: &Scene, options: frame::Options) -> [Frame; 2] {
+    let without = frame::Options { skip: Skip::without("hidden"), ..options };
     [stage.frame(scene, options), stage.frame(scene, without)]
 }
 
@@ -73,7 +73,7 @@ fn pictures_are_the_same_to_the_bit() {
     for (antialias, lists) in
         [(Antialias::None, Place::Host), (Antialias::Outlines, Place::Device), (Antialias::Samples, Place::Host)]
     {
-        let options = Options { size: [192, 128], antialias, lists: Some(lists), ..small() };
+        let options = frame::Options { size: [192, 128], antialias, lists: Some(lists), ..small() };
         let mut frames = pair(&stage, &scene, options);
         let mut placements = scene.at(0.0);
         let mut rng = fastrand::Rng::with_seed(5);
@@ -119,7 +119,7 @@ fn pictures_are_the_same_to_the_bit() {
 fn what_comes_into_view_is_lit_then() {
     let Some(stage) = stage() else { return };
     let scene = room();
-    let mut frames = pair(&stage, &scene, Options { size: [160, 120], ..small() });
+    let mut frames = pair(&stage, &scene, frame::Options { size: [160, 120], ..small() });
     let [before, behind] =
         [camera([0.0, 1.0, 5.0], [0.0, 0.5, 0.0], 30.0), camera([0.0, 1.0, -5.0], [0.0, 0.5, 0.0], 30.0)];
     let mut placements = scene.at(0.0);
@@ -164,7 +164,7 @@ fn what_comes_into_view_is_lit_then() {
 fn nothing_is_lit_twice() {
     let Some(stage) = stage() else { return };
     let scene = room();
-    let mut frame = stage.frame(&scene, Options { size: [64, 48], ..small() });
+    let mut frame = stage.frame(&scene, frame::Options { size: [64, 48], ..small() });
     let mut placements = scene.at(0.0);
     picture(&mut frame, &placements);
     let clusters = frame.merged().clusters;
@@ -180,7 +180,7 @@ fn nothing_is_lit_twice() {
     placements[5].position.x += 0.2;
     picture(&mut frame, &placements);
     assert!(frame.stale_count() > 0);
-    let mut full = stage.frame(&scene, Options { size: [64, 48], skip: Skip::without("hidden"), ..small() });
+    let mut full = stage.frame(&scene, frame::Options { size: [64, 48], skip: Skip::without("hidden"), ..small() });
     assert_eq!(stage.light(&mut frame, &placements), stage.light(&mut full, &placements));
     assert_eq!(frame.stale_count(), 0);
     let counts = [&frame, &full].map(|frame| frame.counts(&placements));

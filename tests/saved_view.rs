@@ -9,7 +9,7 @@ mod stage;
 use cli::good;
 use shadow_fields::asset::picture;
 use shadow_fields::draw::Antialias;
-use shadow_fields::frame::Options;
+use shadow_fields::frame;
 use shadow_fields::merge::Variant;
 use shadow_fields::scene::Scene;
 use shadow_fields::view::{Command, Editor, Step};
@@ -90,9 +90,9 @@ fn a_saved_state_is_rendered_to_the_picture_that_was_shown() {
     let variant = Variant::named("storage").unwrap();
     let bake = shadow_fields::bake::Options { lattice: "cube:4x3".parse().unwrap(), face_px: 16, ..Default::default() };
     let options =
-        Options { bake, variant: Some(variant), size: editor.size(), antialias: Antialias::Samples, ..small() };
+        frame::Options { bake, variant: Some(variant), size: editor.size(), antialias: Antialias::Samples, ..small() };
     // As the command line has it.
-    let options = Options { lights: Default::default(), shading: None, ..options };
+    let options = frame::Options { lights: Default::default(), shading: None, ..options };
     let mut frame = stage.frame(editor.scene(), options);
     let white = (-editor.exposure_ev()).exp2();
     frame.render(&editor.placements(), Some(white)).unwrap();

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use shadow_fields::asset::{Mesh, embedded};
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::bake::vertices::Wanted;
-use shadow_fields::bake::{Options, TRANSFER_OFFSET};
+use shadow_fields::bake::{self, TRANSFER_OFFSET};
 use shadow_fields::check::self_visibility as check;
 use shadow_fields::field::quantity::channel_stride;
 use shadow_fields::field::self_visibility::{
@@ -23,8 +23,8 @@ use shadow_fields::truth::{RayMeshes, Vertex, World};
 use std::f64::consts::TAU;
 use std::path::Path;
 
-fn options(face_px: u32) -> Options {
-    Options { face_px, ..Options::default() }
+fn options(face_px: u32) -> bake::Options {
+    bake::Options { face_px, ..bake::Options::default() }
 }
 
 fn bake(gpu: &Gpu, mesh: &Mesh, face_px: u32) -> Vec<u8> {

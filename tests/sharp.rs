@@ -8,7 +8,7 @@ use shadow_fields::bake::cache::Cache;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::field::sub_light::Panel;
-use shadow_fields::frame::{Frame, Options};
+use shadow_fields::frame::{self, Frame};
 use shadow_fields::lists::gather::Place;
 use shadow_fields::lists::scene_bounds::Counts;
 use shadow_fields::lists::skip::Skip;
@@ -16,7 +16,7 @@ use shadow_fields::scene::{LightForm, Lights, Scene};
 use shadow_fields::truth::{RayCast, RayMeshes, World, sample_vertices};
 
 /// Relative root mean square error of the light on vertices against rays.
-fn error(gpu: &common::Gpu, scene: &Scene, options: Options, rays: u32) -> f64 {
+fn error(gpu: &common::Gpu, scene: &Scene, options: frame::Options, rays: u32) -> f64 {
     let placements = scene.at(0.0);
     let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
     frame.render(&placements, None).unwrap();
@@ -106,12 +106,12 @@ fn scenes_are_lit_as_by_rays() {
     let Some(gpu) = gpu() else { return };
     let base = check::sharp_options();
     let bake = shadow_fields::bake::Options { silhouette: Default::default(), face_px: 32, ..base.bake };
-    let sharp = Options { bake, ..base };
+    let sharp = frame::Options { bake, ..base };
     for (name, scene, limit) in scenes() {
         // Few of the rays into its bounding sphere meet a tube.
         let rays = if name == "a tube" { 16384 } else { 1024 };
         let found = error(&gpu, &scene, sharp, rays);
-        let harmonics = error(&gpu, &scene, Options { lights: Lights::Sh, ..sharp }, 1024);
+        let harmonics = error(&gpu, &scene, frame::Options { lights: Lights::Sh, ..sharp }, 1024);
         report(&format!("{name}: error {found:.4}, in spherical harmonics {harmonics:.4}"));
         assert!(found < limit.min(harmonics), "{name}: {found}, in spherical harmonics {harmonics}");
     }
@@ -138,7 +138,7 @@ fn each_light_has_the_form_that_its_mesh_gives_it() {
 /// A picture of a scene, linear RGB, and the pixels that evaluated lights where the device counts them.
 fn picture(gpu: &common::Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u64>) {
     let options =
-        Options { shading: Some(shading), size: [160, 120], antialias: Antialias::None, ..check::sharp_options() };
+        frame::Options { shading: Some(shading), size: [160, 120], antialias: Antialias::None, ..check::sharp_options() };
     let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
     let timings = frame.render(&scene.at(0.0), Some(4.0)).unwrap();
     (frame.picture(), frame.pixels_evaluated(&timings))
@@ -221,7 +221,7 @@ fn what_outlines_leave_off_lists_changes_nothing() {
     for (scene, name) in [(ring, "passed"), (small_clusters, "covered")] {
         let placements = scene.at(0.0);
         let lit = |lists, skip| {
-            let options = Options { lists: Some(lists), skip, ..check::sharp_options() };
+            let options = frame::Options { lists: Some(lists), skip, ..check::sharp_options() };
             let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), &scene, options, &|_, _, _| ()).unwrap();
             frame.render(&placements, None).unwrap();
             (frame.counts(&placements), frame.radiosity(0).unwrap())
@@ -293,7 +293,7 @@ fn pixels_follow_switches_of_entities() {
     let Some(gpu) = gpu() else { return };
     let (_, scene, _) = scenes().swap_remove(0);
     let options =
-        Options { shading: Some(Shading::Pixel), size: [96, 72], antialias: Antialias::None, ..check::sharp_options() };
+        frame::Options { shading: Some(Shading::Pixel), size: [96, 72], antialias: Antialias::None, ..check::sharp_options() };
     let new = |scene: &Scene| Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
     let show = |frame: &mut Frame| {
         frame.render(&scene.at(0.0), Some(4.0)).unwrap();
@@ -323,7 +323,7 @@ fn a_light_that_is_switched_on_meets_the_chains() {
     ));
     let mut dark = scene.clone();
     dark.entities[2].emits = false;
-    let options = Options { lights: Lights::Sh, ..check::sharp_options() };
+    let options = frame::Options { lights: Lights::Sh, ..check::sharp_options() };
     let new = |scene: &Scene| Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
     let light = |frame: &mut Frame| {
         frame.render(&scene.at(0.0), None).unwrap();

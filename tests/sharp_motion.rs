@@ -9,7 +9,7 @@ use shadow_fields::asset::embedded;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
-use shadow_fields::frame::{Frame, Options};
+use shadow_fields::frame::{self, Frame};
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::truth::pixels::lit_points;
 use shadow_fields::truth::{RayMeshes, World};
@@ -37,7 +37,7 @@ fn scene(cells: usize) -> Scene {
 fn frame(gpu: &common::Gpu, scene: &Scene) -> Frame {
     let base = check::sharp_options();
     let bake = shadow_fields::bake::Options { silhouette: Default::default(), ..base.bake };
-    let options = Options { bake, shading: Some(Shading::Pixel), size: PICTURE, antialias: Antialias::None, ..base };
+    let options = frame::Options { bake, shading: Some(Shading::Pixel), size: PICTURE, antialias: Antialias::None, ..base };
     Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap()
 }
 

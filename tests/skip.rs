@@ -8,7 +8,7 @@ mod stage;
 use common::report;
 use glam::{Quat, Vec3};
 use shadow_fields::check::merge::{ARITHMETIC, against_twin};
-use shadow_fields::frame::Options;
+use shadow_fields::frame;
 use shadow_fields::lists::skip::{Skip, SkipKind, switches};
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::truth::raycast::RayCast;
@@ -53,9 +53,9 @@ fn what_moves_is_merged_again_to_the_same_bits() {
     let Some(stage) = stage() else { return };
     let scene = town(8, 4.0, 4);
     for eps in [1e-3, 0.0] {
-        let options = Options { eps, ..small() };
+        let options = frame::Options { eps, ..small() };
         let mut kept = stage.frame(&scene, options);
-        let mut anew = stage.frame(&scene, Options { skip: Skip::without("unmoved"), ..options });
+        let mut anew = stage.frame(&scene, frame::Options { skip: Skip::without("unmoved"), ..options });
         let mut placements = scene.at(0.0);
         let mut rng = fastrand::Rng::with_seed(3);
         let (mut merged, mut all) = (0, 0);
@@ -127,7 +127,7 @@ fn exact_skips_change_nothing() {
     let entries = all.merged().merged_entries;
     let exact = switches().filter(|row| matches!(row.kind, SkipKind::Exact | SkipKind::Incremental));
     for name in exact.map(|row| row.name) {
-        let mut frame = stage.frame(&scene, Options { skip: Skip::without(name), ..small() });
+        let mut frame = stage.frame(&scene, frame::Options { skip: Skip::without(name), ..small() });
         assert_eq!(stage.light(&mut frame, &placements), expected, "without {name}");
         let counts = all.counts(&placements);
         report(&format!("without {name}: {} entries, with it {entries}; {counts:?}", frame.merged().merged_entries));
@@ -153,7 +153,7 @@ fn a_light_that_faces_away_is_left_off() {
     let placements = scene.at(0.0);
     // Fine directions: a cell more to either side counts as lit.
     let bake = shadow_fields::bake::Options { lattice: "cube:6x12".parse().unwrap(), ..small().bake };
-    let options = Options { bake, ..small() };
+    let options = frame::Options { bake, ..small() };
     let mut with = stage.frame(&scene, options);
     // With a threshold of 0 the twin looks at everything, left off or not.
     let worst = against_twin(&mut with, &placements).unwrap().worst;
@@ -224,7 +224,7 @@ fn what_is_dropped_stays_within_its_bound() {
     let cast = RayCast { rays: 1 << 13, ..Default::default() };
     let truth = cast.run(&world, &vertices);
     for eps in [1e-3, 5e-3, 2e-2] {
-        let mut frame = stage.frame(&town, Options { eps, ..small() });
+        let mut frame = stage.frame(&town, frame::Options { eps, ..small() });
         let light = stage.light(&mut frame, &placements);
         let counts = frame.counts(&placements);
         let (worst, brightest) = stage::difference(&light[0], &exact[0]);
@@ -271,9 +271,9 @@ fn nothing_pops_as_fields_become_caps() {
         ));
         // Fine enough that what a lookup is off by does not hide what caps change.
         let bake = shadow_fields::bake::Options { face_px: 32, lattice: "cube:12x8".parse().unwrap(), ..small().bake };
-        let options = Options { bake, ..small() };
+        let options = frame::Options { bake, ..small() };
         let mut caps = stage.frame(&scene, options);
-        let mut fields = stage.frame(&scene, Options { skip: Skip::without("caps"), ..options });
+        let mut fields = stage.frame(&scene, frame::Options { skip: Skip::without("caps"), ..options });
         let (mut walk, mut apart, mut brightest) = (Vec::new(), 0.0_f32, 0.0);
         let mut kinds = std::collections::BTreeSet::new();
         for i in 0..100 {
@@ -315,7 +315,7 @@ fn nothing_pops_by_more_than_eps() {
          [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.5, subdivisions = 2 }\n[[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"ball\"\n",
     );
     let eps = 4e-3;
-    let mut frame = stage.frame(&scene, Options { eps, ..small() });
+    let mut frame = stage.frame(&scene, frame::Options { eps, ..small() });
     let (mut before, mut largest, mut dropped): (Option<Vec<[f32; 3]>>, f32, bool) = (None, 0.0, false);
     for i in 0..120 {
         let placements = [at(0.0, 0.0, 0.0), at(4.0 + 0.02 * i as f32, 1.0, 0.3)];
@@ -338,7 +338,7 @@ fn the_house_has_something_for_every_skip() {
     let house = shadow_fields::bench::house::scene().unwrap();
     // Fine directions, as for the lamp above.
     let bake = shadow_fields::bake::Options { lattice: "cube:6x12".parse().unwrap(), ..small().bake };
-    let options = Options { bake, eps: 1e-3, ..small() };
+    let options = frame::Options { bake, eps: 1e-3, ..small() };
     let placements = house.at(0.0);
     let mut frame = stage.frame(&house, options);
     let light = stage.light(&mut frame, &placements);
@@ -349,7 +349,7 @@ fn the_house_has_something_for_every_skip() {
     assert!(each.iter().all(|count| *count > 0), "{counts:?}");
     assert!(light[0].iter().any(|c| c[0] > 0.05), "the floor is lit");
     // With a threshold what shines with nothing is below it in any case.
-    let exact = Options { eps: 0.0, ..options };
+    let exact = frame::Options { eps: 0.0, ..options };
     let mut frame = stage.frame(&house, exact);
     let worst = against_twin(&mut frame, &placements).unwrap().worst;
     assert!(worst < ARITHMETIC, "{worst}");

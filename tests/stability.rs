@@ -9,7 +9,7 @@ use shadow_fields::bake;
 use shadow_fields::bench::trials::{cases, run};
 use shadow_fields::check;
 use shadow_fields::field::Storage;
-use shadow_fields::frame::Options;
+use shadow_fields::frame;
 use shadow_fields::lists::skip::Skip;
 use stage::{small, stage};
 
@@ -19,7 +19,7 @@ fn odd_scenes_stay_bounded() {
     for case in cases(64).unwrap() {
         for (storage, base) in [(Storage::F16, check::sharp::sharp_options()), (Storage::F32, small())] {
             let bake = bake::Options { storage, ..base.bake };
-            let options = Options { bake, skip: Skip::without("unmoved"), ..base };
+            let options = frame::Options { bake, skip: Skip::without("unmoved"), ..base };
             let trial = run(&case, stage.frame(&case.scene, options), storage).unwrap();
             report(&format!("{trial:?}"));
             assert!(trial.passed, "{trial:?}");

@@ -7,7 +7,7 @@ use crate::bake;
 use crate::draw::{Antialias, Finish};
 use crate::error::{Error, Result};
 use crate::field::Lookup;
-use crate::frame::{Frame, Options};
+use crate::frame::{self, Frame};
 use crate::scene::Scene;
 use clap::Args;
 use serde_json::json;
@@ -146,7 +146,7 @@ fn load(name: &str) -> Result<Scene> {
     Scene::parse(text, Path::new(&path), &embedded::read)
 }
 
-fn options(arguments: &Arguments, scene: &Scene) -> Options {
+fn options(arguments: &Arguments, scene: &Scene) -> frame::Options {
     let shape = &scene.data.output;
     let size = arguments.size.unwrap_or([shape.width, shape.height]);
     arguments.merge.options(bake::Options::default(), size, arguments.antialias)
@@ -212,14 +212,14 @@ struct Times {
     whole: Vec<f64>,
 }
 
-fn draw(frame: &mut Frame, scene: &Scene, options: Options, path: &Path) -> Result<()> {
+fn draw(frame: &mut Frame, scene: &Scene, options: frame::Options, path: &Path) -> Result<()> {
     let exposure_ev = scene.data.output.exposure_ev;
     frame.render(&scene.at(0.0), Some(scene.data.output.white()))?;
     picture::write_png(path, options.size[0], options.size[1], &frame.picture(), exposure_ev)
 }
 
 fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene) -> Result<PathBuf> {
-    let options = Options { size: ANIMATION_SIZE, ..options(arguments, scene) };
+    let options = frame::Options { size: ANIMATION_SIZE, ..options(arguments, scene) };
     let exposure_ev = scene.data.output.exposure_ev;
     let mut frame = context.frame(scene, options)?;
     let (count, fps) = ANIMATION;
@@ -236,7 +236,7 @@ fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene
 /// One scene without interpolation beside the one with it, and without its occluder.
 fn pair(context: &Context, arguments: &Arguments) -> Result<Vec<PathBuf>> {
     let scene = load(PAIR_SCENE)?;
-    let nearest = Options { lookup: Lookup::Nearest, ..options(arguments, &scene) };
+    let nearest = frame::Options { lookup: Lookup::Nearest, ..options(arguments, &scene) };
     let path = arguments.output.join(format!("{PAIR_SCENE}_nearest.png"));
     draw(&mut context.frame(&scene, nearest)?, &scene, nearest, &path)?;
 

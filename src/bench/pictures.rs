@@ -8,7 +8,7 @@ use crate::asset::false_color::Scheme;
 use crate::asset::picture;
 use crate::draw::{Antialias, Shading};
 use crate::error::Result;
-use crate::frame::Options;
+use crate::frame;
 use crate::truth::error_map::ErrorPicture;
 use crate::truth::flip::mean_flip;
 use crate::truth::pixels::pixels;
@@ -65,7 +65,7 @@ pub struct PixelError {
 /// As [`crate::frame::Frame::new`] and [`crate::frame::Frame::render`], and `Failed` when a file cannot be written.
 pub fn pictures(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<CasePicture> {
     let placements = case.scene.at(case.time_s);
-    let options = Options { size: SIZE, antialias: Antialias::Samples, ..default_options() };
+    let options = frame::Options { size: SIZE, antialias: Antialias::Samples, ..default_options() };
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, None)?;
     let found = error_map::radiosity(&frame)?;
@@ -99,7 +99,7 @@ fn cast(bench: &Bench<'_>, case: &Case, points: usize) -> RayCast {
 fn pixel_error(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<PixelError> {
     let placements = case.scene.at(case.time_s);
     let options =
-        Options { size: PIXEL_SIZE, antialias: Antialias::None, shading: Some(Shading::Pixel), ..default_options() };
+        frame::Options { size: PIXEL_SIZE, antialias: Antialias::None, shading: Some(Shading::Pixel), ..default_options() };
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, Some(f32::INFINITY))?;
     let found = frame.picture();

@@ -7,7 +7,7 @@ use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::draw::Antialias;
 use crate::error::Result;
-use crate::frame::{Frame, Options};
+use crate::frame::{self, Frame};
 use crate::scene::Placement;
 
 /// Two half-float steps, and two roundings of interpolated f32.
@@ -44,7 +44,7 @@ pub(super) fn compare(
 ) -> Result<()> {
     let scene = scene(MIXED)?;
     let placements = scene.at(0.0);
-    let mut options = Options { size: [96, 64], antialias, ..options() };
+    let mut options = frame::Options { size: [96, 64], antialias, ..options() };
     options.bake.lattice = "cube:2x1".parse().expect("a lattice");
     let mut frame = Frame::new(baker, &Cache::default(), &scene, options, &|_, _, _| ())?;
     for white in [1.0, f32::INFINITY] {

@@ -8,7 +8,7 @@ use crate::bake::{self, Baker};
 use crate::draw::{Antialias, Shading};
 use crate::error::Result;
 use crate::field::{Lookup, Storage};
-use crate::frame::{Frame, Options};
+use crate::frame::{self, Frame};
 use crate::lists::gather::Place;
 use crate::lists::skip::Skip;
 use crate::merge::Variant;
@@ -76,9 +76,9 @@ pub fn scene(text: &str) -> Result<Scene> {
 }
 
 /// Few samples of few texels in f32: quick, and all that a comparison with a twin needs. The variant is pinned.
-pub fn options() -> Options {
+pub fn options() -> frame::Options {
     let lattice = "cube:6x4".parse().expect("a lattice");
-    Options {
+    frame::Options {
         bake: bake::Options { storage: Storage::F32, lattice, face_px: 16, ..Default::default() },
         lights: Lights::Sh,
         shading: Some(Shading::Vertex),
@@ -150,7 +150,7 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let folder = tempfile::tempdir()
         .map_err(|error| crate::error::Error::Failed(format!("no folder for temporary files: {error}")))?;
     let cache = Cache::new(Some(folder.path()));
-    let mut compare = |what: String, options: Options| -> Result<()> {
+    let mut compare = |what: String, options: frame::Options| -> Result<()> {
         let mut frame = Frame::new(baker, &cache, &scene, options, &|_, _, _| ())?;
         let found = against_twin(&mut frame, &placements)?;
         let what = if options.variant.is_none_or(|v| v == frame.variant()) {
@@ -178,26 +178,26 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
         for &storage in &storages[usize::from(variant.image)..] {
             let bake = bake::Options { storage, ..base.bake };
             let what = format!("{}, {}", variant.name, format!("{storage:?}").to_lowercase());
-            compare(what, Options { variant: Some(variant), bake, ..base })?;
+            compare(what, frame::Options { variant: Some(variant), bake, ..base })?;
         }
     }
-    compare("no skip".into(), Options { skip: Skip::NONE, ..base })?;
+    compare("no skip".into(), frame::Options { skip: Skip::NONE, ..base })?;
     // The twin looks at everything, so these rows hold for lists that the device makes too.
-    let by_device = Options { lists: Some(Place::Device), ..base };
+    let by_device = frame::Options { lists: Some(Place::Device), ..base };
     compare("lists made on the device".into(), by_device)?;
-    compare("lists made on the device, no skip".into(), Options { skip: Skip::NONE, ..by_device })?;
+    compare("lists made on the device, no skip".into(), frame::Options { skip: Skip::NONE, ..by_device })?;
     for name in ["cones", "horizon", "caps"] {
-        compare(format!("without {name}"), Options { skip: Skip::without(name), ..base })?;
+        compare(format!("without {name}"), frame::Options { skip: Skip::without(name), ..base })?;
     }
-    compare("no guard".into(), Options { guard: false, ..base })?;
+    compare("no guard".into(), frame::Options { guard: false, ..base })?;
     let bake = bake::Options { field_bands: Some(6), ..base.bake };
-    compare("6 bands of visibility".into(), Options { bake, ..base })?;
+    compare("6 bands of visibility".into(), frame::Options { bake, ..base })?;
     for lookup in [Lookup::Nearest, Lookup::Radial] {
-        compare(format!("lookup {lookup:?}").to_lowercase(), Options { lookup, ..base })?;
+        compare(format!("lookup {lookup:?}").to_lowercase(), frame::Options { lookup, ..base })?;
     }
     for (lattice, _) in LATTICES {
         let bake = bake::Options { lattice: lattice.parse().expect("a lattice in the table"), ..base.bake };
-        compare(lattice.into(), Options { bake, ..base })?;
+        compare(lattice.into(), frame::Options { bake, ..base })?;
     }
     Ok(())
 }

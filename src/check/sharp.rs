@@ -6,7 +6,7 @@ use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::bake::silhouette::SilhouetteOptions;
 use crate::error::Result;
-use crate::frame::{Frame, Options};
+use crate::frame::{self, Frame};
 use crate::lists::gather::Place;
 use crate::lists::skip::Skip;
 use crate::merge::Variant;
@@ -73,10 +73,10 @@ emission = [9, 9, 7]
 "#;
 
 /// A small frame with sharp lights.
-pub fn sharp_options() -> Options {
+pub fn sharp_options() -> frame::Options {
     let base = options();
     let silhouette = SilhouetteOptions { cells: 4, map_px: 16, view_px: 64, levels: false, symmetry: true };
-    Options { lights: Lights::Sharp, bake: crate::bake::Options { silhouette, ..base.bake }, ..base }
+    frame::Options { lights: Lights::Sharp, bake: crate::bake::Options { silhouette, ..base.bake }, ..base }
 }
 
 /// The text of the scene that the rows light.
@@ -95,10 +95,10 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let named = |name: &str| Some(Variant::named(name).expect("a variant"));
     for (what, options) in [
         ("texel", base),
-        ("storage", Options { variant: named("storage"), ..base }),
-        ("storage-uniform", Options { variant: named("storage-uniform"), ..base }),
-        ("no skip", Options { skip: Skip::NONE, ..base }),
-        ("lists made on the device", Options { lists: Some(Place::Device), ..base }),
+        ("storage", frame::Options { variant: named("storage"), ..base }),
+        ("storage-uniform", frame::Options { variant: named("storage-uniform"), ..base }),
+        ("no skip", frame::Options { skip: Skip::NONE, ..base }),
+        ("lists made on the device", frame::Options { lists: Some(Place::Device), ..base }),
     ] {
         let mut frame = Frame::new(baker, &cache, &scene, options, &|_, _, _| ())?;
         let found = against_twin(&mut frame, &placements)?;

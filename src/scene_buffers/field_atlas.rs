@@ -1,7 +1,7 @@
 //! All fields of a scene in one buffer, and where each of them lies.
 
 use super::ALIGNMENT;
-use crate::bake::{BakedMesh, Options};
+use crate::bake::{self, BakedMesh};
 use crate::error::Result;
 use crate::field::extent::{Extent, extent};
 use crate::field::quantity::channel_stride;
@@ -44,7 +44,7 @@ pub(super) fn field_atlas(
     device: &Arc<Device>,
     scene: &Scene,
     baked: &[BakedMesh],
-    options: &Options,
+    options: &bake::Options,
 ) -> Result<(Buffer, Vec<[Option<FieldSlot>; 2]>)> {
     let (mut total, mut channels) = (0, 0);
     let mut known = HashMap::<*const ShadowField, FieldSlot>::new();

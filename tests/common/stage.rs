@@ -6,7 +6,7 @@ use super::common::{Gpu, gpu};
 use glam::{Quat, Vec3};
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
-use shadow_fields::frame::{Frame, Options};
+use shadow_fields::frame::{self, Frame};
 use shadow_fields::scene::{Placement, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -34,18 +34,18 @@ pub fn stage() -> Option<Stage> {
 }
 
 /// Few samples of few texels in f32: quick, and all that a comparison with a twin needs. The variant is pinned.
-pub fn small() -> Options {
+pub fn small() -> frame::Options {
     shadow_fields::check::merge::options()
 }
 
 impl Stage {
     /// A scene on the device, its fields baked.
-    pub fn frame(&self, scene: &Scene, options: Options) -> Frame {
+    pub fn frame(&self, scene: &Scene, options: frame::Options) -> Frame {
         self.frame_on(&self.baker, scene, options)
     }
 
     /// The same on the device of another baker, by the fields that are baked already.
-    pub fn frame_on(&self, baker: &Baker, scene: &Scene, options: Options) -> Frame {
+    pub fn frame_on(&self, baker: &Baker, scene: &Scene, options: frame::Options) -> Frame {
         Frame::new(baker, &self.cache, scene, options, &|_, _, _| ()).unwrap()
     }
 

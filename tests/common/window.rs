@@ -8,7 +8,7 @@ use super::stage::small;
 use shadow_fields::asset::picture::srgb_from_linear;
 use shadow_fields::bake::Baker;
 use shadow_fields::bake::cache::Cache;
-use shadow_fields::frame::{Frame, Options};
+use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::{self, Access, Buffer, BufferKind, Commands, FLIGHTS, Image, ImageShape, Validation};
 use shadow_fields::scene::Scene;
 use shadow_fields::view::command::Command;
@@ -24,7 +24,7 @@ pub struct Stand {
     pub viewer: Viewer,
     image: Image,
     readback: Buffer,
-    options: Options,
+    options: frame::Options,
     pub cache: PathBuf,
     pub gpu: Gpu,
 }
@@ -49,7 +49,7 @@ impl Stand {
             workers: None,
             library: gpu.library.clone(),
             cache: Cache::new(Some(&cache)),
-            frame: Options { size: SIZE, ..small() },
+            frame: frame::Options { size: SIZE, ..small() },
             format: FORMAT,
             encodes_srgb: true,
             seed: 1,

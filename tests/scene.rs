@@ -5,7 +5,8 @@ use std::path::Path;
 use glam::{Quat, Vec3};
 use shadow_fields::Result;
 use shadow_fields::asset::embedded;
-use shadow_fields::scene::{Data, Placement, Scene};
+use shadow_fields::field::sub_light::Panel;
+use shadow_fields::scene::{Data, LightForm, Lights, Placement, Scene};
 
 fn nothing(path: &Path) -> Result<Vec<u8>> {
     Err(shadow_fields::Error::input(path, "this test has no files"))
@@ -307,4 +308,27 @@ fn the_scenes_of_the_documentation_load() {
         source.image.is_some(),
     ];
     assert_eq!((parts, scene.data.entities[0].motion.len()), ([true; 6], 5));
+}
+
+#[test]
+fn each_light_has_the_form_that_its_mesh_gives_it() {
+    let text = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n\
+        [[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 6 }\n\
+        [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.5, subdivisions = 4 }\n\
+        [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.7, minor_m = 0.25, segments = 48, sides = 24 }\n\
+        [[mesh]]\nname = \"disc\"\ndisc = { radius_m = 0.3 }\n\
+        [[mesh]]\nname = \"tube\"\nrectangle = { size_m = [1.6, 0.2] }\n\
+        [[mesh]]\nname = \"two\"\ntorus_two_colour = { major_m = 0.4, minor_m = 0.1, segments = 16, sides = 8 }\n\
+        [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"ball\"\nemission = [1, 1, 1]\n[[entity]]\nmesh = \"ring\"\nemission = [1, 1, 1]\n\
+        [[entity]]\nmesh = \"two\"\nemission = [1, 1, 1]\n\
+        [[entity]]\nmesh = \"disc\"\nemission = [1, 1, 1]\n[[entity]]\nmesh = \"tube\"\nemission = [1, 1, 1]\n";
+    let scene = Scene::parse(text, Path::new("lights.toml"), &nothing).unwrap();
+    let form = |entity, lights| LightForm::of(&scene, entity, lights);
+    let LightForm::Ball(share) = form(1, Lights::Sharp) else { panic!("a sphere is a ball") };
+    assert!((0.98..1.0).contains(&share), "{share}");
+    assert_eq!(form(2, Lights::Sharp), LightForm::Outline);
+    assert_eq!(form(3, Lights::Sharp), LightForm::Harmonics);
+    assert!(matches!(form(4, Lights::Sharp), LightForm::Panel(Panel::Disc(_))));
+    assert!(matches!(form(5, Lights::Sharp), LightForm::Panel(Panel::Rectangle(_))));
+    assert!((1..6).all(|entity| form(entity, Lights::Sh) == LightForm::Harmonics));
 }

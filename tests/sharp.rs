@@ -6,13 +6,12 @@ use common::{gpu, report};
 use shadow_fields::asset::embedded;
 use shadow_fields::bake::cache::Cache;
 use shadow_fields::check::sharp as check;
-use shadow_fields::draw::{Antialias, Shading};
-use shadow_fields::field::sub_light::Panel;
+use shadow_fields::draw::{Antialias, Finish, Shading};
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::lists::gather::Place;
 use shadow_fields::lists::scene_bounds::Counts;
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::scene::{LightForm, Lights, Scene};
+use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::truth::{RayCast, RayMeshes, World, sample_vertices};
 
 /// Relative root mean square error of the light on vertices against rays.
@@ -115,24 +114,6 @@ fn scenes_are_lit_as_by_rays() {
         report(&format!("{name}: error {found:.4}, in spherical harmonics {harmonics:.4}"));
         assert!(found < limit.min(harmonics), "{name}: {found}, in spherical harmonics {harmonics}");
     }
-}
-
-#[test]
-fn each_light_has_the_form_that_its_mesh_gives_it() {
-    let scene = parse(&format!(
-        "{HEAD}{LAMPS}[[mesh]]\nname = \"two\"\ntorus_two_colour = {{ major_m = 0.4, minor_m = 0.1, segments = 16, sides = 8 }}\n\
-        [[entity]]\nmesh = \"ball\"\nemission = [1, 1, 1]\n[[entity]]\nmesh = \"ring\"\nemission = [1, 1, 1]\n\
-        [[entity]]\nmesh = \"two\"\nemission = [1, 1, 1]\n\
-        [[entity]]\nmesh = \"disc\"\nemission = [1, 1, 1]\n[[entity]]\nmesh = \"tube\"\nemission = [1, 1, 1]\n"
-    ));
-    let form = |entity, lights| LightForm::of(&scene, entity, lights);
-    let LightForm::Ball(share) = form(1, Lights::Sharp) else { panic!("a sphere is a ball") };
-    assert!((0.98..1.0).contains(&share), "{share}");
-    assert_eq!(form(2, Lights::Sharp), LightForm::Outline);
-    assert_eq!(form(3, Lights::Sharp), LightForm::Harmonics);
-    assert!(matches!(form(4, Lights::Sharp), LightForm::Panel(Panel::Disc(_))));
-    assert!(matches!(form(5, Lights::Sharp), LightForm::Panel(Panel::Rectangle(_))));
-    assert!((1..6).all(|entity| form(entity, Lights::Sh) == LightForm::Harmonics));
 }
 
 /// A picture of a scene, linear RGB, and the pixels that evaluated lights where the device counts them.
@@ -310,6 +291,34 @@ fn pixels_follow_switches_of_entities() {
     let again = show(&mut frame);
     assert!(with != without && with == again);
     assert!(without == show(&mut new(&bare)), "a frame that was made for the other scene shows something else");
+}
+
+/// Vertices are marked that a shadow's edge comes near, but only while pixels read the marks: a frame that goes over to four samples a pixel
+/// shows what a frame does that began with them.
+#[test]
+fn edges_are_marked_where_pixels_read_them() {
+    let Some(gpu) = gpu() else { return };
+    let (_, scene, _) = scenes().swap_remove(0);
+    let new = |antialias| {
+        let options = frame::Options { shading: None, size: [96, 72], antialias, ..check::sharp_options() };
+        Frame::new(&gpu.baker(), &Cache::new(None), &scene, options, &|_, _, _| ()).unwrap()
+    };
+    let show = |frame: &mut Frame| {
+        frame.render(&scene.at(0.0), Some(4.0)).unwrap();
+        let light = frame.light_buffer().0;
+        let quads: Vec<[f32; 4]> = light.download(light.size_bytes as usize / 16).unwrap();
+        (frame.picture(), quads.iter().filter(|quad| quad[3] > 0.0).count())
+    };
+    let (by_pixel, marks) = show(&mut new(Antialias::Samples));
+    let mut frame = new(Antialias::Outlines);
+    let (by_vertex, none) = show(&mut frame);
+    report(&format!("{marks} vertices are marked for pixels, {none} where vertices evaluate"));
+    assert!(marks > 100 && none == 0);
+    assert!(frame.still(&scene.at(0.0), 4.0).unwrap() == by_pixel, "a still picture");
+    for (antialias, picture) in [(Antialias::Samples, &by_pixel), (Antialias::Outlines, &by_vertex)] {
+        frame.set_finish(Finish::Linear, antialias).unwrap();
+        assert!(show(&mut frame).0 == *picture, "{antialias:?}");
+    }
 }
 
 /// A merge that was compiled for a scene without lights learns of one that is switched on.

@@ -104,11 +104,10 @@ pub(super) fn shining(mesh: Mesh, radiance: Vec3, path: &Path) -> Result<Mesh> {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     output::check_folder(&arguments.output)?;
     output::check_ending(&arguments.output, "sf", "a field file")?;
+    let mut mesh = arguments.gltf.mesh(global, &arguments.mesh)?;
     if arguments.silhouette {
-        let mesh = arguments.gltf.mesh(global, &arguments.mesh)?;
         return silhouette::bake(global, (&mesh, &arguments.mesh), &arguments.output, arguments.options().silhouette);
     }
-    let mut mesh = arguments.gltf.mesh(global, &arguments.mesh)?;
     let kind = if arguments.radiance.is_some() { FieldKind::Radiance } else { FieldKind::Occlusion };
     if let Some(radiance) = arguments.radiance {
         mesh = shining(mesh, radiance, &arguments.mesh)?;

@@ -9,7 +9,7 @@ use clap::Args;
 /// Arguments of `check`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Only these passes: capture, project, assemble, gather, merge, draw, smooth
+    /// Only these passes
     #[arg(value_name = "PASS", value_parser = check::PASSES.map(|(name, _)| name))]
     passes: Vec<String>,
 }

@@ -4,6 +4,7 @@ use super::context::{Context, MergeArguments, size};
 use super::{Global, output};
 use crate::asset::{embedded, picture};
 use crate::bake;
+use crate::bench::figures::spread;
 use crate::draw::{Antialias, Finish};
 use crate::error::{Error, Result};
 use crate::field::Lookup;
@@ -187,18 +188,19 @@ fn still(
         }
     }
     let [(_, times), (_, samples), (_, single)] = &timed;
+    let median = |values: &[f64]| spread(values).median;
     Ok(DemoRow {
         scene: name,
         vertices: frame.receiver_vertex_count(),
         entities: scene.entities.len(),
         bake_s: frame.buffers.baked.iter().map(|b| b.report.total.as_secs_f64()).sum(),
-        merge_ms: output::median(&times.merge),
-        draw_ms: output::median(&times.draw),
-        frame_ms: output::median(&times.whole),
-        draw_4_samples_ms: output::median(&samples.draw),
-        frame_4_samples_ms: output::median(&samples.whole),
-        draw_1_sample_ms: output::median(&single.draw),
-        frame_1_sample_ms: output::median(&single.whole),
+        merge_ms: median(&times.merge),
+        draw_ms: median(&times.draw),
+        frame_ms: median(&times.whole),
+        draw_4_samples_ms: median(&samples.draw),
+        frame_4_samples_ms: median(&samples.whole),
+        draw_1_sample_ms: median(&single.draw),
+        frame_1_sample_ms: median(&single.whole),
         first_picture_s,
         variant: frame.variant().name,
     })

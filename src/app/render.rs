@@ -6,6 +6,7 @@ use super::source::GltfArguments;
 use super::{Global, output};
 use crate::asset::false_color::Scheme;
 use crate::asset::picture;
+use crate::bench::figures::spread;
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame, PictureMemory};
@@ -300,7 +301,7 @@ impl<'a> Rendering<'a> {
             self.frame.receiver_vertex_count(),
             self.prepared.as_secs_f64() * 1e3,
             if arguments.frames == 1 { "a frame".into() } else { format!("{} frames, each", arguments.frames) },
-            output::median(&walls),
+            spread(&walls).median,
             if arguments.reference {
                 format!("none: {} rays, relative standard error {:.1e}", arguments.rays, self.worst_error)
             } else {

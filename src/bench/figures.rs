@@ -49,9 +49,15 @@ pub struct Spread {
 
 /// Quartiles by linear interpolation between ranks.
 pub fn spread(values: &[f64]) -> Spread {
+    let [lower, median, upper] = quantiles(values, [0.25, 0.5, 0.75]);
+    Spread { lower, median, upper }
+}
+
+/// The values below which those shares of all lie, by linear interpolation between ranks; 0 where there are none.
+pub fn quantiles<const N: usize>(values: &[f64], shares: [f64; N]) -> [f64; N] {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let at = |share: f64| {
+    shares.map(|share| {
         let rank = share * (sorted.len().max(1) - 1) as f64;
         let (low, part) = (rank as usize, rank.fract());
         match (sorted.get(low), sorted.get(low + 1)) {
@@ -59,8 +65,7 @@ pub fn spread(values: &[f64]) -> Spread {
             (Some(a), None) => *a,
             _ => 0.0,
         }
-    };
-    Spread { lower: at(0.25), median: at(0.5), upper: at(0.75) }
+    })
 }
 
 /// The x at which a falling curve of (x, y) reaches `y`, interpolated linearly in logarithms and extrapolated beyond its last two

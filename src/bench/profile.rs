@@ -2,6 +2,7 @@
 
 use super::Bench;
 use super::ceilings::Ceilings;
+use super::figures::quantiles;
 use crate::asset::Mesh;
 use crate::bake;
 use crate::draw::{Antialias, Finish};
@@ -66,13 +67,8 @@ pub struct Tenths {
 impl Tenths {
     /// The spread of some values; all are 0 where there are none.
     pub fn new(values: &[f64]) -> Self {
-        let mut sorted = values.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            let place = (share * (sorted.len().max(1) - 1) as f64).round() as usize;
-            sorted.get(place).copied().unwrap_or(0.0)
-        };
-        Tenths { p10: at(0.1), median: at(0.5), p90: at(0.9) }
+        let [p10, median, p90] = quantiles(values, [0.1, 0.5, 0.9]);
+        Tenths { p10, median, p90 }
     }
 }
 

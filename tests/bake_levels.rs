@@ -32,7 +32,13 @@ fn scanned(subdivisions: u32) -> Mesh {
 
 fn options(levels: bool) -> bake::Options {
     let shortcuts = Shortcuts { symmetry: false, ..Default::default() };
-    bake::Options { lattice: "cube:9x2".parse().unwrap(), storage: Storage::F32, shortcuts, levels, ..Default::default() }
+    bake::Options {
+        lattice: "cube:9x2".parse().unwrap(),
+        storage: Storage::F32,
+        shortcuts,
+        levels,
+        ..Default::default()
+    }
 }
 
 fn off(found: &[f32], wanted: &[f32]) -> f64 {

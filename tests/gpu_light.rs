@@ -14,7 +14,10 @@ use stage::{at, difference, scene, small, stage};
 
 /// A denser lattice for comparisons with closed forms, f32.
 fn fine() -> frame::Options {
-    frame::Options { bake: bake::Options { lattice: "cube:12x6".parse().unwrap(), face_px: 32, ..small().bake }, ..small() }
+    frame::Options {
+        bake: bake::Options { lattice: "cube:12x6".parse().unwrap(), face_px: 32, ..small().bake },
+        ..small()
+    }
 }
 
 /// The lattice and faces that the command line bakes by default, in f32.

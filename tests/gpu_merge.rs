@@ -280,11 +280,13 @@ fn lists_too_long_for_texel_views() {
     let (scene, base) = crowd();
     let placements = scene.at(0.0);
     let variant = |name: &str| Some(Variant::named(name).unwrap());
-    let expected = stage.light(&mut stage.frame(&scene, frame::Options { variant: variant("storage"), ..base }), &placements);
+    let expected =
+        stage.light(&mut stage.frame(&scene, frame::Options { variant: variant("storage"), ..base }), &placements);
     let device = short_views();
     let baker = Baker::new(&device, &stage.gpu.library);
     for (name, lists) in [("texel", Place::Host), ("texel-shifted", Place::Device), ("image", Place::Host)] {
-        let mut frame = stage.frame_on(&baker, &scene, frame::Options { variant: variant(name), lists: Some(lists), ..base });
+        let mut frame =
+            stage.frame_on(&baker, &scene, frame::Options { variant: variant(name), lists: Some(lists), ..base });
         for round in 0..2 {
             assert_eq!(frame.variant().name, name, "all but the lists has room");
             let found = stage.light(&mut frame, &placements);

@@ -45,12 +45,8 @@ fn basis_compiles() {
 fn product_compiles() {
     for bands in 2..=6 {
         let count = bands * bands;
-        let main = format!(
-            "{} {} sh_subtract_product(a, b); {}",
-            load("a", count),
-            load("b", count),
-            store("a", count)
-        );
+        let main =
+            format!("{} {} sh_subtract_product(a, b); {}", load("a", count), load("b", count), store("a", count));
         compile(&format!("product {bands}"), &glsl_subtract(Style::Factored, bands, bands), &main);
     }
 }

@@ -118,8 +118,12 @@ fn scenes_are_lit_as_by_rays() {
 
 /// A picture of a scene, linear RGB, and the pixels that evaluated lights where the device counts them.
 fn picture(gpu: &common::Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u64>) {
-    let options =
-        frame::Options { shading: Some(shading), size: [160, 120], antialias: Antialias::None, ..check::sharp_options() };
+    let options = frame::Options {
+        shading: Some(shading),
+        size: [160, 120],
+        antialias: Antialias::None,
+        ..check::sharp_options()
+    };
     let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
     let timings = frame.render(&scene.at(0.0), Some(4.0)).unwrap();
     (frame.picture(), frame.pixels_evaluated(&timings))
@@ -273,8 +277,12 @@ fn lights_add_up_where_points_leave_out_what_stands_beside() {
 fn pixels_follow_switches_of_entities() {
     let Some(gpu) = gpu() else { return };
     let (_, scene, _) = scenes().swap_remove(0);
-    let options =
-        frame::Options { shading: Some(Shading::Pixel), size: [96, 72], antialias: Antialias::None, ..check::sharp_options() };
+    let options = frame::Options {
+        shading: Some(Shading::Pixel),
+        size: [96, 72],
+        antialias: Antialias::None,
+        ..check::sharp_options()
+    };
     let new = |scene: &Scene| Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap();
     let show = |frame: &mut Frame| {
         frame.render(&scene.at(0.0), Some(4.0)).unwrap();

@@ -37,7 +37,8 @@ fn scene(cells: usize) -> Scene {
 fn frame(gpu: &common::Gpu, scene: &Scene) -> Frame {
     let base = check::sharp_options();
     let bake = shadow_fields::bake::Options { silhouette: Default::default(), ..base.bake };
-    let options = frame::Options { bake, shading: Some(Shading::Pixel), size: PICTURE, antialias: Antialias::None, ..base };
+    let options =
+        frame::Options { bake, shading: Some(Shading::Pixel), size: PICTURE, antialias: Antialias::None, ..base };
     Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap()
 }
 

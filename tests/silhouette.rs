@@ -107,7 +107,8 @@ fn a_ball_blocks_what_two_discs_have_in_common() {
             let toward = (axis * off.cos() + a * off.sin()).normalize();
             let rays = light_rays(toward, angle, 1000);
             let exact = rays.iter().filter(|ray| ray.angle_between(axis) < ball).count() as f64 / 1000.0;
-            let [blocked, whole] = blocked_light(&field, point, toward, &SeenLight::new(1e6 * toward, 1e6 * angle.sin()));
+            let [blocked, whole] =
+                blocked_light(&field, point, toward, &SeenLight::new(1e6 * toward, 1e6 * angle.sin()));
             let error = (blocked / whole - exact).abs();
             square += error * error / 200.0;
             worst = worst.max(error);

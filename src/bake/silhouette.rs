@@ -297,7 +297,8 @@ pub fn bake_silhouette(
     let triangles = drawn_triangles(baker, mesh, &header, pixel)?;
     let plan =
         if options.symmetry { symmetric_maps::plan(mesh, &nodes, &frames, pixel) } else { vec![None; frames.len()] };
-    let captured: Vec<MapFrame> = frames.iter().zip(&plan).filter(|(_, c)| c.is_none()).map(|(frame, _)| *frame).collect();
+    let captured: Vec<MapFrame> =
+        frames.iter().zip(&plan).filter(|(_, c)| c.is_none()).map(|(frame, _)| *frame).collect();
     // Sides whose maps have the same size share the pass and its buffers.
     let sizes: &[&[Side]] =
         if header.half_px > 0 { &[&[Side::Whole], &[Side::Far, Side::Near]] } else { &[&[Side::Whole]] };

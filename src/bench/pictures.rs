@@ -98,8 +98,12 @@ fn cast(bench: &Bench<'_>, case: &Case, points: usize) -> RayCast {
 /// The program's picture, one sample a pixel, against rays from what each pixel shows.
 fn pixel_error(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<PixelError> {
     let placements = case.scene.at(case.time_s);
-    let options =
-        frame::Options { size: PIXEL_SIZE, antialias: Antialias::None, shading: Some(Shading::Pixel), ..default_options() };
+    let options = frame::Options {
+        size: PIXEL_SIZE,
+        antialias: Antialias::None,
+        shading: Some(Shading::Pixel),
+        ..default_options()
+    };
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, Some(f32::INFINITY))?;
     let found = frame.picture();

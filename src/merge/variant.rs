@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::field::lattice::{CELL_WARP, Directions, Lattice, Lookup, Spacing};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::gpu::Device;
-use crate::layout::{CLUSTER_VERTICES, ENTRY_BITS, DeviceEntity};
+use crate::layout::{CLUSTER_VERTICES, DeviceEntity, ENTRY_BITS};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::merge::chain::Product;
 use crate::sh::basis::Y00;
@@ -199,9 +199,9 @@ mod tests {
     #[test]
     fn there_are_as_many_permutations_as_counted() {
         let mut rows = HashSet::new();
-        let lattices = ["chord,scaled", "linear,raw"].into_iter().flat_map(|spacing| {
-            ["cube:8x4", "latlon:8x4x4"].map(|shape| format!("{shape},{spacing},inner=1.02"))
-        });
+        let lattices = ["chord,scaled", "linear,raw"]
+            .into_iter()
+            .flat_map(|spacing| ["cube:8x4", "latlon:8x4x4"].map(|shape| format!("{shape},{spacing},inner=1.02")));
         for lattice in lattices.map(|text| text.parse().unwrap()) {
             for &variant in VARIANTS {
                 for storage in [Storage::F16, Storage::F32] {

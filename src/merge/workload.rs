@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::{Lattice, Lookup};
 use crate::gpu::{Buffer, BufferKind, Commands, Device, Volume};
-use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, ENTRY_FORMAT, DeviceEntity, ListEntry, NONE};
+use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, DeviceEntity, ENTRY_FORMAT, ListEntry, NONE};
 use crate::lists::skip::Skip;
 use crate::merge::shelf::ImageShelf;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};

@@ -83,7 +83,8 @@ impl SharpTwin<'_> {
             LightForm::Harmonics => return 0.0,
         };
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
-        let occluders: Vec<&SharpObject<'_>> = self.occluders.iter().filter(between).map(|&j| &self.objects[j]).collect();
+        let occluders: Vec<&SharpObject<'_>> =
+            self.occluders.iter().filter(between).map(|&j| &self.objects[j]).collect();
         let near = |object: &SharpObject<'_>, toward: DVec3| {
             let field = object.silhouette.expect("what blocks or shines by its outline has a silhouette field");
             let local = |v: DVec3| object.rotation.inverse() * v;

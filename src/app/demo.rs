@@ -25,7 +25,7 @@ pub struct Arguments {
     #[arg(long, value_parser = size, value_name = "WxH")]
     size: Option<[u32; 2]>,
     /// Frames that are timed, after two to warm up
-    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, default_value_t = 8, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     timed_frames: u32,
     /// How stairs along edges are smoothed in the pictures; all ways are timed
     #[arg(long, default_value = "samples", value_name = "HOW")]

@@ -154,6 +154,6 @@ fn costs_are_what_is_documented() {
     assert_eq!([2, 3, 4, 7].map(|bands| basis_program(bands).cost().fma_count), [3, 14, 28, 97]);
     // Snyder's greedy factoring takes 399 multiplications and 274 additions.
     let product = product_program(Style::Factored, 4, 4).cost();
-    assert_eq!((product.multiply_count, product.add_count, product.fma_count), (392, 267, 394));
+    assert_eq!((product.multiply_count, product.add_count, product.fma_count), (392, 268, 394));
     assert_eq!(rotate_program(4).cost().fma_count, 128);
 }

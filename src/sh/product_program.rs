@@ -7,7 +7,7 @@
 //! "matrix" forms the elements `q_ik = sum_j G_ijk b_j` of the symmetric matrix of multiplication by b, and `c_k += q_ik a_i`,
 //! `c_i += q_ik a_k`: the only one here for a second factor of more or fewer bands. "points" is in [`super::points`].
 //!
-//! Multiply-adds at 4 bands: factored 394 (392 multiplications and 267 additions), pairs 414, matrix 426, points 467; matrix of
+//! Multiply-adds at 4 bands: factored 394 (392 multiplications and 268 additions), pairs 414, matrix 426, points 467; matrix of
 //! 4 by 5, 6 and 7 bands: 533, 596, 644.
 
 use std::collections::BTreeMap;

@@ -184,10 +184,15 @@ impl Batches {
     /// As [`Capture::new`]; `Device` when memory ran out.
     pub fn new(baker: &Baker, captures: &Captures<'_>) -> Result<Self> {
         let kind = captures.reduction.captured();
-        let cost = if kind == CaptureKind::Radiance { Cost::DRAWN } else { Cost::COMPUTED };
         let (device, library) = (baker.device(), baker.library());
         let mut capture = Capture::new(device, library, captures.face_px, kind)?;
         capture.skips = captures.shortcuts.faces;
+        let model = match captures.levels {
+            true => Model::with_levels(device, captures.mesh, baker.leveled(captures.mesh)?)?,
+            false => Model::new(device, captures.mesh, kind == CaptureKind::Radiance)?,
+        };
+        let is_drawn = device.info.is_software() && !capture.computes(&model);
+        let cost = if is_drawn { Cost::DRAWN } else { Cost::COMPUTED };
         let Captures { reduction, face_px, .. } = *captures;
         let (columns, capacity) = (capture.columns, capture.capacity());
         let maps_bytes = if reduction.has_maps() { BYTES } else { 0 };
@@ -201,10 +206,7 @@ impl Batches {
         Ok(Batches {
             project: project.transpose()?,
             self_visibility: self_visibility.transpose()?,
-            model: match captures.levels {
-                true => Model::with_levels(device, captures.mesh, baker.leveled(captures.mesh)?)?,
-                false => Model::new(device, captures.mesh, kind == CaptureKind::Radiance)?,
-            },
+            model,
             jobs: Project::job_buffer(device, capacity)?,
             culls: captures.shortcuts.inside,
             triangle_seconds: cost.triangle * facing_share(captures.mesh),

@@ -221,17 +221,18 @@ impl Batches {
         let eyes: Vec<Vec3> = targets.iter().map(|target| target.eye).collect();
         let (mut planned, mut units) = (Vec::with_capacity(targets.len()), Vec::new());
         let mut first = 0;
+        let outlooks = self.capture.look(&self.model, &eyes);
         while first < targets.len() {
-            let slots = self.capture.plan(&self.model, &eyes[first..]);
+            let slots = self.capture.places(&outlooks[first..]);
             let mut unit = Unit { first: planned.len() as u32, count: 0, seconds: 0.0 };
-            for (target, slots) in targets[first..].iter().zip(&slots) {
+            for ((target, slots), outlook) in targets[first..].iter().zip(&slots).zip(&outlooks[first..]) {
                 if target.job.scale == 0.0 && self.self_visibility.is_none() {
                     continue;
                 }
                 planned.push(CaptureTarget { job: Job { slots: *slots, ..target.job }, ..*target });
-                let triangles = self.model.triangles_seen(target.eye, self.capture.face_px) as f64;
                 unit.count += 1;
-                unit.seconds += self.triangle_seconds * triangles + self.face_seconds * f64::from(face_count(slots));
+                unit.seconds +=
+                    self.triangle_seconds * outlook.triangles as f64 + self.face_seconds * f64::from(face_count(slots));
             }
             units.extend((unit.count > 0).then_some(unit));
             first += slots.len();

@@ -19,6 +19,7 @@ use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
 
 /// Edge of the atlas in texels, where the device allows it. It holds 1 024 faces of 64 px, in 4 MB for occlusion.
@@ -35,6 +36,14 @@ struct Push {
     right: [f32; 4],
     down: [f32; 4],
     forward: [f32; 4],
+}
+
+/// What an eye is shown.
+pub(super) struct Outlook {
+    /// The faces that the object reaches.
+    faces: [bool; FACE_COUNT],
+    /// Triangles of all sides of the object.
+    pub triangles: usize,
 }
 
 /// What a capture sees.
@@ -160,30 +169,41 @@ impl Capture {
         self.columns * self.columns
     }
 
+    /// What each eye is shown.
+    pub(super) fn look(&self, model: &Model, eyes: &[Vec3]) -> Vec<Outlook> {
+        let of = |buffer: &mut Vec<u32>, &eye: &Vec3| {
+            let seen = model.seen(eye, self.face_px, buffer);
+            let faces = std::array::from_fn(|face| {
+                let (forward, right, down) = face_axes(face);
+                let whole = reaches(eye, Vec3::ZERO, 1.0, forward, right, down);
+                let reached = || seen.clone().any(|c| reaches(eye, c.centre, c.radius, forward, right, down));
+                !self.skips || (whole && reached())
+            });
+            Outlook { faces, triangles: seen.map(|chunk| chunk.indices.len() / 3).sum() }
+        };
+        eyes.par_iter().map_init(Vec::new, of).collect()
+    }
+
     /// Gives the faces of the next eyes their places in the atlas until it is full. Returns a slot table for every eye that fits;
     /// at least one does.
-    pub fn plan(&self, model: &Model, eyes: &[Vec3]) -> Vec<Slots> {
-        let mut used = 0;
-        let (mut out, mut buffer) = (Vec::new(), Vec::new());
-        for &eye in eyes {
+    pub(super) fn places(&self, outlooks: &[Outlook]) -> Vec<Slots> {
+        let (mut used, mut out) = (0, Vec::new());
+        for outlook in outlooks {
             // An eye that sees nothing has no face, but it still has a job.
             if used.max(out.len() as u32) + FACE_COUNT as u32 > self.capacity() {
                 break;
             }
-            let mut slots = [NO_SLOT; FACE_COUNT];
-            let seen = model.seen(eye, self.face_px, &mut buffer);
-            for (face, slot) in slots.iter_mut().enumerate() {
-                let (forward, right, down) = face_axes(face);
-                let whole = reaches(eye, Vec3::ZERO, 1.0, forward, right, down);
-                let reached = || seen.clone().any(|c| reaches(eye, c.centre, c.radius, forward, right, down));
-                if !self.skips || (whole && reached()) {
-                    *slot = used;
-                    used += 1;
-                }
-            }
-            out.push(slots);
+            out.push(outlook.faces.map(|shows| {
+                used += u32::from(shows);
+                if shows { used - 1 } else { NO_SLOT }
+            }));
         }
         out
+    }
+
+    /// The places of the next eyes' faces, as `Batches::plan` gives them to a whole bake's.
+    pub fn plan(&self, model: &Model, eyes: &[Vec3]) -> Vec<Slots> {
+        self.places(&self.look(model, eyes))
     }
 
     /// Chooses what every planned face shows. Back faces of closed meshes are culled when `cull` is set.
@@ -193,21 +213,23 @@ impl Capture {
     pub fn choose(&self, model: &Model, eyes: &[Vec3], plan: &[Slots], cull: bool) -> Result<Drawn> {
         let closed = cull && model.closed;
         let computes = self.computes(model);
-        let (mut buffer, mut faces, mut indices) = (Vec::new(), Vec::new(), Vec::<u32>::new());
-        for (&eye, slots) in eyes.iter().zip(plan) {
-            let seen = model.seen(eye, self.face_px, &mut buffer);
+        let shown = |buffer: &mut Vec<u32>, (&eye, slots): (&Vec3, &Slots)| -> Vec<DrawnFace> {
+            let seen = model.seen(eye, self.face_px, buffer);
             let facing: Vec<&Chunk> = seen.filter(|chunk| !(closed && self.skips && chunk.turned_away(eye))).collect();
-            for (face, &slot) in slots.iter().enumerate().filter(|(_, slot)| **slot != NO_SLOT) {
+            let drawn = slots.iter().enumerate().filter(|(_, slot)| **slot != NO_SLOT);
+            let face = |(face, &slot)| {
                 let (forward, right, down) = face_axes(face);
-                let reached = |chunk: &&Chunk| reaches(eye, chunk.centre, chunk.radius, forward, right, down);
-                let visible = facing.iter().copied().filter(|chunk| !self.skips || reached(chunk));
-                let runs = match model.gathered_from() {
-                    Some(leveled) if !computes => {
-                        leveled.levels.gathered(visible.map(|chunk| chunk.indices.clone()), &mut indices)
-                    }
-                    _ => joined(visible.map(|chunk| chunk.indices.clone())),
-                };
-                faces.push(DrawnFace { eye, face, slot, runs });
+                let reached = |chunk: &&&Chunk| reaches(eye, chunk.centre, chunk.radius, forward, right, down);
+                let visible = facing.iter().filter(|chunk| !self.skips || reached(chunk));
+                DrawnFace { eye, face, slot, runs: joined(visible.map(|chunk| chunk.indices.clone())) }
+            };
+            drawn.map(face).collect()
+        };
+        let mut faces: Vec<DrawnFace> = eyes.par_iter().zip(plan).map_init(Vec::new, shown).flatten_iter().collect();
+        let mut indices = Vec::new();
+        if let Some(leveled) = model.gathered_from().filter(|_| !computes) {
+            for face in &mut faces {
+                face.runs = leveled.levels.gathered(&face.runs, &mut indices);
             }
         }
         if computes {

@@ -135,9 +135,11 @@ impl Levels {
     }
 
     /// Adds the indices of ranges to `indices`, and returns the run that they are there.
-    pub fn gathered(&self, ranges: impl Iterator<Item = Range<u32>>, indices: &mut Vec<u32>) -> Vec<Range<u32>> {
+    pub fn gathered(&self, ranges: &[Range<u32>], indices: &mut Vec<u32>) -> Vec<Range<u32>> {
         let start = indices.len() as u32;
-        ranges.for_each(|range| indices.extend_from_slice(&self.indices[range.start as usize..range.end as usize]));
+        ranges
+            .iter()
+            .for_each(|range| indices.extend_from_slice(&self.indices[range.start as usize..range.end as usize]));
         let end = indices.len() as u32;
         if start < end { vec![start..end] } else { Vec::new() }
     }

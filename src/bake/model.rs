@@ -92,11 +92,6 @@ impl Model {
         };
         chosen.iter().map(|&index| &chunks[index as usize])
     }
-
-    /// Number of triangles that an eye is shown in faces of `face_px`, of all sides of the object.
-    pub fn triangles_seen(&self, eye: Vec3, face_px: u32) -> usize {
-        self.seen(eye, face_px, &mut Vec::new()).map(|chunk| chunk.indices.len() / 3).sum()
-    }
 }
 
 /// What one face shows: runs of indices.

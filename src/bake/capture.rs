@@ -201,7 +201,7 @@ impl Capture {
         out
     }
 
-    /// The places of the next eyes' faces, as `Batches::plan` gives them to a whole bake's.
+    /// The places of the next eyes' faces, for captures that are not planned as a whole bake.
     pub fn plan(&self, model: &Model, eyes: &[Vec3]) -> Vec<Slots> {
         self.places(&self.look(model, eyes))
     }
@@ -219,8 +219,8 @@ impl Capture {
             let drawn = slots.iter().enumerate().filter(|(_, slot)| **slot != NO_SLOT);
             let face = |(face, &slot)| {
                 let (forward, right, down) = face_axes(face);
-                let reached = |chunk: &&&Chunk| reaches(eye, chunk.centre, chunk.radius, forward, right, down);
-                let visible = facing.iter().filter(|chunk| !self.skips || reached(chunk));
+                let reached = |chunk: &&Chunk| reaches(eye, chunk.centre, chunk.radius, forward, right, down);
+                let visible = facing.iter().copied().filter(|chunk| !self.skips || reached(chunk));
                 DrawnFace { eye, face, slot, runs: joined(visible.map(|chunk| chunk.indices.clone())) }
             };
             drawn.map(face).collect()

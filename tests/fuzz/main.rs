@@ -8,6 +8,7 @@ mod common;
 mod farm;
 mod memory;
 mod mutate;
+mod stored;
 mod targets;
 
 use common::report;

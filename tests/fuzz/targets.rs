@@ -1,16 +1,12 @@
 //! Every parser and decoder, with the inputs that mutation starts from.
 
 use super::common::generate;
-use super::farm;
+use super::{farm, stored};
 use glam::DVec3;
-use serde::de::DeserializeOwned;
 use shadow_fields::asset::equirect::Equirect;
 use shadow_fields::asset::{Mesh, embedded, picture};
-use shadow_fields::bake::{self, partial::Partial};
 use shadow_fields::error::Error;
-use shadow_fields::field::file::{self, FIELD_MAGIC, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC};
-use shadow_fields::field::silhouette::{SILHOUETTE_MAGIC, SilhouetteField, SilhouetteHeader};
-use shadow_fields::field::{FieldKind, Lattice, Lookup, ShadowField, Storage};
+use shadow_fields::field::Lattice;
 use shadow_fields::gpu::{pipeline_cache, shader};
 use shadow_fields::merge::calibrate::Calibration;
 use shadow_fields::scene::Scene;
@@ -40,10 +36,10 @@ pub const TARGETS: &[Target] = &[
         reads_file: true,
     },
     Target { name: "toml", seeds: scenes, tokens: TOML, parse: scene, reads_file: true },
-    Target { name: "sf", seeds: fields, tokens: HEADER, parse: field, reads_file: true },
-    Target { name: "outlines", seeds: outlines, tokens: HEADER, parse: outline, reads_file: true },
-    Target { name: "selfvis", seeds: payloads, tokens: HEADER, parse: payload, reads_file: true },
-    Target { name: "part", seeds: parts, tokens: HEADER, parse: part, reads_file: false },
+    Target { name: "sf", seeds: stored::fields, tokens: HEADER, parse: stored::field, reads_file: true },
+    Target { name: "outlines", seeds: stored::outlines, tokens: HEADER, parse: stored::outline, reads_file: true },
+    Target { name: "selfvis", seeds: stored::payloads, tokens: HEADER, parse: stored::payload, reads_file: true },
+    Target { name: "part", seeds: stored::parts, tokens: HEADER, parse: stored::part, reads_file: false },
     Target {
         name: "picture",
         seeds: pictures,
@@ -256,112 +252,11 @@ pub fn sealed(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// The file that `write` writes, with a zero byte between header and payload so that [`sealed`] finds the border.
-fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
-    with_file(&[], |path| {
-        write(path);
-        bordered(std::fs::read(path).unwrap())
-    })
-}
-
 /// A file with a zero byte between header and payload.
 pub fn bordered(mut bytes: Vec<u8>) -> Vec<u8> {
     let header = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
     bytes.insert(56 + header, 0);
     bytes
-}
-
-fn field_of(kind: FieldKind, storage: Storage, lattice: &str) -> ShadowField {
-    let options =
-        bake::Options { storage, lattice: lattice.parse().unwrap(), bands: 2, face_px: 16, ..Default::default() };
-    let header = bake::header(&generate::sphere(0.7, 0), kind, &options);
-    let payload = (0..header.payload_bytes()).map(|i| (i * 37) as u8 & 0x3f).collect();
-    ShadowField { header, payload }
-}
-
-fn fields() -> Vec<Vec<u8>> {
-    let one = field_of(FieldKind::Occlusion, Storage::F16, "cube:2x2");
-    let other = field_of(FieldKind::Radiance, Storage::F32, "latlon:2x2x2,linear,raw,inner=0.3,outer=5");
-    [one, other].map(|field| written(|path| field.write(path).unwrap())).into()
-}
-
-/// What [`file::read`] says to a file of such content, without the file, which would take twice as long.
-fn sealed_file<H: DeserializeOwned>(bytes: &[u8], magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
-    file::parse(&sealed(bytes), Path::new(NAME), magic)
-}
-
-fn field(bytes: &[u8]) -> Result<()> {
-    let (header, payload) = sealed_file(bytes, FIELD_MAGIC)?;
-    let field = ShadowField::new(header, payload).map_err(|error| Error::input(Path::new(NAME), error))?;
-    let mut out = vec![0.0; field.header.bands * field.header.bands];
-    for at in [DVec3::new(0.0, 1.5, 0.2), DVec3::new(-30.0, 1.0, 4.0), DVec3::ZERO] {
-        for lookup in [Lookup::Trilinear, Lookup::Nearest] {
-            field.lookup(at, lookup, 0, &mut out);
-        }
-    }
-    Ok(())
-}
-
-fn outline_field() -> SilhouetteField {
-    let header = SilhouetteHeader {
-        cells: 1,
-        map_px: 8,
-        view_px: 16,
-        half_px: 4,
-        level_pixels: 0.0,
-        symmetry: true,
-        centre_m: [0.0; 3],
-        radius_m: 1.0,
-        extent: [[-0.5; 3], [0.5; 3]],
-        mesh: "m".into(),
-        mesh_hash: String::new(),
-    };
-    let map: Vec<u8> = [0.0_f32, 0.0, 0.5, 0.5].iter().flat_map(|x| x.to_le_bytes()).chain([9; 128 + 2 * 32]).collect();
-    let payload = map.repeat(header.map_count());
-    SilhouetteField::new(header, payload).unwrap()
-}
-
-fn outlines() -> Vec<Vec<u8>> {
-    vec![written(|path| outline_field().write(path).unwrap())]
-}
-
-fn outline(bytes: &[u8]) -> Result<()> {
-    let (header, payload) = sealed_file(bytes, SILHOUETTE_MAGIC)?;
-    let field = SilhouetteField::new(header, payload).map_err(|error| Error::input(Path::new(NAME), error))?;
-    for direction in [DVec3::X, DVec3::new(0.3, -0.8, 0.52).normalize()] {
-        let near = field.near(DVec3::new(0.4, 2.0, -0.1), direction);
-        let blocked = field.blocked(&near, direction, 1.0, 0.1);
-        assert!((0.0..=1.0).contains(&blocked), "{blocked} of a light is blocked");
-    }
-    Ok(())
-}
-
-const MAGICS: [[u8; 8]; 4] = [SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC, FIELD_MAGIC, SILHOUETTE_MAGIC];
-
-fn payloads() -> Vec<Vec<u8>> {
-    let header = serde_json::json!({ "mesh_hash": "00", "face_px": 16, "offset": 1e-3, "side": 16, "vertex_count": 2 });
-    let of = |magic| written(|path| file::write(path, magic, &header, &[7; 64]).unwrap());
-    MAGICS.into_iter().take(2).map(of).collect()
-}
-
-fn payload(bytes: &[u8]) -> Result<()> {
-    let sealed = sealed(bytes);
-    let [first, ..] = MAGICS.map(|magic| file::parse::<serde_json::Value>(&sealed, Path::new(NAME), magic).map(|_| ()));
-    first
-}
-
-fn parts() -> Vec<Vec<u8>> {
-    let header = serde_json::json!({ "done": 2, "all": 3, "numbers": 12 });
-    vec![written(|path| file::write(path, *b"SHPART\n\0", &header, &[7; 48]).unwrap())]
-}
-
-fn part(bytes: &[u8]) -> Result<()> {
-    with_file(&sealed(bytes), |path| {
-        let mut values = [0_f32; 12];
-        let done = Partial::new(Some(path.to_owned())).load(&mut values, 3);
-        assert!(done <= 3, "{done} of 3 samples are kept");
-        if done == 0 { Err(Error::Failed("it counts as none".into())) } else { Ok(()) }
-    })
 }
 
 fn radiance_picture() -> Vec<u8> {

@@ -6,7 +6,7 @@
 //! are drawn in chunks of neighbouring triangles. A chunk is left out if its bounding sphere does not reach into the face, or if
 //! the mesh is closed and the eye sees only backs of the chunk. Of a large mesh, chunks of fewer triangles stand for what is far off.
 
-use super::chunk::{Chunk, joined, reaches};
+use super::chunk::{faces_reached, joined};
 use super::model::DrawnFace;
 pub use super::model::{Drawn, Model};
 use super::raster::{Raster, face_axes};
@@ -20,6 +20,7 @@ use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 /// Edge of the atlas in texels, where the device allows it. It holds 1 024 faces of 64 px, in 4 MB for occlusion.
@@ -171,15 +172,17 @@ impl Capture {
 
     /// What each eye is shown.
     pub(super) fn look(&self, model: &Model, eyes: &[Vec3]) -> Vec<Outlook> {
-        let of = |buffer: &mut Vec<u32>, &eye: &Vec3| {
-            let seen = model.seen(eye, self.face_px, buffer);
-            let faces = std::array::from_fn(|face| {
-                let (forward, right, down) = face_axes(face);
-                let whole = reaches(eye, Vec3::ZERO, 1.0, forward, right, down);
-                let reached = || seen.clone().any(|c| reaches(eye, c.centre, c.radius, forward, right, down));
-                !self.skips || (whole && reached())
-            });
-            Outlook { faces, triangles: seen.map(|chunk| chunk.indices.len() / 3).sum() }
+        let of = |buffer: &mut Vec<Range<u32>>, &eye: &Vec3| {
+            let mut outlook = Outlook { faces: [!self.skips; FACE_COUNT], triangles: 0 };
+            let whole = faces_reached(eye, Vec3::ZERO, 1.0);
+            for chunk in model.seen(eye, self.face_px, buffer) {
+                outlook.triangles += chunk.indices.len() / 3;
+                let reached = faces_reached(eye, chunk.centre, chunk.radius);
+                for (shows, (whole, reached)) in outlook.faces.iter_mut().zip(whole.into_iter().zip(reached)) {
+                    *shows |= whole && reached;
+                }
+            }
+            outlook
         };
         eyes.par_iter().map_init(Vec::new, of).collect()
     }
@@ -213,15 +216,14 @@ impl Capture {
     pub fn choose(&self, model: &Model, eyes: &[Vec3], plan: &[Slots], cull: bool) -> Result<Drawn> {
         let closed = cull && model.closed;
         let computes = self.computes(model);
-        let shown = |buffer: &mut Vec<u32>, (&eye, slots): (&Vec3, &Slots)| -> Vec<DrawnFace> {
+        let shown = |buffer: &mut Vec<Range<u32>>, (&eye, slots): (&Vec3, &Slots)| -> Vec<DrawnFace> {
             let seen = model.seen(eye, self.face_px, buffer);
-            let facing: Vec<&Chunk> = seen.filter(|chunk| !(closed && self.skips && chunk.turned_away(eye))).collect();
+            let facing = seen.filter(|chunk| !(closed && self.skips && chunk.turned_away(eye)));
+            let facing: Vec<_> = facing.map(|c| (&c.indices, faces_reached(eye, c.centre, c.radius))).collect();
             let drawn = slots.iter().enumerate().filter(|(_, slot)| **slot != NO_SLOT);
-            let face = |(face, &slot)| {
-                let (forward, right, down) = face_axes(face);
-                let reached = |chunk: &&Chunk| reaches(eye, chunk.centre, chunk.radius, forward, right, down);
-                let visible = facing.iter().copied().filter(|chunk| !self.skips || reached(chunk));
-                DrawnFace { eye, face, slot, runs: joined(visible.map(|chunk| chunk.indices.clone())) }
+            let face = |(face, &slot): (usize, &u32)| {
+                let visible = facing.iter().filter(|(_, reached)| !self.skips || reached[face]);
+                DrawnFace { eye, face, slot, runs: joined(visible.map(|(indices, _)| (*indices).clone())) }
             };
             drawn.map(face).collect()
         };

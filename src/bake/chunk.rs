@@ -1,7 +1,8 @@
 //! Chunks are runs of neighbouring triangles that are drawn or left out together. Each has the bounds that decide it.
 
 use crate::error::{Error, Result};
-use glam::{DVec3, Vec3};
+use crate::sh::cube::FACE_COUNT;
+use glam::{DVec3, Vec3, Vec3Swizzles};
 use meshopt::{VertexDataAdapter, build_meshlets, extract_meshlet_indices};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -115,13 +116,20 @@ pub fn morton(p: Vec3) -> u32 {
     spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
 }
 
-/// Whether a sphere reaches into the pyramid of a cube face seen from `eye`. It is never false for a sphere that does.
-pub(super) fn reaches(eye: Vec3, centre: Vec3, radius: f32, forward: Vec3, right: Vec3, down: Vec3) -> bool {
+/// For every cube face seen from `eye`, in the order of [`crate::sh::cube::face_basis`], whether a sphere reaches into its pyramid. It
+/// is never false where the sphere does.
+pub(super) fn faces_reached(eye: Vec3, centre: Vec3, radius: f32) -> [bool; FACE_COUNT] {
     let q = centre - eye;
     // Planes through the eye at 45 degrees: their unit normals are (forward +- side) / sqrt 2. The margin covers rounding.
     let reach = -1.0001 * radius * std::f32::consts::SQRT_2 - 1e-6;
-    let (f, r, d) = (q.dot(forward), q.dot(right), q.dot(down));
-    f + r >= reach && f - r >= reach && f + d >= reach && f - d >= reach && f >= -1.0001 * radius - 1e-6
+    let behind = -1.0001 * radius - 1e-6;
+    let abs = q.abs();
+    let side = abs.yxx().max(abs.zzy());
+    let (ahead, back) = (
+        (q - side).cmpge(Vec3::splat(reach)) & q.cmpge(Vec3::splat(behind)),
+        (-q - side).cmpge(Vec3::splat(reach)) & (-q).cmpge(Vec3::splat(behind)),
+    );
+    [ahead.x, back.x, ahead.y, back.y, ahead.z, back.z]
 }
 
 /// Joins ranges where one begins at the end of another.

@@ -8,9 +8,12 @@ use super::surface::Surface;
 use glam::DVec3;
 use rayon::prelude::*;
 
+/// Most points that a thread takes at a time. Points near the surface take far longer than those outside its box.
+const TOGETHER: usize = 64;
+
 /// Marks the points inside the mesh. Surface and points are in the same frame.
 pub fn inside(surface: &Surface, points: &[DVec3]) -> Vec<bool> {
-    points.par_iter().map(|&point| surface.encloses(point)).collect()
+    points.par_iter().with_max_len(TOGETHER).map(|&point| surface.encloses(point)).collect()
 }
 
 /// For every marked point the nearest place that stands off the surface by [`TRANSFER_OFFSET`], from where something can be seen. It is
@@ -24,7 +27,7 @@ pub fn pushed_out(surface: &Surface, points: &[DVec3], inside: &[bool]) -> Vec<O
         let eye = on_surface + f64::from(TRANSFER_OFFSET) * (on_surface - point).try_normalize()?;
         (!surface.encloses(eye)).then_some(eye)
     };
-    points.par_iter().zip(inside).map(place).collect()
+    points.par_iter().zip(inside).with_max_len(TOGETHER).map(place).collect()
 }
 
 /// The point of a triangle nearest to the origin (Ericson, *Real-Time Collision Detection*, section 5.1.5, by regions). Bakes of large

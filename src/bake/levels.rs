@@ -88,6 +88,13 @@ impl Tolerance {
 /// Chunks that are simplified together.
 struct Group {
     bounds: Bounds,
+    parts: Range<usize>,
+}
+
+/// Chunks of a group that were simplified from one group.
+struct Part {
+    /// That group, or `None` for the mesh's own triangles.
+    from: Option<usize>,
     chunks: Range<u32>,
 }
 
@@ -105,8 +112,7 @@ enum Below {
 /// Which chunk is drawn in whose place.
 pub(super) struct Levels {
     groups: Vec<Group>,
-    /// For each chunk the group that it was simplified from, or `None` for the mesh's own triangles.
-    from: Vec<Option<u32>>,
+    parts: Vec<Part>,
     /// The first nodes are the roots of the levels.
     nodes: Vec<Node>,
     depth: usize,
@@ -115,8 +121,8 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    /// Puts the chunks that are drawn under a tolerance into `chosen`, in order.
-    pub fn choose(&self, tolerance: Tolerance, chosen: &mut Vec<u32>) {
+    /// Puts runs of the chunks that are drawn under a tolerance into `chosen`, in order.
+    pub fn choose(&self, tolerance: Tolerance, chosen: &mut Vec<Range<u32>>) {
         chosen.clear();
         let mut open: Vec<usize> = (0..self.depth).collect();
         while let Some(node) = open.pop().map(|index| &self.nodes[index]) {
@@ -125,13 +131,14 @@ impl Levels {
             }
             match &node.below {
                 Below::Nodes(children) => open.extend(children.clone()),
-                Below::Group(group) => chosen.extend(self.groups[*group].chunks.clone().filter(|&chunk| {
-                    let from = self.from[chunk as usize];
-                    !from.is_some_and(|group| tolerance.forbids(&self.groups[group as usize].bounds))
-                })),
+                Below::Group(group) => {
+                    let parts = &self.parts[self.groups[*group].parts.clone()];
+                    let drawn = |part: &&Part| !part.from.is_some_and(|g| tolerance.forbids(&self.groups[g].bounds));
+                    chosen.extend(parts.iter().filter(drawn).map(|part| part.chunks.clone()));
+                }
             }
         }
-        chosen.sort_unstable();
+        chosen.sort_unstable_by_key(|chunks| chunks.start);
     }
 
     /// Adds the indices of ranges to `indices`, and returns the run that they are there.
@@ -161,7 +168,7 @@ impl Leveled {
     pub fn within(&self, error: f64) -> Vec<[u32; 3]> {
         let mut chosen = Vec::new();
         self.levels.choose(Tolerance::Parallel(error as f32), &mut chosen);
-        let drawn = chosen.iter().flat_map(|&chunk| self.chunked.triangles_of(chunk as usize));
+        let drawn = chosen.into_iter().flatten().flat_map(|chunk| self.chunked.triangles_of(chunk as usize));
         drawn.map(|triangle| triangle.map(|vertex| self.chunked.vertices[vertex as usize])).collect()
     }
 }
@@ -181,16 +188,18 @@ fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Level
         simplify_fallback_sloppy: false,
         ..clod_default_config(CHUNK_TRIANGLES)
     };
-    let (mut chunked, mut from, mut groups) = (Chunked::default(), Vec::new(), Vec::new());
+    let (mut chunked, mut parts, mut groups) = (Chunked::default(), Vec::new(), Vec::new());
     let mut of_groups = Vec::new();
     clod_build(config, &ClodMesh::new(&welded, &adapter), |group, clusters| {
-        let first = chunked.chunks.len() as u32;
-        for cluster in clusters {
-            chunked.add(positions, cluster.indices);
-            from.push(u32::try_from(cluster.refined).ok());
+        let first = parts.len();
+        for alike in clusters.chunk_by(|a, b| a.refined == b.refined) {
+            let start = chunked.chunks.len() as u32;
+            alike.iter().for_each(|cluster| chunked.add(positions, cluster.indices));
+            let chunks = start..chunked.chunks.len() as u32;
+            parts.push(Part { from: usize::try_from(alike[0].refined).ok(), chunks });
         }
         of_groups.push(group);
-        groups.push(Group { bounds: group.simplified.into(), chunks: first..chunked.chunks.len() as u32 });
+        groups.push(Group { bounds: group.simplified.into(), parts: first..parts.len() });
         groups.len() as i32 - 1
     });
     let depth = of_groups.iter().map(|group| group.depth as usize + 1).max().unwrap_or(0);
@@ -206,7 +215,7 @@ fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Level
     };
     let nodes = clod_build_hierarchy(&of_groups, NODE_CHILDREN, depth).into_iter().map(node).collect();
     let indices = chunked.triangles.as_flattened().to_vec();
-    Ok((chunked, Levels { groups, from, nodes, depth, indices }))
+    Ok((chunked, Levels { groups, parts, nodes, depth, indices }))
 }
 
 #[cfg(test)]
@@ -235,8 +244,8 @@ mod tests {
             let drawn = |tolerance: Tolerance| {
                 let mut chosen = Vec::new();
                 levels.choose(tolerance, &mut chosen);
-                let of = |&chunk: &u32| chunked.triangles_of(chunk as usize).to_vec();
-                let triangles: Vec<[u32; 3]> = chosen.iter().flat_map(of).collect();
+                let of = |chunk: u32| chunked.triangles_of(chunk as usize).to_vec();
+                let triangles: Vec<[u32; 3]> = chosen.into_iter().flatten().flat_map(of).collect();
                 triangles.iter().map(|t| t.map(|vertex| chunked.vertices[vertex as usize])).collect::<Vec<_>>()
             };
             let mut rng = fastrand::Rng::with_seed(5);

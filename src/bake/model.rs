@@ -72,25 +72,25 @@ impl Model {
         }
     }
 
-    /// The chunks that an eye is shown in faces of `face_px`. `buffer` holds their numbers.
+    /// The chunks that an eye is shown in faces of `face_px`. `buffer` holds runs of their numbers.
     pub(super) fn seen<'m>(
         &'m self,
         eye: Vec3,
         face_px: u32,
-        buffer: &'m mut Vec<u32>,
-    ) -> impl Iterator<Item = &'m Chunk> + Clone {
-        let (chunks, chosen) = match &self.cut {
+        buffer: &'m mut Vec<Range<u32>>,
+    ) -> impl Iterator<Item = &'m Chunk> {
+        let chunks = match &self.cut {
             Cut::Levels(leveled) => {
                 leveled.levels.choose(Tolerance::capture(eye, face_px), buffer);
-                (&leveled.chunked.chunks, buffer.as_slice())
+                &leveled.chunked.chunks
             }
             Cut::Whole(chunks) => {
                 buffer.clear();
-                buffer.extend(0..chunks.len() as u32);
-                (chunks, buffer.as_slice())
+                buffer.push(0..chunks.len() as u32);
+                chunks
             }
         };
-        chosen.iter().map(|&index| &chunks[index as usize])
+        buffer.iter().flat_map(|run| &chunks[run.start as usize..run.end as usize])
     }
 }
 

@@ -42,7 +42,7 @@ impl Sources {
     /// Plans the assembly of a lattice of which `unseen` marks the captured samples that may not be used.
     ///
     /// An unusable sample is replaced by the mean of the usable samples that are fewest steps away. A step leads to the next shell or
-    /// to the next direction. `inside` marks samples that were captured elsewhere (see [`super::inside::pushed_out`]); no second
+    /// to the next direction. `inside` marks samples that were captured elsewhere (see [`super::surface::pushed_out`]); no second
     /// difference is taken across them. Every other sample is lowered by `SAG` of its second differences along shells and along
     /// both directions.
     ///

@@ -10,7 +10,6 @@ use super::chunk::{faces_reached, joined};
 use super::model::DrawnFace;
 pub use super::model::{Drawn, Model};
 use super::raster::{Raster, face_axes};
-pub use super::triangles::unit_positions;
 use crate::error::{Error, Result};
 use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::{Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Keeps, Target};
@@ -292,7 +291,7 @@ fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
 }
 
 /// The CPU twin of an occlusion capture, by another method: it casts a ray through every texel centre of one face. The result is
-/// row-major and true where a ray hits the object. Positions are those of [`unit_positions`].
+/// row-major and true where a ray hits the object. Positions are those of [`super::triangles::unit_positions`].
 pub fn twin(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: usize, face_px: u32) -> Vec<bool> {
     let mut covered = vec![false; (face_px * face_px) as usize];
     rays(positions, triangles, eye, face, face_px, |texel, _, _| covered[texel] = true);

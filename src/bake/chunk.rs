@@ -148,7 +148,7 @@ pub(super) fn joined(ranges: impl Iterator<Item = Range<u32>>) -> Vec<Range<u32>
 mod tests {
     use super::*;
     use crate::asset::generate;
-    use crate::bake::capture::unit_positions;
+    use crate::bake::triangles::unit_positions;
 
     #[test]
     fn chunks_hold_every_triangle_once_and_only_backs_are_turned_away() {

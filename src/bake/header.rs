@@ -1,9 +1,9 @@
 //! What decides a bake: its options, and the header of the field, which follows from the options and a mesh.
 
-use super::capture::unit_positions;
 use super::levels;
 use super::silhouette::SilhouetteOptions;
 use super::surface::depth_at_origin;
+use super::triangles::unit_positions;
 use crate::asset::mesh::Mesh;
 use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
 use crate::field::quantity::{FieldKind, Storage};

@@ -7,13 +7,16 @@
 //! drawn simplified, and if the group that it was simplified from may.
 
 use super::chunk::{Chunked, adapter};
-use super::symmetric_samples::TEXEL_SHARE;
 use super::triangles::{distinct, unit_positions};
 use crate::asset::Mesh;
 use crate::error::Result;
 use glam::Vec3;
 use meshopt::{ClodBounds, ClodConfig, ClodMesh, clod_build, clod_build_hierarchy, clod_default_config};
 use std::ops::Range;
+
+/// Largest displacement of what is captured, in texels of a face. The facets of a round body lie partly inside and partly outside
+/// of it, so a displacement neither shrinks nor grows the solid.
+pub const TEXEL_SHARE: f64 = 0.25;
 
 /// Triangles from which on a mesh has levels. Below, drawing them all takes less than a third of a bake.
 const FROM_TRIANGLES: usize = 4000;

@@ -15,7 +15,6 @@ pub mod capture;
 pub mod chunk;
 pub mod ensure;
 mod header;
-pub mod inside;
 pub mod kinds;
 pub mod levels;
 pub mod model;

@@ -3,13 +3,12 @@
 use super::TRANSFER_OFFSET;
 use super::assemble::Sources;
 use super::batches::CaptureTarget;
-use super::capture::unit_positions;
-use super::inside;
 use super::project::Job;
-use super::surface::Surface;
+use super::surface::{self, Surface};
 use super::symmetric_samples::{self, SymmetricPlan};
 use super::symmetry::Symmetry;
 use super::triangles::distinct;
+use super::triangles::unit_positions;
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::{FieldHeader, FieldKind};
@@ -36,8 +35,8 @@ impl FieldSamples {
         let positions: Vec<DVec3> = (0..lattice.sample_count()).map(|i| lattice.position(i)).collect();
         let surface = Surface::new(&unit_positions(mesh), &distinct(mesh));
         let mut inside =
-            if header.shortcuts.inside { inside::inside(&surface, &positions) } else { vec![false; positions.len()] };
-        let pushed = inside::pushed_out(&surface, &positions, &inside);
+            if header.shortcuts.inside { surface::inside(&surface, &positions) } else { vec![false; positions.len()] };
+        let pushed = surface::pushed_out(&surface, &positions, &inside);
         let mut unseen: Vec<bool> = inside.iter().zip(&pushed).map(|(inside, eye)| *inside && eye.is_none()).collect();
         let plan = symmetry_plan(mesh, header, &surface, &inside);
         for (sample, captured) in

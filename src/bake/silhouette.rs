@@ -4,8 +4,8 @@
 //! map, see [`crate::field::silhouette`]. Views of `view_px` are drawn side by side into an atlas of the farthest and the nearest
 //! depth a pixel; two dispatches reduce every view to its map.
 
-use super::capture::unit_positions;
 use super::symmetric_maps;
+use super::triangles::unit_positions;
 use super::{BakeReport, Baker, Progress, hash_text, levels};
 use crate::asset::mesh::Mesh;
 use crate::error::{Error, Result};

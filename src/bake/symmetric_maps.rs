@@ -1,6 +1,6 @@
 //! Maps of a silhouette field that need no capture, because a turn or a mirror moves the mesh onto itself and another map onto them.
 
-use super::symmetric_samples::TEXEL_SHARE;
+use super::levels::TEXEL_SHARE;
 use super::symmetry::Symmetry;
 use crate::asset::mesh::Mesh;
 use crate::field::silhouette::{MapFrame, Side, SilhouetteHeader};

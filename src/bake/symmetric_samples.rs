@@ -5,6 +5,7 @@
 //! [`super::symmetry`]). A sample may use a symmetry if its deviation, seen from there, is at most [`TEXEL_SHARE`] of a texel.
 //! Symmetries that are exact to rounding therefore serve every sample. The turns of a faceted body serve distant samples only.
 
+use super::levels::TEXEL_SHARE;
 use super::symmetry::{Operation, Points, Symmetry};
 use crate::asset::Mesh;
 use crate::field::Lattice;
@@ -17,10 +18,6 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
-
-/// Largest displacement of what is captured, in texels of a face. The facets of a round body lie partly inside and partly outside
-/// of it, so a displacement neither shrinks nor grows the solid.
-pub const TEXEL_SHARE: f64 = 0.25;
 
 /// A sample that is turned from a captured one.
 #[derive(Clone, Copy, Debug)]

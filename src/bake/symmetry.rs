@@ -6,9 +6,8 @@
 //! are found by matching vertices, and their deviation is measured where the matched triangles differ. Turns by any angle are tried
 //! at a few odd angles. The deviation of a sphere is the depth of its facets.
 
-use super::capture::unit_positions;
-use super::inside::nearest_on_triangle;
-use super::surface::Surface;
+use super::surface::{Surface, nearest_on_triangle};
+use super::triangles::unit_positions;
 use crate::asset::Mesh;
 use crate::field::Fit;
 use glam::{DMat3, DVec3, IVec3, Vec3};

@@ -5,11 +5,11 @@
 //! one of the two is baked alone.
 
 use super::batches::{CaptureTarget, Captures, Reduction};
-use super::capture::unit_positions;
 use super::partial::Partial;
 use super::project::{Job, Projection};
 use super::symmetric_samples::{self, Turned};
 use super::symmetry::Symmetry;
+use super::triangles::unit_positions;
 use super::{BakeReport, Baker, Options, Progress, TRANSFER_OFFSET, levels, triangles};
 use crate::asset::Mesh;
 use crate::error::Result;

@@ -11,7 +11,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use shadow_fields::Result;
 use shadow_fields::asset::{Generator, Mesh};
-use shadow_fields::bake::{self, capture, header, project};
+use shadow_fields::bake::{self, capture, header, project, triangles};
 use shadow_fields::field::lattice::{Lattice, Lookup};
 use shadow_fields::field::quantity::FieldKind;
 use shadow_fields::sh::cube::FACE_COUNT;
@@ -75,7 +75,7 @@ impl Subject {
     fn new() -> Result<Self> {
         let mesh: Mesh = Generator::Teapot { subdivisions: TEAPOT_SUBDIVISIONS }.build()?;
         let lattice = header(&mesh, FieldKind::Occlusion, &bake::Options::default()).lattice;
-        let positions = capture::unit_positions(&mesh);
+        let positions = triangles::unit_positions(&mesh);
         let floor_y = positions.iter().map(|p| f64::from(p.y)).fold(f64::MAX, f64::min);
         let receiver = DVec3::new(RECEIVER_X, floor_y, 0.0);
         Ok(Subject { positions, triangles: mesh.triangles, lattice, floor_y, receiver })

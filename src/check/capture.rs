@@ -3,8 +3,9 @@
 use super::CheckRow;
 use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
-use crate::bake::capture::{self, Capture, CaptureKind, Model, NO_SLOT, Slots, unit_positions};
+use crate::bake::capture::{self, Capture, CaptureKind, Model, NO_SLOT, Slots};
 use crate::bake::self_visibility::FREE;
+use crate::bake::triangles::unit_positions;
 use crate::error::Result;
 use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};

@@ -3,9 +3,10 @@
 use super::CheckRow;
 use super::project::Content;
 use crate::asset::{Mesh, generate};
-use crate::bake::capture::{Capture, CaptureKind, unit_positions};
+use crate::bake::capture::{Capture, CaptureKind};
 use crate::bake::project::Projection;
 use crate::bake::self_visibility::twin;
+use crate::bake::triangles::unit_positions;
 use crate::bake::{Baker, TRANSFER_OFFSET};
 use crate::error::Result;
 use crate::field::self_visibility::{BYTES, NODES};

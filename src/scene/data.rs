@@ -43,9 +43,9 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::motion::{Motion, Placement, PlacementF64, RotationData};
-use super::{ENTITY_LIMIT, MESH_LIMIT, gltf, values};
+use super::{ENTITY_LIMIT, MESH_LIMIT, values};
 use crate::asset::Generator;
-use crate::asset::Mesh;
+
 use crate::asset::environment::EnvironmentData;
 use crate::error::{Error, Result};
 
@@ -222,25 +222,6 @@ impl<'de> Deserialize<'de> for MeshData {
         let generator = (!table.is_empty()).then(|| Generator::deserialize(toml::Value::Table(table))).transpose();
         let generator = generator.map_err(|e| D::Error::custom(format!("mesh {name:?}: {}", e.message())))?;
         Ok(Self { name, file, generator })
-    }
-}
-
-impl MeshData {
-    /// Reads the file or runs the generator.
-    pub(super) fn build(&self, folder: &Path, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Mesh> {
-        let mut mesh = match (&self.file, &self.generator) {
-            (Some(file), None) if gltf::is_gltf(file) => {
-                let path = folder.join(file);
-                let (mesh, notes) = gltf::load_mesh(&path)?;
-                notes.left_out().iter().for_each(|line| log::warn!("{}: {line}", path.display()));
-                mesh
-            }
-            (Some(file), None) => Mesh::parse(&read(file)?, &folder.join(file))?,
-            (None, Some(generator)) => generator.build()?,
-            _ => return Err(Error::Input("a mesh has either a file or one generator".into())),
-        };
-        mesh.name.clone_from(&self.name);
-        Ok(mesh)
     }
 }
 

@@ -138,7 +138,7 @@ impl Scene {
             if data.meshes[..i].iter().any(|m| m.name == mesh.name) {
                 return Err(at(format!("there are two meshes {:?}", mesh.name)));
             }
-            let built = mesh.build(folder, &read).map_err(|e| at(format!("mesh {:?}: {e}", mesh.name)))?;
+            let built = build_mesh(mesh, folder, &read).map_err(|e| at(format!("mesh {:?}: {e}", mesh.name)))?;
             meshes.push(Arc::new(built));
         }
         let entities = resolve_all(&data, &meshes, |i, what| Error::input_at(path, lines.entity(i), what))?;
@@ -229,6 +229,23 @@ fn resolve(index: usize, data: &EntityData, mesh: usize, shape: &Mesh) -> Entity
 /// As [`gltf::load_mesh`] and [`Mesh::load`].
 pub fn load_mesh(path: &Path) -> Result<(Mesh, gltf::Notes)> {
     if gltf::is_gltf(path) { gltf::load_mesh(path) } else { Ok((Mesh::load(path)?, gltf::Notes::default())) }
+}
+
+/// Reads the file of a scene's mesh or runs its generator.
+fn build_mesh(data: &MeshData, folder: &Path, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Mesh> {
+    let mut mesh = match (&data.file, &data.generator) {
+        (Some(file), None) if gltf::is_gltf(file) => {
+            let path = folder.join(file);
+            let (mesh, notes) = gltf::load_mesh(&path)?;
+            notes.left_out().iter().for_each(|line| log::warn!("{}: {line}", path.display()));
+            mesh
+        }
+        (Some(file), None) => Mesh::parse(&read(file)?, &folder.join(file))?,
+        (None, Some(generator)) => generator.build()?,
+        _ => return Err(Error::Input("a mesh has either a file or one generator".into())),
+    };
+    mesh.name.clone_from(&data.name);
+    Ok(mesh)
 }
 
 /// Reads a file that a scene names: a mesh or a picture.

@@ -6,7 +6,7 @@
 //! it leaps within some clusters, and a cluster that spans a leap has half of the scene on its list.
 
 use crate::asset::mesh::Mesh;
-use crate::bake::capture::unit_positions;
+use crate::bake::triangles::unit_positions;
 use crate::layout::CLUSTER_VERTICES;
 use crate::lists::gather::{Bounds, GROUP_CLUSTERS};
 use glam::Vec3;

@@ -1,7 +1,7 @@
 //! Meshes for ray casting, in units of the bounding radius from the bounding sphere's centre.
 
 use crate::asset::mesh::Mesh;
-use crate::bake::capture::unit_positions;
+use crate::bake::triangles::unit_positions;
 use crate::bake::{bakes_transfer, first_shell};
 use crate::field::Fit;
 use crate::field::lattice::ROOMY_INNER;

@@ -3,7 +3,7 @@
 use super::command::{Changed, Command, Effect, Request};
 use super::history::History;
 use super::orbit_camera::OrbitCamera;
-use super::pick::{EntityDrag, Picker};
+use super::picker::{EntityDrag, Picker};
 use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
 use crate::bake;

@@ -29,6 +29,7 @@ pub mod outline;
 #[cfg(feature = "view")]
 pub mod panel;
 pub mod pick;
+mod picker;
 #[cfg(feature = "view")]
 mod picture;
 pub mod reference;

@@ -4,37 +4,14 @@ use super::command::{Changed, Command, Effect};
 use super::edit;
 use super::editor::Editor;
 use super::history::{EditKind, Snapshot};
+use super::picker::EntityDrag;
 use crate::draw::camera::clip_from_world;
-use crate::scene::{EntityData, Placement};
+use crate::scene::Placement;
 use crate::truth::ray_mesh::RayMesh;
 use glam::{DVec3, DVec4};
-use std::sync::OnceLock;
 
 /// A drag reaches at most this many scene radii from the eye, because near the horizon a pixel covers kilometres.
 const REACH: f64 = 30.0;
-
-/// Hierarchies of the scene's meshes, each built when a ray first enters its bounding sphere.
-#[derive(Default)]
-pub struct Picker {
-    shapes: Vec<OnceLock<RayMesh>>,
-}
-
-impl Picker {
-    /// A picker for that number of meshes.
-    pub fn new(mesh_count: usize) -> Self {
-        Picker { shapes: (0..mesh_count).map(|_| OnceLock::new()).collect() }
-    }
-}
-
-/// An entity that is being dragged.
-pub struct EntityDrag {
-    entity: usize,
-    /// The entity before the drag.
-    before: EntityData,
-    /// The point where it was grabbed, metres.
-    anchor: DVec3,
-    moved: bool,
-}
 
 /// A ray in the world.
 #[derive(Clone, Copy, Debug)]

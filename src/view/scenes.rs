@@ -2,7 +2,7 @@
 
 use super::command::{Changed, Effect};
 use super::editor::Editor;
-use super::pick::Picker;
+use super::picker::Picker;
 use crate::asset::{Mesh, embedded};
 use crate::error::Result;
 use crate::scene::Scene;

@@ -1,0 +1,29 @@
+//! What the pointer works with: the shapes that rays meet, and the entity that is dragged.
+
+use crate::scene::EntityData;
+use crate::truth::ray_mesh::RayMesh;
+use glam::DVec3;
+use std::sync::OnceLock;
+
+/// Hierarchies of the scene's meshes, each built when a ray first enters its bounding sphere.
+#[derive(Default)]
+pub struct Picker {
+    pub(super) shapes: Vec<OnceLock<RayMesh>>,
+}
+
+impl Picker {
+    /// A picker for that number of meshes.
+    pub fn new(mesh_count: usize) -> Self {
+        Picker { shapes: (0..mesh_count).map(|_| OnceLock::new()).collect() }
+    }
+}
+
+/// An entity that is being dragged.
+pub(super) struct EntityDrag {
+    pub(super) entity: usize,
+    /// The entity before the drag.
+    pub(super) before: EntityData,
+    /// The point where it was grabbed, metres.
+    pub(super) anchor: DVec3,
+    pub(super) moved: bool,
+}

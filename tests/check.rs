@@ -6,11 +6,9 @@ mod common;
 
 use cli::{command, finish, has_device};
 use serde_json::Value;
+use shadow_fields::check::PASSES;
 use shadow_fields::shaders::FILES;
 use std::path::Path;
-
-const PASSES: [&str; 10] =
-    ["capture", "project", "self_visibility", "assemble", "silhouette", "gather", "merge", "sharp", "draw", "smooth"];
 
 fn check(folder: &Path, pass: Option<&str>, shaders: Option<&Path>) -> (i32, Value, String) {
     let mut command = command(folder, &["check", "--json", "--no-progress"]);
@@ -37,7 +35,7 @@ fn every_pass_is_compared_and_passes() {
     let (code, report, stderr) = check(folder.path(), None, None);
     assert_eq!((code, &report["passed"]), (0, &Value::Bool(true)), "{stderr}");
     let rows = report["rows"].as_array().unwrap();
-    for pass in PASSES {
+    for (pass, _) in PASSES {
         assert!(rows.iter().any(|row| row["pass"] == pass), "{pass} is not compared");
     }
     assert!(rows.iter().all(|row| row["worst"].as_f64().unwrap() <= row["tolerance"].as_f64().unwrap()));
@@ -68,6 +66,8 @@ fn a_wrong_shader_is_found() {
         ("draw.frag", "finish(radiance,", "1.01 * finish(radiance,", "draw"),
         ("grid.frag", "push.emission_white.rgb + light", "1.01 * light", "draw"),
         ("smooth.frag", "float share = 0.5", "float share = 0.6", "smooth"),
+        ("show.frag", "push.encode != 0", "push.encode == 0", "show"),
+        ("show.frag", "push.gain * texel", "1.02 * push.gain * texel", "show"),
         ("gather.comp", "KEY(at) = distance_key", "KEY(at) = ~distance_key", "gather"),
         ("gather_scope.glsl", "+ FADE_SINE * view.farthest", "+ FADE_SINE * view.nearest", "gather"),
     ];

@@ -293,6 +293,8 @@ fn quoted_after(code: &str, prefix: &str) -> BTreeSet<String> {
 
 #[test]
 fn each_pass_is_found_by_one_word() {
+    let of_check = shadow_fields::check::PASSES.map(|(pass, _)| pass);
+    assert_eq!(PASSES.iter().map(|(pass, _)| *pass).collect::<Vec<_>>(), of_check, "check has a row for each pass");
     let shaders = files("glsl", &["comp", "vert", "frag"]);
     let stem = |path: &Path| path.file_stem().unwrap().to_string_lossy().into_owned();
     let in_sequence = |path: &PathBuf| !NO_SEQUENCE.iter().any(|folder| path.starts_with(folder));

@@ -49,6 +49,7 @@ use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
 use batches::{Batch, Batches, Captures, Reduce, Reduction};
+use capture::{Capture, Drawn, Model};
 pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, is_seen, needs};
 pub use header::{Options, first_shell, hash_text, header};
 use levels::Leveled;
@@ -76,6 +77,23 @@ fn captured_bytes(header: &FieldHeader) -> u64 {
     4 * u64::from(header.lattice.sample_count()) * header.sample_stride() as u64
 }
 
+/// Records captures of what was chosen, with the barriers before them and the one for what reads the atlas next.
+pub(crate) fn record_captures<'r>(
+    commands: &mut Commands<'r>,
+    capture: &'r Capture,
+    model: &'r Model,
+    drawn: &'r Drawn,
+    reader: Access,
+) -> Result<()> {
+    commands.image_barrier(&capture.atlas, None, drawn.access());
+    if let Some(depth) = capture.depth() {
+        commands.image_barrier(depth, None, Access::DepthWrite);
+    }
+    commands.pass("capture", |c| capture.record(c, model, drawn))?;
+    commands.image_barrier(&capture.atlas, Some(drawn.access()), reader);
+    Ok(())
+}
+
 /// Records one batch of a bake: captures the eyes, reduces their faces, and copies the samples to the host.
 fn record_batch<'r>(
     commands: &mut Commands<'r>,
@@ -85,13 +103,7 @@ fn record_batch<'r>(
 ) -> Result<()> {
     let Batches { capture, project, self_visibility, model, jobs, .. } = batches;
     let count = batch.count;
-    let written = batch.drawn.access();
-    commands.image_barrier(&capture.atlas, None, written);
-    if let Some(depth) = capture.depth() {
-        commands.image_barrier(depth, None, Access::DepthWrite);
-    }
-    commands.pass("capture", |c| capture.record(c, model, &batch.drawn))?;
-    commands.image_barrier(&capture.atlas, Some(written), Access::ComputeSampled);
+    record_captures(commands, capture, model, &batch.drawn, Access::ComputeSampled)?;
     let (atlas, jobs_now) = (&capture.atlas, count as u32);
     if let Some(Reduce { pass, samples, .. }) = project {
         let texels = texels.expect("a projection has a view of texels");

@@ -1,6 +1,7 @@
 //! Captured faces as pictures, for `inspect` and its contact sheets.
 
 use super::capture::{Capture, CaptureKind, Model, NO_SLOT};
+use super::record_captures;
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
@@ -34,12 +35,7 @@ pub fn snapshot(
         let plan = capture.plan(&model, rest);
         let drawn = capture.choose(&model, rest, &plan, true)?;
         let mut commands = Commands::new(device, "snapshot")?;
-        commands.image_barrier(&capture.atlas, None, drawn.access());
-        if let Some(depth) = capture.depth() {
-            commands.image_barrier(depth, None, Access::DepthWrite);
-        }
-        commands.pass("capture", |c| capture.record(c, &model, &drawn))?;
-        commands.image_barrier(&capture.atlas, Some(drawn.access()), Access::TransferRead);
+        record_captures(&mut commands, &capture, &model, &drawn, Access::TransferRead)?;
         commands.copy_image(&capture.atlas, &download);
         commands.barrier(Access::TransferWrite, Access::HostRead);
         commands.submit()?;

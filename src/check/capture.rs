@@ -2,10 +2,10 @@
 
 use super::CheckRow;
 use crate::asset::{Mesh, generate};
-use crate::bake::Baker;
 use crate::bake::capture::{self, Capture, CaptureKind, Model, NO_SLOT, Slots};
 use crate::bake::self_visibility::FREE;
 use crate::bake::triangles::unit_positions;
+use crate::bake::{self, Baker};
 use crate::error::Result;
 use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
@@ -44,12 +44,7 @@ pub fn atlas<T: Pod>(
     let buffer = Buffer::new(device, "atlas on the host", BufferKind::Readback, texels * size_of::<T>() as u64)?;
     let drawn = capture.choose(model, eyes, plan, cull)?;
     let mut commands = Commands::new(device, "capture to host")?;
-    commands.image_barrier(&capture.atlas, None, drawn.access());
-    if let Some(depth) = capture.depth() {
-        commands.image_barrier(depth, None, Access::DepthWrite);
-    }
-    commands.pass("capture", |c| capture.record(c, model, &drawn))?;
-    commands.image_barrier(&capture.atlas, Some(drawn.access()), Access::TransferRead);
+    bake::record_captures(&mut commands, capture, model, &drawn, Access::TransferRead)?;
     commands.copy_image(&capture.atlas, &buffer);
     commands.barrier(Access::TransferWrite, Access::HostRead);
     commands.submit()?;

@@ -11,6 +11,7 @@ pub mod merge;
 pub mod project;
 pub mod self_visibility;
 pub mod sharp;
+pub mod show;
 pub mod silhouette;
 pub mod smooth;
 
@@ -57,8 +58,8 @@ impl CheckRow {
 /// The comparisons of one pass, each told as it comes.
 type Part = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
-/// Every pass, by the one word that names it everywhere.
-pub const PASSES: [(&str, Part); 10] = [
+/// Every pass in the order of execution, by the one word that names it everywhere.
+pub const PASSES: [(&str, Part); 11] = [
     ("capture", capture::rows),
     ("project", project::rows),
     ("self_visibility", self_visibility::rows),
@@ -69,6 +70,7 @@ pub const PASSES: [(&str, Part); 10] = [
     ("sharp", sharp::rows),
     ("draw", draw::rows),
     ("smooth", smooth::rows),
+    ("show", show::rows),
 ];
 
 /// Runs every comparison of the given passes; `told` hears each row as it comes.

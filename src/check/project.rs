@@ -3,10 +3,10 @@
 use super::CheckRow;
 use super::capture::{atlas, texel_index};
 use crate::asset::{Mesh, generate};
-use crate::bake::Baker;
 use crate::bake::capture::{Capture, CaptureKind, Drawn, Model, NO_SLOT, Slots};
 use crate::bake::project::{self, Job, Project, Projection};
 use crate::bake::self_visibility::SelfVisibility;
+use crate::bake::{self, Baker};
 use crate::error::Result;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::BYTES;
@@ -141,12 +141,7 @@ impl<'b> Content<'b> {
     fn captured(&self) -> Result<Commands<'_>> {
         let Content { capture, model, drawn, .. } = self;
         let mut commands = Commands::new(self.baker.device(), "check of captured faces")?;
-        commands.image_barrier(&capture.atlas, None, drawn.access());
-        if let Some(depth) = capture.depth() {
-            commands.image_barrier(depth, None, Access::DepthWrite);
-        }
-        commands.pass("capture", |c| capture.record(c, model, drawn))?;
-        commands.image_barrier(&capture.atlas, Some(drawn.access()), Access::ComputeSampled);
+        bake::record_captures(&mut commands, capture, model, drawn, Access::ComputeSampled)?;
         Ok(commands)
     }
 }

@@ -222,6 +222,14 @@ pub struct Counts {
     pub dropped_bound: f64,
 }
 
+impl Counts {
+    /// Lookups that are left off.
+    pub fn skipped(&self) -> u64 {
+        let lights = self.behind_light + self.facing_away + self.passed_by + self.covered;
+        lights + self.below_horizon + self.apart + self.below_eps
+    }
+}
+
 impl std::ops::AddAssign for Counts {
     fn add_assign(&mut self, other: Self) {
         self.considered += other.considered;

@@ -46,20 +46,20 @@ fn details(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec
     ui.label(RichText::new(status.device).strong());
     ui.label(RichText::new(status.driver).small());
     if let Some(counts) = status.counts {
-        let skipped = counts.behind_light + counts.below_horizon + counts.apart + counts.facing_away + counts.below_eps;
         let entities = editor.scene().entities.len();
         ui.label(format!("{entities} entities, {} lit vertices", grouped(status.vertices as u64)));
-        let share = 100.0 * skipped as f64 / (counts.considered.max(1)) as f64;
-        ui.label(format!("lookups considered {}, skipped {share:.0} %", grouped(counts.considered)));
         let of = |count: u64| 100.0 * count as f64 / counts.considered.max(1) as f64;
+        ui.label(format!("lookups considered {}, skipped {:.0} %", grouped(counts.considered), of(counts.skipped())));
         let small = format!(
             "a lookup: a cluster x a product chain x an entity; behind light {:.0} %, horizon {:.0} %, apart {:.0} %, away {:.0} %, \
-             eps {:.0} %",
+             eps {:.0} %, passed {:.0} %, covered {:.0} %",
             of(counts.behind_light),
             of(counts.below_horizon),
             of(counts.apart),
             of(counts.facing_away),
-            of(counts.below_eps)
+            of(counts.below_eps),
+            of(counts.passed_by),
+            of(counts.covered)
         );
         ui.label(RichText::new(small).small());
     }

@@ -1,6 +1,7 @@
 //! Draws the graph of frame times by pass.
 
 use super::status::{HISTORY, LEAST_TEXT};
+use crate::check::PASSES;
 use crate::gpu::Timing;
 use egui::{Align2, Color32, FontId, Rect, RichText, Sense, Stroke, Ui, Vec2, pos2, vec2};
 use std::collections::VecDeque;
@@ -49,8 +50,7 @@ pub(super) fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
             names.push(&timing.pass);
         }
     }
-    let order = ["merge", "sharp", "draw", "smooth", "show"];
-    names.sort_by_key(|name| order.iter().position(|o| o == name).unwrap_or(order.len()));
+    names.sort_by_key(|name| PASSES.iter().position(|(pass, _)| pass == name).unwrap_or(PASSES.len()));
     let total = |frame: &Vec<Timing>| frame.iter().map(|t| t.milliseconds).sum::<f64>();
     // The range leaves out the slowest few frames, because the first frame compiles shaders.
     let mut totals: Vec<f64> = timings.iter().map(total).collect();

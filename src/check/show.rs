@@ -1,0 +1,65 @@
+//! "show" against its twin: a picture of radiances from black to above white, on targets that encode sRGB by themselves and others.
+
+use super::CheckRow;
+use crate::bake::Baker;
+use crate::draw::show::Show;
+use crate::error::Result;
+use crate::gpu::{Access, Buffer, BufferKind, Commands, Image, ImageShape, Target};
+use ash::vk;
+use half::f16;
+
+/// Largest difference in steps of 8 bits: the shader's curve is off by a twelfth of a step, and a device may round either way.
+const STEPS: f64 = 1.0;
+/// Radiance that becomes white.
+const WHITE: f32 = 2.0;
+const SIZE: [u32; 2] = [64, 32];
+
+/// The comparisons of `check`.
+///
+/// # Errors
+/// As [`Show::new`]; `Device` when memory ran out.
+pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
+    for (format, encodes_srgb, what) in [
+        (vk::Format::R8G8B8A8_UNORM, false, "encoded by the shader"),
+        (vk::Format::R8G8B8A8_SRGB, true, "encoded by the target"),
+    ] {
+        let worst = compare(baker, format, encodes_srgb)?;
+        add(CheckRow::new("show", what, "largest difference, steps of 8 bits", worst, STEPS));
+    }
+    Ok(())
+}
+
+/// The largest difference between a shown ramp and the twin's, in steps of 8 bits.
+fn compare(baker: &Baker, format: vk::Format, encodes_srgb: bool) -> Result<f64> {
+    let device = baker.device();
+    let [width, height] = SIZE;
+    let texels = width * height;
+    // From 0 to a fifth above white; green goes the other way, and blue is below a thousandth, where the curve is a line.
+    let ramp = (0..texels).map(|i| 1.2 * WHITE * i as f32 / (texels - 1) as f32);
+    let radiances = ramp.map(|r| [r, 1.2 * WHITE - r, 1e-3 * r, 1.0].map(f16::from_f32));
+    let radiances: Vec<[f16; 4]> = radiances.collect();
+    let upload = Buffer::with_data(device, "linear ramp", &radiances)?;
+    let shape = ImageShape { format: vk::Format::R16G16B16A16_SFLOAT, width, height, samples: 1 };
+    let picture = Image::new(device, "linear picture", shape)?;
+    let shown = Image::new(device, "shown picture", ImageShape { format, ..shape })?;
+    let bytes = 4 * texels as usize;
+    let readback = Buffer::new(device, "shown on the host", BufferKind::Readback, bytes as u64)?;
+    let show = Show::new(device, baker.library(), format, encodes_srgb)?;
+    let mut commands = Commands::new(device, "check of show")?;
+    commands.image_barrier(&picture, None, Access::TransferWrite);
+    commands.copy_to_image(&upload, &picture);
+    commands.image_barrier(&picture, Some(Access::TransferWrite), Access::GraphicsSampled);
+    commands.image_barrier(&shown, None, Access::ColorWrite);
+    let target = Target { color: &shown, clear: Some([0.0; 4]), depth: None, resolve: None };
+    commands.pass("show", |c| c.render(&target, |drawing| show.record(drawing, &picture, WHITE)))?;
+    commands.image_barrier(&shown, Some(Access::ColorWrite), Access::TransferRead);
+    commands.copy_image(&shown, &readback);
+    commands.barrier(Access::TransferWrite, Access::HostRead);
+    commands.submit()?;
+    let found: Vec<u8> = readback.read(0, bytes);
+    let wanted = radiances
+        .iter()
+        .flat_map(|[r, g, b, _]| [r, g, b].map(|c| Some(Show::twin(c.to_f32(), WHITE))).into_iter().chain([None]));
+    let apart = found.iter().zip(wanted).filter_map(|(found, wanted)| Some(found.abs_diff(wanted?)));
+    Ok(apart.max().map_or(f64::INFINITY, f64::from))
+}

@@ -354,23 +354,3 @@ fn errors_are_shown_in_false_colour() {
     }
     assert!(!names(folder).contains(&"q.png".to_owned()));
 }
-
-/// The guard is a switch with a word, on unless told otherwise; both words reach the merge.
-#[test]
-fn the_guard_takes_on_and_off() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let scene = "assets/scenes/twelve_instances.toml";
-    let render = |name: &str, guard: &[&str]| {
-        good(folder.path(), &small(&[&["render", scene, "-o", name, "--seed", "7"], guard].concat()));
-        picture(folder.path(), name, [96, 64])
-    };
-    let [on, off] = ["on", "off"].map(|word| render(&format!("{word}.png"), &["--guard", word]));
-    assert_eq!(on, render("default.png", &[]), "the guard is on by default");
-    assert_ne!(on, off, "a chain of twelve grows where nothing keeps it");
-    let ran = finish(&mut command(folder.path(), &["render", scene, "-o", "p.png", "--guard", "maybe"]));
-    assert_eq!(ran.code, 2, "{}", ran.stderr);
-    assert!(ran.stderr.contains("expected on or off, got \"maybe\""), "{}", ran.stderr);
-}

@@ -33,7 +33,6 @@ fn merge() -> Vec<(Variant, Reflection)> {
         variant,
         bands: 4,
         field_bands: 4,
-        guard: true,
         storage: Storage::F16,
         lattice: Lattice::default().starting_at(1.02),
         lookup: Lookup::Trilinear,

@@ -87,7 +87,6 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
             normals: &[normal],
             transfer: None,
             bands: 4,
-            guard: small().guard,
             lookup: small().lookup,
             skip: small().skip,
             leaves: &|_, _, _| false,

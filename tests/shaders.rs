@@ -122,7 +122,6 @@ fn usual_permutation() -> MergePermutation {
         variant: VARIANTS[0],
         bands: 4,
         field_bands: 4,
-        guard: true,
         storage: Storage::F16,
         lattice: Lattice::default().starting_at(1.02),
         lookup: Lookup::Trilinear,
@@ -162,7 +161,6 @@ fn merging() -> Vec<ShaderPermutation> {
         permutations.push(MergePermutation { lookup, ..usual });
         permutations.extend(lattices.map(|text| MergePermutation { lattice: lattice(text), lookup, ..usual }));
     }
-    permutations.push(MergePermutation { guard: false, ..usual });
     permutations.push(MergePermutation { lights: false, ..usual });
     permutations.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| MergePermutation {
         bands,

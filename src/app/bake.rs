@@ -30,19 +30,12 @@ pub struct Arguments {
     radiance: Option<Vec3>,
     /// Bake a silhouette field instead: outlines from many directions, for lights that are too small for SH bands. It takes
     /// --quality of the baking options, for 98, 389 or 1 542 KiB, and half as much again where the mesh is not convex
-    #[arg(long, conflicts_with_all = ["radiance", "faces", "inside"])]
+    #[arg(long, conflicts_with = "radiance")]
     silhouette: bool,
     /// Capture only one of the samples or maps that a symmetry of the mesh carries into one another, and turn it for the others.
     /// This serves symmetric meshes and, with samples, bodies of revolution and spheres. What is seen moves by at most 0.25 texels
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
     symmetry: bool,
-    /// Draw only cube faces that the object reaches, with only the triangles that reach into them, and without backs of closed meshes
-    #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
-    faces: bool,
-    /// Capture samples inside the solid off its nearest surface, or fill them from their neighbours. With "off" they are captured
-    /// where they stand, and see all dark
-    #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
-    inside: bool,
     /// Draw fewer and larger triangles of a large mesh in place of those that are far from the eye. What is seen moves by at most 0.25
     /// texels
     #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
@@ -55,7 +48,7 @@ pub struct Arguments {
 
 impl Arguments {
     fn options(&self) -> bake::Options {
-        let shortcuts = Shortcuts { symmetry: self.symmetry, faces: self.faces, inside: self.inside };
+        let shortcuts = Shortcuts { symmetry: self.symmetry, ..Shortcuts::default() };
         let options = self.bake.options();
         let silhouette = SilhouetteOptions { levels: self.levels, symmetry: self.symmetry, ..options.silhouette };
         bake::Options { shortcuts, silhouette, levels: self.levels, ..options }

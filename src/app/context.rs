@@ -113,18 +113,15 @@ pub struct MergeArguments {
     /// entities on a software device
     #[arg(long, value_name = "WHERE")]
     pub lists: Option<Place>,
-    /// Whether a product with an occluder is kept from making the transfer vector longer
-    #[arg(long, action = clap::ArgAction::Set, default_value = "on", value_name = "on|off", value_parser = on_or_off)]
-    pub guard: bool,
 }
 
 impl MergeArguments {
     /// A frame of that size, merged as the arguments say.
     pub fn options(&self, bake: bake::Options, size: [u32; 2], antialias: Antialias) -> frame::Options {
-        let (lookup, guard) = (Lookup::Trilinear, self.guard);
+        let lookup = Lookup::Trilinear;
         let (variant, skip, eps, lists) = (self.variant, self.skip, self.eps, self.lists);
         let (lights, shading) = (self.lights, self.shading);
-        frame::Options { bake, lights, shading, lookup, variant, skip, guard, eps, lists, size, antialias }
+        frame::Options { bake, lights, shading, lookup, variant, skip, eps, lists, size, antialias }
     }
 }
 

@@ -43,9 +43,6 @@ pub struct Arguments {
     /// With --mesh: the linear RGB radiance that a radiance field was baked with. The default is 1,1,1
     #[arg(long, value_name = "R,G,B", requires = "mesh", value_parser = color, allow_hyphen_values = true)]
     radiance: Option<Vec3>,
-    /// With --at: the samples that the lookup takes
-    #[arg(long, default_value = "trilinear", value_name = "LOOKUP")]
-    lookup: Lookup,
 }
 
 /// Farthest coordinate of a lookup in metres.
@@ -97,7 +94,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         "payload_bytes": field.payload.len(),
     });
     if let Some(position_m) = arguments.at {
-        result["at"] = lookup(&field, position_m, arguments.lookup);
+        result["at"] = lookup(&field, position_m);
     }
     if let Some(path) = &arguments.faces {
         let mesh = arguments.mesh.as_deref().map(|path| baked_mesh(header, path, arguments.radiance)).transpose()?;
@@ -169,12 +166,12 @@ fn baked_mesh(header: &FieldHeader, path: &Path, radiance: Option<Vec3>) -> Resu
 }
 
 /// The coefficients at a place in the mesh's frame, in metres.
-fn lookup(field: &ShadowField, position_m: DVec3, lookup: Lookup) -> serde_json::Value {
+fn lookup(field: &ShadowField, position_m: DVec3) -> serde_json::Value {
     let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
     let position = (position_m - centre) / f64::from(field.header.radius_m);
     let channel = |channel| {
         let mut out = vec![0.0; coefficient_count(field.header.bands)];
-        field.lookup(position, lookup, channel, &mut out);
+        field.lookup(position, Lookup::Trilinear, channel, &mut out);
         out
     };
     match field.header.kind {

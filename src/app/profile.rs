@@ -4,10 +4,11 @@ use super::context::{Context, size};
 use super::{Global, output};
 use crate::bench::Bench;
 use crate::bench::ceilings::{self, Ceilings};
-use crate::bench::profile::{self, Contender, ProfileRow, Start, Tenths};
+use crate::bench::profile::{self, ProfileRow, Start, Tenths};
 use crate::error::Result;
 use crate::gpu::{self, Device, Validation};
 use crate::merge::calibrate;
+use crate::merge::variant::{VARIANTS, Variant};
 use crate::merge::workload::Workload;
 use crate::scene::{self, Scene};
 use crate::text;
@@ -34,11 +35,11 @@ pub struct Arguments {
     #[arg(long, default_value = "4,16", value_delimiter = ',', value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     occluders: Vec<u32>,
     /// Time only this variant of the merge shader; an unknown name lists them
-    #[arg(long, value_name = "NAME", conflicts_with = "compare")]
-    variant: Option<String>,
+    #[arg(long, value_name = "NAME", conflicts_with = "compare", value_parser = Variant::named)]
+    variant: Option<Variant>,
     /// Time two variants in turns, and print the ratio of their times
-    #[arg(long, num_args = 2, value_names = ["A", "B"])]
-    compare: Option<Vec<String>>,
+    #[arg(long, num_args = 2, value_names = ["A", "B"], value_parser = Variant::named)]
+    compare: Option<Vec<Variant>>,
     /// Number of timed runs of each, after one that warms up
     #[arg(long, default_value_t = 15, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
@@ -56,10 +57,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     for folder in [&arguments.spirv, &arguments.out].into_iter().flatten() {
         text::make_folder(folder)?;
     }
-    let chosen: Vec<Contender> = match (&arguments.variant, &arguments.compare) {
-        (Some(name), _) => vec![profile::named(&context.device, name)?],
-        (_, Some(names)) => names.iter().map(|name| profile::named(&context.device, name)).collect::<Result<_>>()?,
-        _ => profile::contenders(&context.device),
+    let chosen = match (arguments.variant, &arguments.compare) {
+        (Some(variant), _) => vec![variant],
+        (_, Some(variants)) => variants.clone(),
+        _ => VARIANTS.to_vec(),
     };
     let library = context.baker.library();
     let small = Workload::new(&context.device, 64, 1)?;
@@ -109,7 +110,7 @@ fn time_cases(
     global: &Global,
     arguments: &Arguments,
     context: &Context,
-    chosen: &[Contender],
+    chosen: &[Variant],
     at_best: &Ceilings,
 ) -> Result<Vec<Case>> {
     let show = |what: &str| output::note(global, what);

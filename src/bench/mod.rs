@@ -97,7 +97,6 @@ pub fn default_options() -> frame::Options {
         lights: Lights::default(),
         shading: None,
         lookup: crate::field::Lookup::default(),
-        guard: true,
         // Frames are timed at rest: each must merge everything.
         skip: crate::lists::skip::Skip::without("unmoved"),
         eps: crate::lists::skip::EPS,

@@ -6,13 +6,13 @@ use super::figures::quantiles;
 use crate::asset::Mesh;
 use crate::bake;
 use crate::draw::{Antialias, Finish};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::field::FieldKind;
 use crate::frame::{self, Frame};
 use crate::gpu::Device;
 use crate::gpu::census::{Census, disassemble};
 use crate::merge::Merge;
-use crate::merge::variant::{MergePermutation, VARIANTS, Variant};
+use crate::merge::variant::{MergePermutation, Variant};
 use crate::merge::workload::Workload;
 use crate::scene::{Lights, Scene};
 use crate::shaders::Library;
@@ -21,37 +21,6 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
-
-/// A way to merge: a variant of the shader, guarded or not.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Contender {
-    /// The variant's name; without the guard "variant/unguarded".
-    pub name: String,
-    /// How it reads.
-    pub variant: Variant,
-    /// Whether chains are guarded.
-    pub guard: bool,
-}
-
-/// Everything that is timed: each variant as it is used, then the device's usual variant without the guard.
-pub fn contenders(device: &Device) -> Vec<Contender> {
-    let usual = Variant::sane_default(device);
-    let unguarded = Contender { name: format!("{}/unguarded", usual.name), variant: usual, guard: false };
-    let guarded = |&variant: &Variant| Contender { name: variant.name.into(), variant, guard: true };
-    VARIANTS.iter().map(guarded).chain([unguarded]).collect()
-}
-
-/// The contender with a name.
-///
-/// # Errors
-/// `Usage` that lists the names.
-pub fn named(device: &Device, name: &str) -> Result<Contender> {
-    let all = contenders(device);
-    all.iter().find(|c| c.name == name).cloned().ok_or_else(|| {
-        let names: Vec<_> = all.iter().map(|c| c.name.as_str()).collect();
-        Error::Usage(format!("unknown variant \"{name}\" ({})", names.join(", ")))
-    })
-}
 
 /// Median, and the values below and above which a tenth of all lies.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
@@ -169,17 +138,17 @@ fn row(
 pub fn made_up(
     bench: &Bench<'_>,
     workload: &Workload,
-    chosen: &[Contender],
+    chosen: &[Variant],
     runs: u32,
     at_best: &Ceilings,
 ) -> Result<Vec<(ProfileRow, Vec<f64>)>> {
     let (device, library) = (bench.baker.device(), bench.baker.library());
     let mut ready = Vec::new();
-    for contender in chosen {
-        let permutation = MergePermutation { guard: contender.guard, ..workload.permutation(contender.variant) };
+    for variant in chosen {
+        let permutation = workload.permutation(*variant);
         let census = Census::new(&library.shader(&permutation.row())?)?;
         let merge = Merge::new(device, library, permutation)?;
-        ready.push((contender, permutation, census, merge, workload.inputs(contender.variant)?, Vec::new()));
+        ready.push((variant, permutation, census, merge, workload.inputs(*variant)?, Vec::new()));
     }
     for run in 0..=runs {
         for (.., merge, inputs, times) in &mut ready {
@@ -190,8 +159,8 @@ pub fn made_up(
         }
     }
     let case = format!("{} x {}", workload.vertex_count(), workload.occluder_count());
-    let rows = ready.into_iter().map(|(contender, permutation, census, _, _, times)| {
-        (row(&case, &contender.name, workload.pairs(), &times, &permutation, &census, at_best), times)
+    let rows = ready.into_iter().map(|(variant, permutation, census, _, _, times)| {
+        (row(&case, variant.name, workload.pairs(), &times, &permutation, &census, at_best), times)
     });
     Ok(rows.collect())
 }
@@ -206,21 +175,20 @@ pub fn scene(
     name: &str,
     scene: &Scene,
     size: [u32; 2],
-    chosen: &[Contender],
+    chosen: &[Variant],
     runs: u32,
     at_best: &Ceilings,
 ) -> Result<Vec<(ProfileRow, Vec<f64>)>> {
     let (mut rows, mut frames) = (Vec::new(), Vec::new());
-    for contender in chosen {
+    for variant in chosen {
         let options = frame::Options {
-            guard: contender.guard,
-            variant: Some(contender.variant),
+            variant: Some(*variant),
             // A pair of the merge is one of harmonics; sharp lights are timed by themselves below.
             lights: Lights::Sh,
             size,
             ..super::default_options()
         };
-        frames.push((contender, bench.frame(scene, options)?, Vec::new(), 0));
+        frames.push((variant, bench.frame(scene, options)?, Vec::new(), 0));
     }
     let mut others: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for run in 0..=runs {
@@ -239,10 +207,10 @@ pub fn scene(
     if !sharp.is_empty() {
         others.insert("sharp".into(), sharp);
     }
-    for (contender, frame, times, pairs) in &frames {
+    for (variant, frame, times, pairs) in &frames {
         let permutation = frame.permutation();
         let census = Census::new(&bench.baker.library().shader(&permutation.row())?)?;
-        rows.push((row(name, &contender.name, *pairs, times, &permutation, &census, at_best), times.clone()));
+        rows.push((row(name, variant.name, *pairs, times, &permutation, &census, at_best), times.clone()));
     }
     let mut add = |pass: &str, variant: &str, times: Vec<f64>| rows.push((plain(name, pass, variant, &times), times));
     others.into_iter().for_each(|(pass, times)| add(&pass, "", times));
@@ -348,19 +316,19 @@ pub struct Start {
 ///
 /// # Errors
 /// `Failed` when a shader does not compile.
-pub fn starts(fresh: &Arc<Device>, library: &Library, chosen: &[Contender]) -> Result<Vec<Start>> {
+pub fn starts(fresh: &Arc<Device>, library: &Library, chosen: &[Variant]) -> Result<Vec<Start>> {
     let workload = Workload::new(fresh, 4096, 1)?;
     let bare = Library { cache_dir: None, ..library.clone() };
     let since = |start: Instant| start.elapsed().as_secs_f64() * 1e3;
     let mut out = Vec::new();
-    for contender in chosen {
-        let permutation = MergePermutation { guard: contender.guard, ..workload.permutation(contender.variant) };
+    for variant in chosen {
+        let permutation = workload.permutation(*variant);
         let compile = |library: &Library| -> Result<f64> {
             let start = Instant::now();
             library.shader(&permutation.row())?;
             Ok(since(start))
         };
-        let inputs = workload.inputs(contender.variant)?;
+        let inputs = workload.inputs(*variant)?;
         let first = || -> Result<f64> {
             let start = Instant::now();
             let merge = Merge::new(fresh, library, permutation)?;
@@ -369,7 +337,7 @@ pub fn starts(fresh: &Arc<Device>, library: &Library, chosen: &[Contender]) -> R
         };
         let (spirv_cold_ms, _) = (compile(&bare)?, compile(library)?);
         out.push(Start {
-            variant: contender.name.clone(),
+            variant: variant.name.to_owned(),
             spirv_cold_ms,
             spirv_warm_ms: compile(library)?,
             first_cold_ms: first()?,
@@ -379,15 +347,15 @@ pub fn starts(fresh: &Arc<Device>, library: &Library, chosen: &[Contender]) -> R
     Ok(out)
 }
 
-/// Writes each contender's SPIR-V, as words for a vendor's tool and as text: `VARIANT.spv`, `VARIANT.spvasm`.
+/// Writes each variant's SPIR-V, as words for a vendor's tool and as text: `VARIANT.spv`, `VARIANT.spvasm`.
 ///
 /// # Errors
 /// `Failed` when a file cannot be written.
-pub fn write_spirv(folder: &Path, library: &Library, workload: &Workload, chosen: &[Contender]) -> Result<()> {
-    for contender in chosen {
-        let permutation = MergePermutation { guard: contender.guard, ..workload.permutation(contender.variant) };
+pub fn write_spirv(folder: &Path, library: &Library, workload: &Workload, chosen: &[Variant]) -> Result<()> {
+    for variant in chosen {
+        let permutation = workload.permutation(*variant);
         let shader = library.shader(&permutation.row())?;
-        let path = |ending: &str| folder.join(format!("{}.{ending}", contender.name.replace('/', "-")));
+        let path = |ending: &str| folder.join(format!("{}.{ending}", variant.name));
         let words: Vec<u8> = shader.spirv.iter().flat_map(|word| word.to_le_bytes()).collect();
         crate::text::write(&path("spv"), words)?;
         crate::text::write(&path("spvasm"), &disassemble(&shader)?)?;

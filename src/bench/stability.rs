@@ -104,7 +104,8 @@ type Cap = (DVec3, f64);
 
 fn chain(caps: &[Cap], rule: Rule) -> f64 {
     let tensor = Tensor::new(BANDS, rule.visibility_bands, BANDS);
-    let multiplier = Multiplier::new(chain::Chain::factored(rule.guard), BANDS, rule.visibility_bands);
+    let multiplier =
+        Multiplier::new(chain::Chain { guard: rule.guard, ..Default::default() }, BANDS, rule.visibility_bands);
     let mut t = multiplier.begin(&clamped_cosine(BANDS, DVec3::Y));
     for &(axis, half_angle) in caps {
         let mut blocked = [0.0; MAX_COEFFICIENTS];

@@ -34,8 +34,6 @@ pub struct Point {
     pub axis: &'static str,
     /// Its setting.
     pub name: String,
-    /// Whether long chains are bounded: by the guard.
-    pub guarded: bool,
     /// Bytes of all fields of the scene.
     pub field_bytes: u64,
     /// Device time of the bakes, milliseconds; none where all was in the cache.
@@ -90,7 +88,6 @@ pub fn variations(quick: bool) -> Vec<Variation> {
             add(axis, text, &|o| o.bake.lattice = lattice(text));
         }
     }
-    add("guard", "off", &|o| o.guard = false);
     let faces: &[u32] = if quick { &[16] } else { &[8, 16, 32, 128] };
     for &face_px in faces {
         add("face", &format!("{face_px} px"), &|o| o.bake.face_px = face_px);
@@ -117,7 +114,6 @@ fn add_bands(add: &mut Add<'_>) {
     for bands in [5, 6, 7] {
         add("stored bands", &format!("{bands} of visibility"), &|o| o.bake.field_bands = Some(bands));
     }
-    add("stored bands", "7 of visibility, no guard", &|o| (o.bake.field_bands, o.guard) = (Some(7), false));
     add("stored bands", "3 of transfer, 4 of visibility", &|o| (o.bake.bands, o.bake.field_bands) = (3, Some(4)));
 }
 
@@ -185,7 +181,6 @@ pub fn sweep(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variat
             case: case.name.clone(),
             axis: variation.axis,
             name: variation.name.clone(),
-            guarded: variation.options.guard,
             field_bytes: m.field_bytes,
             bake_ms: m.bake_ms,
             first_merge_ms: m.first_merge_ms,

@@ -15,7 +15,6 @@ const MORE_BYTES: f64 = 1.25;
 
 /// Time, error and bytes of a setting relative to the default, case by case.
 struct Ratios {
-    guarded: bool,
     time: Vec<f64>,
     error: Vec<f64>,
     bytes: Vec<f64>,
@@ -27,7 +26,6 @@ impl Ratios {
             points.iter().zip(defaults).map(|(p, d)| value(p) / value(d).max(f64::MIN_POSITIVE)).collect()
         };
         Ratios {
-            guarded: points.iter().all(|p| p.guarded),
             time: points.iter().map(|p| p.time_per_default).collect(),
             error: of(&|p| p.total.rms),
             bytes: of(&|p| p.field_bytes as f64),
@@ -40,7 +38,7 @@ impl Ratios {
     }
 
     fn takes_the_place(&self) -> bool {
-        self.guarded && self.worst_product() < 1.0 / NOISE && self.bytes.iter().all(|b| *b <= MORE_BYTES)
+        self.worst_product() < 1.0 / NOISE && self.bytes.iter().all(|b| *b <= MORE_BYTES)
     }
 
     /// The setting compared with the default, in words.
@@ -53,7 +51,6 @@ impl Ratios {
         let cheaper = any(&self.time, &less);
         let (larger, smaller) = (any(&self.bytes, &more), any(&self.bytes, &less));
         match (nearer, farther) {
-            _ if !self.guarded => "without a bound for long chains",
             _ if self.takes_the_place() => "BETTER by the rule",
             (true, true) => "nearer in one case, farther in another",
             (true, false) if dearer => "nearer, but slower",
@@ -76,7 +73,7 @@ fn default_in_words() -> String {
     let options = super::default_options();
     let bake = options.bake;
     format!(
-        "lights {}, lattice {}, {} lookup, {}, {} px a face, {} bands of transfer and {} of visibility{}",
+        "lights {}, lattice {}, {} lookup, {}, {} px a face, {} bands of transfer and {} of visibility",
         format!("{:?}", options.lights).to_lowercase(),
         bake.lattice,
         format!("{:?}", options.lookup).to_lowercase(),
@@ -84,7 +81,6 @@ fn default_in_words() -> String {
         bake.face_px,
         bake.bands,
         bake.occlusion_bands(),
-        if options.guard { ", guarded" } else { "" },
     )
 }
 

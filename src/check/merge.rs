@@ -85,7 +85,6 @@ pub fn options() -> frame::Options {
         lookup: Lookup::Trilinear,
         variant: Some(Variant::named("texel").expect("a variant")),
         skip: Skip::ALL,
-        guard: true,
         eps: 0.0,
         lists: Some(Place::Host),
         size: [64, 48],
@@ -189,7 +188,6 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     for name in ["cones", "horizon", "caps"] {
         compare(format!("without {name}"), frame::Options { skip: Skip::without(name), ..base })?;
     }
-    compare("no guard".into(), frame::Options { guard: false, ..base })?;
     let bake = bake::Options { field_bands: Some(6), ..base.bake };
     compare("6 bands of visibility".into(), frame::Options { bake, ..base })?;
     for lookup in [Lookup::Nearest, Lookup::Radial] {

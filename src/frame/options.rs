@@ -23,8 +23,6 @@ pub struct Options {
     pub variant: Option<Variant>,
     /// What the merge leaves out.
     pub skip: Skip,
-    /// Whether an occluder is kept from lengthening a chain of products (see `glsl/merge_product.glsl`).
-    pub guard: bool,
     /// Light that the merge leaves out: contributions to a vertex that are bounded below this share of the radiance that the
     /// scene's exposure shows as white; 0 leaves none out.
     pub eps: f32,
@@ -53,7 +51,6 @@ impl Default for Options {
             lookup: Lookup::Trilinear,
             variant: None,
             skip: Skip::ALL,
-            guard: true,
             eps: EPS,
             lists: None,
             size: [960, 640],

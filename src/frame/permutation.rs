@@ -112,7 +112,6 @@ pub(super) fn permutation(options: &Options, variant: Variant, lights: bool, ent
         variant,
         bands: options.bake.bands,
         field_bands: options.bake.occlusion_bands(),
-        guard: options.guard,
         storage: options.bake.storage,
         lattice: options.bake.lattice,
         lookup: options.lookup,

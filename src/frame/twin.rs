@@ -154,7 +154,6 @@ impl FrameTwin<'_> {
                 bands: options.bake.bands,
                 lookup: options.lookup,
                 skip: options.skip,
-                guard: options.guard,
                 leaves: &leaves,
             };
             let mut lit = twin.run();

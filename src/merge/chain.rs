@@ -18,16 +18,9 @@ pub struct Chain {
 }
 
 impl Default for Chain {
-    /// Factored products, guarded.
+    /// What the merge does: factored products, guarded.
     fn default() -> Self {
-        Chain::factored(true)
-    }
-}
-
-impl Chain {
-    /// What the merge does, with the guard or without it.
-    pub fn factored(guard: bool) -> Self {
-        Chain { product: Product::Factored, guard }
+        Chain { product: Product::Factored, guard: true }
     }
 }
 

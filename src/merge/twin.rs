@@ -52,8 +52,6 @@ pub struct MergeTwin<'t> {
     pub transfer: Option<(&'t [f32], usize)>,
     /// SH bands of transfer and light; an occlusion field has its own.
     pub bands: usize,
-    /// Whether a factor is kept from lengthening a chain.
-    pub guard: bool,
     /// Which samples a lookup takes.
     pub lookup: Lookup,
     /// What is left out.
@@ -69,7 +67,7 @@ impl MergeTwin<'_> {
     /// Radiosity of every vertex: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self) -> Vec<[f64; 3]> {
         let field_bands = self.field_bands();
-        let multiplier = Multiplier::new(Chain::factored(self.guard), self.bands, field_bands);
+        let multiplier = Multiplier::new(Chain::default(), self.bands, field_bands);
         let bands = self.bands.max(field_bands);
         let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(bands, o.rotation)).collect();
         (0..self.positions.len()).into_par_iter().map(|v| self.vertex(v, &multiplier, &rotations)).collect()

@@ -6,7 +6,7 @@ use crate::field::quantity::{Storage, channel_stride};
 use crate::gpu::Device;
 use crate::layout::{CLUSTER_VERTICES, DeviceEntity, ENTRY_BITS};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
-use crate::merge::chain::Product;
+use crate::merge::chain::{Chain, Product};
 use crate::sh::basis::Y00;
 use crate::sh::product_program::STYLES;
 use crate::shaders::ShaderPermutation;
@@ -90,8 +90,6 @@ pub struct MergePermutation {
     pub bands: usize,
     /// SH bands of occlusion fields.
     pub field_bands: usize,
-    /// Whether a factor is kept from lengthening a chain (see `glsl/merge_product.glsl`).
-    pub guard: bool,
     /// Number format of the fields.
     pub storage: Storage,
     /// Samples of the fields. First and last shell are data, not code.
@@ -143,7 +141,7 @@ impl MergePermutation {
         let row = ShaderPermutation::new("merge.comp", self.bands)
             .field_bands(self.field_bands)
             .define("PRODUCT", STYLES.iter().position(|style| *style == product).expect("every style is listed") as u32)
-            .define("GUARD", self.guard)
+            .define("GUARD", Chain::default().guard)
             .number("Y00", Y00)
             .define("WORKGROUP", CLUSTER_VERTICES)
             .define("ENTRY_BITS", ENTRY_BITS)
@@ -193,9 +191,9 @@ mod tests {
     use super::*;
     use std::collections::HashSet;
 
-    /// Of one number of bands and one size of lattice there are 3 136: five ways to read halves and three to read floats, with three
-    /// lookups and two kinds of directions (48), and the image, which is trilinear and a cube; times two spacings, guarded or not, with
-    /// lights or without, and three skips on or off (64).
+    /// Of one number of bands and one size of lattice there are 1 568: five ways to read halves and three to read floats, with three
+    /// lookups and two kinds of directions (48), and the image, which is trilinear and a cube; times two spacings, with
+    /// lights or without, and three skips on or off (32).
     #[test]
     fn there_are_as_many_permutations_as_counted() {
         let mut rows = HashSet::new();
@@ -206,16 +204,15 @@ mod tests {
             for &variant in VARIANTS {
                 for storage in [Storage::F16, Storage::F32] {
                     for lookup in [Lookup::Nearest, Lookup::Radial, Lookup::Trilinear] {
-                        for switches in 0..32 {
+                        for switches in 0..16 {
                             let on = |bit: u32| switches >> bit & 1 == 1;
                             let skip = Skip { horizon: on(0), cones: on(1), caps: on(2), ..Skip::NONE };
-                            let [guard, lights] = [on(3), on(4)];
+                            let lights = on(3);
                             let (bands, field_bands, entity_limit) = (4, 4, 48);
                             let permutation = MergePermutation {
                                 variant,
                                 bands,
                                 field_bands,
-                                guard,
                                 storage,
                                 lattice,
                                 lookup,
@@ -229,6 +226,6 @@ mod tests {
                 }
             }
         }
-        assert_eq!(rows.len(), (8 * 3 * 2 + 1) * 2 * 2 * 2 * 8);
+        assert_eq!(rows.len(), (8 * 3 * 2 + 1) * 2 * 2 * 8);
     }
 }

@@ -138,7 +138,6 @@ impl Workload {
             variant,
             bands: BANDS,
             field_bands: BANDS,
-            guard: true,
             storage: Storage::F16,
             lattice: self.lattice,
             lookup: Lookup::Trilinear,

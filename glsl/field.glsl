@@ -36,7 +36,6 @@ void field_plane_cube(vec3 p, float edges, out uint base, out vec2 cell) {
 }
 
 void field_plane_latlon(vec3 p, out vec2 cell) {
-    const float PI = 3.14159265358979;
     float latitude = acos(clamp(p.y * inversesqrt(max(dot(p, p), 1e-30)), -1.0, 1.0)) / PI * LATITUDES - 0.5;
     float turn = p.x == 0.0 && p.z == 0.0 ? 0.0 : atan(p.z, p.x) / (2.0 * PI);
     cell = vec2((turn - floor(turn)) * LONGITUDES, clamp(latitude, 0.0, LATITUDES - 1.0));

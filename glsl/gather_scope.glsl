@@ -1,7 +1,5 @@
 // The rule that keeps an entity off a cluster's list, in f32: src/lists/scope.rs has the same functions in f64 and says why.
 
-const float EVERYTHING = 1e30;
-
 struct Scope {
     vec3 origin;  // centre of the receiver, world
     vec3 centre;  // of the cluster, from there
@@ -40,7 +38,7 @@ Scope scope_of(Entity receiver, Bounds bounds, float slack) {
 
 float weight_of(vec2 half_angle, float cosine) {
     float c = max(cosine, 0.0);
-    float lobe = max(c, 0.09375 + c * (0.5 + c * 0.46875));
+    float lobe = max(c, COSINE_LOBE.x + c * (COSINE_LOBE.y + c * COSINE_LOBE.z));
     return 2.0 * half_angle.y * half_angle.y / (1.0 + half_angle.x) * lobe;
 }
 

@@ -32,8 +32,8 @@ void main() {
     uvec2 cell = uvec2(clamp(ivec2(floor(place)), ivec2(0), ivec2(push.cells) - 1));
     vec2 at = place - vec2(cell);
     uvec4 corner = texelFetch(corners, int(cell.y * push.cells.x + cell.x));
-    bool upwards = corner.x >= 0x80000000u;
-    corner.x &= 0x7fffffffu;
+    bool upwards = corner.x >= UPWARDS;
+    corner.x &= ~UPWARDS;
     // Two corners lie on the cell's diagonal; the third is the one on this point's side of it.
     bool far = upwards ? at.y > at.x : at.x + at.y > 1.0;
     uvec3 triangle = upwards ? uvec3(corner.x, corner.w, far ? corner.z : corner.y)

@@ -28,7 +28,7 @@ bool has_edge(uint block) {
         uvec2 cell = min(vertex, push.cells - 1);
         uvec4 corner = texelFetch(corners, int(cell.y * push.cells.x + cell.x));
         uvec2 near = vertex.y > cell.y ? corner.zw : corner.xy;
-        uint index = (vertex.x > cell.x ? near.y : near.x) & 0x7fffffffu;
+        uint index = (vertex.x > cell.x ? near.y : near.x) & ~UPWARDS;
         most = max(most, texelFetch(radiosity, int(push.first + index)).w);
     }
     return most > 0.0;

@@ -30,6 +30,6 @@ float cap_of(Entity entity, Cone cone, out float y[COEFFICIENTS]) {
         uint l = uint(sqrt(float(k) + 0.5));
         y[k] *= max(1.0 - float(l * (l + 1)) * quarter, 0.0);
     }
-    return 6.28318531 * covered / (1.0 + cone.cosine);
+    return 2.0 * PI * covered / (1.0 + cone.cosine);
 }
 #endif

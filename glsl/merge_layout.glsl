@@ -47,7 +47,7 @@ vec3 to_lattice(Entity entity, vec3 p) {
 
 // 1 where the samples of the object's lattice lie on the edges of a cube's faces, 0 where they are cells' centres: the bit above.
 float lattice_edges(Entity entity) {
-    return float(uint(entity.shift.w) >> 21);
+    return float(uint(entity.shift.w) >> FIT_BITS);
 }
 
 // A workgroup's worth of neighbouring vertices.

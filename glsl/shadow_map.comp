@@ -20,8 +20,6 @@ layout(push_constant) uniform Push {
     uint is_first;   // whether nothing has been added yet
 } push;
 
-const float PI = 3.14159265;
-const float NOTHING = 1e30;
 
 // Where the map has an occluder along a vector from the light, as a share of the vector. The texel knows its own centre only, so the
 // vector is moved there.
@@ -44,23 +42,23 @@ float met(inout vec3 vector) {
     float along = dot(forward, vector);
     vec2 place = vec2(dot(right, vector), dot(down, vector)) / (max(along, 1e-20) * slope);
     if (along <= 0.0 || max(abs(place.x), abs(place.y)) > 1.0) {
-        return NOTHING;
+        return EVERYTHING;
     }
     ivec2 texel = clamp(ivec2((place * 0.5 + 0.5) * float(MAP)), 0, MAP - 1);
     vec2 middle = (vec2(texel) + 0.5) * (2.0 / float(MAP)) - 1.0;
     vector = along * (forward + slope * (middle.x * right + middle.y * down));
     float found = texelFetch(nearness, texel + MAP * ivec2(face % 3, face / 3), 0).r;
-    return found > 0.0 ? 1.0 / (found * along) : NOTHING;
+    return found > 0.0 ? 1.0 / (found * along) : EVERYTHING;
 }
 
-// Where an occluder lies on the way from the light to the receiver's plane, as a share of the way; NOTHING behind the plane.
+// Where an occluder lies on the way from the light to the receiver's plane, as a share of the way; EVERYTHING behind the plane.
 float occluder(vec3 vector, vec3 to_vertex, vec3 normal) {
     float share = met(vector);
     float facing = dot(normal, vector);
     float plane = facing < -1e-3 * length(vector) ? dot(normal, to_vertex) / facing : 1.0;
     // What is left of a surface's shadow on itself once texels are compared at their centres: its curvature within a texel.
     float bias = 1e-3 + push.right.w / float(MAP);
-    return share < plane * (1.0 - bias) ? share / plane : NOTHING;
+    return share < plane * (1.0 - bias) ? share / plane : EVERYTHING;
 }
 
 #if TAPS > 0
@@ -73,7 +71,7 @@ vec2 disc(int i, int count) {
 
 float visibility(vec3 to_vertex, vec3 normal) {
 #if TAPS == 0
-    return occluder(to_vertex, to_vertex, normal) < NOTHING ? 0.0 : 1.0;
+    return occluder(to_vertex, to_vertex, normal) < EVERYTHING ? 0.0 : 1.0;
 #else
     float distance = length(to_vertex);
     vec3 axis = to_vertex / distance;
@@ -86,7 +84,7 @@ float visibility(vec3 to_vertex, vec3 normal) {
     for (int i = 0; i < SEARCHES; i++) {
         vec2 at = reach * disc(i, SEARCHES);
         float share = occluder(to_vertex + at.x * across + at.y * beside, to_vertex, normal);
-        if (share < NOTHING) {
+        if (share < EVERYTHING) {
             sum += share;
             count += 1.0;
         }
@@ -99,7 +97,7 @@ float visibility(vec3 to_vertex, vec3 normal) {
     float seen = 0.0;
     for (int i = 0; i < TAPS; i++) {
         vec2 at = width * disc(i, TAPS);
-        seen += occluder(to_vertex + at.x * across + at.y * beside, to_vertex, normal) < NOTHING ? 0.0 : 1.0;
+        seen += occluder(to_vertex + at.x * across + at.y * beside, to_vertex, normal) < EVERYTHING ? 0.0 : 1.0;
     }
     return seen / float(TAPS);
 #endif

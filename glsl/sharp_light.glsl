@@ -97,7 +97,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
     rays.place = before ? to * mat3(light.toward, light.across, light.down) : vec3(-light.distance, 0.0, 0.0);
     rays.place *= occluder.centre.w;
     rays.middle = along_axes(light, block.middle);
-    uint first = floatBitsToUint(occluder.sharp.x), field = first & 0x7fffffffu;
+    uint first = floatBitsToUint(occluder.sharp.x), field = first & ~HAS_HALVES;
     NodeCell cell = node_cell(field, rays.axes * rays.middle);
     vec2 in_box = through_box(field, rays.axes * rays.place, rays.axes * rays.middle);
     vec4 weights[4];
@@ -108,14 +108,14 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         rays.offset[k] = dot(rays.place, rays.along[k]);
         rays.foot[k] = rays.place - rays.offset[k] * rays.along[k];
         weights[k] = node_weights(cell, rays.axes * rays.along[k]);
-        limit[k] = before ? reach_of(light, part, rays.along[k]) * occluder.centre.w : 1e30;
+        limit[k] = before ? reach_of(light, part, rays.along[k]) * occluder.centre.w : EVERYTHING;
         float sine = part_sine(light, block, part, rays.along[k]);
         tangent[k] = sine * inversesqrt(1.0 - sine * sine);
     }
     vec4 inside = vec4(0.0);
 #if HALVES
     // Within the bounding sphere each half of the object counts as far as its outline lies between the point and the light.
-    if (before && first > 0x7fffffffu) {
+    if (before && first >= HAS_HALVES) {
         EACH for (uint k = 0; k < 4; k++) {
             float nearest = min(length(rays.place), length(rays.place + limit[k] * rays.along[k]));
             float deep = max(rays.offset[k], -rays.offset[k] - limit[k]);

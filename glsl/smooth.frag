@@ -20,7 +20,7 @@ vec4 picture_at(ivec2 pixel) {
 
 // Whether a pixel shows the line's entity.
 bool shows(vec4 texel) {
-    return abs(texel.a - line_mark.z) < 0.5 / 255.0;
+    return abs(texel.a - line_mark.z) < 0.5 * TAG_STEP;
 }
 
 float depth_at(ivec2 pixel) {

@@ -45,7 +45,7 @@ SeenLight seen_light(vec3 to, Entity shining) {
     light.facing = to_world(shining, vec3(0.0, 1.0, 0.0)) * axes;
     light.half_edges[0] = radii.x * (to_world(shining, vec3(1.0, 0.0, 0.0)) * axes);
     light.half_edges[1] = radii.y * (to_world(shining, vec3(0.0, 0.0, 1.0)) * axes);
-    light.area = radii.x * radii.y * (ratio > 0.0 ? 4.0 : 3.14159265);
+    light.area = radii.x * radii.y * (ratio > 0.0 ? 4.0 : PI);
 #endif
     return light;
 }
@@ -125,17 +125,17 @@ float part_light(SeenLight light, Block block, vec2 place, vec3 along) {
 #if PANELS
     if (light.panel != 0.0) {
         float reach = reach_of(light, place, along), area = light.area * block.area;
-        return area * max(-dot(light.facing, along), 0.0) / (reach * reach + area / 3.14159265);
+        return area * max(-dot(light.facing, along), 0.0) / (reach * reach + area / PI);
     }
 #endif
-    return 3.14159265 * light.sine * light.sine * block.area / along.x;
+    return PI * light.sine * light.sine * block.area / along.x;
 }
 
 // Sine of a part's angular radius.
 float part_sine(SeenLight light, Block block, vec2 place, vec3 along) {
 #if PANELS
     if (light.panel != 0.0) {
-        return min(sqrt(part_light(light, block, place, along) / 3.14159265), MOST_SINE);
+        return min(sqrt(part_light(light, block, place, along) / PI), MOST_SINE);
     }
 #endif
     return light.sine * sqrt(block.area);

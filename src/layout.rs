@@ -131,3 +131,30 @@ impl ListEntry {
         }
     }
 }
+
+/// The weight of what may be anywhere, and a length beyond all others: more than any light makes negligible.
+pub const EVERYTHING: f64 = 1e30;
+/// Flag of a grid's cell whose diagonal runs from corner (0, 0) to (1, 1), not from (1, 0) to (0, 1).
+pub const UPWARDS: u32 = 1 << 31;
+/// Added to the first quad of a silhouette field that has maps of halves.
+pub const HAS_HALVES: u32 = 1 << 31;
+/// Bits of a lattice's factors (see [`crate::field::Fit::packed`]).
+pub const FIT_BITS: u32 = 21;
+/// How far apart tags of entities are in a picture's alpha: as 8 bits tell.
+pub const TAG_STEP: f32 = 1.0 / 255.0;
+/// Coefficients of 1, cosine and its square in the clamped cosine of four bands.
+pub const COSINE_LOBE: [f64; 3] = [0.09375, 0.5, 0.46875];
+
+/// The macros that every shader has: what both languages have to agree on.
+pub fn shared_macros() -> [(&'static str, String); 7] {
+    let [a, b, c] = COSINE_LOBE;
+    [
+        ("PI", std::f64::consts::PI.to_string()),
+        ("EVERYTHING", format!("{EVERYTHING:e}")),
+        ("UPWARDS", format!("{UPWARDS:#x}u")),
+        ("HAS_HALVES", format!("{HAS_HALVES:#x}u")),
+        ("FIT_BITS", FIT_BITS.to_string()),
+        ("TAG_STEP", format!("{TAG_STEP:?}")),
+        ("COSINE_LOBE", format!("vec3({a:?}, {b:?}, {c:?})")),
+    ]
+}

@@ -6,6 +6,7 @@ use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
 use crate::gpu::shader::ShaderSource;
 use crate::gpu::{Shader, Stage};
+use crate::layout::shared_macros;
 use crate::sh;
 use crate::sh::product_program::{STYLES, glsl_subtract};
 use crate::sh::rotation::glsl_rotate;
@@ -152,6 +153,7 @@ impl Library {
         ]
         .into_iter()
         .map(|(name, value)| (name.to_owned(), value.to_string()))
+        .chain(shared_macros().map(|(name, value)| (name.to_owned(), value)))
         .chain(row.defines.iter().map(|(name, value)| ((*name).to_owned(), value.clone())))
         .collect();
         let include = |name: &str| match name.strip_prefix("generated/") {

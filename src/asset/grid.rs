@@ -1,13 +1,11 @@
 //! Finds flat meshes that are grids, as floors are: equal cells in rows, two triangles each.
 
 use super::Mesh;
+use crate::layout::UPWARDS;
 use glam::{DVec3, Vec3};
 
 /// Largest distance of a vertex from its grid position, in cells. It allows for rounding to f32 and in files.
 const TOLERANCE: f64 = 1e-3;
-
-/// Flag of a cell whose diagonal runs from corner (0, 0) to (1, 1), not from (1, 0) to (0, 1).
-pub const UPWARDS: u32 = 1 << 31;
 
 /// A mesh that covers a parallelogram by cells.
 #[derive(Clone, Debug)]

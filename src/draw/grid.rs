@@ -3,12 +3,13 @@
 //! The cells of a floor are small on the screen, so that light on them is smooth. A software rasteriser takes far longer for many
 //! small triangles than for a large one of the same area. The picture is that of the triangles, except for rounding.
 
-use crate::asset::grid::{Grid, UPWARDS};
+use crate::asset::grid::Grid;
 use crate::draw::patches::{BLOCK_CELLS, Patches};
 use crate::draw::pixel_light::texels;
 use crate::draw::{DrawnEntity, DrawnViewport, EntityPush};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
+use crate::layout::UPWARDS;
 use crate::shaders::{Library, ShaderPermutation};
 use crate::sharp::SharpPermutation;
 use ash::vk;

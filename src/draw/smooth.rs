@@ -15,6 +15,7 @@ use crate::error::Result;
 use crate::gpu::{
     Access, Bind, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Keeps, Target, Upload,
 };
+use crate::layout::TAG_STEP;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -27,8 +28,6 @@ const TOLERANCE: f64 = 1e-3;
 /// Pixels that a corner may be moved by: two steps of 1/256, which is what devices have to offer at least, and rounding.
 const SNAPPED: f64 = 0.01;
 
-/// How far tags are apart: as 8 bits of alpha tell.
-const TAG_STEP: f32 = 1.0 / 255.0;
 /// Tags in use; the last value is the background's.
 const TAGS: usize = 254;
 

@@ -26,9 +26,6 @@ impl Fit {
     /// No fit: spherical shells about the bounding sphere's centre.
     pub const ROUND: Fit = Fit { centre: [0.0; 3], stretch: [1.0; 3] };
 
-    /// Bits of the factors in [`Fit::packed`].
-    pub const PACKED_BITS: f32 = 21.0;
-
     /// Largest factor of an axis.
     pub const MOST: f64 = 2.0;
 

@@ -9,6 +9,7 @@
 use super::Fit;
 pub use super::directions::{CELL_WARP, Directions, unwarp, warp};
 use crate::error::{Error, Result};
+use crate::layout::FIT_BITS;
 use glam::DVec3;
 use std::f64::consts::FRAC_PI_2;
 
@@ -203,7 +204,7 @@ impl Lattice {
     /// The lattice as a shader reads it: [`Fit::packed`], where the bit above the factors says whether samples lie on edges.
     pub fn packed(&self) -> [f32; 4] {
         let [x, y, z, factors] = self.fit().packed();
-        [x, y, z, factors + if self.has_edges() { Fit::PACKED_BITS.exp2() } else { 0.0 }]
+        [x, y, z, factors + if self.has_edges() { (1_u32 << FIT_BITS) as f32 } else { 0.0 }]
     }
 
     /// Distance of a place (object's frame, in r) from the shells' centre, in the lattice's space. All distances of this module are

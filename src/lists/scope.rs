@@ -11,6 +11,7 @@
 
 use crate::field::silhouette::{INSIDE, REACH, Side};
 use crate::layout;
+use crate::layout::{COSINE_LOBE, EVERYTHING};
 use crate::lists::scene_bounds::{Bounds, EntityBounds, Light, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
@@ -26,8 +27,6 @@ use glam::{DVec2, DVec3};
 pub const SLACK: f64 = 0.002;
 /// What an outline's distance may be off by, in r: more than the step of a map and what blending four of them errs by.
 const OUTLINE_MARGIN: f64 = 0.06;
-/// The weight of what may be anywhere: more than any light makes negligible.
-pub const EVERYTHING: f64 = 1e30;
 
 /// What becomes of an entity in a chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,7 +111,8 @@ pub struct SphereView {
 /// there with four bands (Ramamoorthi, Hanrahan 2001, section 5).
 fn lobe(cosine: f64) -> f64 {
     let c = cosine.max(0.0);
-    c.max(0.09375 + c * (0.5 + c * 0.46875))
+    let [at_0, slope, bend] = COSINE_LOBE;
+    c.max(at_0 + c * (slope + c * bend))
 }
 
 /// What a sphere takes at most of the light of a uniform distant light of radiance 1, or sends with that radiance, as radiosity

@@ -5,6 +5,7 @@ use crate::bake::BakedMesh;
 use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
 use crate::gpu::{Buffer, Device};
+use crate::layout::HAS_HALVES;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -15,9 +16,6 @@ pub struct Silhouettes {
     /// Two words a cell.
     pub cells: Buffer,
 }
-
-/// Bit of a field's first quad that says that it has maps of halves.
-const HALVES: u32 = 1 << 31;
 
 /// The silhouette field of a mesh.
 #[derive(Clone)]
@@ -43,7 +41,7 @@ impl Silhouettes {
                 cells.extend(field.cells());
                 first
             });
-            let halves = if field.has_halves() { HALVES } else { 0 };
+            let halves = if field.has_halves() { HAS_HALVES } else { 0 };
             SilhouetteSlot { first_quad: first_quad | halves, field: field.clone() }
         };
         let slots = baked.iter().map(|mesh| mesh.silhouette.as_ref().map(&mut slot)).collect();

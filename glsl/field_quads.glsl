@@ -1,20 +1,13 @@
 // Fields as one quad a read, from texels or from a storage block.
-#if TEXEL
-layout(binding = FIELD_BINDING) uniform textureBuffer field_quads;
+#include "readable.glsl"
+#if HALF && !TEXEL
+READ_UVEC2(FIELD_BINDING, FieldQuads, field_quads, field_halves)
 vec4 field_quad(uint i) {
-    return texelFetch(field_quads, int(i));
-}
-#elif HALF
-layout(std430, binding = FIELD_BINDING) readonly buffer FieldQuads { uvec2 field_quads[]; };
-vec4 field_quad(uint i) {
-    uvec2 packed = field_quads[i];
+    uvec2 packed = field_halves(i);
     return vec4(unpackHalf2x16(packed.x), unpackHalf2x16(packed.y));
 }
 #else
-layout(std430, binding = FIELD_BINDING) readonly buffer FieldQuads { vec4 field_quads[]; };
-vec4 field_quad(uint i) {
-    return field_quads[i];
-}
+READ_VEC4(FIELD_BINDING, FieldQuads, field_quads, field_quad)
 #endif
 
 void field_sums(FieldPlace place, uint base, uint sample_quads, out vec4 sums[FETCHED_QUADS]) {

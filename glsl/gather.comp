@@ -21,17 +21,8 @@ struct Group {
 };
 
 // Spheres of all entities (centre in the world, radius), then blocks of occluders, their members, and lights.
-#if TEXEL
-layout(binding = 0) uniform textureBuffer scene_quads;
-vec4 scene_quad(uint i) {
-    return texelFetch(scene_quads, int(i));
-}
-#else
-layout(std430, binding = 0) readonly buffer SceneQuads { vec4 scene_quads[]; };
-vec4 scene_quad(uint i) {
-    return scene_quads[i];
-}
-#endif
+#include "readable.glsl"
+READ_VEC4(0, SceneQuads, scene_quads, scene_quad)
 layout(std430, binding = 1) readonly buffer Entities { Entity entities[]; };
 layout(std430, binding = 2) readonly buffer AllBounds { Bounds bounds[]; };
 layout(std430, binding = 3) buffer Groups { Group groups[]; };

@@ -1,10 +1,8 @@
 // The lists of all clusters, entries at binding 1 and clusters at binding 2, which are the same for a whole workgroup. A processor
 // reads a storage block lane by lane, and one without AVX-512 takes as long for one number of it as for eight texels.
+#include "readable.glsl"
+READ_UINT(1, Entries, entries, entry_at)
 #if TEXEL
-layout(binding = 1) uniform utextureBuffer entries;
-uint entry_at(uint i) {
-    return texelFetch(entries, int(i)).x;
-}
 layout(binding = 2) uniform utextureBuffer clusters;
 Cluster cluster_at(uint i) {
     int at = int(i) * 5;
@@ -16,10 +14,6 @@ Cluster cluster_at(uint i) {
         pairs[4].y);
 }
 #else
-layout(std430, binding = 1) readonly buffer Entries { uint entries[]; };
-uint entry_at(uint i) {
-    return entries[i];
-}
 layout(std430, binding = 2) readonly buffer Clusters { Cluster clusters[]; };
 Cluster cluster_at(uint i) {
     return clusters[i];

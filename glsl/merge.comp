@@ -18,31 +18,15 @@ const uint NONE = 0xffffffffu;
 #include "entities.glsl"
 #define FIELD_BINDING 3
 #include "field.glsl"
+#include "readable.glsl"
+READ_VEC4(4, Transfers, transfers, transfer_quad)
+READ_VEC4(5, Vertices, vertices, vertex_quad)
 #if TEXEL
-layout(binding = 6) uniform textureBuffer sky;
-vec4 sky_quad(uint i) {
-    return texelFetch(sky, int(i));
-}
-layout(binding = 4) uniform textureBuffer transfers;
-vec4 transfer_quad(uint i) {
-    return texelFetch(transfers, int(i));
-}
-layout(binding = 5) uniform textureBuffer vertices;
-vec4 vertex_quad(uint i) {
-    return texelFetch(vertices, int(i));
-}
+READ_VEC4(6, Sky, sky, sky_quad)
 #else
 layout(std140, binding = 6) uniform Sky { vec4 sky[3 * CHANNEL_QUADS]; };
 vec4 sky_quad(uint i) {
     return sky[i];
-}
-layout(std430, binding = 4) readonly buffer Transfers { vec4 transfers[]; };
-vec4 transfer_quad(uint i) {
-    return transfers[i];
-}
-layout(std430, binding = 5) readonly buffer Vertices { vec4 vertices[]; };
-vec4 vertex_quad(uint i) {
-    return vertices[i];
 }
 #endif
 layout(std430, binding = 7) writeonly buffer Radiosity { vec4 radiosity[]; };

@@ -12,38 +12,12 @@ const uint NONE = 0xffffffffu;
 #include "lists.glsl"
 #define NODE_BINDING 3
 #include "silhouette_field.glsl"
-#if TEXEL
-layout(binding = 5) uniform textureBuffer vertices;
-vec4 vertex_quad(uint i) {
-    return texelFetch(vertices, int(i));
-}
-layout(binding = 8) uniform textureBuffer soft; // what the merge has written
-vec4 soft_at(uint i) {
-    return texelFetch(soft, int(i));
-}
-#else
-layout(std430, binding = 5) readonly buffer Vertices { vec4 vertices[]; };
-vec4 vertex_quad(uint i) {
-    return vertices[i];
-}
-layout(std430, binding = 8) readonly buffer Soft { vec4 soft[]; };
-vec4 soft_at(uint i) {
-    return soft[i];
-}
-#endif
+#include "readable.glsl"
+READ_VEC4(5, Vertices, vertices, vertex_quad)
+READ_VEC4(8, Soft, soft, soft_at) // what the merge has written
 layout(std430, binding = 6) writeonly buffer Radiosity { vec4 radiosity[]; };
 #if SELF
-#if TEXEL
-layout(binding = 7) uniform utextureBuffer self_cells;
-uvec2 self_cell(uint i) {
-    return texelFetch(self_cells, int(i)).xy;
-}
-#else
-layout(std430, binding = 7) readonly buffer SelfCells { uvec2 self_cells[]; };
-uvec2 self_cell(uint i) {
-    return self_cells[i];
-}
-#endif
+READ_UVEC2(7, SelfCells, self_cells, self_cell)
 #include "self_frame.glsl"
 #include "self_visibility.glsl"
 #endif

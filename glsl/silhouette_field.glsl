@@ -5,25 +5,9 @@
 // Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the map, in texels from the middle of the
 // first; and edges of a texel in r, the map's first cell, and -1 where the map is seen from behind. Cells are the four texels around a point
 // between them: signed bytes of distance and of depth.
-#if TEXEL
-layout(binding = NODE_BINDING) uniform textureBuffer nodes;
-vec4 node_quad(uint i) {
-    return texelFetch(nodes, int(i));
-}
-layout(binding = NODE_BINDING + 1) uniform utextureBuffer cells;
-uvec2 cell_at(uint i) {
-    return texelFetch(cells, int(i)).xy;
-}
-#else
-layout(std430, binding = NODE_BINDING) readonly buffer Nodes { vec4 nodes[]; };
-vec4 node_quad(uint i) {
-    return nodes[i];
-}
-layout(std430, binding = NODE_BINDING + 1) readonly buffer Cells { uvec2 cells[]; };
-uvec2 cell_at(uint i) {
-    return cells[i];
-}
-#endif
+#include "readable.glsl"
+READ_VEC4(NODE_BINDING, Nodes, nodes, node_quad)
+READ_UVEC2(NODE_BINDING + 1, Cells, cells, cell_at)
 #include "cube.glsl"
 #include "blocked_share.glsl"
 #include "bytes.glsl"

@@ -52,6 +52,7 @@ embedded!(
     "product_points.glsl",
     "project.comp",
     "raster.comp",
+    "readable.glsl",
     "self_frame.glsl",
     "self_visibility.comp",
     "self_visibility.glsl",

@@ -1,5 +1,5 @@
-// All entities, at ENTITY_BINDING. They are the same for a whole workgroup: uniform or storage blocks on a GPU, which loads them once; on
-// a processor, which loads lane by lane, texel reads bring four numbers at a time.
+// All entities, at ENTITY_BINDING. They are the same for a whole workgroup. A GPU loads them once, from a uniform or storage block. A
+// software device reads blocks lane by lane; a texel read brings four numbers at a time.
 #if UNIFORM
 layout(std140, binding = ENTITY_BINDING) uniform Entities { Entity entities[ENTITY_LIMIT]; };
 #define ENTITY(e) entities[e]

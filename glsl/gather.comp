@@ -85,7 +85,7 @@ void meet() {
 uint distance_key(vec3 a, vec3 b) {
     precise vec3 to = a - b;
     precise float square = to.x * to.x + to.y * to.y + to.z * to.z;
-    return floatBitsToUint(square); // of what is not negative, more is more in bits too
+    return floatBitsToUint(square); // floats that are not negative have the same order as their bits
 }
 
 // Occluders that may matter to any cluster of the group, in no order.

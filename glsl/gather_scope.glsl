@@ -95,7 +95,7 @@ bool apart(View a, View b, vec2 fade) {
     return a.outside && b.outside && dot(a.toward, b.toward) < reach.x;
 }
 
-// Of a chain with a light.
+// Whether an occluder is listed in the chain of a light.
 bool occluder_listed(Scope scope, View view, View light, bool sharp, float radiance) {
     bool behind = (switches & SKIP_BEHIND) != 0 && view.nearest - (sharp ? view.radius : 0.0) > light.farthest;
     vec2 fade = sharp ? vec2(1.0, 0.0) : vec2(FADE_COSINE, FADE_SINE);
@@ -103,7 +103,7 @@ bool occluder_listed(Scope scope, View view, View light, bool sharp, float radia
     return !view.below && !behind && !aside && !negligible(scope, radiance * min(view.weight, light.weight));
 }
 
-// Of the sky's chain.
+// Whether an occluder is listed in the chain of the sky.
 bool occluder_listed(Scope scope, View view, float radiance) {
     return !view.below && !negligible(scope, radiance * view.weight);
 }

@@ -1,5 +1,5 @@
-// The lists of all clusters, entries at binding 1 and clusters at binding 2, which are the same for a whole workgroup. A processor
-// reads a storage block lane by lane, and one without AVX-512 takes as long for one number of it as for eight texels.
+// The lists of all clusters: entries at binding 1, clusters at binding 2. They are the same for a whole workgroup. Software devices read a
+// storage block lane by lane; texel reads are cheaper there.
 #include "readable.glsl"
 READ_UINT(1, Entries, entries, entry_at)
 #if TEXEL

@@ -44,14 +44,15 @@ void transfer(uint at, Entity receiver, out float t[COEFFICIENTS]) {
     sh_rotate(t, receiver.alpha_beta, receiver.gamma);
 }
 
-// What a vertex brings to every entry, and what becomes of it.
+// What a vertex brings to every entry: its place and its normal.
 struct Vertex {
     vec3 receiver; // centre, world
     vec3 position; // world axes, from there
     vec3 normal;
 };
 
-// Of an occluder in the chain of l, as far as order and skips decide.
+// How much occluder e counts in the chain of light l: 1 before the light, 0 behind it, and less where it stands beside the light's cone.
+// In the sky's chain every occluder counts.
 float share(Vertex vertex, uint e, Cone cone, uint l) {
     if (LIGHTS == 0) {
         return 1.0;

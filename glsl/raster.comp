@@ -1,5 +1,5 @@
 #version 460
-// Cube faces by computation: a workgroup for each face and band of its rows. A device that computes on many threads may transform and
+// Cube faces by computation: a workgroup for each face and strip of its rows. A device that computes on many threads may transform and
 // clip all triangles on one; here each invocation takes triangles of its own. It finds the texels whose centres' rays meet them.
 layout(local_size_x = WORKGROUP) in;
 
@@ -63,14 +63,14 @@ vec2 cut(vec3 plane) {
     return vec2(plane.y * scale, plane.z * scale + (along ? 0.0 : half_px - 0.5));
 }
 
-// Narrows a span of columns to one side of a cut: from it on where it opens the span, else up to it. max() and min() would cost two
-// more instructions each, for numbers that are none.
+// Narrows a span of columns to one side of a cut: to what follows it where it opens the span, else to what precedes it. Comparisons take
+// two instructions fewer than max() and min(), which also treat NaN.
 void narrow(float place, bool opens, inout vec2 span) {
     span.x = opens && place > span.x ? place : span.x;
     span.y = !opens && place < span.y ? place : span.y;
 }
 
-// Texels low to high of a row are met.
+// Marks the texels low to high of a row as met by a triangle.
 void meet(int row, int low, int high, Planes planes, float t) {
 #if DISTANCE
     float texel = 2.0 / float(push.face_px);
@@ -95,7 +95,7 @@ void meet(int row, int low, int high, Planes planes, float t) {
 #endif
 }
 
-// The corners in the face's frame, where rays are (s, t, 1).
+// Adds a triangle, whose corners are in the face's frame, where rays are (s, t, 1).
 void add(vec3 a, vec3 b, vec3 c, int row_first, int row_end) {
     float half_px = 0.5 * float(push.face_px);
     vec2 low = vec2(0.0, float(row_first));
@@ -143,7 +143,7 @@ vec3 corner(Face face, uint vertex) {
     return vec3(dot(face.right.xyz, q), dot(face.down.xyz, q), dot(face.forward.xyz, q));
 }
 
-// Four texels of a row of the band, a byte each.
+// Four texels of a row of the strip, a byte each.
 uint four(uint row, uint column) {
     uint bytes = 0;
     for (uint k = 0; k < 4; k++) {

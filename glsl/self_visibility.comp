@@ -103,7 +103,7 @@ void add_rim(uint job, uint face, uint k, int row_first, int row_end, vec3 up) {
     }
 }
 
-// Of each state the nearest texel so far: cosine to the node, and half its width in radians.
+// The nearest texel so far of each state: cosine to the node, and half the texel's width in radians.
 struct Nearest {
     vec2 free;
     vec2 blocked;

@@ -9,10 +9,10 @@
 #endif
 
 #if EDGES
-// Vertices carry a shadow's edge the worse, the narrower its penumbra is beside the way to the next vertex, with the square of the two's
-// ratio, and the more light it takes away.
-float finest;       // that ratio for the narrowest penumbra of the light at hand that comes as near as the next vertex, or 0
-float missed = 0.0; // most, over all lights, of the ratio's square times the light
+// Vertices carry a shadow's edge badly where its penumbra is narrow against the distance to the next vertex. The error grows with the
+// square of that distance over the penumbra's width, and with the light that the shadow takes away.
+float finest;       // distance over width, for the narrowest penumbra of the current light that comes as near as the next vertex, or 0
+float missed = 0.0; // most, over all lights, of the square of `finest` times the light
 float open_light = 0.0; // of all lights, nothing between
 #endif
 
@@ -36,7 +36,8 @@ struct Surface {
 #endif
 };
 
-// Of vertex `v` of a mesh, whose normal is given in the object's frame; `self_first`: the first cell of the mesh's first vertex, or NONE.
+// The facing of vertex `v` of a mesh. `normal` is in the object's frame; `self_first` is the first cell of the mesh's first vertex, or
+// NONE.
 Facing facing_of(Entity receiver, vec3 normal, float weight, uint self_first, uint v) {
     Facing facing;
     facing.normal = to_world(receiver, normal);
@@ -88,7 +89,8 @@ void add_open(float irradiance, Entity shining) {
 }
 #endif
 
-// Of the parts of a block, what an occluder lets through that counts only before the light (`before`), or the light's own outline.
+// The share of each part of a block that an occluder lets through. With `before` only what lies before the light counts; without it
+// the occluder is the light itself, and its own outline counts.
 vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block, bool before) {
     Rays rays;
     rays.axes = mat3(to_object(occluder, light.toward), to_object(occluder, light.across), to_object(occluder, light.down));
@@ -124,8 +126,8 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         }
     }
 #endif
-    // Of each side, the share that it blocks and how far its outline counts. Arrays, because lavapipe may lose what a lane has computed in a
-    // loop that it left before others did, unless it is stored.
+    // For each side, the share that it blocks and how far its outline counts. These are arrays, because on lavapipe a lane that leaves a
+    // loop before others may lose what it has computed there, unless it is stored.
     vec4 share[3], counts[3];
     uint side = WHOLE;
     uint last = inside == vec4(0.0) ? WHOLE : NEAR;
@@ -222,9 +224,9 @@ bool may_block(uint packed, Surface surface) {
 
 #endif
 
-// The first entry from `i` on that is evaluated: without cones all are, with them occluders that may block, and lights where they end a
-// chain that is (`within`) or have an outline of their own. What is computed in this loop is read again behind it, since a lane that leaves
-// a loop early may lose on lavapipe what the loop does not carry.
+// The first entry from `i` on that has to be evaluated. With CONES these are occluders that may block, and lights that end a chain of which
+// an occluder was evaluated (`within`) or that have an outline of their own; without CONES all. Values of this loop are read again behind
+// it: on lavapipe a lane that leaves a loop early may lose what the loop does not carry.
 uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
 #if CONES
     bool passes = false;
@@ -238,8 +240,8 @@ uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
     return i;
 }
 
-// Irradiance by the light that ends the chain from entry `i` on, past what is listed before it; past nothing where it is `open`, a constant,
-// of which the compiler keeps one side. `i` becomes the entry behind the light.
+// Irradiance by the light that ends the chain from entry `i` on, past the occluders that are listed before it; with `open` past none.
+// `open` is a constant, so the compiler keeps one side. `i` becomes the entry behind the light.
 vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint count, inout uint i) {
     SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, shining);
     uint b = light.fine >= 1.0 ? 1 : 0, last = light.fine <= 0.0 ? 0 : 4;

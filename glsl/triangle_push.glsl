@@ -1,4 +1,4 @@
-// Of an entity whose triangles are drawn again, where their pixels evaluate sharp lights.
+// Push constants of an entity whose triangles are drawn again, because their pixels evaluate sharp lights.
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
     vec4 emission_white; // radiance factor; w = radiance that is shown as white

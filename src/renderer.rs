@@ -171,8 +171,8 @@ impl Renderer {
     /// [`Scene::at`], with other placements for those that move: entities in the scene's order, then suns.
     ///
     /// # Errors
-    /// `Input` where the list has another length than the scene has entities, or a placement has a number that is not finite or over 1e10, a rotation
-    /// that is not of unit length, or a scale that is not positive; `Device` when the device was lost.
+    /// `Input` where the list has another length than the scene has entities, or a placement has a number that is not finite or over 1e10,
+    /// a rotation that is not of unit length, or a scale that is not positive; `Device` when the device was lost.
     pub fn update(&mut self, placements: &[Placement]) -> Result<()> {
         let entities = &self.frame.scene().entities;
         if placements.len() != entities.len() {
@@ -186,7 +186,8 @@ impl Renderer {
                 && (0.999..1.001).contains(&rotation.length_squared())
                 && (f32::MIN_POSITIVE..=FARTHEST_M).contains(scale);
             if !is_good {
-                return Err(Error::Input(format!("{:?}: {placement:?} is no placement", entity.name)));
+                let ranges = format!("rotations have length 1, scales are above 0, places lie within {FARTHEST_M:e} m");
+                return Err(Error::Input(format!("{:?}: {placement:?} is out of range: {ranges}", entity.name)));
             }
         }
         self.light.clear();

@@ -32,7 +32,7 @@ pub fn serve(
     let failed = |error: Error| Answer::Failed { code: error.exit_code(), message: error.to_string() };
     let mut say = |answer: Answer, bytes: &[u8]| {
         send(&mut output, &answer, &[bytes])
-            .map_err(|error| Error::Failed(format!("the bake does not listen: {error}")))
+            .map_err(|error| Error::Failed(format!("cannot write to the bake that started this worker: {error}")))
     };
     let baker = match open() {
         Ok(baker) => baker,

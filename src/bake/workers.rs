@@ -1,9 +1,9 @@
 //! Shares the captures of a bake out among worker processes, each with a device of its own.
 //!
-//! llvmpipe transforms and clips triangles on one thread a device, so that other cores idle where faces are drawn: those of radiance fields and
-//! of captures too large for [`super::raster`]. What is computed keeps all cores busy by itself, and workers only repeat the host's share: they
-//! made a bake of 70 000 triangles 1.08 times and one of 1 000 000 triangles 1.26 times as long on two cores.
-//! A second device inside one process crashed that driver, so each worker is a process. The bake's own process captures too. Units are dealt out one at a time, so that nobody waits long for another.
+//! llvmpipe transforms and clips triangles on one thread for each device, so drawn faces leave cores idle: those of radiance fields and of
+//! captures too large for [`super::raster`]. Computed faces keep all cores busy, and workers would only repeat the host's share. Two
+//! devices in one process crash llvmpipe, so each worker is a process. The bake's own process captures too. Units are dealt out one at a
+//! time, so that nobody waits long for another.
 
 use super::BakeReport;
 use super::batches::{CaptureTarget, Captures, Unit};
@@ -227,8 +227,8 @@ impl Workers {
         let own = Identity::own(&self.device);
         match worker.answer()? {
             (Answer::Hello(other), _) if other == own => Ok(worker),
-            (Answer::Hello(other), _) => Err(Error::Failed(format!("it is {other}, and this is {own}"))),
-            _ => Err(Error::Failed("it answers with something else".into())),
+            (Answer::Hello(other), _) => Err(Error::Failed(format!("the worker is {other}, and this is {own}"))),
+            _ => Err(Error::Failed("the worker did not begin with its identity".into())),
         }
     }
 }
@@ -281,7 +281,7 @@ impl Worker {
         let request = Request::Begin { mesh: MeshShape::of(mesh), reduction, face_px, shortcuts, levels };
         match self.ask(&request, &MeshShape::arrays(mesh))? {
             (Answer::Ready, _) => Ok(self),
-            _ => Err(Error::Failed("it answers with something else".into())),
+            _ => Err(Error::Failed("the worker did not answer that it is ready".into())),
         }
     }
 
@@ -294,7 +294,7 @@ impl Worker {
                 let report = BakeReport { capture_ms, project_ms, faces, triangles, ..Default::default() };
                 Ok(Captured { samples, report })
             }
-            _ => Err(Error::Failed("it answers with something else".into())),
+            _ => Err(Error::Failed("the worker did not answer with the samples that it was asked for".into())),
         }
     }
 }

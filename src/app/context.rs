@@ -219,7 +219,7 @@ impl Context {
                 global,
                 format!("measured once for {}: \"{}\" merges fastest", self.device.info.name, calibration.fastest),
             ),
-            // The command has done its work with another.
+            // The command has already done its work with another variant; only the next one would gain.
             Err(Error::Failed(error)) => log::warn!("calibration: {error}"),
             Err(error) => return Err(error),
             Ok(None) => {}

@@ -1,6 +1,6 @@
 //! Lamps that shine from one flat side: discs and rectangles. A panel is a thin closed body whose upper face alone has a colour, so that
-//! everything that reads meshes sees it as it is. What a panel is says its mesh besides ([`Mesh::panel`]), for light that is
-//! computed from its shape.
+//! everything that reads meshes sees it as it is. The mesh also says that it is a panel ([`Mesh::panel`]), for light that is computed
+//! from its shape.
 
 use super::generate::cuboid;
 use super::mesh::Mesh;

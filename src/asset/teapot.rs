@@ -24,7 +24,7 @@ type Patch = [[DVec3; 4]; 4];
 /// Tessellates the patches of `control_text` with `subdivisions` squares along each edge.
 ///
 /// The result has y up, spout towards +x, handle towards -x, its base on y = 0, and is in units of the original table taken
-/// as metres (6.5 m from handle to spout, 2.4 m high). Normals are analytic, and point out of the body. Where a patch edge
+/// as metres (6.4 m from handle to spout, 2.4 m high). Normals are analytic, and point out of the body. Where a patch edge
 /// collapses to a point, the limit of the normal is taken and triangles without area are dropped. The mesh is not closed: the lid
 /// rests on an open pot, and spout and handle reach into it.
 ///

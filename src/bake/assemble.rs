@@ -184,7 +184,7 @@ impl Assemble {
     /// A pipeline that stores `storage`.
     ///
     /// # Errors
-    /// As every pipeline.
+    /// As [`ComputePipeline::new`].
     pub fn new(device: &Arc<Device>, library: &Library, storage: Storage) -> Result<Self> {
         let shader = library.shader(&Self::row(storage))?;
         Ok(Assemble { pipeline: ComputePipeline::new(device, "assemble", &shader, &[])? })

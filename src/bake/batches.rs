@@ -151,7 +151,7 @@ pub(super) struct Batches {
     pub culls: bool,
     /// Estimated seconds that a triangle around an eye takes.
     triangle_seconds: f64,
-    /// And what each face takes besides.
+    /// Estimated seconds that a face takes without its triangles.
     face_seconds: f64,
 }
 

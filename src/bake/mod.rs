@@ -66,7 +66,7 @@ pub use workers::{WorkerOptions, Workers};
 /// stay below the horizon, and small enough that contact shadows do not move visibly.
 pub const TRANSFER_OFFSET: f32 = 2e-3;
 
-/// The program with its version and revision: what is made by equal ones belongs together.
+/// The program's name, version and revision. Results of programs with equal text may be mixed.
 pub const PROGRAM: &str = concat!("shadow-fields ", env!("CARGO_PKG_VERSION"), " ", env!("SHADOW_FIELDS_REVISION"));
 
 /// A function that is told how many samples are done, and how many there are.
@@ -213,7 +213,7 @@ impl Baker {
         let started = Instant::now();
         triangles::tell_repeated(mesh);
         let levels = header.level_texels > 0.0;
-        // They take about as long, most of it on one thread each.
+        // Samples and levels take about equally long, each mostly on one thread, so they are made side by side.
         let ahead = || if levels { self.leveled(mesh).map(|_| ()) } else { Ok(()) };
         let (samples, ahead) = rayon::join(|| FieldSamples::new(mesh, &mut header), ahead);
         let (FieldSamples { targets, plan, sources }, ()) = (samples?, ahead?);

@@ -1,15 +1,12 @@
 //! How finely fields are sampled and stored, in one word (`--quality`).
 //!
-//! | quality | lattice | face | bands | format | bake | bytes | error: torus | error: glowing ring |
-//! |---|---|---|---|---|---|---|---|---|
-//! | draft | cube:8x4 | 32 px | 3 | f16 | 0.3 s | 42 084 | 0.107 | 0.058 |
-//! | normal | cube:18x7,edges=auto | 64 px | 4 | f16 | 3.0 s | 280 549 | 0.087 | 0.035 |
-//! | high | cube:24x10 | 128 px | 5 | f16 | 15 s | 1 161 834 | 0.073 | 0.019 |
+//! | quality | lattice | face | bands | format |
+//! |---|---|---|---|---|
+//! | draft | cube:8x4 | 32 px | 3 | f16 |
+//! | normal | cube:18x7,edges=auto | 64 px | 4 | f16 |
+//! | high | cube:24x10 | 128 px | 5 | f16 |
 //!
-//! Bake: processor time for the occlusion field of the built-in teapot (6 400 triangles) on llvmpipe, all cores together
-//! (`shadow-fields bake assets/meshes/teapot.obj -o t.sf --quality Q`). Bytes: of that file. Error: root mean square over all vertices
-//! against ray casting with 1 024 rays, relative to the radiosity's root mean square (`shadow-fields render torus_over_plane -o p.png
-//! --error e.png --quality Q`, and the same for `glowing_torus`). Lights of few degrees are cut to few bands, which more samples do not mend.
+//! Times, bytes and errors are in `src/bench/MEASURED.md`. More samples do not help small lights in bands: the number of bands limits them.
 
 use super::Options;
 use super::silhouette::SilhouetteOptions;
@@ -18,12 +15,12 @@ use super::silhouette::SilhouetteOptions;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Quality {
-    /// A tenth of the time and a seventh of the bytes, 1.2 to 1.7 times the error: cube:8x4, 32 px, 3 bands
+    /// A tenth of the time and a seventh of the bytes; light in bands has 1.2 to 1.7 times the error: cube:8x4, 32 px, 3 bands
     Draft,
-    /// The default: cube:18x7, 64 px, 4 bands
+    /// The default: cube:18x7,edges=auto, 64 px, 4 bands
     #[default]
     Normal,
-    /// 4.9 times the time, 4 times the bytes, 0.55 to 0.84 of the error: cube:24x10, 128 px, 5 bands
+    /// 5 times the time and 4 times the bytes; light in bands has 0.54 to 0.84 of the error: cube:24x10, 128 px, 5 bands
     High,
 }
 

@@ -2,7 +2,7 @@
 //! takes most of a bake; a compute shader runs on all of its threads, eight triangles a step.
 //!
 //! Inputs: the mesh and the runs of its indices that each face shows (see [`super::capture`]). Output: the atlas, by way of a buffer of
-//! a byte a texel. Faces are cut into bands of rows whose texels fit the shared memory of a workgroup.
+//! a byte a texel. Faces are cut into strips of rows whose texels fit the shared memory of a workgroup.
 
 use crate::error::Result;
 use crate::field::self_visibility::DISTANCE_STEPS;
@@ -16,12 +16,12 @@ use glam::Vec3;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Invocations of a workgroup: as many as llvmpipe runs in one step with AVX2. Each step beyond goes through all runs again: with 32, a bake
-/// took 1.1 times as long.
+/// Invocations of a workgroup: as many as llvmpipe runs in one step with AVX2. With more, each further step would go through all runs
+/// again.
 const WORKGROUP: u32 = 8;
-/// Words of shared memory. With distances, one a texel, these are the 16 KB that every device has: a face of 64 px.
+/// Words of shared memory for distances, one for each texel: the 16 KiB that every device has, and a face of 64 px.
 const DISTANCE_WORDS: u32 = 4096;
-/// With a bit a texel, a face of 180 px.
+/// Words of shared memory for coverage, one bit for each texel: a face of 168 px.
 const COVER_WORDS: u32 = 1024;
 const POSITION_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 const INDEX_FORMAT: vk::Format = vk::Format::R32_UINT;

@@ -13,7 +13,7 @@ struct Gathered<'g, T: Pod> {
     values: &'g mut [T],
     targets: &'g [CaptureTarget],
     units: &'g [Unit],
-    /// For every unit whether its samples are in their places.
+    /// Whether the samples of each unit are in their places.
     done: Vec<bool>,
     /// Number of targets that are done.
     count: u32,

@@ -36,7 +36,7 @@ const ANGLE_MARGIN: f64 = 1.15;
 pub struct Operation {
     /// An orthogonal matrix with entries 0 and +-1.
     pub matrix: DMat3,
-    /// In r.
+    /// Largest distance of the moved surface from the surface, in r.
     pub deviation: f64,
 }
 

@@ -49,7 +49,7 @@ pub(super) struct Identity {
 }
 
 impl Identity {
-    /// That of this process on a device.
+    /// The identity of this process on a device.
     pub fn own(device: &crate::gpu::Device) -> Self {
         Identity {
             program: super::PROGRAM.into(),

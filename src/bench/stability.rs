@@ -64,7 +64,7 @@ pub struct CapChain {
 
 /// Largest allowed difference between f32 and f64 for a guarded chain of up to 1 000 factors; each factor rounds by 6e-8.
 pub const NEAR_F32: f64 = 1e-5;
-/// The same for factors stored in f16, each rounded by at most 5e-4 of its largest coefficients.
+/// Largest allowed difference for factors stored in f16, each rounded by at most 5e-4 of its largest coefficients.
 pub const NEAR_F16: f64 = 2e-3;
 
 /// What was measured.

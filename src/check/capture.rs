@@ -100,15 +100,15 @@ pub fn faces<T: Pod>(
 pub struct Coverage {
     /// Texels of all drawn faces.
     pub texels: usize,
-    /// Of them covered by the object.
+    /// Texels of them that the object covers.
     pub covered: usize,
-    /// On which the two disagree.
+    /// Texels on which the two disagree.
     pub differing: usize,
-    /// Of those the ones that lie on no edge of the object: never right.
+    /// Differing texels away from every edge of the object: must be 0.
     pub off_edge: usize,
     /// Faces that were not drawn.
     pub left_out: usize,
-    /// Of those the ones where rays meet the object: never right.
+    /// Faces that were not drawn although rays meet the object in them: must be 0.
     pub left_out_wrongly: usize,
 }
 

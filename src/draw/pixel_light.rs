@@ -25,7 +25,7 @@ pub struct PixelLight<'d> {
     pub silhouettes: [&'d Buffer; 2],
     /// Entries of chains.
     pub entries: &'d Buffer,
-    /// Of every cluster the first of its entries, and how many they are.
+    /// For every cluster of the lit entities: its first entry, and the number of its entries.
     pub chains: &'d Buffer,
     /// Light on vertices without that of sharp lights.
     pub soft: &'d Buffer,

@@ -9,16 +9,16 @@ use std::f64::consts::PI;
 /// Where a field is not zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Extent {
-    /// In no direction: its object blocks or emits nothing.
+    /// The field is zero in all directions: its object blocks or emits nothing.
     Nothing,
-    /// At most within a cone of directions from the centre, object's frame.
+    /// The field is zero outside a cone of directions from the centre, object's frame.
     Cone {
         /// Unit.
         axis: DVec3,
         /// Less than pi.
         half_angle_rad: f64,
     },
-    /// Possibly in all directions.
+    /// The field may differ from zero in all directions.
     All,
 }
 

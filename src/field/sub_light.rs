@@ -3,8 +3,8 @@
 //! One straight edge before a disc is exact only where the occluder's outline is straight over the whole light, and two occluders
 //! multiply only where each blocks its share of every part alike. Both get better as the parts get smaller. Parts come in blocks of
 //! four at the corners of a square around the block's middle, so that every block keeps its centre of mass. For one straight edge four
-//! such parts are as good as a middle and a ring of six (0.012 of the light in the root mean square, against 0.013). A wide light is
-//! four blocks, each a light of half its radius at a corner of the same square (0.011). Where the horizon cuts a light, so it cuts
+//! such parts are as good as a middle and a ring of six: 0.012 of the light in the root mean square. A wide light is four blocks, each a
+//! light of half its radius at a corner of the same square. Where the horizon cuts a light, so it cuts
 //! each part. Parts of a panel lie on its own face ([`Pattern`]), and each is a round light of its part's solid angle.
 
 use glam::{DQuat, DVec2, DVec3};
@@ -66,11 +66,11 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// Of a disc of radius 1.
+    /// The pattern of a disc of radius 1.
     pub const DISC: Pattern = Pattern { places: CORNERS, scale: 0.5 };
 
-    /// Of a square with corners at (1, 1) and (-1, -1) that stands for a rectangle with those half edges: quarters, or four parts in a
-    /// row along an edge that is more than [`STRIP`] times the other.
+    /// The pattern of a square with corners at (1, 1) and (-1, -1) that stands for a rectangle with these half edges: quarters, or four
+    /// parts in a row along an edge that is more than [`STRIP`] times the other.
     pub fn rectangle(half: DVec2) -> Pattern {
         let row = |axis: DVec2| Pattern { places: [-0.75, -0.25, 0.25, 0.75].map(|x| x * axis), scale: 0.25 };
         if half.x > STRIP * half.y {

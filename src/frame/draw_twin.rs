@@ -48,8 +48,8 @@ impl Frame {
         Ok(Smooth::twin(&texels, [width, height], &lines).iter().map(|color| color.to_array()).collect())
     }
 
-    /// The same for samples at other places of a pixel, (0, 0) to (1, 1), as it is before outlines are smoothed. Depth and tag are
-    /// those of the last sample.
+    /// The texels of that picture before outlines are smoothed, from samples at these places of a pixel, (0, 0) to (1, 1). Depth and tag
+    /// are those of the last sample.
     ///
     /// # Errors
     /// `Device` when memory ran out.

@@ -153,8 +153,8 @@ impl Frame {
     /// radiance above it is brought down to it, hue kept, before samples are averaged, so that edges of lights are smooth;
     /// infinity leaves radiance as it is. The host can read the picture afterwards. Returns each pass's duration.
     ///
-    /// While things move a picture lights only what it may show ([`crate::lists::skip::Skip::hidden`]): whoever wants radiosity rather than a picture
-    /// calls this without `white`, which lights everything.
+    /// While entities move a picture lights only what it may show ([`crate::lists::skip::Skip::hidden`]). Without `white` everything is
+    /// lit, for those who want radiosity rather than a picture.
     ///
     /// # Errors
     /// `Device` when the device was lost, `Failed` when a barrier is missing.
@@ -173,7 +173,7 @@ impl Frame {
     fn light_and_draw(&mut self, placements: &[Placement], white: Option<f32>, reads: bool) -> Result<Vec<Timing>> {
         let outcome = self.try_light_and_draw(placements, white, reads);
         if outcome.is_err() {
-            // Perhaps nothing ran: no cluster can be taken for merged.
+            // The device may have run none of it, so every cluster must be merged again.
             self.forget();
         }
         outcome
@@ -205,7 +205,7 @@ impl Frame {
         self.run(None, Some(&self.picture_work(placements, white)), true)
     }
 
-    /// As [`Frame::redraw`] for numbers that are no light: nothing shines, nothing is brought down, and the background is given.
+    /// As [`Frame::redraw`] for values that are not radiance: no emission, no limit to white, and the given background.
     ///
     /// # Errors
     /// As [`Frame::render`].

@@ -18,10 +18,10 @@ use half::f16;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What pictures are drawn by and into.
+/// The pass "draw" with its images and buffers.
 pub(super) struct FramePicture {
     pub draw: Draw,
-    /// What the shaders are compiled for whose pixels evaluate sharp lights.
+    /// The permutation of shaders whose pixels evaluate sharp lights, if any.
     pub sharp: Option<SharpPermutation>,
     /// Where the host reads a picture.
     pub readback: Buffer,
@@ -34,7 +34,7 @@ pub(super) struct FramePicture {
 }
 
 impl FramePicture {
-    /// For linear pictures of the size that `options` states.
+    /// Makes linear pictures of the size in `options`.
     ///
     /// # Errors
     /// As [`Draw::new`].

@@ -18,17 +18,17 @@ pub(super) struct PixelChains {
     pub entities: Upload,
     /// Entries of all chains.
     pub entries: Upload,
-    /// Of every cluster of the entities below the first of its entries, and how many they are.
+    /// For every cluster of the lit entities: its first entry, and the number of its entries.
     pub chains: Upload,
-    /// Of every entity that is lit: where its pixels find what they need, and how far the pixels of a cluster may lie from its vertices,
-    /// metres of the mesh's frame.
+    /// For every lit entity: where its pixels find their data, and how far the pixels of a cluster may lie from its vertices, metres of
+    /// the mesh's frame. `None` for the others.
     receivers: Vec<Option<(ByPixel, f32)>>,
     /// Entities as they were when the chains were made, and their bounds with what each of them takes part in.
     known: Option<(Vec<layout::DeviceEntity>, Vec<EntityBounds>)>,
 }
 
 impl PixelChains {
-    /// For what a scene lights.
+    /// Empty chains for the lit entities of a scene.
     ///
     /// # Errors
     /// `Device` when memory ran out.

@@ -1,4 +1,4 @@
-//! What memory a picture takes, which is told, and compared with what there is, before any work is done for it.
+//! The memory that a picture takes. It is compared with what the device and the host have before any work is done for the picture.
 
 use super::Options;
 use crate::draw::{Draw, Finish};

@@ -13,7 +13,7 @@ use std::ops::Range;
 /// Which radiosity a viewport shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RadiositySource {
-    /// The merge's.
+    /// The radiosity that the merge has written.
     Merged,
     /// What [`Frame::set_comparison`] put at that place.
     Comparison(usize),
@@ -119,7 +119,7 @@ impl Frame {
         drawn.into_iter().map(|(_, _, entity)| entity).collect()
     }
 
-    /// The same for a viewport, without emission where it shows none.
+    /// Entities in the order in which a viewport draws them, without emission where it shows none.
     pub(super) fn drawn_in(&self, placements: &[Placement], viewport: &Viewport) -> Vec<DrawnEntity<'_>> {
         let mut drawn = self.drawn_entities(placements, [viewport.area[2], viewport.area[3]]);
         if !viewport.adds_emission {

@@ -8,8 +8,8 @@ pub(super) fn keep_freed_memory() {
     {
         /// Bytes, more than a frame frees; the largest value that the library accepts for the second threshold.
         const BYTES: libc::c_int = 1 << 25;
-        /// Bytes of the largest piece of which the library makes the heaps of threads. Room of that size is never given back, nor the
-        /// pieces: a bake in one thread (LP_NUM_THREADS=0) spent 5.9 s of 25 s of processor time on their page faults.
+        /// Bytes of the largest piece of which the library makes the heaps of threads. Neither room of that size nor the
+        /// pieces are ever given back; a bake in one thread (LP_NUM_THREADS=0) would spend a quarter of its time on their page faults.
         const PIECE: libc::c_int = 1 << 26;
         // SAFETY: `mallopt` may be called at any time and only changes when memory goes back to the system.
         unsafe {

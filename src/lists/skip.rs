@@ -102,7 +102,7 @@ skips! {
         covered: Exact, "lists/scope.rs outline_result", None, false, Some("covered"), AtRest;
         /// Clusters of vertices for which nothing has changed since they were last merged.
         unmoved: Incremental, "lists/incremental.rs update", None, false, None, OneMoves;
-        /// Clusters of vertices that the camera cannot see, while things move, in pictures; and drawing what it cannot see.
+        /// Clusters that the camera cannot see, in pictures of a moving scene, and triangles that it cannot see.
         hidden: Incremental, "lists/sight.rs may_see", None, false, Some("hidden"), AllMove;
     }
     always {

@@ -228,14 +228,14 @@ impl Cone {
 /// An occluder as a point that blocks: the twin of `glsl/merge_cap.glsl`.
 #[derive(Clone, Copy, Debug)]
 pub struct Cap {
-    /// What it takes away, sr.
+    /// Solid angle that it blocks, sr.
     pub solid_angle: f64,
-    /// The basis in its direction, each band less for its extent.
+    /// SH basis in its direction, each band reduced for its extent.
     y: Coefficients,
 }
 
 impl Cap {
-    /// A share of it.
+    /// The same direction with a share of the solid angle.
     pub fn by(self, share: f64) -> Self {
         Cap { solid_angle: self.solid_angle * share, ..self }
     }

@@ -85,7 +85,7 @@ impl Difference {
             }
             let (mut square, mut largest) = (0.0, 0.0_f64);
             for (a, b) in rgb(&of_a, pixel).into_iter().zip(rgb(&of_b, pixel)) {
-                // Infinite or NaN in both.
+                // A pixel that is not finite is so in both pictures; it counts as equal.
                 let difference = if a.is_finite() { f64::from(a) - f64::from(b) } else { 0.0 };
                 square += difference * difference;
                 largest = largest.max(difference.abs());
@@ -136,8 +136,8 @@ fn differ_beyond_numbers(a: f32, b: f32) -> bool {
     (a.is_infinite() || b.is_infinite()) && a != b
 }
 
-/// FLIP of every pixel, 0 where the mask is dark. The second picture takes the first one's pixels where the mask is dark, so that these look alike and blur
-/// nothing into their neighbours.
+/// FLIP of every pixel, 0 where the mask is dark. The second picture takes the first one's pixels where the mask is dark, so that these
+/// look alike and blur nothing into their neighbours.
 fn flips(a: &Picture, b: &Picture, mask: Option<&[bool]>, exposure_ev: f32) -> Vec<f64> {
     let [of_a, mut of_b] = [a, b].map(|picture| picture.linear(exposure_ev));
     for (pixel, _) in mask.unwrap_or_default().iter().enumerate().filter(|(_, counts)| !**counts) {

@@ -31,7 +31,7 @@ pub enum Button {
     Left,
     /// Moves the camera.
     Right,
-    /// As the right one.
+    /// Moves the camera, as the right button does.
     Middle,
 }
 

@@ -17,11 +17,11 @@ use crate::scene::values::SCALE_LIMIT;
 /// Keys of a node.
 #[derive(Clone, Debug, Default)]
 pub struct Tracks {
-    /// Of its translation.
+    /// Keys of the translation.
     pub position: Option<Keys<Vec3>>,
-    /// Of its rotation.
+    /// Keys of the rotation.
     pub rotation: Option<Keys<[f32; 4]>>,
-    /// Of its scale, one for all axes.
+    /// Keys of the scale, one factor for all axes.
     pub scale: Option<Keys<f32>>,
 }
 

@@ -258,7 +258,7 @@ fn demo_writes_pictures_and_a_table() {
     let pictures: Vec<_> = expected.iter().map(|name| picture(&out, name, [96, 64])).collect();
     assert!((0..pictures.len()).all(|i| (0..i).all(|j| pictures[i] != pictures[j])), "two pictures are equal");
     let rows: Vec<&str> = ran.stdout.lines().collect();
-    assert!(rows[0].starts_with("scene") && rows[0].ends_with("frames/s  4 samples  1 sample"), "{}", ran.stdout);
+    assert!(rows[0].starts_with("scene") && rows[0].ends_with("frames/s  at 4 samples  at 1 sample"), "{}", ran.stdout);
     for (scene, row) in scenes.iter().zip(&rows[1..]) {
         let cells: Vec<&str> = row.split_whitespace().collect();
         assert!(cells[0] == *scene && cells.len() == 10, "{row}");

@@ -28,8 +28,8 @@ pub struct Arguments {
     /// colours if it has them. Example: 4,3,2
     #[arg(long, value_name = "R,G,B", value_parser = color, allow_hyphen_values = true)]
     radiance: Option<Vec3>,
-    /// Bake a silhouette field instead: outlines from many directions, for lights that are too small for SH bands. It takes
-    /// --quality of the baking options, for 98, 389 or 1 542 KiB, and half as much again where the mesh is not convex
+    /// Bake a silhouette field instead: outlines from many directions, for sharp lights. Of the baking options it takes only --quality; the
+    /// field has 98, 389 or 1 542 KiB, and half as much again if the mesh is not convex
     #[arg(long, conflicts_with = "radiance")]
     silhouette: bool,
     /// Capture only one of the samples or maps that a symmetry of the mesh carries into one another, and turn it for the others.
@@ -60,7 +60,7 @@ impl Arguments {
     /// `Usage` where they say which kind.
     pub(super) fn of_any_kind(&self) -> Result<bake::Options> {
         if self.silhouette || self.radiance.is_some() {
-            return Err(Error::Usage("a plan has every kind of field: leave out --silhouette and --radiance".into()));
+            return Err(Error::Usage("a plan bakes all kinds of fields: leave out --silhouette and --radiance".into()));
         }
         Ok(self.options())
     }

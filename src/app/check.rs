@@ -1,4 +1,4 @@
-//! `shadow-fields check`
+//! `shadow-fields check` compares every pass with its CPU twin.
 
 use super::context::Context;
 use super::{Global, output};
@@ -18,7 +18,7 @@ pub struct Arguments {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let context = Context::new(global)?;
     let told = |row: &check::CheckRow| {
-        output::note(global, format!("{} {}", if row.passed { "good" } else { "BAD " }, row.line()))
+        output::note(global, format!("{} {}", if row.passed { "passed" } else { "FAILED" }, row.line()))
     };
     let all = check::PASSES.map(|(name, _)| name);
     let wanted = |name: &&str| arguments.passes.is_empty() || arguments.passes.iter().any(|pass| pass == name);
@@ -30,9 +30,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(format!("{report:#}"));
     } else {
         let info = &context.device.info;
-        output::say(format!("Every pass against its twin on {} ({})", info.name, info.driver));
+        output::say(format!("Passes against their CPU twins on {} ({})", info.name, info.driver));
         let cells = rows.iter().map(|row| {
-            let mark = if row.passed { "yes" } else { "NO" };
+            let mark = if row.passed { "passed" } else { "FAILED" };
             vec![
                 format!("{}: {}", row.pass, row.what),
                 format!("{:.1e}", row.worst),
@@ -41,7 +41,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
                 mark.to_owned(),
             ]
         });
-        output::table(&["pass", "worst", "tolerance", "measured in", "good"], &cells.collect::<Vec<_>>());
+        output::table(&["pass", "worst", "tolerance", "measured in", "result"], &cells.collect::<Vec<_>>());
     }
     let count = rows.len();
     context.finish()?;

@@ -1,4 +1,4 @@
-//! `shadow-fields compare`
+//! `shadow-fields compare` measures how two pictures differ.
 
 use super::{Global, output};
 use crate::asset::decode::Picture;
@@ -14,15 +14,15 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(
     after_help = "FLIP (Andersson et al. 2020) is how different two pictures look when one flips between them, 0 to 1 a pixel: \
-    colours are blurred\nas the eye blurs them 0.7 m from a screen of 0.7 m and 3840 pixels. A mean of 0.01 is hard to see, 0.1 is \
+    colours are blurred\nas the eye blurs them 0.7 m from a screen of 0.7 m and 3 840 pixels. A mean of 0.01 is hard to see, 0.1 is \
     plain.\nRMS and the largest difference are of sRGB values from 0 to 1 as a screen shows them (1 of 255 steps is 0.0039), or of \
     linear values\nwhere both pictures are EXR or HDR. Alpha is not compared. A pixel that is not finite in one picture alone is \
     beyond every bound.\n\nExamples:\n  shadow-fields compare expected.png out/teapot.png --max-flip 0.01 -o difference.png\n  \
     shadow-fields compare a.exr b.exr --max-rms 0.001 --mask without_clock.png --json\n\nExit codes: 0 within the bounds (or none is \
-    given), 1 beyond one, 2 usage, 4 no picture, or pictures of different sizes"
+    given), 1 beyond one, 2 usage, 4 a file that is no picture, or\npictures of different sizes"
 )]
 pub struct Arguments {
-    /// Picture in PNG, JPEG, EXR or HDR, made by this program or not; of an animated PNG the first picture counts
+    /// Picture in PNG, JPEG, EXR or HDR, made by this program or not; the first picture of an animated PNG is compared
     #[arg(value_name = "A")]
     first: PathBuf,
     /// Picture of the same size
@@ -37,10 +37,10 @@ pub struct Arguments {
     /// End with exit code 1 where the root mean square difference is above this
     #[arg(long, value_name = "X", value_parser = bound, allow_negative_numbers = true)]
     max_rms: Option<f64>,
-    /// Picture of the same size: only pixels that are light in it (green at least half of white) count
+    /// Compare only pixels that are light in this picture of the same size (green at least half of white)
     #[arg(long, value_name = "MASK.png")]
     mask: Option<PathBuf>,
-    /// Stops by which EXR and HDR pictures are brightened where they are shown: for FLIP, and beside another
+    /// Stops by which EXR and HDR pictures are brightened before FLIP, and before they are compared with a PNG or JPEG
     #[arg(long, default_value_t = 0.0, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
     exposure_ev: f32,
 }

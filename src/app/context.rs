@@ -51,8 +51,8 @@ pub struct Global {
     /// Folder whose shader files are used instead of the built-in ones of the same name
     #[arg(long, global = true, value_name = "DIR")]
     pub shader_dir: Option<PathBuf>,
-    /// Processes that a bake is shared out among; its bytes are the same. Default: one a core where
-    /// a software device has to draw faces, as of radiance fields, for an estimated two seconds or more, else one
+    /// Number of processes that share a bake; the result is the same. Default: 1, or one per core if a software device has to draw cube
+    /// faces (radiance fields and very large meshes) and this takes an estimated two seconds or more
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub jobs: Option<u32>,
 }
@@ -84,29 +84,33 @@ pub fn cache_dir(global: &Global) -> Option<PathBuf> {
     })
 }
 
-/// Options of a merge.
+/// Options of what lights a scene: the merge and sharp lights.
 #[derive(Args, Clone, Copy, Debug)]
-#[command(next_help_heading = "Merging")]
+#[command(next_help_heading = "Lighting")]
 pub struct MergeArguments {
-    /// Variant of the merge shader: storage, storage-uniform, texel, texel-packed, texel-shifted or image. All compute the same, but
-    /// the sampler of image interpolates less exactly. Default: the fastest of the others on this device, as the first run measures
+    /// Variant of the merge shader: storage, storage-uniform, texel, texel-packed, texel-shifted or image. They differ in how they read
+    /// fields; image interpolates with the sampler, less exactly. Default: the fastest on this device without image, measured once
     #[arg(long, value_name = "NAME", value_parser = Variant::named)]
     pub variant: Option<Variant>,
-    /// Work to leave out: all, none, or a list of horizon, cones, behind, caps, passed, covered, unmoved, hidden. Horizon and cones leave out what
-    /// true visibility makes zero, which is nearer to ray casting than the stored bands are. Caps looks up no field of an occluder
-    /// that is small as seen from a vertex but takes it for a point. Pictures with these three differ a little from those without.
-    /// The others change nothing that is shown: hidden leaves unlit what the camera cannot see while things move
-    #[arg(long, default_value = "all", value_name = "all|none|LIST")]
+    /// Work to leave out: all, none, or a list of these with commas:
+    ///   horizon  lights and occluders below the horizon of the surface *
+    ///   cones    occluders beside the light, as seen from the vertex *
+    ///   behind   occluders farther away than the light
+    ///   caps     fields of occluders that look small from the vertex, which become points *
+    ///   passed   occluders that no ray to a sharp light meets (lists of the host)
+    ///   covered  sharp lights that one occluder covers whole (lists of the host)
+    ///   unmoved  clusters of vertices for which nothing has changed
+    ///   hidden   clusters of vertices that the camera cannot see, while entities move
+    /// Skips with * change pictures a little; the others do not change what is shown
+    #[arg(long, default_value = "all", value_name = "all|none|LIST", verbatim_doc_comment)]
     pub skip: Skip,
     /// Leave out an entity's light or shadow on a vertex where it is bounded below this share of white; 0 leaves out nothing
     #[arg(long, default_value_t = EPS, value_name = "SHARE", value_parser = eps, allow_negative_numbers = true)]
     pub eps: f32,
-    /// Lights that are computed as sharp lights, whose shadows have edges: every entity that glows in one colour, or none (sh: four
-    /// bands of spherical harmonics, as for skies and for lights whose colour varies over their surface)
+    /// How lights of one colour are computed
     #[arg(long, value_enum, default_value = "sharp", value_name = "sh|sharp")]
     pub lights: Lights,
-    /// Where the light of sharp lights is evaluated for pictures: at pixels near shadow edges that are finer than the triangles they fall
-    /// on, and else at vertices; or at vertices alone. Default: pixel with four samples a pixel, vertex with one
+    /// Where sharp lights are evaluated for pictures. Default: pixel with four samples a pixel, vertex with one
     #[arg(long, value_enum, value_name = "vertex|pixel")]
     pub shading: Option<Shading>,
     /// Where the lists of the entities that concern each cluster of vertices are made. Default: device, but host for fewer than 128

@@ -1,4 +1,4 @@
-//! `shadow-fields demo`
+//! `shadow-fields demo` bakes and renders the built-in scenes and times them.
 
 use super::context::{Context, MergeArguments, size};
 use super::{Global, output};
@@ -80,20 +80,22 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(json!({ "origin": origin, "scenes": rows, "pictures": files }).to_string());
         return Ok(());
     }
-    // Draw, frame and frames/s are with one sample a pixel and smoothed outlines; the last two are frames/s.
     let header = [
         "scene",
         "vertices",
         "entities",
-        "bake s",
-        "merge ms",
-        "draw ms",
-        "frame ms",
+        "bake, s",
+        "merge, ms",
+        "draw, ms",
+        "frame, ms",
         "frames/s",
-        "4 samples",
-        "1 sample",
+        "at 4 samples",
+        "at 1 sample",
     ];
     output::table(&header, &rows.iter().map(DemoRow::cells).collect::<Vec<_>>());
+    output::say(
+        "Draw, frame and frames/s: one sample a pixel, outlines smoothed. The last two columns are frames/s as well.",
+    );
     let first = rows.first().map_or(0.0, |row| row.first_picture_s);
     output::say(format!("first picture after {first:.2} s, all after {:.1} s", started.elapsed().as_secs_f64()));
     for path in written {

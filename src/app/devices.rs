@@ -1,4 +1,4 @@
-//! `shadow-fields devices`
+//! `shadow-fields devices` lists the Vulkan devices of this machine.
 
 use super::{Global, output};
 use crate::error::Result;

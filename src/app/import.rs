@@ -1,4 +1,4 @@
-//! `shadow-fields import`
+//! `shadow-fields import` writes a glTF file as a scene file.
 
 use super::source::GltfArguments;
 use super::{Global, output};

@@ -116,7 +116,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("shells", format!("{} r", shells.join(" "))),
         ("fit", format!("about {:?} r, stretched by {:?}", lattice.fit().centre, lattice.fit().stretch)),
         ("samples", format!("{} ({} inside, seen from the surface)", lattice.sample_count(), header.filled_samples)),
-        ("captured", format!("{} of them, the others turned", header.captured_samples)),
+        ("captured", format!("{}; the other samples are turned copies of these", header.captured_samples)),
         ("symmetry", header.symmetry.clone()),
         ("stored", format!("{} samples, {storage}, {} bytes", lattice.stored_count(), field.payload.len())),
         ("face", format!("{0} x {0} texels", header.face_px)),
@@ -126,10 +126,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     if header.kind == FieldKind::Occlusion {
         output::say(format!(
-            "{:16} at most {:.4} times a product, transfers of {} bands",
+            "{:16} one product makes a transfer vector of {} bands at most {:.4} times as long",
             "growth",
-            header.growth,
-            growth::TRANSFER_BANDS
+            growth::TRANSFER_BANDS,
+            header.growth
         ));
     }
     if header.kind == FieldKind::Radiance {

@@ -31,7 +31,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-/// Precomputed shadow fields: soft shadows of many moving objects under many moving lights, on Vulkan.
+/// Precomputed shadow fields: shadows of many moving objects under many moving lights, on Vulkan.
 ///
 /// Start with `shadow-fields demo`: it bakes and renders the built-in scenes into out/.
 #[derive(Parser)]
@@ -57,7 +57,7 @@ enum Subcommands {
     Inspect(inspect::Arguments),
     /// Measure error, time and stability and write tables and plots
     Bench(bench::Arguments),
-    /// Hold every pass against its CPU twin on the chosen device; exit code 1 where one is off
+    /// Compare every pass with its CPU twin on the chosen device; exit code 1 where one differs by more than its tolerance
     Check(check::Arguments),
     /// Compare two pictures, made by this program or not; exit code 1 where they differ by more than a bound
     Compare(compare::Arguments),

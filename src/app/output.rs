@@ -86,7 +86,7 @@ pub fn check_ending(path: &Path, ending: &str, what: &str) -> Result<()> {
     if device || path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
         return Ok(());
     }
-    Err(Error::Usage(format!("{}: the name of {what} is to end in .{ending}", path.display())))
+    Err(Error::Usage(format!("{}: the name of {what} must end in .{ending}", path.display())))
 }
 
 /// Starts the log on stderr: warnings by default, more with `-v`, as RUST_LOG says where it is set.

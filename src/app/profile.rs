@@ -1,4 +1,4 @@
-//! `shadow-fields profile`
+//! `shadow-fields profile` times every pass and every variant of the merge shader.
 
 use super::context::{Context, size};
 use super::{Global, output};
@@ -32,7 +32,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 65_536, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=4_194_304))]
     grid: u32,
     /// Occluders that each vertex of the made-up merge meets; several numbers with commas
-    #[arg(long, default_value = "4,16", value_delimiter = ',', value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
+    #[arg(long, default_value = "4,16", value_delimiter = ',', value_name = "N", value_parser = occluder_count)]
     occluders: Vec<u32>,
     /// Time only this variant of the merge shader; an unknown name lists them
     #[arg(long, value_name = "NAME", conflicts_with = "compare", value_parser = Variant::named)]
@@ -49,6 +49,11 @@ pub struct Arguments {
     /// Write profile.csv, starts.csv and profile.json into this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+}
+
+fn occluder_count(text: &str) -> std::result::Result<u32, String> {
+    let number = text.parse().ok().filter(|count| (1..=256).contains(count));
+    number.ok_or_else(|| format!("expected whole numbers from 1 to 256 with commas, like 4,16, got \"{text}\""))
 }
 
 /// Measures and prints.

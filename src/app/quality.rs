@@ -18,20 +18,20 @@ pub struct BakeArguments {
 
 /// The parts of a quality.
 #[derive(Args, Clone, Copy, Debug)]
-#[command(next_help_heading = "Baking, each part of --quality by itself")]
+#[command(next_help_heading = "Baking: settings that override --quality")]
 struct SingleArguments {
-    /// Sample points: cube:SHELLSxCELLS or latlon:SHELLSxLATITUDESxLONGITUDES, then optionally ,linear,raw (equal steps
-    /// between shells, as in the paper) ,inner=R ,outer=R (in bounding radii) ,edges (samples on the edges of a cube's faces, shared by
-    /// them: finer steps in as many bytes; not for boxes) ,edges=auto (by the mesh)
+    /// Sample points: cube:SHELLSxCELLS or latlon:SHELLSxLATITUDESxLONGITUDES. Words may follow after commas: linear,raw (equal steps
+    /// between shells, as in the paper), inner=R, outer=R (in bounding radii), round (no fit to the mesh's box), edges (samples on the
+    /// edges of cube faces: finer steps in as many bytes, not for boxes), edges=auto (the mesh decides). Example: cube:18x7,edges=auto
     #[arg(long, value_name = "LATTICE")]
     lattice: Option<Lattice>,
     /// Edge of a captured cube face in texels
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=1024))]
     face_px: Option<u32>,
-    /// SH bands of light, transfer and what is stored, 2 to 7; N bands are N^2 coefficients
+    /// SH bands of light, transfer and what is stored, 2 to 7; N bands are N*N coefficients
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7))]
     bands: Option<u32>,
-    /// SH bands of stored visibility if other than --bands: more of them cost fetches and bring long chains nearer to the truth
+    /// SH bands of occlusion fields if other than --bands; more bands make shadows of many occluders more exact, and slower
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=7))]
     field_bands: Option<u32>,
     /// Number format of stored coefficients
@@ -73,6 +73,7 @@ mod tests {
         let all: Vec<bake::Options> = ["draft", "normal", "high"].map(|word| parsed(&["--quality", word])).to_vec();
         assert_eq!(all, Quality::value_variants().iter().map(|quality| quality.options()).collect::<Vec<_>>());
         assert_eq!(all[1], bake::Options::default(), "normal is what there is without the option");
+        assert_eq!("cube:18x7,edges=auto".parse(), Ok(Lattice::default()), "as help texts write it");
         for pair in all.windows(2) {
             let samples = pair.iter().map(|o| o.lattice.starting_at(1.0).stored_count()).collect::<Vec<_>>();
             assert!(pair[0].face_px < pair[1].face_px && pair[0].bands < pair[1].bands && samples[0] < samples[1]);
@@ -101,7 +102,7 @@ mod tests {
     #[test]
     fn help_has_the_single_switches_under_a_heading_of_their_own() {
         let help = CommandLine::command().render_help().to_string();
-        let [before, after] = help.split("Baking, each part of --quality by itself:").collect::<Vec<_>>()[..] else {
+        let [before, after] = help.split("Baking: settings that override --quality:").collect::<Vec<_>>()[..] else {
             panic!("one heading in {help}")
         };
         assert!(before.contains("--quality") && before.contains("draft") && !before.contains("--lattice <"), "{help}");

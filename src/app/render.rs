@@ -1,4 +1,4 @@
-//! `shadow-fields render`
+//! `shadow-fields render` renders a scene to pictures, or to a table of vertices.
 
 use super::context::{Context, MergeArguments, size};
 use super::quality::BakeArguments;
@@ -37,7 +37,7 @@ pub struct Arguments {
     /// Number of pictures
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
-    /// Number of the first picture: its time is so many pictures later, and numbered names begin with it
+    /// Number of the first picture; its time is --time plus this number of pictures, and numbered names start with it
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u32).range(..=10_000_000))]
     first: u32,
     /// Pictures per second of scene time
@@ -55,7 +55,7 @@ pub struct Arguments {
     /// Also write times (ms) and counts
     #[arg(long, value_name = "S.json")]
     stats: Option<PathBuf>,
-    /// Light by ray casting instead of shadow fields. This is slow, and it is the truth that errors are measured against
+    /// Light by ray casting instead of shadow fields: slow, and the truth that errors are measured against
     #[arg(long, group = "judge")]
     reference: bool,
     /// Also write the error of the last picture's vertices against ray casting in false colour, with a scale bar
@@ -64,8 +64,8 @@ pub struct Arguments {
     /// Colours of --error: signed shows too dark in blue and too bright in red, absolute shows the size of the error
     #[arg(long, default_value = "signed", value_name = "SCHEME", requires = "error")]
     error_scheme: Scheme,
-    /// With --error: the error with the last colour, relative to the root mean square of the radiosity; default: the 99th
-    /// percentile, rounded up
+    /// With --error: the error that gets the last colour of the scale, relative to the root mean square of the radiosity; default: the
+    /// 99th percentile, rounded up
     #[arg(long, value_name = "X", value_parser = positive, requires = "error", allow_negative_numbers = true)]
     error_limit: Option<f64>,
     /// With --reference or --error: rays per vertex for the sky and for each light

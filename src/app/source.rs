@@ -11,7 +11,7 @@ use std::path::Path;
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "glTF files (.glb, .gltf)")]
 pub struct GltfArguments {
-    /// End with exit code 4 where something in a glTF file is left out, instead of a line for each kind of thing
+    /// End with exit code 4 if anything in a glTF file is left out; by default each kind is only listed
     #[arg(long)]
     pub strict: bool,
 }

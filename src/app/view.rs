@@ -1,4 +1,4 @@
-//! `shadow-fields view`
+//! `shadow-fields view` opens a window.
 
 use super::context::{Context, MergeArguments, cache_dir, size};
 use super::quality::BakeArguments;
@@ -54,7 +54,7 @@ pub struct Arguments {
     /// Start with the motion paused
     #[arg(long)]
     paused: bool,
-    /// Start without the overlay (H shows it)
+    /// Start without panels (H shows them)
     #[arg(long)]
     no_overlay: bool,
     #[command(flatten)]

@@ -51,10 +51,11 @@ pub fn short<T: Copy + Into<f64> + std::fmt::Display + std::fmt::LowerExp>(numbe
 /// # Errors
 /// [`Error::Input`] where it cannot be read or is larger.
 pub fn read_file(path: &Path, limit_bytes: u64) -> Result<Vec<u8>> {
-    let file = File::open(path).map_err(|e| Error::input(path, e))?;
+    let unread = |error| Error::input(path, format!("cannot be read: {error}"));
+    let file = File::open(path).map_err(unread)?;
     let mut bytes = Vec::new();
     // Reading one byte past the limit detects an oversized file; pipes and devices report no length.
-    file.take(limit_bytes + 1).read_to_end(&mut bytes).map_err(|e| Error::input(path, e))?;
+    file.take(limit_bytes + 1).read_to_end(&mut bytes).map_err(unread)?;
     if bytes.len() as u64 > limit_bytes {
         return Err(Error::input(path, format!("over the limit of {} MiB", limit_bytes >> 20)));
     }

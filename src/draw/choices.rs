@@ -46,9 +46,9 @@ impl Antialias {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Shading {
-    /// At vertices; pixels interpolate.
+    /// At vertices only; pixels interpolate.
     Vertex,
-    /// At pixels near shadow edges that are narrower than the mesh's triangles there; else at vertices.
+    /// At pixels near shadow edges that are finer than the mesh's triangles; else at vertices.
     Pixel,
 }
 

@@ -44,8 +44,8 @@ impl std::str::FromStr for Lattice {
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let explain = || {
             format!(
-                "cannot read lattice \"{text}\" (cube:18x7 or latlon:8x4x4, then optionally ,linear,raw ,inner=R \
-                 ,outer=R ,edges ,edges=auto ,round)"
+                "cannot read lattice \"{text}\": expected cube:18x7 or latlon:8x4x4, then any of ,linear,raw ,inner=R \
+                 ,outer=R ,edges ,edges=auto ,round"
             )
         };
         let mut words = text.split(',');

@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Lights {
-    /// None: every light goes through its field of spherical harmonics.
+    /// Spherical harmonics for all lights; shadows have no edges.
     Sh,
-    /// Every entity that glows in one colour, over its whole surface or from one flat side. What has colours of its own, and the distant light, stay in spherical harmonics.
+    /// Every entity that glows in one colour, or on one flat side, is a sharp light, as every sun is; all other light stays in spherical
+    /// harmonics.
     #[default]
     Sharp,
 }

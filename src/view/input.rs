@@ -94,7 +94,7 @@ pub const CONTROLS: &[KeyHelp] = &[
     row("right drag", "move the camera", &[]),
     row("wheel", "nearer, farther", &[]),
     row("Home", "show the whole scene", &[(Key::Home, false, Command::Home)]),
-    row("click", "select; nothing selected means all that casts shadows or shines", &[]),
+    row("click", "select; with none selected, keys move all occluders and lights", &[]),
     row(
         "Q / A",
         "select the next, the previous",
@@ -105,9 +105,9 @@ pub const CONTROLS: &[KeyHelp] = &[
     row("J / L", "left, right as the camera sees it", &[step('j', Step::Left), step('l', Step::Right)]),
     row("I / K", "up, down in the world", &[step('i', Step::Up), step('k', Step::Down)]),
     row("O / P", "back, forth as the camera sees it", &[step('o', Step::Back), step('p', Step::Forth)]),
-    row("N / M", "larger, smaller", &[step('n', Step::Larger), step('m', Step::Smaller)]),
+    row("N / M", "enlarge, shrink the selected", &[step('n', Step::Larger), step('m', Step::Smaller)]),
     row("R / T", "turn left, right about the vertical", &[step('r', Step::TurnLeft), step('t', Step::TurnRight)]),
-    row("E", "occluder to light and back", &[letter('e', Command::ToggleLight)]),
+    row("E", "turn an occluder into a light and back", &[letter('e', Command::ToggleLight)]),
     row(
         "C / V",
         "turn the sky left, right",
@@ -121,7 +121,7 @@ pub const CONTROLS: &[KeyHelp] = &[
     row("G", "ray-cast reference on the right", &[letter('g', Command::ToggleReference)]),
     row("X", "error in false colour", &[letter('x', Command::ToggleError)]),
     row("F12", "write PNG and EXR", &[(Key::Function(12), false, Command::Screenshot)]),
-    row("Ctrl-S", "write NAME-edited.toml, then -2, -3", &[(Key::Letter('s'), true, Command::Save)]),
+    row("Ctrl-S", "save as NAME-edited.toml (then NAME-edited-2.toml)", &[(Key::Letter('s'), true, Command::Save)]),
     row(
         "Ctrl-Z / Ctrl-Y",
         "undo, redo",

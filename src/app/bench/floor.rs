@@ -1,4 +1,4 @@
-//! `shadow-fields bench floor`
+//! `shadow-fields bench floor` measures the error of bands and of sampling below a teapot.
 
 use super::common::start;
 use crate::app::{Global, output};
@@ -19,11 +19,11 @@ pub struct Arguments {
     /// Only lights that have TEXT in their names; may be given again; a text that none has lists them
     #[arg(long, value_name = "TEXT")]
     case: Vec<String>,
-    /// Rays a vertex, light and factor; default: 16384, with --quick 4096
+    /// Rays for each vertex, light and factor; default: 16 384, with --quick 4 096
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=1_048_576))]
     rays: Option<u32>,
     /// Sample points, as `bake --lattice` takes them
-    #[arg(long, default_value_t = Lattice::default(), value_name = "LATTICE")]
+    #[arg(long, default_value = "cube:18x7,edges=auto", value_name = "LATTICE")]
     lattice: Lattice,
     /// Edge of a captured cube face in texels
     #[arg(long, default_value_t = 64, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=1024))]

@@ -22,19 +22,19 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum What {
-    /// What a picture's error is made of, what run time buys, and ray casting beside the merge
+    /// Split the error of pictures into its causes, sweep the settings, and compare with ray casting and shadow maps
     TimeError(time_error::Arguments),
-    /// What band-limiting and sampling cost below a teapot, beside an independent ray caster's figures
+    /// Measure the error of bands and of sampling below a teapot, and compare it with an independent ray caster's
     Floor(floor::Arguments),
-    /// What one product costs in every form, alone on the device
+    /// Time one SH product in each of its forms
     Product(product::Arguments),
-    /// What long chains, odd places and odd numbers do to the merge; exit code 1 where one goes wrong
+    /// Test the merge with long chains, extreme places and extreme numbers; exit code 1 where a trial fails
     Stability(stability::Arguments),
-    /// What each skip saves and what it does to the error
+    /// Measure what each skip saves and how it changes the error
     Skip(skip::Arguments),
-    /// Whether memory grows, pictures drift or frames slow over a million frames; exit code 1 where they do
+    /// Draw a million frames and watch memory, pictures and frame times; exit code 1 where they drift
     Soak(soak::Arguments),
-    /// Time and memory as vertices, entities and lights become many
+    /// Measure time and memory for growing numbers of vertices, entities and lights
     Scaling(scaling::Arguments),
 }
 

@@ -1,4 +1,4 @@
-//! `shadow-fields bench product`
+//! `shadow-fields bench product` times one SH product in each of its forms.
 
 use super::common::start;
 use crate::app::{Global, output};

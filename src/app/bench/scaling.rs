@@ -1,4 +1,4 @@
-//! `shadow-fields bench scaling`
+//! `shadow-fields bench scaling` measures time and memory for growing scenes.
 
 use super::common::start;
 use crate::app::{Global, output};

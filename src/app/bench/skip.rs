@@ -1,4 +1,4 @@
-//! `shadow-fields bench skip`
+//! `shadow-fields bench skip` measures what each skip saves, in frames and in bakes.
 
 use super::common::start;
 use crate::app::{Global, output};
@@ -41,9 +41,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
 
 fn print_frames(rows: &[skips::SkipCost]) {
     output::say(
-        "Frame without drawing (of \"hidden\" with it, 1280x720), the skip off and on in turns; what it left off (a cluster of 64 \
-         vertices, chain, entity;\nof \"hidden\" clusters); lookups listed (one for a cluster); RMS error against ray casting and the most that a vertex changes, both in units of the RMS \
-         radiosity",
+        "Times of a frame without drawing, in turns without and with the skip (for \"hidden\" with drawing, at 1280x720). Left off: \
+         entries of\nlists (for \"hidden\": clusters). Errors and changes are relative to the RMS radiosity.",
     );
     let cells = rows.iter().map(|row| {
         let mut cells = vec![row.case.clone(), row.skip.clone()];
@@ -74,7 +73,8 @@ fn print_frames(rows: &[skips::SkipCost]) {
 
 fn print_bakes(bakes: &[bake_skips::BakeSkipRow]) {
     output::say(
-        "\nBakes, nothing left out and this skip alone; the field against one of faces of 128 px. Filled: samples inside the solid, captured off its surface or filled",
+        "\nBakes without any shortcut (off) and with this one (on); errors are against a field of faces of 128 px. Filled: samples inside \
+         the solid,\ncaptured at its surface or filled from neighbours.",
     );
     let cells = bakes.iter().map(|row| {
         let mut cells = vec![row.case.clone(), row.triangle_count.to_string(), row.lattice.clone(), row.skip.clone()];

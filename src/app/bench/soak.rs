@@ -1,4 +1,4 @@
-//! `shadow-fields bench soak`
+//! `shadow-fields bench soak` draws a million frames and watches for drift.
 
 use super::common::start;
 use crate::app::{Global, output};

@@ -1,4 +1,4 @@
-//! `shadow-fields bench stability`
+//! `shadow-fields bench stability` tests the merge with long chains and extreme scenes.
 
 use super::common::start;
 use crate::app::{Global, output};
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Arguments of `bench stability`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Chains of up to 64 factors instead of 1000
+    /// Chains of up to 64 factors instead of 1 000
     #[arg(long)]
     quick: bool,
     /// Folder for chains.csv, trials.csv, turns.csv, refusals.csv, stability.json and plots

@@ -1,4 +1,4 @@
-//! `shadow-fields bench time-error`
+//! `shadow-fields bench time-error` splits the error of pictures into its causes and compares methods at equal error.
 
 use super::common::start;
 use crate::app::source::GltfArguments;

@@ -1,4 +1,4 @@
-//! `shadow-fields farm collect`
+//! `shadow-fields farm collect` checks results and makes cache files and pictures of them.
 
 use super::super::context::Context;
 use super::super::render::Numbered;

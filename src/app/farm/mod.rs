@@ -24,7 +24,7 @@ pub struct Arguments {
 enum Commands {
     /// Cut works into slices of about two minutes and write them, with everything that decides their bytes
     Plan(plan::Arguments),
-    /// Do one slice; where its result is there and intact, return at once
+    /// Compute one slice; return at once if its result exists and is intact
     Run(run::Arguments),
     /// Check all results and make cache files and pictures of them, or say which slices have to run again
     Collect(collect::Arguments),
@@ -45,7 +45,7 @@ pub struct StatusArguments {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     // Results are named by all that decides them, and a plan says nothing of these two.
     if global.shader_dir.is_some() || global.seed != Global::SEED {
-        return Err(Error::Usage("farm: --shader-dir and --seed are not for farms: a plan does not hold them".into()));
+        return Err(Error::Usage("farm does not take --shader-dir and --seed: a plan does not store them".into()));
     }
     match &arguments.command {
         Commands::Plan(arguments) => plan::run(global, arguments),

@@ -1,4 +1,4 @@
-//! `shadow-fields farm plan`
+//! `shadow-fields farm plan` cuts works into slices.
 
 use super::super::context::Context;
 use super::super::render::Numbered;

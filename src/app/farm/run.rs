@@ -1,4 +1,4 @@
-//! `shadow-fields farm run`
+//! `shadow-fields farm run` computes one slice.
 
 use super::super::context::Context;
 use super::super::{Cli, Global, Subcommands, output, parse, render};

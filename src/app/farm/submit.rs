@@ -1,4 +1,4 @@
-//! `shadow-fields farm submit`
+//! `shadow-fields farm submit` hands slices to an engine.
 
 use super::super::output::Progress;
 use super::super::{Global, output};
@@ -22,7 +22,7 @@ enum Engine {
     Slurm,
     /// A Dask cluster: PLAN.dask.py is written and run by python3, which needs the package distributed
     Dask,
-    /// A line of a command for each slice, for GNU parallel, Nextflow and others
+    /// A command for each slice, one per line, for GNU parallel, Nextflow and others
     Print,
     /// A job template of Open Job Description, in JSON
     Openjd,
@@ -36,8 +36,8 @@ pub struct Arguments {
     /// What runs the slices
     #[arg(long, value_enum, value_name = "ENGINE")]
     engine: Engine,
-    /// Slices at a time: processes of local and of a Dask cluster on this machine (default: one a core), tasks of all Slurm arrays, but
-    /// at least one of each (default: no limit)
+    /// Number of slices at a time: processes of local, or of a Dask cluster on this machine (default: one per core), or tasks of all Slurm
+    /// arrays together, but at least one of each (default: no limit)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     workers: Option<u32>,
     /// Address of a Dask scheduler; default: a cluster on this machine

@@ -13,7 +13,7 @@ import subprocess
 import sys
 
 TRIES = 3
-# Exit codes that stay: usage, another device or program, bad input.
+# Exit codes that a second try would not change: usage, another device or program, bad input.
 LASTING = (2, 3, 4)
 
 

@@ -1,34 +1,42 @@
 //! Precomputed shadow fields for dynamic scenes, on hand-managed Vulkan.
 //!
-//! Method: Zhou, Hu, Lin, Guo, Shum, *Precomputed Shadow Fields for Dynamic Scenes*, SIGGRAPH 2005, low-frequency version.
-//! Around every object, cube maps are captured at points on concentric shells and projected to spherical harmonics (SH):
-//! an object occlusion field (OOF) for what blocks, a source radiance field (SRF) for what shines. At run time every vertex
-//! of every receiver merges these fields with order-4 SH products.
+//! Method: Zhou, Hu, Lin, Guo, Shum, *Precomputed Shadow Fields for Dynamic Scenes*, SIGGRAPH 2005. Around every object, cube maps are
+//! captured at points on concentric shells and projected to spherical harmonics (SH): an occlusion field for what the object blocks, a
+//! radiance field for what it emits. At run time every vertex merges these fields by SH products. Lights of one colour are sharp lights:
+//! they look up silhouette fields, which keep the edges of shadows.
 //!
 //! # Conventions
 //!
-//! | thing | choice |
-//! |---|---|
-//! | SH basis | The basis is real and orthonormal, with the Condon-Shortley phase as in Sloan, *Stupid SH Tricks*: Y1,-1 = -0.488603 y, Y1,0 = 0.488603 z, Y1,1 = -0.488603 x. Coefficient (l, m) has index l(l+1)+m. The basis is evaluated as polynomials of a unit vector. |
-//! | bands | n bands are n^2 coefficients. What the literature calls "order 4" is 4 bands, 16 coefficients. |
-//! | space | Space is right-handed, +y is up, and lengths are in metres. SH are taken on world x, y, z as they stand. |
-//! | cube faces | The faces are +X -X +Y -Y +Z -Z, with Vulkan's s and t on each. A texel stands for the direction of its centre and weighs its exact solid angle; the weights sum to 4 pi. |
-//! | field distances | Distances are in units of the object's bounding-sphere radius r, from the sphere's centre. Shells lie about the middle of the mesh's box, and its short axes are stretched ([`field::fit`]). |
-//! | occlusion field | It stores the *blocked* part b = P[1 - V], which is 0 where nothing blocks. A sample inside the solid is captured off the nearest surface. |
-//! | between shells | b / (1 - cos a) is interpolated over sin(a/2), where a is the half-angle of the bounding sphere. Samples are lowered by a twelfth of their second differences. Beyond 8 r the value falls as (8r/d)^2. |
-//! | order | An occluder precedes a light if its bounding sphere's centre is nearer to the vertex than the light's. Entity indices decide ties. |
-//! | sharp lights | An entity that glows in one colour, or from one flat side, is a sharp light. It is cut into 4 or 16 parts ([`field::sub_light`]); in each, the visibilities past all occluders' outlines ([`field::silhouette`]) and past the receiver's own mesh ([`field::self_visibility`]) are multiplied. What lies beyond the light's surface blocks nothing. All else goes through SH. |
-//! | small occluders | An occluder whose bounding sphere has a half-angle below 12 degrees blocks a point: it takes away the chain's value in its direction times the solid angle of a projected area, which is fitted to its outermost shell ([`field::Area`]). Up to 16 degrees the point and the field share. |
-//! | switches | An emitter does not occlude, flat ground only receives, and everything else does both. Each can be set per entity. |
-//! | scale | Scales are uniform and positive. |
-//! | light | Light is linear Rec.709 radiance. The radiosity is B = albedo/pi * integral of L V max(0, n.w) dw. |
-//! | numbers | Tables are made in f64, shaders compute in f32, and fields are stored as f16 or f32. |
+//! - SH basis: it is real and orthonormal, with the Condon-Shortley phase as in Sloan, *Stupid SH Tricks*: Y1,-1 = -0.488603 y,
+//!   Y1,0 = 0.488603 z, Y1,1 = -0.488603 x. Coefficient (l, m) has index l(l+1)+m. The basis is evaluated as polynomials of a unit vector.
+//! - Bands: n bands are n^2 coefficients. What the literature calls "order 4" is 4 bands, 16 coefficients.
+//! - Space: it is right-handed, +y is up, and lengths are in metres. SH are taken on world x, y, z as they stand.
+//! - Cube faces: they are +X -X +Y -Y +Z -Z, with Vulkan's s and t on each. A texel stands for the direction of its centre and weighs its
+//!   exact solid angle; the weights sum to 4 pi.
+//! - Field distances: they are in units of the object's bounding-sphere radius r, from the sphere's centre. Shells lie about the middle of
+//!   the mesh's box, and its short axes are stretched ([`field::fit`]).
+//! - Occlusion field: it stores the *blocked* part b = P[1 - V], which is 0 where nothing blocks. A sample inside the solid is captured
+//!   off the nearest surface.
+//! - Between shells: b / (1 - cos a) is interpolated over sin(a/2), where a is the half-angle of the bounding sphere. Samples are lowered
+//!   by a twelfth of their second differences. Beyond 8 r the value falls as (8r/d)^2.
+//! - Order: an occluder precedes a light if its bounding sphere's centre is nearer to the vertex than the light's. Entity indices decide
+//!   ties.
+//! - Sharp lights: an entity that glows in one colour, or from one flat side, is a sharp light. It is cut into 4 or 16 parts
+//!   ([`field::sub_light`]); in each, the visibilities past all occluders' outlines ([`field::silhouette`]) and past the receiver's own
+//!   mesh ([`field::self_visibility`]) are multiplied. What lies beyond the light's surface blocks nothing. All else goes through SH.
+//! - Small occluders: an occluder whose bounding sphere has a half-angle below 12 degrees blocks a point. It takes away the chain's value
+//!   in its direction times the solid angle of a projected area, which is fitted to its outermost shell ([`field::Area`]). Up to 16 degrees
+//!   the point and the field share.
+//! - Entities: an emitter does not occlude, flat ground only receives, and everything else does both. Each can be set per entity. Scales
+//!   are uniform and positive.
+//! - Light: it is linear Rec.709 radiance. The radiosity is B = albedo/pi * integral of L V max(0, n.w) dw.
+//! - Numbers: tables are made in f64, shaders compute in f32, and fields are stored as f16 or f32.
 //!
 //! # Layers
 //!
 //! A module uses only modules above it in this table, and a test holds it to that.
 //!
-//! | module | what stands there |
+//! | module | content |
 //! |---|---|
 //! | [`error`], [`files`], [`text`] | errors with their exit codes; files that are replaced whole; text files of results |
 //! | [`sh`] | spherical harmonics in f64, and the GLSL that is generated from them |
@@ -48,25 +56,10 @@
 //! | [`renderer`] | the front door for programs: a device, a scene, its light and its picture |
 //! | [`truth`] | ray casting and the exact SH chain |
 //! | [`check`] | every pass against its CPU twin |
-//! | `bench` | what things cost and how wrong they are (feature `cli`) |
-//! | [`farm`] | bakes and pictures of many machines: plans, results, engines |
-//! | `view`, `app` | the state behind the window; a file for each subcommand (feature `cli`) |
-//!
-//! # Beyond one device
-//!
-//! Only the second paragraph of this section is built.
-//!
-//! *Merges on many devices.* A cluster reads its list, the entities on the list and their fields, and it writes only its own
-//! vertices. Clusters can therefore be dealt out by receiver and by place. Each device holds the fields and vertices of its own
-//! clusters. In every frame it receives 5 600 bytes for every 30 entities, and it sends 16 bytes for every vertex to the device that
-//! draws. A device merges again only what something moved near.
-//!
-//! *Bakes on many machines.* A field depends on mesh, lattice, bands, face size and number format. Their hash names its cache file, and
-//! every file is replaced whole. [`farm`] cuts bakes and pictures into slices that need no meeting place but a shared folder; a long
-//! bake is cut within a mesh, into ranges of its samples, as [`bake::workers`] does on one machine. `FARM.md` says how it is used.
-//!
-//! *Larger scenes.* Fields that together exceed what a device can bind need several buffers, or only the fields of one neighbourhood
-//! at a time. The cluster lists already name those.
+//! | `bench` | measurements of time and error (feature `cli`) |
+//! | [`farm`] | bakes and pictures of many machines: plans, results, engines (`FARM.md` says how they are used) |
+//! | `view` | the state behind the window (feature `cli`) |
+//! | `app` | the command line, a file for each subcommand (feature `cli`) |
 
 #[cfg(feature = "cli")]
 pub mod app;

@@ -1,5 +1,5 @@
-// Light of sharp lights on a pixel. The shader that includes this defines FACINGS, the number of vertices whose weighed light the pixel
-// has. It binds corners of cells or triangles at 0, and the radiosity of every vertex at 1.
+// Light of sharp lights on a pixel. The shader that includes this defines FACINGS, the number of vertices whose weighed
+// light the pixel has. It binds corners of cells or triangles at 0, and the radiosity of every vertex at 1.
 #include "merge_layout.glsl"
 const uint NONE = 0xffffffffu;
 #define ENTITY_BINDING 2

@@ -1,6 +1,6 @@
-// A chain that stays at the 32 points of a rule, as the values there times the weights, and is projected once at its end: exact
-// for one factor only. `bench product` compares it with merge_product.glsl. The functions have the same names; its twin is
-// merge::chain.
+// A chain that stays at the 32 points of a rule, as the values there times the weights, and is projected once at its
+// end: exact for one factor only. `bench product` compares it with merge_product.glsl. The functions have the same
+// names; its twin is merge::chain.
 #include "generated/points.glsl"
 
 #define FETCHED COEFFICIENTS

@@ -126,8 +126,8 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
         }
     }
 #endif
-    // For each side, the share that it blocks and how far its outline counts. These are arrays, because on lavapipe a lane that leaves a
-    // loop before others may lose what it has computed there, unless it is stored.
+    // For each side, the share that it blocks and how far its outline counts. These are arrays, because on lavapipe a
+    // lane that leaves a loop before others may lose what it has computed there, unless it is stored.
     vec4 share[3], counts[3];
     uint side = WHOLE;
     uint last = inside == vec4(0.0) ? WHOLE : NEAR;
@@ -240,8 +240,8 @@ uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
     return i;
 }
 
-// Irradiance by the light that ends the chain from entry `i` on, past the occluders that are listed before it; with `open` past none.
-// `open` is a constant, so the compiler keeps one side. `i` becomes the entry behind the light.
+// Irradiance by the light that ends the chain from entry `i` on, past the occluders that are listed before it; with
+// `open` past none. `open` is a constant, so the compiler keeps one side. `i` becomes the entry behind the light.
 vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint count, inout uint i) {
     SeenLight light = seen_light(shining.centre.xyz - surface.origin - surface.position, shining);
     uint b = light.fine >= 1.0 ? 1 : 0, last = light.fine <= 0.0 ? 0 : 4;

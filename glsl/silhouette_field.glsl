@@ -1,10 +1,10 @@
 // A lookup in a silhouette field: what an object blocks of a small round light. The twin is src/field/silhouette.rs, with the same names.
 // NODE_CELLS: cells along a face of the node grid; MAP: texels along a map of the whole object, half as many along those of its halves.
 //
-// A field begins with two quads, the least and the largest corner of a box around the object (its frame, in r), then come the nodes.
-// Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the map, in texels from the middle of the
-// first; and edges of a texel in r, the map's first cell, and -1 where the map is seen from behind. Cells are the four texels around a
-// point between them: signed bytes of distance and of depth.
+// A field begins with two quads, the least and the largest corner of a box around the object (its frame, in r), then
+// come the nodes. Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the
+// map, in texels from the middle of the first; and edges of a texel in r, the map's first cell, and -1 where the map is
+// seen from behind. Cells are the four texels around a point between them: signed bytes of distance and of depth.
 #include "readable.glsl"
 READ_VEC4(NODE_BINDING, Nodes, nodes, node_quad)
 READ_UVEC2(NODE_BINDING + 1, Cells, cells, cell_at)
@@ -73,9 +73,9 @@ struct NearMap {
     float depth;     // of the outline along the direction in the middle
 };
 
-// The map of a side at corner k of a cell. `axes`, in the object's frame, are those that directions are given in. `foot` is the place on
-// the middle ray that is nearest to the sphere's centre, by those axes and in r. Places on rays are given by such feet, because they stay
-// small where the object is far away, so that f32 keeps them.
+// The map of a side at corner k of a cell. `axes`, in the object's frame, are those that directions are given in.
+// `foot` is the place on the middle ray that is nearest to the sphere's centre, by those axes and in r. Places on rays
+// are given by such feet, because they stay small where the object is far away, so that f32 keeps them.
 NearMap near_map(NodeCell cell, uint k, uint side, mat3 axes, vec3 foot) {
     uint quad = cell.first + 3 * ((k >> 1) * (NODE_CELLS + 1) + (k & 1));
     vec4 right = node_quad(quad), down = node_quad(quad + 1), map = node_quad(quad + 2);

@@ -1,34 +1,37 @@
 //! Precomputed shadow fields for dynamic scenes, on hand-managed Vulkan.
 //!
-//! Method: Zhou, Hu, Lin, Guo, Shum, *Precomputed Shadow Fields for Dynamic Scenes*, SIGGRAPH 2005. Around every object, cube maps are
-//! captured at points on concentric shells and projected to spherical harmonics (SH): an occlusion field for what the object blocks, a
-//! radiance field for what it emits. At run time every vertex merges these fields by SH products. Lights of one colour are sharp lights:
-//! they look up silhouette fields, which keep the edges of shadows.
+//! Method: Zhou, Hu, Lin, Guo, Shum, *Precomputed Shadow Fields for Dynamic Scenes*, SIGGRAPH 2005. Around every
+//! object, cube maps are captured at points on concentric shells and projected to spherical harmonics (SH): an
+//! occlusion field for what the object blocks, a radiance field for what it emits. At run time every vertex merges
+//! these fields by SH products. Lights of one colour are sharp lights: they look up silhouette fields, which keep the
+//! edges of shadows.
 //!
 //! # Conventions
 //!
-//! - SH basis: it is real and orthonormal, with the Condon-Shortley phase as in Sloan, *Stupid SH Tricks*: Y1,-1 = -0.488603 y,
-//!   Y1,0 = 0.488603 z, Y1,1 = -0.488603 x. Coefficient (l, m) has index l(l+1)+m. The basis is evaluated as polynomials of a unit vector.
+//! - SH basis: it is real and orthonormal, with the Condon-Shortley phase as in Sloan, *Stupid SH Tricks*: Y1,-1 =
+//!   -0.488603 y, Y1,0 = 0.488603 z, Y1,1 = -0.488603 x. Coefficient (l, m) has index l(l+1)+m. The basis is evaluated
+//!   as polynomials of a unit vector.
 //! - Bands: n bands are n^2 coefficients. What the literature calls "order 4" is 4 bands, 16 coefficients.
 //! - Space: it is right-handed, +y is up, and lengths are in metres. SH are taken on world x, y, z as they stand.
-//! - Cube faces: they are +X -X +Y -Y +Z -Z, with Vulkan's s and t on each. A texel stands for the direction of its centre and weighs its
-//!   exact solid angle; the weights sum to 4 pi.
-//! - Field distances: they are in units of the object's bounding-sphere radius r, from the sphere's centre. Shells lie about the middle of
-//!   the mesh's box, and its short axes are stretched ([`field::fit`]).
-//! - Occlusion field: it stores the *blocked* part b = P[1 - V], which is 0 where nothing blocks. A sample inside the solid is captured
-//!   off the nearest surface.
-//! - Between shells: b / (1 - cos a) is interpolated over sin(a/2), where a is the half-angle of the bounding sphere. Samples are lowered
-//!   by a twelfth of their second differences. Beyond 8 r the value falls as (8r/d)^2.
-//! - Order: an occluder precedes a light if its bounding sphere's centre is nearer to the vertex than the light's. Entity indices decide
-//!   ties.
-//! - Sharp lights: an entity that glows in one colour, or from one flat side, is a sharp light. It is cut into 4 or 16 parts
-//!   ([`field::sub_light`]); in each, the visibilities past all occluders' outlines ([`field::silhouette`]) and past the receiver's own
-//!   mesh ([`field::self_visibility`]) are multiplied. What lies beyond the light's surface blocks nothing. All else goes through SH.
-//! - Small occluders: an occluder whose bounding sphere has a half-angle below 12 degrees blocks a point. It takes away the chain's value
-//!   in its direction times the solid angle of a projected area, which is fitted to its outermost shell ([`field::Area`]). Up to 16 degrees
-//!   the point and the field share.
-//! - Entities: an emitter does not occlude, flat ground only receives, and everything else does both. Each can be set per entity. Scales
-//!   are uniform and positive.
+//! - Cube faces: they are +X -X +Y -Y +Z -Z, with Vulkan's s and t on each. A texel stands for the direction of its
+//!   centre and weighs its exact solid angle; the weights sum to 4 pi.
+//! - Field distances: they are in units of the object's bounding-sphere radius r, from the sphere's centre. Shells lie
+//!   about the middle of the mesh's box, and its short axes are stretched ([`field::fit`]).
+//! - Occlusion field: it stores the *blocked* part b = P[1 - V], which is 0 where nothing blocks. A sample inside the
+//!   solid is captured off the nearest surface.
+//! - Between shells: b / (1 - cos a) is interpolated over sin(a/2), where a is the half-angle of the bounding sphere.
+//!   Samples are lowered by a twelfth of their second differences. Beyond 8 r the value falls as (8r/d)^2.
+//! - Order: an occluder precedes a light if its bounding sphere's centre is nearer to the vertex than the light's.
+//!   Entity indices decide ties.
+//! - Sharp lights: an entity that glows in one colour, or from one flat side, is a sharp light. It is cut into 4 or 16
+//!   parts ([`field::sub_light`]); in each, the visibilities past all occluders' outlines ([`field::silhouette`]) and
+//!   past the receiver's own mesh ([`field::self_visibility`]) are multiplied. What lies beyond the light's surface
+//!   blocks nothing. All else goes through SH.
+//! - Small occluders: an occluder whose bounding sphere has a half-angle below 12 degrees blocks a point. It takes away
+//!   the chain's value in its direction times the solid angle of a projected area, which is fitted to its outermost
+//!   shell ([`field::Area`]). Up to 16 degrees the point and the field share.
+//! - Entities: an emitter does not occlude, flat ground only receives, and everything else does both. Each can be set
+//!   per entity. Scales are uniform and positive.
 //! - Light: it is linear Rec.709 radiance. The radiosity is B = albedo/pi * integral of L V max(0, n.w) dw.
 //! - Numbers: tables are made in f64, shaders compute in f32, and fields are stored as f16 or f32.
 //!

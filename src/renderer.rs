@@ -171,8 +171,9 @@ impl Renderer {
     /// [`Scene::at`], with other placements for those that move: entities in the scene's order, then suns.
     ///
     /// # Errors
-    /// `Input` where the list has another length than the scene has entities, or a placement has a number that is not finite or over 1e10,
-    /// a rotation that is not of unit length, or a scale that is not positive; `Device` when the device was lost.
+    /// `Input` where the list has another length than the scene has entities, or a placement has a number that is not
+    /// finite or over 1e10, a rotation that is not of unit length, or a scale that is not positive; `Device` when the
+    /// device was lost.
     pub fn update(&mut self, placements: &[Placement]) -> Result<()> {
         let entities = &self.frame.scene().entities;
         if placements.len() != entities.len() {

@@ -106,8 +106,8 @@ pub fn start_log(global: &Global) {
     let _ = env_logger::Builder::from_env(environment).format(line).try_init();
 }
 
-/// A progress bar for one piece of work after another, and a line for what is being compiled. Nothing is shown where stderr is no terminal
-/// or bars are not wanted.
+/// A progress bar for one piece of work after another, and a line for what is being compiled. Nothing is shown where
+/// stderr is no terminal or bars are not wanted.
 pub struct Progress {
     hidden: bool,
     bars: MultiProgress,

@@ -306,8 +306,8 @@ impl Environment {
         (sum * f64::from(self.source.strength)).to_array()
     }
 
-    /// Projection of each channel to `bands` bands, bands^2 coefficients, without [`Environment::discs`]. All parts but the sky
-    /// are exact: closed forms, a one-dimensional integral, and for pictures the integral over every texel.
+    /// Projection of each channel to `bands` bands, bands^2 coefficients, without [`Environment::discs`]. All parts but
+    /// the sky are exact: closed forms, a one-dimensional integral, and for pictures the integral over every texel.
     pub fn coefficients(&self, bands: usize) -> [Vec<f64>; 3] {
         let turn = Rotation::new(bands, self.turn());
         self.unturned(bands).map(|channel| {

@@ -38,8 +38,8 @@ pub struct Equirect {
     coefficients: [Vec<f64>; 3],
 }
 
-/// Longest edge of the tiles that an OpenEXR file claims, in pixels: the decoder makes room for a tile before it looks at the picture's
-/// size.
+/// Longest edge of the tiles that an OpenEXR file claims, in pixels: the decoder makes room for a tile before it looks
+/// at the picture's size.
 fn widest_tile(bytes: &[u8]) -> Option<u32> {
     const NAME: &[u8] = b"tiles\0tiledesc\0";
     const HEADER_BYTES: usize = 1 << 16;

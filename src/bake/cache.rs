@@ -1,5 +1,5 @@
-//! The cache of what is baked: fields, silhouette fields, transfer vectors and self-visibility. Names are hashes of the mesh's content and
-//! of everything else that decides the numbers. A `Shelf` says where one kind is kept.
+//! The cache of what is baked: fields, silhouette fields, transfer vectors and self-visibility. Names are hashes of the
+//! mesh's content and of everything else that decides the numbers. A `Shelf` says where one kind is kept.
 
 use super::kinds::Kind;
 pub use super::names::field_name;

@@ -1,8 +1,8 @@
 //! Pass "project": makes SH coefficients of captured cube faces, with one workgroup for each sample.
 //!
-//! Inputs: the atlas of [`super::capture`], a [`Job`] for each sample, and the texel table. Output: `samples[target]` of `channels` x
-//! `channel_stride(bands)` floats. They hold the blocked part (1 where a texel is below 1), the radiance, or for transfer the clamped
-//! cosine of the normal less the part that the object itself blocks.
+//! Inputs: the atlas of [`super::capture`], a [`Job`] for each sample, and the texel table. Output: `samples[target]`
+//! of `channels` x `channel_stride(bands)` floats. They hold the blocked part (1 where a texel is below 1), the
+//! radiance, or for transfer the clamped cosine of the normal less the part that the object itself blocks.
 
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;

@@ -6,7 +6,8 @@
 //! | normal | cube:18x7,edges=auto | 64 px | 4 | f16 |
 //! | high | cube:24x10 | 128 px | 5 | f16 |
 //!
-//! Times, bytes and errors are in `src/bench/MEASURED.md`. More samples do not help small lights in bands: the number of bands limits them.
+//! Times, bytes and errors are in `src/bench/MEASURED.md`. More samples do not help small lights in bands: the number
+//! of bands limits them.
 
 use super::Options;
 use super::silhouette::SilhouetteOptions;

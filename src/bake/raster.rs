@@ -16,8 +16,8 @@ use glam::Vec3;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Invocations of a workgroup: as many as llvmpipe runs in one step with AVX2. With more, each further step would go through all runs
-/// again.
+/// Invocations of a workgroup: as many as llvmpipe runs in one step with AVX2. With more, each further step would go
+/// through all runs again.
 const WORKGROUP: u32 = 8;
 /// Words of shared memory for distances, one for each texel: the 16 KiB that every device has, and a face of 64 px.
 const DISTANCE_WORDS: u32 = 4096;

@@ -221,8 +221,8 @@ impl Silhouette {
         (self.atlas_columns * self.atlas_columns) as usize
     }
 
-    /// Draws and reduces that side of the maps from `map_first` on, one for each frame, at most [`Silhouette::capacity`]. Between its own
-    /// steps it places its own barriers.
+    /// Draws and reduces that side of the maps from `map_first` on, one for each frame, at most
+    /// [`Silhouette::capacity`]. Between its own steps it places its own barriers.
     ///
     /// # Errors
     /// What recording returns.

@@ -60,8 +60,8 @@ impl Copied {
     }
 }
 
-/// For each map whether it follows from an earlier one, and how, by symmetries that miss the mesh by at most [`TEXEL_SHARE`] of `pixel`,
-/// the edge of the smallest pixel of the views, in r.
+/// For each map whether it follows from an earlier one, and how, by symmetries that miss the mesh by at most
+/// [`TEXEL_SHARE`] of `pixel`, the edge of the smallest pixel of the views, in r.
 pub fn plan(mesh: &Mesh, nodes: &NodeGrid, frames: &[MapFrame], pixel: f64) -> Vec<Option<Copied>> {
     let operations = Symmetry::of_vertices(mesh, None).operations;
     let close: Vec<DMat3> =

@@ -1,9 +1,9 @@
 //! Shares the captures of a bake out among worker processes, each with a device of its own.
 //!
-//! llvmpipe transforms and clips triangles on one thread for each device, so drawn faces leave cores idle: those of radiance fields and of
-//! captures too large for [`super::raster`]. Computed faces keep all cores busy, and workers would only repeat the host's share. Two
-//! devices in one process crash llvmpipe, so each worker is a process. The bake's own process captures too. Units are dealt out one at a
-//! time, so that nobody waits long for another.
+//! llvmpipe transforms and clips triangles on one thread for each device, so drawn faces leave cores idle: those of
+//! radiance fields and of captures too large for [`super::raster`]. Computed faces keep all cores busy, and workers
+//! would only repeat the host's share. Two devices in one process crash llvmpipe, so each worker is a process. The
+//! bake's own process captures too. Units are dealt out one at a time, so that nobody waits long for another.
 
 use super::BakeReport;
 use super::batches::{CaptureTarget, Captures, Unit};

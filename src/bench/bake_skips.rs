@@ -50,8 +50,8 @@ pub struct BakeSkipRow {
 
 const NONE: Shortcuts = Shortcuts { symmetry: false, faces: false, inside: true };
 
-/// The skips by name, with the shortcuts of a bake without them and with them, and whether levels of detail are drawn. Samples inside a
-/// solid are captured off its surface, except where that is measured.
+/// The skips by name, with the shortcuts of a bake without them and with them, and whether levels of detail are drawn.
+/// Samples inside a solid are captured off its surface, except where that is measured.
 const SKIPS: [(&str, [(Shortcuts, bool); 2]); 5] = [
     ("faces", [(NONE, false), (Shortcuts { faces: true, ..NONE }, false)]),
     ("symmetry", [(NONE, false), (Shortcuts { symmetry: true, ..NONE }, false)]),

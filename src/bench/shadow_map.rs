@@ -1,10 +1,10 @@
 //! A rival that games use: shadow maps, hard and percentage-closer soft (PCSS), for lights that are balls.
 //!
-//! For every light the occluders are drawn from its centre, into one view that just holds them all, or into the six faces of a cube
-//! where they surround it. A compute pass then adds the light to every given point, a vertex or what a pixel shows: its irradiance
-//! without occluders in closed form, times one comparison with the map, or times the share of 32 taps that 16 taps for blockers have
-//! spread. Texels are compared at their own centres with the receiver's plane, so that hardly any bias is needed. The sky has no shadow
-//! map.
+//! For every light the occluders are drawn from its centre, into one view that just holds them all, or into the six
+//! faces of a cube where they surround it. A compute pass then adds the light to every given point, a vertex or what a
+//! pixel shows: its irradiance without occluders in closed form, times one comparison with the map, or times the share
+//! of 32 taps that 16 taps for blockers have spread. Texels are compared at their own centres with the receiver's
+//! plane, so that hardly any bias is needed. The sky has no shadow map.
 
 use crate::asset::Mesh;
 use crate::error::Result;

@@ -10,9 +10,9 @@ use std::f64::consts::PI;
 
 const TERMS: usize = 6;
 
-/// Projected area as a share of the bounding sphere's, for a direction d to or from the object: a polynomial in the squares of
-/// d's cosines with two of three axes. It is equal for opposite directions, as a projected area is, and symmetric about the planes of
-/// the three axes.
+/// Projected area as a share of the bounding sphere's, for a direction d to or from the object: a polynomial in the
+/// squares of d's cosines with two of three axes. It is equal for opposite directions, as a projected area is, and
+/// symmetric about the planes of the three axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Area {
     /// The first two axes, unit vectors in the object's frame.

@@ -9,14 +9,14 @@
 //! centre's plane at another place, so the depth is read first and the place corrected by it (parallax). How much of a small round
 //! light the outline leaves ([`blocked_share`]) follows from the distance and from how far away the outline's point is.
 //!
-//! Within the bounding sphere a part of the object may lie behind the receiver, or beyond the light, and its outline hides that of the
-//! rest. So a mesh that is not convex has maps of its two halves besides ([`Side`]), at half the resolution. Each half counts as far as
-//! its outline lies between receiver and light; where both do, the whole counts. Lights of 3 degrees in the middle of a ring have errors
-//! of 0.01 with halves and of 0.26 without.
+//! Within the bounding sphere a part of the object may lie behind the receiver, or beyond the light, and its outline
+//! hides that of the rest. So a mesh that is not convex has maps of its two halves besides ([`Side`]), at half the
+//! resolution. Each half counts as far as its outline lies between receiver and light; where both do, the whole counts.
+//! Lights of 3 degrees in the middle of a ring have errors of 0.01 with halves and of 0.26 without.
 //!
-//! For a convex mesh that is no ball the field keeps a box instead. A slab's nearest rim may lie before a receiver that stands over the
-//! slab; where the ray enters and leaves the box tells where the object stands. Receivers within a slab's sphere have errors of 0.05 with
-//! it and of 0.19 without.
+//! For a convex mesh that is no ball the field keeps a box instead. A slab's nearest rim may lie before a receiver that
+//! stands over the slab; where the ray enters and leaves the box tells where the object stands. Receivers within a
+//! slab's sphere have errors of 0.05 with it and of 0.19 without.
 
 use super::file;
 pub use super::silhouette_header::{Side, SilhouetteHeader};
@@ -43,8 +43,8 @@ pub const DEEP: [f64; 2] = [-0.6, -0.2];
 pub const ROUND: f64 = 0.9;
 /// Half the edge of a box that tells nothing, in r.
 pub const NO_BOX: f64 = 1e30;
-/// How far from a box, in r, a ray's end may lie and yet count as on it. Rounding moves the end by less within some 80 r of the world's
-/// origin.
+/// How far from a box, in r, a ray's end may lie and yet count as on it. Rounding moves the end by less within some 80
+/// r of the world's origin.
 pub const TOUCHING: f64 = 1e-5;
 /// Least size of a direction's parts where they divide.
 pub const LEAST_STEP: f64 = 1e-7;
@@ -105,7 +105,8 @@ pub struct Near {
     point: DVec3,
     cell: Cell,
     maps: [NearMap; 4],
-    /// Where the ray in the middle of those directions enters and leaves the box around the object, as [`SilhouetteField::through_box`].
+    /// Where the ray in the middle of those directions enters and leaves the box around the object, as
+    /// [`SilhouetteField::through_box`].
     in_box: [f64; 2],
 }
 
@@ -194,8 +195,9 @@ impl SilhouetteField {
         &self.frames
     }
 
-    /// The field as `glsl/silhouette_field.glsl` reads it: two quads of the box around the object, then three of each node, which give
-    /// places in texels from the middle of a map's first; the cells of the field's maps begin at `first_cell`.
+    /// The field as `glsl/silhouette_field.glsl` reads it: two quads of the box around the object, then three of each
+    /// node, which give places in texels from the middle of a map's first; the cells of the field's maps begin at
+    /// `first_cell`.
     pub fn node_quads(&self, first_cell: u32) -> Vec<[f32; 4]> {
         let map_cells = Side::ALL.iter().map(|side| self.side_cells(*side)).sum::<usize>() as u32;
         let node = |&(map, mirrored): &(usize, bool)| {
@@ -331,8 +333,8 @@ impl SilhouetteField {
         self.extent()[1].x < NO_BOX
     }
 
-    /// Where a ray enters and leaves the box around the object. If it misses the box, the interval has no ends, and the outline alone
-    /// decides.
+    /// Where a ray enters and leaves the box around the object. If it misses the box, the interval has no ends, and the
+    /// outline alone decides.
     fn through_box(&self, point: DVec3, direction: DVec3) -> [f64; 2] {
         let least = DVec3::splat(LEAST_STEP);
         let step = DVec3::select(direction.abs().cmplt(least), least, direction);

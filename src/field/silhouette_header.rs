@@ -80,8 +80,8 @@ impl SilhouetteHeader {
         NodeGrid::map_count(self.cells)
     }
 
-    /// Bytes of one map: four floats of its [`MapFrame`](super::silhouette::MapFrame)'s rectangle, then two bytes a texel of the whole
-    /// object and of its halves.
+    /// Bytes of one map: four floats of its [`MapFrame`](super::silhouette::MapFrame)'s rectangle, then two bytes a
+    /// texel of the whole object and of its halves.
     pub fn map_bytes(&self) -> usize {
         16 + self.texel_bytes(Side::Whole) + 2 * self.texel_bytes(Side::Far)
     }

@@ -153,8 +153,8 @@ impl Frame {
     /// radiance above it is brought down to it, hue kept, before samples are averaged, so that edges of lights are smooth;
     /// infinity leaves radiance as it is. The host can read the picture afterwards. Returns each pass's duration.
     ///
-    /// While entities move a picture lights only what it may show ([`crate::lists::skip::Skip::hidden`]). Without `white` everything is
-    /// lit, for those who want radiosity rather than a picture.
+    /// While entities move a picture lights only what it may show ([`crate::lists::skip::Skip::hidden`]). Without
+    /// `white` everything is lit, for those who want radiosity rather than a picture.
     ///
     /// # Errors
     /// `Device` when the device was lost, `Failed` when a barrier is missing.

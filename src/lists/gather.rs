@@ -209,8 +209,8 @@ struct Second {
 }
 
 impl Gather {
-    /// Makes the pass for at most `entity_count` entities; with no more than [`FOUND`] there is no second round. `texel` says whether
-    /// spheres are read through a texel view, which is for software devices.
+    /// Makes the pass for at most `entity_count` entities; with no more than [`FOUND`] there is no second round.
+    /// `texel` says whether spheres are read through a texel view, which is for software devices.
     ///
     /// # Errors
     /// `Failed` when the shader does not compile; as [`Buffer::new`].

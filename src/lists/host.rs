@@ -1,5 +1,5 @@
-//! Lists that the host makes, one cluster at a time: the CPU twin of pass "gather" ([`crate::lists::gather`]). They leave off a little
-//! more, as the host looks at outlines too ([`Scope::outline_result`]).
+//! Lists that the host makes, one cluster at a time: the CPU twin of pass "gather" ([`crate::lists::gather`]). They
+//! leave off a little more, as the host looks at outlines too ([`Scope::outline_result`]).
 
 use crate::layout::{self, ListEntry};
 use crate::lists::scene_bounds::{Bounds, Counts, Light, SceneBounds};

@@ -196,8 +196,8 @@ impl TryFrom<OutputWritten> for Output {
 pub struct MeshData {
     /// The name that entities use; it is unique.
     pub name: String,
-    /// A Wavefront OBJ file or a glTF file, all triangles of which are taken at rest, relative to the scene file. If there is no such
-    /// file, a built-in mesh of that name is taken, such as `assets/meshes/torus.obj`.
+    /// A Wavefront OBJ file or a glTF file, all triangles of which are taken at rest, relative to the scene file. If
+    /// there is no such file, a built-in mesh of that name is taken, such as `assets/meshes/torus.obj`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// A generator, written as `plane = {...}`, `sphere = {...}` and so on.

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 pub enum Lights {
     /// Spherical harmonics for all lights; shadows have no edges.
     Sh,
-    /// Every entity that glows in one colour, or on one flat side, is a sharp light, as every sun is; all other light stays in spherical
-    /// harmonics.
+    /// Every entity that glows in one colour, or on one flat side, is a sharp light, as every sun is; all other light
+    /// stays in spherical harmonics.
     #[default]
     Sharp,
 }

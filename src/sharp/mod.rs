@@ -1,9 +1,10 @@
 //! Pass "sharp": light of sharp lights on every vertex of every receiver, with what the merge has written.
 //!
-//! Inputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and vertices (position and
-//! normal, object frame, two quads each). A light is cut into parts ([`crate::field::sub_light`]); in each part the visibilities past
-//! all occluders are multiplied. Output: `radiosity`, as [`crate::merge`] has it, and albedo / pi times the irradiance of sharp lights.
-//! Where pixels read them, the fourth number is 1 on vertices that a shadow's edge comes near.
+//! Inputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and vertices
+//! (position and normal, object frame, two quads each). A light is cut into parts ([`crate::field::sub_light`]); in
+//! each part the visibilities past all occluders are multiplied. Output: `radiosity`, as [`crate::merge`] has it, and
+//! albedo / pi times the irradiance of sharp lights. Where pixels read them, the fourth number is 1 on vertices that a
+//! shadow's edge comes near.
 
 pub mod twin;
 
@@ -22,18 +23,19 @@ use std::sync::Arc;
 /// How near a shadow's edge must come to a vertex for pixels around it to evaluate lights, in steps to its neighbours: more than the 0.71
 /// that the middle of a grid's cell is away from its corners.
 const EDGE_REACH: f64 = 0.75;
-/// Half-width, in the same steps, of the widest penumbra that pixels evaluate, for a light that is all the light of a vertex. For one that
-/// is a share of it, it is narrower by the share's square root, because what vertices miss goes with the light and with the inverse square of
-/// the width. Pictures then differ by at most 0.0018 relative RMS from pictures whose pixels evaluate every edge.
+/// Half-width, in the same steps, of the widest penumbra that pixels evaluate, for a light that is all the light of a
+/// vertex. For one that is a share of it, it is narrower by the share's square root, because what vertices miss goes
+/// with the light and with the inverse square of the width. Pictures then differ by at most 0.0018 relative RMS from
+/// pictures whose pixels evaluate every edge.
 const EDGE_STEPS: f64 = 1.1;
 /// Steps in the width of the narrowest penumbra, of which the square is far from overflow.
 const MOST_STEPS: f64 = 1e4;
 
-/// Factor on the sine of a light's radius in which all its parts lie: a part's middle lies [`CORNER`] from the light's, and its rim half a
-/// radius on.
+/// Factor on the sine of a light's radius in which all its parts lie: a part's middle lies [`CORNER`] from the light's,
+/// and its rim half a radius on.
 const CONE_WIDER: f64 = 1.12;
-/// Factor on the radius of an occluder's ball beyond which its outline, which maps of 32 texels blur, takes nothing from a light. With 1.1
-/// no pixel changes, with 1.06 by 0.0009 of the brightest.
+/// Factor on the radius of an occluder's ball beyond which its outline, which maps of 32 texels blur, takes nothing
+/// from a light. With 1.1 no pixel changes, with 1.06 by 0.0009 of the brightest.
 const BALL_WIDER: f64 = 1.15;
 
 /// What the shader is compiled for.
@@ -57,12 +59,13 @@ pub struct SharpPermutation {
     pub boxes: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
-    /// Whether every point leaves out the occluders of its lists that stand outside a light's cone. It saves a quarter of the time or more
-    /// in scenes of several sharp lights, and costs a fifth under one light.
+    /// Whether every point leaves out the occluders of its lists that stand outside a light's cone. It saves a quarter
+    /// of the time or more in scenes of several sharp lights, and costs a fifth under one light.
     pub cones: bool,
     /// Whether vertices that a shadow's edge comes near are marked, for pixels that evaluate lights there.
     pub edges: bool,
-    /// Whether loops over parts and maps stay loops: on SwiftShader, which takes over 250 s and 8 GB to compile them unrolled.
+    /// Whether loops over parts and maps stay loops: on SwiftShader, which takes over 250 s and 8 GB to compile them
+    /// unrolled.
     pub rolled: bool,
 }
 

@@ -136,8 +136,8 @@ fn differ_beyond_numbers(a: f32, b: f32) -> bool {
     (a.is_infinite() || b.is_infinite()) && a != b
 }
 
-/// FLIP of every pixel, 0 where the mask is dark. The second picture takes the first one's pixels where the mask is dark, so that these
-/// look alike and blur nothing into their neighbours.
+/// FLIP of every pixel, 0 where the mask is dark. The second picture takes the first one's pixels where the mask is
+/// dark, so that these look alike and blur nothing into their neighbours.
 fn flips(a: &Picture, b: &Picture, mask: Option<&[bool]>, exposure_ev: f32) -> Vec<f64> {
     let [of_a, mut of_b] = [a, b].map(|picture| picture.linear(exposure_ev));
     for (pixel, _) in mask.unwrap_or_default().iter().enumerate().filter(|(_, counts)| !**counts) {

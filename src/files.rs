@@ -60,7 +60,7 @@ pub fn replace_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
 /// Where a path leads: through links, also to a file that does not exist yet.
 ///
 /// # Errors
-/// That of the file system where links go in circles or may not be followed.
+/// The error of the file system where links go in circles or may not be followed.
 fn destination(path: &Path) -> Result<PathBuf> {
     match fs::canonicalize(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => match fs::read_link(path) {

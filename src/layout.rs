@@ -57,7 +57,7 @@ pub struct Cluster {
     pub entry_count: u32,
     /// Index of its bounds for the gather on the device.
     pub bounds: u32,
-    /// Of the entries, those at the front that are chains of sharp lights.
+    /// Number of entries at the front that are chains of sharp lights.
     pub sharp_count: u32,
     /// First cell of its first vertex's self-visibility, or [`NONE`] where the mesh cannot shadow itself.
     pub self_first: u32,

@@ -54,7 +54,7 @@ impl Arguments {
         bake::Options { shortcuts, silhouette, levels: self.levels, ..options }
     }
 
-    /// Options that serve every kind of thing that is baked of a mesh.
+    /// Options that serve every kind of bake of a mesh.
     ///
     /// # Errors
     /// `Usage` where they say which kind.

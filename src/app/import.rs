@@ -12,7 +12,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(
     after_help = "The scene file can be edited like any other; its meshes are OBJ files in the folder SCENE_meshes beside it. \
-    `render` gives the\nsame picture of both. What has no form in a scene file is left out, with a line for each kind of thing.\n\n\
+    `render` gives the\nsame picture of both. What has no form in a scene file is left out, with a line for each kind.\n\n\
     Example:\n  shadow-fields import robot.glb -o robot.toml && shadow-fields render robot.toml -o robot.png --frames 48"
 )]
 pub struct Arguments {

@@ -122,7 +122,7 @@ impl Mesh {
         self.shape.euler_characteristic
     }
 
-    /// Of each vertex, how far the farthest vertex is that shares a triangle with it, metres.
+    /// For each vertex, the distance of the farthest vertex that shares a triangle with it, metres.
     pub fn steps(&self) -> Vec<f32> {
         let mut steps = vec![0.0_f32; self.positions.len()];
         for triangle in &self.triangles {

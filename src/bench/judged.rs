@@ -31,7 +31,7 @@ pub struct Judged {
     pub place: JudgedAt,
     /// All points: an entity with the number of its vertex or of the pixel, and the view from there.
     pub points: Vec<(Vertex, VertexView)>,
-    /// Those that are compared, as indices of `points`.
+    /// Points that are compared, as indices of `points`.
     pub chosen: Vec<usize>,
     /// Their radiosity by rays.
     t0: Vec<Radiosity>,

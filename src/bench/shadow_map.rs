@@ -80,7 +80,7 @@ struct LightPush {
     is_first: u32,
 }
 
-/// Pipelines, maps and everything of a scene that stays the same while things move.
+/// Pipelines, maps and everything of a scene that stays the same while entities move.
 pub struct ShadowMaps {
     device: Arc<Device>,
     draw: GraphicsPipeline,

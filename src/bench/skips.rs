@@ -57,8 +57,8 @@ pub struct SkipCost {
     pub change: Difference,
     /// What the lists leave off, all skips on.
     pub counts: Counts,
-    /// Of that, what this skip left off: (cluster, chain, entity) triples, a cluster being 64 vertices. None where it does not work
-    /// on lists.
+    /// What this skip left off: (cluster, chain, entity) triples, a cluster being 64 vertices. `None` where it does not work on
+    /// lists.
     pub left_off_count: Option<u64>,
 }
 

@@ -76,7 +76,7 @@ pub struct SoakOutcome {
     pub memory_bytes: Option<[u64; 2]>,
     /// Pictures that were compared with the first of the same moment and state.
     pub compared: u64,
-    /// Those of them that were not the same to the bit.
+    /// Compared pictures that were not the same to the bit.
     pub differing: u64,
     /// Milliseconds of the quicker frames (the tenth percentile) in each tenth of all frames after the warm-up.
     pub quicker_ms: [f64; TENTHS],

@@ -36,7 +36,7 @@ pub struct ListAgreement {
     pub wrong_lists: usize,
     /// Entries of all lists.
     pub entries: usize,
-    /// Those that stand there for the slack alone.
+    /// Entries that stand there for the slack alone.
     pub extra_entries: usize,
 }
 

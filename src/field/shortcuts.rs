@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// through a texel's centre may round to the other side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shortcuts {
-    /// Of samples that a symmetry of the mesh carries into one another only one is captured. It is turned for the others.
+    /// Only one of the samples that a symmetry of the mesh carries into one another is captured. It is turned for the others.
     pub symmetry: bool,
     /// Only faces that the object reaches are drawn, with only the triangles that reach into them, and without backs of closed meshes.
     pub faces: bool,

@@ -1,4 +1,4 @@
-//! What decides a frame besides the scene.
+//! Options of a frame: what decides it besides the scene.
 
 use crate::bake;
 use crate::draw::{Antialias, Shading};
@@ -8,7 +8,7 @@ use crate::lists::skip::{EPS, Skip};
 use crate::merge::variant::Variant;
 use crate::scene::Lights;
 
-/// What decides a frame besides the scene.
+/// Options of a frame: what decides it besides the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Fields and transfers.

@@ -130,7 +130,7 @@ macro_rules! objects {
             /// As the Vulkan function of that name; notes the object.
             ///
             /// # Safety
-            /// That of the Vulkan function.
+            /// The same conditions as for the Vulkan function.
             unsafe extern "system" fn $create(
                 device: vk::Device,
                 info: *const vk::$info<'_>,
@@ -153,7 +153,7 @@ macro_rules! objects {
             /// As the Vulkan function of that name; strikes the object off.
             ///
             /// # Safety
-            /// That of the Vulkan function.
+            /// The same conditions as for the Vulkan function.
             unsafe extern "system" fn $destroy(
                 device: vk::Device,
                 object: vk::$kind,
@@ -208,7 +208,7 @@ objects! {
 /// As the Vulkan function of that name; notes the pipelines.
 ///
 /// # Safety
-/// That of the Vulkan function.
+/// The same conditions as for the Vulkan function.
 unsafe extern "system" fn create_graphics_pipelines(
     device: vk::Device,
     cache: vk::PipelineCache,
@@ -236,7 +236,7 @@ unsafe extern "system" fn create_graphics_pipelines(
 /// As the Vulkan function of that name; strikes the pipeline off.
 ///
 /// # Safety
-/// That of the Vulkan function.
+/// The same conditions as for the Vulkan function.
 unsafe extern "system" fn destroy_pipeline(
     device: vk::Device,
     pipeline: vk::Pipeline,
@@ -255,7 +255,7 @@ macro_rules! fallible {
             /// As the Vulkan function of that name; can be made to fail.
             ///
             /// # Safety
-            /// That of the Vulkan function.
+            /// The same conditions as for the Vulkan function.
             unsafe extern "system" fn $name($($parameter: $type),*) -> vk::Result {
                 if fails() {
                     return noted(stringify!($name), vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);

@@ -78,7 +78,7 @@ pub(crate) struct ClusterLists {
 pub struct Merged {
     /// Clusters of all receivers.
     pub clusters: usize,
-    /// Those that were merged; the others kept their light.
+    /// Clusters that were merged; the others kept their light.
     pub merged_clusters: usize,
     /// Lookups in the lists of those, one for 64 vertices. In a window with lists made on the device, of an earlier frame.
     pub merged_entries: usize,
@@ -342,7 +342,7 @@ impl<'b> Moved<'b> {
         Moved { before, most: list.len() * 8 > flags.len().max(64), flags, list }
     }
 
-    /// Those that may stand on the list of a cluster within these bounds, before or now; its receiver has not moved.
+    /// Moved entities that may stand on the list of a cluster within these bounds, before or now; its receiver has not moved.
     fn near(&self, now: &State, receiver: usize, bounds: &Bounds) -> Vec<usize> {
         let both = [&self.before.scene_bounds, &now.scene_bounds];
         let scopes = both.map(|scene| Scope::new(scene, &now.entities[receiver], bounds, 2.0 * SLACK));

@@ -23,7 +23,7 @@ pub struct Variant {
     pub uniform: bool,
     /// Fields of halves are read eight coefficients a texel, where a channel's coefficients are a multiple of eight.
     pub packed: bool,
-    /// Those halves become floats by shifts of their bits rather than by the instruction for it.
+    /// Packed halves become floats by shifts of their bits rather than by the instruction for it.
     pub shifted: bool,
     /// Fields are an image whose samples a sampler interpolates, with weights of as few bits as the device likes (8 on
     /// most): not quite the same function, and so only by name.

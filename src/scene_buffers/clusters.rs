@@ -102,7 +102,7 @@ mod tests {
         assert_eq!((bounds.len(), mixed), (96, 0));
     }
 
-    /// Of two floors far from each other, at most one cluster lies on both.
+    /// At most one cluster lies on both of two floors far from each other.
     #[test]
     fn parts_lie_apart() {
         let part = generate::plane(1.0, 30);

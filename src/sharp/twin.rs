@@ -35,7 +35,7 @@ pub struct SharpLight {
 pub struct SharpTwin<'t> {
     /// All objects.
     pub objects: &'t [SharpObject<'t>],
-    /// Those that occlude the receiver.
+    /// Objects that occlude the receiver.
     pub occluders: &'t [usize],
     /// Rotation of the receiver to the world.
     pub rotation: DQuat,

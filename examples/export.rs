@@ -1,8 +1,9 @@
 //! Bakes the light of a scene into a model: each vertex's radiosity as its colour, and its transfer vector (spherical harmonics) as
 //! attributes of its own. `cargo run --example export -- SCENE.toml light.glb`; viewers of glTF show the colours.
 //!
-//! `COLOR_0` is linear radiance, not below 0, in units of what the scene's exposure shows as white. `_TRANSFER_0`, `_TRANSFER_1` and so on hold four
-//! coefficients each, bands^2 in all, in the node's own frame: albedo / pi times their product with a sky's is the radiosity under it.
+//! `COLOR_0` is linear radiance, not below 0, in units of what the scene's exposure shows as white. `_TRANSFER_0`,
+//! `_TRANSFER_1` and so on hold four coefficients each, bands^2 in all, in the node's own frame: albedo / pi times their
+//! product with a sky's is the radiosity under it.
 
 use shadow_fields::prelude::*;
 use shadow_fields::scene::Lights;

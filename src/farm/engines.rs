@@ -59,12 +59,12 @@ impl Call {
 
 /// Minutes that a slice may take on a slow machine: ten times the longest estimate, and ten minutes.
 fn limit_minutes(plan: &Plan) -> u64 {
-    let longest = plan.slices.iter().map(|slice| slice.seconds()).fold(0.0, f64::max);
+    let longest = plan.slices.iter().map(|slice| f64::from(slice.seconds)).fold(0.0, f64::max);
     10 + (longest / 6.0).ceil() as u64
 }
 
 fn memory_mb(plan: &Plan) -> u32 {
-    plan.slices.iter().map(|slice| slice.memory_mb()).max().unwrap_or(0)
+    plan.slices.iter().map(|slice| slice.memory_mb).max().unwrap_or(0)
 }
 
 /// An array of Slurm: the number of the slice that its task 0 would take, and the tasks as `--array` has them.

@@ -71,40 +71,59 @@ pub enum TaskKind {
     Frames,
 }
 
-/// The least piece of work. In a plan it is a row of these five values.
+/// The least piece of work. In the file it is a row of these five values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Task(pub u32, pub u32, pub TaskKind, pub u32, pub u32);
-
-impl Task {
+#[serde(from = "(u32, u32, TaskKind, u32, u32)", into = "(u32, u32, TaskKind, u32, u32)")]
+pub struct Task {
     /// Index of its work.
-    pub fn work(&self) -> usize {
-        self.0 as usize
-    }
-
+    pub work: u32,
     /// Index of its input.
-    pub fn input(&self) -> usize {
-        self.1 as usize
+    pub input: u32,
+    /// What it makes.
+    pub kind: TaskKind,
+    /// The part of a bake, or the number of the first picture.
+    pub first: u32,
+    /// Parts of the bake, or pictures.
+    pub count: u32,
+}
+
+impl From<(u32, u32, TaskKind, u32, u32)> for Task {
+    fn from((work, input, kind, first, count): (u32, u32, TaskKind, u32, u32)) -> Self {
+        Task { work, input, kind, first, count }
     }
 }
 
-/// Tasks that run together: index of the first, their number, estimated seconds, memory in MB, bytes of the result in KB.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Slice(pub u32, pub u32, pub f32, pub u32, pub u32);
+impl From<Task> for (u32, u32, TaskKind, u32, u32) {
+    fn from(task: Task) -> Self {
+        (task.work, task.input, task.kind, task.first, task.count)
+    }
+}
 
-impl Slice {
+/// Tasks that run together. In the file it is a row of these five values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "(u32, u32, f32, u32, u32)", into = "(u32, u32, f32, u32, u32)")]
+pub struct Slice {
+    /// Index of the first task.
+    pub first: u32,
+    /// Number of tasks.
+    pub count: u32,
     /// Estimated seconds on two cores of a software device.
-    pub fn seconds(&self) -> f64 {
-        f64::from(self.2)
-    }
-
+    pub seconds: f32,
     /// Memory that it needs, in MB.
-    pub fn memory_mb(&self) -> u32 {
-        self.3
-    }
-
+    pub memory_mb: u32,
     /// Space in the shared folder that its result takes, in KB.
-    pub fn disk_kb(&self) -> u32 {
-        self.4
+    pub disk_kb: u32,
+}
+
+impl From<(u32, u32, f32, u32, u32)> for Slice {
+    fn from((first, count, seconds, memory_mb, disk_kb): (u32, u32, f32, u32, u32)) -> Self {
+        Slice { first, count, seconds, memory_mb, disk_kb }
+    }
+}
+
+impl From<Slice> for (u32, u32, f32, u32, u32) {
+    fn from(slice: Slice) -> Self {
+        (slice.first, slice.count, slice.seconds, slice.memory_mb, slice.disk_kb)
     }
 }
 
@@ -169,20 +188,20 @@ impl Plan {
         let memory = BASE_MB + cost.memory_mb.ceil() as u32;
         let kilobytes = (cost.bytes / 1e3).ceil() as u32;
         let fits = |slice: &Slice| {
-            let bytes = 1e3 * f64::from(slice.disk_kb()) + cost.bytes;
-            slice.seconds() + cost.seconds <= SLICE_SECONDS && bytes <= RESULT_BYTES
+            let bytes = 1e3 * f64::from(slice.disk_kb) + cost.bytes;
+            f64::from(slice.seconds) + cost.seconds <= SLICE_SECONDS && bytes <= RESULT_BYTES
         };
         let begins = !self.slices.last().is_some_and(fits);
         if begins {
-            self.slices.push(Slice(self.tasks.len() as u32, 0, 0.0, 0, 0));
+            self.slices.push(Slice { first: self.tasks.len() as u32, ..Slice::default() });
         }
         let slice = self.slices.last_mut().expect("one was there or is new");
-        slice.1 += 1;
-        slice.2 += cost.seconds as f32;
+        slice.count += 1;
+        slice.seconds += cost.seconds as f32;
         // Besides what its largest task needs, a process holds the result.
-        let largest = slice.3 - slice.4.div_ceil(1000);
-        slice.4 = slice.4.saturating_add(kilobytes);
-        slice.3 = largest.max(memory) + slice.4.div_ceil(1000);
+        let largest = slice.memory_mb - slice.disk_kb.div_ceil(1000);
+        slice.disk_kb = slice.disk_kb.saturating_add(kilobytes);
+        slice.memory_mb = largest.max(memory) + slice.disk_kb.div_ceil(1000);
         self.tasks.push(task);
     }
 
@@ -193,7 +212,7 @@ impl Plan {
 
     /// The tasks of a slice.
     pub fn tasks_of(&self, slice: usize) -> &[Task] {
-        let Slice(first, count, ..) = self.slices[slice];
+        let Slice { first, count, .. } = self.slices[slice];
         &self.tasks[first as usize..(first + count) as usize]
     }
 
@@ -205,9 +224,9 @@ impl Plan {
         };
         [&self.program, &self.device.name, &self.device.driver].into_iter().for_each(|text| add(text));
         for task in self.tasks_of(slice) {
-            self.works[task.work()].words.iter().for_each(|word| add(word));
-            add(&self.inputs[task.input()].hash);
-            add(&serde_json::to_string(&(task.2, task.3, task.4)).expect("plain data"));
+            self.works[task.work as usize].words.iter().for_each(|word| add(word));
+            add(&self.inputs[task.input as usize].hash);
+            add(&serde_json::to_string(&(task.kind, task.first, task.count)).expect("plain data"));
         }
         hasher.finalize().to_hex()[..32].to_owned()
     }
@@ -241,7 +260,7 @@ pub(super) mod tests {
         plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
         for index in 0..tasks {
             let cost = Cost { seconds, memory_mb: 1.0, bytes: 1e6 };
-            plan.add(Task(0, 0, TaskKind::Bake(Kind::Shadow), index, tasks), cost);
+            plan.add(Task { work: 0, input: 0, kind: TaskKind::Bake(Kind::Shadow), first: index, count: tasks }, cost);
         }
         plan
     }
@@ -252,8 +271,11 @@ pub(super) mod tests {
         let path = folder.path().join("p.json");
         let mut plan = plan(10, 50.0);
         assert_eq!(plan.slices.len(), 5);
-        assert!(plan.slices.iter().all(|slice| slice.seconds() == 100.0 && slice.disk_kb() == 2000));
+        assert!(plan.slices.iter().all(|slice| slice.seconds == 100.0 && slice.disk_kb == 2000));
         plan.write(&path).unwrap();
+        let written = std::fs::read_to_string(&path).unwrap();
+        assert!(written.contains(r#""tasks":[[0,0,{"bake":"shadow"},0,10],"#), "{written}");
+        assert!(written.contains(r#""slices":[[0,2,100.0,253,2000],"#), "{written}");
         plan.folder = folder.path().to_owned();
         assert_eq!(Plan::read(&path).unwrap(), plan);
         assert_eq!((Plan::parts(150.0), Plan::parts(181.0), Plan::parts(1200.0)), (1, 2, 10));
@@ -263,10 +285,10 @@ pub(super) mod tests {
     #[test]
     fn slices_are_short_of_time_and_of_bytes() {
         let mut plan = plan(1, 1.0);
-        assert_eq!((plan.slices[0].memory_mb(), plan.slices[0].disk_kb()), (BASE_MB + 1 + 1, 1000));
+        assert_eq!((plan.slices[0].memory_mb, plan.slices[0].disk_kb), (BASE_MB + 1 + 1, 1000));
         let large = Cost { seconds: 1.0, memory_mb: 5.0, bytes: 4e8 };
         (0..3).for_each(|_| plan.add(plan.tasks[0], large));
-        let stated: Vec<_> = plan.slices.iter().map(|slice| (slice.1, slice.memory_mb(), slice.disk_kb())).collect();
+        let stated: Vec<_> = plan.slices.iter().map(|slice| (slice.count, slice.memory_mb, slice.disk_kb)).collect();
         assert_eq!(stated, [(3, BASE_MB + 5 + 801, 801_000), (1, BASE_MB + 5 + 400, 400_000)]);
         assert_eq!(Plan::fitting(large), 2);
         assert_eq!(Plan::fitting(Cost { bytes: 2e9, ..large }), 1);
@@ -283,7 +305,7 @@ pub(super) mod tests {
             |p| p.device.driver.push('x'),
             |p| p.works[0].words[1].push('x'),
             |p| p.inputs[0].hash.push('x'),
-            |p| p.tasks[0].2 = TaskKind::Bake(Kind::Vertices),
+            |p| p.tasks[0].kind = TaskKind::Bake(Kind::Vertices),
         ];
         for edit in edits {
             let mut other = base.clone();

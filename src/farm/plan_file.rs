@@ -54,7 +54,7 @@ impl Plan {
             return Err("it has no slices".into());
         }
         let mut next = 0;
-        for (index, Slice(first, count, seconds, ..)) in self.slices.iter().enumerate() {
+        for (index, Slice { first, count, seconds, .. }) in self.slices.iter().enumerate() {
             if *first != next || *count == 0 {
                 return Err(format!("slice {index} does not begin where the one before it ends"));
             }
@@ -67,7 +67,7 @@ impl Plan {
             return Err("its slices hold other tasks than it has".into());
         }
         for (index, task) in self.tasks.iter().enumerate() {
-            let Task(work, input, kind, first, count) = *task;
+            let Task { work, input, kind, first, count } = *task;
             let Some(work) = self.works.get(work as usize) else {
                 return Err(format!("task {index} is of a work that is not there"));
             };
@@ -120,15 +120,15 @@ mod tests {
         let broken = refused(&|p| p.program = "shadow\nfields".into()).to_string();
         assert!(broken.contains(r"a plan of shadow\nfields, and this is") && !broken.contains('\n'), "{broken}");
         let edits: [(fn(&mut Plan), &str); 9] = [
-            (|p| p.slices[0].1 = 9, "slice 1 does not begin where the one before it ends"),
-            (|p| p.slices[0].2 = 1e38, "slice 0 is estimated to take"),
-            (|p| p.slices[1].2 = -1.0, "slice 1 is estimated to take -1 seconds"),
+            (|p| p.slices[0].count = 9, "slice 1 does not begin where the one before it ends"),
+            (|p| p.slices[0].seconds = 1e38, "slice 0 is estimated to take"),
+            (|p| p.slices[1].seconds = -1.0, "slice 1 is estimated to take -1 seconds"),
             (|p| p.slices.truncate(1), "its slices hold other tasks than it has"),
             (|p| p.slices.clear(), "it has no slices"),
-            (|p| p.tasks[0].1 = 9, "task 0 has an input that is not there"),
-            (|p| p.tasks[1].0 = 9, "task 1 is of a work that is not there"),
-            (|p| p.tasks[1].2 = TaskKind::Frames, "task 1, 1 of 2, is none of its kind"),
-            (|p| p.tasks[1].2 = TaskKind::Bake(Kind::Silhouette), "task 1, 1 of 2, is none of its kind"),
+            (|p| p.tasks[0].input = 9, "task 0 has an input that is not there"),
+            (|p| p.tasks[1].work = 9, "task 1 is of a work that is not there"),
+            (|p| p.tasks[1].kind = TaskKind::Frames, "task 1, 1 of 2, is none of its kind"),
+            (|p| p.tasks[1].kind = TaskKind::Bake(Kind::Silhouette), "task 1, 1 of 2, is none of its kind"),
         ];
         for (edit, what) in edits {
             let error = refused(&edit);

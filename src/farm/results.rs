@@ -128,7 +128,8 @@ mod tests {
         plan.works.push(Work { words: Vec::new(), pictures: None });
         plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
         let cost = Cost { seconds: 100.0, memory_mb: 1.0, bytes: 1.0 };
-        (0..2).for_each(|part| plan.add(Task(0, 0, TaskKind::Bake(Kind::Shadow), part, 2), cost));
+        let task = |first| Task { work: 0, input: 0, kind: TaskKind::Bake(Kind::Shadow), first, count: 2 };
+        (0..2).for_each(|part| plan.add(task(part), cost));
         let write = |slice, seconds, entries: &[Entry]| {
             let mut content = Content::default();
             entries.iter().for_each(|(task, name, bytes)| content.add(*task, name, bytes));

@@ -33,7 +33,7 @@ impl Status {
     /// How far a plan is.
     pub fn of(plan: &Plan) -> Self {
         let missing = missing(plan);
-        let estimated = |slice: &usize| plan.slices[*slice].seconds();
+        let estimated = |slice: &usize| f64::from(plan.slices[*slice].seconds);
         let done = (0..plan.slices.len()).filter(|slice| missing.binary_search(slice).is_err());
         let step = (plan.slices.len() - missing.len()).div_ceil(SAMPLES).max(1);
         let took = done.step_by(step).filter_map(|slice| Some((results::seconds(plan, slice)?, estimated(&slice))));
@@ -44,8 +44,8 @@ impl Status {
             done: plan.slices.len() - missing.len(),
             correction,
             left_s: correction * missing.iter().map(estimated).sum::<f64>(),
-            memory_mb: plan.slices.iter().map(|slice| slice.memory_mb()).max().unwrap_or(0),
-            disk_mb: plan.slices.iter().map(|slice| u64::from(slice.disk_kb())).sum::<u64>() / 1000,
+            memory_mb: plan.slices.iter().map(|slice| slice.memory_mb).max().unwrap_or(0),
+            disk_mb: plan.slices.iter().map(|slice| u64::from(slice.disk_kb)).sum::<u64>() / 1000,
         }
     }
 

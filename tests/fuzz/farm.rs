@@ -34,8 +34,9 @@ fn example() -> Plan {
     plan.works = vec![Work { words: words.clone(), pictures: None }, Work { words, pictures: Some("f_#.png".into()) }];
     plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
     let cost = Cost { seconds: 50.0, memory_mb: 1.0, bytes: 1e6 };
-    (0..3).for_each(|part| plan.add(Task(0, 0, TaskKind::Bake(Kind::Shadow), part, 3), cost));
-    plan.add(Task(1, 0, TaskKind::Frames, 5, 7), cost);
+    let task = |first| Task { work: 0, input: 0, kind: TaskKind::Bake(Kind::Shadow), first, count: 3 };
+    (0..3).for_each(|part| plan.add(task(part), cost));
+    plan.add(Task { work: 1, input: 0, kind: TaskKind::Frames, first: 5, count: 7 }, cost);
     plan
 }
 

@@ -93,10 +93,10 @@ struct Collecting<'c> {
 
 impl Collecting<'_> {
     fn take(&mut self, task: &Task, name: &str, bytes: Vec<u8>) -> Result<()> {
-        match *task {
-            Task(work, _, TaskKind::Frames, ..) => {
+        match (task.kind, task.count) {
+            (TaskKind::Frames, _) => {
                 let number = name.trim_end_matches(".png").parse();
-                let (Some(pattern), Ok(number)) = (&self.plan.works[work as usize].pictures, number) else {
+                let (Some(pattern), Ok(number)) = (&self.plan.works[task.work as usize].pictures, number) else {
                     return Err(Error::Failed(format!("a result of pictures holds a file {name:?}")));
                 };
                 match Numbered::new(Path::new(pattern), "png")? {
@@ -104,14 +104,14 @@ impl Collecting<'_> {
                     None => self.replace(&self.plan.path(pattern), &bytes),
                 }
             }
-            Task(.., 1) => {
+            (_, 1) => {
                 let path = self.cache()?.join("fields").join(name);
                 self.replace(&path, &bytes)
             }
-            Task(work, input, kind, part, count) => {
-                let whole = Task(work, input, kind, 0, count);
+            (_, count) => {
+                let whole = Task { first: 0, ..*task };
                 let parts = self.parts.entry(whole).or_default();
-                parts.insert(part, bytes);
+                parts.insert(task.first, bytes);
                 if parts.len() < count as usize {
                     return Ok(());
                 }
@@ -137,7 +137,7 @@ impl Collecting<'_> {
     }
 
     fn join(&mut self, task: &Task, parts: &[Vec<u8>]) -> Result<()> {
-        let Task(work, input, TaskKind::Bake(kind), ..) = *task else { return Ok(()) };
+        let Task { work, input, kind: TaskKind::Bake(kind), .. } = *task else { return Ok(()) };
         let folder = self.cache()?;
         let context = match self.context.take() {
             Some(context) => context,

@@ -86,7 +86,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         }
     }
     plan.write(&arguments.output)?;
-    let seconds: f64 = plan.slices.iter().map(|slice| slice.seconds()).sum();
+    let seconds: f64 = plan.slices.iter().map(|slice| f64::from(slice.seconds)).sum();
     if global.json {
         output::say(json!({ "slices": plan.slices.len(), "tasks": plan.tasks.len(), "seconds": seconds }).to_string());
     } else {
@@ -119,7 +119,8 @@ fn add_bakes(plan: &mut Plan, words: &[String], meshes: &[PathBuf], folder: &Pat
             let parts = if kind.is_cut() { Plan::parts(cost.seconds) } else { 1 };
             let share = f64::from(parts);
             let cost = Cost { seconds: cost.seconds / share, bytes: cost.bytes / share, ..cost };
-            (0..parts).for_each(|part| plan.add(Task(work, index, TaskKind::Bake(kind), part, parts), cost));
+            let task = |first| Task { work, input: index, kind: TaskKind::Bake(kind), first, count: parts };
+            (0..parts).for_each(|part| plan.add(task(part), cost));
         }
     }
     Ok(())
@@ -140,7 +141,7 @@ fn add_pictures(plan: &mut Plan, read: Read, (words, pattern): (Vec<String>, Str
         let count = run.min(frames - first);
         let share = f64::from(count);
         let cost = Cost { seconds: share * each.seconds, bytes: share * each.bytes, ..each };
-        plan.add(Task(work, index, TaskKind::Frames, first, count), cost);
+        plan.add(Task { work, input: index, kind: TaskKind::Frames, first, count }, cost);
     }
 }
 

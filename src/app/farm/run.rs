@@ -75,17 +75,18 @@ struct Running<'r> {
 
 impl Running<'_> {
     fn task(&mut self, task: &Task, take: Take<'_>) -> Result<()> {
-        let Task(_, _, kind, first, count) = *task;
-        let words = &self.plan.works[task.work()].words;
+        let Task { work, input, kind, first, count } = *task;
+        let input = input as usize;
+        let words = &self.plan.works[work as usize].words;
         match kind {
-            TaskKind::Frames => self.frames(task.input(), words, first, count, take),
+            TaskKind::Frames => self.frames(input, words, first, count, take),
             TaskKind::Bake(kind) => {
                 let options = mesh_options(words)?;
                 if self.context.is_none() {
                     self.context = Some(Context::new(self.global)?);
                 }
-                if self.mesh.as_ref().is_none_or(|(input, _)| *input != task.input()) {
-                    self.mesh = Some((task.input(), mesh(self.plan, task.input())?));
+                if self.mesh.as_ref().is_none_or(|(last, _)| *last != input) {
+                    self.mesh = Some((input, mesh(self.plan, input)?));
                 }
                 let (Some(context), Some((_, mesh))) = (&self.context, &self.mesh) else {
                     unreachable!("both were made above")

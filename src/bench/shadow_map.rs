@@ -7,6 +7,7 @@
 //! plane, so that hardly any bias is needed. The sky has no shadow map.
 
 use crate::asset::Mesh;
+use crate::asset::enclose::around_spheres;
 use crate::error::Result;
 use crate::gpu::{
     Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, GraphicsPipeline, GraphicsState, Image,
@@ -246,10 +247,7 @@ fn receivers(scene: &Scene, placements: &[Placement], points: &[(Vertex, VertexV
 }
 
 fn ball(scene: &Scene, placements: &[Placement], entity: usize) -> Ball {
-    let (centre, radius_m) = scene.meshes[scene.entities[entity].mesh].bounding_sphere();
-    let place = &placements[entity];
-    let scale = f64::from(place.scale);
-    (place.position.as_dvec3() + place.turn() * (centre.as_dvec3() * scale), f64::from(radius_m) * scale)
+    placements[entity].sphere(scene.meshes[scene.entities[entity].mesh].bounding_sphere())
 }
 
 fn occluders(scene: &Scene, placements: &[Placement]) -> Vec<(usize, Ball)> {
@@ -273,13 +271,10 @@ fn lights(scene: &Scene, placements: &[Placement]) -> Vec<MappedLight> {
 
 /// The view that just holds all balls, or the six faces of a cube.
 fn views(from: DVec3, balls: &[Ball]) -> Vec<View> {
-    let (low, high) = balls.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), (at, radius_m)| {
-        (low.min(*at - *radius_m), high.max(*at + *radius_m))
-    });
-    let centre = (low + high) / 2.0;
-    let radius_m = balls.iter().map(|(at, r)| at.distance(centre) + r).fold(0.0, f64::max);
-    let far = centre.distance(from);
-    if !balls.is_empty() && far > OUTSIDE * radius_m {
+    if let Some((centre, radius_m)) = around_spheres(balls)
+        && centre.distance(from) > OUTSIDE * radius_m
+    {
+        let far = centre.distance(from);
         let forward = (centre - from) / far;
         let (right, down) = forward.any_orthonormal_pair();
         return vec![View { right, down, forward, slope: (radius_m / far).asin().tan() }];

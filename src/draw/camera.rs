@@ -26,8 +26,6 @@ pub fn near_corner_m(camera: &Camera, aspect: f64) -> f64 {
 
 /// From a mesh's frame, metres from the centre of its bounding sphere, to the world; `centre_m` is that centre in the file's.
 pub fn world_from_centred(placement: &Placement, centre_m: DVec3) -> DMat4 {
-    let rotation = placement.turn();
-    let scale = f64::from(placement.scale);
-    let centre = placement.position.as_dvec3() + rotation * (centre_m * scale);
-    DMat4::from_scale_rotation_translation(DVec3::splat(scale), rotation, centre)
+    let scale = DVec3::splat(f64::from(placement.scale));
+    DMat4::from_scale_rotation_translation(scale, placement.turn(), placement.point(centre_m))
 }

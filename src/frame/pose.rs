@@ -123,9 +123,7 @@ impl Frame {
 
     /// Centre of an entity's bounding sphere in the world, metres.
     pub(super) fn centre(&self, index: usize, placement: &Placement) -> DVec3 {
-        let centre_m = self.buffers.meshes[self.scene.entities[index].mesh].centre_m;
-        let rotation = placement.turn();
-        placement.position.as_dvec3() + rotation * (centre_m * f64::from(placement.scale))
+        placement.point(self.buffers.meshes[self.scene.entities[index].mesh].centre_m)
     }
 
     /// How the light of an entity is computed.

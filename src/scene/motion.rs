@@ -24,6 +24,16 @@ impl Placement {
     pub fn turn(&self) -> DQuat {
         self.rotation.as_dquat().normalize()
     }
+
+    /// Where a point of the object is in the world, metres.
+    pub fn point(&self, object: DVec3) -> DVec3 {
+        self.position.as_dvec3() + self.turn() * (object * f64::from(self.scale))
+    }
+
+    /// Centre and radius in the world of a sphere of the object, metres.
+    pub fn sphere(&self, (centre, radius_m): (Vec3, f32)) -> (DVec3, f64) {
+        (self.point(centre.as_dvec3()), f64::from(radius_m) * f64::from(self.scale))
+    }
 }
 
 /// A rotation in a scene file: `{ axis = [0, 1, 0], angle_deg = 30 }` (right-handed) or `{ quaternion = [x, y, z, w] }` of any

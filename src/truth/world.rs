@@ -74,13 +74,12 @@ impl<'s> World<'s> {
     /// The scene with its entities at `placements`.
     pub fn new(scene: &'s Scene, meshes: &'s RayMeshes, placements: &[Placement]) -> Self {
         let placed = |(entity, placement): (&crate::scene::Entity, &Placement)| {
-            let (centre, radius_m) = scene.meshes[entity.mesh].bounding_sphere();
+            let (centre, radius_m) = placement.sphere(scene.meshes[entity.mesh].bounding_sphere());
             let rotation = placement.turn();
-            let scale = f64::from(placement.scale);
             PlacedEntity {
                 mesh: &meshes.0[entity.mesh],
-                centre: placement.position.as_dvec3() + rotation * (centre.as_dvec3() * scale),
-                radius_m: f64::from(radius_m) * scale,
+                centre,
+                radius_m,
                 rotation,
                 to_object: Mat3A::from(DMat3::from_quat(rotation.inverse()).as_mat3()),
             }

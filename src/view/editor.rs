@@ -4,6 +4,7 @@ use super::command::{Changed, Command, Effect, Request};
 use super::history::History;
 use super::orbit_camera::OrbitCamera;
 use super::picker::{EntityDrag, Picker};
+use crate::asset::enclose::around_spheres;
 use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
 use crate::bake;
@@ -227,22 +228,12 @@ impl Editor {
     pub fn bounds(&self) -> (DVec3, f64) {
         let placements = self.placements();
         let spheres: Vec<(DVec3, f64)> = self.affected_of(None).map(|i| self.sphere(i, &placements[i])).collect();
-        let (low, high) = spheres.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), (centre, r)| {
-            (low.min(*centre - *r), high.max(*centre + *r))
-        });
-        if spheres.is_empty() {
-            return (self.orbit.target, self.orbit.distance_m);
-        }
-        let centre = (low + high) / 2.0;
-        (centre, spheres.iter().map(|(c, r)| c.distance(centre) + r).fold(0.0, f64::max))
+        around_spheres(&spheres).unwrap_or((self.orbit.target, self.orbit.distance_m))
     }
 
     /// Bounding sphere of an entity at a placement, metres.
     pub fn sphere(&self, entity: usize, placement: &Placement) -> (DVec3, f64) {
-        let (centre, radius_m) = self.scene.meshes[self.scene.entities[entity].mesh].bounding_sphere();
-        let scale = f64::from(placement.scale);
-        let rotation = placement.turn();
-        (placement.position.as_dvec3() + rotation * (centre.as_dvec3() * scale), f64::from(radius_m) * scale)
+        placement.sphere(self.scene.meshes[self.scene.entities[entity].mesh].bounding_sphere())
     }
 
     /// Entities that a step moves: the selected one; else all that occlude or emit; if none does, all.

@@ -53,8 +53,7 @@ pub fn camera(
     }
     // The placement of an entity that stands there at time 0; cameras look along -z.
     let at = EntityData { motion: stand.motion.clone(), ..EntityData::of_mesh("") }.at(0.0);
-    let to_world =
-        |p: DVec3| at.position.as_dvec3() + at.turn() * (stand.fixed.transform_point3(p) * f64::from(at.scale));
+    let to_world = |p: DVec3| at.point(stand.fixed.transform_point3(p));
     let (eye, ahead) = (to_world(DVec3::ZERO), to_world(DVec3::NEG_Z));
     let ahead = (ahead - eye).try_normalize().ok_or_else(|| document.fail(&place, "its node squeezes space flat"))?;
     let distance_m = (centre - eye).dot(ahead).max(0.1 * radius_m).max(1e-3);
@@ -80,12 +79,9 @@ pub fn camera(
 /// A sphere around entities at time 0: centre and radius in metres. Each is its mesh's bounding sphere and its data.
 pub fn bounds<'a>(entities: impl Iterator<Item = ((Vec3, f32), &'a EntityData)>) -> (DVec3, f64) {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for ((centre, radius_m), entity) in entities {
-        let at = entity.at(0.0);
-        let scale = f64::from(at.scale);
-        let centre = at.position.as_dvec3() + at.turn() * (centre.as_dvec3() * scale);
-        let reach = DVec3::splat(f64::from(radius_m) * scale);
-        (low, high) = (low.min(centre - reach), high.max(centre + reach));
+    for (sphere, entity) in entities {
+        let (centre, radius_m) = entity.at(0.0).sphere(sphere);
+        (low, high) = (low.min(centre - radius_m), high.max(centre + radius_m));
     }
     if low.x > high.x {
         return (DVec3::ZERO, 1.0);

@@ -9,7 +9,7 @@ use super::BakeReport;
 use super::batches::{CaptureTarget, Captures, Unit};
 use super::wire::{Answer, Identity, MeshShape, Request, receive, send};
 use crate::error::{Error, Result};
-use crate::gpu::{Device, Validation};
+use crate::gpu::{self, Device, Validation};
 use crate::shaders::Library;
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -140,13 +140,9 @@ impl Workers {
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
 
-    fn cores(&self) -> usize {
-        std::thread::available_parallelism().map_or(1, |cores| cores.get())
-    }
-
     /// Most processes that a bake has, this one included, whose faces are computed or drawn.
     pub(super) fn most(&self, computes: bool) -> usize {
-        let usual = if self.device.info.is_software() && !computes { self.cores() } else { 1 };
+        let usual = if self.device.info.is_software() && !computes { gpu::cores() } else { 1 };
         self.options.jobs.map_or(usual, |jobs| jobs as usize)
     }
 
@@ -213,10 +209,7 @@ impl Workers {
             Some(folder) => command.arg("--cache-dir").arg(folder),
             None => command.arg("--no-cache"),
         };
-        if std::env::var_os("LP_NUM_THREADS").is_none() {
-            // Each worker of llvmpipe draws with its share of the cores.
-            command.env("LP_NUM_THREADS", (self.cores() / self.most(false)).max(1).to_string());
-        }
+        gpu::share_cores(&mut command, self.most(false));
         // Ctrl-C in a terminal reaches this process alone, whose end closes the pipes.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);

@@ -2,6 +2,7 @@
 
 use super::engines::Call;
 use crate::error::{Error, Result};
+use crate::gpu;
 use std::path::Path;
 use std::process::Stdio;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -62,9 +63,7 @@ impl Runner {
         let mut last = String::new();
         for attempt in 1..=TRIES {
             let mut command = self.call.command(slice);
-            if std::env::var_os("LP_NUM_THREADS").is_none() {
-                command.env("LP_NUM_THREADS", drawing_threads(self.workers).to_string());
-            }
+            gpu::share_cores(&mut command, self.workers);
             let output = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).output();
             let output = output.map_err(|error| cannot_start(&self.call.program, &error))?;
             if output.status.success() {
@@ -80,13 +79,6 @@ impl Runner {
         }
         Ok(Some((slice, last)))
     }
-}
-
-/// Threads of llvmpipe in each of so many processes besides the one that asks for a drawing. Where every core has a process, none: with
-/// a thread besides, two processes on two cores took 11.1 s for what they did in 10.3 s without.
-fn drawing_threads(workers: usize) -> usize {
-    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-    if workers >= cores { 0 } else { cores / workers }
 }
 
 /// A program that does not start.

@@ -49,6 +49,7 @@ pub use flight::{FLIGHTS, Flight, Timing};
 pub use image::{Image, ImageShape};
 pub use memory::{Buffer, BufferKind, TexelView};
 pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, Keeps};
+pub use select::{cores, share_cores};
 pub use shader::{Shader, Stage};
 pub use share::Gpu;
 pub use upload::Upload;

@@ -8,7 +8,7 @@ use crate::farm::engines::{self, Call};
 use crate::farm::local::{Runner, cannot_start};
 use crate::farm::status::missing;
 use crate::files;
-use crate::gpu::Validation;
+use crate::gpu::{self, Validation};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -62,8 +62,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     match arguments.engine {
         Engine::Local => {
-            let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-            let workers = arguments.workers.map_or(cores, |workers| workers as usize);
+            let workers = arguments.workers.map_or_else(gpu::cores, |workers| workers as usize);
             local(global, &Runner { call, workers }, &slices)
         }
         Engine::Slurm => slurm(arguments, &plan, &call, &slices),

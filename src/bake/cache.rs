@@ -246,44 +246,39 @@ fn is_kept(path: Option<&Path>, write: impl FnOnce(&Path) -> Result<()>) -> bool
     }
 }
 
-/// The field in a file, with the mesh's present name. `None` if the file is missing or damaged or holds another field.
+/// What a file holds. `None` if the file is missing or damaged or holds something else than its name says.
+fn fitting<T>(path: &Path, read: impl FnOnce(&Path) -> Result<T>, fits: impl FnOnce(&T) -> bool) -> Option<T> {
+    let why = match path.exists().then(|| read(path))? {
+        Ok(found) if fits(&found) => return Some(found),
+        Ok(_) => "it does not fit its name".into(),
+        Err(error) => error.to_string(),
+    };
+    log::warn!("{}: {why}; baking anew", path.display());
+    None
+}
+
+/// The field in a file, with the mesh's present name.
 fn read_field(path: &Path, header: &FieldHeader) -> Option<ShadowField> {
-    match path.exists().then(|| ShadowField::read(path))? {
-        Ok(found) if identity(&found.header) == identity(header) => {
-            Some(ShadowField { header: FieldHeader { mesh: header.mesh.clone(), ..found.header }, ..found })
-        }
-        Ok(_) => doubt(path, &"it does not fit its name"),
-        Err(error) => doubt(path, &error),
-    }
+    let mut found = fitting(path, ShadowField::read, |found| identity(&found.header) == identity(header))?;
+    found.header.mesh.clone_from(&header.mesh);
+    Some(found)
 }
 
-/// The silhouette field in a file, with the mesh's present name. `None` if the file is missing or damaged or holds another field.
+/// The silhouette field in a file, with the mesh's present name.
 fn read_silhouette(path: &Path, header: &SilhouetteHeader) -> Option<SilhouetteField> {
-    match path.exists().then(|| SilhouetteField::read(path))? {
-        Ok(mut found) if silhouette_identity(&found.header) == silhouette_identity(header) => {
-            found.header.mesh.clone_from(&header.mesh);
-            Some(found)
-        }
-        Ok(_) => doubt(path, &"it does not fit its name"),
-        Err(error) => doubt(path, &error),
-    }
+    let fits = |found: &SilhouetteField| silhouette_identity(&found.header) == silhouette_identity(header);
+    let mut found = fitting(path, SilhouetteField::read, fits)?;
+    found.header.mesh.clone_from(&header.mesh);
+    Some(found)
 }
 
-/// The payload of a file. `None` if the file is missing or damaged, or if its header or length is another.
+/// The payload of a file with this header, of so many bytes.
 fn read_payload<H: PartialEq + DeserializeOwned>(
     path: &Path,
     magic: [u8; 8],
     header: &H,
     bytes: usize,
 ) -> Option<Vec<u8>> {
-    match path.exists().then(|| file::read::<H>(path, magic))? {
-        Ok((found, payload)) if found == *header && payload.len() == bytes => Some(payload),
-        Ok(_) => doubt(path, &"it does not fit its name"),
-        Err(error) => doubt(path, &error),
-    }
-}
-
-fn doubt<T>(path: &Path, why: &dyn std::fmt::Display) -> Option<T> {
-    log::warn!("{}: {why}; baking anew", path.display());
-    None
+    let read = |path: &Path| file::read::<H>(path, magic);
+    fitting(path, read, |(found, payload)| found == header && payload.len() == bytes).map(|(_, payload)| payload)
 }

@@ -1,7 +1,8 @@
 //! Text files of results: CSV with its origin in the first line, and numbers with three digits.
 
 use crate::error::{Error, Result};
-use serde_json::Value;
+use serde::Serialize;
+use serde_json::{Value, json};
 use std::path::Path;
 
 /// Writes a file of results without leaving a partial one.
@@ -21,9 +22,20 @@ pub fn make_folder(path: &Path) -> Result<()> {
     std::fs::create_dir_all(path).map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", path.display())))
 }
 
-/// Serialisable rows as CSV: nested numbers get names joined by `_`, lists of objects are left out, and the first line, after
+/// Writes rows as NAME.csv, and with their origin as NAME.json.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_rows(folder: &Path, name: &str, origin: &Value, rows: &impl Serialize) -> Result<()> {
+    write(&folder.join(format!("{name}.csv")), csv(origin, rows))?;
+    write(&folder.join(format!("{name}.json")), format!("{:#}\n", json!({ "origin": origin, "rows": rows })))
+}
+
+/// Rows, of which a list is made, as CSV: nested numbers get names joined by `_`, lists of objects are left out, and the first line, after
 /// `#`, is `origin` as JSON.
-pub fn csv(origin: &Value, rows: &[Value]) -> String {
+pub fn csv(origin: &Value, rows: &impl Serialize) -> String {
+    let rows = json!(rows);
+    let rows = rows.as_array().map_or(&[][..], Vec::as_slice);
     let mut flat: Vec<Vec<(String, String)>> = rows.iter().map(|row| flatten("", row)).collect();
     // Columns of words come before columns of numbers, as judged by the first row.
     let words = |row: &Value| {
@@ -81,7 +93,6 @@ pub fn three(x: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn rows_become_columns() {

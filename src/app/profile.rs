@@ -156,8 +156,7 @@ fn ratios(cases: &[Case]) -> Vec<(String, Tenths)> {
 /// Writes profile.csv, starts.csv and profile.json.
 fn write(folder: &Path, document: &Value) -> Result<()> {
     for (file, key) in [("profile.csv", "passes"), ("starts.csv", "starts")] {
-        let lines = document[key].as_array().cloned().unwrap_or_default();
-        text::write(&folder.join(file), text::csv(&document["origin"], &lines))?;
+        text::write(&folder.join(file), text::csv(&document["origin"], &document[key]))?;
     }
     text::write(&folder.join("profile.json"), format!("{document:#}\n"))
 }

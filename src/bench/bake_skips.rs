@@ -107,9 +107,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<Bak
         }
     }
     let origin = json!({ "origin": bench.origin, "quick": bench.quick });
-    let values: Vec<_> = rows.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect();
-    text::write(&folder.join("skip_bake.csv"), &text::csv(&origin, &values))?;
-    text::write(&folder.join("skip_bake.json"), &format!("{:#}\n", json!({ "origin": origin, "rows": rows })))?;
+    text::write_rows(folder, "skip_bake", &origin, &rows)?;
     Ok(rows)
 }
 

@@ -6,7 +6,6 @@ use super::{Bench, default_options};
 use crate::bake;
 use crate::error::Result;
 use crate::frame;
-use crate::text::{csv, write};
 use serde::Serialize;
 use serde_json::json;
 use std::path::Path;
@@ -101,8 +100,6 @@ pub fn run(
         "origin": bench.origin, "quick": bench.quick, "seed": bench.seed, "bake": bake, "lattice": bake.lattice.to_string(),
         "errors": "root mean square over all 1600 vertices, relative to that of the unoccluded value",
     });
-    let values: Vec<_> = rows.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect();
-    write(&folder.join("floor.csv"), &csv(&origin, &values))?;
-    write(&folder.join("floor.json"), &format!("{:#}\n", json!({ "origin": origin, "rows": rows })))?;
+    crate::text::write_rows(folder, "floor", &origin, &rows)?;
     Ok(rows)
 }

@@ -10,10 +10,9 @@ use crate::sh::basis::coefficient_count;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::points;
 use crate::sh::product_program::product_program;
-use crate::text::{csv, write};
 use glam::DVec3;
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::Path;
 
 /// SH bands of all chains.
@@ -188,8 +187,6 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<Vec<Timed>> {
     crate::text::make_folder(folder)?;
     let timed = measure(bench)?;
     let origin = json!({ "origin": bench.origin, "quick": bench.quick, "seed": bench.seed });
-    let rows: Vec<Value> = timed.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect();
-    write(&folder.join("product.csv"), &csv(&origin, &rows))?;
-    write(&folder.join("product.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": timed })))?;
+    crate::text::write_rows(folder, "product", &origin, &timed)?;
     Ok(timed)
 }

@@ -13,7 +13,7 @@ use crate::layout::CLUSTER_VERTICES;
 use crate::lists::gather::{Counts, Place};
 use crate::lists::skip::Skip;
 use crate::scene::{Placement, Scene};
-use crate::text::{csv, write};
+use crate::text::{write, write_rows};
 use crate::truth::{RayCast, RayMeshes, World, sample_vertices};
 use serde::Serialize;
 use serde_json::json;
@@ -79,9 +79,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Sc
         }
     }
     let origin = json!({ "origin": bench.origin, "quick": bench.quick });
-    let rows: Vec<_> = points.iter().map(|p| serde_json::to_value(p).expect("points are plain data")).collect();
-    write(&folder.join("scaling.csv"), &csv(&origin, &rows))?;
-    write(&folder.join("scaling.json"), &format!("{:#}\n", json!({ "origin": origin, "points": points })))?;
+    write_rows(folder, "scaling", &origin, &points)?;
     for (axis, _) in axes {
         let of_axis: Vec<&ScalingPoint> = points.iter().filter(|p| p.axis == axis).collect();
         write(&folder.join(format!("scaling-{}.svg", axis.replace(' ', "-"))), &plot(axis, &of_axis).svg())?;

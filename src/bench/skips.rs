@@ -85,9 +85,7 @@ pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Sk
         "origin": bench.origin, "quick": bench.quick, "seed": bench.seed,
         "errors": "relative to the root mean square of T0 over the judged vertices",
     });
-    let values: Vec<_> = rows.iter().map(|row| serde_json::to_value(row).expect("rows are plain data")).collect();
-    crate::text::write(&folder.join("skip.csv"), &crate::text::csv(&origin, &values))?;
-    crate::text::write(&folder.join("skip.json"), &format!("{:#}\n", json!({ "origin": origin, "rows": rows })))?;
+    crate::text::write_rows(folder, "skip", &origin, &rows)?;
     crate::text::write(&folder.join("skip.svg"), &plot(&rows).svg())?;
     Ok(rows)
 }

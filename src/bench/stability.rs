@@ -17,7 +17,7 @@ use crate::text::{csv, write};
 use glam::DVec3;
 use half::f16;
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -208,13 +208,12 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<StabilityOutcome> {
     }
     (bench.progress)("a million small turns");
     let turns = turns(1_000_000);
-    let rows = |value: Value| value.as_array().cloned().unwrap_or_default();
     let origin = json!({ "origin": bench.origin, "quick": bench.quick, "seed": bench.seed });
     let outcome = StabilityOutcome { chains, trials, turns, refusals: refusals() };
-    write(&folder.join("chains.csv"), &csv(&origin, &rows(json!(outcome.chains))))?;
-    write(&folder.join("trials.csv"), &csv(&origin, &rows(json!(outcome.trials))))?;
-    write(&folder.join("turns.csv"), &csv(&origin, &rows(json!(outcome.turns))))?;
-    write(&folder.join("refusals.csv"), &csv(&origin, &rows(json!(outcome.refusals))))?;
+    write(&folder.join("chains.csv"), &csv(&origin, &outcome.chains))?;
+    write(&folder.join("trials.csv"), &csv(&origin, &outcome.trials))?;
+    write(&folder.join("turns.csv"), &csv(&origin, &outcome.turns))?;
+    write(&folder.join("refusals.csv"), &csv(&origin, &outcome.refusals))?;
     write(&folder.join("chains.svg"), &chain_plot(&outcome.chains).svg())?;
     write(&folder.join("trials.svg"), &trial_plot(&outcome.trials).svg())?;
     write(&folder.join("stability.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;

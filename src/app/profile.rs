@@ -1,8 +1,8 @@
 //! `shadow-fields profile` times every pass and every variant of the merge shader.
 
+use super::bench::common::bench;
 use super::context::{Context, size};
 use super::{Global, output};
-use crate::bench::Bench;
 use crate::bench::ceilings::{self, Ceilings};
 use crate::bench::profile::{self, ProfileRow, Start, Tenths};
 use crate::error::Result;
@@ -119,14 +119,7 @@ fn time_cases(
     at_best: &Ceilings,
 ) -> Result<Vec<Case>> {
     let show = |what: &str| output::note(global, what);
-    let bench = Bench {
-        baker: &context.baker,
-        cache: &context.cache,
-        progress: &show,
-        quick: false,
-        seed: global.seed,
-        origin: context.origin(global),
-    };
+    let bench = bench(context, global, false, &show);
     if let Some(path) = &arguments.bake {
         return Ok(vec![profile::bake(&bench, &scene::load_mesh(path)?.0, arguments.runs)?]);
     }

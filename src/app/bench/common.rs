@@ -15,14 +15,12 @@ pub fn start<T>(global: &Global, quick: bool, measure: impl FnOnce(&Bench<'_>) -
             output::note(global, format!("{:6.1} s  {what}", started.elapsed().as_secs_f64()));
         }
     };
-    let bench = Bench {
-        baker: &context.baker,
-        cache: &context.cache,
-        progress: &show,
-        quick,
-        seed: global.seed,
-        origin: context.origin(global),
-    };
-    let outcome = measure(&bench)?;
+    let outcome = measure(&bench(&context, global, quick, &show))?;
     Ok((context, outcome))
+}
+
+/// What measurements need of an open device.
+pub fn bench<'b>(context: &'b Context, global: &Global, quick: bool, progress: &'b dyn Fn(&str)) -> Bench<'b> {
+    let origin = context.origin(global);
+    Bench { baker: &context.baker, cache: &context.cache, progress, quick, seed: global.seed, origin }
 }

@@ -1,6 +1,6 @@
 //! `shadow-fields bench`: the measurements behind the documentation's figures.
 
-mod common;
+pub(super) mod common;
 mod floor;
 mod product;
 mod scaling;

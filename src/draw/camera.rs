@@ -2,7 +2,7 @@
 
 use crate::scene::{Camera, Placement};
 use glam::dcamera::rh::{proj::vulkan, view};
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DVec3, DVec4};
 
 /// World to Vulkan clip space: y down, reversed depth (1 at the near plane, 0 at infinity). `aspect` is width / height.
 ///
@@ -11,6 +11,17 @@ pub fn clip_from_world(camera: &Camera, aspect: f64) -> DMat4 {
     let (eye, target, near) = (camera.eye.as_dvec3(), camera.target.as_dvec3(), near_m(camera));
     let view = view::look_at_mat4(eye, target, camera.up().as_dvec3());
     vulkan::perspective_infinite_reverse(f64::from(camera.fov_deg).to_radians(), aspect, near) * view
+}
+
+/// Unit direction from the eye through a place in a picture of that size, in pixels from the top left.
+pub fn through_pixels(camera: &Camera, size: [f64; 2]) -> impl Fn([f64; 2]) -> DVec3 {
+    let (eye, to_world) = (camera.eye.as_dvec3(), clip_from_world(camera, size[0] / size[1]).inverse());
+    move |at| {
+        let across = |axis: usize| 2.0 * at[axis] / size[axis] - 1.0;
+        // Depth 1 is the near plane; any point in front of the eye gives the direction.
+        let near = to_world * DVec4::new(across(0), across(1), 1.0, 1.0);
+        (near.truncate() / near.w - eye).normalize()
+    }
 }
 
 /// Distance of the near plane in metres.

@@ -3,9 +3,9 @@
 use super::raycast::{Estimate, RayCast};
 use super::world::{VertexView, World};
 use super::{RayMeshes, Vertex};
-use crate::draw::camera::clip_from_world;
+use crate::draw::camera::through_pixels;
 use crate::scene::{Placement, Scene};
-use glam::{DVec3, DVec4};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// What the middle of each pixel shows that is lit and does not emit: its entity with the pixel's number, row by row from the top left,
@@ -13,12 +13,10 @@ use rayon::prelude::*;
 pub fn lit_points(world: &World<'_>, [width, height]: [u32; 2]) -> Vec<(Vertex, VertexView)> {
     let camera = &world.scene.data.camera;
     let eye = camera.eye.as_dvec3();
-    let to_world = clip_from_world(camera, f64::from(width) / f64::from(height)).inverse();
+    let direction = through_pixels(camera, [width, height].map(f64::from));
     let surface = |pixel: u32| {
-        let at = |place: u32, size: u32| 2.0 * (f64::from(place) + 0.5) / f64::from(size) - 1.0;
-        let near = to_world * DVec4::new(at(pixel % width, width), at(pixel / width, height), 1.0, 1.0);
-        let direction = (near.truncate() / near.w - eye).normalize();
-        let (entity, view) = seen(world, eye, direction)?;
+        let middle = [pixel % width, pixel / width].map(|place| f64::from(place) + 0.5);
+        let (entity, view) = seen(world, eye, direction(middle))?;
         let entity_data = &world.scene.entities[entity];
         (entity_data.receives && !entity_data.emits).then_some((Vertex { entity, index: pixel as usize }, view))
     };

@@ -5,10 +5,10 @@ use super::edit;
 use super::editor::Editor;
 use super::history::{EditKind, Snapshot};
 use super::picker::EntityDrag;
-use crate::draw::camera::clip_from_world;
+use crate::draw::camera::through_pixels;
 use crate::scene::Placement;
 use crate::truth::ray_mesh::RayMesh;
-use glam::{DVec3, DVec4};
+use glam::DVec3;
 
 /// A drag reaches at most this many scene radii from the eye, because near the horizon a pixel covers kilometres.
 const REACH: f64 = 30.0;
@@ -25,14 +25,8 @@ pub struct Ray {
 impl Editor {
     /// The ray through a position in the picture (in pixels, with pixel centres at halves).
     pub fn ray(&self, at: [f32; 2]) -> Ray {
-        let [width, height] = self.size().map(f64::from);
-        let camera = self.camera();
-        let across = |p: f32, of: f64| 2.0 * f64::from(p) / of - 1.0;
-        // Depth 1 is the near plane; any point in front of the eye gives the direction.
-        let near = DVec4::new(across(at[0], width), across(at[1], height), 1.0, 1.0);
-        let world = clip_from_world(camera, width / height).inverse() * near;
-        let origin = camera.eye.as_dvec3();
-        Ray { origin, direction: (world.truncate() / world.w - origin).normalize() }
+        let direction = through_pixels(self.camera(), self.size().map(f64::from))(at.map(f64::from));
+        Ray { origin: self.camera().eye.as_dvec3(), direction }
     }
 
     /// The entity that is seen at a position in the picture, and the visible point in the world.

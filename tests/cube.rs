@@ -8,13 +8,7 @@ use shadow_fields::sh::basis::{coefficient_count, evaluate};
 use shadow_fields::sh::cube::{FACE_COUNT, direction, face_basis, face_st, solid_angle, texel_st};
 use shadow_fields::sh::lobe::cap;
 use shadow_fields::sh::project::project;
-
-/// A uniform direction: all octants, no axes.
-fn random_direction(rng: &mut Rng) -> DVec3 {
-    let (z, azimuth) = (2.0 * rng.f64() - 1.0, 2.0 * PI * rng.f64());
-    let radius = (1.0 - z * z).sqrt();
-    DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z)
-}
+use shadow_fields::sh::quadrature::random_direction;
 
 /// The table of the Vulkan specification as it is printed there: (sc, tc, rc) of a direction on each face.
 fn vulkan_table(face: usize, r: DVec3) -> [f64; 3] {

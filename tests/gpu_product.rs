@@ -10,16 +10,13 @@ use shadow_fields::merge::chain::{Chain, PRODUCTS, Product};
 use shadow_fields::merge::product::{Products, Push, Shape, twin};
 use shadow_fields::sh::basis::coefficient_count;
 use shadow_fields::sh::lobe::{cap, clamped_cosine};
+use shadow_fields::sh::quadrature::random_direction;
 use stage::{Stage, scene, small, stage};
 
 /// Caps of 10 to 40 degrees about the sky, and cosines about as many normals.
 fn inputs(shape: Shape, count: usize) -> [Vec<f64>; 2] {
     let mut rng = fastrand::Rng::with_seed(11);
-    let mut direction = || {
-        let (z, turn) = (2.0 * rng.f64() - 1.0, std::f64::consts::TAU * rng.f64());
-        let across = (1.0 - z * z).sqrt();
-        (glam::DVec3::new(across * turn.cos(), across * turn.sin(), z), (10.0 + 30.0 * rng.f64()).to_radians())
-    };
+    let mut direction = || (random_direction(&mut rng), (10.0 + 30.0 * rng.f64()).to_radians());
     let transfers = (0..count).flat_map(|_| clamped_cosine(shape.bands, direction().0)).collect();
     let factor = |(axis, angle)| cap(shape.field_bands, axis, angle);
     [transfers, (0..count).flat_map(|_| factor(direction())).collect()]

@@ -18,6 +18,7 @@ use shadow_fields::field::sub_light::{Part, SeenLight};
 use shadow_fields::gpu::{Bind, Buffer, Commands, ComputePipeline};
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::sh::lobe;
+use shadow_fields::sh::quadrature::random_direction;
 use shadow_fields::shaders::{Library, ShaderPermutation};
 use shadow_fields::truth::{RayMeshes, Vertex, World};
 use std::f64::consts::TAU;
@@ -102,10 +103,6 @@ fn a_ball_leaves_all_free_outside_and_nothing_inside() {
     assert!(all(bake(&gpu, &room, 32), -LIMIT_RAD));
 }
 
-fn direction(rng: &mut fastrand::Rng) -> DVec3 {
-    DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0)).normalize()
-}
-
 const LOOKUP: &str = r#"#version 460
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Cells { uvec2 cells[]; };
@@ -141,7 +138,7 @@ fn a_shader_finds_what_rust_finds() {
     let pass = ComputePipeline::new(&gpu.device, "lookup", &shader, &[]).unwrap();
     let mut rng = fastrand::Rng::with_seed(8);
     let maps: Vec<[u8; BYTES]> = (0..16).map(|_| std::array::from_fn(|_| rng.u8(..))).collect();
-    let mut rays: Vec<[Vec3; 2]> = (0..4000).map(|_| [0; 2].map(|_| direction(&mut rng).as_vec3())).collect();
+    let mut rays: Vec<[Vec3; 2]> = (0..4000).map(|_| [0; 2].map(|_| random_direction(&mut rng).as_vec3())).collect();
     let poles = [Vec3::Z, Vec3::NEG_Z, Vec3::new(1e-4, -2e-4, -1.0).normalize(), Vec3::X, Vec3::Y];
     rays.extend(poles.iter().flat_map(|normal| [[*normal, *normal], [*normal, Vec3::X], [*normal, Vec3::NEG_Y]]));
     let radius = |i: usize| [0.02_f32, 0.1, 0.4][i % 3];
@@ -220,7 +217,7 @@ fn direct_light_is_that_of_rays() {
         let view = world.view(Vertex { entity: 0, index });
         let normal = mesh.normals[index].as_dvec3();
         for _ in 0..LIGHTS {
-            let toward = direction(&mut rng);
+            let toward = random_direction(&mut rng);
             let toward = if toward.dot(normal) < 0.0 { -toward } else { toward };
             for (degrees, sums) in degrees.iter().zip(&mut sums) {
                 let angle = degrees.to_radians();

@@ -5,14 +5,7 @@ use std::f64::consts::PI;
 use fastrand::Rng;
 use glam::DVec3;
 use shadow_fields::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, Y00, basis_program, coefficient_count, evaluate};
-use shadow_fields::sh::quadrature::{icosahedral_rule, sphere_rule};
-
-/// A uniform direction: all octants, no axes.
-fn random_direction(rng: &mut Rng) -> DVec3 {
-    let (z, azimuth) = (2.0 * rng.f64() - 1.0, 2.0 * PI * rng.f64());
-    let radius = (1.0 - z * z).sqrt();
-    DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z)
-}
+use shadow_fields::sh::quadrature::{icosahedral_rule, random_direction, sphere_rule};
 
 fn basis(bands: usize, direction: DVec3) -> Vec<f64> {
     let mut out = vec![f64::NAN; coefficient_count(bands)];

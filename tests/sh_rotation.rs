@@ -5,17 +5,11 @@ use std::f64::consts::PI;
 use fastrand::Rng;
 use glam::{DQuat, DVec3};
 use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, evaluate};
+use shadow_fields::sh::quadrature::random_direction;
 use shadow_fields::sh::rotation::{Rotation, block_count, rotate_program, turns};
 
 fn random(rng: &mut Rng, bands: usize) -> Vec<f64> {
     (0..coefficient_count(bands)).map(|_| 2.0 * rng.f64() - 1.0).collect()
-}
-
-/// A uniform direction: all octants, no axes.
-fn random_direction(rng: &mut Rng) -> DVec3 {
-    let (z, azimuth) = (2.0 * rng.f64() - 1.0, 2.0 * PI * rng.f64());
-    let radius = (1.0 - z * z).sqrt();
-    DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z)
 }
 
 fn random_rotation(rng: &mut Rng) -> DQuat {

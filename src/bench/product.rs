@@ -10,6 +10,7 @@ use crate::sh::basis::coefficient_count;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::points;
 use crate::sh::product_program::product_program;
+use crate::sh::quadrature::random_direction;
 use glam::DVec3;
 use serde::Serialize;
 use serde_json::json;
@@ -101,9 +102,10 @@ impl<'b> Chains<'b> {
         let device = bench.baker.device();
         let count: u32 = if bench.quick { 16_384 } else { 65_536 };
         let mut rng = fastrand::Rng::with_seed(bench.seed);
-        let transfers: Vec<f64> = (0..count).flat_map(|_| clamped_cosine(BANDS, direction(&mut rng))).collect();
+        let transfers: Vec<f64> = (0..count).flat_map(|_| clamped_cosine(BANDS, random_direction(&mut rng))).collect();
         let mut factors_of = |bands: usize| -> Vec<f64> {
-            let cap = |rng: &mut fastrand::Rng| cap(bands, direction(rng), (5.0 + 30.0 * rng.f64()).to_radians());
+            let cap =
+                |rng: &mut fastrand::Rng| cap(bands, random_direction(rng), (5.0 + 30.0 * rng.f64()).to_radians());
             (0..count).flat_map(|_| cap(&mut rng)).collect()
         };
         let factors: Vec<Vec<f64>> = (BANDS..=7).map(&mut factors_of).collect();
@@ -156,15 +158,6 @@ fn timed(product: &'static str, shape: Shape, error: f64, times: &[f64]) -> Time
         ns_per_product,
         error,
         identical_64: twin(shape, &start, &caps, push)[0] / start[0],
-    }
-}
-
-fn direction(rng: &mut fastrand::Rng) -> DVec3 {
-    loop {
-        let place = DVec3::new(rng.f64(), rng.f64(), rng.f64()) * 2.0 - 1.0;
-        if (0.01..=1.0).contains(&place.length()) {
-            return place.normalize();
-        }
     }
 }
 

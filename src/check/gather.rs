@@ -11,6 +11,7 @@ use crate::lists::gather::{
     Scope,
 };
 use crate::lists::skip::Skip;
+use crate::sh::quadrature::random_direction;
 use crate::sh::rotation::turns;
 use crate::shaders::Library;
 use glam::{DQuat, DVec3};
@@ -38,15 +39,6 @@ pub struct ListAgreement {
     pub entries: usize,
     /// Entries that stand there for the slack alone.
     pub extra_entries: usize,
-}
-
-fn random_direction(rng: &mut fastrand::Rng) -> DVec3 {
-    loop {
-        let p = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5);
-        if (1e-3..0.25).contains(&p.length_squared()) {
-            return p.normalize();
-        }
-    }
 }
 
 /// Whether `part` is what is left of `whole` when some of its entries are taken out.

@@ -108,17 +108,16 @@ pub fn cells(map: &[u8]) -> [[u32; 2]; CELLS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn direction(rng: &mut fastrand::Rng) -> DVec3 {
-        DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0)).normalize()
-    }
+    use crate::sh::quadrature::random_direction;
 
     #[test]
     fn frames_are_right_handed_for_every_normal() {
         let mut rng = fastrand::Rng::with_seed(5);
         let axes = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_Z, DVec3::new(0.0, 0.0, -0.0)];
         let close_to_pole = DVec3::new(1e-9, -1e-9, -1.0);
-        for normal in (0..1000).map(|_| direction(&mut rng)).chain([close_to_pole]).chain(axes.into_iter().take(4)) {
+        for normal in
+            (0..1000).map(|_| random_direction(&mut rng)).chain([close_to_pole]).chain(axes.into_iter().take(4))
+        {
             let frame = frame(normal);
             assert!((frame.transpose() * frame).abs_diff_eq(DMat3::IDENTITY, 1e-9), "{normal}: {frame}");
             assert!(frame.determinant() > 0.0, "{normal}");
@@ -148,7 +147,7 @@ mod tests {
         let map: Vec<u8> = (0..BYTES).map(|_| rng.u8(..)).collect();
         let cells = cells(&map);
         for _ in 0..1000 {
-            let local = direction(&mut rng);
+            let local = random_direction(&mut rng);
             let place = place(local);
             let cell = place.floor().min(DVec2::splat((SIDE - 2) as f64));
             let [angles, distances] = cells[cell.y as usize * (SIDE - 1) + cell.x as usize].map(u32::to_le_bytes);

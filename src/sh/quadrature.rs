@@ -47,6 +47,13 @@ pub fn sphere_rule(degree: usize) -> Vec<(DVec3, f64)> {
     rule
 }
 
+/// A uniform direction.
+pub fn random_direction(rng: &mut fastrand::Rng) -> DVec3 {
+    let (z, azimuth) = (2.0 * rng.f64() - 1.0, 2.0 * PI * rng.f64());
+    let radius = (1.0 - z * z).sqrt();
+    DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z)
+}
+
 /// The 32-point rule, exact to degree 9: twelve icosahedron vertices of weight 4 pi * 25/840 and the twenty vertices of the
 /// dual dodecahedron, the directions of its face centres, of weight 4 pi * 27/840 (McLaren 1963, reference 5 of [`crate::sh`]).
 ///

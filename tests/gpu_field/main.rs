@@ -23,6 +23,7 @@ use shadow_fields::gpu::Device;
 use shadow_fields::scene::Scene;
 use shadow_fields::scene_buffers::SceneBuffers;
 use shadow_fields::sh::lobe;
+use shadow_fields::sh::quadrature::random_direction;
 use shadow_fields::sh::rotation::Rotation;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -53,15 +54,6 @@ fn assert_finite(field: &ShadowField) {
     }
 }
 
-fn unit(rng: &mut Rng) -> DVec3 {
-    loop {
-        let v = DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0));
-        if (0.01..1.0).contains(&v.length_squared()) {
-            return v.normalize();
-        }
-    }
-}
-
 fn norm(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().map(|v| v * v).sum::<f64>().sqrt()
 }
@@ -73,7 +65,7 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
 /// Receivers log-uniform in distance from 1.05 r to 8 r, uniform in direction.
 fn receivers(count: usize, seed: u64) -> Vec<DVec3> {
     let mut rng = Rng::with_seed(seed);
-    (0..count).map(|_| unit(&mut rng) * 1.05 * (8.0_f64 / 1.05).powf(rng.f64())).collect()
+    (0..count).map(|_| random_direction(&mut rng) * 1.05 * (8.0_f64 / 1.05).powf(rng.f64())).collect()
 }
 
 /// The default field of a sphere, baked once.
@@ -123,7 +115,7 @@ fn beyond_the_last_shell_the_sphere_fades() {
     let field = sphere_field(&gpu);
     let mut rng = Rng::with_seed(6);
     for distance in [8.0, 8.01, 12.0, 30.0, 200.0] {
-        let p = distance * unit(&mut rng);
+        let p = distance * random_direction(&mut rng);
         let mut found = [0.0; 16];
         field.lookup(p, Lookup::Trilinear, 0, &mut found);
         let wanted = lobe::sphere(4, -p, 1.0);
@@ -145,7 +137,7 @@ fn spinning_a_sphere_changes_little() {
     let mut rng = Rng::with_seed(7);
     let (mut sum, mut largest, mut count) = (0.0, 0.0_f64, 0);
     for turn in 0..20 {
-        let rotation = DQuat::from_axis_angle(unit(&mut rng), 0.1 + 0.3 * f64::from(turn));
+        let rotation = DQuat::from_axis_angle(random_direction(&mut rng), 0.1 + 0.3 * f64::from(turn));
         let matrix = Rotation::new(4, rotation);
         for p in receivers(50, 100 + turn as u64) {
             let (mut still, mut turned, mut world) = ([0.0; 16], [0.0; 16], [0.0; 16]);

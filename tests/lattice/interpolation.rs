@@ -1,19 +1,20 @@
 //! Which samples a lookup takes, and by what weights.
 
-use super::{LOOKUPS, ROUNDING, interpolate, lattices, noise, store, unit};
+use super::{LOOKUPS, ROUNDING, interpolate, lattices, noise, store};
 use crate::generate;
 use fastrand::Rng;
 use glam::DVec3;
 use shadow_fields::bake;
 use shadow_fields::field::lattice::Directions;
 use shadow_fields::field::{FieldHeader, FieldKind, Lattice, Lookup, ShadowField, Storage};
+use shadow_fields::sh::quadrature::random_direction;
 use std::f64::consts::{PI, TAU};
 
 #[test]
 fn weights_are_convex_everywhere() {
     let mut rng = Rng::with_seed(2);
     for lattice in lattices() {
-        let radial = (0..3000).map(|_| unit(&mut rng) * 10.0_f64.powf(3.0 * rng.f64() - 1.5));
+        let radial = (0..3000).map(|_| random_direction(&mut rng) * 10.0_f64.powf(3.0 * rng.f64() - 1.5));
         let far = [DVec3::ZERO, DVec3::splat(1e-300), DVec3::splat(-1e6), DVec3::new(1e6, 0.0, 0.0), -1e6 * DVec3::Y];
         let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|v| [v, -v, 3.0 * v, -0.3 * v]);
         let corners = (0..8).map(|k| DVec3::new(1.0, f64::from(k & 2) - 1.0, f64::from((k & 1) * 2) - 1.0));
@@ -59,7 +60,7 @@ fn nearest_takes_a_near_sample() {
     let stored = store(&lattice, &index);
     let mut wrong = 0;
     for _ in 0..2000 {
-        let direction = unit(&mut rng);
+        let direction = random_direction(&mut rng);
         let position = direction * (1.02 * (8.0_f64 / 1.02).powf(rng.f64()));
         // A corner of a border holds a mean: there the value is no index, and any of the three is as near.
         let value = interpolate(&lattice, &stored, position, Lookup::Nearest);
@@ -83,7 +84,7 @@ fn linear_in_the_shell_coordinate_is_exact() {
             let d = lattice.inner + (lattice.outer - lattice.inner) * rng.f64();
             let wanted = 3.0 - 0.25 * (slope * lattice.coordinate(d) + offset);
             for lookup in [Lookup::Radial, Lookup::Trilinear] {
-                let value = interpolate(&lattice, &stored, d * unit(&mut rng), lookup);
+                let value = interpolate(&lattice, &stored, d * random_direction(&mut rng), lookup);
                 assert!((value - wanted).abs() < ROUNDING, "{lattice} {d}: {value}, not {wanted}");
             }
         }
@@ -108,7 +109,8 @@ fn interpolation_is_continuous() {
         let last = f64::from(lattice.shells - 1);
         let shell_at = |d: f64| (slope * lattice.coordinate(d) + offset).clamp(0.0, last);
         let at = |p: DVec3| interpolate(&lattice, &stored, p, Lookup::Trilinear) * lattice.unscale(p.length());
-        let mut paths: Vec<(DVec3, DVec3)> = (0..12).map(|_| (unit(&mut rng), unit(&mut rng))).collect();
+        let mut paths: Vec<(DVec3, DVec3)> =
+            (0..12).map(|_| (random_direction(&mut rng), random_direction(&mut rng))).collect();
         // Across corners, along edges, and along them on either side.
         paths.push((DVec3::new(1.0, 1.0, 0.9), DVec3::new(1.0, 1.0, 1.2)));
         paths.push((DVec3::new(1.0, 0.9, 0.8), DVec3::new(0.8, 1.0, 1.1)));
@@ -203,7 +205,7 @@ fn lookup_of_a_field_is_the_lattice_and_the_factor() {
     let field = ShadowField { header, payload };
     assert_eq!(field.header.payload_bytes(), field.payload.len() as u64);
     for _ in 0..300 {
-        let position = unit(&mut rng) * (0.3 + 12.0 * rng.f64());
+        let position = random_direction(&mut rng) * (0.3 + 12.0 * rng.f64());
         for lookup in LOOKUPS {
             for channel in 0..3 {
                 let mut out = [0.0; 4];

@@ -9,6 +9,7 @@ use glam::DVec3;
 use shadow_fields::bake;
 use shadow_fields::field::lattice::{CELL_WARP, OUTSIDE_INNER, Spacing, cap_cosine, cap_height, unwarp, warp};
 use shadow_fields::field::{FieldKind, Fit, Lattice, Lookup};
+use shadow_fields::sh::quadrature::random_direction;
 use std::f64::consts::PI;
 
 /// A few f64 roundings, widened by the steepest slope of a shell coordinate (some hundreds a unit of distance).
@@ -33,15 +34,6 @@ fn lattices() -> Vec<Lattice> {
     ]
     .map(|text| text.parse().unwrap_or_else(|error| panic!("{error}")))
     .to_vec()
-}
-
-fn unit(rng: &mut Rng) -> DVec3 {
-    loop {
-        let v = DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0));
-        if (0.01..1.0).contains(&v.length_squared()) {
-            return v.normalize();
-        }
-    }
 }
 
 /// Values of captured samples as the assemble pass would store them: a border holds the mean of its sources.
@@ -152,7 +144,7 @@ fn fitted_lattices_are_round_ones_in_their_own_space() {
     let fitted: Lattice = "cube:6x5,inner=0.4,centre=0.125:-0.25:0,stretch=1:1.5:1.25".parse().unwrap();
     let mut rng = Rng::with_seed(11);
     for _ in 0..300 {
-        let q = unit(&mut rng) * 10.0 * rng.f64();
+        let q = random_direction(&mut rng) * 10.0 * rng.f64();
         let p = DVec3::new(q.x + 0.125, q.y / 1.5 - 0.25, q.z / 1.25);
         assert!((fitted.distance(p) - q.length()).abs() < 1e-12);
         let (a, b) = (fitted.corners(p, Lookup::Trilinear), round.corners(q, Lookup::Trilinear));
@@ -188,7 +180,7 @@ fn directions_cover_the_sphere_evenly() {
     assert!(all.iter().sum::<DVec3>().length() < 1e-12);
     let nearest = |v: DVec3| all.iter().map(|w| w.angle_between(v)).fold(f64::MAX, f64::min);
     let mut rng = Rng::with_seed(1);
-    let farthest = (0..2000).map(|_| nearest(unit(&mut rng))).fold(0.0, f64::max);
+    let farthest = (0..2000).map(|_| nearest(random_direction(&mut rng))).fold(0.0, f64::max);
     // Cells of 90 / 8 = 11.25 degrees: half a diagonal is 8 degrees at a face's centre.
     assert!(farthest < 8.5_f64.to_radians(), "{} degrees from the nearest sample", farthest.to_degrees());
     for (i, a) in all.iter().enumerate() {

@@ -3,7 +3,7 @@
 use super::plan::{FORMAT, PROGRAM, Plan, SECONDS_LIMIT, Slice, Task, TaskKind};
 use crate::asset;
 use crate::error::{Error, Result, one_line};
-use crate::files;
+use crate::text;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -90,9 +90,7 @@ impl Plan {
     /// # Errors
     /// `Failed` where it cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let bytes = serde_json::to_vec(self).expect("a plan is plain data");
-        files::replace(path, &bytes)
-            .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
+        text::write(path, serde_json::to_vec(self).expect("a plan is plain data"))
     }
 }
 

@@ -47,15 +47,12 @@ pub fn write(data: &Data, meshes: &[Arc<Mesh>], path: &Path, head: &str) -> Resu
             let what = format!("over the limit of {} MiB for a mesh file", obj::FILE_LIMIT_BYTES >> 20);
             return Err(Error::input(&path, what));
         }
-        files::replace(&path, text.as_bytes()).map_err(|error| unwritten(&path, &error))?;
+        crate::text::write(&path, text)?;
     }
+    // Unlike meshes, it makes no folder.
     files::replace_with(path, |file| file.write_all(text.as_bytes()))
-        .map_err(|error: std::io::Error| unwritten(path, &error))?;
+        .map_err(|error: std::io::Error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))?;
     Ok(data)
-}
-
-fn unwritten(path: &Path, error: &std::io::Error) -> Error {
-    Error::Failed(format!("{}: cannot be written: {error}", path.display()))
 }
 
 /// A name that every file system takes and that is not taken, also where case does not count.

@@ -132,8 +132,7 @@ impl Collecting<'_> {
         if std::fs::read(path).is_ok_and(|found| found == bytes) {
             return Ok(());
         }
-        crate::files::replace(path, bytes)
-            .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
+        crate::text::write(path, bytes)
     }
 
     fn join(&mut self, task: &Task, parts: &[Vec<u8>]) -> Result<()> {

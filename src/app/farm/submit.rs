@@ -7,7 +7,6 @@ use crate::farm::Plan;
 use crate::farm::engines::{self, Call};
 use crate::farm::local::{Runner, cannot_start};
 use crate::farm::status::missing;
-use crate::files;
 use crate::gpu::{self, Validation};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -120,8 +119,7 @@ fn local(global: &Global, runner: &Runner, slices: &[usize]) -> Result<()> {
 /// Writes a file beside the plan, with another ending.
 fn beside(plan: &Path, ending: &str, text: &str) -> Result<PathBuf> {
     let path = plan.with_extension(ending);
-    files::replace(&path, text.as_bytes())
-        .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))?;
+    crate::text::write(&path, text)?;
     Ok(path)
 }
 
@@ -133,8 +131,7 @@ fn shown(command: &Command) -> String {
 
 fn slurm(arguments: &Arguments, plan: &Plan, call: &Call, slices: &[usize]) -> Result<()> {
     let logs = call.plan.with_extension("logs");
-    std::fs::create_dir_all(&logs)
-        .map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", logs.display())))?;
+    crate::text::make_folder(&logs)?;
     let script = beside(&call.plan, "sbatch", &engines::slurm(plan, call, &logs))?;
     for (first, tasks) in engines::arrays(slices, arguments.workers.map(|workers| workers as usize)) {
         let mut command = Command::new("sbatch");

@@ -1,7 +1,7 @@
 //! Scenes that are put together in code, held to the same rules as scene files.
 
 use super::data::{Camera, Data, EntityData, MeshData, Output, check};
-use super::{ENTITY_LIMIT, MESH_LIMIT, Scene, read_named, resolve};
+use super::{Scene, check_counts, read_named, resolve_all};
 use crate::asset::Generator;
 use crate::asset::Mesh;
 use crate::asset::environment::{Environment, EnvironmentData};
@@ -97,11 +97,7 @@ impl SceneBuilder {
     /// scene may have.
     pub fn build(self) -> Result<Scene> {
         let SceneBuilder { camera, output, environment, meshes: shapes, entities } = self;
-        for (what, count, limit) in [("meshes", shapes.len(), MESH_LIMIT), ("entities", entities.len(), ENTITY_LIMIT)] {
-            if count > limit {
-                return Err(Error::Input(format!("{count} {what} are over the limit of {limit}")));
-            }
-        }
+        check_counts(shapes.len(), entities.len()).map_err(Error::Input)?;
         camera.check()?;
         check("output", &output)?;
         let (mut meshes, mut named): (Vec<Arc<Mesh>>, Vec<MeshData>) = Default::default();
@@ -120,16 +116,15 @@ impl SceneBuilder {
             meshes.push(mesh);
             named.push(MeshData { name, file: None, generator });
         }
-        let entity = |(index, entity): (usize, &EntityData)| {
-            let what = || entity.name.as_ref().map_or(format!("entity {index}"), |name| format!("entity {name:?}"));
-            check(what(), entity)?;
-            let mesh = named.iter().position(|mesh| mesh.name == entity.mesh);
-            let mesh = mesh.ok_or_else(|| Error::Input(format!("{}: there is no mesh {:?}", what(), entity.mesh)))?;
-            Ok(resolve(index, entity, mesh, &meshes[mesh]))
-        };
-        let resolved = entities.iter().enumerate().map(entity).collect::<Result<Vec<_>>>()?;
-        let light = Environment::new(&environment, &read_named)?;
         let data = Data { camera, output, environment, meshes: named, entities };
+        let what = |index: usize| match &data.entities[index].name {
+            Some(name) => format!("entity {name:?}"),
+            None => format!("entity {index}"),
+        };
+        data.entities.iter().enumerate().try_for_each(|(index, entity)| check(what(index), entity))?;
+        let fail = |index, error: String| Error::Input(format!("{}: {error}", what(index)));
+        let resolved = resolve_all(&data, &meshes, fail)?;
+        let light = Environment::new(&data.environment, &read_named)?;
         Ok(Scene::assemble(data, meshes, resolved, light))
     }
 }

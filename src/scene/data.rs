@@ -43,9 +43,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::motion::{Motion, Placement, PlacementF64, RotationData};
-use super::{ENTITY_LIMIT, MESH_LIMIT, values};
+use super::{check_counts, values};
 use crate::asset::Generator;
-
 use crate::asset::environment::EnvironmentData;
 use crate::error::{Error, Result};
 
@@ -302,13 +301,7 @@ impl Data {
             let line = e.span().map_or(1, |span| line_of(text, span.start));
             Error::input_at(path, line, plain(&e.message().trim().replace('\n', ", ")))
         })?;
-        for (what, count, limit) in
-            [("meshes", data.meshes.len(), MESH_LIMIT), ("entities", data.entities.len(), ENTITY_LIMIT)]
-        {
-            if count > limit {
-                return Err(Error::input(path, format!("{count} {what} are over the limit of {limit}")));
-            }
-        }
+        check_counts(data.meshes.len(), data.entities.len()).map_err(|what| Error::input(path, what))?;
         Ok(data)
     }
 

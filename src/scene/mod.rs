@@ -198,6 +198,13 @@ impl Scene {
     }
 }
 
+/// Says which number is over the limit of a scene.
+fn check_counts(meshes: usize, entities: usize) -> std::result::Result<(), String> {
+    let counts = [("meshes", meshes, MESH_LIMIT), ("entities", entities, ENTITY_LIMIT)];
+    let over = counts.into_iter().find(|(_, count, limit)| count > limit);
+    over.map_or(Ok(()), |(what, count, limit)| Err(format!("{count} {what} are over the limit of {limit}")))
+}
+
 /// The entities of `data` with their meshes found by name. `fail` is given the number of an entity that names none, and the message.
 fn resolve_all(data: &Data, meshes: &[Arc<Mesh>], fail: impl Fn(usize, String) -> Error) -> Result<Vec<Entity>> {
     let entity = |(i, entity): (usize, &EntityData)| {

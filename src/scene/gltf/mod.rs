@@ -40,7 +40,7 @@ use crate::error::{Error, Result};
 use crate::scene::data::{Data, EntityData, MeshData};
 use crate::scene::motion::RotationData;
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
-use crate::scene::{ENTITY_LIMIT, MESH_LIMIT};
+use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, check_counts};
 use document::Document;
 use lamp::Lamps;
 pub use notes::Notes;
@@ -76,14 +76,8 @@ pub fn is_gltf(path: &Path) -> bool {
 pub fn load(path: &Path) -> Result<Import> {
     let document = Document::load(path)?;
     let mut import = Builder::new(&document)?.build()?;
-    if import.data.entities.len() > ENTITY_LIMIT {
-        let what = format!("{} entities are over the limit of {ENTITY_LIMIT}", import.data.entities.len());
-        return Err(Error::input(path, what));
-    }
-    if import.data.meshes.len() > MESH_LIMIT {
-        let what = format!("{} meshes are over the limit of {MESH_LIMIT}", import.data.meshes.len());
-        return Err(Error::input(path, what));
-    }
+    let (meshes, entities) = (import.data.meshes.len(), import.data.entities.len());
+    check_counts(meshes, entities).map_err(|what| Error::input(path, what))?;
     import.meshes.shrink_to_fit();
     Ok(import)
 }

@@ -1,8 +1,8 @@
 //! Edges of a mesh, and which of them a picture shows as lines: outlines and creases.
 
 use super::Mesh;
-use glam::{DMat3, DMat4, DVec3, DVec4, Vec3};
-use std::collections::HashMap;
+use super::topology::{HalfEdge, edges, next_corner, sides, weld};
+use glam::{DMat3, DMat4, DVec3, DVec4};
 
 /// Two normals at one position whose cosine is below this (5 degrees) form a crease.
 const CREASE_COSINE: f32 = 0.996;
@@ -52,60 +52,42 @@ impl Edges {
     /// Finds the edges of a mesh, without those between faces in one plane.
     pub fn new(mesh: &Mesh) -> Self {
         let (centre, _) = mesh.bounding_sphere();
-        let mut numbers: HashMap<[u32; 3], u32> = HashMap::with_capacity(mesh.positions.len());
-        let mut corners: Vec<DVec3> = Vec::new();
-        let welded: Vec<u32> = mesh
-            .positions
-            .iter()
-            .map(|position| {
-                // -0 and 0 are one position.
-                *numbers.entry((*position + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert_with(|| {
-                    corners.push((*position - centre).as_dvec3());
-                    corners.len() as u32 - 1
-                })
-            })
-            .collect();
-        let planes = mesh.triangles.iter().map(|t| {
-            let [a, b, c] = t.map(|v| corners[welded[v as usize] as usize]);
+        let (welded, distinct) = weld(&mesh.positions, &mesh.triangles);
+        let corners: Vec<DVec3> = distinct.iter().map(|position| (*position - centre).as_dvec3()).collect();
+        let planes = welded.chunks_exact(3).map(|triangle| {
+            let [a, b, c] = [0, 1, 2].map(|k| corners[triangle[k] as usize]);
             let normal = (b - a).cross(c - a).normalize_or_zero();
             (normal, normal.dot(a))
         });
         let planes: Vec<(DVec3, f64)> = planes.collect();
-        // A side of a triangle: its ends in ascending order, whether it runs in descending order, and its index among the corners.
-        let side = |corner: usize| {
-            let triangle = mesh.triangles[corner / 3];
-            let [from, to] = [corner % 3, (corner + 1) % 3].map(|k| welded[triangle[k] as usize]);
-            ([from.min(to), from.max(to)], from > to, corner)
-        };
-        let mut sides: Vec<_> = (0..3 * mesh.triangles.len()).map(side).collect();
-        sides.sort_unstable();
         // Vertices of the mesh at the ends of a side, in ascending order of the corners.
-        let vertices = |&(_, reversed, corner): &([u32; 2], bool, usize)| {
-            let triangle = mesh.triangles[corner / 3];
-            let pair = [triangle[corner % 3], triangle[(corner + 1) % 3]].map(|v| v as usize);
-            if reversed { [pair[1], pair[0]] } else { pair }
+        let vertices = |side: &HalfEdge| {
+            let corner = side.corner as usize;
+            let pair = [corner, next_corner(corner)].map(|at| mesh.triangles[at / 3][at % 3] as usize);
+            if side.reversed { [pair[1], pair[0]] } else { pair }
         };
         let differ = |[a, b]: [usize; 2]| {
             a != b
                 && (mesh.normals[a].dot(mesh.normals[b]) < CREASE_COSINE
                     || mesh.colors.as_ref().is_some_and(|colors| colors[a] != colors[b]))
         };
-        let edge = |sides: &[([u32; 2], bool, usize)]| {
-            let (ends, _, first) = sides[0];
-            let far = welded[mesh.triangles[first / 3][(first + 2) % 3] as usize];
-            let face = |side: &([u32; 2], bool, usize)| (side.2 / 3) as u32;
+        let edge = |sides: &[HalfEdge]| {
+            let HalfEdge { low, high, corner, .. } = sides[0];
+            let ends = [low, high];
+            let far = welded[next_corner(next_corner(corner as usize))];
+            let face = |side: &HalfEdge| side.corner / 3;
             let [one, other] = sides else {
                 return Some(Edge { ends, far, faces: [face(&sides[0]); 2], kind: EdgeKind::Border });
             };
             let (u, v) = (vertices(one), vertices(other));
             let crease = differ([u[0], v[0]]) || differ([u[1], v[1]]);
-            let flipped = one.1 == other.1;
+            let flipped = one.reversed == other.reversed;
             let [m, n] = [one, other].map(|side| planes[face(side) as usize].0);
             let straight = m.cross(n).length() < COPLANAR_SINE && (m.dot(n) > 0.0) != flipped;
             let kind = if crease { EdgeKind::Crease { flipped } } else { EdgeKind::Fold { flipped } };
             (crease || !straight).then_some(Edge { ends, far, faces: [face(one), face(other)], kind })
         };
-        let edges = sides.chunk_by(|a, b| a.0 == b.0).filter_map(edge).collect();
+        let edges = edges(&sides(&welded)).filter_map(edge).collect();
         Edges { corners, edges, planes }
     }
 
@@ -155,6 +137,7 @@ fn clipped([from, to]: [DVec4; 2]) -> Option<[DVec4; 2]> {
 mod tests {
     use super::*;
     use crate::asset::generate::cuboid;
+    use glam::Vec3;
 
     /// Clip space of a camera at the origin that looks along -z and sees 90 degrees.
     const CLIP: DMat4 = DMat4::from_cols_array_2d(&[

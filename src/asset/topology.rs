@@ -26,20 +26,18 @@ const VERTEX_NOISE: f64 = 5e-7;
 
 /// One side of a triangle: `corner` is 3 * triangle + k, the side runs from that corner to the next one.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct HalfEdge {
-    low: u32,
-    high: u32,
-    reversed: bool,
-    corner: u32,
+pub(super) struct HalfEdge {
+    pub low: u32,
+    pub high: u32,
+    pub reversed: bool,
+    pub corner: u32,
 }
 
 /// Classifies the surface. `triangles` have three different positions each; `radius_m` is that of the bounding sphere.
 pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m: f32) -> Topology {
-    let (welded, vertex_count) = weld(positions);
-    let corners: Vec<u32> = triangles.iter().flatten().map(|&i| welded[i as usize]).collect();
-    let mut sides: Vec<HalfEdge> = (0..corners.len()).map(|corner| side(&corners, corner)).collect();
-    sides.sort_unstable();
-    let edges: Vec<&[HalfEdge]> = sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)).collect();
+    let (corners, distinct) = weld(positions, triangles);
+    let (sides, vertex_count) = (sides(&corners), distinct.len());
+    let edges: Vec<&[HalfEdge]> = edges(&sides).collect();
     let euler_characteristic = vertex_count as i64 - edges.len() as i64 + triangles.len() as i64;
 
     // Sorted, so that the side that runs from low to high stands first.
@@ -65,20 +63,32 @@ fn tetrahedron_m3(positions: &[Vec3], triangle: &[u32; 3], centre: Vec3) -> f64 
     a.dot(b.cross(c)) / 6.0
 }
 
-/// Numbers equal positions alike (-0 is 0): (number of every position, how many there are).
-fn weld(positions: &[Vec3]) -> (Vec<u32>, usize) {
-    let mut numbers = HashMap::with_capacity(positions.len());
-    let welded = positions
-        .iter()
-        .map(|p| {
-            let next = numbers.len() as u32;
-            *numbers.entry((*p + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert(next)
+/// Numbers equal positions alike (-0 is 0): the numbers of every triangle's corners, and the position of every number.
+pub(super) fn weld(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<Vec3>) {
+    let (mut numbers, mut distinct) = (HashMap::with_capacity(positions.len()), Vec::new());
+    let number = |p: &Vec3| {
+        *numbers.entry((*p + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert_with(|| {
+            distinct.push(*p);
+            distinct.len() as u32 - 1
         })
-        .collect();
-    (welded, numbers.len())
+    };
+    let welded: Vec<u32> = positions.iter().map(number).collect();
+    (triangles.iter().flatten().map(|&i| welded[i as usize]).collect(), distinct)
 }
 
-fn next_corner(corner: usize) -> usize {
+/// The sides of all triangles, in order.
+pub(super) fn sides(corners: &[u32]) -> Vec<HalfEdge> {
+    let mut sides: Vec<HalfEdge> = (0..corners.len()).map(|corner| side(corners, corner)).collect();
+    sides.sort_unstable();
+    sides
+}
+
+/// The sides on each edge.
+pub(super) fn edges(sides: &[HalfEdge]) -> impl Iterator<Item = &[HalfEdge]> {
+    sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high))
+}
+
+pub(super) fn next_corner(corner: usize) -> usize {
     if corner % 3 == 2 { corner - 2 } else { corner + 1 }
 }
 

@@ -5,6 +5,7 @@ use super::silhouette::SilhouetteOptions;
 use super::surface::depth_at_origin;
 use super::triangles::unit_positions;
 use crate::asset::mesh::Mesh;
+use crate::asset::topology::volume_m3;
 use crate::field::lattice::{OUTSIDE_INNER, ROOMY_INNER};
 use crate::field::quantity::{FieldKind, Storage};
 use crate::field::{FieldHeader, Fit, Lattice, Shortcuts};
@@ -82,9 +83,7 @@ const BOXED: f64 = 0.9;
 fn is_served_by_edges(positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
     let (low, high) = positions.iter().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
     let boxed = (high - low).as_dvec3().element_product();
-    let corner = |i: u32| positions[i as usize].as_dvec3();
-    let volume: f64 = triangles.iter().map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2]))) / 6.0).sum();
-    volume.abs() < BOXED * boxed
+    volume_m3(positions, triangles, Vec3::ZERO).abs() < BOXED * boxed
 }
 
 /// The hash of a mesh's content as headers hold it.

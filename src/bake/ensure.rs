@@ -50,14 +50,8 @@ pub struct BakedScene {
 
 /// What a scene needs to have baked.
 pub struct SceneNeeds {
-    /// For every mesh of the scene: headers of its occlusion and radiance fields.
-    fields: Vec<[Option<FieldHeader>; 2]>,
-    /// For every mesh of the scene: whether it needs a silhouette field.
-    silhouettes: Vec<bool>,
-    /// For every mesh of the scene: whether it needs self-visibility.
-    self_visibility: Vec<bool>,
-    /// For every mesh of the scene: whether it needs transfer vectors.
-    transfers: Vec<bool>,
+    /// For every mesh of the scene: what it needs, and the headers of its occlusion and radiance fields.
+    meshes: Vec<(Needed, [Option<FieldHeader>; 2])>,
     /// Options of the bakes.
     pub options: Options,
 }
@@ -65,37 +59,29 @@ pub struct SceneNeeds {
 impl SceneNeeds {
     /// The needs of a scene whose fields and transfers are baked with `options`. A field that nothing sees is not needed.
     pub fn of(scene: &Scene, options: &Options, lights: Lights) -> Self {
-        let needs: Vec<Needed> = (0..scene.meshes.len()).map(|index| needs(scene, index, lights)).collect();
-        let fields = |(index, needed): (usize, &Needed)| {
-            needed.fields.map(|kind| kind.map(|kind| header(&scene.meshes[index], kind, options)))
+        let of_mesh = |(index, mesh): (usize, &Arc<Mesh>)| {
+            let needed = needs(scene, index, lights);
+            (needed, needed.fields.map(|kind| kind.map(|kind| header(mesh, kind, options))))
         };
-        SceneNeeds {
-            fields: needs.iter().enumerate().map(fields).collect(),
-            silhouettes: needs.iter().map(|needed| needed.silhouette).collect(),
-            self_visibility: needs.iter().map(|needed| needed.self_visibility).collect(),
-            transfers: needs.iter().map(|needed| needed.transfer).collect(),
-            options: *options,
-        }
+        SceneNeeds { meshes: scene.meshes.iter().enumerate().map(of_mesh).collect(), options: *options }
     }
 
     /// Bytes of the fields, each rounded up to a multiple of `alignment`. Equal fields count once.
     pub fn field_bytes(&self, alignment: u64) -> u64 {
         let mut known = HashSet::new();
-        let headers = self.fields.iter().flatten().flatten();
+        let headers = self.meshes.iter().flat_map(|(_, headers)| headers).flatten();
         let distinct = headers.filter(|header| known.insert(field_name(header)));
         distinct.map(|header| header.payload_bytes().next_multiple_of(alignment)).sum()
     }
 
     /// Whether everything is in the cache, so that [`ensure()`] bakes nothing.
     pub fn are_cached(&self, scene: &Scene, cache: &Cache) -> bool {
-        let mut fields = self.fields.iter().flatten().flatten();
-        let needing = |needed: &'_ [bool]| scene.meshes.iter().zip(needed.to_vec()).filter(|(_, needed)| *needed);
-        let (mut silhouettes, mut transfers) = (needing(&self.silhouettes), needing(&self.transfers));
-        let mut self_visibility = needing(&self.self_visibility);
-        fields.all(|header| cache.has_field(header))
-            && silhouettes.all(|(mesh, _)| cache.has_silhouette(mesh, &self.options))
-            && self_visibility.all(|(mesh, _)| cache.has_self_visibility(mesh, &self.options))
-            && transfers.all(|(mesh, _)| cache.has_transfer(mesh, &self.options))
+        scene.meshes.iter().zip(&self.meshes).all(|(mesh, (needed, headers))| {
+            headers.iter().flatten().all(|header| cache.has_field(header))
+                && (!needed.silhouette || cache.has_silhouette(mesh, &self.options))
+                && (!needed.self_visibility || cache.has_self_visibility(mesh, &self.options))
+                && (!needed.transfer || cache.has_transfer(mesh, &self.options))
+        })
     }
 }
 
@@ -211,20 +197,20 @@ pub fn ensure(
     let (fields, silhouettes, vertices) = (HashMap::new(), HashMap::new(), HashMap::new());
     let mut making = Making { progress, baked: Vec::new(), fields, silhouettes, vertices };
     let (mut meshes, options) = (Vec::with_capacity(scene.meshes.len()), &needs.options);
-    for (index, mesh) in scene.meshes.iter().enumerate() {
+    for (mesh, (needed, headers)) in scene.meshes.iter().zip(&needs.meshes) {
         let mut to = BakedMesh::default();
-        for (header, to) in needs.fields[index].iter().zip([&mut to.blocked, &mut to.radiance]) {
+        for (header, to) in headers.iter().zip([&mut to.blocked, &mut to.radiance]) {
             let Some(header) = header else { continue };
             let word = if header.kind == FieldKind::Radiance { "light" } else { "shadow" };
             let named = (field_name(header), format!("{} {word}", mesh.name));
             *to = Some(making.once(|all| &mut all.fields, named, |told| cache.field(baker, mesh, header, told))?);
         }
-        if needs.silhouettes[index] {
+        if needed.silhouette {
             let named = (mesh.content_hash(), format!("{} silhouette", mesh.name));
             let find = |told: Progress<'_>| cache.silhouette(baker, mesh, options, told);
             to.silhouette = Some(making.once(|all| &mut all.silhouettes, named, find)?);
         }
-        let wanted = Wanted { transfer: needs.transfers[index], self_visibility: needs.self_visibility[index] };
+        let wanted = Wanted { transfer: needed.transfer, self_visibility: needed.self_visibility };
         let find = |missing, told: Progress<'_>| cache.vertices(baker, mesh, options, missing, told);
         let found = making.vertices(mesh, wanted, find)?;
         (to.transfer, to.self_visibility) = (found.transfer, found.self_visibility);

@@ -29,7 +29,7 @@ pub struct EnvironmentData {
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub strength: f32,
     /// Rotation of all parts about +y, degrees, counter-clockwise seen from above.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "crate::field::is_zero")]
     pub turn_deg: f32,
     /// The same radiance from all directions.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -69,10 +69,6 @@ impl Default for EnvironmentData {
 
 fn is_one(value: &f32) -> bool {
     *value == 1.0
-}
-
-fn is_zero(value: &f32) -> bool {
-    *value == 0.0
 }
 
 impl EnvironmentData {

@@ -69,8 +69,9 @@ pub struct FieldHeader {
     pub mesh_hash: String,
 }
 
-pub(crate) fn is_zero(share: &f64) -> bool {
-    *share == 0.0
+/// Whether a number of a file may be left out, because it is 0.
+pub(crate) fn is_zero<T: Default + PartialEq>(number: &T) -> bool {
+    *number == T::default()
 }
 
 impl FieldHeader {

@@ -41,10 +41,6 @@ impl Side {
 /// Bound on coordinates in bounding radii: 1 and what rounding adds.
 const MOST_EXTENT: f32 = 1.01;
 
-fn is_zero(number: &u32) -> bool {
-    *number == 0
-}
-
 /// Everything about a silhouette field but its maps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SilhouetteHeader {
@@ -55,7 +51,7 @@ pub struct SilhouetteHeader {
     /// Pixels along an edge of the view that a map is reduced from, a multiple of `map_px`.
     pub view_px: u32,
     /// Texels along an edge of the maps of the object's two halves: half of `map_px`, or 0 where a field has none, as of convex meshes.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "super::is_zero")]
     pub half_px: u32,
     /// Share of a view's pixel by which what was drawn may miss the mesh; 0 where all of its triangles were drawn.
     #[serde(default, skip_serializing_if = "super::is_zero")]

@@ -141,7 +141,7 @@ pub struct Output {
     /// Stops by which radiance is brightened before it is encoded, -32 to 32. The default is 0.
     pub exposure_ev: f32,
     /// Scene time of the first picture in seconds. The default is 0.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "crate::field::is_zero")]
     pub time_s: f64,
 }
 
@@ -150,10 +150,6 @@ impl Output {
     pub fn white(&self) -> f32 {
         (-self.exposure_ev).exp2()
     }
-}
-
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
 }
 
 impl Default for Output {

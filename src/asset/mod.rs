@@ -46,6 +46,23 @@ pub fn short<T: Copy + Into<f64> + std::fmt::Display + std::fmt::LowerExp>(numbe
     }
 }
 
+/// Fails where the content of a file is larger than what is read; `what` says what it is.
+pub(crate) fn check_size(path: &Path, size: usize, limit_bytes: u64, what: &str) -> Result<()> {
+    if size as u64 <= limit_bytes {
+        return Ok(());
+    }
+    Err(Error::input(path, format!("over the limit of {} MiB for a {what} file", limit_bytes >> 20)))
+}
+
+/// The content of a file as text, as far as it is not too large.
+pub(crate) fn utf8<'b>(path: &Path, bytes: &'b [u8], limit_bytes: u64, what: &str) -> Result<&'b str> {
+    check_size(path, bytes.len(), limit_bytes, what)?;
+    std::str::from_utf8(bytes).map_err(|error| {
+        let line = 1 + bytes[..error.valid_up_to()].iter().filter(|&&b| b == b'\n').count();
+        Error::input_at(path, line, "not UTF-8 text")
+    })
+}
+
 /// Reads a file of at most `limit_bytes`, whatever length the file system reports.
 ///
 /// # Errors

@@ -35,16 +35,7 @@ impl Mesh {
     /// # Errors
     /// [`Error::Input`]: over [`FILE_LIMIT_BYTES`], not UTF-8, a malformed line, or as [`Mesh::new`].
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
-        if bytes.len() as u64 > FILE_LIMIT_BYTES {
-            return Err(Error::input(
-                path,
-                format!("over the limit of {} MiB for a mesh file", FILE_LIMIT_BYTES >> 20),
-            ));
-        }
-        let text = std::str::from_utf8(bytes).map_err(|e| {
-            let line = 1 + bytes[..e.valid_up_to()].iter().filter(|&&b| b == b'\n').count();
-            Error::input_at(path, line, "not UTF-8 text")
-        })?;
+        let text = super::utf8(path, bytes, FILE_LIMIT_BYTES, "mesh")?;
         let count = |keyword| text.lines().filter(|l| l.split_whitespace().next() == Some(keyword)).count();
         let mut scan = Scan { position_total: count("v"), normal_total: count("vn"), ..Default::default() };
         for (index, line) in text.lines().enumerate() {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::FILE_LIMIT_BYTES;
 use super::data::Data;
 use crate::asset::Mesh;
-use crate::asset::obj;
+use crate::asset::{check_size, obj};
 use crate::error::{Error, Result};
 use crate::files;
 
@@ -37,16 +37,11 @@ pub fn write(data: &Data, meshes: &[Arc<Mesh>], path: &Path, head: &str) -> Resu
         return Err(Error::Failed(format!("{}: a scene file can only name UTF-8 paths", path.display())));
     }
     let text = format!("# {head}\n\n{}", data.to_toml()?);
-    if text.len() > FILE_LIMIT_BYTES {
-        return Err(Error::input(path, format!("over the limit of {} MiB for a scene file", FILE_LIMIT_BYTES >> 20)));
-    }
+    check_size(path, text.len(), FILE_LIMIT_BYTES, "scene")?;
     Data::parse(&text, path)?;
     for (path, mesh) in files_to_write {
         let text = obj::write_obj(mesh);
-        if text.len() as u64 > obj::FILE_LIMIT_BYTES {
-            let what = format!("over the limit of {} MiB for a mesh file", obj::FILE_LIMIT_BYTES >> 20);
-            return Err(Error::input(&path, what));
-        }
+        check_size(&path, text.len(), obj::FILE_LIMIT_BYTES, "mesh")?;
         crate::text::write(&path, text)?;
     }
     // Unlike meshes, it makes no folder.

@@ -21,7 +21,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::asset::environment::{Environment, EnvironmentData};
-use crate::asset::{Mesh, embedded, obj, read_file};
+use crate::asset::{Mesh, embedded, obj, read_file, utf8};
 use crate::error::{Error, Result};
 pub use builder::{SceneBuilder, Shape};
 pub use data::{Camera, Data, EntityData, MeshData, Output};
@@ -33,7 +33,7 @@ pub const ENTITY_LIMIT: usize = 4096;
 /// Largest number of meshes in a scene.
 pub const MESH_LIMIT: usize = 1024;
 /// Largest scene file in bytes.
-pub const FILE_LIMIT_BYTES: usize = 16 << 20;
+pub const FILE_LIMIT_BYTES: u64 = 16 << 20;
 
 /// A checked scene with its meshes. The fields are public to read; methods change them together.
 #[derive(Clone, Debug)]
@@ -110,10 +110,10 @@ impl Scene {
         let path = named.as_deref().unwrap_or(path);
         if !path.exists() && embedded::find(path).is_some() {
             let bytes = embedded::read(path)?;
-            return Self::parse(utf8(path, &bytes)?, path, &embedded::read);
+            return Self::parse(utf8(path, &bytes, FILE_LIMIT_BYTES, "scene")?, path, &embedded::read);
         }
-        let bytes = read_file(path, FILE_LIMIT_BYTES as u64)?;
-        Self::parse(utf8(path, &bytes)?, path, &read_named)
+        let bytes = read_file(path, FILE_LIMIT_BYTES)?;
+        Self::parse(utf8(path, &bytes, FILE_LIMIT_BYTES, "scene")?, path, &read_named)
     }
 
     /// Reads a scene from text. `path` names it in messages; `read` is given the paths of files, which already start with
@@ -258,15 +258,6 @@ fn build_mesh(data: &MeshData, folder: &Path, read: &dyn Fn(&Path) -> Result<Vec
 /// Reads a file that a scene names: a mesh or a picture.
 fn read_named(path: &Path) -> Result<Vec<u8>> {
     read_file(path, obj::FILE_LIMIT_BYTES)
-}
-
-fn utf8<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a str> {
-    if bytes.len() > FILE_LIMIT_BYTES {
-        return Err(Error::input(path, format!("over the limit of {} MiB for a scene file", FILE_LIMIT_BYTES >> 20)));
-    }
-    std::str::from_utf8(bytes).map_err(|e| {
-        Error::input_at(path, 1 + bytes[..e.valid_up_to()].iter().filter(|&&b| b == b'\n').count(), "not UTF-8 text")
-    })
 }
 
 /// Lines at which the tables of a scene file begin, for messages about errors that are found after parsing.

@@ -4,9 +4,10 @@ use super::context::{Context, MergeArguments, size};
 use super::{Global, output};
 use crate::asset::{embedded, picture};
 use crate::bake;
+use crate::bench::cases;
 use crate::bench::figures::spread;
 use crate::draw::{Antialias, Finish};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::field::Lookup;
 use crate::frame::{self, Frame};
 use crate::scene::Scene;
@@ -61,7 +62,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let mut written = Vec::new();
     let mut rows = Vec::new();
     for (name, animated) in SCENES {
-        let scene = load(name)?;
+        let scene = cases::scene(name)?.scene;
         let row = still(&context, arguments, name, &scene, &mut written, started)?;
         output::note(global, format!("{}: {:.0} ms a frame", output::shown(&written[written.len() - 1]), row.frame_ms));
         rows.push(row);
@@ -138,15 +139,6 @@ impl DemoRow {
             format!("{:.1}", 1e3 / self.frame_1_sample_ms),
         ]
     }
-}
-
-fn load(name: &str) -> Result<Scene> {
-    let path = format!("assets/scenes/{name}.toml");
-    let (_, text) = embedded::scenes()
-        .into_iter()
-        .find(|(found, _)| *found == name)
-        .ok_or_else(|| Error::Failed(format!("there is no built-in scene {name}")))?;
-    Scene::parse(text, Path::new(&path), &embedded::read)
 }
 
 fn options(arguments: &Arguments, scene: &Scene) -> frame::Options {
@@ -239,7 +231,7 @@ fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene
 
 /// One scene without interpolation beside the one with it, and without its occluder.
 fn pair(context: &Context, arguments: &Arguments) -> Result<Vec<PathBuf>> {
-    let scene = load(PAIR_SCENE)?;
+    let scene = cases::scene(PAIR_SCENE)?.scene;
     let nearest = frame::Options { lookup: Lookup::Nearest, ..options(arguments, &scene) };
     let path = arguments.output.join(format!("{PAIR_SCENE}_nearest.png"));
     draw(&mut context.frame(&scene, nearest)?, &scene, nearest, &path)?;

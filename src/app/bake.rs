@@ -1,6 +1,6 @@
 //! `shadow-fields bake` bakes the field of one mesh.
 
-use super::context::{Context, on_or_off};
+use super::context::{Context, on_or_off, three};
 use super::quality::BakeArguments;
 use super::source::GltfArguments;
 use super::{Global, output, silhouette};
@@ -66,17 +66,12 @@ impl Arguments {
     }
 }
 
-/// Parses three numbers with commas between them.
+/// Parses a radiance.
 pub(super) fn color(text: &str) -> std::result::Result<Vec3, String> {
-    let numbers: Vec<f32> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
-    match numbers[..] {
-        [r, g, b] if text.split(',').count() == 3 && numbers.iter().all(|c| (0.0..=RADIANCE_LIMIT).contains(c)) => {
-            Ok(Vec3::new(r, g, b))
-        }
-        _ => Err(format!(
-            "expected a radiance like 1,0.5,0.2, three numbers from 0 to {RADIANCE_LIMIT:e}, got \"{text}\""
-        )),
-    }
+    let numbers = three(text).filter(|c| c.iter().all(|c| (0.0..=RADIANCE_LIMIT).contains(c)));
+    numbers.map(Vec3::from_array).ok_or_else(|| {
+        format!("expected a radiance like 1,0.5,0.2, three numbers from 0 to {RADIANCE_LIMIT:e}, got \"{text}\"")
+    })
 }
 
 /// A mesh whose surface shines. Its colours are its own, or white, times `radiance`.

@@ -15,6 +15,7 @@ use crate::scene::{Lights, Scene};
 use crate::shaders::Library;
 use clap::Args;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::sync::Arc;
 
 /// Options of every subcommand.
@@ -141,6 +142,12 @@ pub fn on_or_off(text: &str) -> std::result::Result<bool, String> {
 fn eps(text: &str) -> std::result::Result<f32, String> {
     let number = text.parse().ok().filter(|eps| (0.0..=1.0).contains(eps));
     number.ok_or_else(|| format!("expected a number from 0 to 1, got \"{text}\""))
+}
+
+/// Three numbers with commas between them.
+pub fn three<T: FromStr>(text: &str) -> Option<[T; 3]> {
+    let numbers: Option<Vec<T>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
+    numbers?.try_into().ok()
 }
 
 /// Width and height from `WxH`.

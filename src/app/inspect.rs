@@ -1,7 +1,7 @@
 //! `shadow-fields inspect` shows what is in a field file.
 
 use super::bake::{color, shining};
-use super::context::Context;
+use super::context::{Context, three};
 use super::sheet::{self, Cell};
 use super::{Global, output, silhouette};
 use crate::asset::Mesh;
@@ -49,13 +49,10 @@ pub struct Arguments {
 const PLACE_LIMIT_M: f64 = 1e15;
 
 fn place(text: &str) -> std::result::Result<DVec3, String> {
-    let numbers: Vec<f64> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
-    match numbers[..] {
-        [x, y, z] if text.split(',').count() == 3 && numbers.iter().all(|n| n.abs() <= PLACE_LIMIT_M) => {
-            Ok(DVec3::new(x, y, z))
-        }
-        _ => Err(format!("expected a place like 1,0.5,-2 within {PLACE_LIMIT_M:e} m, got \"{text}\"")),
-    }
+    let numbers = three(text).filter(|numbers| numbers.iter().all(|n: &f64| n.abs() <= PLACE_LIMIT_M));
+    numbers
+        .map(DVec3::from_array)
+        .ok_or_else(|| format!("expected a place like 1,0.5,-2 within {PLACE_LIMIT_M:e} m, got \"{text}\""))
 }
 
 fn direction(text: &str) -> std::result::Result<DVec3, String> {

@@ -28,7 +28,7 @@ use crate::field::quantity::channel_stride;
 use crate::frame::{self, Frame};
 use crate::gpu::Gpu;
 use crate::lists::skip::EPS;
-use crate::scene::data::PICTURE_LIMIT_PX;
+use crate::scene::data::check_picture;
 use crate::scene::{Camera, Lights, Placement, Scene};
 use crate::sh::lobe;
 use crate::shaders::Library;
@@ -80,9 +80,7 @@ impl RenderOptions {
     /// `Input` where a number is out of its range.
     fn frame(&self, scene: &Scene) -> Result<frame::Options> {
         let size = self.size.unwrap_or([scene.data.output.width, scene.data.output.height]);
-        if size.iter().any(|px| !(1..=PICTURE_LIMIT_PX).contains(px)) {
-            return Err(Error::Input(format!("a picture of {size:?} pixels: each is 1 to {PICTURE_LIMIT_PX}")));
-        }
+        check_picture(size).map_err(Error::Input)?;
         if !(0.0..=1.0).contains(&self.eps) {
             return Err(Error::Input(format!("eps {} is not within 0 to 1", self.eps)));
         }

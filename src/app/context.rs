@@ -11,6 +11,7 @@ use crate::gpu::{self, Device, Validation};
 use crate::lists::gather::Place;
 use crate::lists::skip::{EPS, Skip};
 use crate::merge::{Variant, calibrate};
+use crate::scene::data::check_picture;
 use crate::scene::{Lights, Scene};
 use crate::shaders::Library;
 use clap::Args;
@@ -153,7 +154,7 @@ pub fn three<T: FromStr>(text: &str) -> Option<[T; 3]> {
 /// Width and height from `WxH`.
 pub fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let pair = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
-    pair.filter(|[w, h]| (1..=16384).contains(w) && (1..=16384).contains(h))
+    pair.filter(|size| check_picture(*size).is_ok())
         .ok_or_else(|| format!("expected a size like 1280x720, got \"{text}\""))
 }
 

@@ -51,6 +51,14 @@ use crate::error::{Error, Result};
 /// Largest width or height of a picture, in pixels.
 pub const PICTURE_LIMIT_PX: u32 = 16_384;
 
+/// Holds a picture's width and height to [`PICTURE_LIMIT_PX`].
+pub(crate) fn check_picture([width, height]: [u32; 2]) -> std::result::Result<(), String> {
+    if [width, height].iter().all(|px| (1..=PICTURE_LIMIT_PX).contains(px)) {
+        return Ok(());
+    }
+    Err(format!("a picture of {width} x {height} pixels: each is 1 to {PICTURE_LIMIT_PX}"))
+}
+
 /// A scene file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -175,9 +183,7 @@ impl TryFrom<OutputWritten> for Output {
         let usual = Self::default();
         let exposure_ev = written.exposure_ev.unwrap_or(usual.exposure_ev);
         let (width, height) = (written.width.unwrap_or(usual.width), written.height.unwrap_or(usual.height));
-        if [width, height].iter().any(|px| !(1..=PICTURE_LIMIT_PX).contains(px)) {
-            return Err(format!("a picture of {width} x {height} pixels: each is 1 to {PICTURE_LIMIT_PX}"));
-        }
+        check_picture([width, height])?;
         if !(-32.0..=32.0).contains(&exposure_ev) {
             return Err(format!("exposure_ev {exposure_ev} is not within -32 to 32"));
         }

@@ -1,6 +1,7 @@
 //! Draws the graph of frame times by pass.
 
 use super::status::{HISTORY, LEAST_TEXT};
+use crate::bench::figures::quantiles;
 use crate::check::PASSES;
 use crate::gpu::Timing;
 use egui::{Align2, Color32, FontId, Rect, RichText, Sense, Stroke, Ui, Vec2, pos2, vec2};
@@ -53,9 +54,7 @@ pub(super) fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
     names.sort_by_key(|name| PASSES.iter().position(|(pass, _)| pass == name).unwrap_or(PASSES.len()));
     let total = |frame: &Vec<Timing>| frame.iter().map(|t| t.milliseconds).sum::<f64>();
     // The range leaves out the slowest few frames, because the first frame compiles shaders.
-    let mut totals: Vec<f64> = timings.iter().map(total).collect();
-    totals.sort_by(f64::total_cmp);
-    let most = totals.get((totals.len() * 19 / 20).saturating_sub(1)).copied().unwrap_or(0.0);
+    let [most] = quantiles(&timings.iter().map(total).collect::<Vec<_>>(), [0.95]);
     let top = RANGES.into_iter().find(|t| *t >= most).unwrap_or(RANGES[RANGES.len() - 1]);
     let step = area.width() / HISTORY as f32;
     for (column, frame) in timings.iter().rev().enumerate() {
@@ -87,15 +86,11 @@ pub(super) fn graph(ui: &mut Ui, timings: &VecDeque<Vec<Timing>>) {
                     .any(|t| t.pass == *name)
                     .then(|| frame.iter().filter(|t| t.pass == *name).map(|t| t.milliseconds).sum())
             };
-            let text = format!("{name} {:.1} ms", median(timings.iter().filter_map(of).collect()));
+            let [median] = quantiles(&timings.iter().filter_map(of).collect::<Vec<_>>(), [0.5]);
+            let text = format!("{name} {median:.1} ms");
             ui.label(RichText::new(text).color(PASS_COLORS[index % PASS_COLORS.len()]));
         }
     });
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -116,11 +111,5 @@ mod tests {
                 assert!(labels[..index].iter().all(|(other, _)| !other.intersects(*place)), "{text} of {top} ms");
             }
         }
-    }
-
-    #[test]
-    fn the_median_of_nothing_is_nothing() {
-        assert_eq!(median(vec![]), 0.0);
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
     }
 }

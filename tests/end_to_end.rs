@@ -31,27 +31,8 @@ fn small<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
     [arguments, &SMALL].concat()
 }
 
-#[test]
-fn render_writes_what_it_is_asked_for() {
-    if !has_device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let files = ["-o", "p.png", "--exr", "p.exr", "--vertices", "v.csv", "--stats", "s.json", "--variant", "storage"];
-    let arguments = small(&[&["render", SCENE, "--seed", "7"], &files[..]].concat());
-    let ran = good(folder, &arguments);
-    assert_eq!(names(folder), ["p.exr", "p.png", "s.json", "v.csv"]);
-    assert_eq!(ran.stdout.lines().count(), 1, "{}", ran.stdout);
-
-    // The PNG is the EXR in sRGB at the scene's exposure, except where a sample of the pixel is brighter than white: near what is.
-    let png = picture(folder, "p.png", [96, 64]);
-    let exr = image::load_from_memory(&read(folder, "p.exr")).unwrap().into_rgb32f();
-    assert_eq!(exr.dimensions(), (96, 64));
-    let brightest = exr.pixels().flat_map(|p| p.0).fold(0.0_f32, f32::max);
-    assert!((100.0..200.0).contains(&brightest), "the light itself is seen, unclamped: {brightest}");
-    let scene = shadow_fields::scene::Scene::load(Path::new(SCENE)).unwrap();
-    let gain = scene.data.output.exposure_ev.exp2();
+/// Asserts that a PNG is the EXR in sRGB, except where a sample of the pixel is brighter than white: near what is.
+fn assert_encodes(png: &image::RgbImage, exr: &image::Rgb32FImage, gain: f32) {
     let (mut same, mut clamped) = (0, 0);
     for (x, y, p) in png.enumerate_pixels() {
         let linear = exr.get_pixel(x, y).0;
@@ -69,6 +50,29 @@ fn render_writes_what_it_is_asked_for() {
         }
     }
     assert!(same > 5000 && clamped > 5, "{same} pixels below white, {clamped} not");
+}
+
+#[test]
+fn render_writes_what_it_is_asked_for() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let files = ["-o", "p.png", "--exr", "p.exr", "--vertices", "v.csv", "--stats", "s.json", "--variant", "storage"];
+    let arguments = small(&[&["render", SCENE, "--seed", "7"], &files[..]].concat());
+    let ran = good(folder, &arguments);
+    assert_eq!(names(folder), ["p.exr", "p.png", "s.json", "v.csv"]);
+    assert_eq!(ran.stdout.lines().count(), 1, "{}", ran.stdout);
+
+    let png = picture(folder, "p.png", [96, 64]);
+    let exr = image::load_from_memory(&read(folder, "p.exr")).unwrap().into_rgb32f();
+    assert_eq!(exr.dimensions(), (96, 64));
+    let brightest = exr.pixels().flat_map(|p| p.0).fold(0.0_f32, f32::max);
+    assert!((100.0..200.0).contains(&brightest), "the light itself is seen, unclamped: {brightest}");
+    let scene = shadow_fields::scene::Scene::load(Path::new(SCENE)).unwrap();
+    let gain = scene.data.output.exposure_ev.exp2();
+    assert_encodes(&png, &exr, gain);
 
     let text = String::from_utf8(read(folder, "v.csv")).unwrap();
     let mut lines = text.lines();

@@ -22,6 +22,13 @@ use std::path::Path;
 use std::sync::Arc;
 use window::{FORMAT, SIZE, Stand};
 
+/// What is shown, which is what `render` makes of the same state.
+fn as_rendered(stand: &mut Stand, when: &str) -> Vec<[u8; 4]> {
+    let (shown, scene) = (stand.shown(), stand.viewer.editor().scene().clone());
+    assert_eq!(apart(&shown, &stand.rendered(&scene)), 0, "{when}");
+    shown
+}
+
 #[test]
 fn what_is_shown_is_what_render_makes_of_the_state() {
     let Some(mut stand) = Stand::new("state") else { return };
@@ -29,9 +36,7 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
     assert!(stand.viewer.frame().is_none());
     stand.turn();
     stand.ready();
-    let first = stand.shown();
-    let scene = stand.viewer.editor().scene().clone();
-    assert_eq!(apart(&first, &stand.rendered(&scene)), 0);
+    let first = as_rendered(&mut stand, "at first");
 
     // Everything that moves the camera or an entity, one after the other; the picture follows each.
     let mut before = first;
@@ -48,17 +53,14 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
     follows(&mut stand, "the wheel");
     stand.key(Key::Home);
     follows(&mut stand, "Home");
-    stand.letter('q');
-    stand.letter('q');
+    "qq".chars().for_each(|letter| stand.letter(letter));
     assert_eq!(stand.viewer.editor().selection(), Some(1), "the ball");
     follows(&mut stand, "the outline");
-    for letter in "liomr".chars() {
+    for letter in "liom".chars() {
         stand.letter(letter);
-        if letter != 'r' {
-            follows(&mut stand, &format!("key {letter}"));
-        }
+        follows(&mut stand, &format!("key {letter}"));
     }
-    stand.letter('c');
+    "rc".chars().for_each(|letter| stand.letter(letter));
     stand.viewer.apply(Command::SetExposure(0.5)).unwrap();
     follows(&mut stand, "exposure");
     stand.viewer.apply(Command::SetSky(0.5)).unwrap();
@@ -67,17 +69,13 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
     stand.key(Key::Escape);
 
     // A light that was none: its field is baked in the background while the old picture stays.
-    stand.letter('q');
-    stand.letter('q');
-    stand.letter('e');
+    "qqe".chars().for_each(|letter| stand.letter(letter));
     stand.turn();
     stand.ready();
     assert!(stand.viewer.editor().scene().entities[1].emits);
     follows(&mut stand, "a new light");
     stand.key(Key::Escape);
-    let shown = stand.shown();
-    let scene = stand.viewer.editor().scene().clone();
-    assert_eq!(apart(&shown, &stand.rendered(&scene)), 0, "the same state through `render`");
+    as_rendered(&mut stand, "after edits");
 
     // Back as it was, step by step.
     while stand.viewer.editor().undo_count() > 0 {
@@ -85,19 +83,16 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
         stand.turn();
     }
     stand.ready();
-    let shown = stand.shown();
-    let scene = stand.viewer.editor().scene().clone();
-    assert_eq!(apart(&shown, &stand.rendered(&scene)), 0, "after undoing everything");
+    let shown = as_rendered(&mut stand, "after undoing everything");
 
     // The saved file and the picture files.
     stand.viewer.event(Event::Key { key: Key::Letter('s'), control: true, repeat: false }).unwrap();
     stand.key(Key::Function(12));
-    let names = |ending: &str| {
-        let files = std::fs::read_dir(&stand.cache).unwrap().map(|f| f.unwrap().path());
-        files.filter(|f| f.extension().is_some_and(|e| e == ending)).collect::<Vec<_>>()
+    let written = |ending: &str| {
+        let mut files = std::fs::read_dir(&stand.cache).unwrap().map(|f| f.unwrap().path());
+        files.find(|f| f.extension().is_some_and(|e| e == ending) && !f.ends_with("scene.toml")).unwrap()
     };
-    let [png, exr, toml] =
-        ["png", "exr", "toml"].map(|ending| names(ending).into_iter().find(|f| !f.ends_with("scene.toml")).unwrap());
+    let [png, exr, toml] = ["png", "exr", "toml"].map(written);
     assert!(exr.metadata().unwrap().len() > 1000);
     let saved = Scene::load(&toml).unwrap();
     let picture = image::open(png).unwrap().into_rgb8();
@@ -144,8 +139,7 @@ fn keys_that_wait_cost_one_rebuild() {
     let counts = [1, 1, 1, 1, 9].map(&mut toggle);
     assert_eq!(counts, [2, 3, 4, 5, 6]);
     stand.key(Key::Escape); // outlines of what is selected are no part of the scene
-    let (scene, shown) = (stand.viewer.editor().scene().clone(), stand.shown());
-    assert_eq!(apart(&shown, &stand.rendered(&scene)), 0);
+    as_rendered(&mut stand, "after nine");
 }
 
 #[test]

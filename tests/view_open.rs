@@ -59,8 +59,7 @@ fn a_dropped_file_opens_and_edits_outlast_it() {
     ];
     let mut paths = vec![own.clone()];
     for path in &files {
-        stand.letter('q');
-        stand.letter('l');
+        "ql".chars().for_each(|letter| stand.letter(letter));
         stand.viewer.open(path).unwrap();
         let line = said(&stand);
         assert!(line.contains("not saved") && line.contains("Ctrl-Z"), "{line}");
@@ -74,8 +73,7 @@ fn a_dropped_file_opens_and_edits_outlast_it() {
     assert!(!stand.viewer.wants_to_quit());
     let line = said(&stand);
     assert!(paths[..4].iter().all(|path| line.contains(&path.display().to_string())), "{line}");
-    stand.letter('q');
-    stand.letter('l');
+    "ql".chars().for_each(|letter| stand.letter(letter));
     stand.viewer.apply(Command::Quit).unwrap();
     assert!(!stand.viewer.wants_to_quit(), "a new edit is asked for anew");
     let undo = Event::Key { key: Key::Letter('z'), control: true, repeat: false };

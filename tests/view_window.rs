@@ -21,6 +21,39 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use viewing::{SIZE, View, arguments, open};
 
+/// Keys of every row of the help, and what the log says of them.
+const KEYS: [(&str, &str); 29] = [
+    ("q", "SelectNext"),
+    ("q", "SelectNext"),
+    ("a", "SelectPrevious"),
+    ("q", "SelectNext"),
+    ("j", "step: Left"),
+    ("l", "step: Right"),
+    ("i", "step: Up"),
+    ("k", "step: Down"),
+    ("o", "step: Back"),
+    ("p", "step: Forth"),
+    ("n", "step: Larger"),
+    ("m", "step: Smaller"),
+    ("r", "step: TurnLeft"),
+    ("t", "step: TurnRight"),
+    ("ctrl+z", "Undo"),
+    ("ctrl+y", "Redo"),
+    ("c", "TurnSky"),
+    ("v", "TurnSky"),
+    ("g", "ToggleReference"),
+    ("g", "ToggleReference"),
+    ("x", "ToggleError"),
+    ("x", "ToggleError"),
+    ("h", "ToggleOverlay"),
+    ("F1", "ToggleKeys"),
+    ("h", "ToggleOverlay"),
+    ("Escape", "SelectNone"),
+    ("space", "ToggleRunning"),
+    ("space", "ToggleRunning"),
+    ("Home", "Home"),
+];
+
 #[test]
 fn a_window_does_what_its_controls_say() {
     if !has_device() {
@@ -32,38 +65,7 @@ fn a_window_does_what_its_controls_say() {
     let first = view.picture(SIZE);
     assert!(first.iter().any(|p| *p != first[0]), "the window is of one colour");
 
-    // Keys of every row of the help.
-    for (key, text) in [
-        ("q", "SelectNext"),
-        ("q", "SelectNext"),
-        ("a", "SelectPrevious"),
-        ("q", "SelectNext"),
-        ("j", "step: Left"),
-        ("l", "step: Right"),
-        ("i", "step: Up"),
-        ("k", "step: Down"),
-        ("o", "step: Back"),
-        ("p", "step: Forth"),
-        ("n", "step: Larger"),
-        ("m", "step: Smaller"),
-        ("r", "step: TurnLeft"),
-        ("t", "step: TurnRight"),
-        ("ctrl+z", "Undo"),
-        ("ctrl+y", "Redo"),
-        ("c", "TurnSky"),
-        ("v", "TurnSky"),
-        ("g", "ToggleReference"),
-        ("g", "ToggleReference"),
-        ("x", "ToggleError"),
-        ("x", "ToggleError"),
-        ("h", "ToggleOverlay"),
-        ("F1", "ToggleKeys"),
-        ("h", "ToggleOverlay"),
-        ("Escape", "SelectNone"),
-        ("space", "ToggleRunning"),
-        ("space", "ToggleRunning"),
-        ("Home", "Home"),
-    ] {
+    for (key, text) in KEYS {
         view.key(key, text);
     }
 

@@ -10,7 +10,8 @@ use std::sync::OnceLock;
 /// What a device claims to have: each function changes what the driver said.
 #[derive(Clone, Copy)]
 pub struct Claims {
-    pub properties: fn(&mut vk::PhysicalDeviceProperties),
+    pub api_version: u32,
+    pub limits: fn(&mut vk::PhysicalDeviceLimits),
     pub features: fn(&mut vk::PhysicalDeviceVulkan13Features<'_>),
     pub family: fn(&mut vk::QueueFamilyProperties),
     /// Whether the instance has an extension that it has.
@@ -23,14 +24,25 @@ pub struct Claims {
 
 impl Default for Claims {
     fn default() -> Self {
-        Claims {
-            properties: |_| (),
-            features: |_| (),
-            family: |_| (),
-            extension: |_| true,
-            splits_memory: false,
-            heap_bytes: None,
-        }
+        Claims::NONE
+    }
+}
+
+impl Claims {
+    /// What the driver says.
+    pub const NONE: Self = Claims {
+        api_version: u32::MAX,
+        limits: |_| (),
+        features: |_| (),
+        family: |_| (),
+        extension: |_| true,
+        splits_memory: false,
+        heap_bytes: None,
+    };
+
+    fn change(&self, properties: &mut vk::PhysicalDeviceProperties) {
+        properties.api_version = properties.api_version.min(self.api_version);
+        (self.limits)(&mut properties.limits);
     }
 }
 
@@ -42,11 +54,11 @@ module! {
     vkGetPhysicalDeviceProperties: PFN_vkGetPhysicalDeviceProperties(
         physical: vk::PhysicalDevice, out: *mut vk::PhysicalDeviceProperties
     ) {
-        let change = state().claims.properties;
+        let claims = state().claims;
         // SAFETY: the caller keeps the contract of this very function, which writes the struct.
         unsafe {
             REAL.get().expect("wrapped")(physical, out);
-            change(&mut *out);
+            claims.change(&mut *out);
         }
     }
 }
@@ -55,11 +67,11 @@ module! {
     vkGetPhysicalDeviceProperties2: PFN_vkGetPhysicalDeviceProperties2(
         physical: vk::PhysicalDevice, out: *mut vk::PhysicalDeviceProperties2<'_>
     ) {
-        let change = state().claims.properties;
+        let claims = state().claims;
         // SAFETY: the caller keeps the contract of this very function, which writes the struct.
         unsafe {
             REAL.get().expect("wrapped")(physical, out);
-            change(&mut (*out).properties);
+            claims.change(&mut (*out).properties);
         }
     }
 }

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What becomes of a picture on a device.
+#[derive(Clone, Copy)]
 enum Outcome {
     /// It is the same.
     Same,
@@ -21,146 +22,68 @@ enum Outcome {
 use Outcome::{Other, Refused, Same};
 
 /// A device that has less, what is asked of it, and what follows.
-type Row = (&'static str, &'static [&'static str], Claims, Outcome);
+type Row<T> = (&'static str, &'static [&'static str], T, Outcome);
+
+const ALL: Claims = Claims::NONE;
+
+/// Less than the program needs, or nothing that it needs.
+#[rustfmt::skip]
+const OTHERS: &[Row<Claims>] = &[
+    ("Vulkan 1.2", &[], Claims { api_version: ash::vk::API_VERSION_1_2, ..ALL },
+        Refused(3, "supports Vulkan 1.2.0, but 1.3 is needed")),
+    ("no dynamic rendering", &[], Claims { features: |f| f.dynamic_rendering = 0, ..ALL },
+        Refused(3, "lacks the feature dynamicRendering")),
+    ("no synchronization2", &[], Claims { features: |f| f.synchronization2 = 0, ..ALL },
+        Refused(3, "lacks the feature synchronization2")),
+    ("no maintenance4", &[], Claims { features: |f| f.maintenance4 = 0, ..ALL }, Same),
+    ("no timestamps", &[], Claims { family: |f| f.timestamp_valid_bits = 0, ..ALL },
+        Refused(3, "has no queue with graphics, compute and timestamps")),
+    ("timestamps of 36 bits", &[], Claims { family: |f| f.timestamp_valid_bits = 36, ..ALL }, Same),
+    ("no names for debuggers", &[], Claims { extension: |name| name != ash::ext::debug_utils::NAME, ..ALL }, Same),
+    ("memory that the host cannot see", &[], Claims { splits_memory: true, ..ALL }, Same),
+    ("20 MB of memory", &["--size", "2048x2048"], Claims { heap_bytes: Some(20_000_000), ..ALL },
+        Refused(4, "but the device has 0.02 GB")),
+];
 
 /// The least that Vulkan 1.3 allows, and less than the program needs.
-fn table() -> Vec<Row> {
-    let d = Claims::default();
-    let limits = |change: fn(&mut ash::vk::PhysicalDeviceProperties)| Claims { properties: change, ..d };
-    vec![
-        (
-            "Vulkan 1.2",
-            &[],
-            limits(|p| p.api_version = ash::vk::API_VERSION_1_2),
-            Refused(3, "supports Vulkan 1.2.0, but 1.3 is needed"),
-        ),
-        (
-            "no dynamic rendering",
-            &[],
-            Claims { features: |f| f.dynamic_rendering = 0, ..d },
-            Refused(3, "lacks the feature dynamicRendering"),
-        ),
-        (
-            "no synchronization2",
-            &[],
-            Claims { features: |f| f.synchronization2 = 0, ..d },
-            Refused(3, "lacks the feature synchronization2"),
-        ),
-        ("no maintenance4", &[], Claims { features: |f| f.maintenance4 = 0, ..d }, Same),
-        (
-            "no timestamps",
-            &[],
-            Claims { family: |f| f.timestamp_valid_bits = 0, ..d },
-            Refused(3, "has no queue with graphics, compute and timestamps"),
-        ),
-        ("timestamps of 36 bits", &[], Claims { family: |f| f.timestamp_valid_bits = 36, ..d }, Same),
-        ("no names for debuggers", &[], Claims { extension: |name| name != ash::ext::debug_utils::NAME, ..d }, Same),
-        ("memory that the host cannot see", &[], Claims { splits_memory: true, ..d }, Same),
-        (
-            "20 MB of memory",
-            &["--size", "2048x2048"],
-            Claims { heap_bytes: Some(20_000_000), ..d },
-            Refused(4, "but the device has 0.02 GB"),
-        ),
-        ("128 bytes of push constants", &[], limits(|p| p.limits.max_push_constants_size = 128), Same),
-        (
-            "16 bytes of push constants",
-            &[],
-            limits(|p| p.limits.max_push_constants_size = 16),
-            Refused(3, "bytes of push constants, the device takes 16"),
-        ),
-        ("128 invocations a workgroup", &[], limits(|p| p.limits.max_compute_work_group_invocations = 128), Same),
-        (
-            "16 invocations a workgroup",
-            &[],
-            limits(|p| p.limits.max_compute_work_group_invocations = 16),
-            Refused(3, "invocations a workgroup, the device takes 16"),
-        ),
-        ("128 invocations along x", &[], limits(|p| p.limits.max_compute_work_group_size = [128, 128, 64]), Same),
-        (
-            "8 invocations along x",
-            &[],
-            limits(|p| p.limits.max_compute_work_group_size = [8, 128, 64]),
-            Refused(3, "invocations a workgroup along x, the device takes 8"),
-        ),
-        ("16 KiB of shared memory", &[], limits(|p| p.limits.max_compute_shared_memory_size = 16384), Same),
-        (
-            "64 bytes of shared memory",
-            &[],
-            limits(|p| p.limits.max_compute_shared_memory_size = 64),
-            Refused(3, "bytes of memory shared by a workgroup, the device takes 64"),
-        ),
-        (
-            "4 storage buffers a stage",
-            &[],
-            limits(|p| p.limits.max_per_stage_descriptor_storage_buffers = 4),
-            Refused(3, "storage buffers a stage, the device takes 4"),
-        ),
-        ("12 uniform buffers a stage", &[], limits(|p| p.limits.max_per_stage_descriptor_uniform_buffers = 12), Same),
-        ("16 sampled images a stage", &[], limits(|p| p.limits.max_per_stage_descriptor_sampled_images = 16), Same),
-        (
-            "no sampled images",
-            &["--variant", "texel"],
-            limits(|p| p.limits.max_per_stage_descriptor_sampled_images = 0),
-            Refused(3, "sampled images a stage, the device takes 0"),
-        ),
-        ("storage buffers of 128 MiB", &[], limits(|p| p.limits.max_storage_buffer_range = 1 << 27), Same),
-        (
-            "storage buffers of 512 bytes",
-            &[],
-            limits(|p| p.limits.max_storage_buffer_range = 512),
-            Refused(4, "the device can bind 512"),
-        ),
-        (
-            "uniform buffers of 16 KiB",
-            &["--variant", "storage-uniform"],
-            limits(|p| p.limits.max_uniform_buffer_range = 1 << 14),
-            Same,
-        ),
-        (
-            "texel buffers of 65536 texels",
-            &["--variant", "texel"],
-            limits(|p| p.limits.max_texel_buffer_elements = 1 << 16),
-            Same,
-        ),
-        (
-            "texel buffers of 4 texels",
-            &["--variant", "texel"],
-            limits(|p| p.limits.max_texel_buffer_elements = 4),
-            Refused(4, "(4)"),
-        ),
-        ("images of 4096 pixels", &[], limits(|p| p.limits.max_image_dimension2_d = 4096), Same),
-        ("images of 8 pixels", &[], limits(|p| p.limits.max_image_dimension2_d = 8), Refused(4, "at most 8 px")),
-        (
-            "framebuffers 32 pixels high",
-            &["--size", "40x40", "--lights", "sh"],
-            limits(|p| p.limits.max_framebuffer_height = 32),
-            Refused(4, "40x40 is outside the device's 1..=32"),
-        ),
-        ("volumes of one texel", &["--variant", "image"], limits(|p| p.limits.max_image_dimension3_d = 1), Same),
-        (
-            "one workgroup",
-            &[],
-            limits(|p| p.limits.max_compute_work_group_count = [1; 3]),
-            Refused(4, "the device takes [1, 1, 1]"),
-        ),
-        (
-            "buffers at 256 bytes",
-            &[],
-            limits(|p| {
-                (p.limits.min_storage_buffer_offset_alignment, p.limits.min_uniform_buffer_offset_alignment) =
-                    (256, 256)
-            }),
-            Same,
-        ),
-        (
-            "one sample a pixel",
-            &["--antialias", "samples", "--lights", "sh"],
-            limits(|p| p.limits.framebuffer_color_sample_counts = ash::vk::SampleCountFlags::TYPE_1),
-            Other,
-        ),
-    ]
-}
+#[rustfmt::skip]
+const LIMITS: &[Row<fn(&mut ash::vk::PhysicalDeviceLimits)>] = &[
+    ("128 bytes of push constants", &[], |l| l.max_push_constants_size = 128, Same),
+    ("16 bytes of push constants", &[], |l| l.max_push_constants_size = 16,
+        Refused(3, "bytes of push constants, the device takes 16")),
+    ("128 invocations a workgroup", &[], |l| l.max_compute_work_group_invocations = 128, Same),
+    ("16 invocations a workgroup", &[], |l| l.max_compute_work_group_invocations = 16,
+        Refused(3, "invocations a workgroup, the device takes 16")),
+    ("128 invocations along x", &[], |l| l.max_compute_work_group_size = [128, 128, 64], Same),
+    ("8 invocations along x", &[], |l| l.max_compute_work_group_size = [8, 128, 64],
+        Refused(3, "invocations a workgroup along x, the device takes 8")),
+    ("16 KiB of shared memory", &[], |l| l.max_compute_shared_memory_size = 16384, Same),
+    ("64 bytes of shared memory", &[], |l| l.max_compute_shared_memory_size = 64,
+        Refused(3, "bytes of memory shared by a workgroup, the device takes 64")),
+    ("4 storage buffers a stage", &[], |l| l.max_per_stage_descriptor_storage_buffers = 4,
+        Refused(3, "storage buffers a stage, the device takes 4")),
+    ("12 uniform buffers a stage", &[], |l| l.max_per_stage_descriptor_uniform_buffers = 12, Same),
+    ("16 sampled images a stage", &[], |l| l.max_per_stage_descriptor_sampled_images = 16, Same),
+    ("no sampled images", &["--variant", "texel"], |l| l.max_per_stage_descriptor_sampled_images = 0,
+        Refused(3, "sampled images a stage, the device takes 0")),
+    ("storage buffers of 128 MiB", &[], |l| l.max_storage_buffer_range = 1 << 27, Same),
+    ("storage buffers of 512 bytes", &[], |l| l.max_storage_buffer_range = 512,
+        Refused(4, "the device can bind 512")),
+    ("uniform buffers of 16 KiB", &["--variant", "storage-uniform"], |l| l.max_uniform_buffer_range = 1 << 14, Same),
+    ("texel buffers of 65536 texels", &["--variant", "texel"], |l| l.max_texel_buffer_elements = 1 << 16, Same),
+    ("texel buffers of 4 texels", &["--variant", "texel"], |l| l.max_texel_buffer_elements = 4, Refused(4, "(4)")),
+    ("images of 4096 pixels", &[], |l| l.max_image_dimension2_d = 4096, Same),
+    ("images of 8 pixels", &[], |l| l.max_image_dimension2_d = 8, Refused(4, "at most 8 px")),
+    ("framebuffers 32 pixels high", &["--size", "40x40", "--lights", "sh"], |l| l.max_framebuffer_height = 32,
+        Refused(4, "40x40 is outside the device's 1..=32")),
+    ("volumes of one texel", &["--variant", "image"], |l| l.max_image_dimension3_d = 1, Same),
+    ("one workgroup", &[], |l| l.max_compute_work_group_count = [1; 3],
+        Refused(4, "the device takes [1, 1, 1]")),
+    ("buffers at 256 bytes", &[],
+        |l| (l.min_storage_buffer_offset_alignment, l.min_uniform_buffer_offset_alignment) = (256, 256), Same),
+    ("one sample a pixel", &["--antialias", "samples", "--lights", "sh"],
+        |l| l.framebuffer_color_sample_counts = ash::vk::SampleCountFlags::TYPE_1, Other),
+];
 
 fn picture(folder: &Path, more: &[&str]) -> shadow_fields::Result<()> {
     let variant = if more.contains(&"--variant") { &[][..] } else { &["--variant", "storage"] };
@@ -176,7 +99,8 @@ fn devices_that_have_less_are_refused_with_the_number_or_worked_around() {
     let output = folder.join("p.png");
     let mut wrong = Vec::new();
     let mut pictures = BTreeMap::new();
-    for (what, more, claims, outcome) in table() {
+    let limits = LIMITS.iter().map(|&(what, more, limits, outcome)| (what, more, Claims { limits, ..ALL }, outcome));
+    for (what, more, claims, outcome) in OTHERS.iter().copied().chain(limits) {
         let expected = pictures.entry(more).or_insert_with(|| {
             picture(folder, more).unwrap();
             std::fs::read(&output).unwrap()

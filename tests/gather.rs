@@ -12,7 +12,7 @@ use shadow_fields::frame::{self, PictureTarget, record};
 use shadow_fields::gpu::{Commands, FLIGHTS};
 use shadow_fields::layout::{Cluster, ENTRY_ENTITIES, ListEntry};
 use shadow_fields::lists::gather::{
-    self, Bounds, Candidates, FOUND, Gather, Packed, Place, Report, SLACK, SceneBounds, Scope,
+    self, Candidates, ClusterBounds, FOUND, Gather, Packed, Place, Report, SLACK, SceneBounds, Scope,
 };
 use shadow_fields::lists::skip::Skip;
 use stage::{Stage, scene, small, stage};
@@ -44,7 +44,7 @@ fn the_tree_leaves_every_list_as_it_is() {
     for round in 0..60 {
         let crowded = Crowded::new(&mut rng, round, 200);
         let Crowded { scene_bounds, receiver, entity, clusters } = &crowded;
-        let group = Candidates::of_group(scene_bounds, *receiver, entity, &Bounds::union(clusters));
+        let group = Candidates::of_group(scene_bounds, *receiver, entity, &ClusterBounds::union(clusters));
         offered += group.occluder_count();
         all += Candidates::all(scene_bounds, *receiver).occluder_count();
         let lists = crowded.expected(SLACK);

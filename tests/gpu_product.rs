@@ -7,14 +7,14 @@ mod stage;
 use common::report;
 use shadow_fields::gpu::{Buffer, BufferKind, Commands};
 use shadow_fields::merge::chain::{Chain, PRODUCTS, Product};
-use shadow_fields::merge::product::{Products, Push, Shape, twin};
+use shadow_fields::merge::product::{ProductShape, Products, Push, twin};
 use shadow_fields::sh::basis::coefficient_count;
 use shadow_fields::sh::lobe::{cap, clamped_cosine};
 use shadow_fields::sh::quadrature::random_direction;
 use stage::{Stage, scene, small, stage};
 
 /// Caps of 10 to 40 degrees about the sky, and cosines about as many normals.
-fn inputs(shape: Shape, count: usize) -> [Vec<f64>; 2] {
+fn inputs(shape: ProductShape, count: usize) -> [Vec<f64>; 2] {
     let mut rng = fastrand::Rng::with_seed(11);
     let mut direction = || (random_direction(&mut rng), (10.0 + 30.0 * rng.f64()).to_radians());
     let transfers = (0..count).flat_map(|_| clamped_cosine(shape.bands, direction().0)).collect();
@@ -22,7 +22,7 @@ fn inputs(shape: Shape, count: usize) -> [Vec<f64>; 2] {
     [transfers, (0..count).flat_map(|_| factor(direction())).collect()]
 }
 
-fn multiply(stage: &Stage, shape: Shape, [transfers, factors]: &[Vec<f64>; 2], push: Push) -> Vec<f32> {
+fn multiply(stage: &Stage, shape: ProductShape, [transfers, factors]: &[Vec<f64>; 2], push: Push) -> Vec<f32> {
     let (device, library) = (&stage.gpu.device, &stage.gpu.library);
     let narrow = |of: &[f64]| of.iter().map(|c| *c as f32).collect::<Vec<f32>>();
     let transfers = Buffer::with_data(device, "transfers", &narrow(transfers)).unwrap();
@@ -36,7 +36,7 @@ fn multiply(stage: &Stage, shape: Shape, [transfers, factors]: &[Vec<f64>; 2], p
 }
 
 /// Largest difference to the twin.
-fn error(stage: &Stage, shape: Shape, count: usize, steps: u32) -> f64 {
+fn error(stage: &Stage, shape: ProductShape, count: usize, steps: u32) -> f64 {
     let inputs = inputs(shape, count);
     let push = Push { count: count as u32, steps, fade: 0.96875 };
     let found = multiply(stage, shape, &inputs, push);
@@ -59,7 +59,7 @@ fn every_product_is_its_twin() {
     let square = PRODUCTS.iter().flat_map(|(_, product)| chains(*product)).map(|chain| (chain, 4, 4));
     let other = [(3, 3), (4, 5), (4, 7), (3, 6)].map(|(a, b)| (Chain::default(), a, b));
     for (chain, bands, field_bands) in square.chain(other) {
-        let shape = Shape { chain, bands, field_bands };
+        let shape = ProductShape { chain, bands, field_bands };
         // Eight products of numbers about 1, each off by some 6e-8 for each of ten terms. A last workgroup is not full.
         let worst = error(&stage, shape, 100, 8);
         report(&format!("{shape:?}: {worst:.1e}"));
@@ -73,7 +73,7 @@ fn every_product_is_its_twin() {
 fn guarded_chains_stay_bounded() {
     let Some(stage) = stage() else { return };
     for product in [Product::Factored, Product::PointChain] {
-        let shape = |guard| Shape { chain: Chain { product, guard }, bands: 4, field_bands: 4 };
+        let shape = |guard| ProductShape { chain: Chain { product, guard }, bands: 4, field_bands: 4 };
         let inputs = inputs(shape(true), 256);
         for steps in [1, 4, 64, 1000] {
             let push = Push { count: 256, steps, fade: 1.0 };

@@ -11,7 +11,7 @@ use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::gpu::reflect::Reflection;
 // In a shader there is no other entity.
 use shadow_fields::layout::{Cluster, DeviceEntity as Entity};
-use shadow_fields::lists::gather::{Bounds, Gather, Group, Report};
+use shadow_fields::lists::gather::{ClusterBounds, Gather, Group, Report};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{MergePermutation, VARIANTS, Variant};
 use std::mem::offset_of;
@@ -98,8 +98,11 @@ fn structs_of_the_gather() {
         assert_eq!(reflection.strides.get("Group"), Some(&(size_of::<Group>() as u32)));
         same_layout!(reflection, Report { longest, most_found, entry_total, left_count });
         // Two quads: centre and radius, axis and cosine.
-        assert_eq!(reflection.strides.get("Bounds"), Some(&(size_of::<Bounds>() as u32)));
-        assert_eq!([offset_of!(Bounds, radius_m), offset_of!(Bounds, axis), offset_of!(Bounds, cosine)], [12, 16, 28]);
+        assert_eq!(reflection.strides.get("Bounds"), Some(&(size_of::<ClusterBounds>() as u32)));
+        assert_eq!(
+            [offset_of!(ClusterBounds, radius_m), offset_of!(ClusterBounds, axis), offset_of!(ClusterBounds, cosine)],
+            [12, 16, 28]
+        );
         assert_eq!(reflection.strides.get("Entity"), Some(&(size_of::<Entity>() as u32)));
     }
 }

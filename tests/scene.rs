@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::{Quat, Vec3};
 use shadow_fields::Result;
 use shadow_fields::asset::embedded;
-use shadow_fields::field::sub_light::Panel;
+use shadow_fields::field::sub_light::LampFace;
 use shadow_fields::scene::{Data, LightForm, Lights, Placement, Scene};
 
 fn nothing(path: &Path) -> Result<Vec<u8>> {
@@ -328,7 +328,7 @@ fn each_light_has_the_form_that_its_mesh_gives_it() {
     assert!((0.98..1.0).contains(&share), "{share}");
     assert_eq!(form(2, Lights::Sharp), LightForm::Outline);
     assert_eq!(form(3, Lights::Sharp), LightForm::Harmonics);
-    assert!(matches!(form(4, Lights::Sharp), LightForm::Panel(Panel::Disc(_))));
-    assert!(matches!(form(5, Lights::Sharp), LightForm::Panel(Panel::Rectangle(_))));
+    assert!(matches!(form(4, Lights::Sharp), LightForm::LampFace(LampFace::Disc(_))));
+    assert!(matches!(form(5, Lights::Sharp), LightForm::LampFace(LampFace::Rectangle(_))));
     assert!((1..6).all(|entity| form(entity, Lights::Sh) == LightForm::Harmonics));
 }

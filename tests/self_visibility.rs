@@ -14,7 +14,7 @@ use shadow_fields::field::quantity::channel_stride;
 use shadow_fields::field::self_visibility::{
     BYTES, CELLS, LIMIT_RAD, NODES, cells, decode_angle, encode_angle, frame, node_direction, visible,
 };
-use shadow_fields::field::sub_light::{Part, SeenLight};
+use shadow_fields::field::sub_light::{LightPart, SeenLight};
 use shadow_fields::gpu::{Bind, Buffer, Commands, ComputePipeline};
 use shadow_fields::scene::{Placement, Scene};
 use shadow_fields::sh::lobe;
@@ -186,7 +186,7 @@ fn light_rays(direction: DVec3, angle: f64, count: usize, turned: f64) -> impl I
 fn by_map(map: &[u8], normal: DVec3, toward: DVec3, angle: f64) -> f64 {
     let blocks = SeenLight::new(1e6 * toward, 1e6 * angle.sin()).blocks();
     let parts = blocks.iter().flat_map(|(_, parts)| parts);
-    let sees = |part: &Part| visible(map, normal, part.toward, part.sine, f64::INFINITY);
+    let sees = |part: &LightPart| visible(map, normal, part.toward, part.sine, f64::INFINITY);
     parts.map(|part| part.share(normal) * sees(part)).sum::<f64>() / (TAU * (1.0 - angle.cos()))
 }
 

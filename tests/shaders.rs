@@ -17,7 +17,7 @@ use shadow_fields::field::{Lattice, Lookup, Storage};
 use shadow_fields::lists::gather::Gather;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::chain::{Chain, PRODUCTS};
-use shadow_fields::merge::product::{Products, Shape};
+use shadow_fields::merge::product::{ProductShape, Products};
 use shadow_fields::merge::variant::{MergePermutation, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, ShaderPermutation};
 use shadow_fields::sharp::SharpPermutation;
@@ -183,7 +183,7 @@ fn multiplying() -> Vec<ShaderPermutation> {
     square
         .chain(other)
         .flat_map(|(chain, bands, field_bands)| {
-            [true, false].map(|multiply| Products::row(Shape { chain, bands, field_bands }, multiply))
+            [true, false].map(|multiply| Products::row(ProductShape { chain, bands, field_bands }, multiply))
         })
         .collect()
 }

@@ -5,7 +5,7 @@ use crate::asset::decode::Picture;
 use crate::asset::false_color::{ColorScale, NEUTRAL, Scheme};
 use crate::asset::picture::write_png;
 use crate::error::{Error, Result};
-use crate::truth::difference::{Difference, PixelDifference, Values};
+use crate::truth::difference::{PictureDifference, PixelDifference, Values};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -89,7 +89,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         if counts.contains(&true) { Ok(counts) } else { Err(Error::input(path, "the mask is dark everywhere")) }
     });
     let mask = mask.transpose()?;
-    let found = Difference::new(&a, &b, mask.as_deref(), arguments.exposure_ev)
+    let found = PictureDifference::new(&a, &b, mask.as_deref(), arguments.exposure_ev)
         .map_err(|error| error.context(arguments.second.display()))?;
     if let Some(path) = &arguments.output {
         let (rgb, height) = picture(&found, mask.as_deref());
@@ -114,7 +114,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
 
 /// A picture of FLIP in linear RGB with a labelled bar below, and its height in pixels: dark where the two look alike. Pixels that do
 /// not count are grey.
-fn picture(found: &Difference, mask: Option<&[bool]>) -> (Vec<f32>, usize) {
+fn picture(found: &PictureDifference, mask: Option<&[bool]>) -> (Vec<f32>, usize) {
     let scale = ColorScale::fitting(Scheme::Absolute, std::iter::once(found.largest_flip.difference.max(1e-3)));
     let color = |(pixel, flip): (usize, &f64)| {
         if mask.is_none_or(|mask| mask[pixel]) { scale.color(*flip) } else { NEUTRAL }
@@ -124,7 +124,7 @@ fn picture(found: &Difference, mask: Option<&[bool]>) -> (Vec<f32>, usize) {
 }
 
 /// What is above its bound.
-fn beyond(arguments: &Arguments, found: &Difference) -> Vec<String> {
+fn beyond(arguments: &Arguments, found: &PictureDifference) -> Vec<String> {
     let measures = [
         ("mean FLIP", found.mean_flip, arguments.max_flip, "--max-flip"),
         ("RMS", found.rms, arguments.max_rms, "--max-rms"),
@@ -140,7 +140,7 @@ fn beyond(arguments: &Arguments, found: &Difference) -> Vec<String> {
     above
 }
 
-fn say(found: &Difference) {
+fn say(found: &PictureDifference) {
     let unit = match found.values {
         Values::Srgb => "sRGB values from 0 to 1",
         Values::Linear => "linear values",

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::{enclose, topology};
 use crate::error::{Error, Result};
-use crate::field::sub_light::Panel;
+use crate::field::sub_light::LampFace;
 
 /// Largest number of triangles of a mesh: 48 MB of indices, and edge tables of about 200 MB while it is checked.
 pub const TRIANGLE_LIMIT: usize = 4_000_000;
@@ -35,7 +35,7 @@ pub struct Mesh {
     radius_m: f32,
     shape: topology::Topology,
     content_hash: [u8; 32],
-    panel: Option<Panel>,
+    panel: Option<LampFace>,
 }
 
 impl Mesh {
@@ -153,12 +153,12 @@ impl Mesh {
     }
 
     /// The face that shines, of a lamp that shines from one flat side.
-    pub fn panel(&self) -> Option<Panel> {
+    pub fn panel(&self) -> Option<LampFace> {
         self.panel
     }
 
     /// The mesh of a lamp with that face.
-    pub(super) fn with_panel(self, panel: Panel) -> Self {
+    pub(super) fn with_panel(self, panel: LampFace) -> Self {
         Mesh { panel: Some(panel), ..self }
     }
 

@@ -5,7 +5,7 @@
 use super::generate::cuboid;
 use super::mesh::Mesh;
 use crate::error::Result;
-use crate::field::sub_light::Panel;
+use crate::field::sub_light::LampFace;
 use glam::Vec3;
 use std::f64::consts::{PI, TAU};
 
@@ -14,7 +14,7 @@ const THICKNESS: f32 = 1e-3;
 /// Pieces of a disc's rim. Their area is 0.9984 of the circle's.
 const SEGMENTS: u32 = 64;
 /// The body with its upper face white and all others black.
-fn lamp(name: &str, body: Mesh, panel: Panel) -> Result<Mesh> {
+fn lamp(name: &str, body: Mesh, panel: LampFace) -> Result<Mesh> {
     let color = |normal: &Vec3| if normal.y > 0.5 { Vec3::ONE } else { Vec3::ZERO };
     let colors = body.normals.iter().map(color).collect();
     let mesh = Mesh::new(name, body.positions, body.normals, Some(colors), body.triangles)?;
@@ -52,7 +52,7 @@ pub fn disc(radius_m: f32) -> Result<Mesh> {
     }
     let body = Mesh::new("disc", positions, normals, None, triangles)?;
     let share = f64::from(SEGMENTS) / 2.0 * (TAU / f64::from(SEGMENTS)).sin() / PI;
-    lamp("disc", body, Panel::Disc(share))
+    lamp("disc", body, LampFace::Disc(share))
 }
 
 /// A rectangle around the origin with edges of those lengths along x and z, which shines towards +y.
@@ -62,7 +62,7 @@ pub fn disc(radius_m: f32) -> Result<Mesh> {
 pub fn rectangle([width_m, depth_m]: [f32; 2]) -> Result<Mesh> {
     let height = THICKNESS * width_m.hypot(depth_m) / 2.0;
     let body = cuboid(Vec3::new(width_m, height, depth_m), 1);
-    lamp("rectangle", body, Panel::Rectangle(f64::from(depth_m) / f64::from(width_m)))
+    lamp("rectangle", body, LampFace::Rectangle(f64::from(depth_m) / f64::from(width_m)))
 }
 
 #[cfg(test)]
@@ -86,7 +86,7 @@ mod tests {
                 .sum();
             let panel = mesh.panel().unwrap();
             let half = panel.half() * f64::from(radius);
-            let expected = half.x * half.y * if matches!(panel, Panel::Disc(_)) { PI } else { 4.0 };
+            let expected = half.x * half.y * if matches!(panel, LampFace::Disc(_)) { PI } else { 4.0 };
             assert!((area / expected - 1.0).abs() < 1e-5, "{}: {area} {expected}", mesh.name);
         }
     }

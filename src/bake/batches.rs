@@ -27,16 +27,16 @@ const UNITS_EACH: f64 = 4.0;
 /// Seconds that llvmpipe takes on two cores a triangle that an eye sees, and a texel that is captured and reduced. No result depends on
 /// them, only how work is shared out.
 #[derive(Clone, Copy)]
-pub(super) struct Cost {
+pub(super) struct CaptureCost {
     triangle: f64,
     texel: f64,
 }
 
-impl Cost {
+impl CaptureCost {
     /// Where faces are drawn, as measured with the teapot and a torus of 69 696 triangles.
-    pub const DRAWN: Cost = Cost { triangle: 1.7e-7, texel: 5.5e-8 };
+    pub const DRAWN: CaptureCost = CaptureCost { triangle: 1.7e-7, texel: 5.5e-8 };
     /// Where they are computed, as measured with rough balls of 2 028 and 69 312 triangles.
-    pub const COMPUTED: Cost = Cost { triangle: 2.8e-8, texel: 8e-9 };
+    pub const COMPUTED: CaptureCost = CaptureCost { triangle: 2.8e-8, texel: 8e-9 };
 }
 
 /// Share of the triangles of a closed mesh that are drawn, since chunks that show their backs are left out.
@@ -167,7 +167,13 @@ fn facing_share(mesh: &Mesh) -> f64 {
 }
 
 /// Estimated seconds of captures on a software device: of `eyes` that see the mesh in `faces` of `face_px`.
-pub(super) fn estimated_seconds(cost: Cost, (mesh, levels): (&Mesh, bool), eyes: u64, faces: u64, face_px: u32) -> f64 {
+pub(super) fn estimated_seconds(
+    cost: CaptureCost,
+    (mesh, levels): (&Mesh, bool),
+    eyes: u64,
+    faces: u64,
+    face_px: u32,
+) -> f64 {
     let triangles = levels::estimated_triangles(mesh, levels) * facing_share(mesh) * eyes as f64;
     triangles * cost.triangle + faces as f64 * f64::from(face_px).powi(2) * cost.texel
 }
@@ -192,7 +198,7 @@ impl Batches {
             false => Model::new(device, captures.mesh, kind == CaptureKind::Radiance)?,
         };
         let is_drawn = device.info.is_software() && !capture.computes(&model);
-        let cost = if is_drawn { Cost::DRAWN } else { Cost::COMPUTED };
+        let cost = if is_drawn { CaptureCost::DRAWN } else { CaptureCost::COMPUTED };
         let Captures { reduction, face_px, .. } = *captures;
         let (columns, capacity) = (capture.columns, capture.capacity());
         let maps_bytes = if reduction.has_maps() { BYTES } else { 0 };

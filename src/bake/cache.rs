@@ -53,7 +53,7 @@ const FIELD_PART: &str = "part";
 const VERTICES_PART: &str = "vertices-part";
 
 /// What the cache held or a bake has made, and the report of the bake, if there was one.
-pub type Found<T> = (Arc<T>, Option<BakeReport>);
+pub type CacheAnswer<T> = (Arc<T>, Option<BakeReport>);
 
 /// What is baked of the vertices of a mesh, as far as it was wanted.
 #[derive(Clone, Debug, Default)]
@@ -156,7 +156,7 @@ impl Cache {
         mesh: &Mesh,
         header: &FieldHeader,
         progress: Progress<'_>,
-    ) -> Result<Found<ShadowField>> {
+    ) -> Result<CacheAnswer<ShadowField>> {
         let name = field_name(header);
         if let Some(found) = self.look(&FIELDS, &name, |path| read_field(path, header)) {
             return Ok((found, None));
@@ -176,7 +176,7 @@ impl Cache {
         mesh: &Mesh,
         options: &Options,
         progress: Progress<'_>,
-    ) -> Result<Found<SilhouetteField>> {
+    ) -> Result<CacheAnswer<SilhouetteField>> {
         let (name, options) = (silhouette_name(mesh, options), options.silhouette);
         let header = silhouette_header(mesh, options);
         if let Some(found) = self.look(&SILHOUETTES, &name, |path| read_silhouette(path, &header)) {

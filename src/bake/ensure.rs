@@ -1,6 +1,6 @@
 //! Bakes or finds in the cache every field and transfer vector that a scene needs. Everything that shows a scene calls [`ensure()`].
 
-use super::cache::{Cache, Found, FoundVertices, field_name};
+use super::cache::{Cache, CacheAnswer, FoundVertices, field_name};
 use super::vertices::Wanted;
 use super::{BakeReport, Baker, Options, Progress, header};
 use crate::asset::Mesh;
@@ -144,7 +144,7 @@ impl Making<'_> {
         &mut self,
         known: fn(&mut Self) -> &mut HashMap<K, Arc<T>>,
         (key, what): (K, String),
-        find: impl FnOnce(Progress<'_>) -> Result<Found<T>>,
+        find: impl FnOnce(Progress<'_>) -> Result<CacheAnswer<T>>,
     ) -> Result<Arc<T>> {
         if let Some(found) = known(self).get(&key) {
             return Ok(found.clone());

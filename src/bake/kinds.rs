@@ -1,6 +1,6 @@
 //! The kinds of things that are baked of a mesh, and what each of them takes.
 
-use super::batches::{Cost, estimated_seconds};
+use super::batches::{CaptureCost, estimated_seconds};
 use super::{Options, bakes_transfer, levels};
 use crate::asset::Mesh;
 use crate::field::FieldKind;
@@ -58,12 +58,12 @@ impl Kind {
             Kind::Silhouette => {
                 let levels = levels::are_used(mesh, options.silhouette.levels);
                 let maps = NodeGrid::map_count(options.silhouette.cells) as u64;
-                return estimated_seconds(Cost::DRAWN, (mesh, levels), maps, 0, 1);
+                return estimated_seconds(CaptureCost::DRAWN, (mesh, levels), maps, 0, 1);
             }
             Kind::Vertices => mesh.positions.len() as f64,
         };
         let levels = self != Kind::Light && levels::are_used(mesh, options.levels);
-        let cost = if self == Kind::Light { Cost::DRAWN } else { Cost::COMPUTED };
+        let cost = if self == Kind::Light { CaptureCost::DRAWN } else { CaptureCost::COMPUTED };
         estimated_seconds(cost, (mesh, levels), eyes as u64, (FACES * eyes) as u64, options.face_px)
     }
 

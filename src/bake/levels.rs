@@ -50,15 +50,15 @@ pub(super) fn estimated_triangles(mesh: &Mesh, levels: bool) -> f64 {
 
 /// The sphere around a group, and the distance by which its simplified triangles miss it, in r.
 #[derive(Clone, Copy, Debug)]
-struct Bounds {
+struct GroupBounds {
     centre: Vec3,
     radius: f32,
     error: f32,
 }
 
-impl From<ClodBounds> for Bounds {
+impl From<ClodBounds> for GroupBounds {
     fn from(bounds: ClodBounds) -> Self {
-        Bounds { centre: bounds.center.into(), radius: bounds.radius, error: bounds.error }
+        GroupBounds { centre: bounds.center.into(), radius: bounds.radius, error: bounds.error }
     }
 }
 
@@ -78,7 +78,7 @@ impl Tolerance {
     }
 
     /// Whether a group may not be drawn simplified.
-    fn forbids(&self, bounds: &Bounds) -> bool {
+    fn forbids(&self, bounds: &GroupBounds) -> bool {
         match *self {
             Tolerance::Eye(eye, share) => {
                 bounds.error > share * (eye.distance(bounds.centre) - bounds.radius).clamp(0.0, FARTHEST)
@@ -90,12 +90,12 @@ impl Tolerance {
 
 /// Chunks that are simplified together.
 struct Group {
-    bounds: Bounds,
+    bounds: GroupBounds,
     parts: Range<usize>,
 }
 
 /// Chunks of a group that were simplified from one group.
-struct Part {
+struct GroupPart {
     /// That group, or `None` for the mesh's own triangles.
     from: Option<usize>,
     chunks: Range<u32>,
@@ -103,7 +103,7 @@ struct Part {
 
 /// A node of the tree over the groups of one level.
 struct Node {
-    bounds: Bounds,
+    bounds: GroupBounds,
     below: Below,
 }
 
@@ -115,7 +115,7 @@ enum Below {
 /// Which chunk is drawn in whose place.
 pub(super) struct Levels {
     groups: Vec<Group>,
-    parts: Vec<Part>,
+    parts: Vec<GroupPart>,
     /// The first nodes are the roots of the levels.
     nodes: Vec<Node>,
     depth: usize,
@@ -136,7 +136,8 @@ impl Levels {
                 Below::Nodes(children) => open.extend(children.clone()),
                 Below::Group(group) => {
                     let parts = &self.parts[self.groups[*group].parts.clone()];
-                    let drawn = |part: &&Part| !part.from.is_some_and(|g| tolerance.forbids(&self.groups[g].bounds));
+                    let drawn =
+                        |part: &&GroupPart| !part.from.is_some_and(|g| tolerance.forbids(&self.groups[g].bounds));
                     chosen.extend(parts.iter().filter(drawn).map(|part| part.chunks.clone()));
                 }
             }
@@ -199,7 +200,7 @@ fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Level
             let start = chunked.chunks.len() as u32;
             alike.iter().for_each(|cluster| chunked.add(positions, cluster.indices));
             let chunks = start..chunked.chunks.len() as u32;
-            parts.push(Part { from: usize::try_from(alike[0].refined).ok(), chunks });
+            parts.push(GroupPart { from: usize::try_from(alike[0].refined).ok(), chunks });
         }
         of_groups.push(group);
         groups.push(Group { bounds: group.simplified.into(), parts: first..parts.len() });
@@ -210,8 +211,8 @@ fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Level
         Ok(group) => Node { bounds: node.bounds.into(), below: Below::Group(group) },
         // The margins cover rounding: what is forbidden for a group is forbidden for all nodes above.
         Err(_) => {
-            let Bounds { centre, radius, error } = node.bounds.into();
-            let bounds = Bounds { centre, radius: 1.0001 * radius + 1e-6, error: 1.0001 * error };
+            let GroupBounds { centre, radius, error } = node.bounds.into();
+            let bounds = GroupBounds { centre, radius: 1.0001 * radius + 1e-6, error: 1.0001 * error };
             let first = node.child_offset as usize;
             Node { bounds, below: Below::Nodes(first..first + node.child_count as usize) }
         }

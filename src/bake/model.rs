@@ -2,7 +2,7 @@
 
 use super::chunk::{Chunk, Chunked, chunk};
 use super::levels::{Leveled, Tolerance};
-use super::raster::Faces;
+use super::raster::RasterFaces;
 use super::triangles::{distinct, unit_positions};
 use crate::asset::Mesh;
 use crate::error::Result;
@@ -109,7 +109,7 @@ pub struct Drawn {
     /// of levels, and llvmpipe takes 4 us for each draw.
     pub(super) indices: Option<Buffer>,
     /// The faces for a device that computes them.
-    pub(super) computed: Option<Faces>,
+    pub(super) computed: Option<RasterFaces>,
     /// Whether back faces are culled.
     pub(super) closed: bool,
 }
@@ -118,7 +118,7 @@ impl Drawn {
     /// What is computed: faces with runs of the model's own indices.
     pub(super) fn computed(model: &Model, faces: Vec<DrawnFace>, closed: bool) -> Result<Self> {
         let shown = faces.iter().map(|face| (face.eye, face.face, face.slot, face.runs.as_slice()));
-        let computed = Some(Faces::new(model.positions.device(), shown)?);
+        let computed = Some(RasterFaces::new(model.positions.device(), shown)?);
         Ok(Drawn { faces, indices: None, computed, closed })
     }
 

@@ -67,7 +67,7 @@ pub struct Raster {
 }
 
 /// The faces of a batch on the device.
-pub(super) struct Faces {
+pub(super) struct RasterFaces {
     faces: Buffer,
     runs: Buffer,
     count: u32,
@@ -82,7 +82,7 @@ pub(super) fn face_axes(face: usize) -> (Vec3, Vec3, Vec3) {
 /// What a face shows: the eye, the face's number and its place in the atlas, and runs of indices.
 pub(super) type Shown<'s> = (Vec3, usize, u32, &'s [Range<u32>]);
 
-impl Faces {
+impl RasterFaces {
     /// Uploads what faces show.
     pub fn new<'s>(device: &Arc<Device>, shown: impl Iterator<Item = Shown<'s>>) -> Result<Self> {
         let (mut faces, mut runs) = (Vec::new(), Vec::new());
@@ -98,7 +98,7 @@ impl Faces {
             buffer.write(0, bytes);
             Ok(buffer)
         };
-        Ok(Faces {
+        Ok(RasterFaces {
             faces: upload("capture faces", bytemuck::cast_slice(&faces))?,
             runs: upload("capture runs", bytemuck::cast_slice(&runs))?,
             count: faces.len() as u32,
@@ -156,7 +156,7 @@ impl Raster {
         &'r self,
         commands: &mut Commands<'r>,
         (positions, indices): (&'r Buffer, &'r Buffer),
-        (faces, culls): (&'r Faces, bool),
+        (faces, culls): (&'r RasterFaces, bool),
         atlas: &'r Image,
     ) -> Result<()> {
         let across = if self.distance { self.face_px } else { self.face_px.div_ceil(32) };

@@ -1,7 +1,7 @@
 //! The error of a picture, split into its causes by the rungs of [`crate::truth`].
 
 use super::cases::Case;
-use super::figures::{Difference, Radiosity, difference, rms};
+use super::figures::{Radiosity, VertexDifference, difference, rms};
 use super::{Bench, has_sharp_lights};
 use crate::error::{Error, Result};
 use crate::field::Storage;
@@ -103,7 +103,7 @@ impl Truth {
     }
 
     /// Difference to T0 relative to its root mean square.
-    pub fn error(&self, of: &[Radiosity]) -> Difference {
+    pub fn error(&self, of: &[Radiosity]) -> VertexDifference {
         difference(of, &self.t0, self.unit)
     }
 }
@@ -176,19 +176,19 @@ pub struct Budget {
     #[serde(rename = "t1_error_relative")]
     pub t1_error: f64,
     /// T0 to T0c: what the merge's order of centres costs.
-    pub centre_rule: Difference,
+    pub centre_rule: VertexDifference,
     /// T0c to T1.
-    pub bands: Difference,
+    pub bands: VertexDifference,
     /// T1 to T2.
-    pub sampling: Difference,
+    pub sampling: VertexDifference,
     /// T2 to T3.
-    pub arithmetic_and_storage: Difference,
+    pub arithmetic_and_storage: VertexDifference,
     /// T1 to T3: the error that does not come from the number of bands.
-    pub below_bands: Difference,
+    pub below_bands: VertexDifference,
     /// T0 to T3.
-    pub total: Difference,
+    pub total: VertexDifference,
     /// T0 to the merge on the device with sharp lights, which the rungs are not about; none where no light can be sharp.
-    pub sharp_total: Option<Difference>,
+    pub sharp_total: Option<VertexDifference>,
     /// T0's root mean square over that of the unoccluded value, which converts errors to the unit of the unoccluded value.
     #[serde(rename = "t0_per_unoccluded_ratio")]
     pub t0_per_unoccluded: f64,

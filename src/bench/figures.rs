@@ -8,7 +8,7 @@ pub type Radiosity = [f64; 3];
 /// Difference between two sets of vertex values, relative to a given unit. A vertex's error is the root mean square over its
 /// three channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Difference {
+pub struct VertexDifference {
     /// Root mean square over vertices.
     #[serde(rename = "rms_relative")]
     pub rms: f64,
@@ -27,13 +27,17 @@ pub fn rms(values: &[Radiosity]) -> f64 {
 }
 
 /// The difference of two sets of the same vertices in units of `unit`.
-pub fn difference(a: &[Radiosity], b: &[Radiosity], unit: f64) -> Difference {
+pub fn difference(a: &[Radiosity], b: &[Radiosity], unit: f64) -> VertexDifference {
     assert_eq!(a.len(), b.len(), "sets of vertices");
     let apart: Vec<Radiosity> = a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| a[c] - b[c])).collect();
     let mut sorted: Vec<f64> = apart.iter().map(|d| rms(&[*d])).collect();
     sorted.sort_by(f64::total_cmp);
     let at = |share: f64| sorted.get(((sorted.len() as f64 * share).ceil() as usize).saturating_sub(1)).copied();
-    Difference { rms: rms(&apart) / unit, p99: at(0.99).unwrap_or(0.0) / unit, max: at(1.0).unwrap_or(0.0) / unit }
+    VertexDifference {
+        rms: rms(&apart) / unit,
+        p99: at(0.99).unwrap_or(0.0) / unit,
+        max: at(1.0).unwrap_or(0.0) / unit,
+    }
 }
 
 /// Median and quartiles.

@@ -3,7 +3,7 @@
 use super::Bench;
 use super::budget::{Effort, Truth};
 use super::cases::Case;
-use super::figures::{Difference, Radiosity, difference, rms};
+use super::figures::{Radiosity, VertexDifference, difference, rms};
 use crate::truth::pixels::lit_points;
 use crate::truth::raycast::Distant;
 use crate::truth::world::VertexView;
@@ -83,7 +83,7 @@ impl Judged {
     }
 
     /// Difference of the compared points' radiosity to T0, relative to its root mean square.
-    pub fn error(&self, found: &[Radiosity]) -> Difference {
+    pub fn error(&self, found: &[Radiosity]) -> VertexDifference {
         difference(found, &self.t0, self.unit)
     }
 }

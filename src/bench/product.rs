@@ -5,7 +5,7 @@ use super::figures::{Spread, spread};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Commands};
 use crate::merge::chain::{Chain, PRODUCTS, Product};
-use crate::merge::product::{Products, Push, Shape, twin};
+use crate::merge::product::{ProductShape, Products, Push, twin};
 use crate::sh::basis::coefficient_count;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::points;
@@ -72,16 +72,16 @@ pub fn measure(bench: &Bench<'_>) -> Result<Vec<Timed>> {
 }
 
 /// The forms with their names.
-fn shapes() -> Vec<(&'static str, Shape)> {
+fn shapes() -> Vec<(&'static str, ProductShape)> {
     let mut shapes = Vec::new();
     for guard in [false, true] {
         for &(name, product) in PRODUCTS {
-            shapes.push((name, Shape { chain: Chain { product, guard }, bands: BANDS, field_bands: BANDS }));
+            shapes.push((name, ProductShape { chain: Chain { product, guard }, bands: BANDS, field_bands: BANDS }));
         }
     }
     for field_bands in [5, 6, 7] {
         let chain = Chain { product: Product::Matrix, guard: false };
-        shapes.push(("matrix", Shape { chain, bands: BANDS, field_bands }));
+        shapes.push(("matrix", ProductShape { chain, bands: BANDS, field_bands }));
     }
     shapes
 }
@@ -134,7 +134,7 @@ impl<'b> Chains<'b> {
 }
 
 /// What was measured of a form, with its cost and what it makes of 64 identical caps.
-fn timed(product: &'static str, shape: Shape, error: f64, times: &[f64]) -> Timed {
+fn timed(product: &'static str, shape: ProductShape, error: f64, times: &[f64]) -> Timed {
     let cost = if shape.chain.product.stays_at_points() {
         let mut cost = points::evaluate_program(BANDS).cost();
         cost.fma_count += points::COUNT;
@@ -162,7 +162,7 @@ fn timed(product: &'static str, shape: Shape, error: f64, times: &[f64]) -> Time
 }
 
 /// Largest difference to the twin among the first chains.
-fn error_of(shape: Shape, transfers: &[f64], factors: &[f64], found: &[f32]) -> f64 {
+fn error_of(shape: ProductShape, transfers: &[f64], factors: &[f64], found: &[f32]) -> f64 {
     let sizes = [shape.bands, shape.field_bands].map(coefficient_count);
     let chains = transfers.chunks(sizes[0]).zip(factors.chunks(sizes[1])).zip(found.chunks(sizes[0])).take(64);
     let apart = chains.flat_map(|((transfer, factor), found)| {

@@ -9,7 +9,7 @@
 
 use super::budget::{Truth, device_radiosity};
 use super::cases::Case;
-use super::figures::{Difference, Radiosity, Spread, along, crossing, spread};
+use super::figures::{Radiosity, Spread, VertexDifference, along, crossing, spread};
 use super::judged::{Judged, JudgedAt, PIXEL_SIZE};
 use super::shadow_map::{Filter, ShadowMaps, maps_apply};
 use super::sweep;
@@ -31,7 +31,7 @@ pub struct RivalPoint {
     /// Wall time for all points, scaled from the compared ones, milliseconds.
     pub wall_ms: Spread,
     /// Difference to T0.
-    pub error: Difference,
+    pub error: VertexDifference,
 }
 
 /// Shadow maps of one size. They light from the lamps alone: the sky's part of the truth is given to them.
@@ -44,7 +44,7 @@ pub struct MapPoint {
     /// Wall time of drawing the maps and lighting all points, milliseconds.
     pub wall_ms: Spread,
     /// Difference to T0.
-    pub error: Difference,
+    pub error: VertexDifference,
 }
 
 impl MapPoint {
@@ -78,7 +78,7 @@ pub struct Comparison {
     /// Device time of the merge and of sharp lights in it, milliseconds.
     pub merge_ms: Spread,
     /// Error of the merge against T0.
-    pub merge_error: Difference,
+    pub merge_error: VertexDifference,
     /// Ray casting with increasing numbers of rays.
     pub rival: Vec<RivalPoint>,
     /// Wall time in which ray casting reaches the merge's root mean square error, milliseconds: interpolated, extrapolated, or the

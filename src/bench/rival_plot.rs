@@ -1,7 +1,7 @@
 //! Plots of `bench time-error`: each case's time against error, and all cases beside ray casting.
 
 use super::judged::JudgedAt;
-use super::plot::{AxisScale, Curve, Dot, Gap, Panel, Plot, PlotColumn, RowGroup, Rows};
+use super::plot::{AxisScale, Curve, Dot, Gap, Plot, PlotColumn, PlotPanel, RowGroup, Rows};
 use super::rival::Comparison;
 use super::shadow_map::Filter;
 use super::sweep::{Point, pareto};
@@ -22,7 +22,7 @@ pub fn case_plot(case: &str, points: &[Point], comparisons: &[Comparison]) -> Pl
     Plot { title: format!("{case}: time against error"), panels: settings.into_iter().chain(rivals).collect() }
 }
 
-fn settings(points: &[&Point]) -> Panel {
+fn settings(points: &[&Point]) -> PlotPanel {
     let places: Vec<(f64, f64)> = points.iter().map(|p| (p.merge_ms.median, p.total.rms)).collect();
     let dot = |p: &&Point| Dot {
         label: if p.axis == "default" { format!("default: {}", p.name) } else { format!("{}: {}", p.axis, p.name) },
@@ -31,18 +31,18 @@ fn settings(points: &[&Point]) -> Panel {
         y: p.total.rms,
         x_range: Some((p.merge_ms.lower, p.merge_ms.upper)),
     };
-    Panel {
+    PlotPanel {
         title: "Every setting of the merge, at vertices".into(),
         x_label: "merge on the device, milliseconds (median, quartiles)".into(),
         y_label: ERROR.into(),
         dots: points.iter().map(dot).collect(),
         front: pareto(&places),
-        ..Panel::default()
+        ..PlotPanel::default()
     }
 }
 
 /// The panel of comparisons that share their rivals; the first of them has its lead marked.
-fn rivals(comparisons: &[&Comparison]) -> Option<Panel> {
+fn rivals(comparisons: &[&Comparison]) -> Option<PlotPanel> {
     let first = comparisons.first()?;
     let (title, includes) = match first.place {
         JudgedAt::Vertices => ("A frame and its rivals, at vertices", "without drawing"),
@@ -58,13 +58,13 @@ fn rivals(comparisons: &[&Comparison]) -> Option<Panel> {
         points: vec![(c.frame_wall_ms.median, c.merge_error.rms)],
         notes: Vec::new(),
     });
-    Some(Panel {
+    Some(PlotPanel {
         title: title.into(),
         x_label: format!("milliseconds {includes} (median); numbers: rays a light, texels across"),
         y_label: ERROR.into(),
         curves: rival_curves(first).into_iter().chain(ours).collect(),
         gap,
-        ..Panel::default()
+        ..PlotPanel::default()
     })
 }
 

@@ -2,7 +2,7 @@
 
 use super::budget::device_radiosity;
 use super::figures::{Radiosity, Spread, difference, rms, spread};
-use super::plot::{Curve, Panel, Plot};
+use super::plot::{Curve, Plot, PlotPanel};
 use super::sweep::merge_ms;
 use super::town::{Town, moved};
 use super::{Bench, default_options};
@@ -236,12 +236,12 @@ fn plot(axis: &str, points: &[&ScalingPoint]) -> Plot {
             points: known,
         })
     };
-    let panel = |title: &str, y_label: &str, curves: Vec<Option<Curve>>| Panel {
+    let panel = |title: &str, y_label: &str, curves: Vec<Option<Curve>>| PlotPanel {
         title: title.into(),
         x_label: words.into(),
         y_label: y_label.into(),
         curves: curves.into_iter().flatten().collect(),
-        ..Panel::default()
+        ..PlotPanel::default()
     };
     let mib = |bytes: u64| bytes as f64 / 1_048_576.0;
     let each = |p: &ScalingPoint, of: f64| of / (p.vertices as f64 / f64::from(CLUSTER_VERTICES));

@@ -2,7 +2,7 @@
 
 use super::budget::device_radiosity;
 use super::cases::{self, Case};
-use super::figures::{Difference, Radiosity, Spread, difference, rms, spread};
+use super::figures::{Radiosity, Spread, VertexDifference, difference, rms, spread};
 use super::plot::{AxisScale, PlotColumn, RowGroup, Rows};
 use super::sweep::merge_ms;
 use super::town::{Town, moved};
@@ -31,7 +31,7 @@ pub struct Side {
     #[serde(rename = "entry_count")]
     pub entries: usize,
     /// Against ray casting.
-    pub error: Difference,
+    pub error: VertexDifference,
     /// Fields on the device, bytes.
     pub field_bytes: u64,
 }
@@ -54,7 +54,7 @@ pub struct SkipCost {
     #[serde(rename = "speed_up_ratio")]
     pub times_faster: f64,
     /// Largest change of a vertex, relative to the root mean square of T0.
-    pub change: Difference,
+    pub change: VertexDifference,
     /// What the lists leave off, all skips on.
     pub counts: Counts,
     /// What this skip left off: (cluster, chain, entity) triples, a cluster being 64 vertices. `None` where it does not work on

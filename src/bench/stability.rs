@@ -2,7 +2,7 @@
 
 use super::Bench;
 use super::default_options;
-use super::plot::{AxisScale, Curve, Panel, Plot, PlotColumn, RowGroup, Rows};
+use super::plot::{AxisScale, Curve, Plot, PlotColumn, PlotPanel, RowGroup, Rows};
 use super::refusals::{Refusal, refusals};
 use super::trials::{self, Trial};
 use super::turns::{Turn, turns};
@@ -229,9 +229,9 @@ fn chain_plot(chains: &[CapChain]) -> Plot {
         points: chains.iter().filter(|c| c.caps == kind).map(|c| (c.count as f64, value(c))).collect(),
         notes: Vec::new(),
     };
-    let mut panels: Vec<Panel> = kinds
+    let mut panels: Vec<PlotPanel> = kinds
         .iter()
-        .map(|kind| Panel {
+        .map(|kind| PlotPanel {
             title: format!("Caps: {kind} (1.5 and more at the edge)"),
             x_label: "caps in the chain".into(),
             y_label: "irradiance, relative to where nothing blocks".into(),
@@ -244,7 +244,7 @@ fn chain_plot(chains: &[CapChain]) -> Plot {
                 curve(kind, "6 bands of visibility, plain", &|c| c.bands_6),
                 curve(kind, "7 bands of visibility, plain", &|c| c.bands_7),
             ],
-            ..Panel::default()
+            ..PlotPanel::default()
         })
         .collect();
     let largest = |label: &str, value: &dyn Fn(&CapChain) -> f64| {
@@ -256,12 +256,12 @@ fn chain_plot(chains: &[CapChain]) -> Plot {
         let points = worst.into_iter().map(|(count, apart)| (count as f64, apart)).collect();
         Curve { label: label.into(), points, notes: Vec::new() }
     };
-    panels.push(Panel {
+    panels.push(PlotPanel {
         title: format!("What rounding changes; allowed: f32 {NEAR_F32:e}, f16 {NEAR_F16:e}"),
         x_label: "caps in the chain".into(),
         y_label: "largest difference to f64, relative to where nothing blocks".into(),
         curves: vec![largest("guarded in f32", &|c| c.f32), largest("guarded, factors in f16", &|c| c.f16)],
-        ..Panel::default()
+        ..PlotPanel::default()
     });
     Plot { title: "Irradiance behind chains of caps".into(), panels }
 }

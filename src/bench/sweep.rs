@@ -2,7 +2,7 @@
 
 use super::budget::{Truth, device_radiosity};
 use super::cases::Case;
-use super::figures::{Difference, Radiosity, Spread, difference, spread};
+use super::figures::{Radiosity, Spread, VertexDifference, difference, spread};
 use super::{Bench, default_options};
 use crate::error::Result;
 use crate::field::{Lattice, Lookup, Storage};
@@ -46,9 +46,9 @@ pub struct Point {
     #[serde(rename = "time_per_default_ratio")]
     pub time_per_default: f64,
     /// T0 to T3.
-    pub total: Difference,
+    pub total: VertexDifference,
     /// T1 (of 4 bands) to T3.
-    pub below_bands: Difference,
+    pub below_bands: VertexDifference,
 }
 
 /// The lattices that are swept; a quick sweep takes the first three.

@@ -59,7 +59,7 @@ pub fn texel_index(capture: &Capture, slot: u32, x: usize, y: usize) -> usize {
 }
 
 /// Texels of one eye's faces in rows; `None` where the face was not drawn.
-pub type Faces<T> = [Option<Vec<T>>; FACE_COUNT];
+pub type CapturedFaces<T> = [Option<Vec<T>>; FACE_COUNT];
 
 /// How faces are captured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +80,7 @@ pub fn faces<T: Pod>(
     eyes: &[Vec3],
     (face_px, kind, cull): (u32, CaptureKind, bool),
     way: Way,
-) -> Result<Vec<Faces<T>>> {
+) -> Result<Vec<CapturedFaces<T>>> {
     let model = Model::new(baker.device(), mesh, kind == CaptureKind::Radiance)?;
     let mut capture = Capture::new(baker.device(), baker.library(), face_px, kind)?;
     capture.computes = way == Way::Computed;

@@ -7,8 +7,8 @@ use crate::error::Result;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::layout::{Cluster, DeviceEntity, ListEntry};
 use crate::lists::gather::{
-    self, Bounds, Candidates, EntityBounds, GROUP_CLUSTERS, Gather, Group, Inputs, Packed, Report, SLACK, SceneBounds,
-    Scope,
+    self, Candidates, ClusterBounds, EntityBounds, GROUP_CLUSTERS, Gather, GatherInputs, Group, Packed, Report, SLACK,
+    SceneBounds, Scope,
 };
 use crate::lists::skip::Skip;
 use crate::sh::quadrature::random_direction;
@@ -26,7 +26,7 @@ pub struct Crowded {
     /// It, as shaders see it.
     pub entity: DeviceEntity,
     /// Bounds of its clusters.
-    pub clusters: Vec<Bounds>,
+    pub clusters: Vec<ClusterBounds>,
 }
 
 /// How lists agree with the rule.
@@ -90,7 +90,7 @@ impl Crowded {
         let mut cluster = || {
             let centre = 2.0 * random_direction(rng) * rng.f64();
             let axis = (facing + 0.5 * random_direction(rng)).normalize();
-            Bounds::from_parts(centre, 0.3 * rng.f64(), axis, 0.4 * rng.f64())
+            ClusterBounds::from_parts(centre, 0.3 * rng.f64(), axis, 0.4 * rng.f64())
         };
         let clusters = (0..GROUP_CLUSTERS).map(|_| cluster()).collect();
         Crowded { scene_bounds, receiver, entity, clusters }
@@ -139,7 +139,7 @@ impl Crowded {
     ) -> Result<(Vec<(Cluster, Vec<u32>)>, Report)> {
         let count = self.clusters.len() as u32;
         let mut bounds = self.clusters.clone();
-        bounds.push(Bounds::union(&self.clusters));
+        bounds.push(ClusterBounds::union(&self.clusters));
         let cluster = |i: u32| Cluster { receiver: self.receiver, vertex_count: 64, bounds: i, ..Default::default() };
         let clusters: Vec<Cluster> = (0..count).map(cluster).collect();
         let mut entities = vec![DeviceEntity::default(); self.scene_bounds.spheres.len()];
@@ -151,7 +151,7 @@ impl Crowded {
         ];
         let packed = Packed::new(&self.scene_bounds);
         let pass = Gather::new(device, library, texel, entities.len())?;
-        let inputs = Inputs {
+        let inputs = GatherInputs {
             scene_quads: &Buffer::with_data(device, "scene quads", &packed.quads)?,
             entities: &Buffer::with_data(device, "entities", &entities)?,
             bounds: &Buffer::with_data(device, "bounds", &bounds)?,

@@ -56,10 +56,10 @@ impl CheckRow {
 }
 
 /// The comparisons of one pass, each told as it comes.
-type Part = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
+type PassCheck = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
 /// Every pass in the order of execution, by the one word that names it everywhere.
-pub const PASSES: [(&str, Part); 11] = [
+pub const PASSES: [(&str, PassCheck); 11] = [
     ("capture", capture::rows),
     ("project", project::rows),
     ("self_visibility", self_visibility::rows),

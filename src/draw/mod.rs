@@ -22,7 +22,7 @@ use crate::draw::smooth::Smooth;
 use crate::draw::triangles::{DrawTriangles, DrawnTriangles};
 use crate::error::Result;
 use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsState, Image, ImageShape, Keeps, Target};
-use crate::lists::sight::{Faces, Sight};
+use crate::lists::sight::{Sight, TriangleRun};
 use crate::shaders::Library;
 use crate::sharp::SharpPermutation;
 use ash::vk;
@@ -44,7 +44,7 @@ pub enum DrawnMesh {
     /// The mesh is drawn by its triangles.
     Triangles(DrawnTriangles),
     /// The mesh is a grid and is drawn as one parallelogram.
-    Grid(DrawnGrid, Faces),
+    Grid(DrawnGrid, TriangleRun),
 }
 
 impl DrawnMesh {
@@ -62,7 +62,7 @@ impl DrawnMesh {
         if let Some(grid) = Grid::find(mesh).filter(|grid| DrawnGrid::fits(device, grid.vertices.len(), vertices)) {
             return Ok(DrawnMesh::Grid(
                 DrawnGrid::new(device, &grid, centre, mesh.normals[0], &place)?,
-                Faces::of(mesh, &mesh.triangles),
+                TriangleRun::of(mesh, &mesh.triangles),
             ));
         }
         DrawnTriangles::new(device, mesh, order, &place).map(DrawnMesh::Triangles)
@@ -72,7 +72,7 @@ impl DrawnMesh {
 impl DrawnMesh {
     /// Ranges of indices that have to be drawn, in order: all of them, or those of the runs that may be seen.
     pub fn seen(&self, sight: Option<&Sight>) -> Vec<Range<u32>> {
-        let may_see = |faces: &Faces| sight.is_none_or(|sight| sight.may_see(faces));
+        let may_see = |faces: &TriangleRun| sight.is_none_or(|sight| sight.may_see(faces));
         let mut out: Vec<Range<u32>> = Vec::new();
         match self {
             DrawnMesh::Grid(_, faces) => out.extend(may_see(faces).then_some(0..DrawnGrid::INDEX_COUNT)),

@@ -6,7 +6,7 @@ use crate::asset::mesh::Mesh;
 use crate::draw::{DrawnEntity, DrawnViewport, EntityPush};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
-use crate::lists::sight::Faces;
+use crate::lists::sight::TriangleRun;
 use crate::shaders::{Library, ShaderPermutation};
 use crate::sharp::SharpPermutation;
 use ash::vk;
@@ -32,7 +32,7 @@ pub struct DrawnTriangles {
     /// Three indices a triangle; neighbouring triangles stand together.
     pub indices: Buffer,
     /// The indices in runs, and which way the triangles of each run face.
-    pub runs: Vec<(Range<u32>, Faces)>,
+    pub runs: Vec<(Range<u32>, TriangleRun)>,
 }
 
 impl DrawnTriangles {
@@ -53,7 +53,7 @@ impl DrawnTriangles {
         let mut first = 0;
         for run in triangles.chunks(RUN_TRIANGLES) {
             let end = first + 3 * run.len() as u32;
-            runs.push((first..end, Faces::of(mesh, run)));
+            runs.push((first..end, TriangleRun::of(mesh, run)));
             first = end;
         }
         triangles.iter_mut().flatten().for_each(|v| *v = place[*v as usize]);

@@ -153,7 +153,7 @@ pub struct Plan {
 
 /// What a task is estimated to take.
 #[derive(Clone, Copy, Debug)]
-pub struct Cost {
+pub struct TaskCost {
     /// Seconds on two cores of a software device.
     pub seconds: f64,
     /// Memory besides that of the process itself, in MB.
@@ -179,12 +179,12 @@ impl Plan {
     }
 
     /// How many tasks like this one a slice may hold, at least one.
-    pub fn fitting(cost: Cost) -> u32 {
+    pub fn fitting(cost: TaskCost) -> u32 {
         (SLICE_SECONDS / cost.seconds).min(RESULT_BYTES / cost.bytes).max(1.0) as u32
     }
 
     /// Adds a task. It joins the last slice while that remains below [`SLICE_SECONDS`] and its result below 1 GB.
-    pub fn add(&mut self, task: Task, cost: Cost) {
+    pub fn add(&mut self, task: Task, cost: TaskCost) {
         let memory = BASE_MB + cost.memory_mb.ceil() as u32;
         let kilobytes = (cost.bytes / 1e3).ceil() as u32;
         let fits = |slice: &Slice| {
@@ -259,7 +259,7 @@ pub(super) mod tests {
         plan.works.push(Work { words: vec!["--quality".into(), "draft".into()], pictures: None });
         plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
         for index in 0..tasks {
-            let cost = Cost { seconds, memory_mb: 1.0, bytes: 1e6 };
+            let cost = TaskCost { seconds, memory_mb: 1.0, bytes: 1e6 };
             plan.add(Task { work: 0, input: 0, kind: TaskKind::Bake(Kind::Shadow), first: index, count: tasks }, cost);
         }
         plan
@@ -286,13 +286,13 @@ pub(super) mod tests {
     fn slices_are_short_of_time_and_of_bytes() {
         let mut plan = plan(1, 1.0);
         assert_eq!((plan.slices[0].memory_mb, plan.slices[0].disk_kb), (BASE_MB + 1 + 1, 1000));
-        let large = Cost { seconds: 1.0, memory_mb: 5.0, bytes: 4e8 };
+        let large = TaskCost { seconds: 1.0, memory_mb: 5.0, bytes: 4e8 };
         (0..3).for_each(|_| plan.add(plan.tasks[0], large));
         let stated: Vec<_> = plan.slices.iter().map(|slice| (slice.count, slice.memory_mb, slice.disk_kb)).collect();
         assert_eq!(stated, [(3, BASE_MB + 5 + 801, 801_000), (1, BASE_MB + 5 + 400, 400_000)]);
         assert_eq!(Plan::fitting(large), 2);
-        assert_eq!(Plan::fitting(Cost { bytes: 2e9, ..large }), 1);
-        assert_eq!(Plan::fitting(Cost { bytes: 1.0, ..large }), 120);
+        assert_eq!(Plan::fitting(TaskCost { bytes: 2e9, ..large }), 1);
+        assert_eq!(Plan::fitting(TaskCost { bytes: 1.0, ..large }), 120);
     }
 
     /// Each thing that decides a result is part of its name.

@@ -22,7 +22,7 @@ pub type Entry = (u32, String, Vec<u8>);
 
 /// How the result of a slice stands.
 #[derive(Debug)]
-pub enum Found {
+pub enum SliceResult {
     /// It is there and intact.
     Whole(About, Vec<Entry>),
     /// There is none.
@@ -38,10 +38,10 @@ pub fn path(plan: &Plan, slice: usize) -> PathBuf {
 }
 
 /// Looks for the result of a slice and reads it.
-pub fn find(plan: &Plan, slice: usize) -> Found {
+pub fn find(plan: &Plan, slice: usize) -> SliceResult {
     let path = path(plan, slice);
     if !path.exists() {
-        return Found::Missing;
+        return SliceResult::Missing;
     }
     let tasks = plan.tasks_of(slice).len();
     let read = file::read::<About>(&path, MAGIC).and_then(|(about, payload)| {
@@ -51,8 +51,8 @@ pub fn find(plan: &Plan, slice: usize) -> Found {
         Ok((about, entries(&payload, tasks).ok_or_else(|| Error::input(&path, "malformed"))?))
     });
     match read {
-        Ok((about, entries)) => Found::Whole(about, entries),
-        Err(error) => Found::Damaged(error),
+        Ok((about, entries)) => SliceResult::Whole(about, entries),
+        Err(error) => SliceResult::Damaged(error),
     }
 }
 
@@ -117,7 +117,7 @@ fn entries(mut rest: &[u8], tasks: usize) -> Option<Vec<Entry>> {
 mod tests {
     use super::*;
     use crate::bake::kinds::Kind;
-    use crate::farm::plan::{Cost, DeviceClass, Input, Task, TaskKind, Work};
+    use crate::farm::plan::{DeviceClass, Input, Task, TaskCost, TaskKind, Work};
 
     #[test]
     fn results_are_found_missing_and_damaged() {
@@ -127,7 +127,7 @@ mod tests {
         plan.folder = folder.path().to_owned();
         plan.works.push(Work { words: Vec::new(), pictures: None });
         plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
-        let cost = Cost { seconds: 100.0, memory_mb: 1.0, bytes: 1.0 };
+        let cost = TaskCost { seconds: 100.0, memory_mb: 1.0, bytes: 1.0 };
         let task = |first| Task { work: 0, input: 0, kind: TaskKind::Bake(Kind::Shadow), first, count: 2 };
         (0..2).for_each(|part| plan.add(task(part), cost));
         let write = |slice, seconds, entries: &[Entry]| {
@@ -135,24 +135,24 @@ mod tests {
             entries.iter().for_each(|(task, name, bytes)| content.add(*task, name, bytes));
             content.write(&plan, slice, seconds).unwrap();
         };
-        assert!(matches!(find(&plan, 0), Found::Missing) && seconds(&plan, 0).is_none());
+        assert!(matches!(find(&plan, 0), SliceResult::Missing) && seconds(&plan, 0).is_none());
         let entries = vec![(0, "a.sf".to_owned(), vec![1, 2, 3]), (0, "b".to_owned(), Vec::new())];
         write(0, 2.5, &entries);
-        assert!(matches!(find(&plan, 0), Found::Whole(about, found) if about.seconds == 2.5 && found == entries));
+        assert!(matches!(find(&plan, 0), SliceResult::Whole(about, found) if about.seconds == 2.5 && found == entries));
         assert_eq!(seconds(&plan, 0), Some(2.5));
         let good = std::fs::read(path(&plan, 0)).unwrap();
         for at in (0..good.len()).step_by(7) {
             let mut bad = good.clone();
             bad[at] ^= 4;
             std::fs::write(path(&plan, 0), bad).unwrap();
-            assert!(matches!(find(&plan, 0), Found::Damaged(_)), "byte {at}");
+            assert!(matches!(find(&plan, 0), SliceResult::Damaged(_)), "byte {at}");
         }
         std::fs::create_dir_all(path(&plan, 1).parent().unwrap()).unwrap();
         std::fs::write(path(&plan, 1), &good).unwrap();
-        assert!(matches!(find(&plan, 1), Found::Damaged(_)), "another slice's");
+        assert!(matches!(find(&plan, 1), SliceResult::Damaged(_)), "another slice's");
         for (task, name) in [(0, "../a"), (0, ""), (0, ".a"), (1, "a")] {
             write(1, 1.0, &[(task, name.to_owned(), Vec::new())]);
-            assert!(matches!(find(&plan, 1), Found::Damaged(_)), "task {task}, name {name:?}");
+            assert!(matches!(find(&plan, 1), SliceResult::Damaged(_)), "task {task}, name {name:?}");
         }
         for no_time in [-1.0, 1e300, f64::NAN] {
             write(1, no_time, &[]);

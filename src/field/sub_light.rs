@@ -27,27 +27,27 @@ pub const STRIP: f64 = 2.5;
 
 /// The face that shines, in the mesh's own frame: around the origin, at right angles to +y.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Panel {
+pub enum LampFace {
     /// A disc of this share of its bounding sphere's disc.
     Disc(f64),
     /// A rectangle, and its edge along z over that along x.
     Rectangle(f64),
 }
 
-impl Panel {
+impl LampFace {
     /// Half the face's extent along x and along z, in bounding radii; of a disc the radius of a circle of equal area.
     pub fn half(self) -> DVec2 {
         match self {
-            Panel::Disc(share) => DVec2::splat(share.sqrt()),
-            Panel::Rectangle(ratio) => DVec2::new(1.0, ratio) / ratio.hypot(1.0),
+            LampFace::Disc(share) => DVec2::splat(share.sqrt()),
+            LampFace::Rectangle(ratio) => DVec2::new(1.0, ratio) / ratio.hypot(1.0),
         }
     }
 
     /// As shaders have it: less than 0 is a disc, more a rectangle.
     pub fn packed(self) -> f32 {
         match self {
-            Panel::Disc(share) => -share as f32,
-            Panel::Rectangle(ratio) => ratio as f32,
+            LampFace::Disc(share) => -share as f32,
+            LampFace::Rectangle(ratio) => ratio as f32,
         }
     }
 }
@@ -142,7 +142,7 @@ struct SeenPanel {
 
 /// A part of a light: a small round light.
 #[derive(Clone, Copy, Debug)]
-pub struct Part {
+pub struct LightPart {
     /// Unit direction of its middle.
     pub toward: DVec3,
     /// Distance of the light's surface in that direction.
@@ -168,11 +168,11 @@ impl SeenLight {
     }
 
     /// The face of a panel with that bounding sphere, turned by `rotation`.
-    pub fn panel(to: DVec3, radius: f64, panel: Panel, rotation: DQuat) -> Self {
+    pub fn panel(to: DVec3, radius: f64, panel: LampFace, rotation: DQuat) -> Self {
         let half = radius * panel.half();
         let (area, pattern) = match panel {
-            Panel::Disc(_) => (PI * half.x * half.y, Pattern::DISC),
-            Panel::Rectangle(_) => (4.0 * half.x * half.y, Pattern::rectangle(half)),
+            LampFace::Disc(_) => (PI * half.x * half.y, Pattern::DISC),
+            LampFace::Rectangle(_) => (4.0 * half.x * half.y, Pattern::rectangle(half)),
         };
         let half = [rotation * (half.x * DVec3::X), rotation * (half.y * DVec3::Z)];
         let seen = SeenPanel { normal: rotation * DVec3::Y, half, area, pattern };
@@ -180,7 +180,7 @@ impl SeenLight {
     }
 
     /// Its parts, block by block, and the direction of each block's middle.
-    pub fn blocks(&self) -> Vec<(DVec3, [Part; BLOCK])> {
+    pub fn blocks(&self) -> Vec<(DVec3, [LightPart; BLOCK])> {
         let pattern = self.panel.map_or(Pattern::DISC, |panel| panel.pattern);
         let of = |block: Block| match &self.panel {
             Some(panel) => {
@@ -212,9 +212,9 @@ impl SeenLight {
 
     /// On a disc at right angles to the light's middle a direction has the density 1 / tilt, so that the parts of a light above the
     /// horizon send exactly pi sin^2 n.w.
-    fn part_of_ball(&self, block: &Block, place: DVec2) -> Part {
+    fn part_of_ball(&self, block: &Block, place: DVec2) -> LightPart {
         let tilt = self.tilt(place);
-        Part {
+        LightPart {
             toward: self.direction(place),
             distance: self.distance * (tilt - self.sine * (1.0 - place.length_squared()).sqrt()),
             sine: self.sine * block.area.sqrt(),
@@ -228,16 +228,16 @@ impl SeenLight {
     }
 
     /// A part of a panel is a round light of the solid angle that a disc of its area has, which is below 2 pi however near it is.
-    fn part_of_panel(&self, panel: &SeenPanel, block: &Block, place: DVec2) -> Part {
+    fn part_of_panel(&self, panel: &SeenPanel, block: &Block, place: DVec2) -> LightPart {
         let to = self.place_on(panel, place);
         let (distance, toward) = (to.length(), to.normalize_or(self.toward));
         let area = panel.area * block.area;
         let whole = area * (-panel.normal.dot(toward)).max(0.0) / (distance * distance + area / PI);
-        Part { toward, distance, sine: (whole / PI).sqrt().min(MOST_SINE), weight: whole * block.weight }
+        LightPart { toward, distance, sine: (whole / PI).sqrt().min(MOST_SINE), weight: whole * block.weight }
     }
 }
 
-impl Part {
+impl LightPart {
     /// Irradiance of a surface with that normal, of radiance 1.
     pub fn share(&self, normal: DVec3) -> f64 {
         self.weight * self.cosine(normal)
@@ -329,7 +329,7 @@ mod tests {
             let turned = DQuat::from_rotation_x(3.0);
             for (distance, side, limit) in [(6.0, 0.0, 0.002), (3.0, 1.5, 0.005), (1.5, 0.5, 0.012), (0.8, 0.2, 0.03)] {
                 let to = DVec3::new(side, distance, 0.2);
-                let panel = Panel::Rectangle(z / x);
+                let panel = LampFace::Rectangle(z / x);
                 let light = SeenLight::panel(to, f64::hypot(x, z), panel, turned);
                 let corner = |(i, j): (f64, f64)| to + turned * DVec3::new(i * x, 0.0, j * z);
                 let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(corner);
@@ -343,7 +343,7 @@ mod tests {
         // A disc that faces the surface on its axis: pi r^2 / (d^2 + r^2).
         for (distance, limit) in [(8.0, 1e-3), (2.0, 5e-3), (0.5, 0.03)] {
             let turned = DQuat::from_rotation_z(PI);
-            let light = SeenLight::panel(distance * DVec3::Y, 0.5, Panel::Disc(1.0), turned);
+            let light = SeenLight::panel(distance * DVec3::Y, 0.5, LampFace::Disc(1.0), turned);
             let (found, exact) = (light.irradiance(DVec3::Y), PI * 0.25 / (distance * distance + 0.25));
             assert!((found / exact - 1.0).abs() < limit, "{distance}: {found} {exact}");
         }

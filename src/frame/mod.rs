@@ -34,7 +34,7 @@ use crate::lists::gathering::Gathering;
 use crate::lists::incremental::{ClusterLists, Merged};
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
-use crate::merge::{Inputs, Readable};
+use crate::merge::{MergeInputs, Readable};
 use crate::scene::{LightForm, Lights, Placement, Scene};
 use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
@@ -43,7 +43,7 @@ use ash::vk;
 use permutation::{CompiledMerge, harmonic_lights, permutation, usable};
 use picture::FramePicture;
 use pixel::PixelChains;
-use radiosity::Radiosity;
+use radiosity::RadiosityBuffers;
 use sky::SkyLight;
 use std::ops::Range;
 use std::sync::Arc;
@@ -76,7 +76,7 @@ pub struct Frame {
     sky: SkyLight,
     /// Chains of sharp lights for pixels.
     pixel: Option<PixelChains>,
-    radiosity: Radiosity,
+    radiosity: RadiosityBuffers,
     picture: FramePicture,
 }
 
@@ -105,7 +105,7 @@ impl Frame {
         let wanted = permutation(&options, wanted, harmonic_lights(scene, &forms), uniform_entities(device));
         let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted)?)?;
         let sharp = permutation::sharp(&options, &merge.permutation, &forms, scene, &buffers);
-        let radiosity = Radiosity::new(device, scene, &buffers, sharp.is_some())?;
+        let radiosity = RadiosityBuffers::new(device, scene, &buffers, sharp.is_some())?;
         let mut lists = ClusterLists::default();
         for (index, entity) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
             let device_mesh = &buffers.meshes[entity.mesh];
@@ -270,8 +270,8 @@ impl Frame {
         }))
     }
 
-    fn sharp_inputs(&self) -> sharp::Inputs<'_> {
-        sharp::Inputs {
+    fn sharp_inputs(&self) -> sharp::SharpInputs<'_> {
+        sharp::SharpInputs {
             entities: &self.work.entities,
             entries: self.work.entries(),
             clusters: &self.work.clusters,
@@ -283,10 +283,10 @@ impl Frame {
         }
     }
 
-    fn inputs(&self) -> Result<Inputs<'_>> {
+    fn inputs(&self) -> Result<MergeInputs<'_>> {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         let CompiledMerge { permutation, image, .. } = &self.merge;
-        Ok(Inputs {
+        Ok(MergeInputs {
             entities: Readable::shared(&self.work.entities, permutation.variant)?,
             entries: Readable::new(self.work.entries(), permutation.variant, ENTRY_FORMAT)?,
             clusters: Readable::new(&self.work.clusters, permutation.variant, CLUSTER_FORMAT)?,

@@ -91,7 +91,7 @@ pub(super) fn sharp(
         entity_limit: merge.entity_limit,
         silhouette: options.bake.silhouette,
         outlines: lights.contains(&&LightForm::Outline),
-        panels: lights.iter().any(|form| matches!(form, LightForm::Panel(_))),
+        panels: lights.iter().any(|form| matches!(form, LightForm::LampFace(_))),
         halves: any_field(SilhouetteField::has_halves),
         boxes: any_field(SilhouetteField::has_box),
         self_shadows: buffers.meshes.iter().any(|device_mesh| device_mesh.self_first != NONE),

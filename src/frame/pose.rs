@@ -6,9 +6,9 @@ use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
-use crate::lists::gather::{Bounds, EntityBounds, OutlineView, SceneBounds};
+use crate::lists::gather::{ClusterBounds, EntityBounds, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
-use crate::lists::sight::Faces;
+use crate::lists::sight::TriangleRun;
 use crate::scene::{Entity, LightForm, Placement};
 use crate::scene_buffers::{self, FieldSlot};
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
@@ -95,7 +95,7 @@ impl Frame {
         let terms = area.terms.map(|term| term as f32);
         let (share, panel) = match self.light_form(index) {
             LightForm::Ball(share) => (share, 0.0),
-            LightForm::Panel(panel) => (1.0, panel.packed()),
+            LightForm::LampFace(panel) => (1.0, panel.packed()),
             LightForm::Harmonics | LightForm::Outline => (0.0, 0.0),
         };
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());
@@ -155,7 +155,7 @@ pub(super) fn clusters(
     bands: usize,
 ) -> Vec<Member> {
     let transfer_quads = (channel_stride(bands) / 4) as u32;
-    let cluster = |(i, (bounds, faces)): (usize, (&Bounds, &Faces))| {
+    let cluster = |(i, (bounds, faces)): (usize, (&ClusterBounds, &TriangleRun))| {
         let first = i as u32 * CLUSTER_VERTICES;
         let cluster = layout::Cluster {
             receiver: receiver as u32,

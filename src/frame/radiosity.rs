@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// Four floats a vertex: linear RGB radiance that leaves the surface, and 0. The vertices of one entity follow those of another, each
 /// in the order of its mesh's [`crate::scene_buffers::DeviceMesh`].
-pub(super) struct Radiosity {
+pub(super) struct RadiosityBuffers {
     /// Light of all lights.
     pub merged: Buffer,
     /// Light without that of sharp lights, in a scene that has any: what the merge writes then.
@@ -21,7 +21,7 @@ pub(super) struct Radiosity {
     comparisons: [Option<Buffer>; 2],
 }
 
-impl Radiosity {
+impl RadiosityBuffers {
     /// Zero for every vertex of a scene.
     ///
     /// # Errors
@@ -35,7 +35,7 @@ impl Radiosity {
         let mut merged = Buffer::new(device, "radiosity", BufferKind::Device, size_bytes.max(16))?;
         merged.fill(0, &vec![0.0_f32; merged.size_bytes as usize / 4])?;
         let soft = || Buffer::new(device, "soft radiosity", BufferKind::Device, merged.size_bytes);
-        Ok(Radiosity {
+        Ok(RadiosityBuffers {
             soft: sharp.then(soft).transpose()?,
             merged,
             replaced: false,

@@ -8,7 +8,7 @@ use crate::draw::{Draw, DrawnViewport};
 use crate::error::Result;
 use crate::gpu::{self, Access, Buffer, Commands, Drawing, Image};
 use crate::lists::gathering::Gathering;
-use crate::merge::{Inputs, Merge};
+use crate::merge::{Merge, MergeInputs};
 use crate::sharp::{self, Sharp};
 use glam::Vec3;
 
@@ -19,10 +19,10 @@ pub struct MergeWork<'f> {
     pub(super) entities: &'f Buffer,
     pub(super) clusters: &'f Buffer,
     pub(super) cluster_count: u32,
-    pub(super) inputs: Inputs<'f>,
+    pub(super) inputs: MergeInputs<'f>,
     pub(super) merge: &'f Merge,
     /// The pass of sharp lights with what it reads; `None` where the scene has none.
-    pub(super) sharp: Option<(&'f Sharp, sharp::Inputs<'f>)>,
+    pub(super) sharp: Option<(&'f Sharp, sharp::SharpInputs<'f>)>,
     /// What the merge writes: all light, or what the pass of sharp lights adds to.
     pub(super) soft: &'f Buffer,
     pub(super) radiosity: &'f Buffer,

@@ -1,7 +1,7 @@
 //! Pass "gather": which lookups each cluster of vertices needs, in which order. It runs on the device as a pass of the frame, or on
 //! the host.
 //!
-//! Inputs: bounding spheres of the entities, their switches, bounds of the clusters. Output: a list of [`layout::ListEntry`]s a cluster.
+//! GatherInputs: bounding spheres of the entities, their switches, bounds of the clusters. Output: a list of [`layout::ListEntry`]s a cluster.
 //! An entry is left off when it changes no vertex of the cluster (an occluder farther than the light from all of them, or one
 //! that the skips in `merge_cone.glsl` weigh with zero everywhere), and, with a threshold `eps`, when the light that it could
 //! take or bring is bounded below it.
@@ -19,7 +19,9 @@ use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{self, ENTRY_BITS};
 pub use crate::lists::host::{Candidates, counts, twin};
-pub use crate::lists::scene_bounds::{Bounds, Counts, EntityBounds, Light, OutlineView, SceneBounds, distance_key};
+pub use crate::lists::scene_bounds::{
+    ClusterBounds, Counts, EntityBounds, ListLight, OutlineView, SceneBounds, distance_key,
+};
 pub use crate::lists::scope::{SLACK, Scope};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD, Skip};
 use crate::lists::tree::Crowd;
@@ -69,9 +71,9 @@ impl Place {
 
 /// Whether clusters are as near one another as neighbours on a surface are, so that they make a group: a space-filling curve leaps
 /// at times. It does not help against a single cluster that spans a leap.
-pub fn compact(clusters: &[Bounds]) -> bool {
+pub fn compact(clusters: &[ClusterBounds]) -> bool {
     let largest = clusters.iter().map(|bounds| bounds.radius_m).fold(0.0, f32::max);
-    Bounds::union(clusters).radius_m <= 2.0 * largest * (clusters.len() as f32).sqrt()
+    ClusterBounds::union(clusters).radius_m <= 2.0 * largest * (clusters.len() as f32).sqrt()
 }
 
 /// Neighbouring clusters of one receiver that a workgroup gathers for.
@@ -175,12 +177,12 @@ impl Packed {
 }
 
 /// What the pass reads and writes.
-pub struct Inputs<'b> {
+pub struct GatherInputs<'b> {
     /// [`Packed::quads`].
     pub scene_quads: &'b Buffer,
     /// [`layout::DeviceEntity`] of every entity.
     pub entities: &'b Buffer,
-    /// [`Bounds`] of clusters and groups.
+    /// [`ClusterBounds`] of clusters and groups.
     pub bounds: &'b Buffer,
     /// [`Group`]s.
     pub groups: &'b Buffer,
@@ -253,7 +255,7 @@ impl Gather {
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
-        inputs: &Inputs<'r>,
+        inputs: &GatherInputs<'r>,
         packed: &Packed,
         capacity: u32,
         group_count: u32,

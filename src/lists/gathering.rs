@@ -3,7 +3,7 @@
 
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Commands, Device, FLIGHTS, Upload};
-use crate::lists::gather::{Gather, Inputs, Packed, Report};
+use crate::lists::gather::{Gather, GatherInputs, Packed, Report};
 use crate::lists::incremental::{ClusterLists, Dirty};
 use crate::shaders::Library;
 use std::sync::Arc;
@@ -97,7 +97,7 @@ impl Gathering {
     /// As [`Gather::record`].
     pub fn record<'f>(&'f self, commands: &mut Commands<'f>, entities: &'f Buffer, clusters: &'f Buffer) -> Result<()> {
         let Some((packed, capacity, group_count)) = &self.packed else { return Ok(()) };
-        let inputs = Inputs {
+        let inputs = GatherInputs {
             scene_quads: &self.scene_quads,
             entities,
             bounds: &self.bounds,

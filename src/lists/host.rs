@@ -2,7 +2,7 @@
 //! leave off a little more, as the host looks at outlines too ([`Scope::outline_result`]).
 
 use crate::layout::{self, ListEntry};
-use crate::lists::scene_bounds::{Bounds, Counts, Light, SceneBounds};
+use crate::lists::scene_bounds::{ClusterBounds, Counts, ListLight, SceneBounds};
 use crate::lists::scope::{CullResult, SLACK, Scope, SphereView};
 
 /// What may matter to any cluster of a group.
@@ -10,12 +10,12 @@ pub struct Candidates {
     /// Occluders in the order in which they are multiplied ([`SceneBounds::order`]), the receiver left out.
     occluders: Vec<u32>,
     /// Lights in the order of entities, the receiver left out.
-    lights: Vec<Light>,
+    lights: Vec<ListLight>,
 }
 
 impl Candidates {
     /// What may matter to any cluster of a group with these bounds, found with twice the slack of the lists.
-    pub fn of_group(scene: &SceneBounds, receiver: u32, entity: &layout::DeviceEntity, bounds: &Bounds) -> Self {
+    pub fn of_group(scene: &SceneBounds, receiver: u32, entity: &layout::DeviceEntity, bounds: &ClusterBounds) -> Self {
         let scope = Scope::new(scene, entity, bounds, 2.0 * SLACK);
         let mut occluders = Vec::new();
         scene.tree.find(|crowd| scope.leaves_out(crowd), |j| occluders.push(j));
@@ -27,7 +27,7 @@ impl Candidates {
         Self::new(scene, receiver, scene.occluders.clone(), |_| true)
     }
 
-    fn new(scene: &SceneBounds, receiver: u32, mut occluders: Vec<u32>, keeps: impl Fn(&Light) -> bool) -> Self {
+    fn new(scene: &SceneBounds, receiver: u32, mut occluders: Vec<u32>, keeps: impl Fn(&ListLight) -> bool) -> Self {
         occluders.retain(|&j| j != receiver);
         occluders.sort_by_cached_key(|&j| scene.order(receiver, j));
         let lights = scene.lights.iter().filter(|light| light.entity != receiver && keeps(light));

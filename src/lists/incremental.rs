@@ -10,8 +10,8 @@
 //! once nothing moves any more.
 
 use crate::layout::{self, ListEntry};
-use crate::lists::gather::{self, Bounds, Candidates, Counts, GROUP_CLUSTERS, SLACK, SceneBounds, Scope};
-use crate::lists::sight::{Faces, Sight};
+use crate::lists::gather::{self, Candidates, ClusterBounds, Counts, GROUP_CLUSTERS, SLACK, SceneBounds, Scope};
+use crate::lists::sight::{Sight, TriangleRun};
 use crate::scene::Placement;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -31,7 +31,7 @@ pub(crate) struct State {
 struct WatchedGroup {
     receiver: usize,
     clusters: Range<usize>,
-    bounds: Bounds,
+    bounds: ClusterBounds,
 }
 
 /// Clusters of one group that are to be merged.
@@ -52,9 +52,9 @@ pub(crate) struct Member {
     /// The cluster; its list follows separately.
     pub cluster: layout::Cluster,
     /// Bounds of its vertices.
-    pub bounds: Bounds,
+    pub bounds: ClusterBounds,
     /// The triangles by which its light is seen.
-    pub faces: Faces,
+    pub faces: TriangleRun,
 }
 
 /// The clusters of all receivers, and which of them have changed since they were merged.
@@ -62,8 +62,8 @@ pub(crate) struct Member {
 pub(crate) struct ClusterLists {
     /// The clusters; their lists follow separately.
     pub clusters: Vec<layout::Cluster>,
-    bounds: Vec<Bounds>,
-    faces: Vec<Faces>,
+    bounds: Vec<ClusterBounds>,
+    faces: Vec<TriangleRun>,
     groups: Vec<WatchedGroup>,
     now: Option<State>,
     /// Every cluster has changed since the last update by something that no [`State`] holds.
@@ -90,7 +90,7 @@ impl ClusterLists {
     /// Adds the clusters of one receiver, neighbours beside each other.
     pub fn add(&mut self, receiver: usize, clusters: Vec<Member>) {
         let first = self.clusters.len();
-        let all: Vec<Bounds> = clusters.iter().map(|member| member.bounds).collect();
+        let all: Vec<ClusterBounds> = clusters.iter().map(|member| member.bounds).collect();
         let mut start = 0;
         while start < all.len() {
             let mut end = start + 1;
@@ -98,7 +98,7 @@ impl ClusterLists {
                 end += 1;
             }
             let clusters = first + start..first + end;
-            self.groups.push(WatchedGroup { receiver, clusters, bounds: Bounds::union(&all[start..end]) });
+            self.groups.push(WatchedGroup { receiver, clusters, bounds: ClusterBounds::union(&all[start..end]) });
             start = end;
         }
         for Member { cluster, bounds, faces } in clusters {
@@ -110,7 +110,7 @@ impl ClusterLists {
     }
 
     /// Bounds of all clusters and then of all groups.
-    pub fn all_bounds(&self) -> Vec<Bounds> {
+    pub fn all_bounds(&self) -> Vec<ClusterBounds> {
         self.bounds.iter().copied().chain(self.groups.iter().map(|group| group.bounds)).collect()
     }
 
@@ -246,7 +246,7 @@ impl ClusterLists {
     pub fn sharp_chains(&self, receiver: usize, margin_m: f32) -> (Vec<[u32; 2]>, Vec<u32>) {
         let now = self.now();
         let entity = &now.entities[receiver];
-        let around = |bounds: &Bounds| Bounds { radius_m: bounds.radius_m + margin_m, ..*bounds };
+        let around = |bounds: &ClusterBounds| ClusterBounds { radius_m: bounds.radius_m + margin_m, ..*bounds };
         let of_group = |group: &&WatchedGroup| {
             let bounds = around(&group.bounds);
             let candidates = Candidates::of_group(&now.scene_bounds, receiver as u32, entity, &bounds);
@@ -317,7 +317,8 @@ impl ClusterLists {
 
     /// Host memory of the clusters, bytes.
     pub fn size_bytes(&self) -> u64 {
-        (self.clusters.len() * (size_of::<layout::Cluster>() + size_of::<Bounds>() + size_of::<Faces>() + 1)) as u64
+        (self.clusters.len()
+            * (size_of::<layout::Cluster>() + size_of::<ClusterBounds>() + size_of::<TriangleRun>() + 1)) as u64
     }
 }
 
@@ -343,7 +344,7 @@ impl<'b> Moved<'b> {
     }
 
     /// Moved entities that may stand on the list of a cluster within these bounds, before or now; its receiver has not moved.
-    fn near(&self, now: &State, receiver: usize, bounds: &Bounds) -> Vec<usize> {
+    fn near(&self, now: &State, receiver: usize, bounds: &ClusterBounds) -> Vec<usize> {
         let both = [&self.before.scene_bounds, &now.scene_bounds];
         let scopes = both.map(|scene| Scope::new(scene, &now.entities[receiver], bounds, 2.0 * SLACK));
         let near = |j: usize| j != receiver && scopes.iter().any(|scope| scope.may_list(j));
@@ -352,7 +353,7 @@ impl<'b> Moved<'b> {
 
     /// Whether any of `list` may stand on the list of a cluster, before or now: with twice the slack, so that it holds for lists that
     /// either host or device made.
-    fn any_on_list(&self, now: &State, receiver: usize, bounds: &Bounds, list: &[usize]) -> bool {
+    fn any_on_list(&self, now: &State, receiver: usize, bounds: &ClusterBounds, list: &[usize]) -> bool {
         let on = |scene: &SceneBounds| {
             let scope = Scope::new(scene, &now.entities[receiver], bounds, 2.0 * SLACK);
             list.iter().any(|&j| scope.lists(j, receiver as u32))

@@ -16,7 +16,7 @@ const CONE_ROUNDING_RAD: f64 = 1e-3;
 /// Where a cluster's vertices are and where they face, in its mesh's frame: metres from the bounding sphere's centre.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Bounds {
+pub struct ClusterBounds {
     /// Centre of a sphere around the vertices.
     pub centre: [f32; 3],
     /// Its radius in metres.
@@ -27,11 +27,11 @@ pub struct Bounds {
     pub cosine: f32,
 }
 
-impl Bounds {
+impl ClusterBounds {
     /// A sphere around the vertices and a cone around their normals, angle in radians, pi where it bounds nothing.
     pub fn from_parts(centre: DVec3, radius_m: f64, axis: DVec3, spread_rad: f64) -> Self {
         let rounded = centre.as_vec3();
-        Bounds {
+        ClusterBounds {
             centre: rounded.to_array(),
             // What rounding of the centre, here and where it is turned, may add.
             radius_m: ((radius_m + centre.distance(rounded.as_dvec3()) + 1e-6 * centre.length()) * (1.0 + 1e-6)) as f32,
@@ -48,7 +48,7 @@ impl Bounds {
     }
 
     /// Bounds of neighbouring clusters.
-    pub fn union(parts: &[Bounds]) -> Self {
+    pub fn union(parts: &[ClusterBounds]) -> Self {
         let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let spheres = parts.iter().map(|b| (vector(b.centre), f64::from(b.radius_m)));
         let cones = parts.iter().map(|b| (vector(b.axis), f64::from(b.cosine).acos()));
@@ -102,7 +102,7 @@ pub struct OutlineView {
 /// A light as the gather sees it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Light {
+pub struct ListLight {
     /// Axis (world) and cosine of the half-angle, with `CONE_ROUNDING_RAD`, of a cone of directions outside of which its radiance
     /// field is zero; cosine -2 where it shines all round.
     pub facing: [f32; 4],
@@ -129,7 +129,7 @@ pub struct SceneBounds {
     /// Indices of those that occlude.
     pub occluders: Vec<u32>,
     /// Those that shine, the sharp ones first, each in the order of entities.
-    pub lights: Vec<Light>,
+    pub lights: Vec<ListLight>,
     /// Largest radiance of distant light, if there is any.
     pub sky: Option<f32>,
     /// Radiance of the brightest light, distant or not.
@@ -146,7 +146,7 @@ impl SceneBounds {
         let sphere = |entity: &EntityBounds| entity.centre.as_vec3().extend(entity.radius_m as f32).to_array();
         let spheres: Vec<[f32; 4]> = entities.iter().map(sphere).collect();
         let occluders: Vec<u32> = (0..entities.len()).filter(|&j| entities[j].occludes).map(|j| j as u32).collect();
-        let lights = entities.iter().enumerate().filter(|(_, entity)| entity.emits).map(|(j, entity)| Light {
+        let lights = entities.iter().enumerate().filter(|(_, entity)| entity.emits).map(|(j, entity)| ListLight {
             facing: entity.facing.map_or([0.0, 0.0, 0.0, -2.0], |(axis, half_angle)| {
                 axis.as_vec3().extend((half_angle + CONE_ROUNDING_RAD).min(PI).cos() as f32).to_array()
             }),
@@ -156,7 +156,7 @@ impl SceneBounds {
             sharp: u32::from(entity.sharp),
         });
         // The chains of sharp lights come first on every list.
-        let (sharp, others): (Vec<Light>, Vec<Light>) = lights.partition(|light| light.sharp != 0);
+        let (sharp, others): (Vec<ListLight>, Vec<ListLight>) = lights.partition(|light| light.sharp != 0);
         let lights = [sharp, others].concat();
         let sky = sky.map(|sky| sky as f32);
         let brightest = lights.iter().map(|light| light.radiance).fold(sky.unwrap_or(0.0), f32::max);

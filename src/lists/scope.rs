@@ -12,7 +12,7 @@
 use crate::field::silhouette::{INSIDE, REACH, Side};
 use crate::layout;
 use crate::layout::{COSINE_LOBE, EVERYTHING};
-use crate::lists::scene_bounds::{Bounds, EntityBounds, Light, SceneBounds};
+use crate::lists::scene_bounds::{ClusterBounds, EntityBounds, ListLight, SceneBounds};
 use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 use glam::{DVec2, DVec3};
@@ -138,7 +138,7 @@ pub struct Scope<'m> {
 
 impl<'m> Scope<'m> {
     /// Places bounds of a receiver's mesh in the world.
-    pub fn new(scene: &'m SceneBounds, receiver: &layout::DeviceEntity, bounds: &Bounds, slack: f64) -> Self {
+    pub fn new(scene: &'m SceneBounds, receiver: &layout::DeviceEntity, bounds: &ClusterBounds, slack: f64) -> Self {
         let scale = f64::from(receiver.albedo[3]);
         let [x, y, z, _] = receiver.centre;
         let vector = |[x, y, z]: [f32; 3]| DVec3::new(x.into(), y.into(), z.into());
@@ -182,7 +182,7 @@ impl<'m> Scope<'m> {
     }
 
     /// What becomes of a light.
-    pub fn light_result(&self, light: &Light, view: &SphereView) -> CullResult {
+    pub fn light_result(&self, light: &ListLight, view: &SphereView) -> CullResult {
         if view.below {
             return CullResult::BelowHorizon;
         }

@@ -7,7 +7,7 @@
 
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
-use crate::lists::scene_bounds::Bounds;
+use crate::lists::scene_bounds::ClusterBounds;
 use glam::{DMat4, DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 
@@ -21,7 +21,7 @@ const ROUNDING: f32 = 4e-6;
 
 /// A run of triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Faces {
+pub struct TriangleRun {
     /// Centre of a sphere around their corners, metres from that of the mesh's bounding sphere.
     centre: Vec3,
     /// Its radius in metres.
@@ -36,9 +36,9 @@ pub struct Faces {
     rim: bool,
 }
 
-impl Faces {
+impl TriangleRun {
     /// For each run of `count` vertices of a mesh, in a given order, the triangles that use one of them: these show its light.
-    pub fn around(mesh: &Mesh, order: &[u32], count: usize) -> Vec<Faces> {
+    pub fn around(mesh: &Mesh, order: &[u32], count: usize) -> Vec<TriangleRun> {
         let runs = order.len().div_ceil(count);
         let mut run_of = vec![0_u32; order.len()];
         for (place, &v) in order.iter().enumerate() {
@@ -60,7 +60,7 @@ impl Faces {
                 next[run as usize] += 1;
             }
         }
-        let mut faces: Vec<Faces> =
+        let mut faces: Vec<TriangleRun> =
             (0..runs).into_par_iter().map(|run| Self::of(mesh, &members[ends[run]..ends[run + 1]])).collect();
         for v in Grid::find(mesh).iter().flat_map(Grid::rim) {
             faces[run_of[v as usize] as usize].rim = true;
@@ -69,7 +69,7 @@ impl Faces {
     }
 
     /// The run of some triangles of a mesh.
-    pub fn of(mesh: &Mesh, triangles: &[[u32; 3]]) -> Faces {
+    pub fn of(mesh: &Mesh, triangles: &[[u32; 3]]) -> TriangleRun {
         let (middle, _) = mesh.bounding_sphere();
         let at = |v: u32| mesh.positions[v as usize] - middle;
         let corners: Vec<Vec3> = triangles.iter().flatten().map(|&v| at(v)).collect();
@@ -79,12 +79,12 @@ impl Faces {
             (b - a).cross(c - a).try_normalize().map(|n| n.as_vec3())
         };
         let normals: Vec<Vec3> = triangles.iter().filter_map(normal).collect();
-        let bounds = Bounds::new(&corners, &normals);
+        let bounds = ClusterBounds::new(&corners, &normals);
         let centre = Vec3::from_array(bounds.centre);
         let half = corners.iter().fold(Vec3::ZERO, |half, corner| half.max((*corner - centre).abs()));
         let spread = f64::from(bounds.cosine).acos() + BACK_RAD;
         let known = Vec3::from_array(bounds.axis) != Vec3::ZERO;
-        Faces {
+        TriangleRun {
             centre,
             radius_m: bounds.radius_m,
             half_m: half + Vec3::splat(1e-6 * (centre.length() + bounds.radius_m)),
@@ -184,7 +184,7 @@ impl Sight {
     }
 
     /// Whether any of some triangles may be seen.
-    pub fn may_see(&self, faces: &Faces) -> bool {
+    pub fn may_see(&self, faces: &TriangleRun) -> bool {
         // A pixel whose centre lies beyond the rim of a grid shows the light of the nearest cell, which may be any cell of the rim.
         if self.samples && faces.rim {
             return true;
@@ -220,7 +220,7 @@ mod tests {
             order.sort_by_cached_key(|&v| morton((mesh.positions[v as usize] - centre) / radius_m));
             let mut run_of = vec![0; order.len()];
             order.iter().enumerate().for_each(|(place, &v)| run_of[v as usize] = place / 64);
-            let faces = Faces::around(mesh, &order, 64);
+            let faces = TriangleRun::around(mesh, &order, 64);
             let (mut unseen, mut all, mut backs) = (0, 0, 0);
             for _ in 0..60 {
                 let mut point = |reach: f64| reach * DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5);
@@ -264,11 +264,11 @@ mod tests {
     fn the_rim_of_a_grid_is_seen_with_samples() {
         let mesh = plane(2.0, 40);
         let order: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-        let faces = Faces::around(&mesh, &order, 64);
+        let faces = TriangleRun::around(&mesh, &order, 64);
         assert!(faces.first().unwrap().rim && faces.last().unwrap().rim);
         // Rows of 41 vertices: each run of 64 holds an end of one.
         let cells = Grid::find(&mesh).unwrap().rim().count();
         assert_eq!(cells, 4 * (4 * 40 - 4));
-        assert!(Faces::around(&sphere(1.0, 3), &order[..642], 64).iter().all(|faces| !faces.rim));
+        assert!(TriangleRun::around(&sphere(1.0, 3), &order[..642], 64).iter().all(|faces| !faces.rim));
     }
 }

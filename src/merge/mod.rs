@@ -1,6 +1,6 @@
 //! Pass "merge": light on every vertex of every receiver.
 //!
-//! Inputs: entities, clusters and their entries (see [`crate::lists::gather`]), the fields, transfer vectors,
+//! MergeInputs: entities, clusters and their entries (see [`crate::lists::gather`]), the fields, transfer vectors,
 //! vertices (position and normal, object frame, two quads each), the sky's coefficients. Output: `radiosity`, four floats a
 //! vertex: radiance that leaves the surface, albedo / pi times the integral of incoming light, without emission.
 
@@ -66,7 +66,7 @@ impl<'b> Readable<'b> {
 }
 
 /// Everything that a merge reads.
-pub struct Inputs<'b> {
+pub struct MergeInputs<'b> {
     /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: Readable<'b>,
     /// Entries of all clusters.
@@ -104,7 +104,7 @@ impl Merge {
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
-        inputs: &Inputs<'r>,
+        inputs: &MergeInputs<'r>,
         radiosity: &'r Buffer,
         cluster_count: u32,
     ) -> Result<()> {

@@ -1,6 +1,6 @@
 //! Pass "product": chains of products alone, for measuring and testing what is inside the merge.
 //!
-//! Inputs: `transfers`, the coefficients of a chain an invocation; `factors`, a blocked part each. Output: `products`, the chain's
+//! MergeInputs: `transfers`, the coefficients of a chain an invocation; `factors`, a blocked part each. Output: `products`, the chain's
 //! coefficients after a number of multiplications by 1 - b, where b fades by a factor each step.
 
 use crate::error::Result;
@@ -16,7 +16,7 @@ const WORKGROUP: u32 = 64;
 
 /// Which product, of what.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shape {
+pub struct ProductShape {
     /// How it is done.
     pub chain: Chain,
     /// SH bands of the chain.
@@ -44,7 +44,7 @@ pub struct Products {
 
 impl Products {
     /// The row of the shader table; without `multiply`, the loop alone.
-    pub fn row(shape: Shape, multiply: bool) -> ShaderPermutation {
+    pub fn row(shape: ProductShape, multiply: bool) -> ShaderPermutation {
         let style = shape.chain.product.style(shape.bands, shape.field_bands);
         ShaderPermutation::new("product.comp", shape.bands)
             .field_bands(shape.field_bands)
@@ -61,7 +61,7 @@ impl Products {
     /// # Errors
     /// `Failed` when the shader does not compile: products at points want transfer and factors of the same bands, at most
     /// [`crate::sh::points::BANDS`].
-    pub fn new(device: &Arc<Device>, library: &Library, shape: Shape, multiply: bool) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, library: &Library, shape: ProductShape, multiply: bool) -> Result<Self> {
         let shader = library.shader(&Self::row(shape, multiply))?;
         Ok(Products { pipeline: ComputePipeline::new(device, "product", &shader, &[])? })
     }
@@ -82,7 +82,7 @@ impl Products {
 }
 
 /// The CPU twin of one chain.
-pub fn twin(shape: Shape, transfer: &[f64], factor: &[f64], push: Push) -> Vec<f64> {
+pub fn twin(shape: ProductShape, transfer: &[f64], factor: &[f64], push: Push) -> Vec<f64> {
     let multiplier = Multiplier::new(shape.chain, shape.bands, shape.field_bands);
     let mut state = multiplier.begin(transfer);
     let mut blocked = [0.0; MAX_COEFFICIENTS];

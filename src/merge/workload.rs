@@ -9,7 +9,7 @@ use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, DeviceEntity, ENT
 use crate::lists::skip::Skip;
 use crate::merge::shelf::ImageShelf;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
-use crate::merge::{Inputs, Merge, Readable};
+use crate::merge::{Merge, MergeInputs, Readable};
 use crate::sh::rotation::turns;
 use ash::vk;
 use glam::{DQuat, DVec3};
@@ -151,9 +151,9 @@ impl Workload {
     ///
     /// # Errors
     /// As [`Readable::new`].
-    pub fn inputs(&self, variant: Variant) -> Result<Inputs<'_>> {
+    pub fn inputs(&self, variant: Variant) -> Result<MergeInputs<'_>> {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
-        Ok(Inputs {
+        Ok(MergeInputs {
             entities: Readable::shared(&self.entities, variant)?,
             entries: Readable::new(&self.entries, variant, ENTRY_FORMAT)?,
             clusters: Readable::new(&self.clusters, variant, CLUSTER_FORMAT)?,
@@ -168,7 +168,7 @@ impl Workload {
     ///
     /// # Errors
     /// `Device` when the device was lost.
-    pub fn run(&self, merge: &Merge, inputs: &Inputs<'_>) -> Result<f64> {
+    pub fn run(&self, merge: &Merge, inputs: &MergeInputs<'_>) -> Result<f64> {
         let device = self.radiosity.device();
         let mut commands = Commands::new(device, "workload")?;
         let clusters = self.vertex_count / CLUSTER_VERTICES;

@@ -1,7 +1,7 @@
 //! How a scene's lights are computed: by spherical harmonics, or as sharp lights whose shadows have edges.
 
 use super::Scene;
-use crate::field::sub_light::Panel;
+use crate::field::sub_light::LampFace;
 use serde::{Deserialize, Serialize};
 
 /// Which lights are sharp.
@@ -27,7 +27,7 @@ pub enum LightForm {
     /// As a sharp light of the mesh's own outline.
     Outline,
     /// As a sharp light that shines from one flat side.
-    Panel(Panel),
+    LampFace(LampFace),
 }
 
 impl LightForm {
@@ -36,7 +36,7 @@ impl LightForm {
         let mesh = &scene.meshes[scene.entities[entity].mesh];
         match mesh.panel() {
             _ if lights == Lights::Sh => LightForm::Harmonics,
-            Some(panel) => LightForm::Panel(panel),
+            Some(panel) => LightForm::LampFace(panel),
             None if mesh.colors.is_some() => LightForm::Harmonics,
             None => mesh.ball_share().map_or(LightForm::Outline, LightForm::Ball),
         }
@@ -53,8 +53,8 @@ impl LightForm {
             LightForm::Harmonics => "spherical harmonics",
             LightForm::Ball(_) => "sharp, a ball",
             LightForm::Outline => "sharp, the mesh's outline",
-            LightForm::Panel(Panel::Disc(_)) => "sharp, a disc",
-            LightForm::Panel(Panel::Rectangle(_)) => "sharp, a rectangle",
+            LightForm::LampFace(LampFace::Disc(_)) => "sharp, a disc",
+            LightForm::LampFace(LampFace::Rectangle(_)) => "sharp, a rectangle",
         }
     }
 }

@@ -8,7 +8,7 @@
 use crate::asset::mesh::Mesh;
 use crate::bake::triangles::unit_positions;
 use crate::layout::CLUSTER_VERTICES;
-use crate::lists::gather::{Bounds, GROUP_CLUSTERS};
+use crate::lists::gather::{ClusterBounds, GROUP_CLUSTERS};
 use glam::Vec3;
 
 /// The distance, in bounding radii, that the length of a normal counts as. It is a little more than the edge of a cube with that radius
@@ -58,12 +58,12 @@ fn halve(points: &mut [Point]) {
 }
 
 /// Bounds of every run of [`CLUSTER_VERTICES`], relative to the bounding sphere's centre.
-pub(crate) fn bounds(mesh: &Mesh, order: &[u32]) -> Vec<Bounds> {
+pub(crate) fn bounds(mesh: &Mesh, order: &[u32]) -> Vec<ClusterBounds> {
     let (centre, _) = mesh.bounding_sphere();
     let bounds = |run: &[u32]| {
         let positions: Vec<Vec3> = run.iter().map(|&v| mesh.positions[v as usize] - centre).collect();
         let normals: Vec<Vec3> = run.iter().map(|&v| mesh.normals[v as usize]).collect();
-        Bounds::new(&positions, &normals)
+        ClusterBounds::new(&positions, &normals)
     };
     order.chunks(CLUSTER_VERTICES as usize).map(bounds).collect()
 }

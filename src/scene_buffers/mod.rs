@@ -17,8 +17,8 @@ use crate::field::quantity::{Storage, channel_stride};
 use crate::field::self_visibility::{self, BYTES};
 use crate::gpu::{Buffer, Device, Volume};
 use crate::layout::{CLUSTER_VERTICES, NONE};
-use crate::lists::gather::Bounds;
-use crate::lists::sight::Faces;
+use crate::lists::gather::ClusterBounds;
+use crate::lists::sight::TriangleRun;
 use crate::scene::{Lights, Scene};
 pub use field_atlas::FieldSlot;
 use glam::DVec3;
@@ -37,9 +37,9 @@ pub struct DeviceMesh {
     /// Which vertex of the mesh stands at each place of that range. Neighbours stand together.
     pub order: Vec<u32>,
     /// Bounds of every cluster of [`crate::layout::CLUSTER_VERTICES`] vertices.
-    pub clusters: Vec<Bounds>,
+    pub clusters: Vec<ClusterBounds>,
     /// The faces around each cluster, which decide whether a camera sees it.
-    pub faces: Vec<Faces>,
+    pub faces: Vec<TriangleRun>,
     /// First quad of its transfer vectors, or [`NONE`] where the cosine lobe of the normal is exact.
     pub transfer_first: u32,
     /// Occlusion field, if an entity needs one.
@@ -171,7 +171,7 @@ impl Packing {
             self_maps: baked.self_visibility.clone(),
             vertices: vertex_first / 2..vertices.len() as u32 / 2,
             clusters: clusters::bounds(mesh, &order),
-            faces: Faces::around(mesh, &order, CLUSTER_VERTICES as usize),
+            faces: TriangleRun::around(mesh, &order, CLUSTER_VERTICES as usize),
             transfer_first,
             blocked,
             radiance,

@@ -1,6 +1,6 @@
 //! Pass "sharp": light of sharp lights on every vertex of every receiver, with what the merge has written.
 //!
-//! Inputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and vertices
+//! SharpInputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and vertices
 //! (position and normal, object frame, two quads each). A light is cut into parts ([`crate::field::sub_light`]); in
 //! each part the visibilities past all occluders are multiplied. Output: `radiosity`, as [`crate::merge`] has it, and
 //! albedo / pi times the irradiance of sharp lights. Where pixels read them, the fourth number is 1 on vertices that a
@@ -149,7 +149,7 @@ impl SharpPermutation {
 }
 
 /// Everything that the pass reads.
-pub struct Inputs<'b> {
+pub struct SharpInputs<'b> {
     /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: &'b Buffer,
     /// Entries of all clusters.
@@ -192,7 +192,7 @@ impl Sharp {
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
-        inputs: &Inputs<'r>,
+        inputs: &SharpInputs<'r>,
         radiosity: &'r Buffer,
         cluster_count: u32,
     ) -> Result<()> {

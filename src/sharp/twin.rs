@@ -2,7 +2,7 @@
 
 use crate::field::self_visibility::{self, BYTES};
 use crate::field::silhouette::{Near, SilhouetteField};
-use crate::field::sub_light::{BLOCK, Part, SeenLight};
+use crate::field::sub_light::{BLOCK, LightPart, SeenLight};
 use crate::scene::LightForm;
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
@@ -78,7 +78,7 @@ impl SharpTwin<'_> {
         // The light's parts, and the share of each that shines; `None` where its own outline tells.
         let (seen, share) = match light.form {
             LightForm::Ball(share) => (SeenLight::new(to, radius), Some(share)),
-            LightForm::Panel(panel) => (SeenLight::panel(to, radius, panel, shining.rotation), Some(1.0)),
+            LightForm::LampFace(panel) => (SeenLight::panel(to, radius, panel, shining.rotation), Some(1.0)),
             LightForm::Outline => (SeenLight::outlined(to, radius), None),
             LightForm::Harmonics => return 0.0,
         };
@@ -90,15 +90,15 @@ impl SharpTwin<'_> {
             let local = |v: DVec3| object.rotation.inverse() * v;
             field.near(local(point.position - object.centre) / object.radius_m, local(toward))
         };
-        let blocked = |object: &SharpObject<'_>, near: &Near, part: &Part, distance_m: f64| {
+        let blocked = |object: &SharpObject<'_>, near: &Near, part: &LightPart, distance_m: f64| {
             let field = object.silhouette.expect("as in `near`");
             let toward = object.rotation.inverse() * part.toward;
             field.blocked(near, toward, distance_m / object.radius_m, part.tangent())
         };
-        let block = |(toward, parts): (DVec3, [Part; BLOCK])| -> f64 {
+        let block = |(toward, parts): (DVec3, [LightPart; BLOCK])| -> f64 {
             let between: Vec<Near> = occluders.iter().map(|object| near(object, toward)).collect();
             let own = share.is_none().then(|| near(shining, toward));
-            let part = |part: &Part| {
+            let part = |part: &LightPart| {
                 let pairs = occluders.iter().zip(&between);
                 let through: f64 =
                     pairs.map(|(object, near)| 1.0 - blocked(object, near, part, part.distance)).product();

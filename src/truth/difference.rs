@@ -31,7 +31,7 @@ pub struct PixelDifference {
 
 /// The difference of two pictures over the pixels that count.
 #[derive(Clone, Debug, serde::Serialize)]
-pub struct Difference {
+pub struct PictureDifference {
     /// Width of the pictures in pixels.
     pub width: usize,
     /// Height in pixels.
@@ -56,7 +56,7 @@ pub struct Difference {
     pub flip: Vec<f64>,
 }
 
-impl Difference {
+impl PictureDifference {
     /// Compares two pictures where `mask` is true, or everywhere. Pixels that do not count have no effect on those that do. Linear
     /// pictures are brightened by `exposure_ev` stops where they are shown: for FLIP, and beside a picture that is stored in sRGB.
     ///
@@ -116,7 +116,7 @@ impl Difference {
             a: rgb(&of_a, pixel),
             b: rgb(&of_b, pixel),
         };
-        Ok(Difference {
+        Ok(PictureDifference {
             width,
             height,
             pixel_count,

@@ -5,8 +5,8 @@ use shadow_fields::Result;
 use shadow_fields::bake::kinds::Kind;
 use shadow_fields::error::Error;
 use shadow_fields::farm::engines::{self, Call};
-use shadow_fields::farm::plan::{Cost, DeviceClass, Input, Plan, Task, TaskKind, Work};
-use shadow_fields::farm::results::{self, Content, Found};
+use shadow_fields::farm::plan::{DeviceClass, Input, Plan, Task, TaskCost, TaskKind, Work};
+use shadow_fields::farm::results::{self, Content, SliceResult};
 use shadow_fields::farm::status::{Status, missing};
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ fn example() -> Plan {
     let words = vec!["--quality".into(), "draft".into()];
     plan.works = vec![Work { words: words.clone(), pictures: None }, Work { words, pictures: Some("f_#.png".into()) }];
     plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
-    let cost = Cost { seconds: 50.0, memory_mb: 1.0, bytes: 1e6 };
+    let cost = TaskCost { seconds: 50.0, memory_mb: 1.0, bytes: 1e6 };
     let task = |first| Task { work: 0, input: 0, kind: TaskKind::Bake(Kind::Shadow), first, count: 3 };
     (0..3).for_each(|part| plan.add(task(part), cost));
     plan.add(Task { work: 1, input: 0, kind: TaskKind::Frames, first: 5, count: 7 }, cost);
@@ -87,12 +87,12 @@ pub fn slice(bytes: &[u8]) -> Result<()> {
         std::fs::write(path, sealed(bytes)).unwrap();
         assert!(Status::of(plan).line(8).contains("1 of 2 slices"));
         match results::find(plan, 0) {
-            Found::Whole(about, entries) => {
+            SliceResult::Whole(about, entries) => {
                 assert!(about.key == plan.key(0) && entries.iter().all(|(task, ..)| *task < 2));
                 Ok(())
             }
-            Found::Damaged(error) => Err(error),
-            Found::Missing => Err(Error::Failed("it is there, and not found".into())),
+            SliceResult::Damaged(error) => Err(error),
+            SliceResult::Missing => Err(Error::Failed("it is there, and not found".into())),
         }
     })
 }

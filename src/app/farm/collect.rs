@@ -8,7 +8,7 @@ use crate::bake::cache::Cache;
 use crate::bake::parts::join;
 use crate::error::{Error, Result};
 use crate::farm::plan::{DeviceClass, Plan, Task, TaskKind};
-use crate::farm::results::{self, Found};
+use crate::farm::results::{self, SliceResult};
 use crate::farm::status::ranges;
 use clap::Args;
 use serde_json::json;
@@ -37,8 +37,8 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let (mut missing, mut damaged) = (Vec::new(), Vec::new());
     for slice in 0..plan.slices.len() {
         match results::find(&plan, slice) {
-            Found::Missing => missing.push(slice),
-            Found::Damaged(error) => {
+            SliceResult::Missing => missing.push(slice),
+            SliceResult::Damaged(error) => {
                 log::warn!("slice {slice}: {error}");
                 damaged.push(slice);
                 // With it away, the engines run it again.
@@ -50,7 +50,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
                         .map_err(|error| Error::Failed(format!("{}: cannot be removed: {error}", path.display())))?,
                 }
             }
-            Found::Whole(_, entries) => {
+            SliceResult::Whole(_, entries) => {
                 for (task, name, bytes) in entries {
                     collecting.take(&plan.tasks_of(slice)[task as usize], &name, bytes)?;
                 }

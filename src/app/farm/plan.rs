@@ -6,7 +6,7 @@ use super::super::{Global, output};
 use super::run::{mesh_options, render_words, scene_hash};
 use crate::bake::kinds::Kind;
 use crate::error::{Error, Result};
-use crate::farm::plan::{Cost, DeviceClass, Input, Plan, Task, TaskKind, Work};
+use crate::farm::plan::{DeviceClass, Input, Plan, Task, TaskCost, TaskKind, Work};
 use crate::merge::calibrate;
 use crate::scene::{self, Scene};
 use clap::Args;
@@ -55,7 +55,7 @@ pub struct Arguments {
 struct Read {
     input: Input,
     /// Kinds with what they cost, of a mesh; empty for a scene.
-    kinds: Vec<(Kind, Cost)>,
+    kinds: Vec<(Kind, TaskCost)>,
     pixels: f64,
 }
 
@@ -118,7 +118,7 @@ fn add_bakes(plan: &mut Plan, words: &[String], meshes: &[PathBuf], folder: &Pat
         for (kind, cost) in kinds {
             let parts = if kind.is_cut() { Plan::parts(cost.seconds) } else { 1 };
             let share = f64::from(parts);
-            let cost = Cost { seconds: cost.seconds / share, bytes: cost.bytes / share, ..cost };
+            let cost = TaskCost { seconds: cost.seconds / share, bytes: cost.bytes / share, ..cost };
             let task = |first| Task { work, input: index, kind: TaskKind::Bake(kind), first, count: parts };
             (0..parts).for_each(|part| plan.add(task(part), cost));
         }
@@ -131,7 +131,7 @@ fn add_pictures(plan: &mut Plan, read: Read, (words, pattern): (Vec<String>, Str
     let (work, index) = (plan.works.len() as u32, plan.inputs.len() as u32);
     plan.works.push(Work { words, pictures: Some(pattern) });
     plan.inputs.push(read.input);
-    let each = Cost {
+    let each = TaskCost {
         seconds: PICTURE_SECONDS + read.pixels * PIXEL_SECONDS,
         memory_mb: read.pixels * PIXEL_MB,
         bytes: read.pixels * PIXEL_BYTES,
@@ -140,7 +140,7 @@ fn add_pictures(plan: &mut Plan, read: Read, (words, pattern): (Vec<String>, Str
     for first in (0..frames).step_by(run as usize) {
         let count = run.min(frames - first);
         let share = f64::from(count);
-        let cost = Cost { seconds: share * each.seconds, bytes: share * each.bytes, ..each };
+        let cost = TaskCost { seconds: share * each.seconds, bytes: share * each.bytes, ..each };
         plan.add(Task { work, input: index, kind: TaskKind::Frames, first, count }, cost);
     }
 }
@@ -215,7 +215,7 @@ fn written(path: &Path, folder: &Path) -> Result<String> {
 fn read_mesh(path: &Path, folder: &Path, options: &crate::bake::Options) -> Result<Read> {
     let (mesh, _) = scene::load_mesh(path)?;
     let memory_mb = mesh.triangles.len() as f64 * TRIANGLE_MB;
-    let cost = |kind: Kind| Cost {
+    let cost = |kind: Kind| TaskCost {
         seconds: kind.seconds(&mesh, options),
         memory_mb,
         bytes: kind.bytes(&mesh, options) as f64,

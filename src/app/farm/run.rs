@@ -8,7 +8,7 @@ use crate::bake::parts::{BakePart, bake, bake_part};
 use crate::bake::{self, hash_text};
 use crate::error::{Error, Result};
 use crate::farm::plan::{DeviceClass, Plan, Task, TaskKind};
-use crate::farm::results::{self, Content, Found};
+use crate::farm::results::{self, Content, SliceResult};
 use crate::scene::{self, Scene};
 use clap::Args;
 use std::ffi::OsString;
@@ -35,12 +35,12 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     let line = |what: &str| output::say(format!("slice {slice} of {}: {what}", output::shown(&arguments.plan)));
     match results::find(&plan, slice) {
-        Found::Whole(..) => {
+        SliceResult::Whole(..) => {
             line("its result is there and intact");
             return Ok(());
         }
-        Found::Damaged(error) => log::warn!("{error}; doing the slice anew"),
-        Found::Missing => {}
+        SliceResult::Damaged(error) => log::warn!("{error}; doing the slice anew"),
+        SliceResult::Missing => {}
     }
     let started = Instant::now();
     let context = Context::new(global)?;

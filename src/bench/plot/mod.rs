@@ -7,7 +7,7 @@ mod points;
 mod rows;
 
 pub use axis::AxisScale;
-pub use points::{Curve, Dot, Gap, Panel, Plot};
+pub use points::{Curve, Dot, Gap, Plot, PlotPanel};
 pub use rows::{PlotColumn, RowGroup, Rows};
 
 use std::fmt::Write;

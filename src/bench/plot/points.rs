@@ -51,7 +51,7 @@ pub struct Gap {
 
 /// A pair of axes.
 #[derive(Clone)]
-pub struct Panel {
+pub struct PlotPanel {
     /// Title above the panel.
     pub title: String,
     /// Label below the x axis, with its unit.
@@ -72,10 +72,10 @@ pub struct Panel {
     pub gap: Option<Gap>,
 }
 
-impl Default for Panel {
+impl Default for PlotPanel {
     /// An empty panel with logarithmic axes.
     fn default() -> Self {
-        Panel {
+        PlotPanel {
             title: String::new(),
             x_label: String::new(),
             y_label: String::new(),
@@ -94,7 +94,7 @@ pub struct Plot {
     /// Title above the panels.
     pub title: String,
     /// Panels from left to right; the first one's points are listed.
-    pub panels: Vec<Panel>,
+    pub panels: Vec<PlotPanel>,
 }
 
 /// Names of groups and curves in order of appearance, which determines colours and shapes.
@@ -156,7 +156,7 @@ fn stroke(series: usize) -> String {
 
 /// A panel at its position in the plot.
 struct PanelDrawing<'p> {
-    panel: &'p Panel,
+    panel: &'p PlotPanel,
     names: &'p Names,
     left: f64,
     x: Axis,
@@ -171,7 +171,7 @@ fn meet(a: &Rectangle, b: &Rectangle) -> bool {
 }
 
 impl<'p> PanelDrawing<'p> {
-    fn new(panel: &'p Panel, names: &'p Names, left: f64) -> Self {
+    fn new(panel: &'p PlotPanel, names: &'p Names, left: f64) -> Self {
         let curves = || panel.curves.iter().flat_map(|c| &c.points);
         let ranges = panel.dots.iter().filter_map(|d| d.x_range).flat_map(|(low, high)| [low, high]);
         let gap = panel.gap.iter().flat_map(|g| [g.from, g.to]);
@@ -337,7 +337,7 @@ mod tests {
             points: vec![(100.0, 0.1), (1000.0, 0.01)],
             notes: vec!["1".into(), "16 rays".into()],
         };
-        let panel = Panel {
+        let panel = PlotPanel {
             title: "here".into(),
             x_label: "milliseconds".into(),
             y_label: "error".into(),
@@ -345,7 +345,7 @@ mod tests {
             front: vec![0, 1],
             curves: vec![rival],
             gap: Some(Gap { from: 1.0, to: 100.0, y: 0.1, label: "100 times".into() }),
-            ..Panel::default()
+            ..PlotPanel::default()
         };
         let svg = Plot { title: "a < b".into(), panels: vec![panel] }.svg();
         let words =
@@ -354,7 +354,7 @@ mod tests {
             assert!(svg.contains(word), "{word} in {svg}");
         }
         assert!(!svg.contains("NaN"));
-        let empty = Plot { title: String::new(), panels: vec![Panel::default()] };
+        let empty = Plot { title: String::new(), panels: vec![PlotPanel::default()] };
         assert!(!empty.svg().contains("NaN"));
     }
 

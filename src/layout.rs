@@ -33,7 +33,7 @@ pub struct DeviceEntity {
     pub area_terms: [f32; 4],
     /// For sharp lights: the bits of the first quad of its silhouette field, 0 without one, and bit 31 where it has maps of halves; of a
     /// light that is a ball the share of its sphere's disc that shines, 0 where its own outline tells; of a light that shines from one flat
-    /// side [`crate::field::sub_light::Panel::packed`]; and 0.
+    /// side [`crate::field::sub_light::LampFace::packed`]; and 0.
     pub sharp: [f32; 4],
 }
 

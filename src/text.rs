@@ -25,7 +25,7 @@ pub fn make_folder(path: &Path) -> Result<()> {
 /// Writes rows as NAME.csv, and with their origin as NAME.json.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_rows(folder: &Path, name: &str, origin: &Value, rows: &impl Serialize) -> Result<()> {
     write(&folder.join(format!("{name}.csv")), csv(origin, rows))?;
     write(&folder.join(format!("{name}.json")), format!("{:#}\n", json!({ "origin": origin, "rows": rows })))

@@ -66,3 +66,13 @@ fn an_unknown_light_lists_the_known_ones() {
     assert!(ran.stderr.contains("moon") && ran.stderr.contains("(c) key of 4 bands"), "{}", ran.stderr);
     assert!(!folder.path().join("out").exists());
 }
+
+/// `bench skip` has scenes and meshes to choose from, and lists both.
+#[test]
+fn skips_of_an_unknown_case_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let ran = finish(&mut command(folder.path(), &["bench", "skip", "--quick", "--out", "out", "--case", "moon"]));
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(ran.stderr.contains("\"moon\"") && ran.stderr.contains("house; sphere; torus"), "{}", ran.stderr);
+    assert!(!folder.path().join("out").exists());
+}

@@ -63,16 +63,22 @@ const SKIPS: [(&str, [(Shortcuts, bool); 2]); 5] = [
 /// Half of the default shells and directions.
 const LATTICE: &str = "cube:8x5";
 
+/// All meshes.
+pub fn meshes(quick: bool) -> Vec<Mesh> {
+    let mut meshes = vec![generate::sphere(0.5, 4), generate::torus(0.5, 0.2, 96, 48)];
+    if !quick {
+        meshes.push(generate::torus(0.5, 0.2, 200, 100));
+    }
+    meshes
+}
+
 /// Measures every skip on a few meshes, and writes `skip_bake.csv` and `skip_bake.json` into `folder`. `cases`: of all meshes only
 /// those that have one of these texts in their names.
 ///
 /// # Errors
 /// `Failed` when a file cannot be written; else as [`bake::Baker::field`].
 pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<BakeSkipRow>> {
-    let mut meshes = vec![generate::sphere(0.5, 4), generate::torus(0.5, 0.2, 96, 48)];
-    if !bench.quick {
-        meshes.push(generate::torus(0.5, 0.2, 200, 100));
-    }
+    let mut meshes = meshes(bench.quick);
     meshes.retain(|mesh| cases.is_empty() || cases.iter().any(|text| mesh.name.contains(text)));
     let mut rows = Vec::new();
     for mesh in &meshes {

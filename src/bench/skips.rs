@@ -121,7 +121,11 @@ fn plot(rows: &[SkipCost]) -> Rows {
     }
 }
 
-fn all(quick: bool) -> Result<Vec<Case>> {
+/// All cases.
+///
+/// # Errors
+/// As [`cases::scenes`].
+pub fn all(quick: bool) -> Result<Vec<Case>> {
     let town = |things, lights, cells| -> Result<Case> {
         let scene = Town { things, lights, cells, receive: true }.scene()?;
         Ok(Case::at_start(format!("town of {things}, {lights} lights"), scene, Distant::Exact))

@@ -2,7 +2,7 @@
 
 use super::common::start;
 use crate::app::{Global, output};
-use crate::bench::{bake_skips, skips};
+use crate::bench::{bake_skips, cases, skips};
 use crate::error::Result;
 use crate::text::three;
 use clap::Args;
@@ -14,7 +14,7 @@ pub struct Arguments {
     /// A minute on two cores instead of five: two scenes, fewer rays and rounds
     #[arg(long)]
     quick: bool,
-    /// Measure only scenes and meshes that have TEXT in their names; may be given again
+    /// Measure only scenes and meshes that have TEXT in their names; may be given again; a text that none has lists them
     #[arg(long, value_name = "TEXT")]
     case: Vec<String>,
     /// Folder for skip.csv, skip.json, skip.svg, and of bakes skip_bake.csv and skip_bake.json
@@ -24,6 +24,9 @@ pub struct Arguments {
 
 /// Measures and prints a row a scene and skip.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
+    let mut names: Vec<String> = skips::all(arguments.quick)?.into_iter().map(|case| case.name).collect();
+    names.extend(bake_skips::meshes(arguments.quick).into_iter().map(|mesh| mesh.name));
+    cases::named(names, &arguments.case, String::as_str)?;
     let (context, (rows, bakes)) = start(global, arguments.quick, |bench| {
         Ok((
             skips::run(bench, &arguments.out, &arguments.case)?,

@@ -13,8 +13,8 @@ struct Entity {
     vec4 area_x;       // first axis of its projected area, world; w = the constant term
     vec4 area_y;       // second axis, world; w = factor of u
     vec4 area_terms;   // factors of v, u u, v v, u v
-    vec4 sharp;        // first quad of its silhouette field (bits); as a light: share of its disc, 0: it has its own outline; z: as a grid,
-                       // distance between neighbouring vertices, metres; w: less than 0 a disc that shines, more a rectangle
+    vec4 sharp;        // x: first quad of its silhouette field (bits); as a light y: share of its disc, 0: it has its own outline;
+                       // z: below 0 a disc that shines from one side, above 0 a rectangle, 0 a ball
 };
 
 // The rotation that a cosine and sine stand for, applied to two coordinates, and its inverse.

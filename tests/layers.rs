@@ -242,6 +242,13 @@ fn files_are_short() {
         let listed = LONG_FILES.iter().any(|(name, _)| path == Path::new(name));
         assert!(lines <= LINE_LIMIT || listed, "{} has {lines} lines: split it, or give a reason here", path.display());
         assert!(lines > LINE_LIMIT || !listed, "{} is short now: take it off the list", path.display());
+        // rustfmt wraps code, and leaves comments as they are.
+        let comments = text(path).lines().filter(|line| line.trim_start().starts_with("//")).map(str::len).max();
+        assert!(
+            comments.is_none_or(|longest| longest <= 140),
+            "{} has a comment of {comments:?} bytes",
+            path.display()
+        );
     }
     for (name, _) in LONG_FILES {
         assert!(paths.iter().any(|path| path == Path::new(name)), "{name} is gone: take it off the list");

@@ -1,10 +1,11 @@
 //! Pass "capture": draws an object as seen from sample points: six cube faces for each point, many points in one render pass.
 //!
 //! Inputs: the mesh in units of its bounding radius around its centre; eyes in the same frame. Output: an atlas of square
-//! faces. Occlusion: R8, white background, black object, no depth; or with distances in place of black. Radiance: RGBA32F, black background, the mesh's colours,
-//! with depth. A face that the object's bounding sphere does not reach is not drawn and gets no place in the atlas. The other faces
-//! are drawn in chunks of neighbouring triangles. A chunk is left out if its bounding sphere does not reach into the face, or if
-//! the mesh is closed and the eye sees only backs of the chunk. Of a large mesh, chunks of fewer triangles stand for what is far off.
+//! faces. An occlusion capture is R8 without depth: the object is black, or holds its distance, on white. A radiance
+//! capture is RGBA32F with depth: the mesh's colours on black. A face that the object's bounding sphere does not reach
+//! is not drawn and gets no place in the atlas. The other faces are drawn in chunks of neighbouring triangles. A chunk
+//! is left out if its bounding sphere does not reach into the face, or if the mesh is closed and the eye sees only
+//! backs of the chunk. Of a large mesh, chunks of fewer triangles stand for what is far off.
 
 use super::chunk::{faces_reached, joined};
 use super::model::DrawnFace;
@@ -58,7 +59,7 @@ pub enum CaptureKind {
 }
 
 impl CaptureKind {
-    /// For the samples of a field.
+    /// The kind of capture that the samples of a field need.
     pub fn of_field(radiance: bool) -> Self {
         if radiance { CaptureKind::Radiance } else { CaptureKind::Cover }
     }
@@ -67,7 +68,8 @@ impl CaptureKind {
 /// Which faces of which eye lie where in the atlas.
 pub type Slots = [u32; FACE_COUNT];
 
-/// The atlas, and the pipelines that write it. A pipeline is made when faces are first chosen for it: a bake draws all of them, or computes all.
+/// The atlas, and the pipelines that write it. A pipeline is made when faces are first chosen for it: a bake draws all
+/// of them, or computes all.
 pub struct Capture {
     device: Arc<Device>,
     library: Library,

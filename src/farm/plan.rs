@@ -40,7 +40,7 @@ impl std::fmt::Display for DeviceClass {
     }
 }
 
-/// What is done with inputs: its options, as words of the command line of `bake` or `render`.
+/// What a plan does: the options of `bake` or `render`, as typed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Work {

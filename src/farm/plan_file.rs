@@ -64,7 +64,7 @@ impl Plan {
             next = first.checked_add(*count).ok_or("too many tasks")?;
         }
         if next as usize != self.tasks.len() {
-            return Err("its slices hold other tasks than it has".into());
+            return Err("its slices do not cover its tasks, each once".into());
         }
         for (index, task) in self.tasks.iter().enumerate() {
             let Task { work, input, kind, first, count } = *task;
@@ -79,7 +79,7 @@ impl Plan {
                 TaskKind::Bake(kind) => first < count && (count == 1 || kind.is_cut()),
             };
             if !makes_sense {
-                return Err(format!("task {index}, {first} of {count}, is none of its kind"));
+                return Err(format!("task {index}, {first} of {count}, does not belong to its work"));
             }
         }
         Ok(())
@@ -121,7 +121,7 @@ mod tests {
             (|p| p.slices[0].count = 9, "slice 1 does not begin where the one before it ends"),
             (|p| p.slices[0].seconds = 1e38, "slice 0 is estimated to take"),
             (|p| p.slices[1].seconds = -1.0, "slice 1 is estimated to take -1 seconds"),
-            (|p| p.slices.truncate(1), "its slices hold other tasks than it has"),
+            (|p| p.slices.truncate(1), "its slices do not cover its tasks, each once"),
             (|p| p.slices.clear(), "it has no slices"),
             (|p| p.tasks[0].input = 9, "task 0 has an input that is not there"),
             (|p| p.tasks[1].work = 9, "task 1 is of a work that is not there"),

@@ -1,10 +1,10 @@
 //! Pass "gather": which lookups each cluster of vertices needs, in which order. It runs on the device as a pass of the frame, or on
 //! the host.
 //!
-//! GatherInputs: bounding spheres of the entities, their switches, bounds of the clusters. Output: a list of [`layout::ListEntry`]s a cluster.
-//! An entry is left off when it changes no vertex of the cluster (an occluder farther than the light from all of them, or one
-//! that the skips in `merge_cone.glsl` weigh with zero everywhere), and, with a threshold `eps`, when the light that it could
-//! take or bring is bounded below it.
+//! GatherInputs: bounding spheres of the entities, their switches, bounds of the clusters. Output: a list of
+//! [`layout::ListEntry`]s a cluster. An entry is left off when it changes no vertex of the cluster (an occluder farther
+//! than the light from all of them, or one that the skips in `merge_cone.glsl` weigh with zero everywhere), and, with a
+//! threshold `eps`, when the light that it could take or bring is bounded below it.
 //!
 //! A list is a superset of what matters, within a stated slack ([`crate::lists::scope`]). Lists by host and device may differ by
 //! entities within that slack: without a threshold these have a weight of exactly zero in the merge, so the light is the same to the

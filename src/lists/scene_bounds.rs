@@ -1,5 +1,4 @@
-//! What cluster lists are made from at one time: bounds of clusters, bounds of entities and lights. And counts of what the lists
-//! leave off.
+//! Bounds of clusters, entities and lights at one time, from which cluster lists are made, and counts of what lists leave off.
 
 use crate::field::silhouette::SilhouetteField;
 use crate::lists::skip::Skip;
@@ -182,14 +181,15 @@ impl SceneBounds {
 
 /// The key by which [`SceneBounds::order`] goes: the bits of the squared distance of two centres in f32, which rise with it as it is not
 /// negative. `distance_key` in `gather.comp` has the same bits: products and sums are rounded alike on every device as long as a
-/// compiler does not contract them, which Rust never does and `precise` forbids there. Centres whose distances differ by less than a part in
-/// 10^7 may have equal keys; the f64 twins go by this key too.
+/// compiler does not contract them, which Rust never does and `precise` forbids there. Centres whose distances differ
+/// by less than a part in 10^7 may have equal keys; the f64 twins go by this key too.
 pub fn distance_key(a: [f32; 3], b: [f32; 3]) -> u32 {
     let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     (x * x + y * y + z * z).to_bits()
 }
 
-/// What was considered and left off, in (cluster, chain, entity) triples unless said otherwise, and a bound of the light in what was left off.
+/// What was considered and left off, in (cluster, chain, entity) triples unless said otherwise, and a bound of the
+/// light in what was left off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Counts {
     /// Lookups that a merge without lists would make.

@@ -73,6 +73,6 @@ fn skips_of_an_unknown_case_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let ran = finish(&mut command(folder.path(), &["bench", "skip", "--quick", "--out", "out", "--case", "moon"]));
     assert_eq!(ran.code, 2, "{}", ran.stderr);
-    assert!(ran.stderr.contains("\"moon\"") && ran.stderr.contains("house; sphere; torus"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("\"moon\"") && ran.stderr.contains("house; sphere; torus)"), "{}", ran.stderr);
     assert!(!folder.path().join("out").exists());
 }

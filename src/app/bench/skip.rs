@@ -26,6 +26,7 @@ pub struct Arguments {
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let mut names: Vec<String> = skips::all(arguments.quick)?.into_iter().map(|case| case.name).collect();
     names.extend(bake_skips::meshes(arguments.quick).into_iter().map(|mesh| mesh.name));
+    names.dedup();
     cases::named(names, &arguments.case, String::as_str)?;
     let (context, (rows, bakes)) = start(global, arguments.quick, |bench| {
         Ok((

@@ -3,7 +3,7 @@
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-/// One entity of the scene at a moment, in the form that passes read: `Entity` of the shaders.
+/// An entity of the scene at one time, in the form that passes read: `Entity` of the shaders.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct DeviceEntity {

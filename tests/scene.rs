@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 use shadow_fields::Result;
 use shadow_fields::asset::embedded;
 use shadow_fields::field::sub_light::LampFace;
-use shadow_fields::scene::{Data, LightForm, Lights, Placement, Scene};
+use shadow_fields::scene::{Data, LightMethod, Lights, Placement, Scene};
 
 fn nothing(path: &Path) -> Result<Vec<u8>> {
     Err(shadow_fields::Error::input(path, "this test has no files"))
@@ -323,12 +323,12 @@ fn each_light_has_the_form_that_its_mesh_gives_it() {
         [[entity]]\nmesh = \"two\"\nemission = [1, 1, 1]\n\
         [[entity]]\nmesh = \"disc\"\nemission = [1, 1, 1]\n[[entity]]\nmesh = \"tube\"\nemission = [1, 1, 1]\n";
     let scene = Scene::parse(text, Path::new("lights.toml"), &nothing).unwrap();
-    let form = |entity, lights| LightForm::of(&scene, entity, lights);
-    let LightForm::Ball(share) = form(1, Lights::Sharp) else { panic!("a sphere is a ball") };
+    let method = |entity, lights| LightMethod::of(&scene, entity, lights);
+    let LightMethod::Ball(share) = method(1, Lights::Sharp) else { panic!("a sphere is a ball") };
     assert!((0.98..1.0).contains(&share), "{share}");
-    assert_eq!(form(2, Lights::Sharp), LightForm::Outline);
-    assert_eq!(form(3, Lights::Sharp), LightForm::Harmonics);
-    assert!(matches!(form(4, Lights::Sharp), LightForm::LampFace(LampFace::Disc(_))));
-    assert!(matches!(form(5, Lights::Sharp), LightForm::LampFace(LampFace::Rectangle(_))));
-    assert!((1..6).all(|entity| form(entity, Lights::Sh) == LightForm::Harmonics));
+    assert_eq!(method(2, Lights::Sharp), LightMethod::Outline);
+    assert_eq!(method(3, Lights::Sharp), LightMethod::Harmonics);
+    assert!(matches!(method(4, Lights::Sharp), LightMethod::LampFace(LampFace::Disc(_))));
+    assert!(matches!(method(5, Lights::Sharp), LightMethod::LampFace(LampFace::Rectangle(_))));
+    assert!((1..6).all(|entity| method(entity, Lights::Sh) == LightMethod::Harmonics));
 }

@@ -7,7 +7,7 @@ use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
 use crate::field::{FieldHeader, FieldKind, ShadowField};
-use crate::scene::light::{self, LightForm, Lights};
+use crate::scene::light::{self, LightMethod, Lights};
 use crate::scene::{Entity, Scene};
 use std::collections::{HashMap, HashSet};
 use std::hash::Hash;
@@ -104,16 +104,16 @@ pub struct Needed {
 pub fn needs(scene: &Scene, mesh: usize, lights: Lights) -> Needed {
     let entities = || (0..scene.entities.len()).filter(|&i| scene.entities[i].mesh == mesh);
     let seen = || entities().map(|i| (i, &scene.entities[i])).filter(|(_, e)| is_seen(scene, e));
-    let form = |entity| LightForm::of(scene, entity, lights);
+    let method = |entity| LightMethod::of(scene, entity, lights);
     let coloured = scene.meshes[mesh].colors.is_some();
     let (harmonics, sharp) = (light::has_harmonics(scene, lights), light::has_sharp(scene, lights));
-    let shines = |wanted: LightForm| seen().any(|(i, e)| e.emits && form(i) == wanted);
-    let blocked = seen().any(|(_, e)| e.occludes && harmonics) || (shines(LightForm::Harmonics) && !coloured);
-    let radiance = coloured && shines(LightForm::Harmonics);
+    let shines = |wanted: LightMethod| seen().any(|(i, e)| e.emits && method(i) == wanted);
+    let blocked = seen().any(|(_, e)| e.occludes && harmonics) || (shines(LightMethod::Harmonics) && !coloured);
+    let radiance = coloured && shines(LightMethod::Harmonics);
     let shades_itself = bakes_transfer(&scene.meshes[mesh]) && entities().any(|i| scene.entities[i].receives);
     Needed {
         fields: [blocked.then_some(FieldKind::Occlusion), radiance.then_some(FieldKind::Radiance)],
-        silhouette: seen().any(|(_, e)| e.occludes && sharp) || shines(LightForm::Outline),
+        silhouette: seen().any(|(_, e)| e.occludes && sharp) || shines(LightMethod::Outline),
         self_visibility: sharp && shades_itself,
         transfer: harmonics && shades_itself,
     }

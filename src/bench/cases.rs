@@ -6,7 +6,7 @@ use crate::scene::Scene;
 use crate::truth::raycast::Distant;
 use std::path::Path;
 
-/// A scene at one moment, and the distant light that its truth integrates.
+/// A scene at one time, and the distant light that its truth integrates.
 pub struct Case {
     /// Name in tables.
     pub name: String,

@@ -105,7 +105,6 @@ pub struct Corners {
 
 /// Which samples a lookup takes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Lookup {
     /// The one nearest sample.

@@ -1,7 +1,7 @@
 //! What may change from frame to frame: the scene's lights and camera, the merge's variant, and shader files.
 
 use super::permutation::{CompiledMerge, harmonic_lights, usable};
-use super::{Frame, forms, permutation};
+use super::{Frame, methods, permutation};
 use crate::error::Result;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant};
@@ -12,8 +12,8 @@ impl Frame {
     /// Whether the fields that `scene` needs are here, and the passes that its sharp lights need; it has the meshes and entities
     /// that this frame was made for.
     pub fn covers(&self, scene: &Scene) -> bool {
-        let forms = forms(scene, self.options.lights);
-        let wanted = permutation::sharp(&self.options, &self.merge.permutation, &forms, scene, &self.buffers);
+        let methods = methods(scene, self.options.lights);
+        let wanted = permutation::sharp(&self.options, &self.merge.permutation, &methods, scene, &self.buffers);
         let has = |wanted: SharpPermutation| {
             let compiled = self.sharp.as_ref().map(|sharp| sharp.permutation);
             compiled.is_some_and(|has| (has.outlines || !wanted.outlines) && (has.panels || !wanted.panels))
@@ -33,9 +33,9 @@ impl Frame {
         assert_eq!(receivers(scene), receivers(&self.scene), "another scene needs another frame");
         let sky = scene.data.environment != self.scene.data.environment;
         self.scene = scene.clone();
-        self.forms = forms(scene, self.options.lights);
+        self.methods = methods(scene, self.options.lights);
         // A shader that knows of lights serves a scene without them as well.
-        if harmonic_lights(scene, &self.forms) && !self.merge.permutation.lights {
+        if harmonic_lights(scene, &self.methods) && !self.merge.permutation.lights {
             self.compile_merge(MergePermutation { lights: true, ..self.merge.permutation })?;
         }
         if sky {

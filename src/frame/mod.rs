@@ -35,7 +35,7 @@ use crate::lists::incremental::{ClusterLists, Merged};
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
 use crate::merge::{MergeInputs, Readable};
-use crate::scene::{LightForm, Lights, Placement, Scene};
+use crate::scene::{LightMethod, Lights, Placement, Scene};
 use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
@@ -55,8 +55,8 @@ pub use room::PictureMemory;
 pub use viewport::{RadiositySource, Viewport};
 
 /// How the light of each entity of a scene is computed.
-fn forms(scene: &Scene, lights: Lights) -> Vec<LightForm> {
-    (0..scene.entities.len()).map(|entity| LightForm::of(scene, entity, lights)).collect()
+fn methods(scene: &Scene, lights: Lights) -> Vec<LightMethod> {
+    (0..scene.entities.len()).map(|entity| LightMethod::of(scene, entity, lights)).collect()
 }
 
 /// A scene on a device, ready to be lit and drawn at any time.
@@ -65,7 +65,7 @@ pub struct Frame {
     library: Library,
     scene: Scene,
     /// How the light of each entity is computed.
-    forms: Vec<LightForm>,
+    methods: Vec<LightMethod>,
     options: Options,
     /// Baked and uploaded data.
     pub buffers: SceneBuffers,
@@ -101,10 +101,10 @@ impl Frame {
         let buffers = SceneBuffers::new(device, scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
-        let forms = forms(scene, options.lights);
-        let wanted = permutation(&options, wanted, harmonic_lights(scene, &forms), uniform_entities(device));
+        let methods = methods(scene, options.lights);
+        let wanted = permutation(&options, wanted, harmonic_lights(scene, &methods), uniform_entities(device));
         let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted)?)?;
-        let sharp = permutation::sharp(&options, &merge.permutation, &forms, scene, &buffers);
+        let sharp = permutation::sharp(&options, &merge.permutation, &methods, scene, &buffers);
         let radiosity = RadiosityBuffers::new(device, scene, &buffers, sharp.is_some())?;
         let mut lists = ClusterLists::default();
         for (index, entity) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
@@ -136,7 +136,7 @@ impl Frame {
             device: device.clone(),
             library: library.clone(),
             scene: scene.clone(),
-            forms,
+            methods,
             sharp,
             options,
             merge,
@@ -314,7 +314,7 @@ impl Frame {
     }
 
     /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without emission;
-    /// zero where it does not receive. After a picture of things that move, what it does not show may be of an earlier moment;
+    /// zero where it does not receive. After a picture of things that move, what it does not show may be of an earlier time;
     /// see [`Frame::render`].
     ///
     /// # Errors
@@ -370,7 +370,7 @@ impl Frame {
         self.work.lists.clusters.iter().map(|cluster| cluster.vertex_count as usize).sum()
     }
 
-    /// Clusters whose light is of an earlier moment, as no picture since then showed them.
+    /// Clusters whose light is of an earlier time, as no picture since then showed them.
     pub fn stale_count(&self) -> usize {
         self.work.lists.stale_count()
     }

@@ -7,7 +7,7 @@ use crate::gpu::{Device, TexelView, Volume};
 use crate::layout::{DeviceEntity, NONE};
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Variant};
-use crate::scene::{LightForm, Scene};
+use crate::scene::{LightMethod, Scene};
 use crate::scene_buffers::SceneBuffers;
 use crate::shaders::Library;
 use crate::sharp::SharpPermutation;
@@ -76,12 +76,12 @@ pub(super) fn usable(
 pub(super) fn sharp(
     options: &Options,
     merge: &MergePermutation,
-    forms: &[LightForm],
+    methods: &[LightMethod],
     scene: &Scene,
     buffers: &SceneBuffers,
 ) -> Option<SharpPermutation> {
-    let lit = scene.entities.iter().zip(forms).filter(|(entity, form)| entity.emits && form.is_sharp());
-    let lights: Vec<&LightForm> = lit.map(|(_, form)| form).collect();
+    let lit = scene.entities.iter().zip(methods).filter(|(entity, method)| entity.emits && method.is_sharp());
+    let lights: Vec<&LightMethod> = lit.map(|(_, method)| method).collect();
     let any_field = |wanted: fn(&SilhouetteField) -> bool| {
         buffers.meshes.iter().any(|mesh| mesh.silhouette.as_ref().is_some_and(|slot| wanted(&slot.field)))
     };
@@ -90,8 +90,8 @@ pub(super) fn sharp(
         uniform: merge.variant.uniform,
         entity_limit: merge.entity_limit,
         silhouette: options.bake.silhouette,
-        outlines: lights.contains(&&LightForm::Outline),
-        panels: lights.iter().any(|form| matches!(form, LightForm::LampFace(_))),
+        outlines: lights.contains(&&LightMethod::Outline),
+        panels: lights.iter().any(|method| matches!(method, LightMethod::LampFace(_))),
         halves: any_field(SilhouetteField::has_halves),
         boxes: any_field(SilhouetteField::has_box),
         self_shadows: buffers.meshes.iter().any(|device_mesh| device_mesh.self_first != NONE),
@@ -102,8 +102,8 @@ pub(super) fn sharp(
 }
 
 /// Whether any light of the scene meets the chains of the merge. The sky does in any case.
-pub(super) fn harmonic_lights(scene: &Scene, forms: &[LightForm]) -> bool {
-    scene.entities.iter().zip(forms).any(|(entity, form)| entity.emits && !form.is_sharp())
+pub(super) fn harmonic_lights(scene: &Scene, methods: &[LightMethod]) -> bool {
+    scene.entities.iter().zip(methods).any(|(entity, method)| entity.emits && !method.is_sharp())
 }
 
 /// The permutation of the merge shader.

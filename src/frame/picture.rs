@@ -145,7 +145,7 @@ impl Frame {
         draw(&self.device, &self.library, options, finish, self.picture.sharp)
     }
 
-    /// Makes the chains of the moment that was merged last, for pictures whose pixels evaluate sharp lights.
+    /// Makes the chains of the time that was merged last, for pictures whose pixels evaluate sharp lights.
     pub(super) fn prepare_pixels(&mut self) -> Result<()> {
         let shows = self.options.evaluates_pixels() && self.work.lists.is_updated();
         let Some(pixel) = self.pixel.as_mut().filter(|_| shows) else { return Ok(()) };

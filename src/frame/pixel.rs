@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// What pixels read that evaluate sharp lights.
 pub(super) struct PixelChains {
-    /// Entities at the moment of the picture.
+    /// Entities at the time of the picture.
     pub entities: Upload,
     /// Entries of all chains.
     pub entries: Upload,
@@ -74,7 +74,7 @@ impl PixelChains {
             && TexelView::fits(device, vk::Format::R32G32_UINT, self.chains.size_bytes)
     }
 
-    /// Makes the chains of this moment.
+    /// Makes the chains of this time.
     ///
     /// # Errors
     /// `Device` when memory ran out.

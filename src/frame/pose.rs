@@ -9,7 +9,7 @@ use crate::layout::{self, CLUSTER_VERTICES, NONE};
 use crate::lists::gather::{ClusterBounds, EntityBounds, OutlineView, SceneBounds};
 use crate::lists::incremental::{Member, State};
 use crate::lists::sight::TriangleRun;
-use crate::scene::{Entity, LightForm, Placement};
+use crate::scene::{Entity, LightMethod, Placement};
 use crate::scene_buffers::{self, FieldSlot};
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use crate::sh::cube::{self, FACE_COUNT, texel_st};
@@ -18,7 +18,7 @@ use glam::DVec3;
 use std::f64::consts::PI;
 
 impl Frame {
-    /// All that lists and merge depend on at this moment.
+    /// All that lists and merge depend on at this time.
     pub(super) fn state(&self, placements: &[Placement]) -> State {
         let bounds: Vec<EntityBounds> =
             placements.iter().enumerate().map(|(index, p)| self.entity_bounds(index, p)).collect();
@@ -51,7 +51,7 @@ impl Frame {
         // A field that nobody needs was not baked, and one of zeros changes nothing.
         let holds = |slot: &Option<FieldSlot>| slot.as_ref().is_some_and(|slot| slot.extent != Extent::Nothing);
         let coloured = device_mesh.radiance.is_some() && entity.emits;
-        let sharp = entity.emits && self.light_form(index).is_sharp();
+        let sharp = entity.emits && self.light_method(index).is_sharp();
         let source = if coloured { &device_mesh.radiance } else { &device_mesh.blocked };
         let rotation = placement.turn();
         let facing = source.as_ref().filter(|_| !sharp).and_then(|slot| match slot.extent {
@@ -93,10 +93,10 @@ impl Frame {
         let area = device_mesh.blocked.as_ref().map_or(Area::default(), |slot| slot.area);
         let [area_x, area_y] = area.axes.map(|axis| (rotation * axis).as_vec3());
         let terms = area.terms.map(|term| term as f32);
-        let (share, panel) = match self.light_form(index) {
-            LightForm::Ball(share) => (share, 0.0),
-            LightForm::LampFace(panel) => (1.0, panel.packed()),
-            LightForm::Harmonics | LightForm::Outline => (0.0, 0.0),
+        let (share, panel) = match self.light_method(index) {
+            LightMethod::Ball(share) => (share, 0.0),
+            LightMethod::LampFace(panel) => (1.0, panel.packed()),
+            LightMethod::Harmonics | LightMethod::Outline => (0.0, 0.0),
         };
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());
         layout::DeviceEntity {
@@ -127,8 +127,8 @@ impl Frame {
     }
 
     /// How the light of an entity is computed.
-    pub fn light_form(&self, index: usize) -> LightForm {
-        self.forms[index]
+    pub fn light_method(&self, index: usize) -> LightMethod {
+        self.methods[index]
     }
 
     /// Whether an entity occludes and something sees it.

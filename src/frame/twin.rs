@@ -7,7 +7,7 @@ use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
 use crate::lists::gather::{self, Candidates, Counts, SLACK, Scope};
 use crate::lists::incremental::State;
 use crate::merge::twin::{MergeObject, MergeTwin};
-use crate::scene::{Entity, LightForm, Placement, Scene};
+use crate::scene::{Entity, LightMethod, Placement, Scene};
 use crate::scene_buffers;
 use crate::scene_buffers::DeviceMesh;
 use crate::sharp::twin::{SharpLight, SharpObject, SharpTwin, SurfacePoint};
@@ -16,7 +16,7 @@ use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
 
 impl Frame {
-    /// What the lists of all clusters leave off at this moment, and why, and a bound of the light in it: by looking at every
+    /// What the lists of all clusters leave off at this time, and why, and a bound of the light in it: by looking at every
     /// cluster and entity, which no frame does.
     pub fn counts(&self, placements: &[Placement]) -> Counts {
         let entities = || self.scene.entities.iter().filter(|entity| entity.occludes || entity.emits);
@@ -30,7 +30,7 @@ impl Frame {
         }
     }
 
-    /// Entities that stand on the list of any cluster of a receiver at this moment.
+    /// Entities that stand on the list of any cluster of a receiver at this time.
     pub fn listed(&self, placements: &[Placement], receiver: usize) -> BTreeSet<usize> {
         self.work.lists.entities_on(&self.state(placements), receiver)
     }
@@ -43,9 +43,9 @@ impl Frame {
         Ok(self.frame_twin(placements)?.run())
     }
 
-    /// Lights whose form is wanted.
-    fn lights(&self, wanted: impl Fn(LightForm) -> bool) -> Vec<usize> {
-        let emits = |&index: &usize| self.scene.entities[index].emits && wanted(self.light_form(index));
+    /// Lights whose method is wanted.
+    fn lights(&self, wanted: impl Fn(LightMethod) -> bool) -> Vec<usize> {
+        let emits = |&index: &usize| self.scene.entities[index].emits && wanted(self.light_method(index));
         (0..self.scene.entities.len()).filter(emits).collect()
     }
 
@@ -85,8 +85,8 @@ impl Frame {
             placements,
             fields,
             receivers,
-            lights: self.lights(|form| !form.is_sharp()),
-            sharp_lights: self.lights(LightForm::is_sharp),
+            lights: self.lights(|method| !method.is_sharp()),
+            sharp_lights: self.lights(LightMethod::is_sharp),
             sky: self.scene.environment.coefficients(self.options.bake.bands),
         })
     }
@@ -188,7 +188,7 @@ impl FrameTwin<'_> {
         let light = |&entity: &usize| SharpLight {
             entity,
             emission: self.frame.scene.entities[entity].emission.as_dvec3(),
-            form: self.frame.light_form(entity),
+            method: self.frame.light_method(entity),
         };
         let lights: Vec<SharpLight> = self.sharp_lights.iter().filter(|l| **l != receiver.index).map(light).collect();
         let occluders: Vec<usize> =

@@ -57,7 +57,7 @@ impl Gathering {
         })
     }
 
-    /// Prepares to gather for clusters at the last update's moment, and returns them; `None` where the host has to.
+    /// Prepares to gather for clusters at the last update's time, and returns them; `None` where the host has to.
     ///
     /// # Errors
     /// As [`Buffer::new`].

@@ -124,7 +124,7 @@ impl ClusterLists {
         self.renewed = true;
     }
 
-    /// Brings the lists to this moment and returns the clusters to merge: those that have changed, and where `sights` are given, of
+    /// Brings the lists to this time and returns the clusters to merge: those that have changed, and where `sights` are given, of
     /// every entity, those of them that may be seen by one. At first and where nothing has changed since the last update, none is
     /// left out.
     pub fn update(&mut self, now: State, sights: Option<&[Vec<Sight>]>) -> Vec<Dirty> {
@@ -177,7 +177,7 @@ impl ClusterLists {
         self.now.is_some()
     }
 
-    /// The moment of the last update.
+    /// The time of the last update.
     ///
     /// # Panics
     /// Before there was one.
@@ -210,7 +210,7 @@ impl ClusterLists {
         Some([seen, hidden].map(|clusters| Dirty { group: index, clusters }))
     }
 
-    /// The entries of clusters at the last update's moment, by the host: clusters that know their place among the entries, and the
+    /// The entries of clusters at the last update's time, by the host: clusters that know their place among the entries, and the
     /// entries.
     pub fn gather(&self, dirty: &[Dirty]) -> (Vec<layout::Cluster>, Vec<u32>) {
         let now = self.now();
@@ -240,7 +240,7 @@ impl ClusterLists {
         (clusters, all)
     }
 
-    /// The chains of sharp lights of all clusters of a receiver at the last update's moment, for what lies as far as `margin_m` (mesh's
+    /// The chains of sharp lights of all clusters of a receiver at the last update's time, for what lies as far as `margin_m` (mesh's
     /// frame) around their vertices. For each cluster the first of its entries and how many they are: none where no occluder stands on
     /// them, so that light changes there no faster than vertices show.
     pub fn sharp_chains(&self, receiver: usize, margin_m: f32) -> (Vec<[u32; 2]>, Vec<u32>) {
@@ -285,7 +285,7 @@ impl ClusterLists {
         (clusters, groups)
     }
 
-    /// What all lists of a moment leave off, and why.
+    /// What all lists of a time leave off, and why.
     pub fn counts(&self, state: &State) -> Counts {
         let of_group = |group: &WatchedGroup| {
             let entity = &state.entities[group.receiver];
@@ -302,7 +302,7 @@ impl ClusterLists {
         })
     }
 
-    /// Entities on the lists of a receiver's clusters at a moment.
+    /// Entities on the lists of a receiver's clusters at a time.
     pub fn entities_on(&self, state: &State, receiver: usize) -> BTreeSet<usize> {
         let (mut entries, entity) = (Vec::new(), &state.entities[receiver]);
         for group in self.groups.iter().filter(|group| group.receiver == receiver) {

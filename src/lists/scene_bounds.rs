@@ -115,7 +115,7 @@ pub struct ListLight {
     pub sharp: u32,
 }
 
-/// What the lists are made from at one moment.
+/// What the lists are made from at one time.
 pub struct SceneBounds {
     /// All entities.
     pub entities: Vec<EntityBounds>,
@@ -164,7 +164,7 @@ impl SceneBounds {
         SceneBounds { outlines, tree, occluders, lights, sky, brightest, skip, eps: eps as f32, spheres, entities }
     }
 
-    /// Whether lists of the other moment hold here too where no entity has changed.
+    /// Whether lists of the other time hold here too where no entity has changed.
     pub fn is_like(&self, other: &SceneBounds) -> bool {
         self.entities.len() == other.entities.len()
             && (self.sky, self.skip, self.eps) == (other.sky, other.skip, other.eps)

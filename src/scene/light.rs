@@ -19,7 +19,7 @@ pub enum Lights {
 
 /// How one light is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LightForm {
+pub enum LightMethod {
     /// By its field of spherical harmonics.
     Harmonics,
     /// As a sharp light that is a ball; its mesh covers this share of its bounding sphere's disc, on average over all directions.
@@ -30,51 +30,51 @@ pub enum LightForm {
     LampFace(LampFace),
 }
 
-impl LightForm {
+impl LightMethod {
     /// How the light of an entity is computed; of no meaning for one that does not emit.
     pub fn of(scene: &Scene, entity: usize, lights: Lights) -> Self {
         let mesh = &scene.meshes[scene.entities[entity].mesh];
         match mesh.panel() {
-            _ if lights == Lights::Sh => LightForm::Harmonics,
-            Some(panel) => LightForm::LampFace(panel),
-            None if mesh.colors.is_some() => LightForm::Harmonics,
-            None => mesh.ball_share().map_or(LightForm::Outline, LightForm::Ball),
+            _ if lights == Lights::Sh => LightMethod::Harmonics,
+            Some(panel) => LightMethod::LampFace(panel),
+            None if mesh.colors.is_some() => LightMethod::Harmonics,
+            None => mesh.ball_share().map_or(LightMethod::Outline, LightMethod::Ball),
         }
     }
 
     /// Whether its shadows have edges.
     pub fn is_sharp(self) -> bool {
-        self != LightForm::Harmonics
+        self != LightMethod::Harmonics
     }
 
     /// What people read.
     pub fn name(self) -> &'static str {
         match self {
-            LightForm::Harmonics => "spherical harmonics",
-            LightForm::Ball(_) => "sharp, a ball",
-            LightForm::Outline => "sharp, the mesh's outline",
-            LightForm::LampFace(LampFace::Disc(_)) => "sharp, a disc",
-            LightForm::LampFace(LampFace::Rectangle(_)) => "sharp, a rectangle",
+            LightMethod::Harmonics => "spherical harmonics",
+            LightMethod::Ball(_) => "sharp, a ball",
+            LightMethod::Outline => "sharp, the mesh's outline",
+            LightMethod::LampFace(LampFace::Disc(_)) => "sharp, a disc",
+            LightMethod::LampFace(LampFace::Rectangle(_)) => "sharp, a rectangle",
         }
     }
 }
 
 /// Every light of a scene by its name, and how it is computed: entities that emit, and then the distant light.
-pub fn listed(scene: &Scene, lights: Lights) -> Vec<(&str, LightForm)> {
+pub fn listed(scene: &Scene, lights: Lights) -> Vec<(&str, LightMethod)> {
     let local =
-        emitters(scene).map(|entity| (scene.entities[entity].name.as_str(), LightForm::of(scene, entity, lights)));
-    let distant = (!scene.environment.is_none()).then_some(("sky", LightForm::Harmonics));
+        emitters(scene).map(|entity| (scene.entities[entity].name.as_str(), LightMethod::of(scene, entity, lights)));
+    let distant = (!scene.environment.is_none()).then_some(("sky", LightMethod::Harmonics));
     local.chain(distant).collect()
 }
 
 /// Whether any light of a scene is sharp.
 pub fn has_sharp(scene: &Scene, lights: Lights) -> bool {
-    emitters(scene).any(|entity| LightForm::of(scene, entity, lights).is_sharp())
+    emitters(scene).any(|entity| LightMethod::of(scene, entity, lights).is_sharp())
 }
 
 /// Whether any light of a scene, local or distant, goes through spherical harmonics.
 pub fn has_harmonics(scene: &Scene, lights: Lights) -> bool {
-    !scene.environment.is_none() || emitters(scene).any(|entity| !LightForm::of(scene, entity, lights).is_sharp())
+    !scene.environment.is_none() || emitters(scene).any(|entity| !LightMethod::of(scene, entity, lights).is_sharp())
 }
 
 fn emitters(scene: &Scene) -> impl Iterator<Item = usize> + '_ {

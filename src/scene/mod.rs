@@ -25,7 +25,7 @@ use crate::asset::{Mesh, embedded, obj, read_file, utf8};
 use crate::error::{Error, Result};
 pub use builder::{SceneBuilder, Shape};
 pub use data::{Camera, Data, EntityData, MeshData, Output};
-pub use light::{LightForm, Lights};
+pub use light::{LightMethod, Lights};
 pub use motion::{Motion, Placement};
 
 /// Largest number of entities in a scene.

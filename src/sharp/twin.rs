@@ -3,7 +3,7 @@
 use crate::field::self_visibility::{self, BYTES};
 use crate::field::silhouette::{Near, SilhouetteField};
 use crate::field::sub_light::{BLOCK, LightPart, SeenLight};
-use crate::scene::LightForm;
+use crate::scene::LightMethod;
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -28,7 +28,7 @@ pub struct SharpLight {
     /// Linear RGB radiance.
     pub emission: DVec3,
     /// How its light is computed: as a sharp light's.
-    pub form: LightForm,
+    pub method: LightMethod,
 }
 
 /// One receiver under all sharp lights.
@@ -76,11 +76,11 @@ impl SharpTwin<'_> {
         let shining = &self.objects[light.entity];
         let (to, radius) = (shining.centre - point.position, shining.radius_m);
         // The light's parts, and the share of each that shines; `None` where its own outline tells.
-        let (seen, share) = match light.form {
-            LightForm::Ball(share) => (SeenLight::new(to, radius), Some(share)),
-            LightForm::LampFace(panel) => (SeenLight::panel(to, radius, panel, shining.rotation), Some(1.0)),
-            LightForm::Outline => (SeenLight::outlined(to, radius), None),
-            LightForm::Harmonics => return 0.0,
+        let (seen, share) = match light.method {
+            LightMethod::Ball(share) => (SeenLight::new(to, radius), Some(share)),
+            LightMethod::LampFace(panel) => (SeenLight::panel(to, radius, panel, shining.rotation), Some(1.0)),
+            LightMethod::Outline => (SeenLight::outlined(to, radius), None),
+            LightMethod::Harmonics => return 0.0,
         };
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
         let occluders: Vec<&SharpObject<'_>> =

@@ -1,4 +1,4 @@
-//! A scene at one moment, prepared for ray casting.
+//! A scene at one time, prepared for ray casting.
 
 use super::Vertex;
 use super::ray_mesh::{RayMesh, RayMeshes};
@@ -21,7 +21,7 @@ pub struct PlacedEntity<'s> {
     to_object: Mat3A,
 }
 
-/// A scene at one moment.
+/// A scene at one time.
 pub struct World<'s> {
     /// The scene without placements.
     pub scene: &'s Scene,

@@ -73,8 +73,8 @@ fn details(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec
 /// How many lights are computed one way and the other; each with its name where the pointer rests.
 fn lights(ui: &mut Ui, editor: &Editor, status: &Status<'_>) {
     let listed = light::listed(editor.scene(), status.lights);
-    let sharp = listed.iter().filter(|(_, form)| form.is_sharp()).count();
-    let names: Vec<String> = listed.iter().map(|(name, form)| format!("{name}: {}", form.name())).collect();
+    let sharp = listed.iter().filter(|(_, method)| method.is_sharp()).count();
+    let names: Vec<String> = listed.iter().map(|(name, method)| format!("{name}: {}", method.name())).collect();
     let label = ui.label(format!("lights: {sharp} sharp, {} in bands", listed.len() - sharp));
     label.on_hover_text(names.join("\n"));
 }

@@ -8,7 +8,7 @@ pub const STEP_LIMIT: usize = 256;
 /// Largest number of entities that all changes together keep: at least 100 MB.
 pub const ENTITY_LIMIT: usize = 1 << 18;
 
-/// The parts of a scene that a change concerns, at one moment.
+/// The parts of a scene that a change concerns, at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Snapshot {
     /// Entities by index.

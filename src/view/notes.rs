@@ -34,7 +34,7 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
                 Color32::WHITE,
             ),
             Some((rays, ..)) => {
-                (format!("reference: {rays} rays a vertex, of an earlier moment (Space pauses)"), WARNING)
+                (format!("reference: {rays} rays a vertex, of an earlier time (Space pauses)"), WARNING)
             }
             None => ("reference: casting the first rays".to_owned(), WARNING),
         });
@@ -51,7 +51,7 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
                 format!(
                     "error of the merge, in RMS radiosities: RMS {}{}",
                     two_digits(scale.rms),
-                    if fresh { "" } else { ", of an earlier moment (Space pauses)" }
+                    if fresh { "" } else { ", of an earlier time (Space pauses)" }
                 ),
                 if fresh { Color32::WHITE } else { WARNING },
             ),

@@ -125,8 +125,8 @@ mod tests {
             (|p| p.slices.clear(), "it has no slices"),
             (|p| p.tasks[0].input = 9, "task 0 has an input that is not there"),
             (|p| p.tasks[1].work = 9, "task 1 is of a work that is not there"),
-            (|p| p.tasks[1].kind = TaskKind::Frames, "task 1, 1 of 2, is none of its kind"),
-            (|p| p.tasks[1].kind = TaskKind::Bake(Kind::Silhouette), "task 1, 1 of 2, is none of its kind"),
+            (|p| p.tasks[1].kind = TaskKind::Frames, "task 1, 1 of 2, does not belong to its work"),
+            (|p| p.tasks[1].kind = TaskKind::Bake(Kind::Silhouette), "task 1, 1 of 2, does not belong to its work"),
         ];
         for (edit, what) in edits {
             let error = refused(&edit);

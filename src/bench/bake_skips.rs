@@ -72,16 +72,13 @@ pub fn meshes(quick: bool) -> Vec<Mesh> {
     meshes
 }
 
-/// Measures every skip on a few meshes, and writes `skip_bake.csv` and `skip_bake.json` into `folder`. `cases`: of all meshes only
-/// those that have one of these texts in their names.
+/// Measures every skip on some meshes, and writes `skip_bake.csv` and `skip_bake.json` into `folder`.
 ///
 /// # Errors
 /// `Failed` when a file cannot be written; else as [`bake::Baker::field`].
-pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[String]) -> Result<Vec<BakeSkipRow>> {
-    let mut meshes = meshes(bench.quick);
-    meshes.retain(|mesh| cases.is_empty() || cases.iter().any(|text| mesh.name.contains(text)));
+pub fn run(bench: &Bench<'_>, folder: &Path, meshes: &[Mesh]) -> Result<Vec<BakeSkipRow>> {
     let mut rows = Vec::new();
-    for mesh in &meshes {
+    for mesh in meshes {
         let (_, exact) = bake_once(bench, mesh, 128, (NONE, false))?;
         for (skip, shortcuts) in SKIPS {
             let (mut sides, rounds) = ([None::<BakeTime>; 2], if bench.quick { 1 } else { 3 });

@@ -1,12 +1,13 @@
 //! The error of a picture, split into its causes by the rungs of [`crate::truth`].
 
+use super::Bench;
 use super::cases::Case;
 use super::figures::{Radiosity, VertexDifference, difference, rms};
-use super::{Bench, has_sharp_lights};
 use crate::error::{Error, Result};
 use crate::field::Storage;
 use crate::frame::{self, Frame};
 use crate::scene::Lights;
+use crate::scene::light::has_sharp;
 use crate::truth::raycast::{Order, RayCast, relative_error};
 use crate::truth::{ExactChain, RayMeshes, Vertex, World, sample_vertices};
 use serde::Serialize;
@@ -207,7 +208,7 @@ pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Opt
     let mut frame = bench.frame(&case.scene, options)?;
     frame.render(&placements, None)?;
     let t3 = device_radiosity(&frame, &truth.vertices)?;
-    let sharp_total = if has_sharp_lights(&case.scene) {
+    let sharp_total = if has_sharp(&case.scene, Lights::Sharp) {
         let mut frame = bench.frame(&case.scene, frame::Options { lights: Lights::Sharp, ..options })?;
         frame.render(&placements, None)?;
         Some(truth.error(&device_radiosity(&frame, &truth.vertices)?))

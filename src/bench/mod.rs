@@ -35,7 +35,7 @@ use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::error::Result;
 use crate::frame::{self, Frame};
-use crate::scene::{LightMethod, Lights, Scene};
+use crate::scene::{Lights, Scene};
 use serde_json::Value;
 
 /// What every measurement needs.
@@ -82,12 +82,6 @@ impl Bench<'_> {
             }
         })
     }
-}
-
-/// Whether any light of a scene can be sharp.
-pub fn has_sharp_lights(scene: &Scene) -> bool {
-    let is_sharp = |j: usize| scene.entities[j].emits && LightMethod::of(scene, j, Lights::Sharp).is_sharp();
-    (0..scene.entities.len()).any(is_sharp)
 }
 
 /// The options that sweeps vary: the program's defaults, with a picture so small that drawing costs nothing.

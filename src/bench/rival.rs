@@ -13,10 +13,11 @@ use super::figures::{Radiosity, Spread, VertexDifference, along, crossing, sprea
 use super::judged::{Judged, JudgedAt, PIXEL_SIZE};
 use super::shadow_map::{Filter, ShadowMaps, maps_apply};
 use super::sweep;
-use super::{Bench, default_options, has_sharp_lights};
+use super::{Bench, default_options};
 use crate::draw::Shading;
 use crate::error::Result;
 use crate::frame::{self, Frame};
+use crate::scene::light::has_sharp;
 use crate::scene::{Lights, Placement};
 use crate::truth::{RayCast, RayMeshes, Vertex, World};
 use serde::Serialize;
@@ -145,7 +146,7 @@ impl Merged {
     /// With sharp lights and without, where a light can be sharp.
     fn all(bench: &Bench<'_>, case: &Case, place: JudgedAt) -> Result<Vec<Self>> {
         let (sharp, sh) = (Some(Lights::Sharp), Some(Lights::Sh));
-        let ways: &[(Option<Lights>, Shading)] = match (has_sharp_lights(&case.scene), place) {
+        let ways: &[(Option<Lights>, Shading)] = match (has_sharp(&case.scene, Lights::Sharp), place) {
             (false, _) => &[(None, Shading::Vertex)],
             (true, JudgedAt::Vertices) => &[(sharp, Shading::Vertex), (sh, Shading::Vertex)],
             (true, JudgedAt::Pixels) => &[(sharp, Shading::Pixel), (sharp, Shading::Vertex), (sh, Shading::Vertex)],

@@ -67,19 +67,15 @@ fn left_off(name: &str, counts: &Counts) -> Option<u64> {
     serde_json::to_value(counts).ok()?.get(skip::row(name)?.counter?)?.as_u64()
 }
 
-/// Measures, and writes `skip.csv`, `skip.json` and `skip.svg` into `folder`. `chosen`: of all cases only those that have one of these
-/// texts in their names.
+/// Measures every skip in some cases, and writes `skip.csv`, `skip.json` and `skip.svg` into `folder`.
 ///
 /// # Errors
 /// `Failed` when the folder cannot be written; else as [`Frame::new`].
-pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<SkipCost>> {
+pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[Case]) -> Result<Vec<SkipCost>> {
     crate::text::make_folder(folder)?;
     let mut rows = Vec::new();
-    for case in all(bench.quick)? {
-        if !chosen.is_empty() && !chosen.iter().any(|text| case.name.contains(text)) {
-            continue;
-        }
-        rows.extend(of_case(bench, &case)?);
+    for case in cases {
+        rows.extend(of_case(bench, case)?);
     }
     let origin = json!({
         "origin": bench.origin, "quick": bench.quick, "seed": bench.seed,

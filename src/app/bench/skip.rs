@@ -24,15 +24,15 @@ pub struct Arguments {
 
 /// Measures and prints a row a scene and skip.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let mut names: Vec<String> = skips::all(arguments.quick)?.into_iter().map(|case| case.name).collect();
-    names.extend(bake_skips::meshes(arguments.quick).into_iter().map(|mesh| mesh.name));
+    let (mut scenes, mut meshes) = (skips::all(arguments.quick)?, bake_skips::meshes(arguments.quick));
+    let names = scenes.iter().map(|case| &case.name).chain(meshes.iter().map(|mesh| &mesh.name));
+    let mut names: Vec<String> = names.cloned().collect();
     names.dedup();
-    cases::named(names, &arguments.case, String::as_str)?;
+    let names = cases::named(names, &arguments.case, String::as_str)?;
+    scenes.retain(|case| names.contains(&case.name));
+    meshes.retain(|mesh| names.contains(&mesh.name));
     let (context, (rows, bakes)) = start(global, arguments.quick, |bench| {
-        Ok((
-            skips::run(bench, &arguments.out, &arguments.case)?,
-            bake_skips::run(bench, &arguments.out, &arguments.case)?,
-        ))
+        Ok((skips::run(bench, &arguments.out, &scenes)?, bake_skips::run(bench, &arguments.out, &meshes)?))
     })?;
     if global.json {
         output::say(serde_json::json!({ "frames": rows, "bakes": bakes }).to_string());

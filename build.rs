@@ -29,9 +29,9 @@ fn record_revision() {
 /// A combined archive has several times as many bytes; Debian's has a fifth.
 const COMBINED_BYTES: u64 = 1 << 20;
 
-/// The shaderc crate links libshaderc_combined.a alone. Debian's holds only a part and would end in pages of undefined symbols, and
-/// without the library the crate compiles its own copy, which takes 12 minutes on two cores and cmake. Where the build cannot end
-/// well, one line says what to run.
+/// The shaderc crate links libshaderc_combined.a alone. Debian's holds only a part and would end in pages of undefined
+/// symbols, and without the library the crate compiles its own copy, which takes 12 minutes on two cores and cmake.
+/// Where the build cannot end well, one line says what to run.
 fn check_shaderc() {
     println!("cargo::rerun-if-env-changed=SHADERC_LIB_DIR");
     println!("cargo::rerun-if-env-changed=VULKAN_SDK");

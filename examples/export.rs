@@ -1,9 +1,10 @@
-//! Bakes the light of a scene into a model: each vertex's radiosity as its colour, and its transfer vector (spherical harmonics) as
-//! attributes of its own. `cargo run --example export -- SCENE.toml light.glb`; viewers of glTF show the colours.
+//! Bakes the light of a scene into a model: each vertex's radiosity as its colour, and its transfer vector (spherical
+//! harmonics) as attributes of its own. `cargo run --example export -- SCENE.toml light.glb`; viewers of glTF show the
+//! colours.
 //!
 //! `COLOR_0` is linear radiance, not below 0, in units of what the scene's exposure shows as white. `_TRANSFER_0`,
-//! `_TRANSFER_1` and so on hold four coefficients each, bands^2 in all, in the node's own frame: albedo / pi times their
-//! product with a sky's is the radiosity under it.
+//! `_TRANSFER_1` and so on hold four coefficients each, bands^2 in all, in the node's own frame: albedo / pi times
+//! their product with a sky's is the radiosity under it.
 
 use shadow_fields::prelude::*;
 use shadow_fields::scene::Lights;
@@ -17,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = Scene::load(Path::new(&scene))?;
     let gpu = Gpu::own(&DeviceOptions { cache_dir: Cache::usual_folder(), ..Default::default() })?;
     // All lights go through spherical harmonics, so that every mesh has its transfer vectors.
-    let options = RenderOptions { quality: Quality::Draft, lights: Lights::Sh, ..Default::default() };
+    let options = RenderOptions { bake: Quality::Draft.into(), lights: Lights::Sh, ..Default::default() };
     let mut renderer = Renderer::new(&gpu, &scene, &options)?;
     let mut model = Model::default();
     let white = scene.data.output.white();

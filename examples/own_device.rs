@@ -1,5 +1,5 @@
-//! A program with a Vulkan device of its own has its vertices lit on it, and reads the light in a command buffer of its own:
-//! `cargo run --example own_device`.
+//! A program with a Vulkan device of its own has its vertices lit on it, and reads the light in a command buffer of its
+//! own: `cargo run --example own_device`.
 #![allow(unsafe_code)] // it calls Vulkan
 
 use shadow_fields::ash::{self, vk};
@@ -60,8 +60,8 @@ unsafe fn light(
     family: u32,
 ) -> Outcome<()> {
     let cache = Cache::usual_folder();
-    // SAFETY: the instance is for Vulkan 1.3, the device has the required features, both outlive `gpu` and what is made with it,
-    // and nothing else uses the queue.
+    // SAFETY: the instance is for Vulkan 1.3, the device has the required features, both outlive `gpu` and what is made
+    // with it, and nothing else uses the queue.
     let gpu = unsafe { Gpu::from_vulkan(instance, physical, device, queue, family, cache.as_deref())? };
     let ball = Generator::Sphere { radius_m: 0.4, subdivisions: 3 };
     let lamp = EntityData { emission: [30.0, 30.0, 24.0].into(), ..EntityData::of_mesh("ball") };
@@ -72,7 +72,8 @@ unsafe fn light(
         .entity(EntityData { position: [0.0, 0.6, 0.0].into(), ..EntityData::of_mesh("ball") })
         .entity(EntityData { position: [1.0, 2.2, 0.5].into(), scale: 0.3, ..lamp })
         .build()?;
-    let mut renderer = Renderer::new(&gpu, &scene, &RenderOptions { quality: Quality::Draft, ..Default::default() })?;
+    let mut renderer =
+        Renderer::new(&gpu, &scene, &RenderOptions { bake: Quality::Draft.into(), ..Default::default() })?;
     for step in 0..3 {
         let mut placements = scene.at(0.0);
         placements[1].position.x = 0.3 * step as f32;
@@ -93,8 +94,8 @@ unsafe fn light(
     Ok(())
 }
 
-/// Copies the light into a buffer of the program's, in its own command buffer on the same queue. No barrier stands before the copy:
-/// the library has made its writes visible.
+/// Copies the light into a buffer of the program's, in its own command buffer on the same queue. No barrier stands
+/// before the copy: the library has made its writes visible.
 ///
 /// # Safety
 /// As [`light`].

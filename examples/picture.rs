@@ -24,7 +24,7 @@ fn main() -> Result<(), Error> {
         })
         .build()?;
     let gpu = Gpu::own(&DeviceOptions { cache_dir: Cache::usual_folder(), ..Default::default() })?;
-    let options = RenderOptions { quality: Quality::Draft, size: Some([480, 320]), ..Default::default() };
+    let options = RenderOptions { bake: Quality::Draft.into(), size: Some([480, 320]), ..Default::default() };
     Renderer::new(&gpu, &scene, &options)?.write_png(path.as_ref())?;
     println!("{path}: {} on {}", scene.entities.len(), gpu.device().info.name);
     Ok(())

@@ -1,6 +1,6 @@
 #version 460
-// Computes stored samples from captured samples: each is the weighted sum of the captured samples that the host lists for it. One
-// invocation computes four coefficients.
+// Computes stored samples from captured samples: each is the weighted sum of the captured samples that the host lists
+// for it. One invocation computes four coefficients.
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = 0) readonly buffer Captured { vec4 captured[]; };
@@ -34,7 +34,8 @@ void main() {
     }
     sum *= push.factor;
 #if HALF
-    // Subnormal halves are stored as 0: shaders that unpack them are slow on some devices and flush them to 0 on others.
+    // Subnormal halves are stored as 0: shaders that unpack them are slow on some devices and flush them to 0 on
+    // others.
     sum = mix(sum, vec4(0.0), lessThan(abs(sum), vec4(LEAST_HALF)));
     stored[i] = uvec2(packHalf2x16(sum.xy), packHalf2x16(sum.zw));
 #else

@@ -1,6 +1,6 @@
 #version 460
-// One cube face seen from a sample point. Faces are axis-aligned, so right, down and forward are signed unit vectors and the
-// products below are exact.
+// One cube face seen from a sample point. Faces are axis-aligned, so right, down and forward are signed unit vectors
+// and the products below are exact.
 layout(location = 0) in vec4 position; // in r
 #if RADIANCE
 layout(location = 1) in vec3 color;
@@ -19,8 +19,8 @@ layout(push_constant) uniform Push {
 void main() {
     vec3 q = position.xyz - push.eye.xyz;
     float w = dot(push.forward.xyz, q);
-    // Moves a vertex off the plane of the eye, where w is in r. To find a triangle's facing, SwiftShader divides by w before it clips; it
-    // returns 1 for 1 / 0, and a huge quotient gives a wrong facing.
+    // Moves a vertex off the plane of the eye, where w is in r. To find a triangle's facing, SwiftShader divides by w
+    // before it clips; it returns 1 for 1 / 0, and a huge quotient gives a wrong facing.
     if (abs(w) < 1e-6) {
         w = w < 0.0 ? -1e-6 : 1e-6;
     }

@@ -1,14 +1,14 @@
-// What the passes that reduce captured cube faces read: the atlas, and a job for each sample.
+// What the passes that reduce captured cube faces read: the atlas, and the faces of each sample.
 
-struct Job {
+struct SampleFaces {
     vec4 normal;   // unit surface normal, of vertices
     uint slots[6]; // place of each face in the atlas; NONE where the object does not reach
-    uint target;   // sample that is written
-    float scale;   // factor before storing, of coefficients; 0 where none are wanted
+    float scale;   // factor on coefficients
+    uint unused;
 };
 
 layout(binding = 0) uniform texture2D atlas;
-layout(std430, binding = 1) readonly buffer Jobs { Job jobs[]; };
+layout(std430, binding = 1) readonly buffer Samples { SampleFaces samples[]; };
 
 layout(push_constant) uniform Push {
     uint face_px;

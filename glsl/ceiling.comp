@@ -1,7 +1,7 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
-// Measures a device's peak rates, one kind of work per compilation. KIND 0: multiply-adds, 1 texels of four halves, 2 texels of 16
-// bytes, 3 reads of 8 bytes from a storage block, 4 triad, 5 samples that a sampler interpolates between eight texels.
+// Measures a device's peak rates, one kind of work per compilation. KIND 0: multiply-adds, 1 texels of four halves, 2
+// texels of 16 bytes, 3 reads of 8 bytes from a storage block, 4 triad.
 layout(local_size_x = 64) in;
 layout(std430, binding = 1) buffer Out { vec4 results[]; };
 
@@ -14,9 +14,6 @@ layout(binding = 0) uniform utextureBuffer source;
 #elif KIND == 3
 layout(std430, binding = 0) readonly buffer Source { uvec2 source[]; };
 #define READ(i) vec4(source[i].xyxy)
-#elif KIND == 5
-layout(binding = 0) uniform sampler3D source;
-#define READ(i) textureLod(source, vec3(float((i) & 1023u), float(((i) >> 3) & 1023u), float((i) & 255u)) / vec3(1024.0, 1024.0, 256.0), 0.0)
 #elif KIND == 4
 layout(std430, binding = 0) readonly buffer Source { vec4 source[]; };
 layout(std430, binding = 2) readonly buffer Other { vec4 other[]; };

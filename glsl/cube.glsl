@@ -1,5 +1,5 @@
-// The faces of a cube around the origin, and places on them: -1 to 1 from edge to edge, warped so that equal steps are almost equal
-// angles. The twins are src/sh/cube.rs and src/field/directions.rs.
+// The faces of a cube around the origin, and places on them: -1 to 1 from edge to edge, warped so that equal steps are
+// almost equal angles. The twins are src/sh/cube.rs and src/field/directions.rs.
 
 // The face that a direction meets.
 uint cube_face(vec3 p) {

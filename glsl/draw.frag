@@ -1,6 +1,7 @@
 #version 460
 #include "finish.glsl"
-layout(location = 0) in vec3 radiance;
+#include "centroid.glsl"
+layout(location = 0) centroid in vec4 radiance; // w: 1
 layout(location = 0) out vec4 color; // alpha: the entity's tag
 
 layout(push_constant) uniform Push {
@@ -10,5 +11,5 @@ layout(push_constant) uniform Push {
 } push;
 
 void main() {
-    color = vec4(finish(radiance, push.emission_white.w), push.tag);
+    color = vec4(finish(within_triangle(radiance.w) * radiance.rgb, push.emission_white.w), push.tag);
 }

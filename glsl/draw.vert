@@ -3,7 +3,7 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 emission;
 layout(location = 2) in vec4 radiosity;
-layout(location = 0) out vec3 radiance;
+layout(location = 0) out vec4 radiance; // w: 1
 
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
@@ -12,6 +12,6 @@ layout(push_constant) uniform Push {
 } push;
 
 void main() {
-    radiance = push.emission_white.rgb * emission + radiosity.rgb;
+    radiance = vec4(push.emission_white.rgb * emission + radiosity.rgb, 1.0);
     gl_Position = push.clip_from_object * vec4(position, 1.0);
 }

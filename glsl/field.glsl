@@ -1,32 +1,27 @@
 // A lookup in a field: position to stored samples and weights, and their weighted sum. The twin is Lattice::corners and
-// ShadowField::lookup. A quad is four coefficients: vec4, or four halves.
-// DIRECTIONS 0 cube, 1 latitude-longitude; SPACING 0 chord, 1 linear; LOOKUP 0 nearest, 1 radial, 2 trilinear. They and the
-// other choices are constants in plain conditions, of which the compiler keeps one side; only what a driver must not see is left
-// to the preprocessor: how fields are bound and read.
+// ShadowField::lookup. A quad is four coefficients: vec4, or four halves. DIRECTIONS 0 cube, 1 latitude-longitude;
+// SPACING 0 chord, 1 linear. They and the other choices are constants in plain conditions, of which the compiler keeps
+// one side; only what a driver must not see is left to the preprocessor: how fields are bound and read.
 
 const uint FIELD_QUADS = FIELD_STRIDE / 4; // of an occlusion sample
 const uint CHANNEL_QUADS = STRIDE / 4;     // of a channel of radiance, and of a transfer vector
-const uint CHANNEL_STEP = IMAGE == 1 ? 1 : CHANNEL_QUADS;
 const uint FETCHED_QUADS = FIELD_QUADS > CHANNEL_QUADS ? FIELD_QUADS : CHANNEL_QUADS;
 
-// Interpolated by the shader itself, between directions and between shells; a sampler does both.
-const bool BILINEAR = IMAGE == 0 && LOOKUP == 2;
-const bool LINEAR = IMAGE == 0 && LOOKUP != 0;
-const uint CORNERS = (BILINEAR ? 4 : 1) * (LINEAR ? 2 : 1);
+// Samples that a lookup interpolates: four directions on each of two shells.
+const uint CORNERS = 8;
 
 // The bits of a half, moved to where a float has them (SHIFTED), are that float times 2^-112, which the weights undo.
 const float FIELD_UNIT = SHIFTED == 1 ? 5192296858534827628530496329220096.0 : 1.0;
 
 struct FieldPlace {
-    vec3 texel;            // of an image, within a channel, of its first quad; texel centres at halves
-    uint corner[CORNERS];  // of all else: stored sample
+    uint corner[CORNERS];  // stored sample
     float weight[CORNERS]; // includes the factors that undo the stored scale and FIELD_UNIT
 };
 
 #include "cube.glsl"
 
-// Base of the face's stored cells, and coordinates among them (samples at whole numbers, border included). A row's ends are samples
-// (edges 1), or half a step beyond the last that is the face's own (edges 0).
+// Base of the face's stored cells, and coordinates among them (samples at whole numbers, border included). A row's ends
+// are samples (edges 1), or half a step beyond the last that is the face's own (edges 0).
 void field_plane_cube(vec3 p, float edges, out uint base, out vec2 cell) {
     uint face = cube_face(p);
     // At the very centre any direction will do; it must only be a number.
@@ -47,7 +42,6 @@ struct FieldCells {
     uvec2 first;
     uvec2 second;
     vec2 fraction;
-    vec2 cell;
 };
 
 const uint COLUMNS = DIRECTIONS == 0 ? CELLS + 2 : LONGITUDES;
@@ -56,18 +50,15 @@ const uint PLANE = DIRECTIONS == 0 ? 6 * COLUMNS * COLUMNS : LATITUDES * LONGITU
 FieldCells field_cells(vec3 p, float edges) {
     FieldCells cells;
     cells.base = 0;
-    if (DIRECTIONS == 0) {
-        field_plane_cube(p, edges, cells.base, cells.cell);
-    } else {
-        field_plane_latlon(p, cells.cell);
-    }
-    vec2 cell = LOOKUP == 2 ? cells.cell : floor(cells.cell + 0.5);
+    vec2 cell;
     vec2 low;
     if (DIRECTIONS == 0) {
+        field_plane_cube(p, edges, cells.base, cell);
         low = min(floor(cell), vec2(CELLS));
         cells.first = uvec2(low);
         cells.second = cells.first + 1;
     } else {
+        field_plane_latlon(p, cell);
         low = vec2(floor(cell.x), min(floor(cell.y), max(LATITUDES - 2.0, 0.0)));
         cells.first = uvec2(uint(low.x) % LONGITUDES, uint(low.y));
         cells.second = uvec2((uint(low.x) + 1) % LONGITUDES, min(cells.first.y + 1, uint(LATITUDES) - 1));
@@ -93,21 +84,19 @@ FieldPlace field_place(vec3 p, vec4 radial, float edges) {
 
     FieldCells cells = field_cells(p, edges);
     FieldPlace place;
-    place.texel = vec3(cells.cell.x, cells.cell.y + float(cells.base / COLUMNS), t) + 0.5;
-    t = LOOKUP == 0 ? floor(t + 0.5) : t;
     float shell = min(floor(t), max(SHELLS - 2.0, 0.0));
     float radial_fraction = t - shell;
     uint base = cells.base + uint(shell) * PLANE;
     uint up = SHELLS > 1 ? PLANE : 0;
     vec2 fraction = cells.fraction;
-    // Of a corner's number the lowest bits say which cell it is along x and y, the next which shell; without interpolation the nearer.
+    // Of a corner's number the lowest bits say which cell it is along x and y, the next which shell.
     [[unroll]] for (uint k = 0; k < CORNERS; k++) {
-        bool right = BILINEAR ? (k & 1) != 0 : fraction.x > 0.5;
-        bool lower = BILINEAR ? (k & 2) != 0 : fraction.y > 0.5;
-        bool outer = LINEAR ? (k & (BILINEAR ? 4 : 1)) != 0 : radial_fraction > 0.5;
-        float wx = BILINEAR ? (right ? fraction.x : 1.0 - fraction.x) : 1.0;
-        float wy = BILINEAR ? (lower ? fraction.y : 1.0 - fraction.y) : 1.0;
-        float wz = LINEAR ? (outer ? radial_fraction : 1.0 - radial_fraction) : 1.0;
+        bool right = (k & 1) != 0;
+        bool lower = (k & 2) != 0;
+        bool outer = (k & 4) != 0;
+        float wx = right ? fraction.x : 1.0 - fraction.x;
+        float wy = lower ? fraction.y : 1.0 - fraction.y;
+        float wz = outer ? radial_fraction : 1.0 - radial_fraction;
         uint x = right ? cells.second.x : cells.first.x;
         uint y = lower ? cells.second.y : cells.first.y;
         place.corner[k] = base + y * COLUMNS + x + (outer ? up : 0);
@@ -116,10 +105,9 @@ FieldPlace field_place(vec3 p, vec4 radial, float edges) {
     return place;
 }
 
-// Each has field_sums: the weighted sums of one channel of the field whose first quad is `base`; samples are `sample_quads` quads apart.
-#if IMAGE
-#include "field_image.glsl"
-#elif PACKED
+// Each has field_sums: the weighted sums of one channel of the field whose first quad is `base`; samples are
+// `sample_quads` quads apart.
+#if PACKED
 #include "field_packed.glsl"
 #else
 #include "field_quads.glsl"

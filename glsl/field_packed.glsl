@@ -17,7 +17,8 @@ void field_sums(FieldPlace place, uint base, uint sample_quads, out vec4 sums[FE
         at[k] = int((base + place.corner[k] * sample_quads) / 2);
     }
     [[unroll]] for (uint q = 0; q < FETCHED_QUADS; q += 2) {
-        // All corners are read before any is used: a processor keeps nothing in registers while it reads a texel, a GPU waits once.
+        // All corners are read before any is used: a processor keeps nothing in registers while it reads a texel, a GPU
+        // waits once.
         uvec4 halves[CORNERS];
         [[unroll]] for (uint k = 0; k < CORNERS; k++) {
             halves[k] = texelFetch(field_quads, at[k] + int(q / 2));

@@ -1,11 +1,12 @@
 #version 460
 #include "finish.glsl"
 #include "blend.glsl"
-// Shades a point of a grid with the interpolated radiance of its cell's triangle. One fetch finds the triangle and three read its
-// corners, which on a software rasteriser is much cheaper than drawing small triangles.
+#include "centroid.glsl"
+// Shades a point of a grid with the interpolated radiance of its cell's triangle. One fetch finds the triangle and
+// three read its corners, which on a software rasteriser is much cheaper than drawing small triangles.
 layout(binding = 0) uniform utextureBuffer corners;  // vertices of each cell; see asset::grid
 layout(binding = 1) uniform textureBuffer radiosity; // of every vertex of the scene
-layout(location = 0) in vec2 place;
+layout(location = 0) centroid in vec3 place; // z: 1
 layout(location = 0) out vec4 color; // alpha: the entity's tag
 
 layout(push_constant) uniform Push {
@@ -20,29 +21,31 @@ layout(push_constant) uniform Push {
 } push;
 
 #if PIXEL
-// Blocks of cells that a shadow's edge comes near are drawn by this: their pixels evaluate sharp lights themselves, since vertices carry no
-// edge that is finer than their cells.
+// Blocks of cells that a shadow's edge comes near are drawn by this: their pixels evaluate sharp lights themselves,
+// since vertices carry no edge that is finer than their cells.
 #extension GL_EXT_control_flow_attributes : require
-layout(location = 1) in vec3 at_object; // object's frame, metres
+layout(location = 1) centroid in vec3 at; // object's frame, metres
 #define FACINGS 1
 #include "pixel_light.glsl"
 #endif
 
 void main() {
-    uvec2 cell = uvec2(clamp(ivec2(floor(place)), ivec2(0), ivec2(push.cells) - 1));
-    vec2 at = place - vec2(cell);
+    float within = within_triangle(place.z);
+    vec2 in_grid = within * place.xy;
+    uvec2 cell = uvec2(clamp(ivec2(floor(in_grid)), ivec2(0), ivec2(push.cells) - 1));
+    vec2 in_cell = in_grid - vec2(cell);
     uvec4 corner = texelFetch(corners, int(cell.y * push.cells.x + cell.x));
     bool upwards = corner.x >= UPWARDS;
     corner.x &= ~UPWARDS;
     // Two corners lie on the cell's diagonal; the third is the one on this point's side of it.
-    bool far = upwards ? at.y > at.x : at.x + at.y > 1.0;
+    bool far = upwards ? in_cell.y > in_cell.x : in_cell.x + in_cell.y > 1.0;
     uvec3 triangle = upwards ? uvec3(corner.x, corner.w, far ? corner.z : corner.y)
                              : uvec3(corner.y, corner.z, far ? corner.w : corner.x);
     vec3 weight;
     if (upwards) {
-        weight = far ? vec3(1.0 - at.y, at.x, at.y - at.x) : vec3(1.0 - at.x, at.y, at.x - at.y);
+        weight = far ? vec3(1.0 - in_cell.y, in_cell.x, in_cell.y - in_cell.x) : vec3(1.0 - in_cell.x, in_cell.y, in_cell.x - in_cell.y);
     } else {
-        weight = far ? vec3(1.0 - at.y, 1.0 - at.x, at.x + at.y - 1.0) : vec3(at.x, at.y, 1.0 - at.x - at.y);
+        weight = far ? vec3(1.0 - in_cell.y, 1.0 - in_cell.x, in_cell.x + in_cell.y - 1.0) : vec3(in_cell.x, in_cell.y, 1.0 - in_cell.x - in_cell.y);
     }
     uint first = min(triangle.x, min(triangle.y, triangle.z));
     triangle += push.first;
@@ -53,7 +56,7 @@ void main() {
         Entity receiver = ENTITY(push.receiver);
         Facing facings[FACINGS];
         facings[0] = facing_of(receiver, push.normal.xyz, 1.0, NONE, 0);
-        light = blend(soft, triangle, weight) + pixel_light(receiver, at_object, facings, chain);
+        light = blend(soft, triangle, weight) + pixel_light(receiver, within * at, facings, chain);
     }
 #endif
     color = vec4(finish(push.emission_white.rgb + light, push.emission_white.w), push.tag);

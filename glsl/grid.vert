@@ -2,7 +2,7 @@
 // Transforms a corner of a grid, which is drawn as one parallelogram, or of a block of its cells.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec2 cell; // in cells from the first
-layout(location = 0) out vec2 place;
+layout(location = 0) out vec3 place; // z: 1
 
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
@@ -36,7 +36,7 @@ bool has_edge(uint block) {
 #endif
 
 void main() {
-    place = cell;
+    place = vec3(cell, 1.0);
     gl_Position = push.clip_from_object * vec4(position, 1.0);
 #if BLOCK_CELLS > 0
     at = position;

@@ -1,9 +1,9 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 // Light on receivers, a cluster of neighbouring vertices a workgroup. Every chain begins with the vertex's transfer, is
-// multiplied by the visibility past the occluders that lie before its light, and meets the light; the sky's chain comes last.
-// Pass "gather" lists these entries for each cluster, so that all its vertices walk one list and only what concerns one of them is on
-// it; what an entry does to a single vertex (order, overlap, horizon) is decided here.
+// multiplied by the visibility past the occluders that lie before its light, and meets the light; the sky's chain comes
+// last. src/lists/gather.rs lists these entries for each cluster, so that all its vertices walk one list and only what
+// concerns one of them is on it; what an entry does to a single vertex (order, overlap, horizon) is decided here.
 #include "merge_layout.glsl"
 #include "generated/basis.glsl"
 #include "generated/cosine.glsl"
@@ -51,8 +51,8 @@ struct Vertex {
     vec3 normal;
 };
 
-// How much occluder e counts in the chain of light l: 1 before the light, 0 behind it, and less where it stands beside the light's cone.
-// In the sky's chain every occluder counts.
+// How much occluder e counts in the chain of light l: 1 before the light, 0 behind it, and less where it stands beside
+// the light's cone. In the sky's chain every occluder counts.
 float share(Vertex vertex, uint e, Cone cone, uint l) {
     if (LIGHTS == 0) {
         return 1.0;
@@ -79,14 +79,15 @@ void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN]
     float counts = share(vertex, e, cone, l) * field_share(cone);
     weight *= shines ? 1.0 : counts;
     vec3 p = to_lattice(entity, to_object(entity, (vertex.position - entity.centre.xyz) * entity.centre.w));
-    uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_STEP : entity.blocked_base;
+    uint base = of_radiance ? entity.radiance_base + channel * CHANNEL_QUADS : entity.blocked_base;
     float b[FETCHED];
     FieldPlace place = field_place(p, entity.radial, lattice_edges(entity));
     [[unroll]] for (uint k = 0; k < CORNERS; k++) {
         place.weight[k] *= weight;
     }
     field_gather(place, base, of_radiance ? 3 * CHANNEL_QUADS : FIELD_QUADS, b);
-    // Occlusion and radiance of different bands are read alike; what one of them does not have belongs to the next sample.
+    // Occlusion and radiance of different bands are read alike; what one of them does not have belongs to the next
+    // sample.
     [[unroll]] for (uint k = FIELD_COEFFICIENTS; k < FETCHED; k++) {
         b[k] = of_radiance ? b[k] : 0.0;
     }
@@ -101,7 +102,7 @@ void look(Vertex vertex, uint packed, float t_start[CHAIN], inout float t[CHAIN]
         b[k] = shines ? 0.0 : b[k];
     }
     vec3 color = of_radiance ? vec3(channel == 0, channel == 1, channel == 2) : vec3(1.0);
-    sum += (shines ? met : 0.0) * color * entity.emission.rgb;
+    sum += (shines ? met : 0.0) * color * entity.emission;
     chain_multiply(t, b);
     bool anew = LIGHTS == 1 && (packed & ENTRY_LAST) != 0;
     [[unroll]] for (uint k = 0; k < CHAIN; k++) {
@@ -141,7 +142,7 @@ void main() {
     vec3 position = vertex_quad(at).xyz; // object frame, metres, from the bounding sphere's centre
     vec3 normal = vertex_quad(at + 1).xyz;
     // World axes, but from the receiver's centre: far from the world's origin f32 positions would be too coarse.
-    position = receiver.albedo.w * to_world(receiver, position);
+    position = receiver.scale * to_world(receiver, position);
     normal = to_world(receiver, normal);
 
     float through[COEFFICIENTS];
@@ -159,8 +160,9 @@ void main() {
         Vertex vertex = Vertex(receiver.centre.xyz, position, normal);
         uint i = 0;
         uint packed = entry_at(cluster.entry_first);
-        // Loops are tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the loop. It jumps
-        // nowhere else, so entries of either kind run as loops of their own, each in turn as long as there are such entries.
+        // Loops are tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the
+        // loop. It jumps nowhere else, so entries of either kind run as loops of their own, each in turn as long as
+        // there are such entries.
         do {
 #if SKIP_CAPS
             do {
@@ -190,5 +192,5 @@ void main() {
             sum[channel] += sky_quad(channel * CHANNEL_QUADS + k / 4)[k % 4] * through[k];
         }
     }
-    radiosity[cluster.radiosity_first + v] = vec4(sum * receiver.albedo.rgb, 0.0);
+    radiosity[cluster.radiosity_first + v] = vec4(sum * receiver.albedo, 0.0);
 }

@@ -1,6 +1,6 @@
-// An occluder that a vertex sees small blocks one direction, as a point: the chain loses its value there times the solid angle of the
-// occluder's projected area (src/field/area.rs). Between CAP_SINE_LEAST and CAP_SINE_MOST, sines of the bounding sphere's half-angle,
-// this and the field are blended, so that nothing pops.
+// An occluder that a vertex sees small blocks one direction, as a point: the chain loses its value there times the
+// solid angle of the occluder's projected area (src/field/area.rs). Between CAP_SINE_LEAST and CAP_SINE_MOST, sines of
+// the bounding sphere's half-angle, this and the field are blended, so that nothing pops.
 
 // Share of the field; the rest is the point's.
 float field_share(Cone cone) {
@@ -12,8 +12,8 @@ float field_share(Cone cone) {
 }
 
 #if SKIP_CAPS
-// The point occluder: its solid angle and, in the world, the basis in its direction. Cut to a few bands, a disc of mean square radius q
-// (radians) has 1 - l (l + 1) q / 4 of what a point has in band l.
+// The point occluder: its solid angle and, in the world, the basis in its direction. Cut to a few bands, a disc of mean
+// square radius q (radians) has 1 - l (l + 1) q / 4 of what a point has in band l.
 float cap_of(Entity entity, Cone cone, out float y[COEFFICIENTS]) {
     float u = dot(entity.area_x.xyz, cone.toward);
     float v = dot(entity.area_y.xyz, cone.toward);

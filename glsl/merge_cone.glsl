@@ -1,5 +1,6 @@
-// What a bounding sphere covers of a vertex's view, and the skips that follow from it: they are exact for true visibility. The
-// band-limited product is not zero there, so each fades out over FADE radians beyond its threshold and nothing pops.
+// What a bounding sphere covers of a vertex's view, and the skips that follow from it: they are exact for true
+// visibility. The band-limited product is not zero there, so each fades out over FADE radians beyond its threshold and
+// nothing pops.
 
 struct Cone {
     vec3 toward;    // unit, to the sphere's centre
@@ -23,8 +24,8 @@ const float FADE_SINE = sin(FADE);
 const float FADE_COSINE = cos(FADE);
 const float MEET_SINE = sin(MEET);
 
-// 1 while any of the cone stands above the horizon of the surface, 0 when it lies FADE below. From within FADE of the sphere
-// it never reaches 0.
+// 1 while any of the cone stands above the horizon of the surface, 0 when it lies FADE below. From within FADE of the
+// sphere it never reaches 0.
 float above_horizon(Cone cone, vec3 normal) {
 #if SKIP_HORIZON
     return smoothstep(-cone.sine - FADE_SINE, -cone.sine, dot(normal, cone.toward));
@@ -33,8 +34,8 @@ float above_horizon(Cone cone, vec3 normal) {
 #endif
 }
 
-// 0 when two cones are FADE apart, 1 when they reach MEET into one another, or one into the middle of the other; from near a sphere they
-// need reach less. Cones that fill the view together always overlap.
+// 0 when two cones are FADE apart, 1 when they reach MEET into one another, or one into the middle of the other; from
+// near a sphere they need reach less. Cones that fill the view together always overlap.
 float overlap(Cone a, Cone b) {
 #if SKIP_CONES
     float cosine = a.cosine * b.cosine - a.sine * b.sine;

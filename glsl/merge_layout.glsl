@@ -1,21 +1,5 @@
-// What gather and merge read besides fields; src/layout.rs holds the same structs and tests/layouts.rs compares the two.
-
-struct Entity {
-    vec4 centre;       // world, metres; w = 1 / (scale x bounding radius), 1/m
-    vec4 alpha_beta;   // cosine and sine of both; the rotation to the world is Rz(alpha) Ry(beta) Rz(gamma)
-    vec2 gamma;        // cosine and sine
-    uint blocked_base; // first quad of the occlusion field
-    uint radiance_base;// first quad of the radiance field
-    vec4 radial;       // shell coordinate = x * spacing coordinate + y; z = inner, w = outer shell radius in r
-    vec4 emission;     // radiance factor of its light; w = its albedo, of the brightest colour
-    vec4 shift;        // added after stretching, in r; w = stretch of its fields, packed
-    vec4 albedo;       // albedo / pi; w = uniform scale of the object
-    vec4 area_x;       // first axis of its projected area, world; w = the constant term
-    vec4 area_y;       // second axis, world; w = factor of u
-    vec4 area_terms;   // factors of v, u u, v v, u v
-    vec4 sharp;        // x: first quad of its silhouette field (bits); as a light y: share of its disc, 0: it has its own outline;
-                       // z: below 0 a disc that shines from one side, above 0 a rectangle, 0 a ball
-};
+// What merge and sharp read besides fields. Entity and Cluster are the structs of src/layout.rs.
+#include "generated/structs.glsl"
 
 // The rotation that a cosine and sine stand for, applied to two coordinates, and its inverse.
 vec2 turn(vec2 turned_by, vec2 p) {
@@ -37,35 +21,22 @@ vec3 to_object(Entity entity, vec3 p) {
     return p;
 }
 
-// A place (object's frame, in r) in the space of the object's lattice. The stretch of each axis is 1 and 64ths, 0 to 64 of them, of
-// which seven bits an axis make one whole number.
+// A place (object's frame, in r) in the space of the object's lattice. The stretch of each axis is 1 and 64ths, 0 to 64
+// of them, of which seven bits an axis make one whole number.
 vec3 to_lattice(Entity entity, vec3 p) {
     uint packed = uint(entity.shift.w);
     vec3 sixty_fourths = vec3(packed & 127u, packed >> 7 & 127u, packed >> 14 & 127u);
     return p + p * sixty_fourths / 64.0 + entity.shift.xyz;
 }
 
-// 1 where the samples of the object's lattice lie on the edges of a cube's faces, 0 where they are cells' centres: the bit above.
+// 1 where the samples of the object's lattice lie on the edges of a cube's faces, 0 where they are cells' centres: the
+// bit above.
 float lattice_edges(Entity entity) {
     return float(uint(entity.shift.w) >> FIT_BITS);
 }
 
-// A workgroup's worth of neighbouring vertices.
-struct Cluster {
-    uint receiver;        // entity that is lit
-    uint vertex_first;    // in the vertex buffer
-    uint vertex_count;    // at most a workgroup
-    uint transfer_first;  // quad of its first transfer vector; NONE: the cosine of the normal
-    uint radiosity_first; // in the radiosity buffer
-    uint entry_first;
-    uint entry_count;      // at least 1
-    uint bounds;          // for the gather
-    uint sharp_count;     // of the entries, the first: chains of sharp lights
-    uint self_first;      // first cell of its first vertex's self-visibility; NONE: it cannot shadow itself
-};
-
-// An entry: what one lookup is for, as ListEntry::pack puts it together. The first ENTRY_BITS bits: entity. As many more: the light
-// whose chain this is, SKY_CHAIN for the sky's.
+// An entry: what one lookup is for, as ListEntry::pack puts it together. The first ENTRY_BITS bits: entity. As many
+// more: the light whose chain this is, SKY_CHAIN for the sky's.
 const uint SKY_CHAIN = (1u << ENTRY_BITS) - 1u;
 const uint ENTRY_LIGHT = 1u << 2 * ENTRY_BITS;      // meets the light rather than multiplying an occluder
 const uint ENTRY_CHANNEL = 2 * ENTRY_BITS + 1;      // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour

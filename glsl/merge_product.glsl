@@ -1,11 +1,11 @@
-// A chain, and how it is multiplied by the visibility past an occluder; the twin is merge::chain. A chain starts as a vertex's
-// transfer T and is kept as SH coefficients. PRODUCT, a place in sh::product_program::STYLES, is how a product is computed.
+// A chain, and how it is multiplied by the visibility past an occluder; the twin is merge::chain. A chain starts as a
+// vertex's transfer T and is kept as SH coefficients.
 #include "generated/product.glsl"
 
 #define FETCHED (COEFFICIENTS > FIELD_COEFFICIENTS ? COEFFICIENTS : FIELD_COEFFICIENTS)
 #define TERMS COEFFICIENTS
-// The last element of a guarded chain is the square of the length of all but coefficient 0.
-#define CHAIN (TERMS + GUARD)
+// The last element of a chain is the square of the length of all but coefficient 0.
+#define CHAIN (TERMS + 1)
 
 // The square of the length of all coefficients but the first.
 float chain_rest(float c[CHAIN]) {
@@ -20,9 +20,7 @@ void chain_begin(float transfer[COEFFICIENTS], out float c[CHAIN]) {
     [[unroll]] for (uint k = 0; k < TERMS; k++) {
         c[k] = transfer[k];
     }
-#if GUARD
     c[TERMS] = chain_rest(c);
-#endif
 }
 
 // The coefficients of the chain.
@@ -42,30 +40,27 @@ float chain_meet(float c[CHAIN], float f[COEFFICIENTS]) {
 }
 
 #if SKIP_CAPS
-// Takes away what comes from one direction: the chain's value there, over a small solid angle. `y` is the basis in that direction, each
-// band a little less for the cap's extent. What a chain has of light is not negative, so a value that is takes nothing, and coefficient
-// 0 does not change sign; with that, and up to 1.5 sr, it is no longer than before: the guard has nothing to take back.
+// Takes away what comes from one direction: the chain's value there, over a small solid angle. `y` is the basis in that
+// direction, each band a little less for the cap's extent. What a chain has of light is not negative, so a value that
+// is takes nothing, and coefficient 0 does not change sign; with that, and up to 1.5 sr, it is no longer than before:
+// the guard has nothing to take back.
 void chain_cover(inout float c[CHAIN], float y[COEFFICIENTS], float solid_angle) {
     float taken = min(solid_angle * max(chain_meet(c, y), 0.0), max(c[0], 0.0) / Y00);
     [[unroll]] for (uint k = 0; k < TERMS; k++) {
         c[k] -= taken * y[k];
     }
-#if GUARD
     c[TERMS] = chain_rest(c);
-#endif
 }
 #endif
 
 // Multiplies by 1 - b.
 //
-// A factor between 0 and 1 makes neither the integral of a function that is nowhere negative larger, nor its length. Cut to a few
-// bands it can do both, a little at a time and without end. The guard takes that back: coefficient 0 neither grows nor changes
-// sign, and the others are shortened until the whole is no longer than before.
+// A factor between 0 and 1 makes neither the integral of a function that is nowhere negative larger, nor its length.
+// Cut to a few bands it can do both, a little at a time and without end. The guard takes that back: coefficient 0
+// neither grows nor changes sign, and the others are shortened until the whole is no longer than before.
 void chain_multiply(inout float c[CHAIN], float b[FETCHED]) {
-#if GUARD
     float first_before = c[0];
     float rest_before = c[TERMS];
-#endif
     float t[TERMS];
     float blocked[FIELD_COEFFICIENTS];
     [[unroll]] for (uint k = 0; k < TERMS; k++) {
@@ -78,7 +73,6 @@ void chain_multiply(inout float c[CHAIN], float b[FETCHED]) {
     [[unroll]] for (uint k = 0; k < TERMS; k++) {
         c[k] = t[k];
     }
-#if GUARD
     float rest = chain_rest(c);
     float kept = clamp(c[0], min(first_before, 0.0), max(first_before, 0.0));
     // What coefficient 0 gives up, the others may take. A factor of 1 changes nothing, to the last bit.
@@ -89,5 +83,4 @@ void chain_multiply(inout float c[CHAIN], float b[FETCHED]) {
     [[unroll]] for (uint k = 1; k < TERMS; k++) {
         c[k] *= shorten;
     }
-#endif
 }

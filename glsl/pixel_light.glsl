@@ -30,9 +30,9 @@ uvec2 chain_of(uint cluster_first, uint v) {
 // `at`: object's frame, metres.
 vec3 pixel_light(Entity receiver, vec3 at, Facing facings[FACINGS], uvec2 chain) {
     Surface surface;
-    surface.position = receiver.albedo.w * to_world(receiver, at);
+    surface.position = receiver.scale * to_world(receiver, at);
     surface.origin = receiver.centre.xyz;
     surface.inverse_radius = receiver.centre.w;
     surface.facings = facings;
-    return sharp_sum(surface, chain.x, chain.y) * receiver.albedo.rgb;
+    return sharp_sum(surface, chain.x, chain.y) * receiver.albedo;
 }

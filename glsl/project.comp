@@ -1,7 +1,7 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
-// Projects cube faces to SH coefficients, one workgroup per sample. Every invocation sums its share of the texels; then one
-// invocation per coefficient adds the shares in order, so the result does not depend on scheduling.
+// Projects cube faces to SH coefficients, one workgroup per sample. Every invocation sums its share of the texels; then
+// one invocation per coefficient adds the shares in order, so the result does not depend on scheduling.
 #include "generated/basis.glsl"
 #if COSINE
 #include "generated/cosine.glsl"
@@ -13,12 +13,12 @@ layout(local_size_x = WORKGROUP) in;
 
 // For each texel of a face: unit direction as components along (right, down, forward), and solid angle in steradians.
 layout(binding = 2) uniform textureBuffer texels;
-layout(std430, binding = 3) writeonly buffer Samples { float samples[]; };
+layout(std430, binding = 3) writeonly buffer Coefficients { float coefficients[]; };
 
 shared float shares[COEFFICIENTS * CHANNELS][WORKGROUP];
 
 void main() {
-    uint job = gl_WorkGroupID.x;
+    uint index = gl_WorkGroupID.x;
     uint lane = gl_LocalInvocationID.x;
     float sums[COEFFICIENTS * CHANNELS];
     for (uint k = 0; k < COEFFICIENTS * CHANNELS; k++) {
@@ -26,7 +26,7 @@ void main() {
     }
     uint texel_count = push.face_px * push.face_px;
     for (uint face = 0; face < 6; face++) {
-        uint slot = jobs[job].scale == 0.0 ? NONE : jobs[job].slots[face];
+        uint slot = samples[index].slots[face];
         if (slot == NONE) {
             continue;
         }
@@ -48,7 +48,7 @@ void main() {
             vec3 direction = to_object(face, texel.xyz);
             float weight = texel.w;
 #if COSINE
-            weight *= max(0.0, dot(jobs[job].normal.xyz, direction));
+            weight *= max(0.0, dot(samples[index].normal.xyz, direction));
 #endif
             float y[COEFFICIENTS];
             sh_basis(direction, y);
@@ -75,14 +75,14 @@ void main() {
             for (uint other = 0; other < WORKGROUP; other++) {
                 total += shares[channel * COEFFICIENTS + k][other];
             }
-            total *= jobs[job].scale;
+            total *= samples[index].scale;
 #if COSINE
             // The unoccluded part is the whole cosine lobe minus the part that the object's own geometry blocks.
             float lobe[COEFFICIENTS];
-            sh_cosine(jobs[job].normal.xyz, lobe);
+            sh_cosine(samples[index].normal.xyz, lobe);
             total = lobe[k] - total;
 #endif
         }
-        samples[jobs[job].target * (STRIDE * CHANNELS) + i] = total;
+        coefficients[index * (STRIDE * CHANNELS) + i] = total;
     }
 }

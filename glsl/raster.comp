@@ -1,6 +1,7 @@
 #version 460
-// Cube faces by computation: a workgroup for each face and strip of its rows. A device that computes on many threads may transform and
-// clip all triangles on one; here each invocation takes triangles of its own. It finds the texels whose centres' rays meet them.
+// Cube faces by computation: a workgroup for each face and strip of its rows. A device that computes on many threads
+// may transform and clip all triangles on one; here each invocation takes triangles of its own. It finds the texels
+// whose centres' rays meet them.
 layout(local_size_x = WORKGROUP) in;
 
 struct Face {
@@ -9,13 +10,13 @@ struct Face {
     vec4 down;
     vec4 forward;
     uint slot;
-    uint run_first;
-    uint run_count;
+    uint range_first;
+    uint range_count;
     uint unused;
 };
 
 layout(std430, binding = 0) readonly buffer Faces { Face faces[]; };
-layout(std430, binding = 1) readonly buffer Runs { uvec2 runs[]; }; // first index and end
+layout(std430, binding = 1) readonly buffer Ranges { uvec2 ranges[]; }; // first index and end
 layout(binding = 2) uniform textureBuffer positions;
 layout(binding = 3) uniform utextureBuffer indices;
 layout(std430, binding = 4) writeonly buffer Texels { uint texels[]; }; // of the atlas, a byte each
@@ -39,8 +40,9 @@ uint words_across() {
 #endif
 }
 
-// The planes through the eye and each edge: a ray to (s, t, 1) meets the triangle where no product with them is negative. For the triangle
-// at the other side of an edge, the edge's numbers are these with the other sign, exactly; so no ray passes between the two.
+// The planes through the eye and each edge: a ray to (s, t, 1) meets the triangle where no product with them is
+// negative. For the triangle at the other side of an edge, the edge's numbers are these with the other sign, exactly;
+// so no ray passes between the two.
 struct Planes {
     vec3 bc;
     vec3 ca;
@@ -53,8 +55,8 @@ vec3 across(vec3 a, vec3 b) {
     return plane;
 }
 
-// Where an edge's plane cuts the row at t: at column x * t + y, the same for the triangles on both sides of the edge. Where the plane is
-// parallel to the rows, that column lies so far on one side that it leaves a row all or nothing.
+// Where an edge's plane cuts the row at t: at column x * t + y, the same for the triangles on both sides of the edge.
+// Where the plane is parallel to the rows, that column lies so far on one side that it leaves a row all or nothing.
 const float ALONG = 1e-20;
 vec2 cut(vec3 plane) {
     float half_px = 0.5 * float(push.face_px);
@@ -63,8 +65,8 @@ vec2 cut(vec3 plane) {
     return vec2(plane.y * scale, plane.z * scale + (along ? 0.0 : half_px - 0.5));
 }
 
-// Narrows a span of columns to one side of a cut: to what follows it where it opens the span, else to what precedes it. Comparisons take
-// two instructions fewer than max() and min(), which also treat NaN.
+// Narrows a span of columns to one side of a cut: to what follows it where it opens the span, else to what precedes it.
+// Comparisons take two instructions fewer than max() and min(), which also treat NaN.
 void narrow(float place, bool opens, inout vec2 span) {
     span.x = opens && place > span.x ? place : span.x;
     span.y = !opens && place < span.y ? place : span.y;
@@ -167,9 +169,9 @@ void main() {
         words[i] = DISTANCE == 1 ? FREE : 0;
     }
     barrier();
-    for (uint k = 0; k < face.run_count; k++) {
-        uvec2 run = runs[face.run_first + k];
-        for (uint i = run.x + 3 * lane; i < run.y; i += 3 * WORKGROUP) {
+    for (uint k = 0; k < face.range_count; k++) {
+        uvec2 range = ranges[face.range_first + k];
+        for (uint i = range.x + 3 * lane; i < range.y; i += 3 * WORKGROUP) {
             uvec3 triangle = uvec3(texelFetch(indices, int(i)).r, texelFetch(indices, int(i) + 1).r,
                 texelFetch(indices, int(i) + 2).r);
             add(corner(face, triangle.x), corner(face, triangle.y), corner(face, triangle.z), int(row_first), int(row_end));

@@ -1,4 +1,5 @@
-// A buffer that a function reads: as texels where TEXEL is 1, which processors read many times faster, else as a storage block.
+// A buffer that a function reads: as texels where TEXEL is 1, which processors read many times faster, else as a
+// storage block.
 #ifndef READABLE
 #define READABLE
 #if TEXEL

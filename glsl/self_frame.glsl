@@ -1,7 +1,8 @@
-// The hemisphere about a vertex's normal and its square of SELF_SIDE x SELF_SIDE nodes. The twin is src/field/self_visibility.rs.
+// The hemisphere about a vertex's normal and its square of SELF_SIDE x SELF_SIDE nodes. The twin is
+// src/field/self_visibility.rs.
 
-// Axes of a vertex's hemisphere from its unit normal: columns tangent, bitangent, normal. The normal must be the mesh's own, in the
-// object's frame; the axes may then be turned to any other frame in which directions are given.
+// Axes of a vertex's hemisphere from its unit normal: columns tangent, bitangent, normal. The normal must be the mesh's
+// own, in the object's frame; the axes may then be turned to any other frame in which directions are given.
 mat3 self_frame(vec3 normal) {
     float s = normal.z >= 0.0 ? 1.0 : -1.0;
     float a = -1.0 / (s + normal.z);

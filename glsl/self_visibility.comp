@@ -1,9 +1,9 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
-// Cube faces around a vertex to its map of signed angles, one workgroup per vertex and one invocation per node. The nearest texel of
-// the other state has a neighbour that is not of it. So a face becomes a bit a texel, the bits beside an edge are found a word at a
-// time, and the nodes measure to those alone. Texels below the horizon are no part of what the vertex sees, so that nothing is
-// measured to the edge between the sky and the vertex's own surface.
+// Cube faces around a vertex to its map of signed angles, one workgroup per vertex and one invocation per node. The
+// nearest texel of the other state has a neighbour that is not of it. So a face becomes a bit a texel, the bits beside
+// an edge are found a word at a time, and the nodes measure to those alone. Texels below the horizon are no part of
+// what the vertex sees, so that nothing is measured to the edge between the sky and the vertex's own surface.
 
 layout(local_size_x = NODES) in;
 
@@ -29,7 +29,7 @@ bool free_at(uint slot, ivec2 at) {
 }
 
 // What was captured at the texel that a direction (any length) meets.
-uint captured_toward(uint job, vec3 d) {
+uint captured_toward(uint index, vec3 d) {
     vec3 a = abs(d);
     uint face = a.z >= a.x && a.z >= a.y ? (d.z < 0.0 ? 5 : 4) : a.y >= a.x ? (d.y < 0.0 ? 3 : 2) : (d.x < 0.0 ? 1 : 0);
     vec3 right = to_object(face, vec3(1.0, 0.0, 0.0));
@@ -37,11 +37,11 @@ uint captured_toward(uint job, vec3 d) {
     vec2 st = vec2(dot(d, right), dot(d, down)) / max(a.x, max(a.y, a.z));
     int px = int(push.face_px);
     ivec2 at = clamp(ivec2((st + 1.0) * 0.5 * float(px)), ivec2(0), ivec2(px - 1));
-    return captured_at(jobs[job].slots[face], at);
+    return captured_at(samples[index].slots[face], at);
 }
 
-bool free_toward(uint job, vec3 d) {
-    return captured_toward(job, d) == FREE;
+bool free_toward(uint index, vec3 d) {
+    return captured_toward(index, d) == FREE;
 }
 
 // Point of a texel's centre on its face: s and t.
@@ -67,8 +67,8 @@ void load_word(uint i, uint slot, ivec2 first, vec3 up) {
     risen[i] = above;
 }
 
-// Texels of word i that have a neighbour of the other state above the horizon, among rows of `across` words of which `count` are
-// there.
+// Texels of word i that have a neighbour of the other state above the horizon, among rows of `across` words of which
+// `count` are there.
 uint edge_word(uint i, uint across, uint count) {
     uint column = i % across;
     uint word = words[i];
@@ -83,7 +83,7 @@ uint edge_word(uint i, uint across, uint count) {
 }
 
 // Adds texels on the rim of a face whose neighbour on another face is of the other state: number k of all four sides.
-void add_rim(uint job, uint face, uint k, int row_first, int row_end, vec3 up) {
+void add_rim(uint index, uint face, uint k, int row_first, int row_end, vec3 up) {
     int px = int(push.face_px);
     uint side = k / push.face_px;
     int along = int(k % push.face_px);
@@ -98,7 +98,7 @@ void add_rim(uint job, uint face, uint k, int row_first, int row_end, vec3 up) {
     uint across = (push.face_px + 31) / 32;
     uint i = uint(at.y - row_first) * across + uint(at.x) / 32;
     uint bit = 1u << (at.x & 31);
-    if ((risen[i] & bit) != 0 && free_toward(job, to_object(face, toward)) != ((words[i] & bit) != 0)) {
+    if ((risen[i] & bit) != 0 && free_toward(index, to_object(face, toward)) != ((words[i] & bit) != 0)) {
         atomicOr(edges[i], bit);
     }
 }
@@ -110,8 +110,8 @@ struct Nearest {
     uvec3 place; // of the blocked one: face, column and row
 };
 
-// Measures to every texel beside an edge; the node's direction `toward` along the face's axes. Words without an edge are jumped over,
-// and rows are counted by a product: a step of a loop and a division cost more than measuring does.
+// Measures to every texel beside an edge; the node's direction `toward` along the face's axes. Words without an edge
+// are jumped over, and rows are counted by a product: a step of a loop and a division cost more than measuring does.
 void measure(uint face, uint count, int row_first, vec3 toward, inout Nearest nearest) {
     uint across = (push.face_px + 31) / 32;
     float rows = 1.0 / float(across);
@@ -144,9 +144,9 @@ float angle_to(vec2 nearest) {
 }
 
 void main() {
-    uint job = gl_WorkGroupID.x;
+    uint index = gl_WorkGroupID.x;
     uint node = gl_LocalInvocationID.x;
-    vec3 normal = jobs[job].normal.xyz;
+    vec3 normal = samples[index].normal.xyz;
     vec3 toward = self_frame(normal) * self_node(node);
     Nearest nearest = Nearest(vec2(-2.0, 0.0), vec2(-2.0, 0.0), uvec3(0));
     int px = int(push.face_px);
@@ -157,7 +157,7 @@ void main() {
             to_object(face, vec3(0.0, 0.0, 1.0)));
         vec3 up = normal * axes;
         bool rises = abs(up.x) + abs(up.y) + up.z > 0.0;
-        uint slot = jobs[job].slots[face];
+        uint slot = samples[index].slots[face];
         for (int first = 0; first < (rises ? px : 0); first += rows) {
             int row_first = max(first - 1, 0);
             int row_end = min(first + rows + 1, px);
@@ -174,7 +174,7 @@ void main() {
             }
             barrier();
             for (uint k = node; k < 4 * push.face_px; k += NODES) {
-                add_rim(job, face, k, row_first, row_end, up);
+                add_rim(index, face, k, row_first, row_end, up);
             }
             barrier();
             for (uint i = node; i < count; i += NODES) {
@@ -187,11 +187,11 @@ void main() {
     }
     float to_free = angle_to(nearest.free);
     float to_blocked = angle_to(nearest.blocked);
-    bool free = to_free == to_blocked ? free_toward(job, normal) : to_blocked > to_free;
+    bool free = to_free == to_blocked ? free_toward(index, normal) : to_blocked > to_free;
     float angle = free ? max(to_blocked - nearest.blocked.y, 0.0) : -max(to_free - nearest.free.y, 0.0);
     bytes[node] = uint(int(roundEven(clamp(angle / SELF_LIMIT, -1.0, 1.0) * 127.0)) & 0xff);
-    uint away = captured_toward(job, toward);
-    uint beside = nearest.blocked.x < -1.5 ? FREE : captured_at(jobs[job].slots[nearest.place.x], ivec2(nearest.place.yz));
+    uint away = captured_toward(index, toward);
+    uint beside = nearest.blocked.x < -1.5 ? FREE : captured_at(samples[index].slots[nearest.place.x], ivec2(nearest.place.yz));
     bytes[NODES + node] = away == FREE ? beside : away;
     barrier();
     if (node < NODES / 2) {
@@ -199,6 +199,6 @@ void main() {
         for (uint k = 0; k < 4; k++) {
             word |= bytes[4 * node + k] << 8 * k;
         }
-        maps[jobs[job].target * (NODES / 2) + node] = word;
+        maps[index * (NODES / 2) + node] = word;
     }
 }

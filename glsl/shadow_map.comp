@@ -1,7 +1,8 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
-// Adds the light of one ball to every given point, shadowed through a map of the occluders that is drawn from the ball's centre: by a
-// single comparison (TAPS 0), or by percentage-closer soft shadows, Fernando, "Percentage-Closer Soft Shadows" (SIGGRAPH 2005).
+// Adds the light of one ball to every given point, shadowed through a map of the occluders that is drawn from the
+// ball's centre: by a single comparison (TAPS 0), or by percentage-closer soft shadows, Fernando, "Percentage-Closer
+// Soft Shadows" (SIGGRAPH 2005).
 
 layout(local_size_x = 64) in;
 
@@ -21,8 +22,8 @@ layout(push_constant) uniform Push {
 } push;
 
 
-// Where the map has an occluder along a vector from the light, as a share of the vector. The texel knows its own centre only, so the
-// vector is moved there.
+// Where the map has an occluder along a vector from the light, as a share of the vector. The texel knows its own centre
+// only, so the vector is moved there.
 float met(inout vec3 vector) {
     vec3 right = push.right.xyz;
     vec3 down = push.down.xyz;
@@ -51,12 +52,14 @@ float met(inout vec3 vector) {
     return found > 0.0 ? 1.0 / (found * along) : EVERYTHING;
 }
 
-// Where an occluder lies on the way from the light to the receiver's plane, as a share of the way; EVERYTHING behind the plane.
+// Where an occluder lies on the way from the light to the receiver's plane, as a share of the way; EVERYTHING behind
+// the plane.
 float occluder(vec3 vector, vec3 to_vertex, vec3 normal) {
     float share = met(vector);
     float facing = dot(normal, vector);
     float plane = facing < -1e-3 * length(vector) ? dot(normal, to_vertex) / facing : 1.0;
-    // What is left of a surface's shadow on itself once texels are compared at their centres: its curvature within a texel.
+    // What is left of a surface's shadow on itself once texels are compared at their centres: its curvature within a
+    // texel.
     float bias = 1e-3 + push.right.w / float(MAP);
     return share < plane * (1.0 - bias) ? share / plane : EVERYTHING;
 }
@@ -103,8 +106,8 @@ float visibility(vec3 to_vertex, vec3 normal) {
 #endif
 }
 
-// Irradiance of a ball of radiance 1 / pi whose centre is seen under a cosine, `ratio` radii away, cut by the horizon: Lagarde and de
-// Rousiers, "Moving Frostbite to Physically Based Rendering" (2014), section 4.7.2.
+// Irradiance of a ball of radiance 1 / pi whose centre is seen under a cosine, `ratio` radii away, cut by the horizon:
+// Lagarde and de Rousiers, "Moving Frostbite to Physically Based Rendering" (2014), section 4.7.2.
 float irradiance(float cosine, float ratio) {
     if (ratio <= 1.0) {
         return 1.0; // within the ball

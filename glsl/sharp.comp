@@ -1,7 +1,8 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
-// Light of sharp lights on receivers, a cluster of neighbouring vertices a workgroup, added to what the merge has written. A chain is
-// what may stand between the cluster and one light: every occluder's silhouette field takes its share out of every part of the light.
+// Light of sharp lights on receivers, a cluster of neighbouring vertices a workgroup, added to what the merge has
+// written. A chain is what may stand between the cluster and one light: every occluder's silhouette field takes its
+// share out of every part of the light.
 #include "merge_layout.glsl"
 
 layout(local_size_x = WORKGROUP) in;
@@ -34,7 +35,7 @@ void main() {
     uint at = 2 * (cluster.vertex_first + v);
     // World axes, but from the receiver's centre, as in the merge.
     Surface surface;
-    vec4 place = receiver.albedo.w * vertex_quad(at);
+    vec4 place = receiver.scale * vertex_quad(at);
     surface.position = to_world(receiver, place.xyz);
     surface.origin = receiver.centre.xyz;
     surface.inverse_radius = receiver.centre.w;
@@ -44,10 +45,10 @@ void main() {
     surface.facings[0] = facing_of(receiver, vertex_quad(at + 1).xyz, 1.0, cluster.self_first, v);
     vec4 sum = soft_at(cluster.radiosity_first + v);
 #if EDGES
-    float soft = dot(sum.rgb, vec3(1.0)), albedo = dot(receiver.albedo.rgb, vec3(1.0));
+    float soft = dot(sum.rgb, vec3(1.0)), albedo = dot(receiver.albedo, vec3(1.0));
 #endif
     if (cluster.sharp_count > 0) {
-        sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo.rgb;
+        sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo;
     }
 #if EDGES
     sum.w = EDGE_STEPS * EDGE_STEPS * albedo * missed > albedo * open_light + soft ? 1.0 : 0.0;

@@ -1,4 +1,5 @@
-// Light that a surface receives from sharp lights, past what is listed before each of them. The twin is src/sharp/twin.rs.
+// Light that a surface receives from sharp lights, past what is listed before each of them. The twin is
+// src/sharp/twin.rs.
 #include "sub_light.glsl"
 
 // SwiftShader takes minutes and gigabytes to compile what others need unrolled.
@@ -9,8 +10,8 @@
 #endif
 
 #if EDGES
-// Vertices carry a shadow's edge badly where its penumbra is narrow against the distance to the next vertex. The error grows with the
-// square of that distance over the penumbra's width, and with the light that the shadow takes away.
+// Vertices carry a shadow's edge badly where its penumbra is narrow against the distance to the next vertex. The error
+// grows with the square of that distance over the penumbra's width, and with the light that the shadow takes away.
 float finest;       // distance over width, for the narrowest penumbra of the current light that comes as near as the next vertex, or 0
 float missed = 0.0; // most, over all lights, of the square of `finest` times the light
 float open_light = 0.0; // of all lights, nothing between
@@ -36,8 +37,8 @@ struct Surface {
 #endif
 };
 
-// The facing of vertex `v` of a mesh. `normal` is in the object's frame; `self_first` is the first cell of the mesh's first vertex, or
-// NONE.
+// The facing of vertex `v` of a mesh. `normal` is in the object's frame; `self_first` is the first cell of the mesh's
+// first vertex, or NONE.
 Facing facing_of(Entity receiver, vec3 normal, float weight, uint self_first, uint v) {
     Facing facing;
     facing.normal = to_world(receiver, normal);
@@ -82,15 +83,24 @@ void find_edge(float distance, float away, float limit, float penumbra, float pa
     finest = max(finest, near ? min(step / (parts * penumbra), MOST_STEPS) : 0.0);
 }
 
-void add_open(float irradiance, Entity shining) {
-    float light = irradiance * dot(shining.emission.rgb, vec3(1.0));
-    open_light += light;
+// The rim of a spot's cone is an edge as that of a penumbra is. `step`: angle between two vertices as the light sees
+// them.
+void find_rim(float ramp, Entity shining, float step) {
+    float cosine = (ramp - shining.light_ramp.y) / max(shining.light_ramp.x, 1e-30);
+    float change = shining.light_ramp.x * sqrt(max(1.0 - cosine * cosine, 0.0)) * step;
+    bool near = ramp > -EDGE_REACH * change && ramp < 1.0 + EDGE_REACH * change;
+    finest = max(finest, near ? min(2.0 * change, MOST_STEPS) : 0.0);
+}
+
+void add_open(float irradiance, float cone, Entity shining) {
+    float light = irradiance * dot(shining.emission, vec3(1.0));
+    open_light += light * cone;
     missed = max(missed, finest * finest * light);
 }
 #endif
 
-// The share of each part of a block that an occluder lets through. With `before` only what lies before the light counts; without it
-// the occluder is the light itself, and its own outline counts.
+// The share of each part of a block that an occluder lets through. With `before` only what lies before the light
+// counts; without it the occluder is the light itself, and its own outline counts.
 vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block, bool before) {
     Rays rays;
     rays.axes = mat3(to_object(occluder, light.toward), to_object(occluder, light.across), to_object(occluder, light.down));
@@ -99,7 +109,7 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
     rays.place = before ? to * mat3(light.toward, light.across, light.down) : vec3(-light.distance, 0.0, 0.0);
     rays.place *= occluder.centre.w;
     rays.middle = along_axes(light, block.middle);
-    uint first = floatBitsToUint(occluder.sharp.x), field = first & ~HAS_HALVES;
+    uint first = occluder.silhouette, field = first & ~HAS_HALVES;
     NodeCell cell = node_cell(field, rays.axes * rays.middle);
     vec2 in_box = through_box(field, rays.axes * rays.place, rays.axes * rays.middle);
     vec4 weights[4];
@@ -116,7 +126,8 @@ vec4 let_through(Entity occluder, Surface surface, SeenLight light, Block block,
     }
     vec4 inside = vec4(0.0);
 #if HALVES
-    // Within the bounding sphere each half of the object counts as far as its outline lies between the point and the light.
+    // Within the bounding sphere each half of the object counts as far as its outline lies between the point and the
+    // light.
     if (before && first >= HAS_HALVES) {
         EACH for (uint k = 0; k < 4; k++) {
             float nearest = min(length(rays.place), length(rays.place + limit[k] * rays.along[k]));
@@ -195,18 +206,19 @@ uint chain_light(uint packed) {
 #if CONES
 bool has_own_outline(Entity shining) {
 #if OUTLINES
-    return shining.sharp.y <= 0.0;
+    return shining.light_kind == LIGHT_OUTLINE;
 #else
     return false;
 #endif
 }
 
-// Whether an entry is an occluder whose ball reaches into the cone around all parts of its chain's light, as far as the light.
+// Whether an entry is an occluder whose ball reaches into the cone around all parts of its chain's light, as far as the
+// light.
 bool may_block(uint packed, Surface surface) {
     if ((packed & ENTRY_LIGHT) != 0) {
         return false;
     }
-    vec4 shining = ENTITY_CENTRE(chain_light(packed)), ball = ENTITY_CENTRE(packed & SKY_CHAIN);
+    vec4 shining = ENTITY(chain_light(packed)).centre, ball = ENTITY(packed & SKY_CHAIN).centre;
     vec3 from = surface.origin + surface.position;
     vec3 to_light = shining.xyz - from, to_ball = ball.xyz - from;
     float distance = length(to_light);
@@ -224,9 +236,10 @@ bool may_block(uint packed, Surface surface) {
 
 #endif
 
-// The first entry from `i` on that has to be evaluated. With CONES these are occluders that may block, and lights that end a chain of which
-// an occluder was evaluated (`within`) or that have an outline of their own; without CONES all. Values of this loop are read again behind
-// it: on lavapipe a lane that leaves a loop early may lose what the loop does not carry.
+// The first entry from `i` on that has to be evaluated. With CONES these are occluders that may block, and lights that
+// end a chain of which an occluder was evaluated (`within`) or that have an outline of their own; without CONES all.
+// Values of this loop are read again behind it: on lavapipe a lane that leaves a loop early may lose what the loop does
+// not carry.
 uint next_entry(Surface surface, uint first, uint count, uint i, bool within) {
 #if CONES
     bool passes = false;
@@ -269,22 +282,25 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
                 }
             } while ((packed & ENTRY_LIGHT) == 0 && j < count);
         }
-        vec4 shines = vec4(shining.sharp.y);
+        vec4 shines = vec4(shining.light_kind == LIGHT_BALL ? shining.light_share : 1.0);
 #if OUTLINES
         if (!open) {
             // Of a light with an outline of its own, as much of each part shines as the outline covers.
             vec4 dark = let_through(shining, surface, light, block, false);
-            shines = shining.sharp.y > 0.0 ? shines : 1.0 - dark;
+            shines = shining.light_kind == LIGHT_OUTLINE ? 1.0 - dark : shines;
         }
 #endif
         irradiance += dot(share, shines);
         b++;
     } while (b <= last);
     i = j + 1;
+    float ramp = ramp_of(light, shining), cone = clamp(ramp, 0.0, 1.0);
+    cone *= cone;
 #if EDGES
-    add_open(unblocked, shining);
+    find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));
+    add_open(unblocked, cone, shining);
 #endif
-    return irradiance * shining.emission.rgb;
+    return irradiance * cone * shining.emission;
 }
 
 #if CONES
@@ -311,8 +327,9 @@ vec3 open_sum(Surface surface, uint first, uint count) {
 }
 #endif
 
-// Irradiance by all lights of `count` entries from `first`. Where a scene has several lights, most are open to most points: those are
-// added up first, because a software device evaluates an occluder for each turn of the loop that evaluates any.
+// Irradiance by all lights of `count` entries from `first`. Where a scene has several lights, most are open to most
+// points: those are added up first, because a software device evaluates an occluder for each turn of the loop that
+// evaluates any.
 vec3 sharp_sum(Surface surface, uint first, uint count) {
     vec3 sum = vec3(0.0);
 #if CONES

@@ -1,12 +1,12 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
-// Views of an object to maps of signed distance and depth, in two steps. The outline is known at points between neighbouring
-// pixels of which one is covered; these points lie in 2 VIEW - 1 columns: half a pixel apart, alternately between vertical and
-// between horizontal neighbours.
+// Views of an object to maps of signed distance and depth, in two steps. The outline is known at points between
+// neighbouring pixels of which one is covered; these points lie in 2 VIEW - 1 columns: half a pixel apart, alternately
+// between vertical and between horizontal neighbours.
 //   COLUMNS: for every column and every row of the map, the nearest point of the outline in that column.
 //   otherwise: for every texel of the map, the nearest of these over all columns.
-// This is the exact two-pass distance transform of Meijster, Roerdink and Hesselink, "A General Algorithm for Computing Distance
-// Transforms in Linear Time" (2000), with a plain minimum in the second pass.
+// This is the exact two-pass distance transform of Meijster, Roerdink and Hesselink, "A General Algorithm for Computing
+// Distance Transforms in Linear Time" (2000), with a plain minimum in the second pass.
 
 layout(local_size_x = WORKGROUP) in;
 
@@ -77,8 +77,8 @@ void main() {
             here = float(y) + (beside ? 0.5 : 0.0);
             depth = depth_of(a, b);
         }
-        // Rows between the point before and this one belong to the nearer of the two. The mean of points that are equally near makes
-        // mirrored views mirrored maps.
+        // Rows between the point before and this one belong to the nearer of the two. The mean of points that are
+        // equally near makes mirrored views mirrored maps.
         while (row < MAP && row_position(row) < here) {
             float at_row = row_position(row);
             float before = at_row - last, behind = here - at_row;

@@ -1,5 +1,6 @@
-// A lookup in a silhouette field: what an object blocks of a small round light. The twin is src/field/silhouette.rs, with the same names.
-// NODE_CELLS: cells along a face of the node grid; MAP: texels along a map of the whole object, half as many along those of its halves.
+// A lookup in a silhouette field: what an object blocks of a small round light. The twin is src/field/silhouette.rs,
+// with the same names. NODE_CELLS: cells along a face of the node grid; MAP: texels along a map of the whole object,
+// half as many along those of its halves.
 //
 // A field begins with two quads, the least and the largest corner of a box around the object (its frame, in r), then
 // come the nodes. Nodes are three quads each: two rows that take a point (object's frame, in r) to its place on the
@@ -15,7 +16,8 @@ READ_UVEC2(NODE_BINDING + 1, Cells, cells, cell_at)
 const uint BOX_QUADS = 2;
 const uint WHOLE = 0, FAR = 1, NEAR = 2; // sides of an object: all of it, what lies beyond its centre along a direction, and before it
 
-// The cell around a place on a map whose last texel is `last`, and the weights of its corners. The place lies between texels.
+// The cell around a place on a map whose last texel is `last`, and the weights of its corners. The place lies between
+// texels.
 uvec2 around(vec2 place, uint first, float last, out vec4 weights) {
     vec2 low = min(floor(place), last - 1.0);
     vec2 f = place - low;
@@ -55,7 +57,8 @@ NodeCell node_cell(uint field, vec3 toward) {
     return cell;
 }
 
-// Bilinear weights of a cell's nodes for a direction near the one in the middle. They have no step where the cell changes.
+// Bilinear weights of a cell's nodes for a direction near the one in the middle. They have no step where the cell
+// changes.
 vec4 node_weights(NodeCell cell, vec3 toward) {
     vec2 off = among_cells(cell.face, toward) - cell.low - cell.middle;
     vec2 f = clamp(cell.middle + cell.eased * off, -BEYOND, 1.0 + BEYOND);
@@ -103,9 +106,9 @@ NearMap near_map(NodeCell cell, uint k, uint side, mat3 axes, vec3 foot) {
     return near;
 }
 
-// What one map knows of the outline near the ray in direction `along` with that foot, both by the axes.
-// x: signed distance of the ray from the outline, positive where it meets the object; y: depth along the ray of the outline's nearest
-// point. Object's frame, in r.
+// What one map knows of the outline near the ray in direction `along` with that foot, both by the axes. x: signed
+// distance of the ray from the outline, positive where it meets the object; y: depth along the ray of the outline's
+// nearest point. Object's frame, in r.
 vec2 outline(NearMap near, uint side, vec3 along, vec3 foot) {
     vec2 place = near.centre + near.steps * (foot + near.depth * along);
     vec2 within = clamp(place, 0.0, near.last);
@@ -126,8 +129,8 @@ float share_blocked(float distance, float away, float tangent) {
     return blocked_share(distance / max(max(away, NEAREST) * tangent, LEAST_PENUMBRA));
 }
 
-// Where a ray enters the box around an object and where it leaves it. If it misses the box, the interval has no ends, and
-// the outline alone decides.
+// Where a ray enters the box around an object and where it leaves it. If it misses the box, the interval has no ends,
+// and the outline alone decides.
 vec2 through_box(uint field, vec3 point, vec3 direction) {
 #if BOXES
     vec3 per_step = 1.0 / mix(direction, vec3(LEAST_STEP), lessThan(abs(direction), vec3(LEAST_STEP)));
@@ -140,8 +143,8 @@ vec2 through_box(uint field, vec3 point, vec3 direction) {
 #endif
 }
 
-// How far an outline counts that lies that far away: 0 behind the point or beyond the limit, 1 between them. Its nearest point may lie off
-// the ray, and the object then stands where the ray passes its box.
+// How far an outline counts that lies that far away: 0 behind the point or beyond the limit, 1 between them. Its
+// nearest point may lie off the ray, and the object then stands where the ray passes its box.
 float counts_between(float away, float limit, vec2 in_box) {
 #if BOXES
     bool apart = in_box[1] < TOUCHING || in_box[0] > limit - TOUCHING;

@@ -1,8 +1,8 @@
 #version 460
 #extension GL_EXT_samplerless_texture_functions : require
 #include "srgb.glsl"
-// Smooths a pixel whose centre lies within half a pixel of a line, along x or y: the colour of the pixel on the line's other side
-// is blended in by the share of the pixel that the line cuts off.
+// Smooths a pixel whose centre lies within half a pixel of a line, along x or y: the colour of the pixel on the line's
+// other side is blended in by the share of the pixel that the line cuts off.
 layout(binding = 0) uniform texture2D picture; // alpha: tag of the entity seen
 layout(binding = 1) uniform texture2D depth;   // reversed: greater is nearer, 0 infinitely far
 layout(location = 0) in float line_depth;

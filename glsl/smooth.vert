@@ -1,5 +1,6 @@
 #version 460
-// Transforms a corner of the strip around a line, which is the line moved by half a pixel up and down, or left and right.
+// Transforms a corner of the strip around a line, which is the line moved by half a pixel up and down, or left and
+// right.
 layout(location = 0) in vec4 corner; // x, y in normalised device coordinates; depth of the line; offset from it in pixels
 layout(location = 1) in vec3 mark;   // as in smooth.frag
 layout(location = 0) out float line_depth;

@@ -8,7 +8,8 @@ struct SeenLight {
     float sine;     // of the angular radius of its bounding sphere
     float fine;     // share of the four fine blocks
 #if PANELS
-    float panel;    // 0: a ball; less: a disc; more: a rectangle
+    uint kind;
+    float ratio;    // of a rectangle's edges
     vec3 facing;    // unit normal of a panel's side that shines, by the axes above
     mat2x3 half_edges; // from its middle to the middles of two edges, by the axes above, metres
     float area;     // square metres
@@ -35,25 +36,36 @@ SeenLight seen_light(vec3 to, Entity shining) {
     light.fine = clamp((light.sine / LIMIT_SINE - 1.0) / (BLEND - 1.0), 0.0, 1.0);
 #if OUTLINES
     // Four parts do not carry the outline of a mesh.
-    light.fine = shining.sharp.y > 0.0 ? light.fine : 1.0;
+    light.fine = shining.light_kind == LIGHT_OUTLINE ? 1.0 : light.fine;
 #endif
 #if PANELS
-    light.panel = shining.sharp.z;
-    float ratio = light.panel;
-    vec2 radii = (ratio > 0.0 ? vec2(1.0, ratio) * inversesqrt(1.0 + ratio * ratio) : vec2(sqrt(abs(ratio)))) / shining.centre.w;
+    light.kind = shining.light_kind;
+    light.ratio = shining.light_ratio;
+    bool rectangle = light.kind == LIGHT_RECTANGLE;
+    vec2 edges = vec2(1.0, light.ratio) * inversesqrt(1.0 + light.ratio * light.ratio);
+    vec2 radii = (rectangle ? edges : vec2(sqrt(shining.light_share))) / shining.centre.w;
     mat3 axes = mat3(light.toward, light.across, light.down);
     light.facing = to_world(shining, vec3(0.0, 1.0, 0.0)) * axes;
     light.half_edges[0] = radii.x * (to_world(shining, vec3(1.0, 0.0, 0.0)) * axes);
     light.half_edges[1] = radii.y * (to_world(shining, vec3(0.0, 0.0, 1.0)) * axes);
-    light.area = radii.x * radii.y * (ratio > 0.0 ? 4.0 : PI);
+    light.area = radii.x * radii.y * (rectangle ? 4.0 : PI);
 #endif
     return light;
 }
 
+// The root of the share of a spot's light that shines this way, before it is held to 0 to 1; 1 of any other light.
+float ramp_of(SeenLight light, Entity shining) {
+    return -dot(to_world(shining, vec3(0.0, 1.0, 0.0)), light.toward) * shining.light_ramp.x + shining.light_ramp.y;
+}
+
 #if PANELS
+bool is_panel(SeenLight light) {
+    return light.kind == LIGHT_DISC || light.kind == LIGHT_RECTANGLE;
+}
+
 // Whether it is a rectangle so long that its parts lie in one row.
 bool is_strip(SeenLight light) {
-    return light.panel > 0.0 && (light.panel * STRIP < 1.0 || light.panel > STRIP);
+    return light.kind == LIGHT_RECTANGLE && (light.ratio * STRIP < 1.0 || light.ratio > STRIP);
 }
 #endif
 
@@ -62,10 +74,10 @@ vec2 corner(SeenLight light, uint k) {
     vec2 place = (k & 1) == 0 ? vec2(CORNER, 0.0) : vec2(0.0, CORNER);
     place = (k & 2) == 0 ? place : -place;
 #if PANELS
-    if (light.panel > 0.0) {
+    if (light.kind == LIGHT_RECTANGLE) {
         float along = 0.5 * float(k) - 0.75;
         place = vec2((k & 1) == 0 ? -0.5 : 0.5, (k & 2) == 0 ? -0.5 : 0.5);
-        place = is_strip(light) ? (light.panel < 1.0 ? vec2(along, 0.0) : vec2(0.0, along)) : place;
+        place = is_strip(light) ? (light.ratio < 1.0 ? vec2(along, 0.0) : vec2(0.0, along)) : place;
     }
 #endif
     return place;
@@ -102,7 +114,7 @@ float tilt_of(SeenLight light, vec2 place) {
 // Unit direction of a place on the light, by the light's axes.
 vec3 along_axes(SeenLight light, vec2 place) {
 #if PANELS
-    if (light.panel != 0.0) {
+    if (is_panel(light)) {
         vec3 to = vec3(light.distance, 0.0, 0.0) + light.half_edges * place;
         return to / max(length(to), 1e-30);
     }
@@ -113,7 +125,7 @@ vec3 along_axes(SeenLight light, vec2 place) {
 // How far the light's surface is at a place, in direction `along`.
 float reach_of(SeenLight light, vec2 place, vec3 along) {
 #if PANELS
-    if (light.panel != 0.0) {
+    if (is_panel(light)) {
         return length(vec3(light.distance, 0.0, 0.0) + light.half_edges * place);
     }
 #endif
@@ -123,7 +135,7 @@ float reach_of(SeenLight light, vec2 place, vec3 along) {
 // Irradiance that a part sends to a surface that faces it, of radiance 1.
 float part_light(SeenLight light, Block block, vec2 place, vec3 along) {
 #if PANELS
-    if (light.panel != 0.0) {
+    if (is_panel(light)) {
         float reach = reach_of(light, place, along), area = light.area * block.area;
         return area * max(-dot(light.facing, along), 0.0) / (reach * reach + area / PI);
     }
@@ -134,7 +146,7 @@ float part_light(SeenLight light, Block block, vec2 place, vec3 along) {
 // Sine of a part's angular radius.
 float part_sine(SeenLight light, Block block, vec2 place, vec3 along) {
 #if PANELS
-    if (light.panel != 0.0) {
+    if (is_panel(light)) {
         return min(sqrt(part_light(light, block, place, along) / PI), MOST_SINE);
     }
 #endif

@@ -2,12 +2,14 @@
 #extension GL_EXT_control_flow_attributes : require
 #include "finish.glsl"
 #include "blend.glsl"
-// Shades a point of a triangle that a shadow's edge comes near. Its pixel evaluates sharp lights itself; cosines and self-visibility are
-// blended between the vertices, so that where nothing blocks a light the triangle looks as its neighbours do.
-layout(location = 0) in vec3 at_object;
-layout(location = 1) in vec3 weight;
+#include "centroid.glsl"
+// Shades a point of a triangle that a shadow's edge comes near. Its pixel evaluates sharp lights itself; cosines and
+// self-visibility are blended between the vertices, so that where nothing blocks a light the triangle looks as its
+// neighbours do.
+layout(location = 0) centroid in vec3 at;     // object's frame, metres
+layout(location = 1) centroid in vec3 weights;
 layout(location = 2) flat in uvec3 triangle;
-layout(location = 3) in vec3 emission;
+layout(location = 3) centroid in vec3 emission;
 layout(location = 0) out vec4 color; // alpha: the entity's tag
 
 layout(binding = 1) uniform textureBuffer radiosity; // of every vertex of the scene
@@ -18,6 +20,8 @@ layout(binding = 8) uniform textureBuffer vertices;
 
 void main() {
     uvec3 lit = push.first + triangle;
+    float within = within_triangle(weights.x + weights.y + weights.z);
+    vec3 weight = within * weights;
     vec3 light = blend(radiosity, lit, weight);
     uvec2 chain = chain_of(push.cluster_first, min(triangle.x, min(triangle.y, triangle.z)));
     if (chain.y > 0) {
@@ -27,7 +31,7 @@ void main() {
             vec3 normal = texelFetch(vertices, int(2 * (push.vertex_first + triangle[i]) + 1)).xyz;
             facings[i] = facing_of(receiver, normal, weight[i], push.self_first, triangle[i]);
         }
-        light = blend(soft, lit, weight) + pixel_light(receiver, at_object, facings, chain);
+        light = blend(soft, lit, weight) + pixel_light(receiver, within * at, facings, chain);
     }
-    color = vec4(finish(push.emission_white.rgb * emission + light, push.emission_white.w), push.tag);
+    color = vec4(finish(within * push.emission_white.rgb * emission + light, push.emission_white.w), push.tag);
 }

@@ -1,7 +1,7 @@
 #version 460
 // A corner of a mesh's triangle, which is drawn again where a shadow's edge comes near one of its vertices.
-layout(location = 0) out vec3 at_object; // object's frame, metres
-layout(location = 1) out vec3 weight;    // of the triangle's three vertices
+layout(location = 0) out vec3 at;      // object's frame, metres
+layout(location = 1) out vec3 weights; // of the triangle's three vertices
 layout(location = 2) flat out uvec3 triangle;
 layout(location = 3) out vec3 emission;
 
@@ -26,9 +26,9 @@ void main() {
     int first = gl_VertexIndex / 3 * 3;
     triangle = uvec3(texelFetch(corners, first).x, texelFetch(corners, first + 1).x, texelFetch(corners, first + 2).x);
     int corner = gl_VertexIndex - first;
-    weight = vec3(corner == 0, corner == 1, corner == 2);
+    weights = vec3(corner == 0, corner == 1, corner == 2);
     uint own = triangle[corner];
-    at_object = texelFetch(vertices, int(2 * (push.vertex_first + own))).xyz;
+    at = texelFetch(vertices, int(2 * (push.vertex_first + own))).xyz;
     emission.x = uintBitsToFloat(texelFetch(emissions, int(3 * own)).x);
     emission.y = uintBitsToFloat(texelFetch(emissions, int(3 * own + 1)).x);
     emission.z = uintBitsToFloat(texelFetch(emissions, int(3 * own + 2)).x);

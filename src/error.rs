@@ -37,17 +37,6 @@ impl Error {
         }
     }
 
-    /// The kind of error that has this exit code, as another process told it; `Failed` for a code of none.
-    pub fn of_code(code: u8, message: String) -> Self {
-        match code {
-            2 => Error::Usage(message),
-            3 => Error::Unsupported(message),
-            4 => Error::Input(message),
-            5 => Error::Device(message),
-            _ => Error::Failed(message),
-        }
-    }
-
     /// The message for a terminal: on one line, unless it is a compiler's, and without control characters.
     pub fn line(&self) -> String {
         match self {
@@ -88,10 +77,16 @@ impl Error {
     }
 }
 
-/// Text with its control characters written as escapes: a line break or an escape sequence in a file's name neither breaks a line
-/// nor reaches the terminal.
+/// Whether a character breaks a line, starts an escape sequence, or changes the order or the look of those around it.
+pub fn is_deceptive(c: char) -> bool {
+    let invisible = ['\u{61c}', '\u{200b}', '\u{200e}', '\u{200f}', '\u{feff}'].contains(&c);
+    c.is_control() || invisible || ('\u{2028}'..='\u{202e}').contains(&c) || ('\u{2060}'..='\u{206f}').contains(&c)
+}
+
+/// Text with its control and bidirectional characters written as escapes: a file's name neither breaks a line nor
+/// reaches the terminal as anything but text.
 pub fn one_line(text: &str) -> String {
-    let escaped = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
+    let escaped = |c: char| if is_deceptive(c) { c.escape_default().to_string() } else { c.to_string() };
     text.chars().map(escaped).collect()
 }
 

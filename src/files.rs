@@ -1,8 +1,8 @@
-//! Writes files so that no reader sees a partial file.
+//! Reads regular files alone, and writes files so that no reader sees a partial one.
 
 use std::collections::HashSet;
 use std::fs::{self, File};
-use std::io::{BufWriter, Error, ErrorKind, Result, Write};
+use std::io::{BufWriter, Error, ErrorKind, Read, Result, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
@@ -10,12 +10,87 @@ use tempfile::NamedTempFile;
 /// Start of the name that a file has until it is whole.
 const UNFINISHED: &str = ".unfinished-";
 
-/// Writes a file in its folder under another name and renames it, so that another process sees either the old or the new
-/// content. If the path is not a regular file (a pipe, `/dev/stdout`), it is written to directly; a symbolic link is followed
-/// and kept. Unfinished files of killed processes in the folder are removed.
-///
-/// # Errors
-/// What `write` or the file system returns; then no partial file remains.
+/// Opens a file that is to be read. Named pipes, devices and sockets are refused: without a writer, or an end, the
+/// program would wait for ever. A pipe that a shell hands over on purpose (`/dev/stdin`, or `/dev/fd/N` of a process
+/// substitution) is taken.
+pub fn open(path: &Path) -> Result<File> {
+    let mut options = File::options();
+    options.read(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, libc::O_NONBLOCK);
+    let file = options.open(path)?;
+    let kind = file.metadata()?.file_type();
+    if kind.is_file() {
+        return Ok(file);
+    }
+    if kind.is_dir() {
+        return Err(Error::from_raw_os_error(libc::EISDIR));
+    }
+    #[cfg(unix)]
+    if std::os::unix::fs::FileTypeExt::is_fifo(&kind)
+        && ["/dev/stdin", "/dev/fd", "/proc/self/fd"].iter().any(|place| path.starts_with(place))
+    {
+        return File::open(path);
+    }
+    Err(Error::new(ErrorKind::InvalidInput, "it is a pipe or a device, not a regular file"))
+}
+
+/// The content of a file that [`open`] takes.
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// What two paths have in common that lead to the same file.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Identity {
+    /// Device and inode of a file that exists.
+    Inode(u64, u64),
+    /// Folder, without links, and name of one that does not.
+    Path(PathBuf),
+}
+
+/// Which file a path leads to, through links; `None` for devices, pipes and what has no name.
+pub fn identity(path: &Path) -> Option<Identity> {
+    if let Ok(about) = fs::metadata(path) {
+        #[cfg(unix)]
+        return about.is_file().then(|| {
+            use std::os::unix::fs::MetadataExt;
+            Identity::Inode(about.dev(), about.ino())
+        });
+        #[cfg(not(unix))]
+        return about.is_file().then(|| fs::canonicalize(path).ok().map(Identity::Path)).flatten();
+    }
+    let path = destination(path).ok()?;
+    Some(Identity::Path(fs::canonicalize(folder_of(&path)).ok()?.join(path.file_name()?)))
+}
+
+/// Fails where [`replace_with`] could not write a file, so that this is known before the work whose result it is.
+pub fn check_writable(path: &Path) -> Result<()> {
+    match fs::metadata(path) {
+        Ok(about) if about.is_dir() => return Err(Error::other("it is a folder")),
+        Ok(about) if !about.is_file() => return Ok(()),
+        Ok(about) if about.permissions().readonly() => return Err(Error::other("it is read-only")),
+        _ => {}
+    }
+    let missing = |folder: &Path| Error::other(format!("there is no folder {}", folder.display()));
+    if !folder_of(path).is_dir() {
+        return Err(missing(folder_of(path)));
+    }
+    let target = destination(path)?;
+    let folder = folder_of(&target);
+    if folder.is_dir() { unfinished(folder).map(drop) } else { Err(missing(folder)) }
+}
+
+/// The folder that a file stands in.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Writes a file in its folder under another name and renames it, so that another process sees either the old or the
+/// new content. If the path is not a regular file (a pipe, `/dev/stdout`), it is written to directly; a symbolic link
+/// is followed and kept. Unfinished files of killed processes in the folder are removed.
 pub fn replace_with<E: From<Error>>(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::result::Result<(), E>,
@@ -26,7 +101,7 @@ pub fn replace_with<E: From<Error>>(
         return Ok(file.flush()?);
     }
     let target = destination(path)?;
-    let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(&target);
     sweep_once(folder);
     let made = unfinished(folder)?;
     // Through the plain file: errors of the temporary one would show its name, which means nothing to the user.
@@ -39,17 +114,11 @@ pub fn replace_with<E: From<Error>>(
 }
 
 /// As [`replace_with`] for bytes; creates the folder if it does not exist.
-///
-/// # Errors
-/// What the file system returns.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
     replace_parts(path, &[bytes])
 }
 
 /// As [`replace`] for bytes that lie in several places.
-///
-/// # Errors
-/// What the file system returns.
 pub fn replace_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
     if let Some(folder) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
         fs::create_dir_all(folder)?;
@@ -58,9 +127,6 @@ pub fn replace_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
 }
 
 /// Where a path leads: through links, also to a file that does not exist yet.
-///
-/// # Errors
-/// The error of the file system where links go in circles or may not be followed.
 fn destination(path: &Path) -> Result<PathBuf> {
     match fs::canonicalize(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => match fs::read_link(path) {
@@ -71,7 +137,8 @@ fn destination(path: &Path) -> Result<PathBuf> {
     }
 }
 
-/// A new file that its process holds locked for as long as it writes: [`sweep`] knows by the lock which files nobody will finish.
+/// A new file that its process holds locked for as long as it writes: [`sweep`] knows by the lock which files nobody
+/// will finish.
 fn unfinished(folder: &Path) -> Result<NamedTempFile> {
     loop {
         let mut builder = tempfile::Builder::new();

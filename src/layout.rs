@@ -1,73 +1,202 @@
-//! Structs shared with `glsl/merge_layout.glsl`; `tests/layouts.rs` compares names and offsets with the compiled shaders.
+//! What Rust and GLSL both read: structs, of which the GLSL text and its readers are generated from the Rust fields,
+//! and constants. `tests/gpu/layouts.rs` compares names and offsets with the compiled shaders.
 
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
+use std::fmt::Write;
 
-/// An entity of the scene at one time, in the form that passes read: `Entity` of the shaders.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct DeviceEntity {
-    /// Centre of the bounding sphere in the world, metres; w = 1 / (scale x bounding radius).
-    pub centre: [f32; 4],
-    /// Cosine and sine of alpha and of beta; the rotation to the world is Rz(alpha) Ry(beta) Rz(gamma).
-    pub alpha_beta: [f32; 4],
-    /// Cosine and sine of gamma.
-    pub gamma: [f32; 2],
-    /// First quad of the occlusion field.
-    pub blocked_base: u32,
-    /// First quad of the radiance field.
-    pub radiance_base: u32,
-    /// Slope and offset of the shell coordinate, inner and outer shell radius in r.
-    pub radial: [f32; 4],
-    /// Linear RGB radiance factor of the entity's light; w = the largest channel of its albedo.
-    pub emission: [f32; 4],
-    /// Added to a stretched position, in r; w = the packed stretch factors of the axes ([`crate::field::Fit::packed`]).
-    pub shift: [f32; 4],
-    /// Albedo / pi; w = uniform scale of the entity.
-    pub albedo: [f32; 4],
-    /// First axis of its projected area ([`crate::field::Area`]), world; w = the area's constant term.
-    pub area_x: [f32; 4],
-    /// Second axis, world; w = factor of u, the square of a direction's cosine to the first.
-    pub area_y: [f32; 4],
-    /// Factors of v (the square of the cosine to the second axis), u u, v v and u v.
-    pub area_terms: [f32; 4],
-    /// For sharp lights: the bits of the first quad of its silhouette field, 0 without one, and bit 31 where it has maps of halves; of a
-    /// light that is a ball the share of its sphere's disc that shines, 0 where its own outline tells; of a light that shines from one flat
-    /// side [`crate::field::sub_light::LampFace::packed`]; and 0.
-    pub sharp: [f32; 4],
+/// A type of a shared struct's field.
+trait Shared {
+    /// Its name in GLSL.
+    const GLSL: &'static str;
 }
 
-/// A workgroup's worth of neighbouring vertices of one receiver.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct Cluster {
-    /// Entity that is lit.
-    pub receiver: u32,
-    /// First vertex in the vertex buffer.
-    pub vertex_first: u32,
-    /// Vertices, at most [`CLUSTER_VERTICES`].
-    pub vertex_count: u32,
-    /// First quad of the first vertex's transfer vector, or [`NONE`] for the cosine of the normal.
-    pub transfer_first: u32,
-    /// First vertex in the radiosity buffer.
-    pub radiosity_first: u32,
-    /// First entry in the list.
-    pub entry_first: u32,
-    /// Entries, at least 1.
-    pub entry_count: u32,
-    /// Index of its bounds for the gather on the device.
-    pub bounds: u32,
-    /// Number of entries at the front that are chains of sharp lights.
-    pub sharp_count: u32,
-    /// First cell of its first vertex's self-visibility, or [`NONE`] where the mesh cannot shadow itself.
-    pub self_first: u32,
+impl Shared for u32 {
+    const GLSL: &'static str = "uint";
+}
+impl Shared for f32 {
+    const GLSL: &'static str = "float";
+}
+impl Shared for [f32; 2] {
+    const GLSL: &'static str = "vec2";
+}
+impl Shared for [f32; 3] {
+    const GLSL: &'static str = "vec3";
+}
+impl Shared for [f32; 4] {
+    const GLSL: &'static str = "vec4";
+}
+
+struct SharedField {
+    name: &'static str,
+    glsl: &'static str,
+    offset_bytes: usize,
+    size_bytes: usize,
+}
+
+/// Declares a struct whose fields both languages have, and lists them for the generated GLSL.
+macro_rules! shared_struct {
+    ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty),* $(,)? }) => {
+        $(#[$meta])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+        pub struct $name {
+            $($(#[$doc])* pub $field: $kind),*
+        }
+
+        impl $name {
+            const FIELDS: &[SharedField] = &[$(SharedField {
+                name: stringify!($field),
+                glsl: <$kind as Shared>::GLSL,
+                offset_bytes: std::mem::offset_of!($name, $field),
+                size_bytes: size_of::<$kind>(),
+            }),*];
+        }
+    };
+}
+
+shared_struct! {
+    /// An entity of the scene at one time, in the form that passes read: `Entity` of the shaders.
+    DeviceEntity {
+        /// Centre of the bounding sphere in the world, metres; w = 1 / (scale x bounding radius), 1/m.
+        centre: [f32; 4],
+        /// Cosine and sine of alpha and of beta; the rotation to the world is Rz(alpha) Ry(beta) Rz(gamma).
+        alpha_beta: [f32; 4],
+        /// Cosine and sine of gamma.
+        gamma: [f32; 2],
+        /// First quad of the occlusion field.
+        blocked_base: u32,
+        /// First quad of the radiance field.
+        radiance_base: u32,
+        /// Slope and offset of the shell coordinate, inner and outer shell radius in r.
+        radial: [f32; 4],
+        /// Linear RGB radiance factor of the entity's light.
+        emission: [f32; 3],
+        /// The largest channel of its albedo.
+        reflectance: f32,
+        /// Added to a stretched position, in r; w = the packed stretch factors of the axes
+        /// ([`crate::field::Fit::packed`]).
+        shift: [f32; 4],
+        /// Albedo / pi.
+        albedo: [f32; 3],
+        /// Uniform scale of the entity.
+        scale: f32,
+        /// First axis of its projected area ([`crate::field::Area`]), world; w = the area's constant term.
+        area_x: [f32; 4],
+        /// Second axis, world; w = factor of u, the square of a direction's cosine to the first.
+        area_y: [f32; 4],
+        /// Factors of v (the square of the cosine to the second axis), u u, v v and u v.
+        area_terms: [f32; 4],
+        /// First quad of its silhouette field, with [`HAS_HALVES`] where it has maps of halves; 0 without a field.
+        silhouette: u32,
+        /// Shape of its sharp light: a [`LightKind`].
+        light_kind: u32,
+        /// Of a ball or a disc: the share of its bounding sphere's disc that shines.
+        light_share: f32,
+        /// Of a rectangle: its edge along z over that along x.
+        light_ratio: f32,
+        /// Of a spot, which shines along its own +y: [`crate::scene::light::Spot::ramp`]. 0 and 1 of any other light.
+        light_ramp: [f32; 2],
+        /// Fills the last quad.
+        unused: [f32; 2],
+    }
+}
+
+impl DeviceEntity {
+    /// Whether its light has a cone.
+    pub fn is_spot(&self) -> bool {
+        self.light_ramp[0] > 0.0
+    }
+}
+
+shared_struct! {
+    /// A workgroup's worth of neighbouring vertices of one receiver.
+    Cluster {
+        /// Entity that is lit.
+        receiver: u32,
+        /// First vertex in the vertex buffer.
+        vertex_first: u32,
+        /// Vertices, at most [`CLUSTER_VERTICES`].
+        vertex_count: u32,
+        /// First quad of the first vertex's transfer vector, or [`NONE`] for the cosine of the normal.
+        transfer_first: u32,
+        /// First vertex in the radiosity buffer.
+        radiosity_first: u32,
+        /// First entry in the list.
+        entry_first: u32,
+        /// Entries, at least 1.
+        entry_count: u32,
+        /// Texels hold an even number of words.
+        unused: u32,
+        /// Number of entries at the front that are chains of sharp lights.
+        sharp_count: u32,
+        /// First cell of its first vertex's self-visibility, or [`NONE`] where the mesh cannot shadow itself.
+        self_first: u32,
+    }
+}
+
+/// Shape of an entity's light in passes that evaluate sharp lights.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightKind {
+    /// It is no sharp light.
+    #[default]
+    None,
+    Ball,
+    /// The mesh's own outline.
+    Outline,
+    /// A disc that shines from one side.
+    Disc,
+    /// A rectangle that shines from one side.
+    Rectangle,
+}
+
+/// The GLSL text of the shared structs.
+pub fn glsl_structs() -> String {
+    let text = |name: &str, fields: &[SharedField]| {
+        let fields: String = fields.iter().map(|field| format!("    {} {};\n", field.glsl, field.name)).collect();
+        format!("struct {name} {{\n{fields}}};\n")
+    };
+    text("Entity", DeviceEntity::FIELDS) + &text("Cluster", Cluster::FIELDS)
+}
+
+/// `entity_at(i)`, which reads an entity from the texel view `entities`, four floats a texel.
+pub fn glsl_entity_at() -> String {
+    glsl_reader("Entity entity_at", "entities", "vec4", DeviceEntity::FIELDS)
+}
+
+/// `cluster_at(i)`, which reads a cluster from the texel view `clusters`, of [`CLUSTER_FORMAT`].
+pub fn glsl_cluster_at() -> String {
+    glsl_reader("Cluster cluster_at", "clusters", "uvec2", Cluster::FIELDS)
+}
+
+/// A function that puts a struct together from its texels. No field lies in two of them.
+fn glsl_reader(function: &str, view: &str, texel: &str, fields: &[SharedField]) -> String {
+    let texel_words = if texel == "uvec2" { 2 } else { 4 };
+    let end_bytes = fields.last().map_or(0, |field| field.offset_bytes + field.size_bytes);
+    let texels = (end_bytes / 4).div_ceil(texel_words);
+    let mut text = format!("{function}(uint i) {{\n    int at = int(i) * {texels};\n");
+    for t in 0..texels {
+        writeln!(text, "    {texel} t{t} = {texel}(texelFetch({view}, at + {t}));").expect("a String takes all");
+    }
+    let read = |field: &SharedField| {
+        let word = field.offset_bytes / 4;
+        let count = field.size_bytes / 4;
+        let first = word % texel_words;
+        let part = format!("t{}.{}", word / texel_words, &"xyzw"[first..first + count]);
+        if field.glsl == "uint" && texel == "vec4" { format!("floatBitsToUint({part})") } else { part }
+    };
+    let name = function.split(' ').next().unwrap_or(function);
+    let reads: Vec<String> = fields.iter().map(read).collect();
+    writeln!(text, "    return {name}({});\n}}", reads.join(", ")).expect("a String takes all");
+    text
 }
 
 /// The index that means "none".
 pub const NONE: u32 = u32::MAX;
 
-/// Vertices of a cluster, which is one workgroup: eight subgroups on llvmpipe, two on most GPUs, and within the limits of
-/// every device.
+/// Vertices of a cluster, which is one workgroup: eight subgroups on llvmpipe, two on most GPUs, and within the limits
+/// of every device.
 pub const CLUSTER_VERTICES: u32 = 64;
 
 /// Texels through which some variants of a pass read entries: one each.
@@ -146,8 +275,9 @@ pub const TAG_STEP: f32 = 1.0 / 255.0;
 pub const COSINE_LOBE: [f64; 3] = [0.09375, 0.5, 0.46875];
 
 /// The macros that every shader has: what both languages have to agree on.
-pub fn shared_macros() -> [(&'static str, String); 7] {
+pub fn shared_macros() -> [(&'static str, String); 11] {
     let [a, b, c] = COSINE_LOBE;
+    let kind = |kind: LightKind| format!("{}u", kind as u32);
     [
         ("PI", std::f64::consts::PI.to_string()),
         ("EVERYTHING", format!("{EVERYTHING:e}")),
@@ -156,5 +286,9 @@ pub fn shared_macros() -> [(&'static str, String); 7] {
         ("FIT_BITS", FIT_BITS.to_string()),
         ("TAG_STEP", format!("{TAG_STEP:?}")),
         ("COSINE_LOBE", format!("vec3({a:?}, {b:?}, {c:?})")),
+        ("LIGHT_BALL", kind(LightKind::Ball)),
+        ("LIGHT_OUTLINE", kind(LightKind::Outline)),
+        ("LIGHT_DISC", kind(LightKind::Disc)),
+        ("LIGHT_RECTANGLE", kind(LightKind::Rectangle)),
     ]
 }

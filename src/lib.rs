@@ -60,38 +60,60 @@
 //! | [`truth`] | ray casting and the exact SH chain |
 //! | [`check`] | every pass against its CPU twin |
 //! | `bench` | measurements of time and error (feature `cli`) |
-//! | [`farm`] | bakes and pictures of many machines: plans, results, engines (`FARM.md` says how they are used) |
+//! | [`farm`] | bakes and pictures of many machines: plans, results, engines (`docs/farm.md` says how they are used) |
 //! | `view` | the state behind the window (feature `cli`) |
 //! | `app` | the command line, a file for each subcommand (feature `cli`) |
 
-#[cfg(feature = "cli")]
-pub mod app;
-pub mod asset;
-pub mod bake;
-#[cfg(feature = "cli")]
-pub mod bench;
-pub mod check;
-pub mod draw;
 pub mod error;
-pub mod farm;
-pub mod field;
-pub mod files;
-pub mod frame;
 #[allow(unsafe_code)]
 pub mod gpu;
-pub mod layout;
-pub mod lists;
-pub mod merge;
 pub mod prelude;
 pub mod renderer;
 pub mod scene;
+
+// Below the front door: public for the tests of this repository alone, and free to change with every version.
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod app;
+#[doc(hidden)]
+pub mod asset;
+#[doc(hidden)]
+pub mod bake;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod bench;
+#[doc(hidden)]
+pub mod check;
+#[doc(hidden)]
+pub mod draw;
+#[doc(hidden)]
+pub mod farm;
+#[doc(hidden)]
+pub mod field;
+#[doc(hidden)]
+pub mod files;
+#[doc(hidden)]
+pub mod frame;
+#[doc(hidden)]
+pub mod layout;
+#[doc(hidden)]
+pub mod lists;
+#[doc(hidden)]
+pub mod merge;
+#[doc(hidden)]
 pub mod scene_buffers;
+#[doc(hidden)]
 pub mod sh;
+#[doc(hidden)]
 pub mod shaders;
+#[doc(hidden)]
 pub mod sharp;
+#[doc(hidden)]
 pub mod text;
+#[doc(hidden)]
 pub mod truth;
 #[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod view;
 
 /// The crate whose Vulkan handles this library takes and returns.

@@ -14,22 +14,20 @@
 //! # }
 //! ```
 //!
-//! [`Gpu::from_vulkan`](crate::gpu::Gpu::from_vulkan) takes a device that the caller has made, and [`Renderer::light_buffer`] gives the
-//! light to it where it lies. The files in `examples/` show each of these.
+//! [`Gpu::from_vulkan`](crate::gpu::Gpu::from_vulkan) takes a device that the caller has made, and
+//! [`Renderer::light_buffer`] gives the light to it where it lies. The files in `examples/` show each of these.
 
 use crate::asset::decode::Picture;
 use crate::asset::picture;
+use crate::bake::Baker;
 use crate::bake::cache::Cache;
 use crate::bake::ensure::SceneProgress;
-use crate::bake::{Baker, Quality};
-use crate::draw::{Antialias, Shading};
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
-use crate::frame::{self, Frame};
+use crate::frame::Frame;
+pub use crate::frame::RenderOptions;
 use crate::gpu::Gpu;
-use crate::lists::skip::EPS;
-use crate::scene::data::check_picture;
-use crate::scene::{Camera, Lights, Placement, Scene};
+use crate::scene::{Camera, Placement, Scene};
 use crate::sh::lobe;
 use crate::shaders::Library;
 use ash::vk;
@@ -39,64 +37,14 @@ use std::path::Path;
 /// Largest magnitude of a coordinate of a placement, metres, and largest scale; suns stand at a tenth of it.
 const FARTHEST_M: f32 = 1e10;
 
-/// What a program decides about a [`Renderer`] besides the scene.
-#[derive(Clone)]
-pub struct RenderOptions {
-    /// How finely fields are sampled and stored.
-    pub quality: Quality,
-    /// Where what is baked is kept; `None` is below the cache folder of the [`Gpu`], or in memory where it has none.
-    pub cache: Option<Cache>,
-    /// Width and height of pictures in pixels, 1 to 16 384 each; `None` takes the scene's.
-    pub size: Option<[u32; 2]>,
-    /// Which lights are sharp.
-    pub lights: Lights,
-    /// Where their light is evaluated for pictures; `None` takes [`Shading::usual`].
-    pub shading: Option<Shading>,
-    /// How the edges of pictures are smoothed.
-    pub antialias: Antialias,
-    /// Contributions to a vertex that are bounded below this share of white are left out, 0 to 1; 0 leaves out nothing.
-    pub eps: f32,
-}
-
-impl Default for RenderOptions {
-    /// What `shadow-fields render` does without options.
-    fn default() -> Self {
-        RenderOptions {
-            quality: Quality::default(),
-            cache: None,
-            size: None,
-            lights: Lights::default(),
-            shading: None,
-            antialias: Antialias::default(),
-            eps: EPS,
-        }
-    }
-}
-
-impl RenderOptions {
-    /// The frame's options for a scene.
-    ///
-    /// # Errors
-    /// `Input` where a number is out of its range.
-    fn frame(&self, scene: &Scene) -> Result<frame::Options> {
-        let size = self.size.unwrap_or([scene.data.output.width, scene.data.output.height]);
-        check_picture(size).map_err(Error::Input)?;
-        if !(0.0..=1.0).contains(&self.eps) {
-            return Err(Error::Input(format!("eps {} is not within 0 to 1", self.eps)));
-        }
-        let RenderOptions { lights, shading, antialias, eps, .. } = *self;
-        let bake = self.quality.options();
-        Ok(frame::Options { bake, lights, shading, antialias, eps, size, ..Default::default() })
-    }
-}
-
-/// The light of all entities on the device: four floats a vertex, linear RGB radiance that leaves the surface, without emission, and a
-/// fourth for the library's own use.
+/// The light of all entities on the device: four floats a vertex, linear RGB radiance that leaves the surface, without
+/// emission, and a fourth for the library's own use.
 #[derive(Clone, Debug)]
 pub struct LightBuffer<'r> {
-    /// The buffer, of usages storage, uniform, uniform texel, vertex, index, and both transfers. It stays the renderer's and is the same
-    /// as long as that lives. On a device of [`Gpu::from_vulkan`] all writes of a call are visible to every command that the caller submits
-    /// to the same queue after the call (a barrier to all commands and all reads is part of it), so that it needs no barrier of its own.
+    /// The buffer, of usages storage, uniform, uniform texel, vertex, index, and both transfers. It stays the
+    /// renderer's and is the same as long as that lives. On a device of [`Gpu::from_vulkan`] all writes of a call are
+    /// visible to every command that the caller submits to the same queue after the call (a barrier to all commands and
+    /// all reads is part of it), so that it needs no barrier of its own.
     pub buffer: vk::Buffer,
     /// Its size in bytes.
     pub size_bytes: u64,
@@ -117,8 +65,8 @@ pub struct LightRange<'r> {
     pub order: &'r [u32],
 }
 
-/// Transfer vectors of the vertices of an entity: what each makes of distant light that nothing else blocks. With the light's coefficients
-/// L in the entity's own frame, the radiosity is albedo / pi times the sum of T * L.
+/// Transfer vectors of the vertices of an entity: what each makes of distant light that nothing else blocks. With the
+/// light's coefficients L in the entity's own frame, the radiosity is albedo / pi times the sum of T * L.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transfer {
     /// SH bands; a vector has bands^2 coefficients.
@@ -146,7 +94,8 @@ impl Renderer {
         Self::with_progress(gpu, scene, options, &|_, _, _| ())
     }
 
-    /// As [`Renderer::new`], and tells `progress` what is being baked, the samples that are done and the samples in all.
+    /// As [`Renderer::new`], and tells `progress` what is being baked, the samples that are done and the samples in
+    /// all.
     ///
     /// # Errors
     /// As [`Renderer::new`].
@@ -165,8 +114,9 @@ impl Renderer {
         Ok(Renderer { gpu: gpu.clone(), frame, placements: None, light: Vec::new() })
     }
 
-    /// Lights every receiver with all entities placed so, as far as anything has changed since the last call. The list is as that of
-    /// [`Scene::at`], with other placements for those that move: entities in the scene's order, then suns.
+    /// Lights every receiver with all entities placed so, as far as anything has changed since the last call. The list
+    /// is as that of [`Scene::at`], with other placements for those that move: entities in the scene's order, then
+    /// suns.
     ///
     /// # Errors
     /// `Input` where the list has another length than the scene has entities, or a placement has a number that is not
@@ -195,9 +145,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// Radiosity of every vertex, by entity in the scene's order and by vertex in the mesh's order: linear RGB radiance that leaves the
-    /// surface, without emission, in W m^-2 sr^-1; zero where an entity does not receive. Before the first update it is that of the scene's
-    /// own time.
+    /// Radiosity of every vertex, by entity in the scene's order and by vertex in the mesh's order: linear RGB radiance
+    /// that leaves the surface, without emission, in W m^-2 sr^-1; zero where an entity does not receive. Before the
+    /// first update it is that of the scene's own time.
     ///
     /// # Errors
     /// As [`Renderer::update`].
@@ -222,14 +172,15 @@ impl Renderer {
         }
     }
 
-    /// Transfer vectors of an entity's vertices, in its own frame: baked ones, or the cosine lobes of the normals of a mesh that cannot
-    /// shadow itself.
+    /// Transfer vectors of an entity's vertices, in its own frame: baked ones, or the cosine lobes of the normals of a
+    /// mesh that cannot shadow itself.
     ///
     /// # Errors
-    /// `Input` where there is no such entity, or where none were baked, as no light of the scene goes through spherical harmonics;
-    /// `Device` when memory ran out.
+    /// `Input` where there is no such entity, or where none were baked, as no light of the scene goes through spherical
+    /// harmonics; `Device` when memory ran out.
     pub fn transfer(&self, entity: usize) -> Result<Transfer> {
-        let (scene, bands) = (self.frame.scene(), self.frame.buffers.bands);
+        let scene = self.frame.scene();
+        let bands = self.frame.buffers.bands;
         let known = scene.entities.get(entity);
         let mesh = known.ok_or_else(|| Error::Input(format!("there is no entity {entity}")))?.mesh;
         if let Some((floats, stride)) = self.frame.buffers.transfer(&self.frame.buffers.meshes[mesh])? {
@@ -245,8 +196,8 @@ impl Renderer {
         Ok(Transfer { bands, coefficients: lobes.map(|c| c as f32).collect() })
     }
 
-    /// The picture of what was lit last, as the camera sees it: linear values. Radiance above what the scene's exposure shows as white is
-    /// brought down to white, hue kept.
+    /// The picture of what was lit last, as the camera sees it: linear values. Radiance above what the scene's exposure
+    /// shows as white is brought down to white, hue kept.
     ///
     /// # Errors
     /// As [`Renderer::update`].

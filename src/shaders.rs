@@ -1,14 +1,15 @@
-//! Every shader of the program: entry points and includes embedded in the binary, a folder that overrides them, and the text
-//! that is generated from the tables of [`crate::sh`].
+//! Every shader of the program: entry points and includes embedded in the binary, a folder that overrides them, and the
+//! text that is generated from the tables of [`crate::sh`].
 
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
+use crate::files;
 use crate::gpu::shader::ShaderSource;
 use crate::gpu::{Shader, Stage};
-use crate::layout::shared_macros;
+use crate::layout::{self, shared_macros};
 use crate::sh;
-use crate::sh::product_program::{STYLES, glsl_subtract};
+use crate::sh::product_program::glsl_subtract;
 use crate::sh::rotation::glsl_rotate;
 use std::path::PathBuf;
 
@@ -28,17 +29,15 @@ embedded!(
     "capture.vert",
     "captured.glsl",
     "ceiling.comp",
+    "centroid.glsl",
     "cube.glsl",
     "draw.frag",
     "draw.vert",
     "entities.glsl",
     "field.glsl",
-    "field_image.glsl",
     "field_packed.glsl",
     "field_quads.glsl",
     "finish.glsl",
-    "gather.comp",
-    "gather_scope.glsl",
     "grid.frag",
     "grid.vert",
     "lists.glsl",
@@ -47,9 +46,9 @@ embedded!(
     "merge_cone.glsl",
     "merge_layout.glsl",
     "merge_product.glsl",
+    "overlay.frag",
+    "overlay.vert",
     "pixel_light.glsl",
-    "product.comp",
-    "product_points.glsl",
     "project.comp",
     "raster.comp",
     "readable.glsl",
@@ -76,7 +75,8 @@ embedded!(
     "triangle_push.glsl",
 );
 
-/// One compilation of one entry point. It contains everything that changes the compiled code, and all of it is the cache key.
+/// One compilation of one entry point. It contains everything that changes the compiled code, and all of it is the
+/// cache key.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct ShaderPermutation {
     /// File in `glsl/`; its ending decides the stage.
@@ -134,9 +134,6 @@ pub struct Library {
 
 impl Library {
     /// Compiles a permutation, or reads it from the cache.
-    ///
-    /// # Errors
-    /// `Failed` with the compiler's messages; `Input` when a file of the override folder cannot be read.
     pub fn shader(&self, row: &ShaderPermutation) -> Result<Shader> {
         let stage = match row.file.rsplit('.').next() {
             Some("comp") => Stage::Compute,
@@ -186,8 +183,8 @@ impl Library {
         if let Some(path) = self.shader_dir.as_ref().map(|folder| folder.join(name))
             && path.exists()
         {
-            return std::fs::read_to_string(&path)
-                .map_err(|error| Error::input(&path, format!("cannot be read: {error}")));
+            let text = files::open(&path).and_then(std::io::read_to_string);
+            return text.map_err(|error| Error::input(&path, format!("cannot be read: {error}")));
         }
         FILES
             .iter()
@@ -197,19 +194,18 @@ impl Library {
     }
 }
 
-/// Text of a generated include. Includes are resolved before the preprocessor removes any, so a permutation may also request
-/// includes that it does not use.
+/// Text of a generated include. Includes are resolved before the preprocessor removes any, so a permutation may also
+/// request includes that it does not use.
 fn generate(name: &str, row: &ShaderPermutation) -> Option<String> {
-    let (bands, field_bands) = (row.bands, row.field_bands);
+    let bands = row.bands;
+    let field_bands = row.field_bands;
     match name {
         "basis.glsl" => Some(sh::basis::glsl_basis(bands)),
+        "cluster_at.glsl" => Some(layout::glsl_cluster_at()),
         "cosine.glsl" => Some(sh::lobe::glsl_clamped_cosine(bands)),
-        "points.glsl" if bands > sh::points::BANDS => Some(String::new()),
-        "points.glsl" => Some(sh::points::glsl_points(bands)),
-        "product.glsl" => {
-            let place = row.defines.iter().find(|(name, _)| *name == "PRODUCT").and_then(|(_, n)| n.parse().ok());
-            Some(glsl_subtract(STYLES[place.unwrap_or(0)], bands, field_bands))
-        }
+        "entity_at.glsl" => Some(layout::glsl_entity_at()),
+        "product.glsl" => Some(glsl_subtract(bands, field_bands)),
+        "structs.glsl" => Some(layout::glsl_structs()),
         // One overload for each array length.
         "rotate.glsl" => {
             let more = if field_bands > bands { glsl_rotate(field_bands) } else { String::new() };

@@ -1,38 +1,32 @@
-//! Text files of results: CSV with its origin in the first line, and numbers with three digits.
+//! Text files of results: CSV with its origin in the first line, numbers with three digits; and numbers of the command
+//! line.
 
 use crate::error::{Error, Result};
 use serde::Serialize;
 use serde_json::{Value, json};
+use std::ops::{Bound, RangeBounds};
 use std::path::Path;
+use std::str::FromStr;
 
 /// Writes a file of results without leaving a partial one.
-///
-/// # Errors
-/// `Failed` that names the file.
 pub fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<()> {
     crate::files::replace(path, text.as_ref())
         .map_err(|error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
 }
 
 /// Makes the folder that results go to, with those that it stands in.
-///
-/// # Errors
-/// `Failed` that names the folder.
 pub fn make_folder(path: &Path) -> Result<()> {
     std::fs::create_dir_all(path).map_err(|error| Error::Failed(format!("{}: cannot be made: {error}", path.display())))
 }
 
 /// Writes rows as NAME.csv, and with their origin as NAME.json.
-///
-/// # Errors
-/// As [`write()`].
 pub fn write_rows(folder: &Path, name: &str, origin: &Value, rows: &impl Serialize) -> Result<()> {
     write(&folder.join(format!("{name}.csv")), csv(origin, rows))?;
     write(&folder.join(format!("{name}.json")), format!("{:#}\n", json!({ "origin": origin, "rows": rows })))
 }
 
-/// Rows, of which a list is made, as CSV: nested numbers get names joined by `_`, lists of objects are left out, and the first line, after
-/// `#`, is `origin` as JSON.
+/// Rows, of which a list is made, as CSV: nested numbers get names joined by `_`, lists of objects are left out, and
+/// the first line, after `#`, is `origin` as JSON.
 pub fn csv(origin: &Value, rows: &impl Serialize) -> String {
     let rows = json!(rows);
     let rows = rows.as_array().map_or(&[][..], Vec::as_slice);
@@ -74,6 +68,47 @@ fn flatten(prefix: &str, value: &Value) -> Vec<(String, String)> {
 
 fn quote(cell: &str) -> String {
     if cell.contains([',', '"', '\n']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
+}
+
+/// A number as text; very large and very small ones have an exponent (`1e15`).
+pub fn short<T: Copy + Into<f64> + std::fmt::Display + std::fmt::LowerExp>(number: T) -> String {
+    let size = number.into().abs();
+    if size.is_finite() && size != 0.0 && !(1e-4..1e7).contains(&size) {
+        format!("{number:e}")
+    } else {
+        number.to_string()
+    }
+}
+
+/// A parser of finite numbers within a range, for options of the command line.
+pub fn number<T>(range: impl RangeBounds<T> + Clone) -> impl Fn(&str) -> std::result::Result<T, String> + Clone
+where
+    T: FromStr + PartialOrd + Copy + Into<f64> + std::fmt::Display + std::fmt::LowerExp,
+{
+    move |text| {
+        let number = text.trim().parse().ok().filter(|x: &T| range.contains(x) && (*x).into().is_finite());
+        let from = match range.start_bound() {
+            Bound::Included(least) => format!(" from {}", short(*least)),
+            Bound::Excluded(limit) => format!(" above {}", short(*limit)),
+            Bound::Unbounded => String::new(),
+        };
+        let to = match range.end_bound() {
+            Bound::Included(most) => format!(" to {}", short(*most)),
+            Bound::Excluded(limit) => format!(" below {}", short(*limit)),
+            Bound::Unbounded => String::new(),
+        };
+        number.ok_or_else(|| format!("expected a number{from}{to}, got \"{text}\""))
+    }
+}
+
+/// A parser of three numbers with commas between them.
+pub fn triple<T>(
+    number: impl Fn(&str) -> std::result::Result<T, String> + Clone,
+) -> impl Fn(&str) -> std::result::Result<[T; 3], String> + Clone {
+    move |text| {
+        let numbers: Vec<T> = text.split(',').map(&number).collect::<std::result::Result<_, _>>()?;
+        numbers.try_into().map_err(|_| format!("expected three numbers like 1,0.5,2, got \"{text}\""))
+    }
 }
 
 /// A number with three significant digits; from a million on as a power of ten.

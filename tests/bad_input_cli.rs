@@ -1,5 +1,5 @@
-//! Bad input through the program: one clear line on stderr that names the file (and the line), the exit code that README lists,
-//! and nothing left behind.
+//! Bad input through the program: one clear line on stderr that names the file (and the line), the exit code that
+//! README lists, and nothing left behind.
 
 #[path = "common/cli.rs"]
 mod cli;
@@ -29,8 +29,8 @@ fn case(files: &[(&str, &str)]) -> Case {
     Case { _temporary: temporary, folder }
 }
 
-/// The command ends with `code` and, besides the note on a software device, one line with every one of `parts`; no file comes
-/// or goes.
+/// The command ends with `code` and, besides the note on a software device, one line with every one of `parts`; no file
+/// comes or goes.
 fn refused_command(folder: &Path, command: &mut Command, code: i32, parts: &[&str]) {
     let before = names(folder);
     let ran = finish(command);
@@ -83,6 +83,7 @@ fn scenes() {
         (entity("scale = [1, 2, 1]"), ["s.toml:9: ", "uniform and positive"]),
         (entity("colour = 1"), ["s.toml:9: ", "unknown field `colour`"]),
         ("this is no scene".into(), ["s.toml:1: ", ""]),
+        (format!("{CAMERA}\"a\\nb\" = 1\n"), ["s.toml:4: ", "unknown field `a\\nb`"]),
     ] {
         refused(&case(&[("s.toml", &text)]), &render, 4, &parts);
     }
@@ -111,8 +112,8 @@ fn field_files() {
         damaged(&bytes, &[]);
     }
     damaged(b"not a field at all, but long enough to hold the first part of one", &["not a field file"]);
-    // The version stands behind the magic; the number of samples in the header, whose hash is then wrong too: neither is
-    // believed before it is checked, and nothing of that size is allocated.
+    // The version stands behind the magic; the number of samples in the header, whose hash is then wrong too: neither
+    // is believed before it is checked, and nothing of that size is allocated.
     let mut bytes = whole.clone();
     bytes[8] = bytes[8].wrapping_add(1);
     damaged(&bytes, &["version"]);
@@ -142,6 +143,12 @@ fn drivers_layers_and_devices() {
             3,
             &["no Vulkan driver", "mesa-vulkan-drivers", "/nowhere/no.json"],
         );
+    }
+    // What is to be timed is read before anything is measured.
+    for arguments in [["profile", "gone.toml"], ["profile", "--bake=gone.obj"]] {
+        let mut without = command(&case.folder, &arguments);
+        without.env("VK_DRIVER_FILES", "/nowhere/no.json").env_remove("VK_ADD_DRIVER_FILES");
+        refused_command(&case.folder, &mut without, 4, &["gone.", "o such file"]);
     }
     if !has_device() {
         return;
@@ -212,13 +219,14 @@ fn output_that_cannot_be_written() {
     let case = case(&files);
     let small = ["--lattice", "cube:1x1", "--face-px", "4"];
     // Told before a device is opened.
-    for option in ["--exr", "--vertices", "--stats"] {
-        let render = ["render", "s.toml", "-o", "p.png", option, "no/such/out"];
-        refused(&case, &[&render[..], &small].concat(), 1, &["no/such/out: ", "no folder no/such"]);
+    for (option, output) in [("--exr", "no/such/p.exr"), ("--vertices", "no/such/v.csv"), ("--stats", "no/such/s.json")]
+    {
+        let render = ["render", "s.toml", "-o", "p.png", option, output];
+        refused(&case, &[&render[..], &small].concat(), 1, &[output, "no folder no/such"]);
     }
     for output in ["no/p.png", "file/p.png", "no/p_##.png"] {
         let render = ["render", "s.toml", "-o", output];
-        refused(&case, &[&render[..], &small].concat(), 1, &[output, "no folder "]);
+        refused(&case, &[&render[..], &small].concat(), 1, &[&output[..4], "no folder "]);
     }
     refused(&case, &[&["bake", "m.obj", "-o", "no/f.sf"][..], &small].concat(), 1, &["no/f.sf: ", "no folder no"]);
     if !has_device() {
@@ -294,13 +302,13 @@ fn usage_of_values_and_pairs() {
     for (start, more, part) in [
         (&render[..], &["--eps", "-1"][..], "expected a number from 0 to 1, got \"-1\""),
         (&render, &["--error", "e.png", "--error-limit", "-1"], "expected a number above 0, got \"-1\""),
-        (&render, &["--time", "nan"], "expected seconds from -1e9 to 1e9, got \"nan\""),
+        (&render, &["--time", "nan"], "expected a number from -1e9 to 1e9, got \"nan\""),
         (&render, &["--rays", "64"], "--reference"),
         (&render, &["--error-scheme", "absolute"], "--error"),
         (&render, &["--error-limit", "1"], "--error"),
-        (&bake, &["--radiance", "-1,2,3"], "expected a radiance like 1,0.5,0.2"),
+        (&bake, &["--radiance", "-1,2,3"], "expected a number from 0 to 1e15, got \"-1\""),
         (&bake, &["--radiance", "1e38,1,1"], "from 0 to 1e15"),
-        (&["inspect", "f.sf"], &["--at", "1e300,0,0"], "within 1e15 m"),
+        (&["inspect", "f.sf"], &["--at", "1e300,0,0"], "expected a number from -1e15 to 1e15"),
     ] {
         let ran = finish(&mut command(&case.folder, &[start, more].concat()));
         assert!(ran.code == 2 && ran.stderr.contains(part), "{more:?}: {} {}", ran.code, ran.stderr);

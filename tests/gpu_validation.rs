@@ -1,5 +1,5 @@
-//! Those who watch are watched: the validation layer hears deliberate errors, and the tracker objects to every barrier that is
-//! left out.
+//! Those who watch are watched: the validation layer hears deliberate errors, and the tracker objects to every barrier
+//! that is left out.
 
 mod common;
 
@@ -7,7 +7,7 @@ use common::generate;
 use common::{Gpu, gpu, library, report};
 use glam::Vec3;
 use shadow_fields::bake::assemble::Assemble;
-use shadow_fields::bake::capture::{Capture, CaptureKind, Model};
+use shadow_fields::bake::capture::{Capture, CaptureKind, Model, Way};
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::field::{FieldKind, Storage};
 use shadow_fields::gpu::image::ImageShape;
@@ -84,8 +84,8 @@ fn without_the_layer_nothing_is_heard() {
     assert!(device.take_validation_messages().is_empty());
 }
 
-/// Two dispatches, the second reading what the first wrote, a copy of the outcome, and the host's reading of that: three
-/// barriers.
+/// Two dispatches, the second reading what the first wrote, a copy of the outcome, and the host's reading of that:
+/// three barriers.
 fn chain(gpu: &Gpu) -> Result<Vec<f32>> {
     let pass = Assemble::new(&gpu.device, &gpu.library, Storage::F32)?;
     let input = Buffer::with_data(&gpu.device, "input", &(0..64).map(|i| i as f32).collect::<Vec<_>>())?;
@@ -190,18 +190,14 @@ fn the_barrier_of_a_bake_batch_is_missed() {
 #[test]
 fn every_barrier_of_a_picture_is_missed() {
     let Some(gpu) = gpu() else { return };
-    let model = Model::new(&gpu.device, &generate::sphere(1.0, 1), false).unwrap();
-    let mut capture = Capture::new(&gpu.device, &gpu.library, 16, CaptureKind::Cover).unwrap();
-    capture.computes = true;
+    let model = Model::new(&gpu.device, &generate::sphere(1.0, 1)).unwrap();
+    let capture = Capture::new(&gpu.device, &gpu.library, model, 16, CaptureKind::Cover, Way::Computed).unwrap();
     let eyes = [Vec3::new(1.5, 0.3, 0.2)];
-    let plan = capture.plan(&model, &eyes);
-    let drawn = capture.choose(&model, &eyes, &plan, true).unwrap();
+    let drawn = capture.choose(&eyes, &capture.plan(&eyes)[0]).unwrap();
     let host = Buffer::new(&gpu.device, "host picture", BufferKind::Readback, 4 << 20).unwrap();
     let run = || {
         let mut commands = Commands::new(&gpu.device, "picture")?;
-        commands.image_barrier(&capture.atlas, None, drawn.access());
-        commands.pass("capture", |c| capture.record(c, &model, &drawn))?;
-        commands.image_barrier(&capture.atlas, Some(drawn.access()), Access::TransferRead);
+        capture.record(&mut commands, &drawn, Access::TransferRead)?;
         commands.pass("copy", |c| {
             c.copy_image(&capture.atlas, &host);
             Ok(())

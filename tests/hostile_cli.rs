@@ -1,12 +1,13 @@
-//! Names, numbers and surroundings that nobody means well: the program neither panics nor passes them to the terminal, and ends
-//! with the exit code that the reason has.
+//! Names, numbers and surroundings that nobody means well: the program neither panics nor passes them to the terminal,
+//! and ends with the exit code that the reason has.
 #![cfg(unix)]
 
 #[path = "common/cli.rs"]
 mod cli;
 mod common;
 
-use cli::{Ran, command, finish, has_device, names};
+use cli::{Ran, command, finish, good, has_device, names};
+use shadow_fields::error::is_deceptive;
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::symlink;
@@ -31,9 +32,9 @@ fn bake(folder: &TempDir, more: &[&str]) -> Command {
     command(folder.path(), &[&["bake", "m.obj"], &SMALL[..], more].concat())
 }
 
-/// No control character but the ends of lines.
+/// No control or bidirectional character but the ends of lines.
 fn assert_clean(text: &str) {
-    assert!(text.chars().all(|c| c == '\n' || !c.is_control()), "{text:?}");
+    assert!(text.chars().all(|c| c == '\n' || !is_deceptive(c)), "{text:?}");
 }
 
 #[test]
@@ -73,6 +74,8 @@ fn control_characters_do_not_reach_the_terminal() {
         (&["bake", "m.obj", "-o", "a\u{1b}[31m\nb/f.sf"], 1),
         (&["bake", "m.obj", "-o", "a\u{1b}[31m\nb.txt"], 2),
         (&["inspect", "a\u{7}\r.sf"], 4),
+        (&["bake", "a\u{2028}b\u{202e}c.obj", "-o", "f.sf"], 4),
+        (&["bake", "m.obj", "-o", "a\u{2067}b\u{200f}.txt"], 2),
         (&["render", "\u{1b}]0;title\u{7}.toml", "-o", "p.png"], 4),
     ] {
         let ran = run(&folder, arguments);
@@ -83,6 +86,56 @@ fn control_characters_do_not_reach_the_terminal() {
         let ran = run(&folder, &["render", "s.toml", "-o", "p.png", argument]);
         assert_clean(&ran.stderr);
         assert!(ran.code == 2 && ran.stderr.contains("\\u{1b}"), "{} {}", ran.code, ran.stderr);
+    }
+}
+
+/// Results show names of files too, and are JSON where that is asked for.
+#[test]
+fn results_have_no_control_characters() {
+    let folder = folder();
+    let gltf = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [] }] }"#;
+    std::fs::write(folder.path().join("m.gltf"), gltf).unwrap();
+    let name = "a\u{202e}b\u{85}c.toml";
+    let said = good(folder.path(), &["import", "m.gltf", "-o", name]).stdout;
+    assert_clean(&said);
+    let said = good(folder.path(), &["import", "m.gltf", "-o", name, "--json"]).stdout;
+    assert_clean(&said);
+    let report: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(report["file"], name);
+}
+
+/// No line of a help text ends before the width is used and goes on in the next.
+#[test]
+fn help_texts_are_wrapped_once() {
+    let folder = folder();
+    let help = |width: usize, words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_shadow-fields"));
+        finish(command.current_dir(folder.path()).args(words).arg("--help").env("COLUMNS", width.to_string())).stdout
+    };
+    let commands = |text: &str| -> Vec<String> {
+        let listed = text.split("Commands:\n").nth(1).unwrap_or("").lines().take_while(|line| !line.is_empty());
+        let names = listed.filter_map(|line| line.strip_prefix("  ")?.split(' ').next().map(str::to_owned));
+        names.filter(|name| !name.is_empty() && name != "help").collect()
+    };
+    for width in [80, 120] {
+        let mut pending: Vec<Vec<String>> = vec![Vec::new()];
+        let mut seen = 0;
+        while let Some(words) = pending.pop() {
+            let text = help(width, &words.iter().map(String::as_str).collect::<Vec<_>>());
+            for (line, next) in text.lines().zip(text.lines().skip(1)) {
+                let indent = |line: &str| line.len() - line.trim_start().len();
+                let first = next.trim_start().split(' ').next().unwrap_or("");
+                let goes_on =
+                    first.starts_with(|c: char| c.is_ascii_lowercase() || c == '(') && !next.trim().contains("  ");
+                let fits = line.chars().count() + 1 + first.chars().count() <= width.min(110);
+                let ends = line.is_empty() || indent(line) != indent(next) || line.trim_end().ends_with(['.', ':']);
+                let example = next.trim_start().starts_with("shadow-fields ");
+                assert!(!goes_on || !fits || ends || example, "{words:?} at {width}: {line:?} and {next:?}");
+            }
+            seen += 1;
+            pending.extend(commands(&text).into_iter().map(|name| [&words[..], &[name]].concat()));
+        }
+        assert!(seen > 15, "only {seen} commands were found");
     }
 }
 

@@ -1,5 +1,5 @@
-//! Killed, crowded and cramped: whenever a command is killed, however many share a cache, and whether or not that can be written,
-//! outputs are whole or absent, the next run is as if nothing had happened, and nothing is left over.
+//! Killed, crowded and cramped: whenever a command is killed, however many share a cache, and whether or not that can
+//! be written, outputs are whole or absent, the next run is as if nothing had happened, and nothing is left over.
 //!
 //! Some kills run by default. All 60 of every command: `cargo test --test kills -- --ignored --nocapture`.
 #![cfg(unix)]
@@ -47,8 +47,9 @@ const MODEL: &str = r#"{ "asset": { "version": "2.0" }, "scene": 0, "scenes": [{
 "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }],
 "buffers": [{ "byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }] }"#;
 
-/// Every kind of command that writes, and what it writes. Those whose files hold times, `bench` and `profile`, write them likewise;
-/// `demo` has a test of its own, and `farm` in `tests/farm`. What the first one writes is an input of others.
+/// Every kind of command that writes, and what it writes. Those whose files hold times, `bench` and `profile`, write
+/// them likewise; `demo` has a test of its own, and `farm` in `tests/farm`. What the first one writes is an input of
+/// others.
 const COMMANDS: [(&str, &[&str]); 8] = [
     ("bake m.obj -o f.sf --lattice cube:3x3 --face-px 8", &["f.sf"]),
     ("bake m.obj -o s.sf --silhouette --quality draft", &["s.sf"]),

@@ -21,11 +21,11 @@ fn a_round_of_a_loop_is_counted() {
     let arithmetic = ceiling(0);
     assert_eq!(arithmetic.flops, 16 * 4 * 2, "sixteen vectors of four, multiplied and added");
     assert!(arithmetic.fetches.is_empty() && arithmetic.block_bytes.is_empty());
-    for kind in [1, 2, 5] {
+    for kind in [1, 2] {
         let census = ceiling(kind);
         assert_eq!(census.fetches.get("source"), Some(&16));
         assert_eq!(census.fetch_count(), 16);
-        assert!(kind == 5 || census.flops == 16 * 4, "each is added");
+        assert_eq!(census.flops, 16 * 4, "each is added");
     }
     let census = ceiling(3);
     assert_eq!(census.fetch_count(), 0);
@@ -62,45 +62,28 @@ fn two_variants_side_by_side() {
         "--occluders",
         "2",
         "--compare",
-        "texel",
+        "texel-packed",
         "storage",
-        "--out",
+        "--output",
         "out",
-        "--spirv",
-        "spirv",
     ];
     let document = json(folder.path(), &more);
     positive(
         &document["ceilings"],
-        &[
-            "/gflops",
-            "/texel_halves_giga",
-            "/texel_packed_giga",
-            "/filtered_giga",
-            "/storage_giga",
-            "/triad_gb_s",
-            "/dispatch_ms",
-        ],
+        &["/gflops", "/texel_halves_giga", "/texel_packed_giga", "/storage_giga", "/triad_gb_s", "/dispatch_ms"],
     );
     let rows = document["passes"].as_array().unwrap();
     assert_eq!(rows.len(), 2);
-    for (row, name) in rows.iter().zip(["texel", "storage"]) {
+    for (row, name) in rows.iter().zip(["texel-packed", "storage"]) {
         assert_eq!(row["variant"], name);
         positive(row, &["/ms/median", "/ns_a_pair", "/gflops", "/gb_s", "/arithmetic_share", "/read_share"]);
-        // Eight corners of four quads; 659 operations of the product and 256 of the weights alone.
+        // Eight corners of four quads.
         assert!(row["work"]["bytes"].as_u64().unwrap() >= 8 * 4 * 8, "{row}");
-        assert!(row["work"]["flops"].as_u64().unwrap() > 900, "{row}");
-        assert_eq!(row["work"]["fetches"].as_u64().unwrap() > 0, name == "texel");
+        positive(row, &["/work/flops"]);
+        assert_eq!(row["work"]["fetches"].as_u64().unwrap() > 0, name == "texel-packed");
     }
     positive(&document["ratios"][0], &["/ratio/p10", "/ratio/median", "/ratio/p90"]);
-    for start in document["starts"].as_array().unwrap() {
-        positive(start, &["/spirv_cold_ms", "/spirv_warm_ms", "/first_cold_ms", "/first_warm_ms"]);
-    }
-    assert_eq!(names(&folder.path().join("out")), ["profile.csv", "profile.json", "starts.csv"]);
-    let spirv = names(&folder.path().join("spirv"));
-    assert_eq!(spirv, ["storage.spv", "storage.spvasm", "texel.spv", "texel.spvasm"]);
-    let words = std::fs::read(folder.path().join("spirv/texel.spv")).unwrap();
-    assert_eq!(words[..4], 0x0723_0203_u32.to_le_bytes(), "SPIR-V's magic number");
+    assert_eq!(names(&folder.path().join("out")), ["profile.csv", "profile.json"]);
 }
 
 /// A folder that holds `floor.toml`, a scene of one floor under a uniform sky.
@@ -118,8 +101,10 @@ fn a_scene_is_timed_pass_by_pass() {
         return;
     }
     let folder = folder_with_floor();
-    let document =
-        json(folder.path(), &["floor.toml", "--runs", "2", "--size", "64x48", "--compare", "texel-packed", "texel"]);
+    let document = json(
+        folder.path(),
+        &["floor.toml", "--runs", "2", "--size", "64x48", "--compare", "texel-packed", "texel-shifted"],
+    );
     let rows = document["passes"].as_array().unwrap();
     assert!(
         rows[0]["arithmetic_share"].is_null() && rows[0]["ns_a_pair"].is_null(),

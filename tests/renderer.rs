@@ -26,7 +26,7 @@ fn room() -> SceneBuilder {
 }
 
 fn small() -> RenderOptions {
-    RenderOptions { quality: Quality::Draft, size: Some([96, 64]), ..Default::default() }
+    RenderOptions { bake: Quality::Draft.into(), size: Some([96, 64]), ..Default::default() }
 }
 
 /// The one line of a scene that is refused.
@@ -151,7 +151,8 @@ fn a_renderer_lights_its_scene_at_once_and_refuses_what_is_no_placement() {
     }
     assert!(renderer.light().unwrap() == at_once, "what is refused changes nothing");
 
-    // Transfer vectors: baked ones of the ring, lobes of the floor; the first coefficient of an open vertex is sqrt(pi) / 2.
+    // Transfer vectors: baked ones of the ring, lobes of the floor; the first coefficient of an open vertex is sqrt(pi)
+    // / 2.
     let [floor, ring] = [0, 1].map(|entity| renderer.transfer(entity).unwrap());
     assert_eq!((floor.bands, floor.coefficients.len()), (3, 9 * at_once[0].len()));
     assert_eq!(ring.coefficients.len(), 9 * at_once[1].len());

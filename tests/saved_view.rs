@@ -12,7 +12,7 @@ use shadow_fields::draw::Antialias;
 use shadow_fields::frame;
 use shadow_fields::merge::Variant;
 use shadow_fields::scene::Scene;
-use shadow_fields::view::{Command, Editor, Step};
+use shadow_fields::view::{Command, Editor};
 use stage::{small, stage};
 use std::path::Path;
 
@@ -71,10 +71,7 @@ fn a_saved_state_is_rendered_to_the_picture_that_was_shown() {
     for command in [
         Command::SelectNext,
         Command::SelectNext,
-        Command::Step { step: Step::Right, repeat: false },
-        Command::Step { step: Step::TurnLeft, repeat: false },
         Command::SelectNext,
-        Command::Step { step: Step::Larger, repeat: false },
         Command::ToggleLight,
         Command::SetLight(2.0),
         Command::SetSkyTurn(70.0),
@@ -110,7 +107,8 @@ fn a_saved_state_is_rendered_to_the_picture_that_was_shown() {
     let levels: std::collections::HashSet<&[u8]> = shown.chunks(3).collect();
     assert!(levels.len() > 200, "flat: {} colours", levels.len());
 
-    // Motion goes on from there, and is the same at any rate of frames: the last of 7 at 12 a second is the last of 4 at 6.
+    // Motion goes on from there, and is the same at any rate of frames: the last of 7 at 12 a second is the last of 4
+    // at 6.
     run(&["render", "own-edited.toml", "-o", "a_#.png", "--exr", "a_#.exr", "--frames", "7", "--fps", "12"]);
     run(&["render", "own-edited.toml", "-o", "b_##.png", "--exr", "b.exr", "--frames", "4", "--fps", "6"]);
     assert!(png("a_0.png").into_raw() == shown);

@@ -13,12 +13,9 @@ use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
 use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::draw::triangles::DrawTriangles;
-use shadow_fields::field::{Lattice, Lookup, Storage};
-use shadow_fields::lists::gather::Gather;
+use shadow_fields::field::{Lattice, Storage};
 use shadow_fields::lists::skip::Skip;
-use shadow_fields::merge::chain::{Chain, PRODUCTS};
-use shadow_fields::merge::product::{ProductShape, Products};
-use shadow_fields::merge::variant::{MergePermutation, VARIANTS, Variant};
+use shadow_fields::merge::variant::{MergePermutation, Reads, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, ShaderPermutation};
 use shadow_fields::sharp::SharpPermutation;
 use std::collections::BTreeSet;
@@ -48,22 +45,18 @@ fn sharp() -> Vec<ShaderPermutation> {
     let way = |bits: u32| {
         let on = |bit: u32| bits >> bit & 1 == 1;
         let silhouette = SilhouetteOptions::default();
-        let (texel, uniform, outlines, panels, self_shadows, halves, boxes) =
-            (on(0), on(1), on(2), on(3), on(4), on(2) != on(3), on(2) != on(4));
-        let (cones, edges, rolled) = (on(5), on(0) == on(2), on(5));
         SharpPermutation {
-            texel,
-            uniform,
+            reads: [Reads::Storage, Reads::StorageUniform, Reads::Texels][bits as usize % 3],
             entity_limit: 48,
             silhouette,
-            outlines,
-            panels,
-            halves,
-            boxes,
-            self_shadows,
-            cones,
-            edges,
-            rolled,
+            outlines: on(2),
+            panels: on(3),
+            halves: on(2) != on(3),
+            boxes: on(2) != on(4),
+            self_shadows: on(4),
+            cones: on(5),
+            edges: on(0) == on(2),
+            rolled: on(5),
         }
         .row()
     };
@@ -74,8 +67,7 @@ fn drawing() -> Vec<ShaderPermutation> {
     let flat = [false, true].map(|display| ShaderPermutation::new("draw.frag", 4).define("DISPLAY", display));
     let silhouette = SilhouetteOptions::default();
     let sharp = [false, true].map(|outlines| SharpPermutation {
-        texel: true,
-        uniform: false,
+        reads: Reads::Texels,
         entity_limit: 48,
         silhouette,
         outlines,
@@ -96,21 +88,17 @@ fn drawing() -> Vec<ShaderPermutation> {
     fragments
         .chain([false, true].map(Smooth::fragment))
         .chain(
-            ["draw.vert", "grid.vert", "show.vert", "show.frag", "smooth.vert"]
+            ["draw.vert", "grid.vert", "overlay.vert", "overlay.frag", "show.vert", "show.frag", "smooth.vert"]
                 .map(|file| ShaderPermutation::new(file, 4)),
         )
         .collect()
-}
-
-fn gathering() -> Vec<ShaderPermutation> {
-    [false, true].into_iter().flat_map(|texel| [false, true].map(|roomy| Gather::row(texel, roomy))).collect()
 }
 
 fn measuring() -> Vec<ShaderPermutation> {
     let kind = |kind: u32| ShaderPermutation::new("ceiling.comp", 4).define("KIND", kind);
     let rate = |n| kind(n).define("READS", 16_u32).define("ROUNDS", 16_u32).define("MASK", 1023_u32);
     let maps = [Filter::Hard, Filter::Pcss].into_iter().flat_map(|filter| ShadowMaps::permutations(filter, 512));
-    (0..4).map(rate).chain([kind(4), rate(5)]).chain(maps).collect()
+    (0..4).map(rate).chain([kind(4)]).chain(maps).collect()
 }
 
 fn lattice(text: &str) -> Lattice {
@@ -124,7 +112,6 @@ fn usual_permutation() -> MergePermutation {
         field_bands: 4,
         storage: Storage::F16,
         lattice: Lattice::default().starting_at(1.02),
-        lookup: Lookup::Trilinear,
         skip: Skip::ALL,
         lights: true,
         entity_limit: 48,
@@ -157,10 +144,7 @@ fn merging() -> Vec<ShaderPermutation> {
         "latlon:8x4x4,linear,raw,inner=0.2",
         "latlon:1x1x1,inner=1.02",
     ];
-    for lookup in [Lookup::Nearest, Lookup::Radial, Lookup::Trilinear] {
-        permutations.push(MergePermutation { lookup, ..usual });
-        permutations.extend(lattices.map(|text| MergePermutation { lattice: lattice(text), lookup, ..usual }));
-    }
+    permutations.extend(lattices.map(|text| MergePermutation { lattice: lattice(text), ..usual }));
     permutations.push(MergePermutation { lights: false, ..usual });
     permutations.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| MergePermutation {
         bands,
@@ -170,22 +154,9 @@ fn merging() -> Vec<ShaderPermutation> {
     permutations.push(MergePermutation {
         variant: Variant::named("texel-shifted").unwrap(),
         lattice: lattice("latlon:8x4x4,linear,raw,inner=0.2"),
-        lookup: Lookup::Nearest,
         ..usual
     });
     permutations.iter().map(MergePermutation::row).collect()
-}
-
-/// Every product, with its loop alone, guarded or not, and by fields of more or fewer bands.
-fn multiplying() -> Vec<ShaderPermutation> {
-    let square = PRODUCTS.iter().flat_map(|&(_, product)| [true, false].map(|guard| (Chain { product, guard }, 4, 4)));
-    let other = [(4, 6), (3, 5), (5, 3)].map(|(bands, field_bands)| (Chain::default(), bands, field_bands));
-    square
-        .chain(other)
-        .flat_map(|(chain, bands, field_bands)| {
-            [true, false].map(|multiply| Products::row(ProductShape { chain, bands, field_bands }, multiply))
-        })
-        .collect()
 }
 
 /// What spirv-val says of the words: `Err` with its complaint.
@@ -228,11 +199,6 @@ fn baking_shaders_are_valid() {
 }
 
 #[test]
-fn multiplying_shaders_are_valid() {
-    check(multiplying());
-}
-
-#[test]
 fn drawing_shaders_are_valid() {
     check(drawing());
     check(sharp());
@@ -241,7 +207,6 @@ fn drawing_shaders_are_valid() {
 #[test]
 fn measuring_shaders_are_valid() {
     check(measuring());
-    check(gathering());
 }
 
 #[test]
@@ -257,11 +222,8 @@ fn merge_of_seven_bands_is_valid() {
 
 #[test]
 fn every_entry_point_is_among_the_rows() {
-    let compiled: BTreeSet<&str> = [baking(), drawing(), gathering(), measuring(), merging(), multiplying(), sharp()]
-        .concat()
-        .iter()
-        .map(|row| row.file)
-        .collect();
+    let compiled: BTreeSet<&str> =
+        [baking(), drawing(), measuring(), merging(), sharp()].concat().iter().map(|row| row.file).collect();
     let there: BTreeSet<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| !name.ends_with(".glsl")).collect();
     assert_eq!(compiled, there);
 }

@@ -1,16 +1,153 @@
-//! Thousands of frames of a moving scene whose entities change; `bench soak` draws a million.
+//! Thousands of frames of a small moving scene whose entities change: whether memory grows, pictures drift or frames
+//! slow.
 
 mod common;
 
 use common::{cache_dir, library, report, skip};
-use shadow_fields::bake::Baker;
+use glam::Vec3;
 use shadow_fields::bake::cache::Cache;
-use shadow_fields::bench::{Bench, soak};
+use shadow_fields::bake::{self, Baker};
+use shadow_fields::draw::Antialias;
+use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::{Device, DeviceOptions};
+use shadow_fields::lists::skip::Skip;
+use shadow_fields::scene::Scene;
 use std::path::Path;
 
-#[test]
-fn frames_neither_drift_nor_take_more_memory() {
+/// Edge of the pictures in pixels.
+const SIZE_PX: u32 = 64;
+/// Moments of the scene's period, and states of its entities; each pair is seen again and again.
+const MOMENTS: u64 = 24;
+const STATES: u64 = 4;
+/// Frames between two states.
+const STATE_FRAMES: u64 = 7;
+/// Share of the frames that may still take memory for the first time.
+const WARM_UP: f64 = 0.2;
+/// Largest growth of the process's memory after that.
+const MOST_GROWTH: f64 = 0.02;
+
+const SCENE: &str = r#"
+[camera]
+eye = [0, 1.5, 4]
+target = [0, 0, 0]
+[environment]
+gradient = { radiance = [0.3, 0.35, 0.4] }
+[[mesh]]
+name = "floor"
+plane = { size_m = 4, cells = 12 }
+[[mesh]]
+name = "ball"
+sphere = { radius_m = 0.5, subdivisions = 2 }
+[[mesh]]
+name = "ring"
+torus = { major_m = 0.5, minor_m = 0.15, segments = 16, sides = 8 }
+[[entity]]
+mesh = "floor"
+position = [0, -0.6, 0]
+[[entity]]
+mesh = "ball"
+position = [-0.8, 0, 0]
+motion = [{ bob = { amplitude_m = 0.2, period_s = 4 } }]
+[[entity]]
+mesh = "ring"
+position = [0.6, 0, 0]
+motion = [{ spin = { axis = [1, 1, 0], period_s = 4 } }]
+[[entity]]
+mesh = "ball"
+position = [0, 1.2, 1]
+scale = 0.3
+emission = [30, 24, 12]
+motion = [{ orbit = { centre = [0, 1.2, 0], period_s = 4 } }]
+"#;
+const PERIOD_S: f64 = 4.0;
+
+/// What was measured.
+#[derive(Clone, Debug)]
+struct Outcome {
+    /// Memory of the process in bytes when the warm-up ended, and the most after it; `None` where the system does not
+    /// say.
+    memory_bytes: Option<[u64; 2]>,
+    /// Pictures that were compared with the first of the same moment and state.
+    compared: u64,
+    /// Compared pictures that were not the same to the bit.
+    differing: u64,
+}
+
+impl Outcome {
+    /// What is wrong, a line each.
+    fn faults(&self) -> Vec<String> {
+        let mut faults = Vec::new();
+        if let Some([before, most]) = self.memory_bytes
+            && most as f64 > before as f64 * (1.0 + MOST_GROWTH)
+        {
+            faults.push(format!("memory grew from {before} to {most} bytes after the warm-up"));
+        }
+        if self.differing > 0 || self.compared == 0 {
+            faults.push(format!("{} of {} pictures of the same moment differ", self.differing, self.compared));
+        }
+        faults
+    }
+}
+
+/// The scene in one of its states: other colours, a lamp that is brighter, goes out or casts shadows instead.
+fn changed(scene: &Scene, state: u64) -> Scene {
+    let mut data = scene.data.clone();
+    data.entities[1].albedo = Vec3::new(0.7, 0.7 - 0.15 * state as f32, 0.3);
+    let lamp = &mut data.entities[3];
+    match state {
+        0 => {}
+        1 => lamp.emission *= 2.0,
+        2 => {
+            lamp.emission = Vec3::ZERO;
+            lamp.emits = Some(false);
+            lamp.occludes = Some(true);
+        }
+        _ => lamp.scale = 0.2,
+    }
+    let text = data.to_toml().unwrap();
+    let mut changed = Scene::parse(&text, Path::new("soak.toml"), &shadow_fields::asset::embedded::read).unwrap();
+    changed.meshes = scene.meshes.clone();
+    changed
+}
+
+fn soak(frame: &mut Frame, states: &[Scene], frames: u64) -> Outcome {
+    let warm_up = ((frames as f64 * WARM_UP) as u64).max(2 * MOMENTS * STATES * STATE_FRAMES);
+    let mut first: Vec<Option<Vec<f32>>> = vec![None; (MOMENTS * STATES) as usize];
+    let mut memory = None;
+    let mut compared = 0;
+    let mut differing = 0;
+    for index in 0..frames {
+        let moment = index % MOMENTS;
+        let state = index / STATE_FRAMES % STATES;
+        if index % STATE_FRAMES == 0 {
+            frame.set_scene(&states[state as usize]).unwrap();
+        }
+        let placements = states[state as usize].at(moment as f64 * PERIOD_S / MOMENTS as f64);
+        frame.render(&placements, Some(1.0)).unwrap();
+        let picture = frame.picture();
+        match &first[(moment * STATES + state) as usize] {
+            None => first[(moment * STATES + state) as usize] = Some(picture),
+            Some(known) => {
+                compared += 1;
+                differing += u64::from(*known != picture);
+            }
+        }
+        if index >= warm_up && index % 256 == 0 {
+            let now = resident_bytes();
+            memory = now.map(|now| memory.map_or([now, now], |[before, most]: [u64; 2]| [before, most.max(now)]));
+        }
+    }
+    Outcome { memory_bytes: memory, compared, differing }
+}
+
+/// Memory of this process that is in use, where the system says it.
+fn resident_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    Some(1024 * line.split_whitespace().next()?.parse::<u64>().ok()?)
+}
+
+fn draw(frames: u64) {
     // Not under the validation layer, which keeps what it has seen.
     let options = DeviceOptions { cache_dir: Some(cache_dir()), ..DeviceOptions::default() };
     let device = match Device::new(&options) {
@@ -18,17 +155,46 @@ fn frames_neither_drift_nor_take_more_memory() {
         Err(error) => return skip(&error.to_string()),
     };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fields-soak");
-    let (baker, cache) = (Baker::new(&device, &library()), Cache::new(Some(&folder)));
-    let bench = Bench {
-        baker: &baker,
-        cache: &cache,
-        progress: &|_| (),
-        quick: true,
-        seed: 1,
-        origin: serde_json::Value::Null,
+    let scene = Scene::parse(SCENE, Path::new("soak.toml"), &shadow_fields::asset::embedded::read).unwrap();
+    let options = frame::Options {
+        bake: bake::Options { lattice: "cube:6x4".parse().unwrap(), face_px: 16, ..Default::default() },
+        skip: Skip::ALL,
+        size: [SIZE_PX; 2],
+        antialias: Antialias::Outlines,
+        ..shadow_fields::bench::default_options()
     };
-    let outcome = soak::run(&bench, 2500, None).unwrap();
+    let states: Vec<Scene> = (0..STATES).map(|state| changed(&scene, state)).collect();
+    let baker = Baker::new(&device, &library());
+    let cache = Cache::new(Some(&folder));
+    let mut frame = Frame::new(&baker, &cache, &scene, options, &|_, _, _| ()).unwrap();
+    let outcome = soak(&mut frame, &states, frames);
     report(&format!("{outcome:?}"));
     assert!(outcome.compared > 2000, "{outcome:?}");
     assert_eq!(outcome.faults(), [""; 0]);
+}
+
+#[test]
+fn frames_neither_drift_nor_take_more_memory() {
+    draw(2500);
+}
+
+#[test]
+#[ignore = "an hour"]
+fn a_million_frames_neither_drift_nor_take_more_memory() {
+    draw(1_000_000);
+}
+
+#[test]
+fn growth_and_drift_are_faults() {
+    let good = Outcome { memory_bytes: Some([1000, 1019]), compared: 5, differing: 0 };
+    assert_eq!(good.faults(), [""; 0]);
+    assert_eq!(Outcome { memory_bytes: None, ..good.clone() }.faults(), [""; 0]);
+    for (bad, word) in [
+        (Outcome { memory_bytes: Some([1000, 1021]), ..good.clone() }, "memory"),
+        (Outcome { differing: 1, ..good.clone() }, "1 of 5"),
+        (Outcome { compared: 0, ..good.clone() }, "0 of 0"),
+    ] {
+        let faults = bad.faults();
+        assert!(faults.len() == 1 && faults[0].contains(word), "{faults:?}");
+    }
 }

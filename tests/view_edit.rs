@@ -1,6 +1,6 @@
 //! Edits of an entity hold at all times, whatever its motion.
 
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use shadow_fields::scene::EntityData;
 use shadow_fields::scene::keys::{Between, Keys, Written};
@@ -65,10 +65,6 @@ fn node() -> impl Strategy<Value = Motion> {
     )
 }
 
-fn entity() -> impl Strategy<Value = EntityData> {
-    entity_with(motion())
-}
-
 fn entity_in_nodes() -> impl Strategy<Value = EntityData> {
     entity_with(prop_oneof![motion(), node()])
 }
@@ -83,6 +79,7 @@ fn entity_with(motion: impl Strategy<Value = Motion>) -> impl Strategy<Value = E
             scale,
             albedo: Vec3::splat(0.5),
             emission: Vec3::ZERO,
+            spot: None,
             emits: None,
             occludes: None,
             receives: None,
@@ -115,22 +112,6 @@ proptest! {
         prop_assert!((after.scale / before.scale - 1.0).abs() < 1e-6);
     }
 
-    #[test]
-    fn scaling_scales_at_all_times(entity in entity_in_nodes(), by in 0.5_f64..2.0, time in time()) {
-        let (before, after) = (entity.at(time), edit::scaled(&entity, by).unwrap().at(time));
-        prop_assert!(after.position == before.position && after.rotation == before.rotation);
-        prop_assert!((f64::from(after.scale / before.scale) / by - 1.0).abs() < 1e-5);
-    }
-
-    #[test]
-    fn turning_turns_in_place_at_all_times(entity in entity(), angle in -3.0_f64..3.0, time in time()) {
-        let turn = DQuat::from_axis_angle(DVec3::new(0.3, 0.9, -0.1).normalize(), angle);
-        let (before, after) = (entity.at(time), edit::turned(&entity, turn).at(time));
-        prop_assert!(after.position == before.position && after.scale == before.scale);
-        let expected = (turn * before.rotation.as_dquat()).as_quat();
-        prop_assert!(after.rotation.dot(expected).abs() > 1.0 - 1e-5, "{} {expected}", after.rotation);
-    }
-
     /// Where things are is a function of time: asked in any order, and the same to the bit.
     #[test]
     fn motion_has_no_memory(entity in entity_in_nodes(), times in prop::collection::vec(time(), 1..20)) {
@@ -150,6 +131,5 @@ fn what_leaves_the_range_of_a_scene_file_is_refused() {
     assert!(edit::moved(entity, DVec3::new(5e5, 0.0, 0.0)).is_some());
     assert!(edit::moved(entity, DVec3::new(2e6, 0.0, 0.0)).is_none(), "a key");
     assert!(edit::moved(entity, DVec3::new(0.0, 0.0, -2e6)).is_none(), "the centre of an orbit");
-    assert!(edit::moved(entity, DVec3::splat(f64::NAN)).is_none() && edit::scaled(entity, f64::NAN).is_none());
-    assert!(edit::scaled(entity, 9.0).is_some() && edit::scaled(entity, 11.0).is_none(), "a key");
+    assert!(edit::moved(entity, DVec3::splat(f64::NAN)).is_none());
 }

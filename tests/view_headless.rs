@@ -9,18 +9,17 @@ mod stage;
 #[path = "common/window.rs"]
 mod window;
 
-use common::gpu;
 use room::apart;
 use shadow_fields::draw::Antialias;
 use shadow_fields::error::Error;
-use shadow_fields::gpu::{Access, Commands, Device, Image, ImageShape, Overlay, Paint, Target};
 use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::view::Setup;
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Button, Event, Key};
+use std::collections::HashSet;
 use std::path::Path;
-use std::sync::Arc;
-use window::{FORMAT, SIZE, Stand};
+use std::time::Duration;
+use window::{SIZE, Stand};
 
 /// What is shown, which is what `render` makes of the same state.
 fn as_rendered(stand: &mut Stand, when: &str) -> Vec<[u8; 4]> {
@@ -54,13 +53,12 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
     stand.key(Key::Home);
     follows(&mut stand, "Home");
     "qq".chars().for_each(|letter| stand.letter(letter));
-    assert_eq!(stand.viewer.editor().selection(), Some(1), "the ball");
+    assert_eq!(stand.viewer.editor().selection, Some(1), "the ball");
     follows(&mut stand, "the outline");
-    for letter in "liom".chars() {
-        stand.letter(letter);
-        follows(&mut stand, &format!("key {letter}"));
-    }
-    "rc".chars().for_each(|letter| stand.letter(letter));
+    let places = (0..SIZE[0]).flat_map(|x| (0..SIZE[1]).map(move |y| [x as f32, y as f32]));
+    let at = places.into_iter().find(|at| stand.viewer.editor().grabs(*at)).unwrap();
+    stand.drag(Button::Left, at, [at[0] + 30.0, at[1] + 10.0]);
+    follows(&mut stand, "a drag of the ball");
     stand.viewer.apply(Command::SetExposure(0.5)).unwrap();
     follows(&mut stand, "exposure");
     stand.viewer.apply(Command::SetSky(0.5)).unwrap();
@@ -102,6 +100,20 @@ fn what_is_shown_is_what_render_makes_of_the_state() {
 }
 
 #[test]
+fn a_bake_shows_the_scene_without_shadows() {
+    let Some(mut stand) = Stand::with("preview", |setup| setup.preview_after = Duration::ZERO) else { return };
+    let shown = stand.shown();
+    assert!(stand.viewer.is_baking() && stand.viewer.frame().is_none());
+    let colors: HashSet<[u8; 4]> = shown.iter().copied().collect();
+    assert!(colors.len() > 50, "{} colours", colors.len());
+    // The camera moves while the bake goes on.
+    stand.drag(Button::Left, [20.0, 20.0], [60.0, 40.0]);
+    assert!(stand.viewer.frame().is_some() || apart(&shown, &stand.shown()) > 20, "a turn is not seen");
+    stand.ready();
+    as_rendered(&mut stand, "with its shadows");
+}
+
+#[test]
 fn a_scene_that_stands_still_costs_only_its_showing() {
     let Some(mut stand) = Stand::new("still") else { return };
     stand.ready();
@@ -117,7 +129,7 @@ fn a_scene_that_stands_still_costs_only_its_showing() {
     assert_eq!(passes(&mut stand), "draw show", "a camera that moves merges nothing");
     stand.viewer.apply(Command::SelectNext).unwrap();
     stand.viewer.apply(Command::SelectNext).unwrap();
-    stand.letter('j');
+    stand.viewer.apply(Command::SetSky(0.5)).unwrap();
     assert_eq!(passes(&mut stand), "merge draw show");
     assert!(!stand.viewer.wants_frame() || stand.viewer.idle().is_some());
 }
@@ -130,7 +142,8 @@ fn keys_that_wait_cost_one_rebuild() {
     let Some(mut stand) = Stand::with("hasty", sharp) else { return };
     stand.ready();
     stand.letter('q');
-    // The floor as a light and as an occluder: each needs fields that the other's frame does not have. They are baked here.
+    // The floor as a light and as an occluder: each needs fields that the other's frame does not have. They are baked
+    // here.
     let mut toggle = |count| {
         (0..count).for_each(|_| stand.letter('e'));
         stand.ready();
@@ -214,7 +227,7 @@ fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
     assert_eq!(apart(&plain, &stand.shown()), 0, "the pipeline before stays");
     // The floor is drawn as a grid, by a shader of its own.
     // Both read what the vertex shader writes: the validation layer asks for that where a device lacks maintenance4.
-    for (file, input) in [("grid.frag", "vec2"), ("draw.frag", "vec3")] {
+    for (file, input) in [("grid.frag", "vec3"), ("draw.frag", "vec4")] {
         let red = format!(
             "layout(location = 0) in {input} at;\nvoid main() {{ color = vec4(1, at.x > 1e30 ? 1 : 0, 0, 1); }}\n"
         );
@@ -237,50 +250,6 @@ fn changed_shaders_are_rebuilt_and_broken_ones_are_not_used() {
     assert_eq!(apart(&plain, &stand.shown()), 0);
 }
 
-/// Two frames of an overlay, the second with more in it.
-fn draw_overlay(device: &Arc<Device>) -> shadow_fields::Result<()> {
-    let [width, height] = SIZE;
-    let image = Image::new(device, "window", ImageShape { format: FORMAT, width, height, samples: 1 })?;
-    let mut overlay = Overlay::new(device, FORMAT, true)?;
-    let context = egui::Context::default();
-    let size = egui::vec2(width as f32, height as f32);
-    for lines in [1, 9] {
-        let screen_rect = Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size));
-        let output = context.run_ui(egui::RawInput { screen_rect, ..Default::default() }, |ui| {
-            (0..lines).for_each(|line| drop(ui.label(format!("line {line}"))));
-        });
-        let paint = Paint { primitives: context.tessellate(output.shapes, 1.0), pixels_per_point: 1.0 };
-        overlay.update(output.textures_delta)?;
-        let mut commands = Commands::new(device, "overlay")?;
-        commands.image_barrier(&image, None, Access::ColorWrite);
-        let target = Target { color: &image, clear: Some([0.0; 4]), depth: None, resolve: None };
-        commands.render(&target, |drawing| drawing.overlay(&mut overlay, &image, &paint))?;
-        commands.submit()?;
-    }
-    Ok(())
-}
-
-/// Each Vulkan call that the overlay makes fails once. The validation layer counts what is left when the device goes.
-#[test]
-fn an_overlay_that_fails_leaves_no_object() {
-    let Some(_turn) = gpu() else { return };
-    let device = common::open().unwrap();
-    let mut failed = 0;
-    loop {
-        Overlay::fail_call(Some(failed));
-        match draw_overlay(&device) {
-            Ok(()) => break,
-            Err(error) => assert!(error.to_string().contains("ERROR_OUT_OF_DEVICE_MEMORY"), "call {failed}: {error}"),
-        }
-        failed += 1;
-    }
-    Overlay::fail_call(None);
-    assert!(failed > 40, "{failed} calls were made to fail");
-    let messages = device.validation_messages();
-    drop(device);
-    assert_eq!(messages.take(), [""; 0]);
-}
-
 /// Whatever ends the window, edits are written first, to a file that did not exist, and the message says where.
 #[test]
 fn a_window_that_fails_saves_edits_first() {
@@ -291,15 +260,16 @@ fn a_window_that_fails_saves_edits_first() {
     assert_eq!(quiet.to_string(), lost().to_string(), "nothing was edited");
     assert!(!stand.cache.join("scene-edited.toml").exists());
 
-    for (name, key) in [("scene-edited.toml", 'l'), ("scene-edited-2.toml", 'o')] {
+    for (name, ev) in [("scene-edited.toml", 0.5), ("scene-edited-2.toml", 1.0)] {
         stand.letter('q');
-        stand.letter(key);
+        stand.viewer.apply(Command::SetExposure(ev)).unwrap();
         let told = stand.viewer.rescued(lost());
         let path = stand.cache.join(name);
         assert_eq!(told.exit_code(), 5);
         assert_eq!(told.to_string(), format!("{}; the edited scene was saved as {}", lost(), path.display()));
         let saved = Scene::load(&path).unwrap();
         assert_eq!(saved.data.entities, stand.viewer.editor().scene().data.entities, "{name}");
+        assert_eq!(saved.data.output.exposure_ev, ev, "{name}");
         assert_eq!(&saved.data.camera, stand.viewer.editor().camera(), "{name}");
         assert_eq!([saved.data.output.width, saved.data.output.height], SIZE);
         assert_eq!(stand.viewer.rescued(lost()).to_string(), lost().to_string(), "it is saved now");

@@ -1,4 +1,4 @@
-//! Files that are dropped on the window, its close, and what it remembers, without a window.
+//! Files that are dropped on the window, and its close, without a window.
 #![cfg(feature = "view")]
 
 mod common;
@@ -15,7 +15,6 @@ use model::Model;
 use room::apart;
 use shadow_fields::view::command::Command;
 use shadow_fields::view::input::{Event, Key};
-use shadow_fields::view::settings::Settings;
 use window::{SIZE, Stand};
 
 /// A file that is dropped on the window: each kind opens, a bad one changes nothing, and edits are kept.
@@ -34,7 +33,7 @@ fn a_dropped_file_opens_and_edits_outlast_it() {
     let plain = stand.shown();
 
     // What cannot be opened is one line, also while the overlay is hidden, and the scene stays.
-    assert!(!stand.viewer.editor().shows_overlay());
+    assert!(!stand.viewer.editor().overlay);
     for (name, text) in [("bad.toml", "[camera"), ("bad.glb", "glTF"), ("bad.obj", "f 1 2 3"), ("notes.txt", "words")] {
         stand.viewer.open(&write(name, text.as_bytes())).unwrap();
         let line = said(&stand);
@@ -59,7 +58,7 @@ fn a_dropped_file_opens_and_edits_outlast_it() {
     ];
     let mut paths = vec![own.clone()];
     for path in &files {
-        "ql".chars().for_each(|letter| stand.letter(letter));
+        stand.viewer.apply(Command::SetExposure(0.75)).unwrap();
         stand.viewer.open(path).unwrap();
         let line = said(&stand);
         assert!(line.contains("not saved") && line.contains("Ctrl-Z"), "{line}");
@@ -73,7 +72,7 @@ fn a_dropped_file_opens_and_edits_outlast_it() {
     assert!(!stand.viewer.wants_to_quit());
     let line = said(&stand);
     assert!(paths[..4].iter().all(|path| line.contains(&path.display().to_string())), "{line}");
-    "ql".chars().for_each(|letter| stand.letter(letter));
+    stand.viewer.apply(Command::SetExposure(0.75)).unwrap();
     stand.viewer.apply(Command::Quit).unwrap();
     assert!(!stand.viewer.wants_to_quit(), "a new edit is asked for anew");
     let undo = Event::Key { key: Key::Letter('z'), control: true, repeat: false };
@@ -109,28 +108,4 @@ fn what_a_dropped_file_loses_is_said() {
     stand.viewer.open(&path).unwrap();
     let line = stand.viewer.message().unwrap();
     assert!(line.starts_with("not opened: ") && line.contains("--strict"), "{line}");
-}
-
-/// The list of keys is unfolded at the first start and folded at the next, and what the user folds or unfolds is kept.
-#[test]
-fn the_window_remembers_which_panels_are_folded() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("window.toml");
-    let press = |presses: usize| {
-        let mut stand = Stand::with("settings", |setup| setup.settings = Some(file.clone()))?;
-        // The overlay is hidden: the first press shows it, with the list.
-        for _ in 0..presses {
-            stand.key(Key::Function(1));
-            stand.turn();
-            assert!(stand.viewer.editor().shows_overlay());
-        }
-        Some(Settings::start(&file).keys)
-    };
-    let Some(kept) = press(0) else { return };
-    assert!(!kept, "folded after the first start");
-    assert!(!press(1).unwrap(), "one look is no choice");
-    assert!(!press(2).unwrap() && press(3).unwrap(), "unfolded again");
-    assert!(press(0).unwrap());
-    std::fs::write(&file, "nonsense").unwrap();
-    assert!(!press(0).unwrap(), "a bad file is that of a first start");
 }

@@ -18,29 +18,17 @@ mod viewing;
 use cli::{SMALL, cache, command, finish, good, has_device};
 use display::Display;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
-use viewing::{SIZE, View, arguments, open};
+use std::time::{Duration, Instant};
+use viewing::{PATIENCE, SIZE, View, arguments, open};
 
 /// Keys of every row of the help, and what the log says of them.
-const KEYS: [(&str, &str); 29] = [
+const KEYS: [(&str, &str); 17] = [
     ("q", "SelectNext"),
     ("q", "SelectNext"),
     ("a", "SelectPrevious"),
     ("q", "SelectNext"),
-    ("j", "step: Left"),
-    ("l", "step: Right"),
-    ("i", "step: Up"),
-    ("k", "step: Down"),
-    ("o", "step: Back"),
-    ("p", "step: Forth"),
-    ("n", "step: Larger"),
-    ("m", "step: Smaller"),
-    ("r", "step: TurnLeft"),
-    ("t", "step: TurnRight"),
     ("ctrl+z", "Undo"),
     ("ctrl+y", "Redo"),
-    ("c", "TurnSky"),
-    ("v", "TurnSky"),
     ("g", "ToggleReference"),
     ("g", "ToggleReference"),
     ("x", "ToggleError"),
@@ -123,8 +111,8 @@ fn names(folder: &Path, ending: &str) -> Vec<PathBuf> {
     files.filter(|file| file.extension().is_some_and(|e| e == ending)).collect()
 }
 
-/// A GLB file with three parts that move and two lamps: in the window and as a picture, with no scene file. Then other files are dropped on
-/// the window.
+/// A GLB file with three parts that move and two lamps: in the window and as a picture, with no scene file. Then other
+/// files are dropped on the window.
 #[test]
 fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
     if !has_device() {
@@ -143,10 +131,15 @@ fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
     arguments[0] = "robot.glb";
     arguments.retain(|argument| *argument != "--paused");
     let mut view = View::open(&display, folder.path(), &arguments);
-    let first = display.look(SIZE);
-    std::thread::sleep(Duration::from_millis(700));
-    let second = display.look(SIZE);
-    assert!(room::apart(&first, &second) > 50, "nothing moves in the window");
+    // Once the first picture is there, another follows.
+    for _ in 0..2 {
+        let first = display.look(SIZE);
+        let end = Instant::now() + PATIENCE;
+        while room::apart(&first, &display.look(SIZE)) <= 50 {
+            assert!(Instant::now() < end, "nothing moves in the window");
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
     view.key("space", "ToggleRunning");
     let still = view.picture(SIZE);
     assert!(names(folder.path(), "toml").is_empty(), "no scene file was written");
@@ -160,6 +153,9 @@ fn a_gltf_file_moves_in_the_window_and_dropped_files_open() {
     let told = view.picture(SIZE);
     assert!(room::apart(&still[..480 * 200], &told[..480 * 200]) < 50, "the scene stays");
     assert!(room::apart(&still, &told) > 500, "the line is seen");
+    // winit tells nothing of a file that does not exist.
+    drag::drop_file(&display.name, window, &folder.path().join("missing.toml"), [200, 100]);
+    view.hears("message: not opened: what was dropped is no file");
     // Another opens, and the window's title names it.
     let scene = room::write(folder.path(), SIZE.map(|side| side as u32), "");
     drag::drop_file(&display.name, window, &scene, [200, 100]);

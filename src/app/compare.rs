@@ -1,10 +1,12 @@
 //! `shadow-fields compare` measures how two pictures differ.
 
+use super::outputs::{Output, Outputs};
 use super::{Global, output};
 use crate::asset::decode::Picture;
 use crate::asset::false_color::{ColorScale, NEUTRAL, Scheme};
 use crate::asset::picture::write_png;
 use crate::error::{Error, Result};
+use crate::text::number;
 use crate::truth::difference::{PictureDifference, PixelDifference, Values};
 use clap::Args;
 use serde_json::json;
@@ -14,12 +16,12 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(
     after_help = "FLIP (Andersson et al. 2020) is how different two pictures look when one flips between them, 0 to 1 a pixel: \
-    colours are blurred\nas the eye blurs them 0.7 m from a screen of 0.7 m and 3 840 pixels. A mean of 0.01 is hard to see, 0.1 is \
+    colours are blurred as the eye blurs them 0.7 m from a screen of 0.7 m and 3 840 pixels. A mean of 0.01 is hard to see, 0.1 is \
     plain.\nRMS and the largest difference are of sRGB values from 0 to 1 as a screen shows them (1 of 255 steps is 0.0039), or of \
-    linear values\nwhere both pictures are EXR or HDR. Alpha is not compared. A pixel that is not finite in one picture alone is \
+    linear values where both pictures are EXR or HDR. Alpha is not compared. A pixel that is not finite in one picture alone is \
     beyond every bound.\n\nExamples:\n  shadow-fields compare expected.png out/teapot.png --max-flip 0.01 -o difference.png\n  \
     shadow-fields compare a.exr b.exr --max-rms 0.001 --mask without_clock.png --json\n\nExit codes: 0 within the bounds (or none is \
-    given), 1 beyond one, 2 usage, 4 a file that is no picture, or\npictures of different sizes"
+    given), 1 beyond one, 2 usage, 4 a file that is no picture, or pictures of different sizes"
 )]
 pub struct Arguments {
     /// Picture in PNG, JPEG, EXR or HDR, made by this program or not; the first picture of an animated PNG is compared
@@ -32,45 +34,28 @@ pub struct Arguments {
     #[arg(short, long, value_name = "DIFF.png")]
     output: Option<PathBuf>,
     /// End with exit code 1 where mean FLIP is above this
-    #[arg(long, value_name = "0..1", value_parser = share, allow_negative_numbers = true)]
+    #[arg(long, value_name = "0..1", value_parser = number::<f64>(0.0..=1.0), allow_negative_numbers = true)]
     max_flip: Option<f64>,
     /// End with exit code 1 where the root mean square difference is above this
-    #[arg(long, value_name = "X", value_parser = bound, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", value_parser = number::<f64>(0.0..), allow_negative_numbers = true)]
     max_rms: Option<f64>,
     /// Compare only pixels that are light in this picture of the same size (green at least half of white)
     #[arg(long, value_name = "MASK.png")]
     mask: Option<PathBuf>,
     /// Stops by which EXR and HDR pictures are brightened before FLIP, and before they are compared with a PNG or JPEG
-    #[arg(long, default_value_t = 0.0, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_name = "STOPS", value_parser = number::<f32>(-32.0..=32.0), allow_negative_numbers = true)]
     exposure_ev: f32,
-}
-
-/// A number from 0 to 1.
-fn share(text: &str) -> std::result::Result<f64, String> {
-    let number = text.parse().ok().filter(|x| (0.0..=1.0).contains(x));
-    number.ok_or_else(|| format!("expected a number from 0 to 1, got \"{text}\""))
-}
-
-/// A finite number from 0.
-fn bound(text: &str) -> std::result::Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x >= 0.0);
-    number.ok_or_else(|| format!("expected a finite number from 0, got \"{text}\""))
-}
-
-/// Stops, as in a scene file.
-fn stops(text: &str) -> std::result::Result<f32, String> {
-    let number = text.parse().ok().filter(|x| (-32.0..=32.0).contains(x));
-    number.ok_or_else(|| format!("expected stops from -32 to 32, got \"{text}\""))
 }
 
 /// Compares, prints, and fails beyond a bound.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.output {
-        output::check_folder(path)?;
-        output::check_ending(path, "png", "the difference picture")?;
+        let inputs = [&arguments.first, &arguments.second].into_iter().chain(&arguments.mask).cloned();
+        Outputs::check(&inputs.collect::<Vec<_>>(), &[Output::new("--output", path, "png")])?;
     }
     let [a, b] = [&arguments.first, &arguments.second].map(|path| Picture::read(path));
-    let (a, b) = (a?, b?);
+    let a = a?;
+    let b = b?;
     for (picture, path) in [(&a, &arguments.first), (&b, &arguments.second)] {
         if picture.is_transparent {
             output::note(
@@ -108,12 +93,13 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if beyond.is_empty() {
         return Ok(());
     }
-    let (first, second) = (arguments.first.display(), arguments.second.display());
+    let first = arguments.first.display();
+    let second = arguments.second.display();
     Err(Error::Failed(format!("{second} differs from {first}: {}", beyond.join(", "))))
 }
 
-/// A picture of FLIP in linear RGB with a labelled bar below, and its height in pixels: dark where the two look alike. Pixels that do
-/// not count are grey.
+/// A picture of FLIP in linear RGB with a labelled bar below, and its height in pixels: dark where the two look alike.
+/// Pixels that do not count are grey.
 fn picture(found: &PictureDifference, mask: Option<&[bool]>) -> (Vec<f32>, usize) {
     let scale = ColorScale::fitting(Scheme::Absolute, std::iter::once(found.largest_flip.difference.max(1e-3)));
     let color = |(pixel, flip): (usize, &f64)| {

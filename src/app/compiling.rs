@@ -19,7 +19,6 @@ pub struct CompilingLine {
 }
 
 impl CompilingLine {
-    /// A line among `bars`.
     pub fn new(bars: MultiProgress) -> Self {
         let (stop, stopped) = channel();
         let thread = std::thread::spawn(move || {

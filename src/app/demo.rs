@@ -1,15 +1,13 @@
 //! `shadow-fields demo` bakes and renders the built-in scenes and times them.
 
-use super::context::{Context, MergeArguments, size};
-use super::{Global, output};
+use super::context::Context;
+use super::{Global, output, outputs};
 use crate::asset::{embedded, picture};
-use crate::bake;
 use crate::bench::cases;
 use crate::bench::figures::spread;
 use crate::draw::{Antialias, Finish};
 use crate::error::Result;
-use crate::field::Lookup;
-use crate::frame::{self, Frame};
+use crate::frame::{self, Frame, RenderOptions};
 use crate::scene::Scene;
 use clap::Args;
 use serde_json::json;
@@ -22,20 +20,14 @@ pub struct Arguments {
     /// Folder for the pictures
     #[arg(short, long, default_value = "out", value_name = "DIR")]
     output: PathBuf,
-    /// Size of the pictures; default: each scene's own
-    #[arg(long, value_parser = size, value_name = "WxH")]
-    size: Option<[u32; 2]>,
     /// Frames that are timed, after two to warm up
     #[arg(long, default_value_t = 8, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     timed_frames: u32,
-    /// How stairs along edges are smoothed in the pictures; all ways are timed
-    #[arg(long, default_value = "samples", value_name = "HOW")]
-    antialias: Antialias,
     /// No animations
     #[arg(long)]
     no_animations: bool,
     #[command(flatten)]
-    merge: MergeArguments,
+    options: RenderOptions,
 }
 
 /// The scenes in the order of the table, and whether each is animated too.
@@ -51,12 +43,13 @@ const SCENES: [(&str, bool); 6] = [
 const ANIMATION: (u32, u16) = (36, 12);
 /// Size of an animation's pictures.
 const ANIMATION_SIZE: [u32; 2] = [480, 320];
-/// Scene of the pictures with and without interpolation and without the occluder.
-const PAIR_SCENE: &str = "sphere_over_plane";
+/// Scene of the picture without its occluder.
+const LIT_SCENE: &str = "sphere_over_plane";
 
 /// Bakes and renders the built-in scenes.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let started = Instant::now();
+    outputs::check_folder("--output", &arguments.output, &[])?;
     let context = Context::new(global)?;
     crate::text::make_folder(&arguments.output)?;
     let mut written = Vec::new();
@@ -70,9 +63,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
             written.push(animation(&context, arguments, name, &scene)?);
         }
     }
-    written.extend(pair(&context, arguments)?);
+    written.push(without_occluder(&context, arguments)?);
     let origin = context.origin(global);
-    if arguments.merge.variant.is_none() {
+    if arguments.options.variant.is_none() {
         context.learn(global)?;
     }
     context.finish()?;
@@ -141,14 +134,8 @@ impl DemoRow {
     }
 }
 
-fn options(arguments: &Arguments, scene: &Scene) -> frame::Options {
-    let shape = &scene.data.output;
-    let size = arguments.size.unwrap_or([shape.width, shape.height]);
-    arguments.merge.options(bake::Options::default(), size, arguments.antialias)
-}
-
-/// The scene's picture, and its frame time while it moves: frames as a window shows them, not read back, edges smoothed one way
-/// and another.
+/// The scene's picture, and its frame time while it moves: frames as a window shows them, not read back, edges smoothed
+/// one way and another.
 fn still(
     context: &Context,
     arguments: &Arguments,
@@ -157,7 +144,7 @@ fn still(
     written: &mut Vec<PathBuf>,
     started: Instant,
 ) -> Result<DemoRow> {
-    let options = options(arguments, scene);
+    let options = arguments.options.frame(scene)?;
     let mut frame = context.frame(scene, options)?;
     let path = arguments.output.join(format!("{name}.png"));
     draw(&mut frame, scene, options, &path)?;
@@ -215,7 +202,7 @@ fn draw(frame: &mut Frame, scene: &Scene, options: frame::Options, path: &Path) 
 }
 
 fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene) -> Result<PathBuf> {
-    let options = frame::Options { size: ANIMATION_SIZE, ..options(arguments, scene) };
+    let options = frame::Options { size: ANIMATION_SIZE, ..arguments.options.frame(scene)? };
     let exposure_ev = scene.data.output.exposure_ev;
     let mut frame = context.frame(scene, options)?;
     let (count, fps) = ANIMATION;
@@ -229,20 +216,16 @@ fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene
     Ok(path)
 }
 
-/// One scene without interpolation beside the one with it, and without its occluder.
-fn pair(context: &Context, arguments: &Arguments) -> Result<Vec<PathBuf>> {
-    let scene = cases::scene(PAIR_SCENE)?.scene;
-    let nearest = frame::Options { lookup: Lookup::Nearest, ..options(arguments, &scene) };
-    let path = arguments.output.join(format!("{PAIR_SCENE}_nearest.png"));
-    draw(&mut context.frame(&scene, nearest)?, &scene, nearest, &path)?;
-
+/// A picture of one scene without its occluder.
+fn without_occluder(context: &Context, arguments: &Arguments) -> Result<PathBuf> {
+    let scene = cases::scene(LIT_SCENE)?.scene;
     let mut bare = scene.data.clone();
     let lit = |index: usize| !scene.entities[index].occludes;
     bare.entities = bare.entities.iter().enumerate().filter(|(i, _)| lit(*i)).map(|(_, e)| e.clone()).collect();
-    let source = format!("assets/scenes/{PAIR_SCENE}.toml");
+    let source = format!("assets/scenes/{LIT_SCENE}.toml");
     let bare = Scene::parse(&bare.to_toml()?, Path::new(&source), &embedded::read)?;
-    let alone = arguments.output.join(format!("{PAIR_SCENE}_without_occluder.png"));
-    let options = options(arguments, &bare);
+    let alone = arguments.output.join(format!("{LIT_SCENE}_without_occluder.png"));
+    let options = arguments.options.frame(&bare)?;
     draw(&mut context.frame(&bare, options)?, &bare, options, &alone)?;
-    Ok(vec![path, alone])
+    Ok(alone)
 }

@@ -1,18 +1,21 @@
 //! `shadow-fields import` writes a glTF file as a scene file.
 
+use super::outputs::{Output, Outputs};
 use super::source::GltfArguments;
 use super::{Global, output};
-use crate::error::{Error, Result};
-use crate::scene::{Scene, export, gltf};
+use crate::error::{Error, Result, one_line};
+use crate::files;
+use crate::scene::{self, Scene, export::Export, gltf};
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `import`.
 #[derive(Args)]
 #[command(
     after_help = "The scene file can be edited like any other; its meshes are OBJ files in the folder SCENE_meshes beside it. \
-    `render` gives the\nsame picture of both. What has no form in a scene file is left out, with a line for each kind.\n\n\
+    `render` gives the same picture of both. What has no form in a scene file is left out, with a line for each kind.\n\n\
     Example:\n  shadow-fields import robot.glb -o robot.toml && shadow-fields render robot.toml -o robot.png --frames 48"
 )]
 pub struct Arguments {
@@ -21,22 +24,49 @@ pub struct Arguments {
     /// Scene file to write
     #[arg(short, long, value_name = "SCENE.toml")]
     output: PathBuf,
+    /// Replace files that stand under the names of the scene file and its meshes, also those that `import` did not
+    /// write
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     gltf: GltfArguments,
 }
 
+impl Arguments {
+    /// Fails where a file would be replaced that an import did not write.
+    fn check_own(&self, path: &Path) -> Result<()> {
+        let own = format!("# {HEAD}");
+        let mut start = vec![0; own.len()];
+        let foreign = path.is_file()
+            && !files::open(path).is_ok_and(|mut file| file.read_exact(&mut start).is_ok() && start == own.as_bytes());
+        if foreign && !self.force {
+            let what = "stands there already, and `import` did not write it; --force replaces it";
+            return Err(Error::Usage(format!("{} {what}", path.display())));
+        }
+        Ok(())
+    }
+}
+
+/// What the comment in the first line of every imported file starts with.
+const HEAD: &str = "Written by shadow-fields import";
+
 /// Reads a glTF file and writes it as a scene file.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    output::check_folder(&arguments.output)?;
-    output::check_ending(&arguments.output, "toml", "a scene file")?;
     if !gltf::is_gltf(&arguments.scene) {
         return Err(Error::Usage(format!("{}: expected a .glb or .gltf file", arguments.scene.display())));
     }
+    let inputs = scene::files::of_scene(&arguments.scene);
+    let output = Output::new("--output", &arguments.output, "toml");
+    Outputs::check(&inputs, std::slice::from_ref(&output))?;
+    arguments.check_own(&arguments.output)?;
     let scene: Scene = arguments.gltf.scene(global, &arguments.scene)?;
+    let export = Export::new(&scene.data, &scene.meshes, &arguments.output)?;
+    export.mesh_files().try_for_each(|file| arguments.check_own(file))?;
+    let outputs = Outputs::check(&inputs, &[output.with(export.mesh_files())])?;
     let name = arguments.scene.file_name().unwrap_or_default().to_string_lossy();
-    let head = crate::error::one_line(&format!("Written by shadow-fields import from {name}."));
-    export::write(&scene.data, &scene.meshes, &arguments.output, &head)?;
-    let (meshes, entities) = (scene.meshes.len(), scene.entities.len());
+    export.write(&one_line(&format!("{HEAD} from {name}."))).map_err(|error| outputs.after(error))?;
+    let meshes = scene.meshes.len();
+    let entities = scene.entities.len();
     let triangles: usize = scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     if global.json {
         let file = arguments.output.display().to_string();

@@ -1,7 +1,8 @@
 //! `shadow-fields inspect` shows what is in a field file.
 
 use super::bake::{color, shining};
-use super::context::{Context, three};
+use super::context::Context;
+use super::outputs::{Output, Outputs};
 use super::sheet::{self, Cell};
 use super::{Global, output, silhouette};
 use crate::asset::Mesh;
@@ -9,11 +10,11 @@ use crate::bake::{self, snapshot::snapshot};
 use crate::error::{Error, Result, one_line};
 use crate::field::file;
 use crate::field::silhouette::SILHOUETTE_MAGIC;
-use crate::field::{FieldHeader, FieldKind, Lookup, ShadowField, growth};
+use crate::field::{FieldHeader, FieldKind, ShadowField, growth};
 use crate::scene;
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube;
-use crate::text;
+use crate::text::{self, number, triple};
 use clap::Args;
 use glam::{DVec3, Vec3};
 use serde_json::json;
@@ -49,10 +50,7 @@ pub struct Arguments {
 const PLACE_LIMIT_M: f64 = 1e15;
 
 fn place(text: &str) -> std::result::Result<DVec3, String> {
-    let numbers = three(text).filter(|numbers| numbers.iter().all(|n: &f64| n.abs() <= PLACE_LIMIT_M));
-    numbers
-        .map(DVec3::from_array)
-        .ok_or_else(|| format!("expected a place like 1,0.5,-2 within {PLACE_LIMIT_M:e} m, got \"{text}\""))
+    triple(number(-PLACE_LIMIT_M..=PLACE_LIMIT_M))(text).map(DVec3::from_array)
 }
 
 fn direction(text: &str) -> std::result::Result<DVec3, String> {
@@ -72,8 +70,9 @@ fn silhouette(global: &Global, arguments: &Arguments) -> Result<()> {
 /// Shows a field.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.faces {
-        output::check_folder(path)?;
-        output::check_ending(path, "png", "a picture")?;
+        let mut inputs = vec![arguments.field.clone()];
+        inputs.extend(arguments.mesh.iter().flat_map(|mesh| scene::files::of_mesh(mesh)));
+        Outputs::check(&inputs, &[Output::new("--faces", path, "png")])?;
     }
     if file::has_magic(&arguments.field, SILHOUETTE_MAGIC) {
         return silhouette(global, arguments);
@@ -113,8 +112,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("shells", format!("{} r", shells.join(" "))),
         ("fit", format!("about {:?} r, stretched by {:?}", lattice.fit().centre, lattice.fit().stretch)),
         ("samples", format!("{} ({} inside, seen from the surface)", lattice.sample_count(), header.filled_samples)),
-        ("captured", format!("{}; the other samples are turned copies of these", header.captured_samples)),
-        ("symmetry", header.symmetry.clone()),
+        ("captured", format!("{}; the other samples lie at the same places or see nothing", header.captured_samples)),
         ("stored", format!("{} samples, {storage}, {} bytes", lattice.stored_count(), field.payload.len())),
         ("face", format!("{0} x {0} texels", header.face_px)),
     ];
@@ -168,7 +166,7 @@ fn lookup(field: &ShadowField, position_m: DVec3) -> serde_json::Value {
     let position = (position_m - centre) / f64::from(field.header.radius_m);
     let channel = |channel| {
         let mut out = vec![0.0; coefficient_count(field.header.bands)];
-        field.lookup(position, Lookup::Trilinear, channel, &mut out);
+        field.lookup(position, channel, &mut out);
         out
     };
     match field.header.kind {
@@ -210,8 +208,9 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
             rows.push((format!("{latitude_deg:+.0} deg, {distance:.2} r"), cells));
         }
     }
-    // Visibility has one white for the whole sheet. The radiance from the coefficients falls with the square of the distance, so each
-    // row has a white of its own. Captured faces keep the surface's radiance and are cut at that white.
+    // Visibility has one white for the whole sheet. The radiance from the coefficients falls with the square of the
+    // distance, so each row has a white of its own. Captured faces keep the surface's radiance and are cut at that
+    // white.
     let brightest = |rows: &[(String, Vec<Cell>)], least: f32| {
         rows.iter().flat_map(|(_, cells)| cells.iter().flatten()).fold(least, |m, c| m.max(*c))
     };
@@ -221,8 +220,8 @@ fn write_sheet(global: &Global, field: &ShadowField, mesh: Option<&Mesh>, path: 
     };
     if let Some(mesh) = mesh {
         let context = Context::new(global)?;
-        let radiance = field.header.kind == FieldKind::Radiance;
-        let faces = snapshot(&context.device, context.baker.library(), mesh, &eyes, FACE_PX as u32, radiance)?;
+        let kind = field.header.kind;
+        let faces = snapshot(&context.device, context.baker.library(), mesh, &eyes, FACE_PX as u32, kind)?;
         let mut captured = faces.chunks(LONGITUDES);
         for (_, cells) in &mut rows {
             let fresh = captured.next().ok_or_else(|| Error::Failed("a captured row is missing".into()))?;
@@ -255,7 +254,7 @@ fn reconstruct(field: &ShadowField, position: DVec3) -> Cell {
     let found: Vec<Vec<f64>> = (0..channels)
         .map(|channel| {
             let mut out = vec![0.0; count];
-            field.lookup(position, Lookup::Trilinear, channel, &mut out);
+            field.lookup(position, channel, &mut out);
             out
         })
         .collect();

@@ -12,16 +12,14 @@ mod farm;
 mod import;
 mod inspect;
 mod output;
-mod pages;
+mod outputs;
 mod profile;
-mod quality;
 mod render;
 mod sheet;
 mod silhouette;
 mod source;
 #[cfg(feature = "view")]
 mod view;
-mod worker;
 
 use crate::error::{Error, Result, one_line};
 use crate::gpu::signals;
@@ -57,7 +55,8 @@ enum Subcommands {
     Inspect(inspect::Arguments),
     /// Measure error, time and stability and write tables and plots
     Bench(bench::Arguments),
-    /// Compare every pass with its CPU twin on the chosen device; exit code 1 where one differs by more than its tolerance
+    /// Compare every pass with its CPU twin on the chosen device; exit code 1 where one differs by more than its
+    /// tolerance
     Check(check::Arguments),
     /// Compare two pictures, made by this program or not; exit code 1 where they differ by more than a bound
     Compare(compare::Arguments),
@@ -68,30 +67,18 @@ enum Subcommands {
     View(view::Arguments),
     /// List the Vulkan devices of this machine
     Devices(devices::Arguments),
-    /// Write shell completions and manual pages into a folder
-    #[command(hide = true)]
-    Pages(pages::Arguments),
     /// Share bakes and pictures out among many machines
     #[command(subcommand_required = true, arg_required_else_help = true)]
     Farm(farm::Arguments),
-    /// Capture for a bake in another process, which starts this
-    #[command(name = crate::bake::workers::COMMAND, hide = true)]
-    BakeWorker,
 }
 
 /// Runs the program on arguments, the first of which is its name, as the command line does.
-///
-/// # Errors
-/// `Usage` with the parser's words, on several lines, where the arguments are not understood; what the subcommand returns.
 pub fn run_on<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<()> {
     run(&parse(arguments)?).and_then(|()| output::written())
 }
 
-/// Whether the command line understands arguments, the first of which is the program's name. Nothing is run. The parser is
-/// made once and kept, because making it takes longer than using it.
-///
-/// # Errors
-/// `Usage` as [`run_on`].
+/// Whether the command line understands arguments, the first of which is the program's name. Nothing is run. The parser
+/// is made once and kept, because making it takes longer than using it.
 pub fn understand<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<()> {
     static COMMAND: LazyLock<Mutex<clap::Command>> = LazyLock::new(|| Mutex::new(Cli::command()));
     let usage = |error: clap::Error| Error::Usage(error.to_string());
@@ -118,7 +105,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Ends the program with what the parser says. It quotes arguments, so it reads them again with their control characters escaped.
+/// Ends the program with what the parser says. It quotes arguments, so it reads them again with their control
+/// characters escaped.
 fn refuse(error: clap::Error) -> ! {
     let arguments = std::env::args_os().map(|argument| one_line(&argument.to_string_lossy()));
     Cli::try_parse_from(arguments).err().unwrap_or(error).exit()
@@ -138,9 +126,7 @@ fn run(cli: &Cli) -> Result<()> {
         #[cfg(feature = "view")]
         Subcommands::View(arguments) => view::run(&cli.global, arguments),
         Subcommands::Devices(arguments) => devices::run(&cli.global, arguments),
-        Subcommands::Pages(arguments) => pages::run(arguments),
         Subcommands::Farm(arguments) => farm::run(&cli.global, arguments),
-        Subcommands::BakeWorker => worker::run(&cli.global),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Global;
 use super::compiling::CompilingLine;
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result, is_deceptive, one_line};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::cell::RefCell;
 use std::io::{IsTerminal, Write};
@@ -14,7 +14,12 @@ static UNWRITTEN: Mutex<Option<std::io::Error>> = Mutex::new(None);
 
 /// Writes lines of results to stdout. A reader that went away is no error; any other is kept for [`written`].
 pub fn say(text: impl AsRef<str>) {
-    let text = text.as_ref().split('\n').map(one_line).collect::<Vec<_>>().join("\n");
+    // In the form of JSON's escapes, because results may be JSON.
+    let escaped = |c: char| match c {
+        c if c != '\n' && is_deceptive(c) => format!("\\u{:04x}", u32::from(c)),
+        c => c.to_string(),
+    };
+    let text: String = text.as_ref().chars().map(escaped).collect();
     let mut stdout = std::io::stdout().lock();
     let Err(error) = writeln!(stdout, "{text}").and_then(|()| stdout.flush()) else { return };
     if error.kind() != std::io::ErrorKind::BrokenPipe {
@@ -23,9 +28,6 @@ pub fn say(text: impl AsRef<str>) {
 }
 
 /// Fails where results could not be written, as to a full disk.
-///
-/// # Errors
-/// `Failed` with the first reason.
 pub fn written() -> Result<()> {
     match UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).take() {
         Some(error) => Err(Error::Failed(format!("stdout: cannot be written: {error}"))),
@@ -58,37 +60,6 @@ pub fn unwritten(error: Error) -> Error {
     }
 }
 
-/// Fails where a file could not be written because its folder is missing or it is a folder itself: told before work is done,
-/// not after.
-///
-/// # Errors
-/// `Failed` with the file's name.
-pub fn check_folder(path: &Path) -> Result<()> {
-    if path.is_dir() {
-        return Err(Error::Failed(format!("{}: cannot be written: it is a folder", path.display())));
-    }
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => Err(Error::Failed(format!(
-            "{}: cannot be written: there is no folder {}",
-            path.display(),
-            folder.display()
-        ))),
-        _ => Ok(()),
-    }
-}
-
-/// Fails where a file's name does not end as its kind does; a device or pipe may have any name.
-///
-/// # Errors
-/// `Usage` with the name and the ending.
-pub fn check_ending(path: &Path, ending: &str, what: &str) -> Result<()> {
-    let device = std::fs::metadata(path).is_ok_and(|m| !m.is_file());
-    if device || path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
-        return Ok(());
-    }
-    Err(Error::Usage(format!("{}: the name of {what} must end in .{ending}", path.display())))
-}
-
 /// Starts the log on stderr: warnings by default, more with `-v`, as RUST_LOG says where it is set.
 pub fn start_log(global: &Global) {
     let level = match (global.quiet, global.verbose) {
@@ -99,7 +70,8 @@ pub fn start_log(global: &Global) {
     };
     let environment = env_logger::Env::default().default_filter_or(level);
     let line = |buffer: &mut env_logger::fmt::Formatter, record: &log::Record<'_>| {
-        let (level, style) = (record.level(), buffer.default_level_style(record.level()));
+        let level = record.level();
+        let style = buffer.default_level_style(record.level());
         let message = one_line(&record.args().to_string());
         writeln!(buffer, "[{style}{level:<5}{style:#} {}] {message}", record.target())
     };

@@ -1,12 +1,13 @@
 //! `shadow-fields profile` times every pass and every variant of the merge shader.
 
 use super::bench::common::bench;
-use super::context::{Context, size};
-use super::{Global, output};
+use super::context::Context;
+use super::{Global, output, outputs};
+use crate::asset::Mesh;
 use crate::bench::ceilings::{self, Ceilings};
-use crate::bench::profile::{self, ProfileRow, Start, Tenths};
+use crate::bench::profile::{self, ProfileRow, Tenths};
 use crate::error::Result;
-use crate::gpu::{self, Device, Validation};
+use crate::frame::picture_size;
 use crate::merge::calibrate;
 use crate::merge::variant::{VARIANTS, Variant};
 use crate::merge::workload::Workload;
@@ -21,18 +22,18 @@ use std::path::{Path, PathBuf};
 pub struct Arguments {
     /// Scene file, or the name of a built-in scene, whose passes are timed; without one a made-up merge of known size
     scene: Option<PathBuf>,
-    /// Time the passes of a bake of this mesh instead: capture, project and assemble of an occlusion field, of a radiance field and of
-    /// transfers
-    #[arg(long, value_name = "MESH.obj", conflicts_with_all = ["scene", "variant", "compare", "spirv"])]
+    /// Time the passes of a bake of this mesh instead: capture, project and assemble of an occlusion field, of a
+    /// radiance field and of transfers
+    #[arg(long, value_name = "MESH.obj", conflicts_with_all = ["scene", "variant", "compare"])]
     bake: Option<PathBuf>,
     /// Size of the scene's pictures
-    #[arg(long, default_value = "1280x720", value_parser = size, value_name = "WxH")]
+    #[arg(long, default_value = "1280x720", value_parser = picture_size, value_name = "WxH")]
     size: [u32; 2],
     /// Vertices of the made-up merge
     #[arg(long, default_value_t = 65_536, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=4_194_304))]
     grid: u32,
     /// Occluders that each vertex of the made-up merge meets; several numbers with commas
-    #[arg(long, default_value = "4,16", value_delimiter = ',', value_name = "N", value_parser = occluder_count)]
+    #[arg(long, default_value = "4,16", value_delimiter = ',', value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     occluders: Vec<u32>,
     /// Time only this variant of the merge shader; an unknown name lists them
     #[arg(long, value_name = "NAME", conflicts_with = "compare", value_parser = Variant::named)]
@@ -43,25 +44,39 @@ pub struct Arguments {
     /// Number of timed runs of each, after one that warms up
     #[arg(long, default_value_t = 15, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
-    /// Write the variants' SPIR-V into this folder, as words and as text
-    #[arg(long, value_name = "DIR")]
-    spirv: Option<PathBuf>,
-    /// Write profile.csv, starts.csv and profile.json into this folder
-    #[arg(long, value_name = "DIR")]
+    /// Write profile.csv and profile.json into this folder
+    #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
-fn occluder_count(text: &str) -> std::result::Result<u32, String> {
-    let number = text.parse().ok().filter(|count| (1..=256).contains(count));
-    number.ok_or_else(|| format!("expected whole numbers from 1 to 256 with commas, like 4,16, got \"{text}\""))
+/// What is timed.
+enum Subject {
+    Bake(Mesh),
+    Scene(String, Scene),
+    MadeUp,
+}
+
+impl Arguments {
+    fn subject(&self) -> Result<Subject> {
+        Ok(match (&self.bake, &self.scene) {
+            (Some(path), _) => Subject::Bake(scene::load_mesh(path)?.0),
+            (None, Some(path)) => {
+                let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+                Subject::Scene(name, Scene::load(path)?)
+            }
+            (None, None) => Subject::MadeUp,
+        })
+    }
 }
 
 /// Measures and prints.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let context = Context::new(global)?;
-    for folder in [&arguments.spirv, &arguments.out].into_iter().flatten() {
-        text::make_folder(folder)?;
+    let inputs: Vec<PathBuf> = arguments.scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
+    if let Some(folder) = &arguments.out {
+        outputs::check_folder("--output", folder, &inputs)?;
     }
+    let subject = arguments.subject()?;
+    let context = Context::new(global)?;
     let chosen = match (arguments.variant, &arguments.compare) {
         (Some(variant), _) => vec![variant],
         (_, Some(variants)) => variants.clone(),
@@ -69,29 +84,19 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     };
     let library = context.baker.library();
     let small = Workload::new(&context.device, 64, 1)?;
-    if let Some(folder) = &arguments.spirv {
-        profile::write_spirv(folder, library, &small, &chosen)?;
-    }
     let at_best = ceilings::measure(&context.device, library, small.field_bytes())?;
-    let cases = time_cases(global, arguments, &context, &chosen, &at_best)?;
+    let cases = time_cases(global, arguments, &subject, &context, &chosen, &at_best)?;
     let ratios = if arguments.compare.is_some() { ratios(&cases) } else { Vec::new() };
     let rows: Vec<ProfileRow> = cases.into_iter().flatten().map(|(row, _)| row).collect();
     if arguments.variant.is_none() && arguments.compare.is_none() && arguments.bake.is_none() {
         context.learn(global)?;
     }
     let usual = calibrate::best_known(&context.device).name;
-    let fresh = Device::new(&gpu::DeviceOptions {
-        device: Some(context.device.info.uuid.clone()),
-        validation: Validation::Off,
-        cache_dir: None,
-    })?;
-    let starts = if arguments.bake.is_some() { Vec::new() } else { profile::starts(&fresh, library, &chosen)? };
     let document = json!({
         "origin": context.origin(global),
         "ceilings": at_best,
         "passes": rows,
         "ratios": ratios.iter().map(|(what, ratio)| json!({ "what": what, "ratio": ratio })).collect::<Vec<_>>(),
-        "starts": starts,
         "usual_variant": usual,
     });
     if let Some(folder) = &arguments.out {
@@ -101,7 +106,6 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(document.to_string());
     } else {
         print_passes(&at_best, &rows, &ratios);
-        print_starts(&starts);
         output::say(format!("\nwithout --variant this device merges with \"{usual}\""));
     }
     context.finish()
@@ -114,26 +118,24 @@ type Case = Vec<(ProfileRow, Vec<f64>)>;
 fn time_cases(
     global: &Global,
     arguments: &Arguments,
+    subject: &Subject,
     context: &Context,
     chosen: &[Variant],
     at_best: &Ceilings,
 ) -> Result<Vec<Case>> {
     let show = |what: &str| output::note(global, what);
     let bench = bench(context, global, false, &show);
-    if let Some(path) = &arguments.bake {
-        return Ok(vec![profile::bake(&bench, &scene::load_mesh(path)?.0, arguments.runs)?]);
-    }
-    if let Some(path) = &arguments.scene {
-        let scene = Scene::load(path)?;
-        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        let case = profile::scene(&bench, &name, &scene, arguments.size, chosen, arguments.runs, at_best)?;
-        return Ok(vec![case]);
-    }
     let made_up = |&occluders: &u32| {
         let workload = Workload::new(&context.device, arguments.grid, occluders)?;
         profile::made_up(&bench, &workload, chosen, arguments.runs, at_best)
     };
-    arguments.occluders.iter().map(made_up).collect()
+    match subject {
+        Subject::Bake(mesh) => Ok(vec![profile::bake(&bench, mesh, arguments.runs)?]),
+        Subject::Scene(name, scene) => {
+            Ok(vec![profile::scene(&bench, name, scene, arguments.size, chosen, arguments.runs, at_best)?])
+        }
+        Subject::MadeUp => arguments.occluders.iter().map(made_up).collect(),
+    }
 }
 
 /// Time of the first row over that of the second, run by run, of each case.
@@ -146,24 +148,18 @@ fn ratios(cases: &[Case]) -> Vec<(String, Tenths)> {
     cases.iter().filter_map(ratio).collect()
 }
 
-/// Writes profile.csv, starts.csv and profile.json.
+/// Writes profile.csv and profile.json.
 fn write(folder: &Path, document: &Value) -> Result<()> {
-    for (file, key) in [("profile.csv", "passes"), ("starts.csv", "starts")] {
-        text::write(&folder.join(file), text::csv(&document["origin"], &document[key]))?;
-    }
+    text::make_folder(folder)?;
+    text::write(&folder.join("profile.csv"), text::csv(&document["origin"], &document["passes"]))?;
     text::write(&folder.join("profile.json"), format!("{document:#}\n"))
 }
 
 fn print_passes(at_best: &Ceilings, rows: &[ProfileRow], ratios: &[(String, Tenths)]) {
     output::say(format!(
-        "at best: {:.0} GFLOP/s; {:.2} G texels/s of four halves, {:.2} of 16 bytes; {:.2} G filtered samples/s; {:.2} G storage \
+        "at best: {:.0} GFLOP/s; {:.2} G texels/s of four halves, {:.2} of 16 bytes; {:.2} G storage \
          reads/s of 8 bytes; triad {:.1} GB/s",
-        at_best.gflops,
-        at_best.texel_halves_giga,
-        at_best.texel_packed_giga,
-        at_best.filtered_giga,
-        at_best.storage_giga,
-        at_best.triad_gb_s
+        at_best.gflops, at_best.texel_halves_giga, at_best.texel_packed_giga, at_best.storage_giga, at_best.triad_gb_s
     ));
     let header = [
         "pass",
@@ -205,17 +201,4 @@ fn cells(row: &ProfileRow) -> Vec<String> {
     cells.extend([number(row.gflops, 0), number(row.gb_s, 1)]);
     cells.extend([row.arithmetic_share, row.read_share, both].map(percent));
     cells
-}
-
-fn print_starts(starts: &[Start]) {
-    if starts.is_empty() {
-        return;
-    }
-    output::say("\nbefore the first merge, ms");
-    let cells = |start: &Start| {
-        let times = [start.spirv_cold_ms, start.spirv_warm_ms, start.first_cold_ms, start.first_warm_ms];
-        [start.variant.clone()].into_iter().chain(times.map(|ms| format!("{ms:.1}"))).collect()
-    };
-    let header = ["variant", "SPIR-V", "from cache", "pipeline and first run", "again"];
-    output::table(&header, &starts.iter().map(cells).collect::<Vec<_>>());
 }

@@ -1,23 +1,23 @@
 //! `shadow-fields render` renders a scene to pictures, or to a table of vertices.
 
-use super::context::{Context, MergeArguments, size};
-use super::quality::BakeArguments;
+use super::context::Context;
+use super::outputs::{Numbered, Output, Outputs};
 use super::source::GltfArguments;
 use super::{Global, output};
 use crate::asset::false_color::Scheme;
 use crate::asset::picture;
 use crate::bench::figures::spread;
-use crate::draw::Antialias;
 use crate::error::{Error, Result};
-use crate::frame::{self, Frame, PictureMemory};
+use crate::frame::{self, Frame, PictureMemory, RenderOptions};
 use crate::gpu::Timing;
-use crate::scene::{Placement, Scene, light, values::NUMBER_LIMIT};
-use crate::text;
+use crate::scene::{self, Placement, Scene, light, values::NUMBER_LIMIT};
+use crate::text::{self, number};
 use crate::truth::{self, ErrorMap, error_map, raycast::RayCast};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::ops::Bound;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// A picture that takes more memory than this is told in a line.
@@ -26,9 +26,11 @@ const ANNOUNCED_BYTES: u64 = 1_000_000_000;
 /// Arguments of `render`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Scene file (see assets/scenes for examples), the name of a built-in one, a glTF file (.glb, .gltf) or an OBJ file
+    /// Scene file (see assets/scenes for examples), the name of a built-in one, a glTF file (.glb, .gltf) or an OBJ
+    /// file
     scene: PathBuf,
-    /// Picture to write; with --frames an animated PNG, or pictures numbered from 0 when the name has a run of #: out/f_####.png
+    /// Picture to write; with --frames an animated PNG, or pictures numbered from 0 when the name has a run of #:
+    /// out/f_####.png
     #[arg(short, long, value_name = "P.png")]
     output: PathBuf,
     /// Also write linear f32 radiance: of every picture when the name has a run of #, else of the last
@@ -40,16 +42,8 @@ pub struct Arguments {
     /// Number of the first picture; its time is --time plus this number of pictures, and numbered names start with it
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u32).range(..=10_000_000))]
     first: u32,
-    /// Pictures per second of scene time
-    #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
-    fps: u16,
-    /// Scene time of the first picture, seconds; default: the scene's, which is 0 unless it says otherwise
-    #[arg(long, value_name = "SECONDS", value_parser = time_s, allow_negative_numbers = true)]
-    time: Option<f64>,
-    /// Size of the picture; default: the scene's
-    #[arg(long, value_parser = size, value_name = "WxH")]
-    pub(super) size: Option<[u32; 2]>,
-    /// Also write one row for each lit vertex: entity, position (m) and normal in the world, linear radiosity without emission
+    /// Also write one row for each lit vertex: entity, position (m) and normal in the world, linear radiosity without
+    /// emission
     #[arg(long, value_name = "V.csv")]
     vertices: Option<PathBuf>,
     /// Also write times (ms) and counts
@@ -64,45 +58,66 @@ pub struct Arguments {
     /// Colours of --error: signed shows too dark in blue and too bright in red, absolute shows the size of the error
     #[arg(long, default_value = "signed", value_name = "SCHEME", requires = "error")]
     error_scheme: Scheme,
-    /// With --error: the error that gets the last colour of the scale, relative to the root mean square of the radiosity; default: the
-    /// 99th percentile, rounded up
-    #[arg(long, value_name = "X", value_parser = positive, requires = "error", allow_negative_numbers = true)]
+    /// With --error: the error that gets the last colour of the scale, relative to the root mean square of the
+    /// radiosity; default: the 99th percentile, rounded up
+    #[arg(long, value_name = "X", value_parser = number::<f64>((Bound::Excluded(0.0), Bound::Unbounded)), requires = "error", allow_negative_numbers = true)]
     error_limit: Option<f64>,
     /// With --reference or --error: rays per vertex for the sky and for each light
     #[arg(long, default_value_t = 1024, value_name = "N", requires = "judge", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
     rays: u32,
-    /// How edges are smoothed: by four samples a pixel, by redrawing outlines and creases (faster on a software device), or not at all
-    #[arg(long, default_value = "samples", value_name = "HOW")]
-    antialias: Antialias,
     #[command(flatten)]
-    merge: MergeArguments,
-    #[command(flatten)]
-    bake: BakeArguments,
+    picture: PictureArguments,
     #[command(flatten)]
     gltf: GltfArguments,
 }
 
 impl Arguments {
-    /// Fails where something besides numbered pictures is asked for.
-    ///
-    /// # Errors
-    /// `Usage` with what.
-    pub(super) fn pictures_only(&self) -> Result<()> {
-        let others = [&self.exr, &self.vertices, &self.stats, &self.error];
-        if self.frames != 1 || self.first != 0 || others.into_iter().any(Option::is_some) {
-            return Err(Error::Usage("a plan has its own --frames, and writes pictures alone".into()));
+    /// All files that are to be written, none of which may be one that the scene names.
+    fn outputs(&self) -> Result<Outputs> {
+        let numbers = self.first..self.first + self.frames;
+        let mut outputs = vec![Output::pictures("--output", &self.output, "png", numbers.clone())?];
+        if let Some(path) = &self.exr {
+            outputs.push(Output::pictures("--exr", path, "exr", numbers)?);
         }
-        Ok(())
+        let others =
+            [("--vertices", &self.vertices, "csv"), ("--stats", &self.stats, "json"), ("--error", &self.error, "png")];
+        let given = others.into_iter().filter_map(|(option, path, ending)| Some((option, path.as_ref()?, ending)));
+        outputs.extend(given.map(|(option, path, ending)| Output::new(option, path, ending)));
+        Outputs::check(&scene::files::of_scene(&self.scene), &outputs)
+    }
+}
+
+/// Options that decide a picture, besides the scene.
+#[derive(Args, Clone)]
+pub(super) struct PictureArguments {
+    /// Pictures per second of scene time
+    #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
+    pub(super) fps: u16,
+    /// Scene time of the first picture, seconds; default: the scene's, which is 0 unless it says otherwise
+    #[arg(long, value_name = "SECONDS", value_parser = number::<f64>(-NUMBER_LIMIT..=NUMBER_LIMIT), allow_negative_numbers = true)]
+    pub(super) time: Option<f64>,
+    #[command(flatten)]
+    pub(super) options: RenderOptions,
+}
+
+impl PictureArguments {
+    /// Scene time of picture 0, in seconds.
+    pub(super) fn first_s(&self, scene: &Scene) -> f64 {
+        self.time.unwrap_or(scene.data.output.time_s)
     }
 }
 
 /// Renders a scene.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let names = PictureNames::new(arguments)?;
+    let outputs = arguments.outputs()?;
+    render(global, arguments).map_err(|error| outputs.after(error))
+}
+
+fn render(global: &Global, arguments: &Arguments) -> Result<()> {
     let scene = arguments.gltf.scene(global, &arguments.scene)?;
     let context = Context::new(global)?;
     let mut rendering = Rendering::new(global, arguments, &context, &scene)?;
-    rendering.write_pictures(&names)?;
+    rendering.write_pictures()?;
     let last_frame = json!(rendering.frame.merged());
     rendering.write_vertices()?;
     let error = rendering.write_error()?;
@@ -112,28 +127,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     output::say(if global.json { report.to_string() } else { rendering.summary() });
     drop(rendering);
-    if arguments.merge.variant.is_none() {
+    if arguments.picture.options.variant.is_none() {
         context.learn(global)?;
     }
     context.finish()
-}
-
-/// Names of pictures, all of them in folders that exist.
-struct PictureNames {
-    numbered: Option<Numbered>,
-    numbered_exr: Option<Numbered>,
-}
-
-impl PictureNames {
-    fn new(arguments: &Arguments) -> Result<Self> {
-        let numbered = Numbered::new(&arguments.output, "png")?;
-        let others = [&arguments.exr, &arguments.vertices, &arguments.stats, &arguments.error];
-        for path in others.into_iter().flatten().chain([&arguments.output]) {
-            output::check_folder(path)?;
-        }
-        let numbered_exr = arguments.exr.as_deref().map(|path| Numbered::new(path, "exr")).transpose()?.flatten();
-        Ok(PictureNames { numbered, numbered_exr })
-    }
 }
 
 /// A scene that is being rendered.
@@ -144,6 +141,7 @@ struct Rendering<'a> {
     scene: &'a Scene,
     options: frame::Options,
     frame: Frame,
+    numbered_exr: Option<Numbered>,
     prepared: Duration,
     /// Scene time of each picture in seconds, its wall time and its passes.
     timings: Vec<(f64, Duration, Vec<Timing>)>,
@@ -154,9 +152,7 @@ struct Rendering<'a> {
 impl<'a> Rendering<'a> {
     fn new(global: &'a Global, arguments: &'a Arguments, context: &'a Context, scene: &'a Scene) -> Result<Self> {
         let started = Instant::now();
-        let shape = &scene.data.output;
-        let size = arguments.size.unwrap_or([shape.width, shape.height]);
-        let options = arguments.merge.options(arguments.bake.options(), size, arguments.antialias);
+        let options = arguments.picture.options.frame(scene)?;
         announce(global, context, &options)?;
         let frame = context.frame(scene, options).map_err(|error| match error {
             Error::Input(_) => error.context(arguments.scene.display()),
@@ -170,6 +166,7 @@ impl<'a> Rendering<'a> {
             scene,
             options,
             frame,
+            numbered_exr: arguments.exr.as_deref().map(Numbered::new).transpose()?.flatten(),
             prepared,
             timings: Vec::new(),
             worst_error: 0.0,
@@ -177,11 +174,11 @@ impl<'a> Rendering<'a> {
     }
 
     /// Lights and draws one picture; also writes it as EXR where that is asked for.
-    fn draw(&mut self, number: u32, names: &PictureNames) -> Result<Vec<f32>> {
-        let (arguments, white) = (self.arguments, self.scene.data.output.white());
-        let first_s = arguments.time.unwrap_or(self.scene.data.output.time_s);
+    fn draw(&mut self, number: u32) -> Result<Vec<f32>> {
+        let arguments = self.arguments;
+        let white = self.scene.data.output.white();
         let index = arguments.first + number;
-        let time_s = first_s + f64::from(index) / f64::from(arguments.fps);
+        let time_s = arguments.picture.first_s(self.scene) + f64::from(index) / f64::from(arguments.picture.fps);
         let placements = self.scene.at(time_s);
         let start = Instant::now();
         let passes = if arguments.reference {
@@ -193,8 +190,11 @@ impl<'a> Rendering<'a> {
         };
         self.timings.push((time_s, start.elapsed(), passes));
         let rgb = self.frame.picture();
-        let last = arguments.exr.as_ref().filter(|_| number + 1 == arguments.frames).cloned();
-        if let Some(path) = names.numbered_exr.as_ref().map(|numbered| numbered.path(index)).or(last) {
+        let exr = match &self.numbered_exr {
+            Some(numbered) => Some(numbered.path(index)),
+            None => arguments.exr.clone().filter(|_| number + 1 == arguments.frames),
+        };
+        if let Some(path) = exr {
             self.frame.redraw(&placements, f32::INFINITY)?;
             let [width, height] = self.options.size;
             picture::write_exr(&path, width, height, &self.frame.picture())?;
@@ -204,19 +204,20 @@ impl<'a> Rendering<'a> {
     }
 
     /// Writes all pictures: one file, an animated PNG, or numbered files.
-    fn write_pictures(&mut self, names: &PictureNames) -> Result<()> {
+    fn write_pictures(&mut self) -> Result<()> {
+        let numbered = Numbered::new(&self.arguments.output)?;
         let (arguments, [width, height]) = (self.arguments, self.options.size);
         let exposure_ev = self.scene.data.output.exposure_ev;
-        if names.numbered.is_none() && arguments.frames > 1 {
-            let frames =
-                (0..arguments.frames).map(|index| Ok(picture::encode_srgb(&self.draw(index, names)?, exposure_ev)));
-            return picture::write_apng(&arguments.output, width, height, frames, arguments.fps);
+        if numbered.is_none() && arguments.frames > 1 {
+            let frames = (0..arguments.frames).map(|index| Ok(picture::encode_srgb(&self.draw(index)?, exposure_ev)));
+            return picture::write_apng(&arguments.output, width, height, frames, arguments.picture.fps);
         }
         for index in 0..arguments.frames {
-            let numbered = names.numbered.as_ref();
-            let path =
-                numbered.map_or_else(|| arguments.output.clone(), |numbered| numbered.path(arguments.first + index));
-            picture::write_png(&path, width, height, &self.draw(index, names)?, exposure_ev)?;
+            let path = match &numbered {
+                Some(numbered) => numbered.path(arguments.first + index),
+                None => arguments.output.clone(),
+            };
+            picture::write_png(&path, width, height, &self.draw(index)?, exposure_ev)?;
         }
         Ok(())
     }
@@ -250,7 +251,8 @@ impl<'a> Rendering<'a> {
 
     /// What `--stats` and `--json` have.
     fn report(&self, last_frame: &Value, error: &Value) -> Value {
-        let (frame, options) = (&self.frame, &self.options);
+        let frame = &self.frame;
+        let options = &self.options;
         let pictures = self.timings.iter().map(|(time_s, wall, passes)| {
             let named = |t: &Timing| (format!("{}_ms", t.pass.replace(' ', "_")), json!(t.milliseconds));
             let evaluated = frame.pixels_evaluated(passes);
@@ -312,9 +314,6 @@ impl<'a> Rendering<'a> {
 }
 
 /// Says what memory a large picture takes, before any work is done for it.
-///
-/// # Errors
-/// `Input` where it is more than there is.
 fn announce(global: &Global, context: &Context, options: &frame::Options) -> Result<()> {
     let picture = PictureMemory::new(&context.device, options);
     picture.check(&context.device)?;
@@ -332,48 +331,6 @@ fn light_by_rays(frame: &mut Frame, placements: &[Placement], rays: u32, seed: u
         frame.set_radiosity(entity, &radiosity)?;
     }
     Ok(error)
-}
-
-/// A scene time in seconds, within the limit of numbers in scene files.
-fn time_s(text: &str) -> std::result::Result<f64, String> {
-    let number = text.parse().ok().filter(|time: &f64| time.abs() <= NUMBER_LIMIT);
-    number.ok_or_else(|| format!("expected seconds from -{NUMBER_LIMIT:e} to {NUMBER_LIMIT:e}, got \"{text}\""))
-}
-
-/// A number above 0.
-fn positive(text: &str) -> std::result::Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
-    number.ok_or_else(|| format!("expected a number above 0, got \"{text}\""))
-}
-
-/// An output name with a run of `#` that stands for the frame's number.
-pub(super) struct Numbered {
-    before: String,
-    digits: usize,
-    after: String,
-}
-
-impl Numbered {
-    /// A name that ends as the pictures do; `None` where it has no run of `#`.
-    pub(super) fn new(path: &Path, ending: &str) -> Result<Option<Self>> {
-        output::check_ending(path, ending, "this picture")?;
-        let Some(text) = path.to_str() else {
-            let what = format!("{}: a name with # has to be UTF-8", path.display());
-            return if path.as_os_str().as_encoded_bytes().contains(&b'#') {
-                Err(Error::Usage(what))
-            } else {
-                Ok(None)
-            };
-        };
-        Ok(text.find('#').map(|at| {
-            let digits = text[at..].bytes().take_while(|b| *b == b'#').count();
-            Numbered { before: text[..at].into(), digits, after: text[at + digits..].into() }
-        }))
-    }
-
-    pub(super) fn path(&self, index: u32) -> PathBuf {
-        format!("{}{index:0width$}{}", self.before, self.after, width = self.digits).into()
-    }
 }
 
 /// A row a vertex of every receiver, world frame.

@@ -34,11 +34,8 @@ impl Canvas {
     }
 }
 
-/// Writes a sheet: `per_column` cells under each column's label, a row label of up to three lines, parted by ", ", on the left.
-/// Values up to a row's white are shown.
-///
-/// # Errors
-/// As [`picture::write_png`].
+/// Writes a sheet: `per_column` cells under each column's label, a row label of up to three lines, parted by ", ", on
+/// the left. Values up to a row's white are shown.
 pub fn write(
     path: &Path,
     columns: &[String],
@@ -47,7 +44,8 @@ pub fn write(
     face_px: usize,
     whites: &[f32],
 ) -> Result<()> {
-    let (cell_width, cell_height) = (4 * face_px + GAP, 3 * face_px + GAP);
+    let cell_width = 4 * face_px + GAP;
+    let cell_height = 3 * face_px + GAP;
     let width = MARGIN + columns.len() * per_column * cell_width;
     let height = TEXT + GAP + rows.len() * cell_height;
     let mut canvas = Canvas { width, height, rgb: vec![0.35; 3 * width * height] };
@@ -62,7 +60,9 @@ pub fn write(
         for (column, cell) in cells.iter().enumerate() {
             let left = MARGIN + column * cell_width;
             for (texel, rgb) in cell.chunks_exact(3).enumerate() {
-                let (face, x, y) = (texel / (face_px * face_px), texel % face_px, texel / face_px % face_px);
+                let face = texel / (face_px * face_px);
+                let x = texel % face_px;
+                let y = texel / face_px % face_px;
                 let (right, down) = PLACES[face];
                 let value = [rgb[0], rgb[1], rgb[2]].map(|c| c / white);
                 canvas.set(left + right * face_px + x, top + down * face_px + y, value);

@@ -27,11 +27,13 @@ pub fn bake(global: &Global, (mesh, mesh_file): (&Mesh, &Path), out: &Path, opti
     if global.json {
         output::say(result.to_string());
     } else {
-        let (file, edge, maps) = (output::shown(out), field.header.map_px, field.header.map_count());
-        let (triangles, bytes) = (mesh.triangles.len(), field.payload().len());
+        let file = output::shown(out);
+        let edge = field.header.map_px;
+        let maps = field.header.map_count();
+        let triangles = mesh.triangles.len();
+        let bytes = field.payload().len();
         output::say(format!(
-            "{file}: {maps} maps of {edge}x{edge} ({} captured), {triangles} triangles, {bytes} bytes, {seconds:.2} s",
-            report.samples - report.turned
+            "{file}: {maps} maps of {edge}x{edge}, {triangles} triangles, {bytes} bytes, {seconds:.2} s"
         ));
     }
     Ok(())
@@ -85,7 +87,8 @@ pub fn inspect(global: &Global, file: &Path, ray: Option<Ray>, sheet: Option<&Pa
 fn lookup(field: &SilhouetteField, (position_m, toward): Ray) -> serde_json::Value {
     let radius_m = f64::from(field.header.radius_m);
     let centre = DVec3::from_array(field.header.centre_m.map(f64::from));
-    let (point, direction) = ((position_m - centre) / radius_m, toward.normalize());
+    let point = (position_m - centre) / radius_m;
+    let direction = toward.normalize();
     let near = field.near(point, direction);
     let outline = field.outline(&near, Side::Whole, direction);
     let blocked = |angle_deg: f64| field.blocked(&near, direction, f64::INFINITY, angle_deg.to_radians().tan());
@@ -102,7 +105,8 @@ const TEXT_PX: usize = 14;
 
 /// Writes all maps side by side: distances above, depths below.
 fn write_sheet(field: &SilhouetteField, path: &Path) -> Result<()> {
-    let (edge, count) = (field.header.map_px as usize, field.header.map_count());
+    let edge = field.header.map_px as usize;
+    let count = field.header.map_count();
     let columns = ((2 * count) as f64).sqrt().ceil() as usize;
     let rows = count.div_ceil(columns);
     let width = (columns * (edge + 1)).max(420);
@@ -115,7 +119,8 @@ fn write_sheet(field: &SilhouetteField, path: &Path) -> Result<()> {
     for (half, title) in titles.iter().enumerate() {
         lettering::write(&mut rgb, width, (4, half * block + 2), 1, [0.0; 3], title);
         for map in 0..count {
-            let (left, top) = (map % columns * (edge + 1), half * block + TEXT_PX + map / columns * (edge + 1));
+            let left = map % columns * (edge + 1);
+            let top = half * block + TEXT_PX + map / columns * (edge + 1);
             for (y, x) in (0..edge).flat_map(|y| (0..edge).map(move |x| (y, x))) {
                 let value = field.texel(map, Side::Whole, x, y)[half] / [REACH, 1.0][half];
                 let level = picture::linear_from_srgb(0.5 + 0.5 * value as f32);

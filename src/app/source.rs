@@ -18,9 +18,6 @@ pub struct GltfArguments {
 
 impl GltfArguments {
     /// Reads a scene file or a glTF file, and says what is left out of the latter.
-    ///
-    /// # Errors
-    /// As [`Scene::load`], and `Input` where something is left out and may not be.
     pub fn scene(self, global: &Global, path: &Path) -> Result<Scene> {
         let (scene, notes) = Scene::load_with_notes(path)?;
         self.tell(global, path, &notes)?;
@@ -28,9 +25,6 @@ impl GltfArguments {
     }
 
     /// Reads an OBJ file or all triangles of a glTF file, and says what is left out of the latter.
-    ///
-    /// # Errors
-    /// As [`scene::load_mesh`], and `Input` where something is left out and may not be.
     pub fn mesh(self, global: &Global, path: &Path) -> Result<Mesh> {
         let (mesh, notes) = scene::load_mesh(path)?;
         self.tell(global, path, &notes)?;

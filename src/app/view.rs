@@ -1,11 +1,11 @@
 //! `shadow-fields view` opens a window.
 
-use super::context::{Context, MergeArguments, cache_dir, size};
-use super::quality::BakeArguments;
+use super::context::Context;
 use super::source::GltfArguments;
 use super::{Global, output};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
+use crate::frame::{self, RenderOptions};
 use crate::gpu::{self, Device, PresentMode, Window, display, heap};
 use crate::scene::Scene;
 use crate::view::command::Command;
@@ -27,10 +27,10 @@ use winit::window::WindowId;
 
 /// Pixels of a touchpad's wheel that count as a notch.
 const NOTCH_PX: f64 = 40.0;
+/// Time in which the events of a drop come.
+const DROP_PATIENCE: Duration = Duration::from_millis(200);
 /// How often a window that shows nothing is asked again.
 const HIDDEN_PERIOD: Duration = Duration::from_millis(200);
-/// File in the cache folder that keeps what the window remembers.
-const SETTINGS: &str = "window.toml";
 /// Smallest window in which the overlay can be read.
 const LEAST_SIZE: PhysicalSize<u32> = PhysicalSize::new(160, 120);
 
@@ -38,19 +38,13 @@ const LEAST_SIZE: PhysicalSize<u32> = PhysicalSize::new(160, 120);
 #[derive(Args)]
 #[command(after_long_help = format!("Controls:\n{}", crate::view::input::help()))]
 pub struct Arguments {
-    /// Scene file, the name of a built-in one, a glTF file (.glb, .gltf) or an OBJ file. Another can be dropped on the window (on X11)
+    /// Scene file, the name of a built-in one, a glTF file (.glb, .gltf) or an OBJ file. Another can be dropped on the
+    /// window (on X11)
     #[arg(default_value = "assets/scenes/teapot_lights.toml")]
     scene: PathBuf,
-    /// Size of the window in pixels; default: the scene's
-    #[arg(long, value_parser = size, value_name = "WxH")]
-    size: Option<[u32; 2]>,
     /// Vulkan present mode: when a finished frame is shown
     #[arg(long, default_value = "fifo", value_name = "MODE")]
     present_mode: PresentMode,
-    /// How edges are smoothed: by four samples a pixel (default on a GPU), by redrawing outlines and creases (default on a software
-    /// device), or not at all
-    #[arg(long, value_name = "HOW")]
-    antialias: Option<Antialias>,
     /// Start with the motion paused
     #[arg(long)]
     paused: bool,
@@ -58,9 +52,7 @@ pub struct Arguments {
     #[arg(long)]
     no_overlay: bool,
     #[command(flatten)]
-    merge: MergeArguments,
-    #[command(flatten)]
-    bake: BakeArguments,
+    options: RenderOptions,
     #[command(flatten)]
     gltf: GltfArguments,
 }
@@ -73,6 +65,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let owned = events.owned_display_handle();
     let handle = owned.display_handle().map_err(no_display)?.as_raw();
     let proxy = events.create_proxy();
+    display::notice_drops(handle);
     // A loop that has ended need not be woken.
     let _watch = display::outlive(handle, move || proxy.send_event(()).unwrap_or_default());
     let mut device_options = gpu::DeviceOptions::default();
@@ -126,9 +119,11 @@ fn close(shown: Option<Shown>, outcome: Result<()>) -> Result<()> {
     outcome.map_err(|error| shown.viewer.rescued(error))
 }
 
-/// Ends the window whose display is lost. What belongs to it is left to the end of the process, since its calls would fail or wait.
+/// Ends the window whose display is lost. What belongs to it is left to the end of the process, since its calls would
+/// fail or wait.
 fn close_lost(shown: Option<Shown>, display: impl Sized) -> Result<()> {
-    let (mut shown, _display) = (ManuallyDrop::new(shown), ManuallyDrop::new(display));
+    let mut shown = ManuallyDrop::new(shown);
+    let _display = ManuallyDrop::new(display);
     let error = display::lost();
     Err(match &mut *shown {
         Some(shown) => shown.viewer.rescued(error),
@@ -180,6 +175,9 @@ struct Shown {
     modifiers: ModifiersState,
     pointer: [f32; 2],
     updated: Instant,
+    opened: Instant,
+    /// When a drop of files that does not come counts as failed.
+    drop_end: Option<Instant>,
     /// Nothing could be drawn the last time.
     hidden: bool,
     /// When it was tried.
@@ -199,7 +197,8 @@ struct App<'a> {
 impl App<'_> {
     fn open(&mut self, events: &ActiveEventLoop, scene: Scene) -> Result<Shown> {
         let device = &self.context.device;
-        let [width, height] = self.arguments.size.unwrap_or([scene.data.output.width, scene.data.output.height]);
+        let [width, height] =
+            self.arguments.options.size.unwrap_or([scene.data.output.width, scene.data.output.height]);
         let attributes = winit::window::Window::default_attributes()
             .with_title(title(&self.arguments.scene))
             .with_inner_size(PhysicalSize::new(width, height))
@@ -207,19 +206,18 @@ impl App<'_> {
         let window = Arc::new(events.create_window(attributes).map_err(no_display)?);
         let own: [u32; 2] = window.inner_size().into();
         let target = Window::new(device, &window, own, self.arguments.present_mode)?;
-        let antialias = self.arguments.antialias.unwrap_or_else(|| Antialias::usual(device));
+        let antialias = self.arguments.options.antialias.unwrap_or_else(|| Antialias::usual(device));
         let setup = Setup {
             device: device.clone(),
             options: self.device_options.clone(),
-            workers: self.global.workers(),
             library: self.context.baker.library().clone(),
             cache: self.context.cache.clone(),
-            frame: self.arguments.merge.options(self.arguments.bake.options(), own, antialias),
+            frame: frame::Options { size: own, antialias, ..self.arguments.options.frame(&scene)? },
             format: target.format(),
             encodes_srgb: target.encodes_srgb(),
             seed: self.global.seed,
             strict: self.arguments.gltf.strict,
-            settings: cache_dir(self.global).map(|folder| folder.join(SETTINGS)),
+            preview_after: Duration::from_secs(1),
         };
         let mut editor = Editor::new(scene, &self.arguments.scene);
         let paused = self.arguments.paused.then_some(Command::ToggleRunning);
@@ -247,6 +245,8 @@ impl App<'_> {
             modifiers: ModifiersState::empty(),
             pointer: [0.0; 2],
             updated: Instant::now(),
+            opened: Instant::now(),
+            drop_end: None,
             hidden: false,
             tried: Instant::now(),
         })
@@ -284,6 +284,7 @@ impl ApplicationHandler for App<'_> {
         let now = Instant::now();
         let passed = now.duration_since(std::mem::replace(&mut shown.updated, now));
         let outcome = shown.viewer.update(passed.as_secs_f64());
+        shown.look_for_drops(now);
         let flow = if shown.hidden {
             if shown.tried.elapsed() >= HIDDEN_PERIOD {
                 shown.window.request_redraw();
@@ -293,7 +294,8 @@ impl ApplicationHandler for App<'_> {
             shown.window.request_redraw();
             ControlFlow::Wait
         } else {
-            shown.viewer.idle().map_or(ControlFlow::Wait, |idle| ControlFlow::WaitUntil(now + idle))
+            let idle = shown.viewer.idle().map(|idle| now + idle);
+            idle.into_iter().chain(shown.drop_end).min().map_or(ControlFlow::Wait, ControlFlow::WaitUntil)
         };
         events.set_control_flow(flow);
         self.check(events, outcome);
@@ -301,6 +303,29 @@ impl ApplicationHandler for App<'_> {
 }
 
 impl Shown {
+    /// Says of files that were dropped that they do not exist: no event follows such a drop.
+    fn look_for_drops(&mut self, now: Instant) {
+        if display::take_drop() {
+            self.drop_end = Some(now + DROP_PATIENCE);
+        }
+        if self.drop_end.take_if(|end| *end <= now).is_some() {
+            self.viewer.insist("not opened: what was dropped is no file that exists here".to_owned());
+        }
+    }
+
+    /// egui's input, as `take_egui_input` gives it. That panics where another program has just destroyed the window.
+    fn input(&mut self) -> egui::RawInput {
+        let scale = egui_winit::pixels_per_point(self.viewer.egui(), &self.window);
+        let [width, height] = self.viewer.size().map(|side| side as f32 / scale);
+        let input = self.egui.egui_input_mut();
+        input.time = Some(self.opened.elapsed().as_secs_f64());
+        input.screen_rect = Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height)));
+        input.viewport_id = egui::ViewportId::ROOT;
+        let viewport = input.viewports.entry(egui::ViewportId::ROOT).or_default();
+        viewport.native_pixels_per_point = Some(self.window.scale_factor() as f32);
+        input.take()
+    }
+
     fn window_event(&mut self, event: &WindowEvent) -> Result<()> {
         if let WindowEvent::RedrawRequested = event {
             return self.redraw();
@@ -311,7 +336,12 @@ impl Shown {
         }
         match event {
             WindowEvent::CloseRequested => self.viewer.apply(Command::Quit),
-            WindowEvent::DroppedFile(path) => self.viewer.open(path),
+            WindowEvent::DroppedFile(path) => {
+                self.drop_end = None;
+                display::take_drop();
+                self.viewer.open(path)
+            }
+            WindowEvent::Destroyed => Err(Error::Device("another program destroyed the window".into())),
             WindowEvent::Resized(size) => {
                 log::info!("resized to {}x{}", size.width, size.height);
                 self.hidden = false;
@@ -359,7 +389,7 @@ impl Shown {
     }
 
     fn redraw(&mut self) -> Result<()> {
-        let input = self.egui.take_egui_input(&self.window);
+        let input = self.input();
         let output = self.viewer.ui(input)?;
         self.egui.handle_platform_output(&self.window, output);
         self.window.pre_present_notify();

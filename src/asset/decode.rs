@@ -12,10 +12,10 @@ use crate::error::{Error, Result};
 
 /// Largest number of pixels of a picture that is read: one of 7680 x 4320 is below.
 pub const PIXEL_LIMIT: u64 = 1 << 25;
-/// Largest file of a picture in bytes: 512 MiB, what a picture of [`PIXEL_LIMIT`] pixels takes as uncompressed f32 RGBA.
+/// Largest file of a picture in bytes: 512 MiB, what a picture of [`PIXEL_LIMIT`] pixels takes as uncompressed f32
+/// RGBA.
 const FILE_LIMIT_BYTES: u64 = 512 << 20;
 
-/// What is read.
 const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::OpenExr, ImageFormat::Hdr];
 
 /// A picture as it is stored: rows from the top, pixels from the left, three channels each. Alpha is dropped.
@@ -34,18 +34,11 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Reads a file.
-    ///
-    /// # Errors
-    /// As [`Picture::decode`], with the file's name in front, and where it cannot be read.
     pub fn read(path: &Path) -> Result<Self> {
         Self::decode(&super::read_file(path, FILE_LIMIT_BYTES)?).map_err(|error| error.context(path.display()))
     }
 
     /// Decodes a PNG, of an animated one the first picture; JPEG; OpenEXR with red, green and blue; or Radiance HDR.
-    ///
-    /// # Errors
-    /// [`Error::Input`] in one line: of another format, damaged, or of more than [`PIXEL_LIMIT`] pixels.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
         let damaged = |error: image::ImageError| Error::Input(error.to_string().replace('\n', " "));
         let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();

@@ -20,7 +20,8 @@ pub struct Sun {
     /// Angular diameter, 0.01 to 90 degrees.
     #[serde(default = "sun_deg")]
     pub angle_deg: f32,
-    /// Linear RGB radiance, W m^-2 sr^-1. A white surface that faces a disc of diameter `a` shines with radiance * sin^2(a / 2).
+    /// Linear RGB radiance, W m^-2 sr^-1. A white surface that faces a disc of diameter `a` shines with radiance *
+    /// sin^2(a / 2).
     pub radiance: Vec3,
 }
 
@@ -31,9 +32,6 @@ fn sun_deg() -> f32 {
 
 impl Sun {
     /// Checks angle and direction; radiance is checked as that of all parts is.
-    ///
-    /// # Errors
-    /// [`Error::Input`], one line that names the key out of range.
     pub(super) fn check(&self) -> Result<()> {
         check_angle("sun angle_deg", self.angle_deg)?;
         if self.toward.as_dvec3().try_normalize().is_none() {
@@ -42,7 +40,6 @@ impl Sun {
         Ok(())
     }
 
-    /// The disc that it is.
     pub fn disc(&self) -> Disc {
         Disc {
             name: "sun",

@@ -6,8 +6,8 @@ use glam::{DMat3, DMat4, DVec3, DVec4};
 
 /// Two normals at one position whose cosine is below this (5 degrees) form a crease.
 const CREASE_COSINE: f32 = 0.996;
-/// Faces with a sine up to this between them lie in one plane, and their edge is never seen. It allows for the rounding of f32
-/// positions.
+/// Faces with a sine up to this between them lie in one plane, and their edge is never seen. It allows for the rounding
+/// of f32 positions.
 const COPLANAR_SINE: f64 = 1e-5;
 
 /// When an edge is seen.
@@ -34,14 +34,15 @@ struct Edge {
 pub struct Line {
     /// End points in clip space, in front of the eye and within the picture.
     pub ends: [DVec4; 2],
-    /// Side of its face, seen along the line from its first end to its second with x to the right and y down: positive is
-    /// right. A crease also has a face on the other side.
+    /// Side of its face, seen along the line from its first end to its second with x to the right and y down: positive
+    /// is right. A crease also has a face on the other side.
     pub side: f64,
 }
 
 /// Edges of a mesh with the faces beside them.
 pub struct Edges {
-    /// Positions, metres from the centre of the bounding sphere. Vertices at one position are one corner, whatever their normals.
+    /// Positions, metres from the centre of the bounding sphere. Vertices at one position are one corner, whatever
+    /// their normals.
     corners: Vec<DVec3>,
     edges: Vec<Edge>,
     /// Plane of each face: normal, and the dot product of the normal with a point of the face.
@@ -79,7 +80,8 @@ impl Edges {
             let [one, other] = sides else {
                 return Some(Edge { ends, far, faces: [face(&sides[0]); 2], kind: EdgeKind::Border });
             };
-            let (u, v) = (vertices(one), vertices(other));
+            let u = vertices(one);
+            let v = vertices(other);
             let crease = differ([u[0], v[0]]) || differ([u[1], v[1]]);
             let flipped = one.reversed == other.reversed;
             let [m, n] = [one, other].map(|side| planes[face(side) as usize].0);
@@ -91,8 +93,8 @@ impl Edges {
         Edges { corners, edges, planes }
     }
 
-    /// Silhouette and border edges as seen from `eye` (metres from the centre of the bounding sphere, in the mesh's frame), and
-    /// with `creases` also the creases in view. Hidden edges are included.
+    /// Silhouette and border edges as seen from `eye` (metres from the centre of the bounding sphere, in the mesh's
+    /// frame), and with `creases` also the creases in view. Hidden edges are included.
     pub fn lines(&self, clip_from_object: DMat4, eye: DVec3, creases: bool) -> Vec<Line> {
         let seen: Vec<bool> = self.planes.iter().map(|(normal, offset)| normal.dot(eye) > *offset).collect();
         let place = |corner: u32| clip_from_object * self.corners[corner as usize].extend(1.0);
@@ -118,7 +120,8 @@ impl Edges {
 /// The part of a segment in clip coordinates that lies in front of the eye and within the picture.
 fn clipped([from, to]: [DVec4; 2]) -> Option<[DVec4; 2]> {
     let sides = |c: DVec4| [c.w - 1e-6, c.w - c.x, c.w + c.x, c.w - c.y, c.w + c.y];
-    let (mut first, mut last) = (0.0, 1.0);
+    let mut first = 0.0;
+    let mut last = 1.0;
     for (a, b) in sides(from).into_iter().zip(sides(to)) {
         if a < 0.0 && b < 0.0 {
             return None;

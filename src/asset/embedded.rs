@@ -29,8 +29,8 @@ const FILES: &[(&str, &[u8])] = files![
 /// The folder that embedded paths stand in: `assets/scenes/NAME.toml`.
 pub const ROOT: &str = "assets";
 
-/// The contents of an embedded file, by its path from the repository's root, such as `assets/meshes/torus.obj`. The path may
-/// contain `..`, as a scene's relative paths do.
+/// The contents of an embedded file, by its path from the repository's root, such as `assets/meshes/torus.obj`. The
+/// path may contain `..`, as a scene's relative paths do.
 pub fn find(path: &Path) -> Option<&'static [u8]> {
     entry(path).map(|(_, bytes)| *bytes)
 }
@@ -56,9 +56,6 @@ fn entry(path: &Path) -> Option<&'static (&'static str, &'static [u8])> {
 }
 
 /// [`find`] as a reader of files.
-///
-/// # Errors
-/// [`Error::Input`] for a path that is not embedded.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     find(path).map(<[u8]>::to_vec).ok_or_else(|| Error::input(path, "no such embedded file"))
 }

@@ -1,15 +1,17 @@
 //! The smallest sphere around a set of points.
 //!
-//! Smallest enclosing balls are an LP-type problem (Welzl 1991): the ball is fixed by at most four of the points. The loop
-//! here keeps such a support, adds the point farthest outside, and solves the five points by trying every subset. The radius
-//! grows in every iteration, so the loop ends; meshes take 5 to 30 iterations, each one pass over the points.
+//! Smallest enclosing balls are an LP-type problem (Welzl 1991): the ball is fixed by at most four of the points. The
+//! loop here keeps such a support, adds the point farthest outside, and solves the five points by trying every subset.
+//! The radius grows in every iteration, so the loop ends; meshes take 5 to 30 iterations, each one pass over the
+//! points.
 
 use glam::{DMat3, DVec3, Vec3};
 
-/// A point counts as inside when its distance is within this factor of the radius: far above f64 rounding, far below f32.
+/// A point counts as inside when its distance is within this factor of the radius: far above f64 rounding, far below
+/// f32.
 const INSIDE: f64 = 1.0 + 1e-11;
-/// The centre of the bounding box is used instead if its sphere is larger by at most this factor, one f32 rounding, because it
-/// is exact for a symmetric mesh.
+/// The centre of the bounding box is used instead if its sphere is larger by at most this factor, one f32 rounding,
+/// because it is exact for a symmetric mesh.
 const CENTRE_SLACK: f64 = 1.0 + 2e-7;
 /// Bound on the iterations, more than any mesh needs, in case rounding makes the support cycle.
 const TURN_LIMIT: usize = 1000;

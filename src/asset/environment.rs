@@ -1,5 +1,5 @@
-//! Distant light: radiance that depends on direction only, evaluated and projected to spherical harmonics. Its small bright discs
-//! are kept apart.
+//! Distant light: radiance that depends on direction only, evaluated and projected to spherical harmonics. Its small
+//! bright discs are kept apart.
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,8 @@ use crate::sh::rotation::Rotation;
 /// Largest angle by which the light may be turned: f32 still resolves hundredths of a degree there.
 const TURN_LIMIT_DEG: f32 = 1e5;
 
-/// Distant light as data: the sum of the parts that are given, or darkness if none is. Radiances are linear RGB, W m^-2 sr^-1.
+/// Distant light as data: the sum of the parts that are given, or darkness if none is. Radiances are linear RGB, W m^-2
+/// sr^-1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EnvironmentData {
@@ -52,7 +53,6 @@ pub struct EnvironmentData {
 }
 
 impl Default for EnvironmentData {
-    /// Darkness.
     fn default() -> Self {
         EnvironmentData {
             strength: 1.0,
@@ -190,8 +190,8 @@ pub struct KeyLight {
 
 /// An equirectangular HDR, OpenEXR (linear) or PNG (sRGB) picture around the scene.
 ///
-/// The top row is +y. The middle column is -z, straight ahead for a viewer who looks along -z, and columns to its right are
-/// to the right, +x; the picture's left and right edges meet at +z.
+/// The top row is +y. The middle column is -z, straight ahead for a viewer who looks along -z, and columns to its right
+/// are to the right, +x; the picture's left and right edges meet at +z.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EnvironmentImage {
@@ -212,11 +212,6 @@ pub struct Environment {
 
 impl Environment {
     /// Checks `source` and decodes its picture, whose bytes `read` supplies.
-    ///
-    /// # Errors
-    /// [`Error::Input`], one line: a negative number, radiance over [`RADIANCE_LIMIT`], a direction without length, a picture
-    /// that cannot be read, is not HDR, EXR or PNG, is wider than [`super::equirect::WIDTH_LIMIT_PX`], or holds negative or
-    /// non-finite radiance.
     pub fn new(source: &EnvironmentData, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Self> {
         source.check()?;
         let picture = source.image.as_ref().map(|image| {
@@ -229,9 +224,6 @@ impl Environment {
     }
 
     /// The same picture with other data. If the data name a picture, it must be the same one.
-    ///
-    /// # Errors
-    /// As [`Environment::new`], and if the data name another picture.
     pub fn with(&self, source: &EnvironmentData) -> Result<Self> {
         source.check()?;
         let file = |source: &EnvironmentData| source.image.as_ref().map(|image| image.file.clone());
@@ -247,7 +239,6 @@ impl Environment {
         Ok(Self { source: source.clone(), picture, dome })
     }
 
-    /// Its data.
     pub fn source(&self) -> &EnvironmentData {
         &self.source
     }
@@ -257,8 +248,8 @@ impl Environment {
         self.source.has_at_most_a_sun() || self.source.strength == 0.0
     }
 
-    /// Distant discs: the sun, that of the generated sky, and what was taken out of the picture ([`Equirect::peak`]). Scenes light by
-    /// them as by entities, so that they cast sharp shadows.
+    /// Distant discs: the sun, that of the generated sky, and what was taken out of the picture ([`Equirect::peak`]).
+    /// Scenes light by them as by entities, so that they cast sharp shadows.
     pub fn discs(&self) -> Vec<Disc> {
         let EnvironmentData { sun, image, strength, .. } = &self.source;
         let peak = self.picture.as_ref().zip(image.as_ref()).and_then(|(picture, image)| {

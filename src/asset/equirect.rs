@@ -19,11 +19,12 @@ use crate::sh::rotation::Rotation;
 pub const WIDTH_LIMIT_PX: u32 = 16_384;
 /// Largest amount of memory in bytes that decoding an image may take.
 const DECODE_LIMIT_BYTES: u64 = 2 << 30;
-/// The same for an image of no bytes, and for each of its bytes, so that a short file cannot claim a large picture: deflate packs at most
-/// 1 032 bytes into one.
+/// The same for an image of no bytes, and for each of its bytes, so that a short file cannot claim a large picture:
+/// deflate packs at most 1 032 bytes into one.
 const DECODE_LIMIT_BY_SIZE: [u64; 2] = [64 << 20, 4096];
-/// Nodes of the rule along a row's polar angle. SH times the sine are trigonometric polynomials of degree [`MAX_BANDS`]: for
-/// the worst picture, one row from pole to pole, the rule's error is below 1e-9, and for two rows it is below f64 precision.
+/// Nodes of the rule along a row's polar angle. SH times the sine are trigonometric polynomials of degree
+/// [`MAX_BANDS`]: for the worst picture, one row from pole to pole, the rule's error is below 1e-9, and for two rows it
+/// is below f64 precision.
 const ROW_NODES: usize = 16;
 
 /// Linear radiance of texels. Rows start at +y; columns start behind the viewer and run from left to right: see
@@ -51,10 +52,6 @@ fn widest_tile(bytes: &[u8]) -> Option<u32> {
 
 impl Equirect {
     /// Decodes an HDR, OpenEXR or PNG file and projects it.
-    ///
-    /// # Errors
-    /// [`Error::Input`], one line: another format, damaged, larger than [`WIDTH_LIMIT_PX`] by half of it, or a pixel that is
-    /// negative or not finite.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
         let fail = |what: String| Error::Input(format!("environment image: {what}"));
         let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| fail(e.to_string()))?;
@@ -93,14 +90,15 @@ impl Equirect {
         Ok(picture)
     }
 
-    /// The sun of the picture, which its texels and coefficients no longer hold, if it had one: a spot of at most 8 degrees that sends at
-    /// least a twentieth of all light.
+    /// The sun of the picture, which its texels and coefficients no longer hold, if it had one: a spot of at most 8
+    /// degrees that sends at least a twentieth of all light.
     pub fn peak(&self) -> Option<Disc> {
         self.peak
     }
 
     fn take_out_peak(&mut self) -> Option<Disc> {
-        let (width, height) = (self.width as f64, self.height as f64);
+        let width = self.width as f64;
+        let height = self.height as f64;
         let direction = |x: usize, y: usize| {
             let (across, ahead) = (TAU * ((x as f64 + 0.5) / width - 0.5)).sin_cos();
             let (level, up) = (PI * (y as f64 + 0.5) / height).sin_cos();
@@ -114,23 +112,26 @@ impl Equirect {
         let column = (0.5 + direction.x.atan2(-direction.z) / TAU) * self.width as f64;
         let row = direction.y.clamp(-1.0, 1.0).acos() / PI * self.height as f64;
         // The right edge and the south pole round onto the last texel; a negative index saturates to 0.
-        let (x, y) = ((column as usize).min(self.width - 1), (row as usize).min(self.height - 1));
+        let x = (column as usize).min(self.width - 1);
+        let y = (row as usize).min(self.height - 1);
         DVec3::from_array(self.texels[y * self.width + x].map(f64::from))
     }
 
-    /// Its projection to at most [`MAX_BANDS`] bands, one list per channel. It is exact for a radiance that is constant over
-    /// each texel: texels are integrated, not sampled at their centres.
+    /// Its projection to at most [`MAX_BANDS`] bands, one list per channel. It is exact for a radiance that is constant
+    /// over each texel: texels are integrated, not sampled at their centres.
     pub fn coefficients(&self, bands: usize) -> [&[f64]; 3] {
         self.coefficients.each_ref().map(|channel| &channel[..bands * bands])
     }
 
-    /// With the polar axis along z, SH are A_lm(theta) times cos(m phi) or sin(|m| phi), so the integral over a texel is the
-    /// integral along its row's polar angle times the integral along its column's azimuth. A rotation from +z to +y follows.
+    /// With the polar axis along z, SH are A_lm(theta) times cos(m phi) or sin(|m| phi), so the integral over a texel
+    /// is the integral along its row's polar angle times the integral along its column's azimuth. A rotation from +z to
+    /// +y follows.
     fn project(&self) -> [Vec<f64>; 3] {
         // Column x spans the azimuth -TAU x / width to -TAU (x + 1) / width from +z, which stands for frame +x.
         let across: Vec<[[f64; 2]; MAX_BANDS]> = (0..self.width)
             .map(|x| {
-                let (middle, half) = (TAU * (x as f64 + 0.5) / self.width as f64, PI / self.width as f64);
+                let middle = TAU * (x as f64 + 0.5) / self.width as f64;
+                let half = PI / self.width as f64;
                 std::array::from_fn(|m| {
                     let m = m as f64;
                     let length = if m == 0.0 { 2.0 * half } else { 2.0 * (m * half).sin() / m };

@@ -1,7 +1,7 @@
 //! Errors as colours, with a scale bar.
 //!
-//! Magnitudes run from dark to light (viridis, whose brightness grows evenly, also in grey and for colour-blind readers). Signed errors
-//! run from blue (too dark) over white to red (too bright), equally dark at both ends.
+//! Magnitudes run from dark to light (viridis, whose brightness grows evenly, also in grey and for colour-blind
+//! readers). Signed errors run from blue (too dark) over white to red (too bright), equally dark at both ends.
 
 use super::lettering;
 use super::picture::linear_from_srgb;
@@ -63,10 +63,12 @@ impl ColorScale {
         (low..=4).step_by(2).map(|i| f64::from(i) / 4.0 * self.limit).collect()
     }
 
-    /// Adds a labelled colour bar below a picture of linear RGB triples. Returns the new picture and its height in pixels.
+    /// Adds a labelled colour bar below a picture of linear RGB triples. Returns the new picture and its height in
+    /// pixels.
     pub fn with_bar(&self, rgb: &[f32], width: usize, title: &str) -> (Vec<f32>, usize) {
         let size = (width / 480).clamp(1, 4);
-        let (line, edge) = (lettering::GLYPH * size + 4 * size, 8 * size);
+        let line = lettering::GLYPH * size + 4 * size;
+        let edge = 8 * size;
         let bar_height = 14 * size;
         // A title that does not fit is wrapped.
         let columns = ((width.saturating_sub(2 * edge)) / lettering::width("0", size)).max(8);
@@ -80,7 +82,8 @@ impl ColorScale {
             lettering::write(&mut out, width, (edge, y), size, [1.0; 3], text);
             y += line;
         }
-        let (left, right) = (edge, width.saturating_sub(edge).max(edge + 2));
+        let left = edge;
+        let right = width.saturating_sub(edge).max(edge + 2);
         let low = self.ticks()[0];
         for x in left..right.min(width) {
             let part = (x - left) as f64 / (right - 1 - left) as f64;
@@ -146,7 +149,8 @@ mod tests {
         let absolute = ColorScale { scheme: Scheme::Absolute, limit: 0.2 };
         let signed = ColorScale { scheme: Scheme::Signed, limit: 0.2 };
         for i in 0..50 {
-            let (less, more) = (0.004 * f64::from(i), 0.004 * f64::from(i + 1));
+            let less = 0.004 * f64::from(i);
+            let more = 0.004 * f64::from(i + 1);
             assert!(brightness(absolute.color(less)) < brightness(absolute.color(more)), "{more}");
             for sign in [-1.0, 1.0] {
                 assert!(brightness(signed.color(sign * less)) >= brightness(signed.color(sign * more)), "{more}");

@@ -1,7 +1,7 @@
 //! Generated meshes with analytic normals, for the built-in scenes and the tests.
 //!
-//! The functions assert their ranges and are the crate's own. [`Generator`](super::Generator) is their public form; it reports bad numbers
-//! as errors.
+//! The functions assert their ranges and are the crate's own. [`Generator`](super::Generator) is their public form; it
+//! reports bad numbers as errors.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -31,8 +31,8 @@ fn finish(
         .unwrap_or_else(|e| panic!("generator {name} made a bad mesh: {e}"))
 }
 
-/// Coordinate `index` of 0 to `cells` on an edge of length `size` centred on zero. All edges use this function, so shared edges
-/// match to the bit; it is odd about the middle, so opposite ends do too.
+/// Coordinate `index` of 0 to `cells` on an edge of length `size` centred on zero. All edges use this function, so
+/// shared edges match to the bit; it is odd about the middle, so opposite ends do too.
 fn along(size: f32, index: u32, cells: u32) -> f32 {
     (f64::from(size) * 0.5 * (2.0 * f64::from(index) - f64::from(cells)) / f64::from(cells)) as f32
 }
@@ -50,7 +50,8 @@ pub fn plane(size_m: f32, cells: u32) -> Mesh {
         (0..row * row).map(|i| Vec3::new(along(size_m, i % row, cells), 0.0, along(size_m, i / row, cells))).collect();
     let corner = |x: u32, z: u32| z * row + x;
     let triangles = (0..cells * cells).flat_map(|i| {
-        let (x, z) = (i % cells, i / cells);
+        let x = i % cells;
+        let z = i / cells;
         split([corner(x, z), corner(x, z + 1), corner(x + 1, z + 1), corner(x + 1, z)])
     });
     let triangles = triangles.collect();
@@ -91,7 +92,9 @@ pub fn sphere(radius_m: f32, subdivisions: u32) -> Mesh {
         triangles = triangles
             .iter()
             .flat_map(|&[a, b, c]| {
-                let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+                let ab = middle(a, b);
+                let bc = middle(b, c);
+                let ca = middle(c, a);
                 [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
             })
             .collect();
@@ -100,8 +103,8 @@ pub fn sphere(radius_m: f32, subdivisions: u32) -> Mesh {
     finish("sphere", positions, points.iter().map(|p| p.as_vec3()).collect(), None, triangles)
 }
 
-/// A closed ring around the y axis: `major_m` to the middle of its cross-section, which has radius `minor_m` <= `major_m`.
-/// segments * sides vertices, all on the torus.
+/// A closed ring around the y axis: `major_m` to the middle of its cross-section, which has radius `minor_m` <=
+/// `major_m`. segments * sides vertices, all on the torus.
 pub fn torus(major_m: f32, minor_m: f32, segments: u32, sides: u32) -> Mesh {
     ring("torus", major_m, minor_m, segments, sides, None)
 }
@@ -138,7 +141,8 @@ fn ring(
     let corner = |s: u32, k: u32| (s % segments) * sides + k % sides;
     let triangles = (0..segments * sides)
         .flat_map(|i| {
-            let (s, k) = (i / sides, i % sides);
+            let s = i / sides;
+            let k = i % sides;
             split([corner(s, k), corner(s + 1, k), corner(s + 1, k + 1), corner(s, k + 1)])
         })
         .collect();
@@ -146,17 +150,21 @@ fn ring(
     finish(name, positions, normals, colors, triangles)
 }
 
-/// A closed box around the origin with `cells` squares along every edge; normals are split at the edges, positions agree.
+/// A closed box around the origin with `cells` squares along every edge; normals are split at the edges, positions
+/// agree.
 pub fn cuboid(size_m: Vec3, cells: u32) -> Mesh {
     assert!(size_m.min_element() > 0.0 && cells > 0, "cuboid: size {size_m}, cells {cells}");
-    let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    let mut positions = Vec::new();
+    let mut normals = Vec::new();
+    let mut triangles = Vec::new();
     let row = cells + 1;
     for axis in 0..3 {
         for side in [0, cells] {
             let base = positions.len() as u32;
             let mut normal = Vec3::ZERO;
             normal[axis] = if side == 0 { -1.0 } else { 1.0 };
-            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let u = (axis + 1) % 3;
+            let v = (axis + 2) % 3;
             for i in 0..row * row {
                 let mut p = Vec3::ZERO;
                 p[axis] = along(size_m[axis], side, cells);
@@ -167,7 +175,8 @@ pub fn cuboid(size_m: Vec3, cells: u32) -> Mesh {
             }
             let corner = |x: u32, y: u32| base + y * row + x;
             for i in 0..cells * cells {
-                let (x, y) = (i % cells, i / cells);
+                let x = i % cells;
+                let y = i / cells;
                 let square = [corner(x, y), corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)];
                 // u, v and the axis are right-handed, so the square as it stands faces the positive side.
                 triangles.extend(split(if side == 0 { [square[0], square[3], square[2], square[1]] } else { square }));

@@ -8,7 +8,8 @@ use crate::error::{Error, Result};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// A generated mesh as a scene file names it: a table with one key, for example `sphere = { radius_m = 0.5, subdivisions = 3 }`.
+/// A generated mesh as a scene file names it: a table with one key, for example `sphere = { radius_m = 0.5,
+/// subdivisions = 3 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Generator {
@@ -65,7 +66,8 @@ pub enum Generator {
         /// Edge lengths in metres along x and z.
         size_m: [f32; 2],
     },
-    /// Martin Newell's teapot: y up, base on y = 0, spout towards +x, 6.5 m from handle to spout and 2.4 m high. It is not closed.
+    /// Martin Newell's teapot: y up, base on y = 0, spout towards +x, 6.5 m from handle to spout and 2.4 m high. It is
+    /// not closed.
     Teapot {
         /// Squares along an edge of each of the 32 patches.
         subdivisions: u32,
@@ -76,7 +78,8 @@ impl Generator {
     /// Checks the numbers and makes the mesh.
     ///
     /// # Errors
-    /// [`Error::Input`], one line, where a length is not positive and finite or a count is zero or makes too many triangles.
+    /// [`Error::Input`], one line, where a length is not positive and finite or a count is zero or makes too many
+    /// triangles.
     pub fn build(&self) -> Result<Mesh> {
         use Generator::{Cuboid, Disc, Plane, Rectangle, Sphere, Teapot, Torus, TorusTwoColour};
         let square = |n: u32| u64::from(n).pow(2);

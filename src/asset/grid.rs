@@ -16,7 +16,8 @@ pub struct Grid {
     pub sides: [Vec3; 2],
     /// Number of cells in a row, and number of rows.
     pub cells: [u32; 2],
-    /// Vertices of every cell, row by row: at its corners (0, 0), (1, 0), (0, 1) and (1, 1). The first may have [`UPWARDS`] added.
+    /// Vertices of every cell, row by row: at its corners (0, 0), (1, 0), (0, 1) and (1, 1). The first may have
+    /// [`UPWARDS`] added.
     pub vertices: Vec<[u32; 4]>,
 }
 
@@ -67,7 +68,8 @@ impl Grid {
     pub fn rim(&self) -> impl Iterator<Item = u32> {
         let [columns, rows] = self.cells.map(|n| n as usize);
         let at_side = move |cell: usize| {
-            let (x, y) = (cell % columns, cell / columns);
+            let x = cell % columns;
+            let y = cell / columns;
             x == 0 || y == 0 || x + 1 == columns || y + 1 == rows
         };
         let cells = self.vertices.iter().enumerate().filter(move |(cell, _)| at_side(*cell));
@@ -75,8 +77,8 @@ impl Grid {
     }
 }
 
-/// Vertices of every cell of a grid with `columns` cells in a row, if every cell has two halves along one diagonal. `places` are
-/// the vertices' grid coordinates, which start at `least`.
+/// Vertices of every cell of a grid with `columns` cells in a row, if every cell has two halves along one diagonal.
+/// `places` are the vertices' grid coordinates, which start at `least`.
 fn cells(triangles: &[[u32; 3]], places: &[[i64; 2]], least: [i64; 2], columns: i64) -> Option<Vec<[u32; 4]>> {
     const NONE: u32 = u32::MAX;
     let mut cells = vec![[NONE; 4]; triangles.len() / 2];

@@ -5,7 +5,6 @@ use font8x8::UnicodeFonts;
 /// Edge of a glyph in pixels at size 1, with its spacing.
 pub const GLYPH: usize = 8;
 
-/// Width of a text in pixels.
 pub fn width(text: &str, size: usize) -> usize {
     GLYPH * size * text.chars().count()
 }
@@ -16,8 +15,10 @@ pub fn write(rgb: &mut [f32], picture_width: usize, (x, y): (usize, usize), size
     for (index, letter) in text.chars().enumerate() {
         let rows = font8x8::BASIC_FONTS.get(letter).or_else(|| font8x8::GREEK_FONTS.get(letter)).unwrap_or_default();
         for place in 0..(GLYPH * size).pow(2) {
-            let (dx, dy) = (place % (GLYPH * size), place / (GLYPH * size));
-            let (px, py) = (x + index * GLYPH * size + dx, y + dy);
+            let dx = place % (GLYPH * size);
+            let dy = place / (GLYPH * size);
+            let px = x + index * GLYPH * size + dx;
+            let py = y + dy;
             let at = 3 * (py * picture_width + px);
             if rows[dy / size] >> (dx / size) & 1 == 1 && px < picture_width && at + 3 <= rgb.len() {
                 rgb[at..at + 3].copy_from_slice(&color);
@@ -32,7 +33,8 @@ mod tests {
 
     #[test]
     fn letters_stand_where_they_should() {
-        let (width, height) = (40, 20);
+        let width = 40;
+        let height = 20;
         let mut rgb = vec![0.0; 3 * width * height];
         write(&mut rgb, width, (10, 2), 1, [1.0; 3], "-");
         let lit: Vec<(usize, usize)> =

@@ -41,13 +41,10 @@ pub struct Mesh {
 impl Mesh {
     /// Checks and completes a mesh.
     ///
-    /// Empty `normals` are computed from the triangles, weighted by angle; given ones are brought to unit length, and those
-    /// of zero length replaced by computed ones. Triangles with two equal corners are dropped, which leaves a closed surface
-    /// closed; needles and other triangles without area are kept, since dropping them could open it. Unused vertices are dropped.
-    ///
-    /// # Errors
-    /// [`Error::Input`] with one line: no triangles, more than [`TRIANGLE_LIMIT`], an index out of range, a number that is
-    /// not finite or beyond [`COORDINATE_LIMIT_M`], zero radius, zero total area.
+    /// Empty `normals` are computed from the triangles, weighted by angle; given ones are brought to unit length, and
+    /// those of zero length replaced by computed ones. Triangles with two equal corners are dropped, which leaves a
+    /// closed surface closed; needles and other triangles without area are kept, since dropping them could open it.
+    /// Unused vertices are dropped.
     pub fn new(
         name: impl Into<String>,
         positions: Vec<Vec3>,
@@ -95,14 +92,14 @@ impl Mesh {
         (self.centre, self.radius_m)
     }
 
-    /// Whether the surface, with equal positions welded, is a 2-manifold without boundary, wound consistently and outwards
-    /// (positive volume). Only then may back faces be culled.
+    /// Whether the surface, with equal positions welded, is a 2-manifold without boundary, wound consistently and
+    /// outwards (positive volume). Only then may back faces be culled.
     pub fn is_closed(&self) -> bool {
         self.shape.closed
     }
 
-    /// Whether the mesh is closed and each of its pieces has positive volume, so that no piece is the wall of a cavity or inside
-    /// out. From outside, only front faces are seen.
+    /// Whether the mesh is closed and each of its pieces has positive volume, so that no piece is the wall of a cavity
+    /// or inside out. From outside, only front faces are seen.
     pub fn is_solid(&self) -> bool {
         self.shape.solid
     }
@@ -140,8 +137,9 @@ impl Mesh {
         area_m2(&self.positions, &self.triangles)
     }
 
-    /// Mean over all directions of the share of its bounding sphere's disc that the mesh covers, if it is a ball: convex, with every face
-    /// at least 0.9 r from the centre. Of a convex body that mean is its area over four (Cauchy 1841).
+    /// Mean over all directions of the share of its bounding sphere's disc that the mesh covers, if it is a ball:
+    /// convex, with every face at least 0.9 r from the centre. Of a convex body that mean is its area over four (Cauchy
+    /// 1841).
     pub fn ball_share(&self) -> Option<f64> {
         let radius = f64::from(self.radius_m);
         let depth = |triangle: &[u32; 3]| {
@@ -157,7 +155,6 @@ impl Mesh {
         self.panel
     }
 
-    /// The mesh of a lamp with that face.
     pub(super) fn with_panel(self, panel: LampFace) -> Self {
         Mesh { panel: Some(panel), ..self }
     }
@@ -203,7 +200,8 @@ fn check_numbers(positions: &[Vec3], normals: &[Vec3], colors: Option<&[Vec3]>, 
     Ok(())
 }
 
-/// Drops triangles with two equal corners and renumbers vertices by first use: (old index of every new vertex, triangles).
+/// Drops triangles with two equal corners and renumbers vertices by first use: (old index of every new vertex,
+/// triangles).
 fn compact(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 3]>) {
     let mut new_index = vec![u32::MAX; positions.len()];
     let mut used = Vec::new();
@@ -227,8 +225,8 @@ fn compact(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 3
     (used, kept)
 }
 
-/// Unit normals: the given ones normalised; where there is none, the angle-weighted mean of the triangles around the vertex
-/// (Thuermer and Wuethrich 1998), which does not depend on how a face is cut; +y where even that vanishes.
+/// Unit normals: the given ones normalised; where there is none, the angle-weighted mean of the triangles around the
+/// vertex (Thuermer and Wuethrich 1998), which does not depend on how a face is cut; +y where even that vanishes.
 fn complete_normals(positions: &[Vec3], triangles: &[[u32; 3]], given: &[Vec3]) -> Vec<Vec3> {
     let mut sums = vec![DVec3::ZERO; positions.len()];
     if given.is_empty() || given.iter().any(|n| n.as_dvec3().try_normalize().is_none()) {
@@ -249,7 +247,8 @@ fn complete_normals(positions: &[Vec3], triangles: &[[u32; 3]], given: &[Vec3]) 
     (0..positions.len()).map(unit).collect()
 }
 
-/// Whether a normal has unit length up to f32 rounding; such a normal is kept to the bit, so that files read back unchanged.
+/// Whether a normal has unit length up to f32 rounding; such a normal is kept to the bit, so that files read back
+/// unchanged.
 fn is_unit(normal: Vec3) -> bool {
     (normal.as_dvec3().length_squared() - 1.0).abs() < 5e-7
 }

@@ -1,13 +1,13 @@
 //! Triangle meshes, distant light and pictures.
 //!
-//! Everything read from a file is checked here, once: all other modules rely on a [`mesh::Mesh`] to have finite numbers,
-//! indices within range and a positive size.
+//! Everything read from a file is checked here, once: all other modules rely on a [`mesh::Mesh`] to have finite
+//! numbers, indices within range and a positive size.
 
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
 use crate::error::{Error, Result};
+pub use crate::text::short;
 
 pub mod decode;
 pub mod disc;
@@ -36,16 +36,6 @@ pub mod topology;
 pub use generator::Generator;
 pub use mesh::Mesh;
 
-/// A number as text; very large and very small ones have an exponent (`1e15`).
-pub fn short<T: Copy + Into<f64> + std::fmt::Display + std::fmt::LowerExp>(number: T) -> String {
-    let size = number.into().abs();
-    if size.is_finite() && size != 0.0 && !(1e-4..1e7).contains(&size) {
-        format!("{number:e}")
-    } else {
-        number.to_string()
-    }
-}
-
 /// Fails where the content of a file is larger than what is read; `what` says what it is.
 pub(crate) fn check_size(path: &Path, size: usize, limit_bytes: u64, what: &str) -> Result<()> {
     if size as u64 <= limit_bytes {
@@ -63,13 +53,10 @@ pub(crate) fn utf8<'b>(path: &Path, bytes: &'b [u8], limit_bytes: u64, what: &st
     })
 }
 
-/// Reads a file of at most `limit_bytes`, whatever length the file system reports.
-///
-/// # Errors
-/// [`Error::Input`] where it cannot be read or is larger.
+/// Reads a file of at most `limit_bytes`, whatever length the file system reports (see [`crate::files::open`]).
 pub fn read_file(path: &Path, limit_bytes: u64) -> Result<Vec<u8>> {
     let unread = |error| Error::input(path, format!("cannot be read: {error}"));
-    let file = File::open(path).map_err(unread)?;
+    let file = crate::files::open(path).map_err(unread)?;
     let mut bytes = Vec::new();
     // Reading one byte past the limit detects an oversized file; pipes and devices report no length.
     file.take(limit_bytes + 1).read_to_end(&mut bytes).map_err(unread)?;

@@ -1,13 +1,14 @@
 //! Wavefront OBJ: a checking reader around `tobj`, and a writer whose text reads back as the same bits.
 //!
-//! The reader accepts `v x y z [w | r g b]` (colours are linear emission), `vn`, and `f` with any number of corners, as `v`, `v/vt`,
-//! `v//vn` or `v/vt/vn`, counted from 1 or from the end (-1). Groups, objects, materials, texture coordinates, points and lines
-//! are skipped: the file is one mesh. If any corner lacks a normal, all normals are computed; vertices are then smooth where
-//! faces share an index. Faces of more than three corners become fans, so they should be convex.
+//! The reader accepts `v x y z [w | r g b]` (colours are linear emission), `vn`, and `f` with any number of corners, as
+//! `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1 or from the end (-1). Groups, objects, materials, texture
+//! coordinates, points and lines are skipped: the file is one mesh. If any corner lacks a normal, all normals are
+//! computed; vertices are then smooth where faces share an index. Faces of more than three corners become fans, so they
+//! should be convex.
 //!
-//! `tobj` accepts NaN and indices past the end (some of which it wraps around), panics on faces without corners, and invents
-//! missing normals. So every line is checked here first, which also provides the line numbers for messages, and `tobj` receives
-//! only checked lines with plain indices.
+//! `tobj` accepts NaN and indices past the end (some of which it wraps around), panics on faces without corners, and
+//! invents missing normals. So every line is checked here first, which also provides the line numbers for messages, and
+//! `tobj` receives only checked lines with plain indices.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -23,17 +24,11 @@ pub const FILE_LIMIT_BYTES: u64 = 256 << 20;
 
 impl Mesh {
     /// Reads a Wavefront OBJ file; see [`super::obj`] for the accepted syntax.
-    ///
-    /// # Errors
-    /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line: missing, or as [`Mesh::parse`].
     pub fn load(path: &Path) -> Result<Self> {
         Self::parse(&super::read_file(path, FILE_LIMIT_BYTES)?, path)
     }
 
     /// Reads OBJ text from memory, for files embedded in the binary; `path` is only for messages and the name.
-    ///
-    /// # Errors
-    /// [`Error::Input`]: over [`FILE_LIMIT_BYTES`], not UTF-8, a malformed line, or as [`Mesh::new`].
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let text = super::utf8(path, bytes, FILE_LIMIT_BYTES, "mesh")?;
         let count = |keyword| text.lines().filter(|l| l.split_whitespace().next() == Some(keyword)).count();
@@ -110,7 +105,9 @@ impl Scan {
     }
 
     fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> std::result::Result<(), String> {
-        let (mut plain, mut with_normals, mut corner_count) = (String::from("f"), String::from("f"), 0);
+        let mut plain = String::from("f");
+        let mut with_normals = String::from("f");
+        let mut corner_count = 0;
         for word in words {
             let parts: Vec<&str> = word.split('/').collect();
             if parts.len() > 3 {
@@ -158,7 +155,9 @@ impl Scan {
 /// Gives every (position, normal) pair in use a vertex of its own.
 fn join_indices(name: &str, from: &tobj::Mesh, has_normals: bool) -> Result<Mesh> {
     let triple = |values: &[f32], i: u32| Vec3::from_slice(&values[3 * i as usize..]);
-    let (mut positions, mut normals, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut positions = Vec::new();
+    let mut normals = Vec::new();
+    let mut colors = Vec::new();
     let mut vertices = HashMap::new();
     let mut corners = Vec::with_capacity(from.indices.len());
     for (k, &position) in from.indices.iter().enumerate() {

@@ -1,6 +1,6 @@
-//! Lamps that shine from one flat side: discs and rectangles. A panel is a thin closed body whose upper face alone has a colour, so that
-//! everything that reads meshes sees it as it is. The mesh also says that it is a panel ([`Mesh::panel`]), for light that is computed
-//! from its shape.
+//! Lamps that shine from one flat side: discs and rectangles. A panel is a thin closed body whose upper face alone has
+//! a colour, so that everything that reads meshes sees it as it is. The mesh also says that it is a panel
+//! ([`Mesh::panel`]), for light that is computed from its shape.
 
 use super::generate::cuboid;
 use super::mesh::Mesh;
@@ -22,11 +22,10 @@ fn lamp(name: &str, body: Mesh, panel: LampFace) -> Result<Mesh> {
 }
 
 /// A disc of `radius_m` around the origin, which shines towards +y.
-///
-/// # Errors
-/// As [`Mesh::new`].
 pub fn disc(radius_m: f32) -> Result<Mesh> {
-    let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    let mut positions = Vec::new();
+    let mut normals = Vec::new();
+    let mut triangles = Vec::new();
     let height = THICKNESS * radius_m / 2.0;
     let around = |i: u32| {
         let angle = TAU * f64::from(i % SEGMENTS) / f64::from(SEGMENTS);
@@ -56,9 +55,6 @@ pub fn disc(radius_m: f32) -> Result<Mesh> {
 }
 
 /// A rectangle around the origin with edges of those lengths along x and z, which shines towards +y.
-///
-/// # Errors
-/// As [`Mesh::new`].
 pub fn rectangle([width_m, depth_m]: [f32; 2]) -> Result<Mesh> {
     let height = THICKNESS * width_m.hypot(depth_m) / 2.0;
     let body = cuboid(Vec3::new(width_m, height, depth_m), 1);

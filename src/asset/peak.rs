@@ -1,7 +1,8 @@
 //! The sun of an environment picture, taken out as a disc.
 //!
-//! Four bands spread a sun of half a degree over half the sky. What stands out of its surroundings in a small spot becomes a
-//! [`Disc`] instead, which casts sharp shadows, and the picture keeps the rest. Together they send as much light as the whole picture.
+//! Four bands spread a sun of half a degree over half the sky. What stands out of its surroundings in a small spot
+//! becomes a [`Disc`] instead, which casts sharp shadows, and the picture keeps the rest. Together they send as much
+//! light as the whole picture.
 
 use super::disc::Disc;
 use glam::DVec3;
@@ -20,8 +21,8 @@ const LEAST_TEXELS: f64 = 2.0;
 /// Least half diameter of the disc, radians: the sun's.
 const LEAST_HALF_RAD: f64 = 0.265 * PI / 180.0;
 
-/// Takes the peak out of a picture of `width` x `height` texels, rows from +y, if it has one. `direction` gives the middle of a texel by
-/// column and row.
+/// Takes the peak out of a picture of `width` x `height` texels, rows from +y, if it has one. `direction` gives the
+/// middle of a texel by column and row.
 pub(super) fn take_out(
     texels: &mut [[f32; 3]],
     [width, height]: [usize; 2],
@@ -42,7 +43,8 @@ pub(super) fn take_out(
     // The first of the brightest.
     let brightest =
         (0..texels.len()).reduce(|best, i| if gray(&texels[i]) > gray(&texels[best]) { i } else { best })?;
-    let (x, y) = (brightest % width, brightest / width);
+    let x = brightest % width;
+    let y = brightest / width;
     let middle = direction(x, y);
     let rows = (AROUND_RAD / row_rad).ceil() as usize + 1;
     let near: Vec<(usize, f64, DVec3)> = (y.saturating_sub(rows)..(y + rows + 1).min(height))
@@ -62,7 +64,9 @@ pub(super) fn take_out(
     };
     let around = [0, 1, 2].map(median);
     let excess = |texel: &[f32; 3]| [0, 1, 2].map(|c| (texel[c] - around[c]).max(0.0));
-    let (mut taken, mut within, mut toward) = (DVec3::ZERO, 0.0, DVec3::ZERO);
+    let mut taken = DVec3::ZERO;
+    let mut within = 0.0;
+    let mut toward = DVec3::ZERO;
     for (i, solid, at) in &inner {
         let over = rgb(&excess(&texels[*i])) * *solid;
         taken += over;

@@ -1,7 +1,7 @@
 //! Writes pictures: PNG with the exact sRGB curve, animated PNG, and linear OpenEXR.
 //!
-//! Rows run from the top, pixels from the left, three channels each. A file appears under its name only once it is complete:
-//! it is written beside it and renamed.
+//! Rows run from the top, pixels from the left, three channels each. A file appears under its name only once it is
+//! complete: it is written beside it and renamed.
 
 use std::io::Write;
 use std::path::Path;
@@ -29,9 +29,6 @@ pub fn encode_srgb(linear_rgb: &[f32], exposure_ev: f32) -> Vec<u8> {
 }
 
 /// Writes linear RGB as 8-bit sRGB PNG; a text chunk `Exposure` states the exposure in stops.
-///
-/// # Errors
-/// [`Error::Failed`] where the path cannot be written; [`Error::Input`] where the numbers are too few or too many for the size.
 pub fn write_png(path: &Path, width: u32, height: u32, linear_rgb: &[f32], exposure_ev: f32) -> Result<()> {
     check_size(path, width, height, linear_rgb.len())?;
     let pixels = encode_srgb(linear_rgb, exposure_ev);
@@ -44,11 +41,8 @@ pub fn write_png(path: &Path, width: u32, height: u32, linear_rgb: &[f32], expos
     })
 }
 
-/// Writes 8-bit sRGB frames (see [`encode_srgb`]) as an endlessly repeating animated PNG with `fps` frames per second. Frames
-/// are requested one by one, and only their compressed form is kept until the file is written.
-///
-/// # Errors
-/// As [`write_png`]; [`Error::Usage`] without frames or with zero `fps`; that of a frame.
+/// Writes 8-bit sRGB frames (see [`encode_srgb`]) as an endlessly repeating animated PNG with `fps` frames per second.
+/// Frames are requested one by one, and only their compressed form is kept until the file is written.
 pub fn write_apng(
     path: &Path,
     width: u32,
@@ -75,9 +69,6 @@ pub fn write_apng(
 }
 
 /// Writes linear RGB as OpenEXR with 32-bit floats, without any rounding.
-///
-/// # Errors
-/// [`Error::Failed`] where the path cannot be written; [`Error::Input`] where the numbers are too few or too many for the size.
 pub fn write_exr(path: &Path, width: u32, height: u32, linear_rgb: &[f32]) -> Result<()> {
     check_size(path, width, height, linear_rgb.len())?;
     // The encoder seeks, so the file is made in memory.
@@ -108,11 +99,8 @@ fn check_size(path: &Path, width: u32, height: u32, channel_count: usize) -> Res
 /// What can go wrong while a file is written.
 type WriteResult = std::result::Result<(), Box<dyn std::error::Error>>;
 
-/// Writes a file in its folder under another name and renames it, so that it is never seen half-written. If the path is not
-/// a regular file (a pipe, `/dev/stdout`), it is written to directly.
-///
-/// # Errors
-/// [`Error::Failed`] with the path; then no partial file remains.
+/// Writes a file in its folder under another name and renames it, so that it is never seen half-written. If the path is
+/// not a regular file (a pipe, `/dev/stdout`), it is written to directly.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> WriteResult) -> Result<()> {
     files::replace_with(path, write).map_err(|e| Error::Failed(format!("{}: cannot be written: {e}", path.display())))
 }

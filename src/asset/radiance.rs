@@ -12,8 +12,8 @@ pub(super) fn one() -> f32 {
     1.0
 }
 
-/// z_l = sqrt((2l + 1) / (4 pi)) * 2 pi * integral over c of exp(sharpness * (c - 1)) P_l(c), by Simpson's rule in 1 - c over the
-/// part where the exponential exceeds 1e-17.
+/// z_l = sqrt((2l + 1) / (4 pi)) * 2 pi * integral over c of exp(sharpness * (c - 1)) P_l(c), by Simpson's rule in 1 -
+/// c over the part where the exponential exceeds 1e-17.
 pub(super) fn key_zonal(bands: usize, sharpness: f64) -> Vec<f64> {
     let end = if sharpness > 20.0 { 40.0 / sharpness } else { 2.0 };
     let step = end / LOBE_INTERVALS as f64;
@@ -29,7 +29,8 @@ pub(super) fn key_zonal(bands: usize, sharpness: f64) -> Vec<f64> {
         let below = step * i as f64;
         let value = weight * step / 3.0 * (-sharpness * below).exp();
         let c = 1.0 - below;
-        let (mut previous, mut legendre) = (0.0, 1.0);
+        let mut previous = 0.0;
+        let mut legendre = 1.0;
         for (l, sum) in z.iter_mut().enumerate() {
             *sum += value * legendre;
             let degree = l as f64;

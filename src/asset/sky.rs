@@ -1,8 +1,9 @@
-//! A generated sky: the daylight of Preetham, Shirley and Smits, *A Practical Analytic Model for Daylight*, SIGGRAPH 1999, over
-//! ground of one colour, with a sun.
+//! A generated sky: the daylight of Preetham, Shirley and Smits, *A Practical Analytic Model for Daylight*, SIGGRAPH
+//! 1999, over ground of one colour, with a sun.
 //!
-//! Luminance and chromaticity of the dome are the paper's equation 3 with the coefficients of its appendix A.2. The brightness is
-//! not physical: [`Sky::radiance`] and [`Sky::sun`] set the radiance of a white surface, so that no exposure has to be found.
+//! Luminance and chromaticity of the dome are the paper's equation 3 with the coefficients of its appendix A.2. The
+//! brightness is not physical: [`Sky::radiance`] and [`Sky::sun`] set the radiance of a white surface, so that no
+//! exposure has to be found.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -16,8 +17,8 @@ use crate::error::{Error, Result};
 use crate::sh::basis::{self, MAX_BANDS, MAX_COEFFICIENTS};
 use crate::sh::quadrature::gauss_legendre;
 
-/// Nodes in the cosine and in azimuth of the rule that projects the dome. Doubling them changes every coefficient by less than
-/// 2e-4 of the first one.
+/// Nodes in the cosine and in azimuth of the rule that projects the dome. Doubling them changes every coefficient by
+/// less than 2e-4 of the first one.
 const RULE: (usize, usize) = (64, 128);
 /// Optical depth of clear air at the zenith for red, green and blue (Rayleigh scattering, 1 / wavelength^4).
 const AIR_DEPTH: DVec3 = DVec3::new(0.05, 0.10, 0.22);
@@ -59,8 +60,6 @@ impl Default for Sky {
 }
 
 impl Sky {
-    /// # Errors
-    /// [`Error::Input`], one line that names the key out of range.
     pub(super) fn check(&self) -> Result<()> {
         let range = |what: &str, value: f32, low: f32, high: f32| match (low..=high).contains(&value) {
             true => Ok(()),
@@ -81,7 +80,6 @@ impl Sky {
     }
 }
 
-/// An evaluated sky.
 #[derive(Clone, Debug)]
 pub struct Dome {
     /// Direction to the sun, unit.

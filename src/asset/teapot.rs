@@ -15,21 +15,18 @@ pub const DEFAULT_SUBDIVISIONS: u32 = 10;
 const VERTICAL_SQUEEZE: f64 = 1.3;
 /// Vertices of neighbouring patches closer than this, in units of the table, are one position.
 const WELD_DISTANCE: f64 = 1e-6;
-/// Normals that agree this closely at one position are one vertex; f64 rounding leaves less than 1e-9 between patches that
-/// meet smoothly.
+/// Normals that agree this closely at one position are one vertex; f64 rounding leaves less than 1e-9 between patches
+/// that meet smoothly.
 const WELD_COSINE: f64 = 1.0 - 1e-6;
 
 type Patch = [[DVec3; 4]; 4];
 
 /// Tessellates the patches of `control_text` with `subdivisions` squares along each edge.
 ///
-/// The result has y up, spout towards +x, handle towards -x, its base on y = 0, and is in units of the original table taken
-/// as metres (6.4 m from handle to spout, 2.4 m high). Normals are analytic, and point out of the body. Where a patch edge
-/// collapses to a point, the limit of the normal is taken and triangles without area are dropped. The mesh is not closed: the lid
-/// rests on an open pot, and spout and handle reach into it.
-///
-/// # Errors
-/// [`Error::Input`] for malformed control text.
+/// The result has y up, spout towards +x, handle towards -x, its base on y = 0, and is in units of the original table
+/// taken as metres (6.4 m from handle to spout, 2.4 m high). Normals are analytic, and point out of the body. Where a
+/// patch edge collapses to a point, the limit of the normal is taken and triangles without area are dropped. The mesh
+/// is not closed: the lid rests on an open pot, and spout and handle reach into it.
 pub fn teapot(control_text: &str, subdivisions: u32) -> Result<Mesh> {
     assert!(subdivisions > 0, "teapot: no subdivisions");
     let mut weld = Weld::default();
@@ -38,14 +35,15 @@ pub fn teapot(control_text: &str, subdivisions: u32) -> Result<Mesh> {
         let row = subdivisions + 1;
         let vertices: Vec<u32> = (0..row * row)
             .map(|i| {
-                let (u, v) =
-                    (f64::from(i / row) / f64::from(subdivisions), f64::from(i % row) / f64::from(subdivisions));
+                let u = f64::from(i / row) / f64::from(subdivisions);
+                let v = f64::from(i % row) / f64::from(subdivisions);
                 let (position, normal) = evaluate(&patch, u, v);
                 weld.add(position, normal)
             })
             .collect();
         for i in 0..subdivisions * subdivisions {
-            let (u, v) = (i / subdivisions, i % subdivisions);
+            let u = i / subdivisions;
+            let v = i % subdivisions;
             let at = |u: u32, v: u32| vertices[(u * row + v) as usize];
             let [a, b, c, d] = [at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)];
             // The table's u x v points into the body, so the square is wound the other way and normals are v x u.
@@ -113,7 +111,8 @@ fn evaluate(patch: &Patch, u: f64, v: f64) -> (DVec3, DVec3) {
     (blend(patch, bu, bv), normal.normalize_or(DVec3::Y))
 }
 
-/// Collects vertices: positions closer than [`WELD_DISTANCE`] become equal, and one vertex where the normals agree as well.
+/// Collects vertices: positions closer than [`WELD_DISTANCE`] become equal, and one vertex where the normals agree as
+/// well.
 #[derive(Default)]
 struct Weld {
     cells: HashMap<IVec3, Vec<u32>>,
@@ -126,7 +125,8 @@ impl Weld {
     fn add(&mut self, position: DVec3, normal: DVec3) -> u32 {
         // Cells are much larger than the distance; neighbouring cells are searched where their border is close.
         let cell = |p: DVec3| (p / (64.0 * WELD_DISTANCE)).floor().as_ivec3();
-        let (low, high) = (cell(position - WELD_DISTANCE), cell(position + WELD_DISTANCE));
+        let low = cell(position - WELD_DISTANCE);
+        let high = cell(position + WELD_DISTANCE);
         let mut found = None;
         for x in low.x..=high.x {
             for y in low.y..=high.y {

@@ -9,7 +9,8 @@ use glam::{DVec3, Vec3};
 pub struct Topology {
     /// 2-manifold without boundary, wound consistently, positive volume.
     pub closed: bool,
-    /// Closed, and every piece has positive volume: from outside no back face is seen, unless a piece intersects itself.
+    /// Closed, and every piece has positive volume: from outside no back face is seen, unless a piece intersects
+    /// itself.
     pub solid: bool,
     /// Closed, in one piece, Euler characteristic 2, no edge bends inwards.
     pub convex: bool,
@@ -21,7 +22,8 @@ pub struct Topology {
 
 /// Largest distance of a vertex from the plane of a flat mesh, relative to the bounding radius: a few f32 roundings.
 const FLAT_TOLERANCE: f64 = 1e-5;
-/// Largest displacement of a vertex by f32 rounding, relative to the bounding radius, with a factor of 4 for rotated files.
+/// Largest displacement of a vertex by f32 rounding, relative to the bounding radius, with a factor of 4 for rotated
+/// files.
 const VERTEX_NOISE: f64 = 5e-7;
 
 /// One side of a triangle: `corner` is 3 * triangle + k, the side runs from that corner to the next one.
@@ -36,7 +38,8 @@ pub(super) struct HalfEdge {
 /// Classifies the surface. `triangles` have three different positions each; `radius_m` is that of the bounding sphere.
 pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m: f32) -> Topology {
     let (corners, distinct) = weld(positions, triangles);
-    let (sides, vertex_count) = (sides(&corners), distinct.len());
+    let sides = sides(&corners);
+    let vertex_count = distinct.len();
     let edges: Vec<&[HalfEdge]> = edges(&sides).collect();
     let euler_characteristic = vertex_count as i64 - edges.len() as i64 + triangles.len() as i64;
 
@@ -65,7 +68,8 @@ fn tetrahedron_m3(positions: &[Vec3], triangle: &[u32; 3], centre: Vec3) -> f64 
 
 /// Numbers equal positions alike (-0 is 0): the numbers of every triangle's corners, and the position of every number.
 pub(super) fn weld(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<Vec3>) {
-    let (mut numbers, mut distinct) = (HashMap::with_capacity(positions.len()), Vec::new());
+    let mut numbers = HashMap::with_capacity(positions.len());
+    let mut distinct = Vec::new();
     let number = |p: &Vec3| {
         *numbers.entry((*p + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert_with(|| {
             distinct.push(*p);
@@ -83,7 +87,6 @@ pub(super) fn sides(corners: &[u32]) -> Vec<HalfEdge> {
     sides
 }
 
-/// The sides on each edge.
 pub(super) fn edges(sides: &[HalfEdge]) -> impl Iterator<Item = &[HalfEdge]> {
     sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high))
 }
@@ -93,15 +96,18 @@ pub(super) fn next_corner(corner: usize) -> usize {
 }
 
 fn side(corners: &[u32], corner: usize) -> HalfEdge {
-    let (from, to) = (corners[corner], corners[next_corner(corner)]);
+    let from = corners[corner];
+    let to = corners[next_corner(corner)];
     HalfEdge { low: from.min(to), high: from.max(to), reversed: from > to, corner: corner as u32 }
 }
 
-/// Number of closed fans of triangles around vertices. It exceeds the number of vertices if two surfaces touch in a point.
+/// Number of closed fans of triangles around vertices. It exceeds the number of vertices if two surfaces touch in a
+/// point.
 fn fan_count(edges: &[&[HalfEdge]], corner_count: usize) -> usize {
     let mut sets = Sets::new(corner_count);
     for e in edges {
-        let (a, b) = (e[0].corner as usize, e[1].corner as usize);
+        let a = e[0].corner as usize;
+        let b = e[1].corner as usize;
         sets.join(a, next_corner(b));
         sets.join(next_corner(a), b);
     }
@@ -145,7 +151,8 @@ impl Sets {
     }
 
     fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
+        let a = self.root(a);
+        let b = self.root(b);
         if a != b {
             self.parent[a.max(b)] = a.min(b) as u32;
             self.count -= 1;
@@ -153,12 +160,15 @@ impl Sets {
     }
 }
 
-/// Whether the far corner of the edge's second triangle lies below the plane of the first, or above it by no more than rounding
-/// explains. Rounding tilts the first plane, so its effect grows with the ratio of the two corners' distances from the edge.
+/// Whether the far corner of the edge's second triangle lies below the plane of the first, or above it by no more than
+/// rounding explains. Rounding tilts the first plane, so its effect grows with the ratio of the two corners' distances
+/// from the edge.
 fn bends_outwards(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]], radius_m: f64) -> bool {
     let at = |corner: usize| positions[triangles[corner / 3][corner % 3] as usize].as_dvec3();
-    let (one, other) = (edge[0].corner as usize, edge[1].corner as usize);
-    let (from, to) = (at(one), at(next_corner(one)));
+    let one = edge[0].corner as usize;
+    let other = edge[1].corner as usize;
+    let from = at(one);
+    let to = at(next_corner(one));
     let own_far = at(next_corner(next_corner(one)));
     let other_far = at(next_corner(next_corner(other)));
     let normal = (to - from).cross(own_far - from);
@@ -169,7 +179,8 @@ fn bends_outwards(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]],
     unit.dot(other_far - from) <= VERTEX_NOISE * radius_m * (1.0 + other_height / own_height)
 }
 
-/// Chooses three vertices that span the set widely, so that the plane is well determined, and tests all others against it.
+/// Chooses three vertices that span the set widely, so that the plane is well determined, and tests all others against
+/// it.
 fn is_flat(positions: &[Vec3], radius_m: f64) -> bool {
     let most = |measure: &dyn Fn(DVec3) -> f64| {
         let larger = |a: DVec3, b: DVec3| if measure(b) > measure(a) { b } else { a };

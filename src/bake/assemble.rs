@@ -1,6 +1,6 @@
-//! Pass "assemble": makes the stored field from captured samples. It lowers them by their curvature, which suits interpolation. It
-//! copies the borders of cube faces from neighbouring faces, and it fills samples that see nothing from valid ones around them.
-//! It rounds to f16 where the field is stored so.
+//! Pass "assemble": makes the stored field from captured samples. It lowers them by their curvature, which suits
+//! interpolation. It copies the borders of cube faces from neighbouring faces, and it fills samples that see nothing
+//! from valid ones around them. It rounds to f16 where the field is stored so.
 //!
 //! Input: `captured`, floats of one sample after another. Output: the field's payload at a byte offset of `field`.
 
@@ -18,13 +18,13 @@ use std::sync::Arc;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Source {
-    /// Captured sample.
     pub sample: u32,
     /// The share. The shares in a stored sample sum to 1.
     pub weight: f32,
 }
 
-/// Every stored sample is a weighted sum of captured samples. This lists those of all stored samples, one list after another.
+/// Every stored sample is a weighted sum of captured samples. This lists those of all stored samples, one list after
+/// another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sources {
     /// Where each stored sample's list begins, and at last where the last list ends.
@@ -33,21 +33,18 @@ pub struct Sources {
     pub list: Vec<Source>,
 }
 
-/// The mean height of the chord between two samples above the function, in units of the second difference. Where f'' is constant,
-/// the chord over a step h is too high by f'' t (h - t) / 2 at t, and the mean of that is f'' h^2 / 12. If every sample is lowered
-/// by the mean, the mean square error is least: its root falls from 0.0913 to 0.0373 h^2 f''.
+/// The mean height of the chord between two samples above the function, in units of the second difference. Where f'' is
+/// constant, the chord over a step h is too high by f'' t (h - t) / 2 at t, and the mean of that is f'' h^2 / 12. If
+/// every sample is lowered by the mean, the mean square error is least: its root falls from 0.0913 to 0.0373 h^2 f''.
 const SAG: f64 = 1.0 / 12.0;
 
 impl Sources {
     /// Plans the assembly of a lattice of which `unseen` marks the captured samples that may not be used.
     ///
-    /// An unusable sample is replaced by the mean of the usable samples that are fewest steps away. A step leads to the next shell or
-    /// to the next direction. `inside` marks samples that were captured elsewhere (see [`super::surface::pushed_out`]); no second
-    /// difference is taken across them. Every other sample is lowered by `SAG` of its second differences along shells and along
-    /// both directions.
-    ///
-    /// # Errors
-    /// `Input` when no sample is usable.
+    /// An unusable sample is replaced by the mean of the usable samples that are fewest steps away. A step leads to the
+    /// next shell or to the next direction. `inside` marks samples that were captured elsewhere (see
+    /// [`super::surface::pushed_out`]); no second difference is taken across them. Every other sample is lowered by
+    /// `SAG` of its second differences along shells and along both directions.
     pub fn new(lattice: &Lattice, inside: &[bool], unseen: &[bool]) -> Result<Self> {
         if inside.iter().all(|&i| i) {
             return Err(Error::Input("every sample point lies inside the solid: nothing can see the object".into()));
@@ -64,7 +61,8 @@ impl Sources {
             .collect();
         let directions = lattice.direction_count();
         let planes = lattice.sources();
-        let (mut offsets, mut list) = (vec![0], Vec::new());
+        let mut offsets = vec![0];
+        let mut list = Vec::new();
         for shell in 0..lattice.shells {
             for cells in &planes {
                 let mut sum = BTreeMap::<u32, f64>::new();
@@ -95,15 +93,18 @@ fn fit(lattice: &Lattice, inside: &[bool], sample: u32) -> BTreeMap<u32, f64> {
     out
 }
 
-/// Fewest shells, and fewest cells along a face's edge, whose second differences measure curvature. Fewer are too far apart.
+/// Fewest shells, and fewest cells along a face's edge, whose second differences measure curvature. Fewer are too far
+/// apart.
 const FEWEST: u32 = 4;
 
-/// Pairs of samples between which a sample lies: the shells below and above, and the neighbours on both sides along both axes of
-/// a cube's grid. Grids of latitudes and longitudes are lowered by nothing, since they exist to compare with earlier work.
+/// Pairs of samples between which a sample lies: the shells below and above, and the neighbours on both sides along
+/// both axes of a cube's grid. Grids of latitudes and longitudes are lowered by nothing, since they exist to compare
+/// with earlier work.
 fn opposite(lattice: &Lattice, sample: u32) -> Vec<[u32; 2]> {
     let Directions::Cube { cells } = lattice.directions else { return Vec::new() };
     let directions = lattice.direction_count();
-    let (shell, direction) = (sample / directions, sample % directions);
+    let shell = sample / directions;
+    let direction = sample % directions;
     let mut out = Vec::new();
     if lattice.shells >= FEWEST && shell > 0 && shell + 1 < lattice.shells {
         out.push([sample - directions, sample + directions]);
@@ -138,11 +139,13 @@ fn nearest_usable(lattice: &Lattice, inside: &[bool], start: u32) -> Vec<u32> {
 /// The samples one step away: the shells above and below, and the four directions around.
 fn neighbours(lattice: &Lattice, sample: u32) -> Vec<u32> {
     let directions = lattice.direction_count();
-    let (shell, direction) = (sample / directions, sample % directions);
+    let shell = sample / directions;
+    let direction = sample % directions;
     let mut out: Vec<u32> = match lattice.directions {
         Directions::Cube { .. } => lattice.cell_neighbours(direction),
         Directions::LatLon { latitudes, longitudes } => {
-            let (y, x) = (direction / longitudes, direction % longitudes);
+            let y = direction / longitudes;
+            let x = direction % longitudes;
             let mut around =
                 vec![y * longitudes + (x + 1) % longitudes, y * longitudes + (x + longitudes - 1) % longitudes];
             around.extend((y > 0).then(|| direction - longitudes));
@@ -174,7 +177,6 @@ pub struct Assemble {
 }
 
 impl Assemble {
-    /// The row of the shader table.
     pub fn row(storage: Storage) -> ShaderPermutation {
         ShaderPermutation::new("assemble.comp", 4)
             .define("HALF", storage == Storage::F16)
@@ -182,18 +184,13 @@ impl Assemble {
     }
 
     /// A pipeline that stores `storage`.
-    ///
-    /// # Errors
-    /// As [`ComputePipeline::new`].
     pub fn new(device: &Arc<Device>, library: &Library, storage: Storage) -> Result<Self> {
         let shader = library.shader(&Self::row(storage))?;
         Ok(Assemble { pipeline: ComputePipeline::new(device, "assemble", &shader, &[])? })
     }
 
-    /// Writes `stored_count` samples of `sample_quads` quads, each multiplied by `factor`, into a byte range of `field`.
-    ///
-    /// # Errors
-    /// `Input` when a buffer is larger than the device can bind.
+    /// Writes `stored_count` samples of `sample_quads` quads, each multiplied by `factor`, into a byte range of
+    /// `field`.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,

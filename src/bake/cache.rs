@@ -1,26 +1,23 @@
 //! The cache of what is baked: fields, silhouette fields, transfer vectors and self-visibility. Names are hashes of the
 //! mesh's content and of everything else that decides the numbers. A `Shelf` says where one kind is kept.
 
-use super::kinds::Kind;
 pub use super::names::field_name;
 use super::names::{SelfVisibilityHeader, TransferHeader, identity, key, silhouette_identity, silhouette_name};
-use super::partial::Partial;
 use super::silhouette::{bake_silhouette, silhouette_header};
-use super::vertices::Wanted;
-use super::{BakeReport, Baker, Options, Progress};
+use super::{BakeReport, Baker, Options, Progress, Wanted};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
 use crate::field::file::{self, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC};
 use crate::field::quantity::channel_stride;
 use crate::field::silhouette::{SilhouetteField, SilhouetteHeader};
-use crate::field::{FieldHeader, FieldKind, ShadowField, self_visibility};
+use crate::field::{FieldHeader, ShadowField, self_visibility};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A folder of what is baked. Where there is no folder or no room on disk, it is kept in memory as long as any clone of the cache
-/// exists. Nothing is baked twice.
+/// A folder of what is baked. Where there is no folder or no room on disk, it is kept in memory as long as any clone of
+/// the cache exists. Nothing is baked twice.
 #[derive(Clone, Default)]
 pub struct Cache {
     folder: Option<PathBuf>,
@@ -48,10 +45,6 @@ const FIELDS: Shelf<ShadowField> = Shelf { ending: "sf", memory: |all| &mut all.
 const SILHOUETTES: Shelf<SilhouetteField> = Shelf { ending: "outlines", memory: |all| &mut all.silhouettes };
 const TRANSFERS: Shelf<Vec<f32>> = Shelf { ending: "transfer", memory: |all| &mut all.transfers };
 const SELF_VISIBILITY: Shelf<Vec<u8>> = Shelf { ending: "selfvis", memory: |all| &mut all.self_visibility };
-/// Endings of the files of bakes that are not done: of a field, and of vertices.
-const FIELD_PART: &str = "part";
-const VERTICES_PART: &str = "vertices-part";
-
 /// What the cache held or a bake has made, and the report of the bake, if there was one.
 pub type CacheAnswer<T> = (Arc<T>, Option<BakeReport>);
 
@@ -72,31 +65,14 @@ impl Cache {
         Cache { folder: folder.map(|f| f.join("fields")), memory: Arc::default() }
     }
 
-    /// The folder that the program keeps its cache in: `shadow-fields` in the user's cache folder; `None` where the user has none. It may
-    /// not exist yet.
+    /// The folder that the program keeps its cache in: `shadow-fields` in the user's cache folder; `None` where the
+    /// user has none. It may not exist yet.
     pub fn usual_folder() -> Option<PathBuf> {
         dirs::cache_dir().map(|folder| folder.join("shadow-fields"))
     }
 
     fn path(&self, key: &str, ending: &str) -> Option<PathBuf> {
         Some(self.folder.as_ref()?.join(format!("{key}.{ending}")))
-    }
-
-    /// The file of what a cancelled bake has kept of one kind of thing, in a cache that has a folder. Outlines have none.
-    pub(super) fn unfinished(&self, mesh: &Mesh, options: &Options, kind: Kind) -> Option<PathBuf> {
-        let field = |kind| self.path(&field_name(&super::header(mesh, kind, options)), FIELD_PART);
-        match kind {
-            Kind::Shadow => field(FieldKind::Occlusion),
-            Kind::Light => field(FieldKind::Radiance),
-            Kind::Silhouette => None,
-            Kind::Vertices => self.unfinished_vertices(mesh, options, Wanted::BOTH),
-        }
-    }
-
-    fn unfinished_vertices(&self, mesh: &Mesh, options: &Options, wanted: Wanted) -> Option<PathBuf> {
-        let transfer = wanted.transfer.then(|| TransferHeader::new(mesh, options));
-        let maps = wanted.self_visibility.then(|| SelfVisibilityHeader::new(mesh, options));
-        self.path(&key(&(transfer, maps)), VERTICES_PART)
     }
 
     fn exists(&self, key: &str, ending: &str) -> bool {
@@ -147,9 +123,6 @@ impl Cache {
     }
 
     /// The field that `header` describes, and the report of its bake, which is `None` if the cache held the field.
-    ///
-    /// # Errors
-    /// As [`Baker::field`]. A damaged or unreadable cache file is baked anew.
     pub fn field(
         &self,
         baker: &Baker,
@@ -161,15 +134,11 @@ impl Cache {
         if let Some(found) = self.look(&FIELDS, &name, |path| read_field(path, header)) {
             return Ok((found, None));
         }
-        let partial = Partial::new(self.path(&name, FIELD_PART));
-        let (made, report) = baker.field_from(&partial, mesh, header.clone(), progress)?;
+        let (made, report) = baker.field(mesh, header.clone(), progress)?;
         Ok((self.keep(&FIELDS, name, made, |path, field| field.write(path)), Some(report)))
     }
 
     /// The silhouette field of a mesh, and the report of its bake, which is `None` if the cache held it.
-    ///
-    /// # Errors
-    /// As [`bake_silhouette`]. A damaged or unreadable cache file is baked anew.
     pub fn silhouette(
         &self,
         baker: &Baker,
@@ -177,7 +146,8 @@ impl Cache {
         options: &Options,
         progress: Progress<'_>,
     ) -> Result<CacheAnswer<SilhouetteField>> {
-        let (name, options) = (silhouette_name(mesh, options), options.silhouette);
+        let name = silhouette_name(mesh, options);
+        let options = options.silhouette;
         let header = silhouette_header(mesh, options);
         if let Some(found) = self.look(&SILHOUETTES, &name, |path| read_silhouette(path, &header)) {
             return Ok((found, None));
@@ -186,10 +156,8 @@ impl Cache {
         Ok((self.keep(&SILHOUETTES, name, made, |path, field| field.write(path)), Some(report)))
     }
 
-    /// What is wanted of the vertices of a mesh (see [`Baker::vertices_from`]). What the cache does not hold is baked together.
-    ///
-    /// # Errors
-    /// As [`Baker::field`]. A damaged or unreadable cache file is baked anew.
+    /// What is wanted of the vertices of a mesh (see [`Baker::vertices`]). What the cache does not hold is baked
+    /// together.
     pub fn vertices(
         &self,
         baker: &Baker,
@@ -198,8 +166,10 @@ impl Cache {
         wanted: Wanted,
         progress: Progress<'_>,
     ) -> Result<FoundVertices> {
-        let (of_transfer, of_maps) = (TransferHeader::new(mesh, options), SelfVisibilityHeader::new(mesh, options));
-        let (transfer_key, maps_key) = (key(&of_transfer), key(&of_maps));
+        let of_transfer = TransferHeader::new(mesh, options);
+        let of_maps = SelfVisibilityHeader::new(mesh, options);
+        let transfer_key = key(&of_transfer);
+        let maps_key = key(&of_maps);
         let transfer = wanted.transfer.then(|| {
             let bytes = 4 * of_transfer.vertex_count * channel_stride(of_transfer.bands);
             let floats = |payload: Vec<u8>| bytemuck::pod_collect_to_vec(&payload);
@@ -218,8 +188,7 @@ impl Cache {
         if !missing.transfer && !missing.self_visibility {
             return Ok(out);
         }
-        let partial = Partial::new(self.unfinished_vertices(mesh, options, missing));
-        let (made, report) = baker.vertices_from(&partial, mesh, options, missing, progress)?;
+        let (made, report) = baker.vertices(mesh, options, missing, progress)?;
         if missing.transfer {
             out.transfer = Some(self.keep(&TRANSFERS, transfer_key, made.transfer, |path, floats| {
                 file::write(path, TRANSFER_MAGIC, &of_transfer, bytemuck::cast_slice(floats))

@@ -1,4 +1,4 @@
-//! Chunks are runs of neighbouring triangles that are drawn or left out together. Each has the bounds that decide it.
+//! Chunks are neighbouring triangles that are drawn or left out together. Each has the bounds that decide it.
 
 use crate::error::{Error, Result};
 use crate::sh::cube::FACE_COUNT;
@@ -11,7 +11,7 @@ use std::ops::Range;
 const CHUNK_TRIANGLES: usize = 128;
 /// Weight of the distance between normals against the distance between places, when chunks are made.
 const CONE_WEIGHT: f32 = 0.5;
-/// A run of triangles with the sphere around them, in r, and the cone around their normals.
+/// Neighbouring triangles with the sphere around them, in r, and the cone around their normals.
 #[derive(Clone, Debug)]
 pub(super) struct Chunk {
     pub indices: Range<u32>,
@@ -39,9 +39,9 @@ impl Chunk {
 
     /// Whether only backs are seen from `eye`. It is never true where a front is seen.
     ///
-    /// The direction to any of its points is within asin(radius / distance) of the direction to the centre, and any normal is within
-    /// the cone around the axis. If these two angles and the one between centre and axis sum to less than a right angle, all
-    /// triangles show their backs. The bound a . q >= sine |q| + radius implies that.
+    /// The direction to any of its points is within asin(radius / distance) of the direction to the centre, and any
+    /// normal is within the cone around the axis. If these two angles and the one between centre and axis sum to less
+    /// than a right angle, all triangles show their backs. The bound a . q >= sine |q| + radius implies that.
     pub fn turned_away(&self, eye: Vec3) -> bool {
         let q = self.centre - eye;
         // The margin covers rounding.
@@ -64,7 +64,6 @@ pub(super) struct Chunked {
 }
 
 impl Chunked {
-    /// The triangles of a chunk.
     pub fn triangles_of(&self, chunk: usize) -> &[[u32; 3]] {
         let Range { start, end } = self.chunks[chunk].indices;
         &self.triangles[start as usize / 3..end as usize / 3]
@@ -72,7 +71,8 @@ impl Chunked {
 
     /// Adds a chunk of triangles that are given by the mesh's vertices.
     pub fn add(&mut self, positions: &[Vec3], corners: &[u32]) {
-        let (first, start) = (self.vertices.len(), self.triangles.len());
+        let first = self.vertices.len();
+        let start = self.triangles.len();
         let (vertices, local) = extract_meshlet_indices(corners);
         self.vertices.extend(vertices);
         self.triangles
@@ -116,19 +116,18 @@ pub fn morton(p: Vec3) -> u32 {
     spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
 }
 
-/// For every cube face seen from `eye`, in the order of [`crate::sh::cube::face_basis`], whether a sphere reaches into its pyramid. It
-/// is never false where the sphere does.
+/// For every cube face seen from `eye`, in the order of [`crate::sh::cube::face_basis`], whether a sphere reaches into
+/// its pyramid. It is never false where the sphere does.
 pub(super) fn faces_reached(eye: Vec3, centre: Vec3, radius: f32) -> [bool; FACE_COUNT] {
     let q = centre - eye;
-    // Planes through the eye at 45 degrees: their unit normals are (forward +- side) / sqrt 2. The margin covers rounding.
+    // Planes through the eye at 45 degrees: their unit normals are (forward +- side) / sqrt 2. The margin covers
+    // rounding.
     let reach = -1.0001 * radius * std::f32::consts::SQRT_2 - 1e-6;
     let behind = -1.0001 * radius - 1e-6;
     let abs = q.abs();
     let side = abs.yxx().max(abs.zzy());
-    let (ahead, back) = (
-        (q - side).cmpge(Vec3::splat(reach)) & q.cmpge(Vec3::splat(behind)),
-        (-q - side).cmpge(Vec3::splat(reach)) & (-q).cmpge(Vec3::splat(behind)),
-    );
+    let ahead = (q - side).cmpge(Vec3::splat(reach)) & q.cmpge(Vec3::splat(behind));
+    let back = (-q - side).cmpge(Vec3::splat(reach)) & (-q).cmpge(Vec3::splat(behind));
     [ahead.x, back.x, ahead.y, back.y, ahead.z, back.z]
 }
 
@@ -166,7 +165,8 @@ mod tests {
         expected.sort_unstable();
         assert_eq!(found, expected);
         let mut rng = fastrand::Rng::with_seed(4);
-        let (mut away, mut all) = (0, 0);
+        let mut away = 0;
+        let mut all = 0;
         for _ in 0..300 {
             let eye = 4.0 * Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5);
             for chunk in chunks.iter().filter(|c| c.turned_away(eye)) {

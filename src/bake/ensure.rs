@@ -1,11 +1,12 @@
-//! Bakes or finds in the cache every field and transfer vector that a scene needs. Everything that shows a scene calls [`ensure()`].
+//! Bakes or finds in the cache every field and transfer vector that a scene needs. Everything that shows a scene calls
+//! [`ensure()`].
 
 use super::cache::{Cache, CacheAnswer, FoundVertices, field_name};
-use super::vertices::Wanted;
-use super::{BakeReport, Baker, Options, Progress, header};
+use super::{BakeReport, Baker, Options, Progress, Wanted, header};
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
+use crate::field::silhouette_nodes::NodeGrid;
 use crate::field::{FieldHeader, FieldKind, ShadowField};
 use crate::scene::light::{self, LightMethod, Lights};
 use crate::scene::{Entity, Scene};
@@ -28,13 +29,11 @@ pub struct Baked {
 /// What is baked of one mesh, as far as the scene's entities need it. Equal meshes share it.
 #[derive(Clone, Default)]
 pub struct BakedMesh {
-    /// Occlusion field.
     pub blocked: Option<Arc<ShadowField>>,
-    /// Radiance field.
     pub radiance: Option<Arc<ShadowField>>,
-    /// Silhouette field.
     pub silhouette: Option<Arc<SilhouetteField>>,
-    /// Self-visibility of every vertex for sharp lights, [`crate::field::self_visibility::BYTES`] each in the mesh's order of vertices.
+    /// Self-visibility of every vertex for sharp lights, [`crate::field::self_visibility::BYTES`] each in the mesh's
+    /// order of vertices.
     pub self_visibility: Option<Arc<Vec<u8>>>,
     /// Transfer vectors in the mesh's order of vertices, or `None` where the cosine lobe of the normal is exact.
     pub transfer: Option<Arc<Vec<f32>>>,
@@ -42,22 +41,20 @@ pub struct BakedMesh {
 
 /// Everything that is baked of a scene.
 pub struct BakedScene {
-    /// For every mesh of the scene.
     pub meshes: Vec<BakedMesh>,
     /// Bakes that were not found in the cache.
     pub baked: Vec<Baked>,
 }
 
-/// What a scene needs to have baked.
 pub struct SceneNeeds {
     /// For every mesh of the scene: what it needs, and the headers of its occlusion and radiance fields.
     meshes: Vec<(Needed, [Option<FieldHeader>; 2])>,
-    /// Options of the bakes.
     pub options: Options,
 }
 
 impl SceneNeeds {
-    /// The needs of a scene whose fields and transfers are baked with `options`. A field that nothing sees is not needed.
+    /// The needs of a scene whose fields and transfers are baked with `options`. A field that nothing sees is not
+    /// needed.
     pub fn of(scene: &Scene, options: &Options, lights: Lights) -> Self {
         let of_mesh = |(index, mesh): (usize, &Arc<Mesh>)| {
             let needed = needs(scene, index, lights);
@@ -85,28 +82,60 @@ impl SceneNeeds {
     }
 }
 
+impl SceneNeeds {
+    /// The bakes that [`ensure()`] will not find in the cache, in its order: the name that progress is told by, and the
+    /// number of captures.
+    pub fn missing(&self, scene: &Scene, cache: &Cache) -> Vec<(String, u32)> {
+        let mut missing: Vec<(String, u32)> = Vec::new();
+        for (mesh, (needed, headers)) in scene.meshes.iter().zip(&self.meshes) {
+            for header in headers.iter().flatten().filter(|header| !cache.has_field(header)) {
+                missing.push((field_title(mesh, header), header.lattice.sample_count()));
+            }
+            if needed.silhouette && !cache.has_silhouette(mesh, &self.options) {
+                missing.push((
+                    format!("{} silhouette", mesh.name),
+                    NodeGrid::map_count(self.options.silhouette.cells) as u32,
+                ));
+            }
+            let wanted = Wanted {
+                transfer: needed.transfer && !cache.has_transfer(mesh, &self.options),
+                self_visibility: needed.self_visibility && !cache.has_self_visibility(mesh, &self.options),
+            };
+            if wanted.transfer || wanted.self_visibility {
+                missing.push((format!("{} {}", mesh.name, wanted.name()), mesh.positions.len() as u32));
+            }
+        }
+        missing
+    }
+}
+
+/// The name of a field's bake.
+fn field_title(mesh: &Mesh, header: &FieldHeader) -> String {
+    let word = if header.kind == FieldKind::Radiance { "light" } else { "shadow" };
+    format!("{} {word}", mesh.name)
+}
+
 /// What the entities of a mesh need to have baked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Needed {
     /// Occlusion and radiance field.
     pub fields: [Option<FieldKind>; 2],
-    /// Silhouette field.
     pub silhouette: bool,
     /// Self-visibility for sharp lights.
     pub self_visibility: bool,
-    /// Transfer vectors.
     pub transfer: bool,
 }
 
-/// What the entities of a mesh need. An entity that only receives, or that nothing else can see, needs no field. Without light
-/// no shadows are needed, without light in spherical harmonics no occlusion field, without sharp lights no silhouettes. A light of
-/// one colour needs no radiance field.
+/// What the entities of a mesh need. An entity that only receives, or that nothing else can see, needs no field.
+/// Without light no shadows are needed, without light in spherical harmonics no occlusion field, without sharp lights
+/// no silhouettes. A light of one colour needs no radiance field.
 pub fn needs(scene: &Scene, mesh: usize, lights: Lights) -> Needed {
     let entities = || (0..scene.entities.len()).filter(|&i| scene.entities[i].mesh == mesh);
     let seen = || entities().map(|i| (i, &scene.entities[i])).filter(|(_, e)| is_seen(scene, e));
     let method = |entity| LightMethod::of(scene, entity, lights);
     let coloured = scene.meshes[mesh].colors.is_some();
-    let (harmonics, sharp) = (light::has_harmonics(scene, lights), light::has_sharp(scene, lights));
+    let harmonics = light::has_harmonics(scene, lights);
+    let sharp = light::has_sharp(scene, lights);
     let shines = |wanted: LightMethod| seen().any(|(i, e)| e.emits && method(i) == wanted);
     let blocked = seen().any(|(_, e)| e.occludes && harmonics) || (shines(LightMethod::Harmonics) && !coloured);
     let radiance = coloured && shines(LightMethod::Harmonics);
@@ -143,7 +172,8 @@ impl Making<'_> {
     fn once<K: Eq + Hash, T>(
         &mut self,
         known: fn(&mut Self) -> &mut HashMap<K, Arc<T>>,
-        (key, what): (K, String),
+        key: K,
+        what: String,
         find: impl FnOnce(Progress<'_>) -> Result<CacheAnswer<T>>,
     ) -> Result<Arc<T>> {
         if let Some(found) = known(self).get(&key) {
@@ -182,11 +212,8 @@ impl Making<'_> {
     }
 }
 
-/// Bakes or finds in the cache every field and transfer of `needs`, which are those of `scene`, mesh by mesh. What is baked is kept in
-/// the cache.
-///
-/// # Errors
-/// As [`Baker::field`].
+/// Bakes or finds in the cache every field and transfer of `needs`, which are those of `scene`, mesh by mesh. What is
+/// baked is kept in the cache.
 pub fn ensure(
     baker: &Baker,
     cache: &Cache,
@@ -194,26 +221,33 @@ pub fn ensure(
     needs: &SceneNeeds,
     progress: SceneProgress<'_>,
 ) -> Result<BakedScene> {
-    let (fields, silhouettes, vertices) = (HashMap::new(), HashMap::new(), HashMap::new());
-    let mut making = Making { progress, baked: Vec::new(), fields, silhouettes, vertices };
-    let (mut meshes, options) = (Vec::with_capacity(scene.meshes.len()), &needs.options);
+    let mut making = Making {
+        progress,
+        baked: Vec::new(),
+        fields: HashMap::new(),
+        silhouettes: HashMap::new(),
+        vertices: HashMap::new(),
+    };
+    let options = &needs.options;
+    let mut meshes = Vec::with_capacity(scene.meshes.len());
     for (mesh, (needed, headers)) in scene.meshes.iter().zip(&needs.meshes) {
         let mut to = BakedMesh::default();
         for (header, to) in headers.iter().zip([&mut to.blocked, &mut to.radiance]) {
             let Some(header) = header else { continue };
-            let word = if header.kind == FieldKind::Radiance { "light" } else { "shadow" };
-            let named = (field_name(header), format!("{} {word}", mesh.name));
-            *to = Some(making.once(|all| &mut all.fields, named, |told| cache.field(baker, mesh, header, told))?);
+            let find = |told: Progress<'_>| cache.field(baker, mesh, header, told);
+            let title = field_title(mesh, header);
+            *to = Some(making.once(|all| &mut all.fields, field_name(header), title, find)?);
         }
         if needed.silhouette {
-            let named = (mesh.content_hash(), format!("{} silhouette", mesh.name));
+            let what = format!("{} silhouette", mesh.name);
             let find = |told: Progress<'_>| cache.silhouette(baker, mesh, options, told);
-            to.silhouette = Some(making.once(|all| &mut all.silhouettes, named, find)?);
+            to.silhouette = Some(making.once(|all| &mut all.silhouettes, mesh.content_hash(), what, find)?);
         }
         let wanted = Wanted { transfer: needed.transfer, self_visibility: needed.self_visibility };
         let find = |missing, told: Progress<'_>| cache.vertices(baker, mesh, options, missing, told);
         let found = making.vertices(mesh, wanted, find)?;
-        (to.transfer, to.self_visibility) = (found.transfer, found.self_visibility);
+        to.transfer = found.transfer;
+        to.self_visibility = found.self_visibility;
         meshes.push(to);
     }
     // What is held for further bakes is free for pictures.

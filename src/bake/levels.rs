@@ -1,10 +1,11 @@
 //! Levels of detail: in place of triangles that are far from the eye, fewer and larger ones are drawn.
 //!
-//! meshoptimizer builds them as in Karis, *Nanite: A Deep Dive*, SIGGRAPH 2021. Neighbouring chunks form a group; a group is simplified
-//! to half of its triangles while the vertices on its rim stay in their places, and what comes out is cut into new chunks for the next
-//! level. A group knows by how much its simplified triangles miss it, and a sphere around it; both grow from level to level. So for
-//! any eye one rule decides each chunk, and what is drawn fits together without a gap: a chunk is drawn if its group may not be
-//! drawn simplified, and if the group that it was simplified from may.
+//! meshoptimizer builds them as in Karis, *Nanite: A Deep Dive*, SIGGRAPH 2021. Neighbouring chunks form a group; a
+//! group is simplified to half of its triangles while the vertices on its rim stay in their places, and what comes out
+//! is cut into new chunks for the next level. A group knows by how much its simplified triangles miss it, and a sphere
+//! around it; both grow from level to level. So for any eye one rule decides each chunk, and what is drawn fits
+//! together without a gap: a chunk is drawn if its group may not be drawn simplified, and if the group that it was
+//! simplified from may.
 
 use super::chunk::{Chunked, adapter};
 use super::triangles::{distinct, unit_positions};
@@ -14,38 +15,28 @@ use glam::Vec3;
 use meshopt::{ClodBounds, ClodConfig, ClodMesh, clod_build, clod_build_hierarchy, clod_default_config};
 use std::ops::Range;
 
-/// Largest displacement of what is captured, in texels of a face. The facets of a round body lie partly inside and partly outside
-/// of it, so a displacement neither shrinks nor grows the solid.
+/// Largest displacement of what is captured, in texels of a face. The facets of a round body lie partly inside and
+/// partly outside of it, so a displacement neither shrinks nor grows the solid.
 pub const TEXEL_SHARE: f64 = 0.25;
 
 /// Triangles from which on a mesh has levels. Below, drawing them all takes less than a third of a bake.
 const FROM_TRIANGLES: usize = 4000;
-/// Triangles of a chunk, and chunks of a group. Larger groups simplify better inside their rims; smaller groups follow the distance
-/// more closely, and save more than twice as much in rough meshes.
+/// Triangles of a chunk, and chunks of a group. Larger groups simplify better inside their rims; smaller groups follow
+/// the distance more closely, and save more than twice as much in rough meshes.
 const CHUNK_TRIANGLES: usize = 32;
 const GROUP_CHUNKS: usize = 8;
-/// Distance, in r, from which on what is drawn may miss the mesh by no more, though it is seen ever smaller. Simplified bodies are a
-/// little smaller on average, and that changes the same share of a field at every distance. With 0.25 it moves the coefficients of a
-/// torus of 69 696 triangles by 0.0027 (relative RMS), with 0.6 by 0.0043; a rough mesh of 69 168 draws 15 % more triangles.
+/// Distance, in r, from which on what is drawn may miss the mesh by no more, though it is seen ever smaller. Simplified
+/// bodies are a little smaller on average, and that changes the same share of a field at every distance. With 0.25 it
+/// moves the coefficients of a torus of 69 696 triangles by 0.0027 (relative RMS), with 0.6 by 0.0043; a rough mesh of
+/// 69 168 draws 15 % more triangles.
 const FARTHEST: f32 = 0.25;
 /// Children of a node of the tree over the groups.
 const NODE_CHILDREN: usize = 8;
 
-/// Whether captures of a mesh draw levels.
-pub fn are_used(mesh: &Mesh, wanted: bool) -> bool {
-    wanted && mesh.triangles.len() >= FROM_TRIANGLES
-}
-
-/// The share of a texel by which captures of a mesh may miss it: [`TEXEL_SHARE`], or 0 where no levels are used.
-pub fn texels(mesh: &Mesh, wanted: bool) -> f64 {
-    if are_used(mesh, wanted) { TEXEL_SHARE } else { 0.0 }
-}
-
-/// Triangles of a mesh that an eye is estimated to be shown, from fronts and backs: with levels of detail, 80 for each of the square root
-/// of their number. It was 76 with 69 168 triangles and 112 with 8 648.
-pub(super) fn estimated_triangles(mesh: &Mesh, levels: bool) -> f64 {
-    let all = mesh.triangles.len() as f64;
-    if levels { all.min(80.0 * all.sqrt()) } else { all }
+/// The share of a texel by which captures of a mesh may miss it where levels are wanted: 0 for meshes that are too
+/// small to have any.
+pub fn texels(mesh: &Mesh) -> f64 {
+    if mesh.triangles.len() >= FROM_TRIANGLES { TEXEL_SHARE } else { 0.0 }
 }
 
 /// The sphere around a group, and the distance by which its simplified triangles miss it, in r.
@@ -91,11 +82,11 @@ impl Tolerance {
 /// Chunks that are simplified together.
 struct Group {
     bounds: GroupBounds,
-    parts: Range<usize>,
+    siblings: Range<usize>,
 }
 
 /// Chunks of a group that were simplified from one group.
-struct GroupPart {
+struct Siblings {
     /// That group, or `None` for the mesh's own triangles.
     from: Option<usize>,
     chunks: Range<u32>,
@@ -115,16 +106,15 @@ enum Below {
 /// Which chunk is drawn in whose place.
 pub(super) struct Levels {
     groups: Vec<Group>,
-    parts: Vec<GroupPart>,
+    siblings: Vec<Siblings>,
     /// The first nodes are the roots of the levels.
     nodes: Vec<Node>,
     depth: usize,
-    /// Indices of all chunks.
     indices: Vec<u32>,
 }
 
 impl Levels {
-    /// Puts runs of the chunks that are drawn under a tolerance into `chosen`, in order.
+    /// Puts ranges of the chunks that are drawn under a tolerance into `chosen`, in order.
     pub fn choose(&self, tolerance: Tolerance, chosen: &mut Vec<Range<u32>>) {
         chosen.clear();
         let mut open: Vec<usize> = (0..self.depth).collect();
@@ -135,22 +125,23 @@ impl Levels {
             match &node.below {
                 Below::Nodes(children) => open.extend(children.clone()),
                 Below::Group(group) => {
-                    let parts = &self.parts[self.groups[*group].parts.clone()];
-                    let drawn =
-                        |part: &&GroupPart| !part.from.is_some_and(|g| tolerance.forbids(&self.groups[g].bounds));
-                    chosen.extend(parts.iter().filter(drawn).map(|part| part.chunks.clone()));
+                    for Siblings { from, chunks } in &self.siblings[self.groups[*group].siblings.clone()] {
+                        if !from.is_some_and(|group| tolerance.forbids(&self.groups[group].bounds)) {
+                            chosen.push(chunks.clone());
+                        }
+                    }
                 }
             }
         }
         chosen.sort_unstable_by_key(|chunks| chunks.start);
     }
 
-    /// Adds the indices of ranges to `indices`, and returns the run that they are there.
+    /// Adds the indices of ranges to `indices`, and returns the range that they are there.
     pub fn gathered(&self, ranges: &[Range<u32>], indices: &mut Vec<u32>) -> Vec<Range<u32>> {
         let start = indices.len() as u32;
-        ranges
-            .iter()
-            .for_each(|range| indices.extend_from_slice(&self.indices[range.start as usize..range.end as usize]));
+        for range in ranges {
+            indices.extend_from_slice(&self.indices[range.start as usize..range.end as usize]);
+        }
         let end = indices.len() as u32;
         if start < end { vec![start..end] } else { Vec::new() }
     }
@@ -192,18 +183,20 @@ fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Level
         simplify_fallback_sloppy: false,
         ..clod_default_config(CHUNK_TRIANGLES)
     };
-    let (mut chunked, mut parts, mut groups) = (Chunked::default(), Vec::new(), Vec::new());
+    let mut chunked = Chunked::default();
+    let mut siblings = Vec::new();
+    let mut groups = Vec::new();
     let mut of_groups = Vec::new();
     clod_build(config, &ClodMesh::new(&welded, &adapter), |group, clusters| {
-        let first = parts.len();
+        let first = siblings.len();
         for alike in clusters.chunk_by(|a, b| a.refined == b.refined) {
             let start = chunked.chunks.len() as u32;
             alike.iter().for_each(|cluster| chunked.add(positions, cluster.indices));
             let chunks = start..chunked.chunks.len() as u32;
-            parts.push(GroupPart { from: usize::try_from(alike[0].refined).ok(), chunks });
+            siblings.push(Siblings { from: usize::try_from(alike[0].refined).ok(), chunks });
         }
         of_groups.push(group);
-        groups.push(Group { bounds: group.simplified.into(), parts: first..parts.len() });
+        groups.push(Group { bounds: group.simplified.into(), siblings: first..siblings.len() });
         groups.len() as i32 - 1
     });
     let depth = of_groups.iter().map(|group| group.depth as usize + 1).max().unwrap_or(0);
@@ -219,7 +212,7 @@ fn leveled(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Chunked, Level
     };
     let nodes = clod_build_hierarchy(&of_groups, NODE_CHILDREN, depth).into_iter().map(node).collect();
     let indices = chunked.triangles.as_flattened().to_vec();
-    Ok((chunked, Levels { groups, parts, nodes, depth, indices }))
+    Ok((chunked, Levels { groups, siblings, nodes, depth, indices }))
 }
 
 #[cfg(test)]
@@ -239,7 +232,8 @@ mod tests {
         Mesh::new("bumpy", positions, Vec::new(), None, ball.triangles.clone()).unwrap()
     }
 
-    /// What is drawn under any tolerance is a closed surface: what runs along an edge one way, runs along it the other way too.
+    /// What is drawn under any tolerance is a closed surface: what runs along an edge one way, runs along it the other
+    /// way too.
     #[test]
     fn chunks_of_all_levels_fit_together() {
         for mesh in [bumpy(), generate::torus(1.0, 0.4, 120, 60)] {

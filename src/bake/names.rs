@@ -1,12 +1,11 @@
 //! Names of what the cache keeps: hashes of the mesh's content and of everything else that decides the numbers.
 
-use super::levels;
 use super::silhouette::silhouette_header;
 use super::{Options, TRANSFER_OFFSET};
 use crate::asset::mesh::Mesh;
 use crate::field::file::VERSION;
 use crate::field::silhouette::SilhouetteHeader;
-use crate::field::{FieldHeader, Shortcuts, self_visibility};
+use crate::field::{FieldHeader, self_visibility};
 use serde::{Deserialize, Serialize};
 
 /// The header of a cached transfer file: everything that decides transfer vectors.
@@ -15,8 +14,6 @@ pub(super) struct TransferHeader {
     mesh_hash: String,
     pub bands: usize,
     face_px: u32,
-    #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
-    shortcuts: Shortcuts,
     #[serde(default, skip_serializing_if = "crate::field::is_zero")]
     level_texels: f64,
     offset: f32,
@@ -29,8 +26,7 @@ impl TransferHeader {
             mesh_hash: super::hash_text(mesh),
             bands: options.bands,
             face_px: options.face_px,
-            shortcuts: options.shortcuts,
-            level_texels: levels::texels(mesh, options.levels),
+            level_texels: options.level_texels(mesh),
             offset: TRANSFER_OFFSET,
             vertex_count: mesh.positions.len(),
         }
@@ -42,8 +38,6 @@ impl TransferHeader {
 pub(super) struct SelfVisibilityHeader {
     mesh_hash: String,
     face_px: u32,
-    #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
-    shortcuts: Shortcuts,
     #[serde(default, skip_serializing_if = "crate::field::is_zero")]
     level_texels: f64,
     offset: f32,
@@ -59,9 +53,7 @@ impl SelfVisibilityHeader {
         SelfVisibilityHeader {
             mesh_hash: super::hash_text(mesh),
             face_px: options.face_px,
-            // Every vertex is captured, whether the mesh has symmetries or not.
-            shortcuts: Shortcuts { symmetry: true, ..options.shortcuts },
-            level_texels: levels::texels(mesh, options.levels),
+            level_texels: options.level_texels(mesh),
             offset: TRANSFER_OFFSET,
             side: self_visibility::SIDE,
             rim: self_visibility::RIM,
@@ -79,14 +71,7 @@ pub(super) fn key(header: &impl Serialize) -> String {
 
 /// What decides a field: its header without the mesh's name and without what only the bake finds out.
 pub(super) fn identity(header: &FieldHeader) -> FieldHeader {
-    FieldHeader {
-        mesh: String::new(),
-        filled_samples: 0,
-        captured_samples: 0,
-        symmetry: String::new(),
-        growth: 0.0,
-        ..header.clone()
-    }
+    FieldHeader { mesh: String::new(), filled_samples: 0, captured_samples: 0, growth: 0.0, ..header.clone() }
 }
 
 /// The name of a field in the cache. Fields with equal content have equal names.
@@ -128,13 +113,11 @@ mod tests {
         let mesh = generate::torus_two_colour(1.0, 0.3, 64, 32);
         let base = Options::default();
         // A new option does not compile here until it has a row below.
-        let Options { bands, field_bands, storage, lattice, face_px, shortcuts, silhouette, levels } = base;
-        let Shortcuts { symmetry, faces, inside } = shortcuts;
+        let Options { bands, field_bands, storage, lattice, face_px, silhouette, levels } = base;
         assert!(field_bands.is_none() && storage == Storage::F16);
-        let shortcuts = |shortcuts| Options { shortcuts, ..base };
         let all = [true, true, true, true, false];
         let silhouettes = |silhouette| Options { silhouette, ..base };
-        let SilhouetteOptions { cells, map_px, view_px, levels: _, symmetry: _ } = silhouette;
+        let SilhouetteOptions { cells, map_px, view_px, levels: _ } = silhouette;
         let outlines = [false, false, false, false, true];
         let flipped: Vec<(&str, Options, [bool; 5])> = vec![
             ("bands", Options { bands: bands + 1, ..base }, [true, true, true, false, false]),
@@ -142,14 +125,10 @@ mod tests {
             ("storage", Options { storage: Storage::F32, ..base }, [true, true, false, false, false]),
             ("lattice", Options { lattice: "cube:4x3".parse().unwrap(), ..base }, [true, true, false, false, false]),
             ("face_px", Options { face_px: face_px / 2, ..base }, all),
-            ("symmetry", shortcuts(Shortcuts { symmetry: !symmetry, faces, inside }), [true, true, true, false, false]),
-            ("faces", shortcuts(Shortcuts { symmetry, faces: !faces, inside }), all),
-            ("inside", shortcuts(Shortcuts { symmetry, faces, inside: !inside }), all),
             ("cells", silhouettes(SilhouetteOptions { cells: 2 * cells, ..silhouette }), outlines),
             ("map_px", silhouettes(SilhouetteOptions { map_px: 2 * map_px, ..silhouette }), outlines),
             ("levels", Options { levels: !levels, ..base }, [true, false, true, true, false]),
             ("levels of outlines", silhouettes(SilhouetteOptions { levels: false, ..silhouette }), outlines),
-            ("symmetry of outlines", silhouettes(SilhouetteOptions { symmetry: false, ..silhouette }), outlines),
             ("view_px", silhouettes(SilhouetteOptions { view_px: 2 * view_px, ..silhouette }), outlines),
         ];
         assert_ne!(lattice, flipped[3].1.lattice);
@@ -162,18 +141,5 @@ mod tests {
                 assert!(!decides || distinct.insert(name.clone()), "{option}: the name of another option's change");
             }
         }
-    }
-
-    /// Fields that were baked before shortcuts had a place in headers are still found: with all shortcuts on, the name is the old one.
-    #[test]
-    fn headers_leave_out_shortcuts_that_are_all_on() {
-        let header = crate::bake::header(&generate::sphere(1.0, 1), FieldKind::Occlusion, &Options::default());
-        let text = serde_json::to_string(&header).unwrap();
-        assert!(!text.contains("shortcuts"), "{text}");
-        assert_eq!(serde_json::from_str::<FieldHeader>(&text).unwrap(), header);
-        let shortcuts = Shortcuts { symmetry: false, ..Shortcuts::default() };
-        let changed = FieldHeader { shortcuts, ..header };
-        let text = serde_json::to_string(&changed).unwrap();
-        assert_eq!(serde_json::from_str::<FieldHeader>(&text).unwrap(), changed);
     }
 }

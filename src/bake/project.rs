@@ -1,9 +1,11 @@
 //! Pass "project": makes SH coefficients of captured cube faces, with one workgroup for each sample.
 //!
-//! Inputs: the atlas of [`super::capture`], a [`Job`] for each sample, and the texel table. Output: `samples[target]`
-//! of `channels` x `channel_stride(bands)` floats. They hold the blocked part (1 where a texel is below 1), the
+//! Inputs: the atlas of [`super::capture`], [`SampleFaces`] for each sample, and the texel table. Output: for each
+//! sample `channels` x `channel_stride(bands)` floats. They hold the blocked part (1 where a texel is below 1), the
 //! radiance, or for transfer the clamped cosine of the normal less the part that the object itself blocks.
 
+use super::capture::Slots;
+use super::samples::Sample;
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
 use crate::gpu::memory::TexelView;
@@ -15,13 +17,10 @@ use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-use super::capture::Slots;
-
 /// What a projection makes of the faces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
     /// Blocked part of an occlusion capture, one channel.
     Blocked,
@@ -32,31 +31,36 @@ pub enum Projection {
 }
 
 impl Projection {
-    /// Channels of a sample.
     pub fn channels(self) -> usize {
         if self == Projection::Radiance { 3 } else { 1 }
     }
 }
 
-/// One sample whose faces are reduced.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct Job {
+pub struct SampleFaces {
     /// Unit surface normal, for transfer and self-visibility.
     pub normal: [f32; 4],
     /// Place of each face in the atlas.
     pub slots: Slots,
-    /// Index of the sample that is written.
-    pub target: u32,
-    /// Factor by which coefficients are multiplied. Where it is 0, nothing is projected.
+    /// Factor on coefficients.
     pub scale: f32,
+    /// Fills the struct up to a multiple of 16 bytes.
+    pub unused: u32,
+}
+
+impl SampleFaces {
+    pub(super) fn new(sample: &Sample, slots: Slots) -> Self {
+        SampleFaces { normal: sample.normal.extend(0.0).to_array(), slots, scale: sample.scale, unused: 0 }
+    }
 }
 
 /// Bytes of shared memory that every device has (Vulkan 1.3, "Required Limits": maxComputeSharedMemorySize).
 const SHARED_BYTES: usize = 16_384;
 
-/// Number of invocations that share a sample's texels. It is one wave of the widest GPUs, or fewer where their sums (one float for each
-/// coefficient and channel) would not fit [`SHARED_BYTES`]: 32 from 5 bands of radiance on, and 16 for 7 bands.
+/// Number of invocations that share a sample's texels. It is one wave of the widest GPUs, or fewer where their sums
+/// (one float for each coefficient and channel) would not fit [`SHARED_BYTES`]: 32 from 5 bands of radiance on, and 16
+/// for 7 bands.
 fn workgroup(bands: usize, projection: Projection) -> u32 {
     let sums = 4 * coefficient_count(bands) * projection.channels();
     [64, 32].into_iter().find(|count| count * sums <= SHARED_BYTES).unwrap_or(16) as u32
@@ -76,7 +80,6 @@ pub(super) struct Push {
 pub struct Project {
     pipeline: ComputePipeline,
     texels: Buffer,
-    /// SH bands.
     pub bands: usize,
     /// What the projection makes of the faces.
     pub projection: Projection,
@@ -85,7 +88,6 @@ pub struct Project {
 }
 
 impl Project {
-    /// The row of the shader table.
     pub fn row(bands: usize, projection: Projection) -> ShaderPermutation {
         ShaderPermutation::new("project.comp", bands)
             .define("CHANNELS", projection.channels() as u32)
@@ -94,9 +96,6 @@ impl Project {
     }
 
     /// A pipeline for faces of `face_px` in an atlas of `columns`.
-    ///
-    /// # Errors
-    /// `Input` when the texel table of such faces is larger than the device's views.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
@@ -118,37 +117,29 @@ impl Project {
     }
 
     /// The view of the texel table that [`Project::record`] wants.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn texel_view(&self) -> Result<TexelView<'_>> {
         TexelView::new(&self.texels, TEXEL_FORMAT)
     }
 
-    /// Room for `count` jobs that the host writes.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    pub fn job_buffer(device: &Arc<Device>, count: u32) -> Result<Buffer> {
-        Buffer::new(device, "project jobs", BufferKind::Upload, u64::from(count) * size_of::<Job>() as u64)
+    /// Room for `count` samples that the host writes.
+    pub fn sample_buffer(device: &Arc<Device>, count: u32) -> Result<Buffer> {
+        let bytes = u64::from(count) * size_of::<SampleFaces>() as u64;
+        Buffer::new(device, "samples with faces", BufferKind::Upload, bytes)
     }
 
-    /// Projects the first `job_count` jobs.
-    ///
-    /// # Errors
-    /// What recording returns.
+    /// Projects the first `sample_count` samples.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
         atlas: &'r Image,
-        jobs: &'r Buffer,
-        texels: &'r TexelView<'r>,
         samples: &'r Buffer,
-        job_count: u32,
+        texels: &'r TexelView<'r>,
+        coefficients: &'r Buffer,
+        sample_count: u32,
     ) -> Result<()> {
         let push = Push { face_px: self.face_px, atlas_columns: self.columns };
-        let resources = [Bind::Image(atlas), Bind::Buffer(jobs), Bind::Texel(*texels), Bind::Buffer(samples)];
-        commands.dispatch(&self.pipeline, &resources, &push, [job_count * self.pipeline.local_size[0], 1, 1])
+        let resources = [Bind::Image(atlas), Bind::Buffer(samples), Bind::Texel(*texels), Bind::Buffer(coefficients)];
+        commands.dispatch(&self.pipeline, &resources, &push, [sample_count * self.pipeline.local_size[0], 1, 1])
     }
 }
 
@@ -159,15 +150,16 @@ fn texel_table(face_px: usize) -> Vec<[f32; 4]> {
     let weights = solid_angle(face_px);
     (0..face_px * face_px)
         .map(|i| {
-            let (s, t) = (texel_st(i % face_px, face_px), texel_st(i / face_px, face_px));
+            let s = texel_st(i % face_px, face_px);
+            let t = texel_st(i / face_px, face_px);
             let d = DVec3::new(s, t, 1.0).normalize();
             [d.x as f32, d.y as f32, d.z as f32, weights[i] as f32]
         })
         .collect()
 }
 
-/// The CPU twin of the pass. `texel(face, x, y)` is what was captured, by channel. The result holds the coefficients of one channel
-/// after another, `channel_stride(bands)` apart.
+/// The CPU twin of the pass. `texel(face, x, y)` is what was captured, by channel. The result holds the coefficients of
+/// one channel after another, `channel_stride(bands)` apart.
 pub fn twin(
     bands: usize,
     projection: Projection,
@@ -182,7 +174,8 @@ pub fn twin(
     let normal = normal.as_dvec3();
     for face in 0..FACE_COUNT {
         for (i, weight) in weights.iter().enumerate() {
-            let (x, y) = (i % face_px, i / face_px);
+            let x = i % face_px;
+            let y = i / face_px;
             let w = direction(face, texel_st(x, face_px), texel_st(y, face_px));
             let mut basis = [0.0; MAX_COEFFICIENTS];
             evaluate(bands, w, &mut basis);

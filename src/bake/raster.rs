@@ -1,9 +1,11 @@
-//! The pass "capture" by computation, for software devices. llvmpipe transforms and clips the triangles that are drawn on one thread, which
-//! takes most of a bake; a compute shader runs on all of its threads, eight triangles a step.
+//! The pass "capture" by computation, for software devices. llvmpipe transforms and clips the triangles that are drawn
+//! on one thread, which takes most of a bake; a compute shader runs on all of its threads, eight triangles a step.
 //!
-//! Inputs: the mesh and the runs of its indices that each face shows (see [`super::capture`]). Output: the atlas, by way of a buffer of
-//! a byte a texel. Faces are cut into strips of rows whose texels fit the shared memory of a workgroup.
+//! Inputs: the mesh and the ranges of its indices that each face shows (see [`super::capture`]). Output: the atlas, by
+//! way of a buffer of a byte a texel. Faces are cut into strips of rows whose texels fit the shared memory of a
+//! workgroup.
 
+use super::model::{DrawnFace, Model};
 use crate::error::Result;
 use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::memory::TexelView;
@@ -13,11 +15,10 @@ use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Invocations of a workgroup: as many as llvmpipe runs in one step with AVX2. With more, each further step would go
-/// through all runs again.
+/// through all ranges again.
 const WORKGROUP: u32 = 8;
 /// Words of shared memory for distances, one for each texel: the 16 KiB that every device has, and a face of 64 px.
 const DISTANCE_WORDS: u32 = 4096;
@@ -26,7 +27,7 @@ const COVER_WORDS: u32 = 1024;
 const POSITION_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 const INDEX_FORMAT: vk::Format = vk::Format::R32_UINT;
 
-/// A face, where it goes, and its runs of indices.
+/// A face, where it goes, and its ranges of indices.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct Face {
@@ -40,10 +41,9 @@ pub struct Face {
     pub forward: [f32; 4],
     /// Place in the atlas.
     pub slot: u32,
-    /// Number of its first run.
-    pub run_first: u32,
-    /// Number of its runs.
-    pub run_count: u32,
+    /// Number of its first range of indices.
+    pub range_first: u32,
+    pub range_count: u32,
     /// Fills the struct up to a multiple of 16 bytes.
     pub unused: u32,
 }
@@ -69,7 +69,7 @@ pub struct Raster {
 /// The faces of a batch on the device.
 pub(super) struct RasterFaces {
     faces: Buffer,
-    runs: Buffer,
+    ranges: Buffer,
     count: u32,
 }
 
@@ -79,19 +79,18 @@ pub(super) fn face_axes(face: usize) -> (Vec3, Vec3, Vec3) {
     (forward.as_vec3(), right.as_vec3(), down.as_vec3())
 }
 
-/// What a face shows: the eye, the face's number and its place in the atlas, and runs of indices.
-pub(super) type Shown<'s> = (Vec3, usize, u32, &'s [Range<u32>]);
-
 impl RasterFaces {
     /// Uploads what faces show.
-    pub fn new<'s>(device: &Arc<Device>, shown: impl Iterator<Item = Shown<'s>>) -> Result<Self> {
-        let (mut faces, mut runs) = (Vec::new(), Vec::new());
-        for (eye, face, slot, own) in shown {
-            let (forward, right, down) = face_axes(face);
-            let (run_first, run_count) = (runs.len() as u32, own.len() as u32);
-            runs.extend(own.iter().map(|run| [run.start, run.end]));
-            let [eye, right, down, forward] = [eye, right, down, forward].map(|v| v.extend(0.0).to_array());
-            faces.push(Face { eye, right, down, forward, slot, run_first, run_count, unused: 0 });
+    pub fn new(device: &Arc<Device>, shown: &[DrawnFace]) -> Result<Self> {
+        let mut faces = Vec::new();
+        let mut ranges = Vec::new();
+        for DrawnFace { eye, face, slot, ranges: own } in shown {
+            let (forward, right, down) = face_axes(*face);
+            let [eye, right, down, forward] = [*eye, right, down, forward].map(|v| v.extend(0.0).to_array());
+            let range_first = ranges.len() as u32;
+            let range_count = own.len() as u32;
+            faces.push(Face { eye, right, down, forward, slot: *slot, range_first, range_count, unused: 0 });
+            ranges.extend(own.iter().map(|range| [range.start, range.end]));
         }
         let upload = |name, bytes: &[u8]| -> Result<Buffer> {
             let mut buffer = Buffer::new(device, name, BufferKind::Upload, bytes.len() as u64)?;
@@ -100,7 +99,7 @@ impl RasterFaces {
         };
         Ok(RasterFaces {
             faces: upload("capture faces", bytemuck::cast_slice(&faces))?,
-            runs: upload("capture runs", bytemuck::cast_slice(&runs))?,
+            ranges: upload("capture ranges", bytemuck::cast_slice(&ranges))?,
             count: faces.len() as u32,
         })
     }
@@ -120,26 +119,24 @@ impl Raster {
         if distance { DISTANCE_WORDS } else { COVER_WORDS }
     }
 
-    /// Whether faces of this edge can be computed: with a byte a texel, in words of four of a row.
+    /// Whether faces of this edge can be computed: bytes are written in words of four of a row.
     pub(super) fn serves(face_px: u32) -> bool {
         face_px.is_multiple_of(4) && face_px <= COVER_WORDS
     }
 
-    /// Whether the device's texel views hold a mesh of so many bytes of positions and of indices.
-    pub(super) fn holds(device: &Device, positions: &Buffer, indices: &Buffer) -> bool {
-        TexelView::fits(device, POSITION_FORMAT, positions.size_bytes)
-            && TexelView::fits(device, INDEX_FORMAT, indices.size_bytes)
+    /// Whether the device's texel views hold a model.
+    pub(super) fn holds(device: &Device, model: &Model) -> bool {
+        TexelView::fits(device, POSITION_FORMAT, model.positions.size_bytes)
+            && TexelView::fits(device, INDEX_FORMAT, model.indices.size_bytes)
     }
 
     /// The pipeline for an atlas of `columns` by `columns` faces of `face_px`.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub(super) fn new(
         device: &Arc<Device>,
         library: &Library,
         distance: bool,
-        (face_px, columns): (u32, u32),
+        face_px: u32,
+        columns: u32,
     ) -> Result<Self> {
         let pipeline = ComputePipeline::new(device, "capture", &library.shader(&Self::row(distance))?, &[])?;
         let bytes = u64::from(columns * face_px).pow(2);
@@ -149,25 +146,22 @@ impl Raster {
 
     /// Computes faces, with a barrier of its own, and copies them into the atlas, which must be in the layout of
     /// [`Access::TransferWrite`].
-    ///
-    /// # Errors
-    /// What recording returns.
     pub(super) fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
-        (positions, indices): (&'r Buffer, &'r Buffer),
-        (faces, culls): (&'r RasterFaces, bool),
+        model: &'r Model,
+        faces: &'r RasterFaces,
         atlas: &'r Image,
     ) -> Result<()> {
         let across = if self.distance { self.face_px } else { self.face_px.div_ceil(32) };
         let band_rows = (Self::words(self.distance) / across).min(self.face_px);
-        let (face_px, atlas_columns) = (self.face_px, self.columns);
-        let push = Push { face_px, atlas_columns, band_rows, culls: u32::from(culls) };
+        let face_px = self.face_px;
+        let push = Push { face_px, atlas_columns: self.columns, band_rows, culls: u32::from(model.closed) };
         let resources = [
             Bind::Buffer(&faces.faces),
-            Bind::Buffer(&faces.runs),
-            Bind::Texel(TexelView::new(positions, POSITION_FORMAT)?),
-            Bind::Texel(TexelView::new(indices, INDEX_FORMAT)?),
+            Bind::Buffer(&faces.ranges),
+            Bind::Texel(TexelView::new(&model.positions, POSITION_FORMAT)?),
+            Bind::Texel(TexelView::new(&model.indices, INDEX_FORMAT)?),
             Bind::Buffer(&self.texels),
         ];
         let groups = [faces.count * WORKGROUP, face_px.div_ceil(band_rows), 1];

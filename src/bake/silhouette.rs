@@ -1,10 +1,10 @@
-//! Pass "silhouette": an object as parallel light sees it from every node of a grid, reduced to maps of distance and depth.
+//! Pass "silhouette": an object as parallel light sees it from every node of a grid, reduced to maps of distance and
+//! depth.
 //!
-//! Inputs: the mesh in units of its bounding radius around its centre; a [`MapFrame`] for each map. Output: two bytes a texel and
-//! map, see [`crate::field::silhouette`]. Views of `view_px` are drawn side by side into an atlas of the farthest and the nearest
-//! depth a pixel; two dispatches reduce every view to its map.
+//! Inputs: the mesh in units of its bounding radius around its centre; a [`MapFrame`] for each map. Output: two bytes a
+//! texel and map, see [`crate::field::silhouette`]. Views of `view_px` are drawn side by side into an atlas of the
+//! farthest and the nearest depth a pixel; two dispatches reduce every view to its map.
 
-use super::symmetric_maps;
 use super::triangles::unit_positions;
 use super::{BakeReport, Baker, Progress, hash_text, levels};
 use crate::asset::mesh::Mesh;
@@ -41,16 +41,15 @@ pub struct SilhouetteOptions {
     pub map_px: u32,
     /// Pixels along an edge of the view that a map is reduced from.
     pub view_px: u32,
-    /// Whether a large mesh is drawn with fewer triangles, which miss it by a share of a view's pixel (see [`super::levels`]).
+    /// Whether a large mesh is drawn with fewer triangles, which miss it by a share of a view's pixel (see
+    /// [`super::levels`]).
     pub levels: bool,
-    /// Whether maps of a symmetric mesh are copied from those that a symmetry moves onto them.
-    pub symmetry: bool,
 }
 
 impl Default for SilhouetteOptions {
     /// 193 maps of 32 x 32 texels: 389 KiB, and 193 KiB for the halves of a mesh that is not convex.
     fn default() -> Self {
-        SilhouetteOptions { cells: 8, map_px: 32, view_px: 128, levels: true, symmetry: true }
+        SilhouetteOptions { cells: 8, map_px: 32, view_px: 128, levels: true }
     }
 }
 
@@ -62,8 +61,7 @@ pub fn silhouette_header(mesh: &Mesh, options: SilhouetteOptions) -> SilhouetteH
         map_px: options.map_px,
         view_px: options.view_px,
         half_px: if mesh.is_convex() { 0 } else { options.map_px / 2 },
-        level_pixels: levels::texels(mesh, options.levels),
-        symmetry: options.symmetry,
+        level_pixels: if options.levels { levels::texels(mesh) } else { 0.0 },
         centre_m: centre.to_array(),
         radius_m,
         extent: extent(mesh),
@@ -137,12 +135,10 @@ pub struct SilhouetteBuffers {
 
 impl SilhouetteBuffers {
     /// Uploads a mesh, of which `triangles` are drawn, and the rectangles of its maps.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn new(
         device: &Arc<Device>,
-        (mesh, triangles): (&Mesh, &[[u32; 3]]),
+        mesh: &Mesh,
+        triangles: &[[u32; 3]],
         frames: &[MapFrame],
         map_px: u32,
     ) -> Result<Self> {
@@ -181,9 +177,6 @@ impl Silhouette {
     }
 
     /// The pipelines for maps and views of these edges.
-    ///
-    /// # Errors
-    /// `Input` when a view is larger than the device's images; `Failed` when a shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, map_px: u32, view_px: u32) -> Result<Self> {
         let most = device.most_image_px();
         if view_px > most {
@@ -201,7 +194,8 @@ impl Silhouette {
             keeps: Keeps::Largest,
             nearer_steps: 0.0,
         };
-        let (vertex, fragment) = (library.shader(&vertex)?, library.shader(&fragment)?);
+        let vertex = library.shader(&vertex)?;
+        let fragment = library.shader(&fragment)?;
         let reduce = |name, row| ComputePipeline::new(device, name, &library.shader(row)?, &[]);
         let bytes = 4 * u64::from(atlas_columns * atlas_columns) * u64::from(map_px) * u64::from(2 * view_px - 1);
         Ok(Silhouette {
@@ -222,15 +216,13 @@ impl Silhouette {
     }
 
     /// Draws and reduces that side of the maps from `map_first` on, one for each frame, at most
-    /// [`Silhouette::capacity`]. Between its own steps it places its own barriers.
-    ///
-    /// # Errors
-    /// What recording returns.
+    /// [`Silhouette::capacity`]. It places the barriers between its own steps.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
         buffers: &'r SilhouetteBuffers,
-        (frames, side): (&[MapFrame], Side),
+        frames: &[MapFrame],
+        side: Side,
         map_first: usize,
     ) -> Result<()> {
         assert!(frames.len() <= self.capacity(), "{} views in an atlas of {}", frames.len(), self.capacity());
@@ -239,7 +231,8 @@ impl Silhouette {
         commands.render(&target, |drawing| {
             drawing.bind(&self.view, &[(&buffers.positions, 0)], &buffers.indices);
             for (view, frame) in frames.iter().enumerate() {
-                let (view, px) = (view as u32, self.view_px);
+                let view = view as u32;
+                let px = self.view_px;
                 drawing.area(view % self.atlas_columns * px, view / self.atlas_columns * px, px, px);
                 drawing.push(&ViewPush::new(frame, side));
                 drawing.indexed(0..buffers.index_count);
@@ -258,29 +251,23 @@ impl Silhouette {
     }
 }
 
-/// Edge of the smallest pixel of all views, in r.
-fn smallest_pixel(header: &SilhouetteHeader, frames: &[MapFrame]) -> f64 {
-    let edges = frames.iter().map(|frame| 2.0 * frame.half.min_element());
-    edges.fold(f64::INFINITY, f64::min) / f64::from(header.view_px)
-}
-
-/// The triangles that all views show. With levels of detail they miss the mesh by a share of the smallest pixel.
+/// The triangles that all views show. With levels of detail they miss the mesh by a share of the smallest pixel of all
+/// views.
 fn drawn_triangles<'m>(
     baker: &Baker,
     mesh: &'m Mesh,
     header: &SilhouetteHeader,
-    pixel: f64,
+    frames: &[MapFrame],
 ) -> Result<Cow<'m, [[u32; 3]]>> {
     if header.level_pixels == 0.0 {
         return Ok(Cow::Borrowed(&mesh.triangles));
     }
+    let edges = frames.iter().map(|frame| 2.0 * frame.half.min_element());
+    let pixel = edges.fold(f64::INFINITY, f64::min) / f64::from(header.view_px);
     Ok(Cow::Owned(baker.leveled(mesh)?.within(header.level_pixels * pixel)))
 }
 
 /// Bakes the silhouette field of a mesh on the device; `progress` hears of maps. Returns the report of the bake too.
-///
-/// # Errors
-/// `Input` when the options are out of range or a view does not fit the device; `Device` when memory ran out.
 pub fn bake_silhouette(
     baker: &Baker,
     mesh: &Mesh,
@@ -288,48 +275,55 @@ pub fn bake_silhouette(
     progress: Progress<'_>,
 ) -> Result<(SilhouetteField, BakeReport)> {
     let started = Instant::now();
-    let (device, library) = (baker.device(), baker.library());
+    let device = baker.device();
+    let library = baker.library();
     let header = silhouette_header(mesh, options);
     header.validate()?;
-    let nodes = NodeGrid::new(options.cells);
-    let mut frames = frames(mesh, &nodes, header.map_count());
-    let pixel = smallest_pixel(&header, &frames);
-    let triangles = drawn_triangles(baker, mesh, &header, pixel)?;
-    let plan =
-        if options.symmetry { symmetric_maps::plan(mesh, &nodes, &frames, pixel) } else { vec![None; frames.len()] };
-    let captured: Vec<MapFrame> =
-        frames.iter().zip(&plan).filter(|(_, c)| c.is_none()).map(|(frame, _)| *frame).collect();
+    let frames = frames(mesh, &NodeGrid::new(options.cells), header.map_count());
+    let triangles = drawn_triangles(baker, mesh, &header, &frames)?;
     // Sides whose maps have the same size share the pass and its buffers.
     let sizes: &[&[Side]] =
         if header.half_px > 0 { &[&[Side::Whole], &[Side::Far, Side::Near]] } else { &[&[Side::Whole]] };
-    let all = (captured.len() * sizes.iter().map(|sides| sides.len()).sum::<usize>()) as u32;
-    let (mut maps, mut done, mut report) = (Vec::new(), 0, BakeReport::default());
+    let all = (frames.len() * sizes.iter().map(|sides| sides.len()).sum::<usize>()) as u32;
+    let mut texels = Vec::new();
+    let mut done = 0;
+    let mut report = BakeReport::default();
     for sides in sizes {
         let map_px = header.edge_px(sides[0]) as u32;
         let pass = Silhouette::new(device, library, map_px, options.view_px * map_px / options.map_px)?;
-        let buffers = SilhouetteBuffers::new(device, (mesh, &triangles), &captured, map_px)?;
+        let buffers = SilhouetteBuffers::new(device, mesh, &triangles, &frames, map_px)?;
         for &side in *sides {
-            let mut first = 0;
-            for batch in captured.chunks(pass.capacity()) {
+            for (batch, frames) in frames.chunks(pass.capacity()).enumerate() {
                 let mut commands = Commands::new(device, "silhouette bake")?;
-                commands.pass("silhouette", |c| pass.record(c, &buffers, (batch, side), first))?;
+                let first = batch * pass.capacity();
+                commands.pass("silhouette", |c| pass.record(c, &buffers, frames, side, first))?;
                 report.add(&commands.submit()?);
-                first += batch.len();
-                done += batch.len() as u32;
+                done += frames.len() as u32;
                 progress(done, all);
             }
-            maps.push(buffers.maps.download::<u8>(captured.len() * header.texel_bytes(side))?);
+            texels.push(buffers.maps.download::<u8>(frames.len() * header.texel_bytes(side))?);
         }
     }
     report.samples = frames.len() as u32;
-    report.turned = (frames.len() - captured.len()) as u32;
-    for (map, copied) in plan.iter().enumerate() {
-        if let Some(copied) = copied {
-            frames[map] = copied.frame(&frames[map], &frames[copied.of]);
+    report.total = started.elapsed();
+    let payload = payload(&header, &frames, &texels);
+    Ok((SilhouetteField::new(header, payload)?, report))
+}
+
+/// The payload of a field: each map's rectangle before the texels of its sides. `texels` holds those of all maps, side
+/// after side.
+fn payload(header: &SilhouetteHeader, frames: &[MapFrame], texels: &[Vec<u8>]) -> Vec<u8> {
+    let mut payload = Vec::with_capacity(header.payload_bytes());
+    for (map, frame) in frames.iter().enumerate() {
+        for number in [frame.centre.x, frame.centre.y, frame.half.x, frame.half.y] {
+            payload.extend((number as f32).to_le_bytes());
+        }
+        for (&side, texels) in Side::ALL.iter().zip(texels) {
+            let bytes = header.texel_bytes(side);
+            payload.extend(&texels[map * bytes..][..bytes]);
         }
     }
-    report.total = started.elapsed();
-    Ok((SilhouetteField::new(header.clone(), symmetric_maps::joined(&header, &frames, &plan, &maps))?, report))
+    payload
 }
 
 /// The CPU twin of the pass for one side of a map, in f64 and by plain search: bytes of distance and depth, row by row.
@@ -341,7 +335,8 @@ pub fn silhouette_twin(mesh: &Mesh, (frame, side): (&MapFrame, Side), map_px: u3
     for (y, x) in (0..px).flat_map(|y| (0..px).map(move |x| (y, x))) {
         for (i, j) in [(1, 0), (0, 1)] {
             if x + i < px && y + j < px {
-                let (a, b) = (view[y * px + x], view[(y + j) * px + x + i]);
+                let a = view[y * px + x];
+                let b = view[(y + j) * px + x + i];
                 let Some((low, high)) = a.xor(b) else { continue };
                 let place = DVec2::new((x + 1) as f64 - 0.5 * j as f64, (y + 1) as f64 - 0.5 * i as f64);
                 points.push((place, (low + high) / 2.0));

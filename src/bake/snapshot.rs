@@ -1,41 +1,37 @@
 //! Captured faces as pictures, for `inspect` and its contact sheets.
 
-use super::capture::{Capture, CaptureKind, Model, NO_SLOT};
-use super::record_captures;
+use super::capture::{Capture, CaptureKind, Model, NO_SLOT, Way};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
+use crate::field::FieldKind;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::shaders::Library;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Captures six faces from every eye (in r) and brings them to the host as RGB triples: faces +X -X +Y -Y +Z -Z, each in rows of
-/// `face_px`. Occlusion captures are white where nothing is hit.
-///
-/// # Errors
-/// As [`Capture::new`].
+/// Captures six faces from every eye (in r) and brings them to the host as RGB triples: faces +X -X +Y -Y +Z -Z, each
+/// in rows of `face_px`. Occlusion captures are white where nothing is hit.
 pub fn snapshot(
     device: &Arc<Device>,
     library: &Library,
     mesh: &Mesh,
     eyes: &[DVec3],
     face_px: u32,
-    radiance: bool,
+    kind: FieldKind,
 ) -> Result<Vec<Vec<f32>>> {
-    let capture = Capture::new(device, library, face_px, CaptureKind::of_field(radiance))?;
-    let model = Model::new(device, mesh, radiance)?;
+    let radiance = kind == FieldKind::Radiance;
+    let model = if radiance { Model::with_colors(device, mesh)? } else { Model::new(device, mesh)? };
+    let capture = Capture::new(device, library, model, face_px, CaptureKind::of_field(kind), Way::usual(device))?;
     let eyes: Vec<Vec3> = eyes.iter().map(|eye| eye.as_vec3()).collect();
     let texel_bytes = if radiance { 16 } else { 1 };
     let edge = (capture.columns * face_px) as usize;
     let bytes = (edge * edge * texel_bytes) as u64;
     let download = Buffer::new(device, "captured faces", BufferKind::Readback, bytes)?;
     let mut out = Vec::new();
-    while out.len() < eyes.len() {
-        let rest = &eyes[out.len()..];
-        let plan = capture.plan(&model, rest);
-        let drawn = capture.choose(&model, rest, &plan, true)?;
+    for batch in capture.plan(&eyes) {
+        let drawn = capture.choose(&eyes[out.len()..][..batch.len()], &batch)?;
         let mut commands = Commands::new(device, "snapshot")?;
-        record_captures(&mut commands, &capture, &model, &drawn, Access::TransferRead)?;
+        capture.record(&mut commands, &drawn, Access::TransferRead)?;
         commands.copy_image(&capture.atlas, &download);
         commands.barrier(Access::TransferWrite, Access::HostRead);
         commands.submit()?;
@@ -44,7 +40,8 @@ pub fn snapshot(
             if slot == NO_SLOT {
                 return [if radiance { 0.0 } else { 1.0 }; 3];
             }
-            let (column, row) = ((slot % capture.columns) as usize, (slot / capture.columns) as usize);
+            let column = (slot % capture.columns) as usize;
+            let row = (slot / capture.columns) as usize;
             let at = ((row * face_px as usize + y) * edge + column * face_px as usize + x) * texel_bytes;
             if radiance {
                 let float = |k: usize| f32::from_le_bytes(atlas[at + 4 * k..at + 4 * k + 4].try_into().expect("four"));
@@ -53,7 +50,7 @@ pub fn snapshot(
                 [f32::from(atlas[at]) / 255.0; 3]
             }
         };
-        for slots in &plan {
+        for slots in &batch {
             let px = face_px as usize;
             let faces = slots.iter().flat_map(|&slot| (0..px * px).flat_map(move |i| texel(slot, i % px, i / px)));
             out.push(faces.collect());

@@ -1,9 +1,10 @@
-//! The surface of a mesh, which answers how near it is to a point and whether it encloses a point. It is a tree of neighbouring
-//! triangles, so that most of them are judged together.
+//! The surface of a mesh, which answers how near it is to a point and whether it encloses a point. It is a tree of
+//! neighbouring triangles, so that most of them are judged together.
 //!
-//! The winding number is the mesh's signed solid angle over 4 pi (for a triangle: Van Oosterom, Strackee 1983, equation 8). A node
-//! whose distance is large against its size counts as a dipole: the sum of its area normals at its middle. This follows Barill,
-//! Dickson, Schmidt, Levin, Jacobson, *Fast Winding Numbers for Soups and Clouds*, SIGGRAPH 2018, equation 11.
+//! The winding number is the mesh's signed solid angle over 4 pi (for a triangle: Van Oosterom, Strackee 1983, equation
+//! 8). A node whose distance is large against its size counts as a dipole: the sum of its area normals at its middle.
+//! This follows Barill, Dickson, Schmidt, Levin, Jacobson, *Fast Winding Numbers for Soups and Clouds*, SIGGRAPH 2018,
+//! equation 11.
 
 use super::TRANSFER_OFFSET;
 use super::chunk::sort_spatially;
@@ -12,10 +13,9 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Most triangles in a leaf.
 const LEAF_TRIANGLES: usize = 8;
-/// A node counts as a dipole from this many of its radii on. What that leaves out is of second order, about a hundredth of its share,
-/// and the question is only whether the sum is nearer to 0 or to 1.
+/// A node counts as a dipole from this many of its radii on. What that leaves out is of second order, about a hundredth
+/// of its share, and the question is only whether the sum is nearer to 0 or to 1.
 const FAR: f64 = 5.0;
 /// A point lies inside if its winding number is above this.
 const INSIDE: f64 = 0.5;
@@ -97,7 +97,8 @@ impl Surface {
                 }
             } else {
                 // The nearer child is looked into first.
-                let (first, second) = ((bound(index + 1), index + 1), (bound(node.second), node.second));
+                let first = (bound(index + 1), index + 1);
+                let second = (bound(node.second), node.second);
                 open.extend(if first.0 < second.0 { [second, first] } else { [first, second] });
             }
         }
@@ -115,10 +116,11 @@ impl Surface {
         boxed && self.winding_number(point) > INSIDE
     }
 
-    /// The generalised winding number around a point. It is 1 inside and 0 outside a closed mesh, and in between near the holes of an
-    /// open mesh.
+    /// The generalised winding number around a point. It is 1 inside and 0 outside a closed mesh, and in between near
+    /// the holes of an open mesh.
     pub fn winding_number(&self, point: DVec3) -> f64 {
-        let (mut total, mut index) = (0.0, 0);
+        let mut total = 0.0;
+        let mut index = 0;
         let mut open = Vec::with_capacity(64);
         while let Some(node) = self.nodes.get(index) {
             let q = node.centre - point;
@@ -140,8 +142,8 @@ impl Surface {
     }
 }
 
-/// The distance of a surface from the origin, if it encloses the origin. One pass over all triangles takes less than a tree does for
-/// one question.
+/// The distance of a surface from the origin, if it encloses the origin. One pass over all triangles takes less than a
+/// tree does for one question.
 pub fn depth_at_origin(triangles: &[[DVec3; 3]]) -> Option<f64> {
     // Shares of a fixed length are summed in order, so that the sum is the same on any number of threads.
     let share = |part: &[[DVec3; 3]]| {
@@ -159,7 +161,9 @@ fn bounds(triangles: &[[DVec3; 3]]) -> (DVec3, DVec3) {
 
 /// Signed solid angle of a triangle seen from the origin. It is positive if the back is seen.
 fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
-    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let la = a.length();
+    let lb = b.length();
+    let lc = c.length();
     let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
     2.0 * a.dot(b.cross(c)).atan2(denominator)
 }
@@ -172,11 +176,12 @@ pub fn inside(surface: &Surface, points: &[DVec3]) -> Vec<bool> {
     points.par_iter().with_max_len(TOGETHER).map(|&point| surface.encloses(point)).collect()
 }
 
-/// For every marked point the nearest place that stands off the surface by [`TRANSFER_OFFSET`], from where something can be seen. It is
-/// `None` for points that are not marked, and where that place lies inside as well because parts of the mesh run into each other.
+/// For every marked point the nearest place that stands off the surface by [`TRANSFER_OFFSET`], from where something
+/// can be seen. It is `None` for points that are not marked, and where that place lies inside as well because parts of
+/// the mesh run into each other.
 ///
-/// An interpolation between such a sample and one outside takes the surface's own value at the surface. Receivers in a narrow gap
-/// therefore find what is seen there.
+/// An interpolation between such a sample and one outside takes the surface's own value at the surface. Receivers in a
+/// narrow gap therefore find what is seen there.
 pub fn pushed_out(surface: &Surface, points: &[DVec3], inside: &[bool]) -> Vec<Option<DVec3>> {
     let place = |(&point, &inside): (&DVec3, &bool)| {
         let on_surface = inside.then(|| surface.nearest(point)).flatten()?;
@@ -186,10 +191,12 @@ pub fn pushed_out(surface: &Surface, points: &[DVec3], inside: &[bool]) -> Vec<O
     points.par_iter().zip(inside).with_max_len(TOGETHER).map(place).collect()
 }
 
-/// The point of a triangle nearest to the origin (Ericson, *Real-Time Collision Detection*, section 5.1.5, by regions). Bakes of large
-/// meshes spend a quarter of their time here, so nothing is left to the inlining of closures.
+/// The point of a triangle nearest to the origin (Ericson, *Real-Time Collision Detection*, section 5.1.5, by regions).
+/// Bakes of large meshes spend a quarter of their time here, so nothing is left to the inlining of closures.
 pub fn nearest_on_triangle([a, b, c]: [DVec3; 3]) -> DVec3 {
-    let (ab, bc, ca) = (b - a, c - b, a - c);
+    let ab = b - a;
+    let bc = c - b;
+    let ca = a - c;
     let normal = ab.cross(c - a);
     let faces = normal != DVec3::ZERO
         && normal.dot(ab.cross(-a)) >= 0.0

@@ -11,8 +11,9 @@ pub fn unit_positions(mesh: &Mesh) -> Vec<Vec3> {
     mesh.positions.iter().map(|p| ((p.as_dvec3() - centre.as_dvec3()) / f64::from(radius_m)).as_vec3()).collect()
 }
 
-/// The triangles of a mesh without those that repeat another: with corners of the same place and colour, the same way around. What is
-/// seen does not change. A tree cannot divide stacked triangles, so each query of a surface would look at every one of them.
+/// The triangles of a mesh without those that repeat another: with corners of the same place and colour, the same way
+/// around. What is seen does not change. A tree cannot divide stacked triangles, so each query of a surface would look
+/// at every one of them.
 ///
 /// Of a closed mesh no triangle repeats another, since along each edge its surface runs once each way.
 pub fn distinct(mesh: &Mesh) -> Cow<'_, [[u32; 3]]> {

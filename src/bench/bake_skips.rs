@@ -1,10 +1,11 @@
-//! Skips of the bake, part of `bench skip`: time, number of captures and the field's error, with each skip off and on in turns.
+//! Skips of the bake, part of `bench skip`: time, number of captures and the field's error, with each skip off and on
+//! in turns.
 
 use super::Bench;
 use crate::asset::{Mesh, generate};
 use crate::bake::{self, BakeReport};
 use crate::error::Result;
-use crate::field::{FieldKind, Shortcuts, Storage};
+use crate::field::{FieldKind, Storage};
 use crate::text;
 use serde::Serialize;
 use serde_json::json;
@@ -23,21 +24,17 @@ pub struct BakeTime {
     pub face_count: u32,
     /// Triangles that were drawn, each as often as faces showed it.
     pub drawn_triangle_count: u64,
-    /// Relative root mean square error of the coefficients against a bake without skips and with faces of twice the edge; for
-    /// the large mesh, against the bake without this skip.
+    /// Relative root mean square error of the coefficients against a bake without skips and with faces of twice the
+    /// edge; for the large mesh, against the bake without this skip.
     pub error: f64,
 }
 
-/// One skip on one mesh.
 #[derive(Clone, Debug, Serialize)]
 pub struct BakeSkipRow {
-    /// Mesh.
     pub case: String,
-    /// Its triangles.
     pub triangle_count: usize,
     /// Sample points.
     pub lattice: String,
-    /// Name of the skip.
     pub skip: String,
     /// The bake without any skip; for the large mesh, with all other skips.
     pub off: BakeTime,
@@ -48,22 +45,12 @@ pub struct BakeSkipRow {
     pub times_faster: f64,
 }
 
-const NONE: Shortcuts = Shortcuts { symmetry: false, faces: false, inside: true };
-
-/// The skips by name, with the shortcuts of a bake without them and with them, and whether levels of detail are drawn.
-/// Samples inside a solid are captured off its surface, except where that is measured.
-const SKIPS: [(&str, [(Shortcuts, bool); 2]); 5] = [
-    ("faces", [(NONE, false), (Shortcuts { faces: true, ..NONE }, false)]),
-    ("symmetry", [(NONE, false), (Shortcuts { symmetry: true, ..NONE }, false)]),
-    ("inside", [(Shortcuts { inside: false, ..NONE }, false), (NONE, false)]),
-    ("levels", [(NONE, false), (NONE, true)]),
-    ("all", [(NONE, false), (Shortcuts { symmetry: true, faces: true, ..NONE }, true)]),
-];
+/// The skips by name, with whether levels of detail are drawn without them and with them.
+const SKIPS: [(&str, [bool; 2]); 1] = [("levels", [false, true])];
 
 /// Half of the default shells and directions.
 const LATTICE: &str = "cube:8x5";
 
-/// All meshes.
 pub fn meshes(quick: bool) -> Vec<Mesh> {
     let mut meshes = vec![generate::sphere(0.5, 4), generate::torus(0.5, 0.2, 96, 48)];
     if !quick {
@@ -73,21 +60,19 @@ pub fn meshes(quick: bool) -> Vec<Mesh> {
 }
 
 /// Measures every skip on some meshes, and writes `skip_bake.csv` and `skip_bake.json` into `folder`.
-///
-/// # Errors
-/// `Failed` when a file cannot be written; else as [`bake::Baker::field`].
 pub fn run(bench: &Bench<'_>, folder: &Path, meshes: &[Mesh]) -> Result<Vec<BakeSkipRow>> {
     let mut rows = Vec::new();
     for mesh in meshes {
-        let (_, exact) = bake_once(bench, mesh, 128, (NONE, false))?;
-        for (skip, shortcuts) in SKIPS {
-            let (mut sides, rounds) = ([None::<BakeTime>; 2], if bench.quick { 1 } else { 3 });
+        let (_, exact) = bake_once(bench, mesh, 128, false)?;
+        for (skip, levels) in SKIPS {
+            let mut sides = [None::<BakeTime>; 2];
+            let rounds = if bench.quick { 1 } else { 3 };
             for _ in 0..rounds {
-                for (side, shortcuts) in sides.iter_mut().zip(shortcuts) {
-                    let (report, values) = bake_once(bench, mesh, 64, shortcuts)?;
+                for (side, levels) in sides.iter_mut().zip(levels) {
+                    let (report, values) = bake_once(bench, mesh, 64, levels)?;
                     let now = BakeTime {
                         bake_ms: report.total.as_secs_f64() * 1e3,
-                        captured_count: report.samples + report.filled - report.turned,
+                        captured_count: report.samples + report.filled,
                         filled_count: report.filled,
                         face_count: report.faces,
                         drawn_triangle_count: report.triangles,
@@ -115,14 +100,9 @@ pub fn run(bench: &Bench<'_>, folder: &Path, meshes: &[Mesh]) -> Result<Vec<Bake
 }
 
 /// An occlusion field in f32.
-fn bake_once(
-    bench: &Bench<'_>,
-    mesh: &Mesh,
-    face_px: u32,
-    (shortcuts, levels): (Shortcuts, bool),
-) -> Result<(BakeReport, Vec<f32>)> {
+fn bake_once(bench: &Bench<'_>, mesh: &Mesh, face_px: u32, levels: bool) -> Result<(BakeReport, Vec<f32>)> {
     let lattice = LATTICE.parse().expect("a lattice");
-    let options = bake::Options { lattice, storage: Storage::F32, face_px, shortcuts, levels, ..Default::default() };
+    let options = bake::Options { lattice, storage: Storage::F32, face_px, levels, ..Default::default() };
     let header = bake::header(mesh, FieldKind::Occlusion, &options);
     let (field, report) = bench.baker.field(mesh, header, &|_, _| ())?;
     Ok((report, field.payload.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes"))).collect()))

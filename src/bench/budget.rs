@@ -40,7 +40,6 @@ impl Effort {
 
 /// T0, T0c and T1 of a case, which do not depend on options of bake or merge.
 pub struct Truth {
-    /// The compared vertices.
     pub vertices: Vec<Vertex>,
     /// Radiosity of T0, by ray casting.
     pub t0: Vec<Radiosity>,
@@ -89,9 +88,6 @@ impl Truth {
     }
 
     /// Whether there is anything to compare.
-    ///
-    /// # Errors
-    /// `Input` when no light reaches any of the vertices.
     pub fn check(&self, case: &Case) -> Result<()> {
         if self.t0.as_flattened().iter().any(|c| *c > 0.0) {
             return Ok(());
@@ -122,7 +118,8 @@ fn in_parts<T>(
     vertices: &[Vertex],
     run: impl Fn(&[Vertex]) -> Vec<T>,
 ) -> Vec<T> {
-    let (mut out, mut told) = (Vec::with_capacity(vertices.len()), Instant::now());
+    let mut out = Vec::with_capacity(vertices.len());
+    let mut told = Instant::now();
     for part in vertices.chunks(PART) {
         out.extend(run(part));
         if told.elapsed() >= SILENCE {
@@ -150,9 +147,6 @@ pub fn select(all: &[(usize, Vec<Radiosity>)], vertices: &[Vertex]) -> Vec<Radio
 }
 
 /// The device's radiosity of the compared vertices after a merge.
-///
-/// # Errors
-/// `Device` when memory ran out.
 pub fn device_radiosity(frame: &Frame, vertices: &[Vertex]) -> Result<Vec<Radiosity>> {
     let mut all = Vec::new();
     for (entity, _) in frame.scene().entities.iter().enumerate().filter(|(_, e)| e.receives) {
@@ -188,18 +182,17 @@ pub struct Budget {
     pub below_bands: VertexDifference,
     /// T0 to T3.
     pub total: VertexDifference,
-    /// T0 to the merge on the device with sharp lights, which the rungs are not about; none where no light can be sharp.
+    /// T0 to the merge on the device with sharp lights, which the rungs are not about; none where no light can be
+    /// sharp.
     pub sharp_total: Option<VertexDifference>,
-    /// T0's root mean square over that of the unoccluded value, which converts errors to the unit of the unoccluded value.
+    /// T0's root mean square over that of the unoccluded value, which converts errors to the unit of the unoccluded
+    /// value.
     #[serde(rename = "t0_per_unoccluded_ratio")]
     pub t0_per_unoccluded: f64,
 }
 
-/// Computes T2 and T3 with fields and a merge of the given options, all lights in SH, and compares all rungs; then the same merge
-/// with sharp lights.
-///
-/// # Errors
-/// As [`Frame::new`].
+/// Computes T2 and T3 with fields and a merge of the given options, all lights in SH, and compares all rungs; then the
+/// same merge with sharp lights.
 pub fn budget(bench: &Bench<'_>, case: &Case, truth: &Truth, options: frame::Options) -> Result<Budget> {
     let placements = case.scene.at(case.time_s);
     let options = frame::Options { lights: Lights::Sh, ..options };

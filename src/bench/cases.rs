@@ -8,13 +8,9 @@ use std::path::Path;
 
 /// A scene at one time, and the distant light that its truth integrates.
 pub struct Case {
-    /// Name in tables.
     pub name: String,
-    /// Description of its light.
     pub light: String,
-    /// The scene.
     pub scene: Scene,
-    /// Scene time in seconds.
     pub time_s: f64,
     /// Form of the distant light that ray casting integrates.
     pub distant: Distant,
@@ -27,9 +23,6 @@ impl Case {
     }
 
     /// The scene of a file at the time of its first picture, named after the file.
-    ///
-    /// # Errors
-    /// `Input` when nothing in the scene shines, or nothing is lit.
     pub fn of_file(path: &Path, scene: Scene) -> Result<Self> {
         let missing = if !scene.entities.iter().any(|e| e.receives) {
             "no entity receives light"
@@ -47,17 +40,11 @@ impl Case {
 
 /// Direction of the key light and of the sphere lights.
 const TOWARD: [f64; 3] = [0.5, 0.707, 0.5];
-/// Gap between floor and object, in bounding radii.
+/// Gap between floor and teapot, in bounding radii.
 const GAP: f64 = 0.02;
-/// Distance of the near sphere lights from the object's centre, in bounding radii.
-pub const NEAR: f64 = 5.0;
-/// Distance of a disc in the sky, or of a distant sphere light, in bounding radii: its direction changes by 0.25 degrees over the floor.
-pub const FAR: f64 = 1000.0;
-
+/// Distance of the sphere lights from the teapot's centre, in bounding radii.
+const DISTANCE: f64 = 5.0;
 /// The items whose names contain one of the texts, in their order. Without texts all items are returned.
-///
-/// # Errors
-/// `Usage` with a list of the names when no name contains one of the texts.
 pub fn named<T>(mut all: Vec<T>, texts: &[String], name: impl Fn(&T) -> &str) -> Result<Vec<T>> {
     for text in texts {
         if !all.iter().any(|case| name(case).contains(text)) {
@@ -70,18 +57,11 @@ pub fn named<T>(mut all: Vec<T>, texts: &[String], name: impl Fn(&T) -> &str) ->
 }
 
 /// The embedded scenes at time 0.
-///
-/// # Errors
-/// `Input` when an embedded scene is malformed; tests read all of them.
 pub fn scenes() -> Result<Vec<Case>> {
     let names = embedded::scenes().into_iter().map(|(name, _)| name);
     names.map(scene).collect()
 }
 
-/// An embedded scene by name.
-///
-/// # Errors
-/// `Input` when there is no such scene.
 pub fn scene(name: &str) -> Result<Case> {
     let path = Path::new(embedded::ROOT).join("scenes").join(format!("{name}.toml"));
     let scene = Scene::load(&path)?;
@@ -108,27 +88,14 @@ pub fn light(scene: &Scene) -> String {
 }
 
 /// Cells along a side of the floor of [`teapot_lights`]: as many vertices as the floors of the embedded scenes have.
-pub const FINE_CELLS: usize = 112;
+const FLOOR_CELLS: usize = 112;
 
-/// Teapot of bounding radius 1 over a floor of 113 x 113 vertices and 6 x 6 m that alone is lit, under one light at a time:
-/// (a) a uniform sky, (b) a sky that brightens upwards, (c) a soft key light that is defined by its 4 bands, (d) a sphere
-/// light seen from the teapot's centre under a half angle of 15 and of 7.5 degrees.
-///
-/// # Errors
-/// As [`floor`].
+/// Teapot of bounding radius 1 over a floor of 113 x 113 vertices and 6 x 6 m that alone is lit, under one light at a
+/// time: (a) a uniform sky, (b) a sky that brightens upwards, (c) a soft key light that is defined by its 4 bands, (d)
+/// a sphere light seen from the teapot's centre under a half angle of 15 and of 7.5 degrees.
 pub fn teapot_lights() -> Result<Vec<Case>> {
-    Ok(floor(FINE_CELLS)?.into_iter().filter(|case| !case.name.contains("disc")).collect())
-}
-
-/// As [`teapot_lights`] over a floor with `cells` cells along a side, followed by discs of half-angles of 30 and 15 degrees in the
-/// sky: sphere lights so far away that they look the same from all vertices.
-///
-/// # Errors
-/// `Input` when the embedded mesh or a scene of this function is malformed; tests run it.
-pub fn floor(cells: usize) -> Result<Vec<Case>> {
     let mesh = Mesh::parse(&embedded::read(Path::new("assets/meshes/teapot.obj"))?, Path::new("teapot.obj"))?;
-    let (head, middle_y) = over_floor(&mesh, "teapot", cells);
-    let bulb = |half_angle_deg, distance| bulb(half_angle_deg, distance, middle_y);
+    let (head, middle_y) = over_floor(&mesh);
     let lights = [
         ("teapot, (a) uniform sky", "[environment]\nuniform = [1, 1, 1]".to_owned(), Distant::Exact),
         ("teapot, (b) sky gradient", "[environment]\ngradient = { radiance = [1, 1, 1] }".to_owned(), Distant::Exact),
@@ -137,10 +104,8 @@ pub fn floor(cells: usize) -> Result<Vec<Case>> {
             format!("[environment]\nkey = {{ radiance = [1, 1, 1], toward = {TOWARD:?}, sharpness = 4 }}"),
             Distant::Bands(4),
         ),
-        ("teapot, (d) sphere light of 15 degrees", bulb(15.0, NEAR), Distant::Exact),
-        ("teapot, (d) sphere light of 7.5 degrees", bulb(7.5, NEAR), Distant::Exact),
-        ("teapot, disc of half-angle 30 degrees", bulb(30.0, FAR), Distant::Exact),
-        ("teapot, disc of half-angle 15 degrees", bulb(15.0, FAR), Distant::Exact),
+        ("teapot, (d) sphere light of 15 degrees", bulb(15.0, middle_y), Distant::Exact),
+        ("teapot, (d) sphere light of 7.5 degrees", bulb(7.5, middle_y), Distant::Exact),
     ];
     let case = |(name, light, distant): (&str, String, Distant)| {
         let scene = Scene::parse(&format!("{head}{light}"), Path::new(PLACE), &embedded::read)?;
@@ -150,14 +115,15 @@ pub fn floor(cells: usize) -> Result<Vec<Case>> {
 }
 
 /// Path under which the texts of these scenes are read, so that they find `../meshes`.
-pub const PLACE: &str = "assets/scenes/over_floor.toml";
+const PLACE: &str = "assets/scenes/over_floor.toml";
 
-/// Text of a scene without light, and the height of its object's centre in metres. The floor of 6 x 6 m with `cells` squares along a side
-/// alone is lit. The object is the mesh of `../meshes/FILE.obj`, scaled to a bounding radius of 1 m, at a small distance above the
-/// floor's middle. The scene also has a mesh "bulb", a ball of radius 1 m, which no entity uses yet.
-pub fn over_floor(mesh: &Mesh, file: &str, cells: usize) -> (String, f64) {
+/// Text of a scene without light, and the height of the teapot's centre in metres. The teapot is scaled to a bounding
+/// radius of 1 m, at a small distance above the floor's middle. The scene also has a mesh "bulb", a ball of radius 1 m,
+/// which no entity uses yet.
+fn over_floor(mesh: &Mesh) -> (String, f64) {
     let (centre, radius_m) = mesh.bounding_sphere();
-    let (centre, scale) = (centre.as_dvec3(), 1.0 / f64::from(radius_m));
+    let centre = centre.as_dvec3();
+    let scale = 1.0 / f64::from(radius_m);
     let lowest = mesh.positions.iter().map(|p| f64::from(p.y)).fold(f64::INFINITY, f64::min);
     let place = [-centre.x * scale, GAP - lowest * scale, -centre.z * scale];
     let text = format!(
@@ -167,17 +133,17 @@ pub fn over_floor(mesh: &Mesh, file: &str, cells: usize) -> (String, f64) {
         target = [0, 0.5, 0]
         [[mesh]]
         name = "floor"
-        plane = {{ size_m = 6, cells = {cells} }}
+        plane = {{ size_m = 6, cells = {FLOOR_CELLS} }}
         [[mesh]]
-        name = "{file}"
-        file = "../meshes/{file}.obj"
+        name = "teapot"
+        file = "../meshes/teapot.obj"
         [[mesh]]
         name = "bulb"
         sphere = {{ radius_m = 1, subdivisions = 4 }}
         [[entity]]
         mesh = "floor"
         [[entity]]
-        mesh = "{file}"
+        mesh = "teapot"
         position = {place:?}
         scale = {scale}
         receives = false
@@ -186,12 +152,12 @@ pub fn over_floor(mesh: &Mesh, file: &str, cells: usize) -> (String, f64) {
     (text, place[1] + centre.y * scale)
 }
 
-/// Text of a sphere light that is seen under a half angle from the centre of the object of [`over_floor`], `distance` bounding radii
-/// away. A surface there that faces it receives the irradiance pi.
-pub fn bulb(half_angle_deg: f64, distance: f64, middle_y: f64) -> String {
+/// Text of a sphere light that is seen under a half angle from the teapot's centre. A surface there that faces it
+/// receives the irradiance pi.
+fn bulb(half_angle_deg: f64, middle_y: f64) -> String {
     let length = TOWARD.iter().map(|c| c * c).sum::<f64>().sqrt();
-    let [x, y, z] = TOWARD.map(|c| c * distance / length);
-    let scale = distance * half_angle_deg.to_radians().sin();
+    let [x, y, z] = TOWARD.map(|c| c * DISTANCE / length);
+    let scale = DISTANCE * half_angle_deg.to_radians().sin();
     let radiance = half_angle_deg.to_radians().sin().powi(-2);
     format!(
         "[[entity]]\nmesh = \"bulb\"\nreceives = false\nscale = {scale}\nposition = [{x}, {}, {z}]\nemission = [{radiance}, {radiance}, {radiance}]",

@@ -1,7 +1,7 @@
 //! Peak rates of a device, measured with shaders that do one kind of work each, to compare the merge with.
 
 use crate::error::Result;
-use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView, Volume};
+use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use serde::Serialize;
@@ -16,8 +16,6 @@ pub struct Ceilings {
     pub texel_halves_giga: f64,
     /// Texels of 16 bytes from a buffer of the field's size, in 10^9 a second.
     pub texel_packed_giga: f64,
-    /// Samples interpolated between eight texels of four halves of an image of the field's size, in 10^9 a second.
-    pub filtered_giga: f64,
     /// Reads of 8 bytes from a storage block of the field's size, in 10^9 a second.
     pub storage_giga: f64,
     /// Bytes that `a = b + s c` reads and writes in buffers larger than caches, in 10^9 a second.
@@ -41,15 +39,9 @@ const READS: u32 = 16;
 const TRIAD_FLOATS: u32 = 4 << 20;
 
 /// Measures a device with reads from a buffer of `field_bytes`.
-///
-/// # Errors
-/// `Failed` when a shader does not compile, `Device` when memory ran out.
 pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Result<Ceilings> {
     let source = Buffer::with_data(device, "ceiling source", &vec![0x2000_2000_u32; field_bytes as usize / 4])?;
     let out = Buffer::new(device, "ceiling results", BufferKind::Device, 4 * u64::from(TRIAD_FLOATS))?;
-    // The width and height of a field of the default lattice.
-    let size = [40, 60, (field_bytes / (8 * 40 * 60)).max(1) as u32];
-    let image = Volume::with_data(device, "ceiling image", size, &vec![[0x2000; 4]; (size[2] * 40 * 60) as usize])?;
     // Invocations per run differ by kind, because some kinds are slow on a CPU.
     let rate = |kind: u32, invocations: u32, rounds: u32, texel_bytes: u64| -> Result<f64> {
         let count = (field_bytes / texel_bytes).max(8) as u32;
@@ -66,7 +58,6 @@ pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Res
             _ => None,
         };
         let first = match view {
-            _ if kind == 5 => Bind::Volume(&image),
             Some(view) => Bind::Texel(view),
             None => Bind::Buffer(&source),
         };
@@ -78,7 +69,6 @@ pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Res
         gflops: 8.0 * rate(0, 65_536, 256, 8)?,
         texel_halves_giga: rate(1, 16_384, 64, 8)?,
         texel_packed_giga: rate(2, 16_384, 64, 16)?,
-        filtered_giga: rate(5, 16_384, 16, 8)?,
         storage_giga: rate(3, 16_384, 16, 8)?,
         triad_gb_s: triad(device, library, &out)?,
         dispatch_ms: idle(device, library, &source, &out)?,
@@ -88,7 +78,8 @@ pub fn measure(device: &Arc<Device>, library: &Library, field_bytes: u64) -> Res
 fn triad(device: &Arc<Device>, library: &Library, out: &Buffer) -> Result<f64> {
     let bytes = 4 * u64::from(TRIAD_FLOATS);
     let ones = vec![1.0_f32; TRIAD_FLOATS as usize];
-    let (b, c) = (Buffer::with_data(device, "ceiling b", &ones)?, Buffer::with_data(device, "ceiling c", &ones)?);
+    let b = Buffer::with_data(device, "ceiling b", &ones)?;
+    let c = Buffer::with_data(device, "ceiling c", &ones)?;
     let row = ShaderPermutation::new("ceiling.comp", 4).define("KIND", 4_u32);
     let pipeline = ComputePipeline::new(device, "ceiling", &library.shader(&row)?, &[])?;
     let resources = [Bind::Buffer(&b), Bind::Buffer(out), Bind::Buffer(&c)];

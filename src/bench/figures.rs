@@ -5,8 +5,8 @@ use serde::Serialize;
 /// Radiosity of a vertex: linear RGB radiance.
 pub type Radiosity = [f64; 3];
 
-/// Difference between two sets of vertex values, relative to a given unit. A vertex's error is the root mean square over its
-/// three channels.
+/// Difference between two sets of vertex values, relative to a given unit. A vertex's error is the root mean square
+/// over its three channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct VertexDifference {
     /// Root mean square over vertices.
@@ -45,7 +45,6 @@ pub fn difference(a: &[Radiosity], b: &[Radiosity], unit: f64) -> VertexDifferen
 pub struct Spread {
     /// First quartile.
     pub lower: f64,
-    /// Median.
     pub median: f64,
     /// Third quartile.
     pub upper: f64,
@@ -63,7 +62,8 @@ pub fn quantiles<const N: usize>(values: &[f64], shares: [f64; N]) -> [f64; N] {
     sorted.sort_by(f64::total_cmp);
     shares.map(|share| {
         let rank = share * (sorted.len().max(1) - 1) as f64;
-        let (low, part) = (rank as usize, rank.fract());
+        let low = rank as usize;
+        let part = rank.fract();
         match (sorted.get(low), sorted.get(low + 1)) {
             (Some(a), Some(b)) => a + part * (b - a),
             (Some(a), None) => *a,
@@ -72,9 +72,9 @@ pub fn quantiles<const N: usize>(values: &[f64], shares: [f64; N]) -> [f64; N] {
     })
 }
 
-/// The x at which a falling curve of (x, y) reaches `y`, interpolated linearly in logarithms and extrapolated beyond its last two
-/// points. If the curve starts below `y`, its first x is returned. `None` if there are fewer than two points or the curve does
-/// not fall.
+/// The x at which a falling curve of (x, y) reaches `y`, interpolated linearly in logarithms and extrapolated beyond
+/// its last two points. If the curve starts below `y`, its first x is returned. `None` if there are fewer than two
+/// points or the curve does not fall.
 pub fn crossing(curve: &[(f64, f64)], y: f64) -> Option<f64> {
     let logs: Vec<(f64, f64)> = curve.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
     let target = y.ln();
@@ -83,7 +83,8 @@ pub fn crossing(curve: &[(f64, f64)], y: f64) -> Option<f64> {
     (slope < 0.0).then(|| (pair[0].0 + (target - pair[0].1) / slope).exp().max(curve[0].0))
 }
 
-/// The value of a rising curve of (x, y) at `x`, interpolated and extrapolated linearly in logarithms. A single point gives its y.
+/// The value of a rising curve of (x, y) at `x`, interpolated and extrapolated linearly in logarithms. A single point
+/// gives its y.
 ///
 /// # Panics
 /// When there is no point.

@@ -1,4 +1,5 @@
-//! A storey of a house, made for skips: lamps that face away from the ceiling, lamps that are out, entities in the attic.
+//! A storey of a house, made for skips: lamps that face away from the ceiling, lamps that are out, entities in the
+//! attic.
 
 use crate::asset::{Mesh, embedded};
 use crate::error::Result;
@@ -12,11 +13,8 @@ const LAMPS: usize = 3;
 /// Entities along a side of the storey, and of the attic.
 const THINGS: usize = 5;
 
-/// A floor and a ceiling of 8 by 8 m, lamps of which three shine down and the others are out, entities on the floor and in the
-/// attic. The field of a shining lamp is zero above it, and the field of a lamp that is out is zero everywhere.
-///
-/// # Errors
-/// `Input` when the scene of this function is malformed; tests run it.
+/// A floor and a ceiling of 8 by 8 m, lamps of which three shine down and the others are out, entities on the floor and
+/// in the attic. The field of a shining lamp is zero above it, and the field of a lamp that is out is zero everywhere.
 pub fn scene() -> Result<Scene> {
     let panel = "cuboid = { size_m = [0.9, 0.1, 0.9], cells = 3 }";
     let mut text = format!(
@@ -51,7 +49,9 @@ pub fn scene() -> Result<Scene> {
         let mesh = &scene.meshes[index];
         let color = |n: &Vec3| if shines && n.y < -0.5 { Vec3::ONE } else { Vec3::ZERO };
         let colors = mesh.normals.iter().map(color).collect();
-        let (positions, normals, triangles) = (mesh.positions.clone(), mesh.normals.clone(), mesh.triangles.clone());
+        let positions = mesh.positions.clone();
+        let normals = mesh.normals.clone();
+        let triangles = mesh.triangles.clone();
         scene.meshes[index] = Mesh::new(mesh.name.clone(), positions, normals, Some(colors), triangles)?.into();
     }
     Ok(scene)

@@ -1,4 +1,5 @@
-//! Where the merge and its rivals are compared: at vertices, which the merge lights, and at pixels, which a person sees.
+//! Where the merge and its rivals are compared: at vertices, which the merge lights, and at pixels, which a person
+//! sees.
 
 use super::Bench;
 use super::budget::{Effort, Truth};
@@ -19,7 +20,6 @@ const SKY_RAYS: u32 = 1024;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum JudgedAt {
-    /// Lit vertices.
     Vertices,
     /// Pixels of a picture of [`PIXEL_SIZE`] that show a lit surface.
     Pixels,
@@ -27,20 +27,17 @@ pub enum JudgedAt {
 
 /// All points to light, and the truth of those that are compared.
 pub struct Judged {
-    /// What they are.
     pub place: JudgedAt,
     /// All points: an entity with the number of its vertex or of the pixel, and the view from there.
     pub points: Vec<(Vertex, VertexView)>,
     /// Points that are compared, as indices of `points`.
     pub chosen: Vec<usize>,
-    /// Their radiosity by rays.
     t0: Vec<Radiosity>,
     /// Root mean square of `t0`: the unit of errors.
     unit: f64,
 }
 
 impl Judged {
-    /// The vertices of a truth.
     pub fn vertices(world: &World<'_>, truth: &Truth) -> Self {
         let points: Vec<_> = receiver_vertices(world.scene).into_iter().map(|v| (v, world.view(v))).collect();
         let at = |vertex| points.binary_search_by_key(vertex, |(key, _)| *key).expect("it is lit");

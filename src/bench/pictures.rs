@@ -1,5 +1,5 @@
-//! A case as a person sees it: the picture of the merge beside that of ray casting, by vertex and by pixel, and the error of every
-//! vertex.
+//! A case as a person sees it: the picture of the merge beside that of ray casting, by vertex and by pixel, and the
+//! error of every vertex.
 
 use super::cases::Case;
 use super::judged::PIXEL_SIZE;
@@ -17,8 +17,8 @@ use crate::truth::{self, ErrorMap, RayCast, error_map};
 use serde::Serialize;
 use std::path::Path;
 
-/// Rays of a reference in a quick and in a thorough run, a few seconds on two cores. Vertices and lights share them, so a scene
-/// with fewer vertices gets more rays per vertex.
+/// Rays of a reference in a quick and in a thorough run, a few seconds on two cores. Vertices and lights share them, so
+/// a scene with fewer vertices gets more rays per vertex.
 const RAYS: [usize; 2] = [8_000_000, 32_000_000];
 /// Size of the pictures in pixels, error pictures without their scale bars.
 const SIZE: [u32; 2] = [720, 480];
@@ -58,11 +58,9 @@ pub struct PixelError {
     pub mean_flip: f64,
 }
 
-/// Writes `error-CASE.png`, `beside-CASE.png` and `pixels-CASE.png` into `folder`. For the first two ray casting lights vertices, as
-/// the merge does, and both are drawn alike, with the scene's exposure; for the last the program draws as it always does.
-///
-/// # Errors
-/// As [`crate::frame::Frame::new`] and [`crate::frame::Frame::render`], and `Failed` when a file cannot be written.
+/// Writes `error-CASE.png`, `beside-CASE.png` and `pixels-CASE.png` into `folder`. For the first two ray casting lights
+/// vertices, as the merge does, and both are drawn alike, with the scene's exposure; for the last the program draws as
+/// it always does.
 pub fn pictures(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<CasePicture> {
     let placements = case.scene.at(case.time_s);
     let options = frame::Options { size: SIZE, antialias: Antialias::Samples, ..default_options() };
@@ -110,7 +108,8 @@ fn pixel_error(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<PixelErr
     let cast = cast(bench, case, found.len() / 3);
     let lit = pixels(&case.scene, &placements, PIXEL_SIZE, &cast);
     let mut wanted = found.clone();
-    let (mut apart, mut whole) = (0.0, f64::MIN_POSITIVE);
+    let mut apart = 0.0;
+    let mut whole = f64::MIN_POSITIVE;
     for (pixel, estimate) in &lit {
         for (c, radiance) in estimate.radiosity.iter().enumerate() {
             wanted[3 * pixel + c] = *radiance as f32;
@@ -135,7 +134,6 @@ fn beside(case: &Case, size: [u32; 2], [left, right]: [&[f32]; 2], path: &Path) 
     Ok((path.display().to_string(), mean_flip(width as usize, &exposed(left), &exposed(right))))
 }
 
-/// `KIND-CASE.png` in a folder.
 fn named(folder: &Path, kind: &str, case: &Case) -> std::path::PathBuf {
     folder.join(format!("{kind}-{}.png", dashed(&case.name)))
 }

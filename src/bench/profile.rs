@@ -9,17 +9,13 @@ use crate::draw::{Antialias, Finish};
 use crate::error::Result;
 use crate::field::FieldKind;
 use crate::frame::{self, Frame};
-use crate::gpu::Device;
-use crate::gpu::census::{Census, disassemble};
+use crate::gpu::census::Census;
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Variant};
 use crate::merge::workload::Workload;
 use crate::scene::{Lights, Scene};
-use crate::shaders::Library;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 /// Median, and the values below and above which a tenth of all lies.
@@ -59,14 +55,12 @@ pub struct ProfileRow {
     pub case: String,
     /// A pass of a frame, or "frame": from placements to the picture on the device, by the host's clock.
     pub pass: String,
-    /// Variant.
     pub variant: String,
     /// Device time.
     pub ms: Tenths,
-    /// Nanoseconds a pair of vertex and occluder. Only merges have this and the values below, and only where the time is not mostly that
-    /// of starting a dispatch (see [`Ceilings::resolve`]).
+    /// Nanoseconds a pair of vertex and occluder. Only merges have this and the values below, and only where the time
+    /// is not mostly that of starting a dispatch (see [`Ceilings::resolve`]).
     pub ns_a_pair: Option<f64>,
-    /// Work of a pair.
     pub work: Option<Work>,
     /// Multiplications and additions reached, in 10^9 a second.
     pub gflops: Option<f64>,
@@ -79,10 +73,8 @@ pub struct ProfileRow {
 }
 
 fn work(permutation: &MergePermutation, census: &Census) -> Work {
-    // A sampler reads eight texels of four halves.
     let texel = |name: &str| match name {
         "field_quads" => texel_bytes(permutation),
-        "field_image" => 64,
         "entries" => 4,
         _ => 16,
     };
@@ -109,10 +101,8 @@ fn row(
     // One a nanosecond is 10^9 a second.
     let ns = ms.median * 1e6 / pairs.max(1) as f64;
     let field = census.fetches.get("field_quads").copied().unwrap_or(0);
-    let filtered = census.fetches.get("field_image").copied().unwrap_or(0);
     let field_rate = if texel_bytes(permutation) == 8 { at_best.texel_halves_giga } else { at_best.texel_packed_giga };
-    let other = f64::from(work.fetches - field - filtered) / at_best.texel_packed_giga
-        + f64::from(filtered) / at_best.filtered_giga;
+    let other = f64::from(work.fetches - field) / at_best.texel_packed_giga;
     let loaded: u32 = census.block_bytes.values().sum();
     let reads = f64::from(field) / field_rate + other + f64::from(loaded) / 8.0 / at_best.storage_giga;
     // Rates are unknown where a scene has few vertices.
@@ -132,9 +122,6 @@ fn row(
 }
 
 /// Times made-up merges, interleaved, after one run each to warm up. Returns a row and all times of each.
-///
-/// # Errors
-/// `Failed` when a shader does not compile.
 pub fn made_up(
     bench: &Bench<'_>,
     workload: &Workload,
@@ -142,7 +129,8 @@ pub fn made_up(
     runs: u32,
     at_best: &Ceilings,
 ) -> Result<Vec<(ProfileRow, Vec<f64>)>> {
-    let (device, library) = (bench.baker.device(), bench.baker.library());
+    let device = bench.baker.device();
+    let library = bench.baker.library();
     let mut ready = Vec::new();
     for variant in chosen {
         let permutation = workload.permutation(*variant);
@@ -165,11 +153,9 @@ pub fn made_up(
     Ok(rows.collect())
 }
 
-/// Times a scene's merge in each variant, in turns, everything merged in every frame while it moves; its other passes, the draw and
-/// whole frames for files and for a screen, with and without multisampling. Returns a row and all times of each.
-///
-/// # Errors
-/// As [`crate::frame::Frame::new`].
+/// Times a scene's merge in each variant, in turns, everything merged in every frame while it moves; its other passes,
+/// the draw and whole frames for files and for a screen, with and without multisampling. Returns a row and all times of
+/// each.
 pub fn scene(
     bench: &Bench<'_>,
     name: &str,
@@ -179,7 +165,8 @@ pub fn scene(
     runs: u32,
     at_best: &Ceilings,
 ) -> Result<Vec<(ProfileRow, Vec<f64>)>> {
-    let (mut rows, mut frames) = (Vec::new(), Vec::new());
+    let mut rows = Vec::new();
+    let mut frames = Vec::new();
     for variant in chosen {
         let options = frame::Options {
             variant: Some(*variant),
@@ -243,11 +230,9 @@ fn frame_times(frame: &mut Frame, scene: &Scene, runs: u32) -> Result<[Vec<f64>;
     Ok(times)
 }
 
-/// Bakes a mesh's occlusion field, radiance field and transfers a few times, at most three, after a small one that compiles, and
-/// times the passes: device time of all of a bake's dispatches and draws together, and "bake" by the host's clock.
-///
-/// # Errors
-/// As [`crate::bake::Baker::field`].
+/// Bakes a mesh's occlusion field, radiance field and transfers a few times, at most three, after a small one that
+/// compiles, and times the passes: device time of all of a bake's dispatches and draws together, and "bake" by the
+/// host's clock.
 pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(ProfileRow, Vec<f64>)>> {
     let options = bake::Options::default();
     // Two shells, because an inner one alone may lie inside the solid, where nothing is captured.
@@ -263,7 +248,7 @@ pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(ProfileRow
         let reports = [
             ("occlusion", field(FieldKind::Occlusion, &options)?),
             ("radiance", field(FieldKind::Radiance, &options)?),
-            ("transfer", bench.baker.transfer(mesh, &options, &|_, _| ())?.1),
+            ("transfer", bench.baker.vertices(mesh, &options, bake::Wanted::TRANSFER, &|_, _| ())?.1),
         ];
         for (what, report) in reports {
             let mut add = |pass, ms: f64| times.entry((what, pass)).or_default().push(ms);
@@ -294,71 +279,4 @@ fn plain(case: &str, pass: &str, variant: &str, times: &[f64]) -> ProfileRow {
         arithmetic_share: None,
         read_share: None,
     }
-}
-
-/// Times that a variant takes up to the end of its first run, milliseconds.
-#[derive(Clone, Debug, Serialize)]
-pub struct Start {
-    /// Variant.
-    pub variant: String,
-    /// Compilation of GLSL to SPIR-V.
-    pub spirv_cold_ms: f64,
-    /// SPIR-V read from the cache on disk.
-    pub spirv_warm_ms: f64,
-    /// Pipeline and first dispatch on a device that has not seen the shader in this process. A driver may still know it from
-    /// its own cache on disk.
-    pub first_cold_ms: f64,
-    /// The same with the pipeline cache.
-    pub first_warm_ms: f64,
-}
-
-/// Measures starts on `fresh`, a device without cache folder; `library` keeps SPIR-V.
-///
-/// # Errors
-/// `Failed` when a shader does not compile.
-pub fn starts(fresh: &Arc<Device>, library: &Library, chosen: &[Variant]) -> Result<Vec<Start>> {
-    let workload = Workload::new(fresh, 4096, 1)?;
-    let bare = Library { cache_dir: None, ..library.clone() };
-    let since = |start: Instant| start.elapsed().as_secs_f64() * 1e3;
-    let mut out = Vec::new();
-    for variant in chosen {
-        let permutation = workload.permutation(*variant);
-        let compile = |library: &Library| -> Result<f64> {
-            let start = Instant::now();
-            library.shader(&permutation.row())?;
-            Ok(since(start))
-        };
-        let inputs = workload.inputs(*variant)?;
-        let first = || -> Result<f64> {
-            let start = Instant::now();
-            let merge = Merge::new(fresh, library, permutation)?;
-            workload.run(&merge, &inputs)?;
-            Ok(since(start))
-        };
-        let (spirv_cold_ms, _) = (compile(&bare)?, compile(library)?);
-        out.push(Start {
-            variant: variant.name.to_owned(),
-            spirv_cold_ms,
-            spirv_warm_ms: compile(library)?,
-            first_cold_ms: first()?,
-            first_warm_ms: first()?,
-        });
-    }
-    Ok(out)
-}
-
-/// Writes each variant's SPIR-V, as words for a vendor's tool and as text: `VARIANT.spv`, `VARIANT.spvasm`.
-///
-/// # Errors
-/// `Failed` when a file cannot be written.
-pub fn write_spirv(folder: &Path, library: &Library, workload: &Workload, chosen: &[Variant]) -> Result<()> {
-    for variant in chosen {
-        let permutation = workload.permutation(*variant);
-        let shader = library.shader(&permutation.row())?;
-        let path = |ending: &str| folder.join(format!("{}.{ending}", variant.name));
-        let words: Vec<u8> = shader.spirv.iter().flat_map(|word| word.to_le_bytes()).collect();
-        crate::text::write(&path("spv"), words)?;
-        crate::text::write(&path("spvasm"), &disassemble(&shader)?)?;
-    }
-    Ok(())
 }

@@ -1,11 +1,12 @@
-//! Comparison with the alternatives to shadow fields, at vertices and at pixels: soft shadows by ray casting on all CPU threads, and,
-//! where all lights are balls, by shadow maps on the same device ([`super::shadow_map`]).
+//! Comparison with the alternatives to shadow fields, at vertices and at pixels: soft shadows by ray casting on all CPU
+//! threads, and, where all lights are balls, by shadow maps on the same device ([`super::shadow_map`]).
 //!
-//! The rival is [`RayCast`] in one run. It uses an 8-wide hierarchy per mesh behind a bounding sphere test, scrambled Sobol points,
-//! cosine sampling of the sky and cone sampling of local lights, and leaves out occluders that cannot lie between point and light.
-//! Rays stop at the light's surface; where along a ray that is, is asked only where an occluder lies beside the light.
-//! Its hierarchies are built beforehand, as fields are baked beforehand. At pixels a frame of ours draws its picture, and the rivals
-//! are given what each pixel shows and light that; the time of a plain drawing is added to theirs.
+//! The rival is [`RayCast`] in one run. It uses an 8-wide hierarchy per mesh behind a bounding sphere test, scrambled
+//! Sobol points, cosine sampling of the sky and cone sampling of local lights, and leaves out occluders that cannot lie
+//! between point and light. Rays stop at the light's surface; where along a ray that is, is asked only where an
+//! occluder lies beside the light. Its hierarchies are built beforehand, as fields are baked beforehand. At pixels a
+//! frame of ours draws its picture, and the rivals are given what each pixel shows and light that; the time of a plain
+//! drawing is added to theirs.
 
 use super::budget::{Truth, device_radiosity};
 use super::cases::Case;
@@ -60,11 +61,10 @@ impl MapPoint {
 pub struct Comparison {
     /// Scene and light.
     pub case: String,
-    /// What lights it, in words.
+    /// The case with its light, where it is lit and how lights are taken.
+    pub title: String,
     pub light: String,
-    /// What is lit.
     pub place: JudgedAt,
-    /// Points that are lit.
     #[serde(rename = "point_count")]
     pub points: usize,
     /// Threads of the ray caster.
@@ -82,8 +82,8 @@ pub struct Comparison {
     pub merge_error: VertexDifference,
     /// Ray casting with increasing numbers of rays.
     pub rival: Vec<RivalPoint>,
-    /// Wall time in which ray casting reaches the merge's root mean square error, milliseconds: interpolated, extrapolated, or the
-    /// time of one ray if that already has a smaller error.
+    /// Wall time in which ray casting reaches the merge's root mean square error, milliseconds: interpolated,
+    /// extrapolated, or the time of one ray if that already has a smaller error.
     pub rival_ms_at_equal_rms: Option<f64>,
     /// Shadow maps, hard ones first, with increasing sizes; none where a light is no ball.
     pub maps: Vec<MapPoint>,
@@ -101,34 +101,15 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Name of the case with its light, unless the name contains it, and with where it is lit and how lights are taken.
-    pub fn title(&self) -> String {
-        let light = if self.case.contains(", (") { String::new() } else { format!(" ({})", self.light) };
-        let place = if self.place == JudgedAt::Pixels { ", at pixels" } else { "" };
-        format!("{}{light}{place}{}", self.case, self.way().map_or(String::new(), |way| format!(", {way}")))
-    }
-
-    /// How lights are taken, where that is not the usual way of the place.
-    fn way(&self) -> Option<&'static str> {
-        match (self.lights, self.place, self.shading) {
-            (Some(Lights::Sh), ..) => Some("lights in SH"),
-            (Some(Lights::Sharp), JudgedAt::Pixels, Shading::Vertex) => Some("sharp lights by vertex"),
-            _ => None,
-        }
-    }
-
     /// Name of the merge in tables and plots.
     pub fn merge_title(&self) -> &'static str {
-        self.way().unwrap_or(match (self.lights, self.place) {
-            (Some(_), JudgedAt::Pixels) => "sharp lights by pixel",
-            (Some(_), JudgedAt::Vertices) => "sharp lights",
-            (None, _) => "merge",
-        })
-    }
-
-    /// Whether its rivals are those of a comparison that stands before it.
-    pub fn repeats_rivals(&self) -> bool {
-        self.way().is_some()
+        match (self.lights, self.place, self.shading) {
+            (None, ..) => "merge",
+            (Some(Lights::Sh), ..) => "lights in SH",
+            (Some(Lights::Sharp), JudgedAt::Vertices, _) => "sharp lights",
+            (Some(Lights::Sharp), JudgedAt::Pixels, Shading::Vertex) => "sharp lights by vertex",
+            (Some(Lights::Sharp), JudgedAt::Pixels, Shading::Pixel) => "sharp lights by pixel",
+        }
     }
 }
 
@@ -145,7 +126,8 @@ struct Merged {
 impl Merged {
     /// With sharp lights and without, where a light can be sharp.
     fn all(bench: &Bench<'_>, case: &Case, place: JudgedAt) -> Result<Vec<Self>> {
-        let (sharp, sh) = (Some(Lights::Sharp), Some(Lights::Sh));
+        let sharp = Some(Lights::Sharp);
+        let sh = Some(Lights::Sh);
         let ways: &[(Option<Lights>, Shading)] = match (has_sharp(&case.scene, Lights::Sharp), place) {
             (false, _) => &[(None, Shading::Vertex)],
             (true, JudgedAt::Vertices) => &[(sharp, Shading::Vertex), (sh, Shading::Vertex)],
@@ -157,7 +139,8 @@ impl Merged {
             let lights_of_frame = lights.unwrap_or_default();
             let options = frame::Options { lights: lights_of_frame, shading: Some(*shading), size, ..usual };
             let frame = bench.frame(&case.scene, options)?;
-            let (walls, merges) = (Vec::new(), Vec::new());
+            let walls = Vec::new();
+            let merges = Vec::new();
             Ok(Merged { place, lights: *lights, shading: *shading, frame, walls, merges })
         };
         ways.iter().map(merged).collect()
@@ -203,9 +186,11 @@ impl Merged {
         let times: Vec<(f64, f64)> = rival.iter().map(|p| (f64::from(p.rays), p.wall_ms.median)).collect();
         let rays_at_equal_rms = crossing(&errors, merge_error.rms);
         let rival_ms = rays_at_equal_rms.map(|rays| along(&times, rays));
-        let (frame_wall_ms, merge_ms) = (spread(&self.walls), spread(&self.merges));
-        Ok(Comparison {
+        let frame_wall_ms = spread(&self.walls);
+        let merge_ms = spread(&self.merges);
+        let mut comparison = Comparison {
             case: case.name.clone(),
+            title: String::new(),
             light: case.light.clone(),
             place: judged.place,
             points: judged.points.len(),
@@ -222,15 +207,15 @@ impl Merged {
             frame_wall_ms,
             merge_ms,
             rival: rival.to_vec(),
-        })
+        };
+        let place = if judged.place == JudgedAt::Pixels { "pixels" } else { "vertices" };
+        comparison.title = format!("{} ({}), {} at {place}", case.name, case.light, comparison.merge_title());
+        Ok(comparison)
     }
 }
 
-/// Measures merge, shadow maps and ray casting in turns, at vertices and at pixels: where a light can be sharp, with sharp lights and
-/// with lights in SH, at pixels also with sharp lights by vertex.
-///
-/// # Errors
-/// As [`Frame::new`] and [`Frame::render`].
+/// Measures merge, shadow maps and ray casting in turns, at vertices and at pixels: where a light can be sharp, with
+/// sharp lights and with lights in SH, at pixels also with sharp lights by vertex.
 pub fn compare(bench: &Bench<'_>, case: &Case, truth: &Truth) -> Result<Vec<Comparison>> {
     let shapes = RayMeshes::new(&case.scene);
     let world = World::new(&case.scene, &shapes, &case.scene.at(case.time_s));

@@ -2,18 +2,17 @@
 
 use super::budget::device_radiosity;
 use super::figures::{Radiosity, Spread, difference, rms, spread};
-use super::plot::{Curve, Plot, PlotPanel};
+use super::plot::{self, Curve};
 use super::sweep::merge_ms;
 use super::town::{Town, moved};
 use super::{Bench, default_options};
 use crate::error::{Error, Result};
 use crate::frame::memory::Memory;
 use crate::frame::{self, Frame};
-use crate::layout::CLUSTER_VERTICES;
-use crate::lists::gather::{Counts, Place};
+use crate::lists::gather::Counts;
 use crate::lists::skip::Skip;
-use crate::scene::{Placement, Scene};
-use crate::text::{write, write_rows};
+use crate::scene::Placement;
+use crate::text::write_rows;
 use crate::truth::{RayCast, RayMeshes, World, sample_vertices};
 use serde::Serialize;
 use serde_json::json;
@@ -41,11 +40,6 @@ pub struct ScalingPoint {
     pub one_moves_ms: Spread,
     /// Wall time of a frame at rest, milliseconds.
     pub rest_ms: Spread,
-    /// Median milliseconds that a frame in which everything but the floor moves takes besides the merge, including uploads, with
-    /// lists made by the host. Measured along the entities axis only.
-    pub host_lists_ms: Option<f64>,
-    /// The same with lists made by the device, measured in turns with the host's.
-    pub device_lists_ms: Option<f64>,
     /// Lookups per vertex.
     pub entries_a_vertex: f64,
     /// Lookups that the lists skip.
@@ -54,16 +48,14 @@ pub struct ScalingPoint {
     pub error: f64,
     /// Device memory and lists, bytes.
     pub memory_bytes: Memory,
-    /// Device memory, bytes.
     pub device_bytes: u64,
-    /// Resident memory of the process in bytes, if the system reports it. On a software device it includes device memory.
+    /// Resident memory of the process in bytes, if the system reports it. On a software device it includes device
+    /// memory.
     pub resident_bytes: Option<u64>,
 }
 
-/// Measures the `chosen` axes (all if empty), and writes `scaling.csv`, `scaling.json` and a plot per axis into `folder`.
-///
-/// # Errors
-/// `Usage` when there is no such axis, `Failed` when the folder cannot be written; else as [`Frame::new`].
+/// Measures the `chosen` axes (all if empty), and writes `scaling.csv`, `scaling.json` and a plot an axis into
+/// `folder`.
 pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<ScalingPoint>> {
     let mut axes = axes(bench.quick);
     if let Some(name) = chosen.iter().find(|name| !axes.iter().any(|(axis, _)| axis == name)) {
@@ -82,13 +74,14 @@ pub fn run(bench: &Bench<'_>, folder: &Path, chosen: &[String]) -> Result<Vec<Sc
     write_rows(folder, "scaling", &origin, &points)?;
     for (axis, _) in axes {
         let of_axis: Vec<&ScalingPoint> = points.iter().filter(|p| p.axis == axis).collect();
-        write(&folder.join(format!("scaling-{}.svg", axis.replace(' ', "-"))), &plot(axis, &of_axis).svg())?;
+        let path = folder.join(format!("scaling-{}.svg", axis.replace(' ', "-")));
+        plot::write(&path, "A frame without drawing", axis, "milliseconds (median)", &curves(axis, &of_axis))?;
     }
     Ok(points)
 }
 
-/// Every axis with its towns from small to large. With more entities the town becomes larger at equal density of entities and
-/// vertices, so the neighbourhood of a vertex stays the same.
+/// Every axis with its towns from small to large. With more entities the town becomes larger at equal density of
+/// entities and vertices, so the neighbourhood of a vertex stays the same.
 fn axes(quick: bool) -> Vec<(&'static str, Vec<Town>)> {
     let cells: &[usize] = if quick { &[31, 63, 127, 255] } else { &[31, 63, 127, 255, 511, 1023] };
     let things: &[usize] = if quick { &[16, 64, 1024, 4095] } else { &[1, 4, 16, 64, 256, 1024, 4095] };
@@ -121,32 +114,6 @@ fn error(bench: &Bench<'_>, frame: &mut Frame, placements: &[Placement]) -> Resu
     Ok(difference(&device_radiosity(frame, &vertices)?, &truth, rms(&truth).max(f64::MIN_POSITIVE)).rms)
 }
 
-/// Median milliseconds besides the merge with lists made by the host and by the device, measured in turns.
-fn lists(bench: &Bench<'_>, scene: &Scene, at: &dyn Fn(usize) -> Vec<Placement>) -> Result<[f64; 2]> {
-    let mut frames = Vec::new();
-    for place in [Place::Host, Place::Device] {
-        let options = frame::Options { skip: Skip::ALL, lists: Some(place), ..default_options() };
-        frames.push((bench.frame(scene, options)?, Vec::new()));
-    }
-    let begun = Instant::now();
-    for round in 0..if bench.quick { 7 } else { 15 } {
-        // Long frames need fewer repetitions.
-        if round >= 5 && begun.elapsed().as_secs_f64() > 5.0 {
-            break;
-        }
-        for (frame, times) in &mut frames {
-            let now = at(round);
-            let started = Instant::now();
-            let merge = merge_ms(&frame.render(&now, None)?);
-            // The first frames compile shaders and allocate memory.
-            if round >= 2 {
-                times.push(started.elapsed().as_secs_f64() * 1e3 - merge);
-            }
-        }
-    }
-    Ok([spread(&frames[0].1).median, spread(&frames[1].1).median])
-}
-
 fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoint> {
     let scene = town.scene()?;
     let placements = scene.at(0.0);
@@ -157,7 +124,9 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
     };
     let most = if bench.quick { 3 } else { 7 };
     let timed = |frame: &mut Frame, at: &dyn Fn(usize) -> Vec<Placement>| -> Result<(Vec<f64>, Vec<f64>)> {
-        let (mut walls, mut merges, begun) = (Vec::new(), Vec::new(), Instant::now());
+        let mut walls = Vec::new();
+        let mut merges = Vec::new();
+        let begun = Instant::now();
         for round in 0..=most {
             let now = at(round);
             let started = Instant::now();
@@ -183,8 +152,6 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
         now
     })?;
     let (rest, _) = timed(&mut frame, &|_| placements.clone())?;
-    let lists_ms = axis.starts_with("entities").then(|| lists(bench, &scene, &|round| everything(round as f64)));
-    let lists_ms = lists_ms.transpose()?;
     let merge_ms = spread(&merges);
     // This is read before ray casting, which needs memory of its own.
     let resident_bytes = resident_bytes();
@@ -199,8 +166,6 @@ fn point(bench: &Bench<'_>, axis: &'static str, town: Town) -> Result<ScalingPoi
         merge_ns_a_vertex: merge_ms.median * 1e6 / vertices as f64,
         one_moves_ms: spread(&one),
         rest_ms: spread(&rest),
-        host_lists_ms: lists_ms.map(|[host, _]| host),
-        device_lists_ms: lists_ms.map(|[_, device]| device),
         entries_a_vertex,
         counts: frame.counts(&placements),
         error: error(bench, &mut frame, &placements)?,
@@ -217,90 +182,21 @@ fn resident_bytes() -> Option<u64> {
     Some(line.trim().trim_end_matches(" kB").trim().parse::<u64>().ok()? * 1024)
 }
 
-fn plot(axis: &str, points: &[&ScalingPoint]) -> Plot {
+/// Times against what grows along an axis.
+fn curves(axis: &str, points: &[&ScalingPoint]) -> Vec<Curve> {
     let size = |p: &ScalingPoint| match axis {
         "vertices" => p.vertices,
         "lights" => p.lights,
         _ => p.entities,
     } as f64;
-    // A town grows with its entities: what a vertex costs tells whether what exists matters, or only what is near.
-    let town = axis.starts_with("entities");
-    let words = if town { "entities" } else { axis };
-    let time = |p: &ScalingPoint, ms: f64| if town { ms * 1e3 / p.vertices as f64 } else { ms };
-    // A slope in logarithms says how cost follows size: 0 not at all, 1 in proportion.
-    let curve = |label: &str, noted: bool, value: &dyn Fn(&ScalingPoint) -> Option<f64>| {
-        let known: Vec<(f64, f64)> = points.iter().filter_map(|p| Some((size(p), value(p)?))).collect();
-        (known.len() > 1).then(|| Curve {
-            label: format!("{label}: slope {:.2}", slope(known.iter().copied())),
-            notes: known.iter().filter(|_| noted).map(|p| crate::text::three(p.1)).collect(),
-            points: known,
-        })
+    let curve = |label: &str, value: fn(&ScalingPoint) -> f64| Curve {
+        label: label.into(),
+        points: points.iter().map(|p| (size(p), value(p))).collect(),
+        notes: points.iter().map(|p| crate::text::three(value(p))).collect(),
     };
-    let panel = |title: &str, y_label: &str, curves: Vec<Option<Curve>>| PlotPanel {
-        title: title.into(),
-        x_label: words.into(),
-        y_label: y_label.into(),
-        curves: curves.into_iter().flatten().collect(),
-        ..PlotPanel::default()
-    };
-    let mib = |bytes: u64| bytes as f64 / 1_048_576.0;
-    let each = |p: &ScalingPoint, of: f64| of / (p.vertices as f64 / f64::from(CLUSTER_VERTICES));
-    Plot {
-        title: if town {
-            format!(
-                "A frame without drawing as a town grows: {axis}, and vertices in proportion (slope 0: a vertex costs the same)"
-            )
-        } else {
-            format!("A frame without drawing as {axis} grow in number (slope 0: not at all, 1: in proportion)")
-        },
-        panels: vec![
-            panel(
-                "Time",
-                if town { "microseconds a vertex (median)" } else { "milliseconds (median)" },
-                vec![
-                    curve("all move, whole frame", true, &|p| Some(time(p, p.all_move_ms.median))),
-                    curve("one moves", true, &|p| Some(time(p, p.one_moves_ms.median))),
-                    curve("at rest", false, &|p| Some(time(p, p.rest_ms.median))),
-                    curve("of all move, lists by the host", false, &|p| Some(time(p, p.host_lists_ms?))),
-                    curve("of all move, lists by the device", false, &|p| Some(time(p, p.device_lists_ms?))),
-                ],
-            ),
-            panel(
-                "Work a vertex",
-                "lookups a vertex",
-                vec![
-                    curve("lookups, nothing skipped", true, &|p| Some(each(p, p.counts.considered as f64))),
-                    curve("lookups done", true, &|p| Some(p.entries_a_vertex)),
-                ],
-            ),
-            panel(
-                "Memory",
-                "MiB",
-                vec![
-                    curve("resident, whole process", true, &|p| p.resident_bytes.map(mib)),
-                    curve("on the device", true, &|p| Some(mib(p.device_bytes))),
-                ],
-            ),
-        ],
-    }
-}
-
-/// Least-squares slope in logarithms: 1 where cost is in proportion to size.
-fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let logs: Vec<(f64, f64)> = points.map(|(x, y)| (x.ln(), y.ln())).collect();
-    let count = logs.len() as f64;
-    let (mean_x, mean_y) =
-        (logs.iter().map(|p| p.0).sum::<f64>() / count, logs.iter().map(|p| p.1).sum::<f64>() / count);
-    let (along, across) =
-        logs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + (x - mean_x).powi(2), b + (x - mean_x) * (y - mean_y)));
-    across / along
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn slope_of_a_power() {
-        let points = [1.0, 2.0, 10.0].map(|x: f64| (x, 3.0 * x.powf(1.5)));
-        assert!((super::slope(points.into_iter()) - 1.5).abs() < 1e-12);
-    }
+    vec![
+        curve("all move", |p| p.all_move_ms.median),
+        curve("one moves", |p| p.one_moves_ms.median),
+        curve("at rest", |p| p.rest_ms.median),
+    ]
 }

@@ -26,7 +26,6 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Filter {
-    /// One.
     Hard,
     /// 16 for the distance of what blocks, then 32.
     Pcss,
@@ -37,8 +36,8 @@ const NEAR: f64 = 0.5;
 /// Ratio of the distance of all occluders to the radius of the ball around them from which on one view holds them.
 const OUTSIDE: f64 = 1.15;
 
-/// Distance off its surface from which a point of a bent mesh is compared, in bounding radii: facets bulge out of the plane through a
-/// corner.
+/// Distance off its surface from which a point of a bent mesh is compared, in bounding radii: facets bulge out of the
+/// plane through a corner.
 const OFFSET: f32 = 4e-3;
 
 /// A view from a light: axes, and the tangent of half the angle across.
@@ -49,7 +48,6 @@ struct View {
     slope: f64,
 }
 
-/// A light and its views.
 struct MappedLight {
     entity: usize,
     centre: DVec3,
@@ -114,11 +112,8 @@ impl ShadowMaps {
         [ShaderPermutation::new("shadow_map.vert", 4), ShaderPermutation::new("shadow_map.frag", 4), shade]
     }
 
-    /// Maps of `map_px` texels across a view for a scene to which [`maps_apply`], its entities at `placements`, and the points to light:
-    /// an entity, and the view from a place on its surface.
-    ///
-    /// # Errors
-    /// `Input` when the device's images are too small, `Device` when memory ran out.
+    /// Maps of `map_px` texels across a view for a scene to which [`maps_apply`], its entities at `placements`, and the
+    /// points to light: an entity, and the view from a place on its surface.
     pub fn new(
         (device, library): (&Arc<Device>, &Library),
         scene: &Scene,
@@ -166,9 +161,6 @@ impl ShadowMaps {
     }
 
     /// Draws all maps and lights all points, and waits.
-    ///
-    /// # Errors
-    /// `Device` when the device was lost.
     pub fn run(&self, scene: &Scene, placements: &[Placement]) -> Result<Vec<Timing>> {
         let occluders = occluders(scene, placements);
         let mut commands = Commands::new(&self.device, "shadow map")?;
@@ -207,7 +199,8 @@ impl ShadowMaps {
                 let [positions, indices] = &self.meshes[mesh];
                 drawing.bind(&self.draw, &[(positions, 0)], indices);
                 for (index, view) in light.views.iter().enumerate().filter(|(_, view)| view.may_see(light, ball)) {
-                    let (index, px) = (index as u32, self.map_px);
+                    let index = index as u32;
+                    let px = self.map_px;
                     drawing.area(index % 3 * px, index / 3 * px, px, px);
                     drawing.push(&view.push(light, &placements[*entity]));
                     drawing.indexed(0..3 * scene.meshes[mesh].triangles.len() as u32);
@@ -224,9 +217,6 @@ impl ShadowMaps {
     }
 
     /// Light of the lights on every point after a run: linear RGB radiance.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn radiosity(&self) -> Result<Vec<[f64; 3]>> {
         let found: Vec<[f32; 4]> = self.radiosity.download(self.vertex_count as usize)?;
         Ok(found.into_iter().map(|[r, g, b, _]| [r, g, b].map(f64::from)).collect())
@@ -236,7 +226,8 @@ impl ShadowMaps {
 /// Position and entity, normal and offset, and albedo of every point.
 fn receivers(scene: &Scene, placements: &[Placement], points: &[(Vertex, VertexView)]) -> Vec<[f32; 4]> {
     let of = |(key, view): &(Vertex, VertexView)| {
-        let (entity, place) = (&scene.entities[key.entity], &placements[key.entity]);
+        let entity = &scene.entities[key.entity];
+        let place = &placements[key.entity];
         let mesh = &scene.meshes[entity.mesh];
         let offset_m = if mesh.is_flat() { 0.0 } else { OFFSET * mesh.bounding_sphere().1 * place.scale };
         let [position, normal] = [view.position, view.normal].map(DVec3::as_vec3);
@@ -290,7 +281,8 @@ impl View {
     /// Whether a ball may be seen: it lies wholly outside none of the four sides.
     fn may_see(&self, light: &MappedLight, (centre, radius_m): &Ball) -> bool {
         let at = *centre - light.centre;
-        let (along, length) = (at.dot(self.forward), self.slope.hypot(1.0));
+        let along = at.dot(self.forward);
+        let length = self.slope.hypot(1.0);
         [self.right, self.down].iter().all(|side| (at.dot(*side).abs() - self.slope * along) / length < *radius_m)
     }
 

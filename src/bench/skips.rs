@@ -3,7 +3,6 @@
 use super::budget::device_radiosity;
 use super::cases::{self, Case};
 use super::figures::{Radiosity, Spread, VertexDifference, difference, rms, spread};
-use super::plot::{AxisScale, PlotColumn, RowGroup, Rows};
 use super::sweep::merge_ms;
 use super::town::{Town, moved};
 use super::{Bench, default_options, house};
@@ -11,7 +10,7 @@ use crate::draw::Antialias;
 use crate::error::Result;
 use crate::frame::{self, Frame};
 use crate::lists::gather::Counts;
-use crate::lists::skip::{self, BenchCase, EPS, Skip};
+use crate::lists::skip::{EPS, Skip};
 use crate::scene::{Placement, Scene};
 use crate::truth::raycast::{Distant, relative_error};
 use crate::truth::{RayCast, RayMeshes, Vertex, World, sample_vertices};
@@ -32,23 +31,17 @@ pub struct Side {
     pub entries: usize,
     /// Against ray casting.
     pub error: VertexDifference,
-    /// Fields on the device, bytes.
     pub field_bytes: u64,
 }
 
-/// One skip in one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct SkipCost {
-    /// Scene.
     pub case: String,
-    /// Name of the skip.
     pub skip: String,
-    /// Lit vertices.
     #[serde(rename = "vertex_count")]
     pub vertices: usize,
     /// Without it, all others on.
     pub off: Side,
-    /// With all skips.
     pub on: Side,
     /// Frame time off over on.
     #[serde(rename = "speed_up_ratio")]
@@ -57,20 +50,50 @@ pub struct SkipCost {
     pub change: VertexDifference,
     /// What the lists leave off, all skips on.
     pub counts: Counts,
-    /// What this skip left off: (cluster, chain, entity) triples, a cluster being 64 vertices. `None` where it does not work on
-    /// lists.
+    /// What this skip left off: (cluster, chain, entity) triples, a cluster being 64 vertices. `None` where it does not
+    /// work on lists.
     pub left_off_count: Option<u64>,
 }
 
-/// What the skip of that row's name left off.
-fn left_off(name: &str, counts: &Counts) -> Option<u64> {
-    serde_json::to_value(counts).ok()?.get(skip::row(name)?.counter?)?.as_u64()
+/// What moves while a skip is timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Motion {
+    /// Nothing: frames without drawing, everything merged in each.
+    AtRest,
+    /// One thing, frames without drawing.
+    OneMoves,
+    /// All that casts shadows or shines, frames as a window shows them.
+    AllMove,
 }
 
-/// Measures every skip in some cases, and writes `skip.csv`, `skip.json` and `skip.svg` into `folder`.
-///
-/// # Errors
-/// `Failed` when the folder cannot be written; else as [`Frame::new`].
+/// How each skip that has a switch is timed.
+const TIMED: [(&str, Motion); 8] = [
+    ("horizon", Motion::AtRest),
+    ("cones", Motion::AtRest),
+    ("behind", Motion::AtRest),
+    ("caps", Motion::AtRest),
+    ("passed", Motion::AtRest),
+    ("covered", Motion::AtRest),
+    ("unmoved", Motion::OneMoves),
+    ("hidden", Motion::AllMove),
+];
+
+/// The number of entries that a skip left off the lists; `None` where it does not work on lists.
+fn left_off(name: &str, counts: &Counts) -> Option<u64> {
+    match name {
+        "horizon" => Some(counts.below_horizon),
+        "cones" => Some(counts.apart),
+        "behind" => Some(counts.behind_light),
+        "caps" => Some(counts.caps),
+        "passed" => Some(counts.passed_by),
+        "covered" => Some(counts.covered),
+        "hidden" => Some(counts.hidden),
+        "eps" => Some(counts.below_eps),
+        _ => None,
+    }
+}
+
+/// Measures every skip in some cases, and writes `skip.csv` and `skip.json` into `folder`.
 pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[Case]) -> Result<Vec<SkipCost>> {
     crate::text::make_folder(folder)?;
     let mut rows = Vec::new();
@@ -82,52 +105,16 @@ pub fn run(bench: &Bench<'_>, folder: &Path, cases: &[Case]) -> Result<Vec<SkipC
         "errors": "relative to the root mean square of T0 over the judged vertices",
     });
     crate::text::write_rows(folder, "skip", &origin, &rows)?;
-    crate::text::write(&folder.join("skip.svg"), &plot(&rows).svg())?;
     Ok(rows)
 }
 
-/// Time and error of every skip, off and on.
-fn plot(rows: &[SkipCost]) -> Rows {
-    let mut cases: Vec<&str> = rows.iter().map(|row| row.case.as_str()).collect();
-    cases.dedup();
-    let group = |case: &&str| RowGroup {
-        heading: (*case).to_owned(),
-        rows: rows.iter().filter(|row| row.case == *case).map(|row| row.skip.clone()).collect(),
-    };
-    let column = |x_label: &str, value: &dyn Fn(&SkipCost) -> [Option<f64>; 2]| PlotColumn {
-        x_label: x_label.into(),
-        scale: AxisScale::Log,
-        limit: None,
-        values: rows.iter().map(|row| value(row).to_vec()).collect(),
-    };
-    let lead = column("times faster with it", &|row| [None, Some(row.times_faster)]);
-    Rows {
-        title: "Every skip off and on, all others on".into(),
-        series: vec!["off".into(), "on".into()],
-        groups: cases.iter().map(group).collect(),
-        columns: vec![
-            column("frame without drawing, milliseconds (median)", &|row| {
-                [row.off, row.on].map(|side| Some(side.frame_ms.median))
-            }),
-            PlotColumn { limit: Some((1.0, "equal".into())), ..lead },
-            column("RMS error against ray casting, relative", &|row| {
-                [row.off, row.on].map(|side| Some(side.error.rms))
-            }),
-        ],
-    }
-}
-
-/// All cases.
-///
-/// # Errors
-/// As [`cases::scenes`].
 pub fn all(quick: bool) -> Result<Vec<Case>> {
     let town = |things, lights, cells| -> Result<Case> {
         let scene = Town { things, lights, cells, receive: true }.scene()?;
         Ok(Case::at_start(format!("town of {things}, {lights} lights"), scene, Distant::Exact))
     };
-    // A storey of a house: a floor with things on it below a ceiling, flat lamps between that shine down, of which most are out, and
-    // an attic full of things.
+    // A storey of a house: a floor with things on it below a ceiling, flat lamps between that shine down, of which most
+    // are out, and an attic full of things.
     let house = Case::at_start("house".into(), house::scene()?, Distant::Exact);
     if quick {
         return Ok(vec![cases::scene("torus_over_plane")?, town(64, 4, 80)?, house]);
@@ -154,22 +141,22 @@ fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<SkipCost>> {
     let kept = frame::Options { skip: Skip::ALL, ..at_rest };
     let shown = frame::Options { size: PICTURE, antialias: Antialias::usual(bench.baker.device()), ..kept };
     let mut rows = Vec::new();
-    for row in skip::switches() {
-        let (what, base, timed) = match row.bench {
-            Some(BenchCase::OneMoves) => (format!("{}, one moves", row.name), kept, BenchCase::OneMoves),
-            Some(BenchCase::AllMove) => (format!("{}, all move", row.name), shown, BenchCase::AllMove),
-            _ => (row.name.to_owned(), at_rest, BenchCase::AtRest),
+    for (name, motion) in TIMED {
+        let (what, base) = match motion {
+            Motion::AtRest => (name.to_owned(), at_rest),
+            Motion::OneMoves => (format!("{name}, one moves"), kept),
+            Motion::AllMove => (format!("{name}, all move"), shown),
         };
         let mut off = base;
-        *off.skip.switch(row.name).expect("a row with a switch") = false;
-        rows.push(judge.row(bench, case, &placements, [row.name, &what], [off, base], timed)?);
+        *off.skip.switch(name).expect("a skip with a switch") = false;
+        rows.push(judge.row(bench, case, &placements, [name, &what], [off, base], motion)?);
     }
     let what = format!("eps {EPS}");
     let without_eps = frame::Options { eps: 0.0, ..at_rest };
-    rows.push(judge.row(bench, case, &placements, ["eps", &what], [without_eps, at_rest], BenchCase::AtRest)?);
+    rows.push(judge.row(bench, case, &placements, ["eps", &what], [without_eps, at_rest], Motion::AtRest)?);
     let none = frame::Options { eps: 0.0, skip: Skip::NONE, ..at_rest };
     let what = "all but unmoved";
-    rows.push(judge.row(bench, case, &placements, [what, what], [none, at_rest], BenchCase::AtRest)?);
+    rows.push(judge.row(bench, case, &placements, [what, what], [none, at_rest], Motion::AtRest)?);
     Ok(rows)
 }
 
@@ -177,14 +164,14 @@ fn of_case(bench: &Bench<'_>, case: &Case) -> Result<Vec<SkipCost>> {
 const PICTURE: [u32; 2] = [1280, 720];
 
 /// The entities that move.
-fn movers(scene: &Scene, timed: BenchCase) -> Vec<usize> {
+fn movers(scene: &Scene, motion: Motion) -> Vec<usize> {
     let entities = &scene.entities;
     let occluders = (0..entities.len()).filter(|&i| entities[i].occludes);
     let lights = (0..entities.len()).filter(|&i| entities[i].emits && !entities[i].occludes);
-    match timed {
-        BenchCase::AtRest => Vec::new(),
-        BenchCase::OneMoves => occluders.take(1).collect(),
-        BenchCase::AllMove => occluders.chain(lights).collect(),
+    match motion {
+        Motion::AtRest => Vec::new(),
+        Motion::OneMoves => occluders.take(1).collect(),
+        Motion::AllMove => occluders.chain(lights).collect(),
     }
 }
 
@@ -197,9 +184,10 @@ fn in_turns(
     movers: &[usize],
     placements: &[Placement],
     rounds: u32,
-    timed: BenchCase,
+    motion: Motion,
 ) -> Result<Times> {
-    let (mut walls, mut merges) = ([Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
+    let mut walls = [Vec::new(), Vec::new()];
+    let mut merges = [Vec::new(), Vec::new()];
     for round in 0..rounds + 2 {
         let mut now = placements.to_vec();
         for &mover in movers {
@@ -207,7 +195,7 @@ fn in_turns(
         }
         for (side, frame) in frames.iter_mut().enumerate() {
             let started = Instant::now();
-            let passes = if timed == BenchCase::AllMove { frame.show(&now, 1.0)? } else { frame.render(&now, None)? };
+            let passes = if motion == Motion::AllMove { frame.show(&now, 1.0)? } else { frame.render(&now, None)? };
             let merge = merge_ms(&passes);
             // The first frames compile.
             if round >= 2 {
@@ -235,11 +223,11 @@ impl Judge {
         placements: &[Placement],
         [name, what]: [&str; 2],
         [off, on]: [frame::Options; 2],
-        timed: BenchCase,
+        motion: Motion,
     ) -> Result<SkipCost> {
         let mut frames = [bench.frame(&case.scene, off)?, bench.frame(&case.scene, on)?];
         let rounds = if bench.quick { 5 } else { 11 };
-        let (walls, merges) = in_turns(&mut frames, &movers(&case.scene, timed), placements, rounds, timed)?;
+        let (walls, merges) = in_turns(&mut frames, &movers(&case.scene, motion), placements, rounds, motion)?;
         let entries = [frames[0].merged().merged_entries, frames[1].merged().merged_entries];
         let mut found = Vec::new();
         for frame in &mut frames {
@@ -253,7 +241,8 @@ impl Judge {
             error: difference(&found[i], &self.truth, self.unit),
             field_bytes: frames[i].memory().fields,
         };
-        let (off, on) = (side(0), side(1));
+        let off = side(0);
+        let on = side(1);
         let counts = frames[1].counts(placements);
         (bench.progress)(&format!("{}: {what} measured", case.name));
         Ok(SkipCost {
@@ -267,5 +256,17 @@ impl Judge {
             off,
             on,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lists::skip::TABLE;
+
+    #[test]
+    fn every_switch_is_timed() {
+        let names: Vec<&str> = TABLE.iter().map(|row| row.name).collect();
+        assert_eq!(TIMED.map(|(name, _)| name)[..], names);
     }
 }

@@ -2,13 +2,10 @@
 
 use super::Bench;
 use super::default_options;
-use super::plot::{AxisScale, Curve, Plot, PlotColumn, PlotPanel, RowGroup, Rows};
-use super::refusals::{Refusal, refusals};
 use super::trials::{self, Trial};
-use super::turns::{Turn, turns};
 use crate::error::Result;
 use crate::field::Storage;
-use crate::merge::chain::{self, Multiplier};
+use crate::merge::chain::Multiplier;
 use crate::sh::basis::MAX_COEFFICIENTS;
 use crate::sh::lobe::{cap, clamped_cosine};
 use crate::sh::product::Tensor;
@@ -29,9 +26,7 @@ const TRUTH_DEGREE: usize = 400;
 /// Irradiance of a horizontal plane under a uniform sky of unit irradiance, behind a chain of caps.
 #[derive(Clone, Debug, Serialize)]
 pub struct CapChain {
-    /// Description of the caps.
     pub caps: &'static str,
-    /// Number of caps.
     #[serde(rename = "cap_count")]
     pub count: usize,
     /// True irradiance, by quadrature of the true visibility.
@@ -62,7 +57,8 @@ pub struct CapChain {
     pub passed: bool,
 }
 
-/// Largest allowed difference between f32 and f64 for a guarded chain of up to 1 000 factors; each factor rounds by 6e-8.
+/// Largest allowed difference between f32 and f64 for a guarded chain of up to 1 000 factors; each factor rounds by
+/// 6e-8.
 pub const NEAR_F32: f64 = 1e-5;
 /// Largest allowed difference for factors stored in f16, each rounded by at most 5e-4 of its largest coefficients.
 pub const NEAR_F16: f64 = 2e-3;
@@ -70,21 +66,14 @@ pub const NEAR_F16: f64 = 2e-3;
 /// What was measured.
 #[derive(Serialize)]
 pub struct StabilityOutcome {
-    /// Chains of caps.
     pub chains: Vec<CapChain>,
-    /// Scenes.
     pub trials: Vec<Trial>,
-    /// Rotations that are composed of small steps.
-    pub turns: Vec<Turn>,
-    /// Inputs that must be refused.
-    pub refusals: Vec<Refusal>,
 }
 
 impl StabilityOutcome {
     /// Number of failures, and number of tests.
     pub fn failed(&self) -> [usize; 2] {
         let passed = self.chains.iter().map(|c| c.passed).chain(self.trials.iter().map(|t| t.passed));
-        let passed = passed.chain(self.turns.iter().map(|t| t.passed)).chain(self.refusals.iter().map(|r| r.passed));
         let all: Vec<bool> = passed.collect();
         [all.iter().filter(|passed| !**passed).count(), all.len()]
     }
@@ -104,8 +93,7 @@ type Cap = (DVec3, f64);
 
 fn chain(caps: &[Cap], rule: Rule) -> f64 {
     let tensor = Tensor::new(BANDS, rule.visibility_bands, BANDS);
-    let multiplier =
-        Multiplier::new(chain::Chain { guard: rule.guard, ..Default::default() }, BANDS, rule.visibility_bands);
+    let multiplier = Multiplier::new(BANDS, rule.visibility_bands);
     let mut t = multiplier.begin(&clamped_cosine(BANDS, DVec3::Y));
     for &(axis, half_angle) in caps {
         let mut blocked = [0.0; MAX_COEFFICIENTS];
@@ -116,7 +104,11 @@ fn chain(caps: &[Cap], rule: Rule) -> f64 {
         if rule.single {
             subtract_single(&tensor, &mut t, &blocked);
         } else {
-            multiplier.multiply(&mut t, &blocked);
+            if rule.guard {
+                multiplier.multiply(&mut t, &blocked)
+            } else {
+                multiplier.multiply_unguarded(&mut t, &blocked)
+            }
         }
     }
     // Unit irradiance: radiance 1 / pi, whose expansion is sqrt(4 pi) / pi in the constant band.
@@ -131,7 +123,8 @@ fn subtract_single(tensor: &Tensor, t: &mut [f64; MAX_COEFFICIENTS], blocked: &[
     for entry in tensor.entries() {
         after[entry.k] -= entry.value as f32 * (before[entry.i] * blocked[entry.j] as f32);
     }
-    let (first, rest) = (before[0], rest_of(&after));
+    let first = before[0];
+    let rest = rest_of(&after);
     let kept = after[0].clamp(first.min(0.0), first.max(0.0));
     let room = (rest_of(&before) + (first - kept) * (first + kept)).max(0.0);
     let shorten = if rest > room { (room / rest).sqrt() } else { 1.0 };
@@ -151,7 +144,8 @@ pub fn chains(seed: u64, longest: usize) -> Vec<CapChain> {
     let mut rng = fastrand::Rng::with_seed(seed);
     let distinct: Vec<Cap> = (0..longest)
         .map(|_| {
-            let (height, turn) = (rng.f64(), 2.0 * PI * rng.f64());
+            let height = rng.f64();
+            let turn = 2.0 * PI * rng.f64();
             let across = (1.0 - height * height).sqrt();
             let axis = DVec3::new(across * turn.cos(), height, across * turn.sin());
             (axis, (10.0 + 30.0 * rng.f64()).to_radians())
@@ -167,7 +161,8 @@ pub fn chains(seed: u64, longest: usize) -> Vec<CapChain> {
             let of_bands = |visibility_bands| chain(caps, Rule { visibility_bands, ..base });
             let guard = Rule { guard: true, ..base };
             let guarded = chain(caps, guard);
-            let (f32, f16) = (chain(caps, Rule { single: true, ..guard }), chain(caps, Rule { half: true, ..guard }));
+            let f32 = chain(caps, Rule { single: true, ..guard });
+            let f16 = chain(caps, Rule { half: true, ..guard });
             out.push(CapChain {
                 caps: name,
                 count,
@@ -188,10 +183,7 @@ pub fn chains(seed: u64, longest: usize) -> Vec<CapChain> {
     out
 }
 
-/// Runs all tests, and writes `chains.csv`, `trials.csv`, `turns.csv`, `refusals.csv`, `stability.json` and plots into `folder`.
-///
-/// # Errors
-/// `Failed` when the folder cannot be written; else as [`crate::frame::Frame::new`].
+/// Runs all tests, and writes `chains.csv`, `trials.csv` and `stability.json` into `folder`.
 pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<StabilityOutcome> {
     crate::text::make_folder(folder)?;
     (bench.progress)("chains of caps");
@@ -206,91 +198,12 @@ pub fn run(bench: &Bench<'_>, folder: &Path) -> Result<StabilityOutcome> {
         }
         (bench.progress)(&case.name);
     }
-    (bench.progress)("a million small turns");
-    let turns = turns(1_000_000);
     let origin = json!({ "origin": bench.origin, "quick": bench.quick, "seed": bench.seed });
-    let outcome = StabilityOutcome { chains, trials, turns, refusals: refusals() };
+    let outcome = StabilityOutcome { chains, trials };
     write(&folder.join("chains.csv"), &csv(&origin, &outcome.chains))?;
     write(&folder.join("trials.csv"), &csv(&origin, &outcome.trials))?;
-    write(&folder.join("turns.csv"), &csv(&origin, &outcome.turns))?;
-    write(&folder.join("refusals.csv"), &csv(&origin, &outcome.refusals))?;
-    write(&folder.join("chains.svg"), &chain_plot(&outcome.chains).svg())?;
-    write(&folder.join("trials.svg"), &trial_plot(&outcome.trials).svg())?;
     write(&folder.join("stability.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
     Ok(outcome)
-}
-
-/// Plot of the chains against the truth by kind of cap, and of the effect of f32 and f16.
-fn chain_plot(chains: &[CapChain]) -> Plot {
-    let mut kinds: Vec<&str> = chains.iter().map(|c| c.caps).collect();
-    kinds.dedup();
-    let curve = |kind: &str, label: &str, value: &dyn Fn(&CapChain) -> f64| Curve {
-        label: label.into(),
-        points: chains.iter().filter(|c| c.caps == kind).map(|c| (c.count as f64, value(c))).collect(),
-        notes: Vec::new(),
-    };
-    let mut panels: Vec<PlotPanel> = kinds
-        .iter()
-        .map(|kind| PlotPanel {
-            title: format!("Caps: {kind} (1.5 and more at the edge)"),
-            x_label: "caps in the chain".into(),
-            y_label: "irradiance, relative to where nothing blocks".into(),
-            scales: [AxisScale::Log, AxisScale::Linear(-0.1, 1.5)],
-            curves: vec![
-                curve(kind, "truth", &|c| c.truth),
-                curve(kind, "plain products of 4 bands", &|c| c.plain),
-                curve(kind, "guarded (the default)", &|c| c.guarded),
-                curve(kind, "5 bands of visibility, plain", &|c| c.bands_5),
-                curve(kind, "6 bands of visibility, plain", &|c| c.bands_6),
-                curve(kind, "7 bands of visibility, plain", &|c| c.bands_7),
-            ],
-            ..PlotPanel::default()
-        })
-        .collect();
-    let largest = |label: &str, value: &dyn Fn(&CapChain) -> f64| {
-        let mut worst: std::collections::BTreeMap<usize, f64> = Default::default();
-        for chain in chains {
-            let apart = worst.entry(chain.count).or_default();
-            *apart = apart.max((value(chain) - chain.guarded).abs());
-        }
-        let points = worst.into_iter().map(|(count, apart)| (count as f64, apart)).collect();
-        Curve { label: label.into(), points, notes: Vec::new() }
-    };
-    panels.push(PlotPanel {
-        title: format!("What rounding changes; allowed: f32 {NEAR_F32:e}, f16 {NEAR_F16:e}"),
-        x_label: "caps in the chain".into(),
-        y_label: "largest difference to f64, relative to where nothing blocks".into(),
-        curves: vec![largest("guarded in f32", &|c| c.f32), largest("guarded, factors in f16", &|c| c.f16)],
-        ..PlotPanel::default()
-    });
-    Plot { title: "Irradiance behind chains of caps".into(), panels }
-}
-
-/// Plot of each scene's radiosity relative to its bound, and of its difference to the f64 twin.
-fn trial_plot(trials: &[Trial]) -> Rows {
-    let mut names: Vec<String> = trials.iter().map(|t| t.name.clone()).collect();
-    names.dedup();
-    let values = |value: &dyn Fn(&Trial) -> f64| -> Vec<Vec<Option<f64>>> {
-        let of = |name: &String, storage| trials.iter().find(|t| t.name == *name && t.storage == storage).map(value);
-        names.iter().map(|name| vec![of(name, Storage::F16), of(name, Storage::F32)]).collect()
-    };
-    let columns = vec![
-        PlotColumn {
-            x_label: "largest radiosity / its bound".into(),
-            scale: AxisScale::Linear(0.0, 1.1),
-            limit: Some((1.0, "bound".into())),
-            values: values(&|t| if t.largest == 0.0 { 0.0 } else { t.largest / t.bound }),
-        },
-        PlotColumn {
-            x_label: "difference to the f64 twin, relative".into(),
-            scale: AxisScale::Log,
-            limit: Some((trials::NEAR_TWIN, "tolerance".into())),
-            values: values(&|t| t.twin_error),
-        },
-    ];
-    let series = vec!["fields in f16".into(), "in f32".into()];
-    let groups = vec![RowGroup { heading: String::new(), rows: names }];
-    Rows { title: "Odd scenes on the device".into(), series, groups, columns }
 }
 
 #[cfg(test)]

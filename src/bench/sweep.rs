@@ -5,7 +5,7 @@ use super::cases::Case;
 use super::figures::{Radiosity, Spread, VertexDifference, difference, spread};
 use super::{Bench, default_options};
 use crate::error::Result;
-use crate::field::{Lattice, Lookup, Storage};
+use crate::field::{Lattice, Storage};
 use crate::frame::{self, Frame};
 use crate::gpu::Timing;
 use crate::scene::{Lights, Placement};
@@ -17,11 +17,8 @@ const WARM_UP: usize = 2;
 
 /// One setting that is measured.
 pub struct Variation {
-    /// What is varied.
     pub axis: &'static str,
-    /// Its setting.
     pub name: String,
-    /// Everything.
     pub options: frame::Options,
 }
 
@@ -30,9 +27,7 @@ pub struct Variation {
 pub struct Point {
     /// Scene and light.
     pub case: String,
-    /// What is varied.
     pub axis: &'static str,
-    /// Its setting.
     pub name: String,
     /// Bytes of all fields of the scene.
     pub field_bytes: u64,
@@ -80,8 +75,6 @@ pub fn variations(quick: bool) -> Vec<Variation> {
         all.push(Variation { axis, name: name.to_owned(), options });
     };
     add("lights", "sh", &|o| o.lights = Lights::Sh);
-    add("lookup", "nearest", &|o| o.lookup = Lookup::Nearest);
-    add("lookup", "radial", &|o| o.lookup = Lookup::Radial);
     add("storage", "f32", &|o| o.bake.storage = Storage::F32);
     for (axis, text) in &LATTICES[..if quick { 3 } else { LATTICES.len() }] {
         if lattice(text) != base.bake.lattice {
@@ -119,14 +112,15 @@ fn add_bands(add: &mut Add<'_>) {
 
 /// Settings that change together.
 fn add_sets(add: &mut Add<'_>) {
-    add("together", "student: 8x4x4, nearest, f32, 32 px", &|o| {
+    add("together", "student: 8x4x4, f32, 32 px", &|o| {
         o.bake.lattice = lattice("latlon:8x4x4,linear,raw,inner=0.2");
-        (o.bake.storage, o.bake.face_px, o.lookup) = (Storage::F32, 32, Lookup::Nearest);
+        o.bake.storage = Storage::F32;
+        o.bake.face_px = 32;
     });
     add("together", "small: cube:8x4, 16 px", &|o| (o.bake.lattice, o.bake.face_px) = (lattice("cube:8x4"), 16));
-    add("together", "paper: 16 linear shells x 96, radial, f32", &|o| {
+    add("together", "paper: 16 linear shells x 96, f32", &|o| {
         o.bake.lattice = lattice("cube:16x4,linear,raw,inner=0.2");
-        (o.bake.storage, o.lookup) = (Storage::F32, Lookup::Radial);
+        o.bake.storage = Storage::F32;
     });
     add("together", "fine: cube:24x10, f32, 128 px", &|o| {
         (o.bake.lattice, o.bake.storage, o.bake.face_px) = (lattice("cube:24x10"), Storage::F32, 128);
@@ -140,9 +134,6 @@ pub fn merge_ms(timings: &[Timing]) -> f64 {
 
 /// Renders one frame after another in rounds, so that whatever else the machine does meets all alike: merge times in
 /// milliseconds, by frame and round.
-///
-/// # Errors
-/// As [`Frame::render`].
 pub fn interleaved(frames: &mut [Frame], placements: &[Placement], rounds: usize) -> Result<Vec<Vec<f64>>> {
     let mut times = vec![Vec::with_capacity(rounds); frames.len()];
     for round in 0..WARM_UP + rounds {
@@ -167,10 +158,6 @@ struct Measured {
     found: Vec<Radiosity>,
 }
 
-/// Measures every variation on one case.
-///
-/// # Errors
-/// As [`Frame::new`] and [`Frame::render`].
 pub fn sweep(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variation]) -> Result<Vec<Point>> {
     let measured = by_device(bench, case, truth, variations)?;
     let default_ms = measured[0].times_ms.clone();
@@ -195,7 +182,8 @@ pub fn sweep(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variat
 
 fn by_device(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variation]) -> Result<Vec<Measured>> {
     let placements = case.scene.at(case.time_s);
-    let (mut frames, mut first) = (Vec::new(), Vec::new());
+    let mut frames = Vec::new();
+    let mut first = Vec::new();
     for variation in variations {
         let started = Instant::now();
         let mut frame = bench.frame(&case.scene, variation.options)?;
@@ -219,28 +207,9 @@ fn by_device(bench: &Bench<'_>, case: &Case, truth: &Truth, variations: &[Variat
     measured.collect()
 }
 
-/// Indices of the points that no other beats in both numbers (smaller is better), by the first.
-pub fn pareto(points: &[(f64, f64)]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..points.len()).collect();
-    order.sort_by(|&a, &b| points[a].0.total_cmp(&points[b].0).then(points[a].1.total_cmp(&points[b].1)));
-    let mut best = f64::INFINITY;
-    order.retain(|&i| {
-        let kept = points[i].1 < best;
-        best = best.min(points[i].1);
-        kept
-    });
-    order
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_front_is_what_nothing_beats() {
-        assert_eq!(pareto(&[(1.0, 9.0), (2.0, 3.0), (2.0, 4.0), (3.0, 3.0), (4.0, 1.0), (0.5, 10.0)]), [5, 0, 1, 4]);
-        assert!(pareto(&[]).is_empty());
-    }
 
     #[test]
     fn every_variation_can_be_baked_and_differs_from_the_default() {

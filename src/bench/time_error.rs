@@ -3,11 +3,11 @@
 use super::budget::{Budget, Effort, Truth, budget};
 use super::cases::{self, Case};
 use super::pictures::{CasePicture, dashed, pictures};
+use super::plot::{self, Curve};
 use super::rival::{Comparison, compare};
-use super::rival_plot::{case_plot, rival_plot};
-use super::small_lights::SmallLight;
+use super::shadow_map::Filter;
 use super::sweep::{Point, Variation, sweep, variations};
-use super::{Bench, default_options, verdict};
+use super::{Bench, default_options};
 use crate::error::{Error, Result};
 use crate::text::{csv, write};
 use serde::Serialize;
@@ -23,7 +23,6 @@ pub struct Selection {
     pub scene: Option<PathBuf>,
     /// Parts of the names of cases; named cases are also swept.
     pub cases: Vec<String>,
-    /// Axes of the sweep.
     pub axes: Vec<String>,
 }
 
@@ -50,12 +49,8 @@ impl TimeErrorOutcome {
     }
 }
 
-/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, `time-error.txt`, three pictures and
-/// a plot per case, and a plot of the comparison with ray casting. `own` is the case of the selected scene file.
-///
-/// # Errors
-/// `Usage` when a case or axis does not exist, `Failed` when the folder cannot be written, `Input` when no light reaches any of the
-/// judged vertices; else as [`crate::frame::Frame::new`].
+/// Measures, and writes into `folder`: `budget.csv`, `sweep.csv`, `rival.csv`, `time-error.json`, and three pictures
+/// and a plot a case. `own` is the case of the selected scene file.
 pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection, own: Option<Case>) -> Result<TimeErrorOutcome> {
     let sweeps_all = own.is_some() || !selection.cases.is_empty();
     let cases = own.map_or_else(|| chosen(bench.quick, &selection.cases), |case| Ok(vec![case]))?;
@@ -94,40 +89,16 @@ pub fn run(bench: &Bench<'_>, folder: &Path, selection: &Selection, own: Option<
     Ok(outcome)
 }
 
-/// A case that can be named; one of small lights is made only when it is.
-enum Nameable {
-    Made(Box<Case>),
-    Small(SmallLight, String),
-}
-
-impl Nameable {
-    fn name(&self) -> &str {
-        match self {
-            Nameable::Made(case) => &case.name,
-            Nameable::Small(_, name) => name,
-        }
-    }
-
-    fn case(self) -> Result<Case> {
-        match self {
-            Nameable::Made(case) => Ok(*case),
-            Nameable::Small(which, _) => which.case(),
-        }
-    }
-}
-
-/// The named cases, or all but those of small lights. A quick run without names leaves out cases that take ten seconds or more to
-/// bake on two cores, and uses the teapot under one light only.
-fn chosen(quick: bool, named: &[String]) -> Result<Vec<Case>> {
+/// The named cases, or all. A quick run without names leaves out cases that take ten seconds or more to bake on two
+/// cores, and uses the teapot under one light only.
+fn chosen(quick: bool, names: &[String]) -> Result<Vec<Case>> {
     let mut all: Vec<Case> = cases::teapot_lights()?.into_iter().chain(cases::scenes()?).collect();
-    if named.is_empty() {
-        let cheap = |name: &str| ["sphere_over_plane", "torus_over_plane"].contains(&name) || name.contains("(b)");
-        all.retain(|case| !quick || cheap(&case.name));
-        return Ok(all);
+    if quick && names.is_empty() {
+        all.retain(|case| {
+            ["sphere_over_plane", "torus_over_plane"].contains(&case.name.as_str()) || case.name.contains("(b)")
+        });
     }
-    let small = SmallLight::all().into_iter().map(|which| Nameable::Small(which, which.name()));
-    let all: Vec<Nameable> = all.into_iter().map(|case| Nameable::Made(Box::new(case))).chain(small).collect();
-    cases::named(all, named, Nameable::name)?.into_iter().map(Nameable::case).collect()
+    cases::named(all, names, |case| &case.name)
 }
 
 /// The default, and the settings of the named axes, or of all axes.
@@ -144,7 +115,8 @@ fn variations_of(quick: bool, axes: &[String]) -> Result<Vec<Variation>> {
     Ok(all)
 }
 
-/// Variations need new bakes, so only two cases are swept by default: one occluder under a sky, and one with a local light.
+/// Variations need new bakes, so only two cases are swept by default: one occluder under a sky, and one with a local
+/// light.
 fn is_swept(case: &Case) -> bool {
     case.name == "torus_over_plane" || case.name.contains("(b)")
 }
@@ -160,23 +132,41 @@ fn write_all(bench: &Bench<'_>, folder: &Path, selection: &Selection, outcome: &
     write(&folder.join("rival.csv"), &csv(&origin, &rivals))?;
     write(&folder.join("time-error.json"), &format!("{:#}\n", json!({ "origin": origin, "outcome": outcome })))?;
     for Budget { case, .. } in &outcome.budgets {
-        write(
-            &folder.join(format!("time-error-{}.svg", dashed(case))),
-            &case_plot(case, &outcome.points, &outcome.comparisons).svg(),
-        )?;
+        let path = folder.join(format!("time-error-{}.svg", dashed(case)));
+        let curves = curves(outcome.comparisons.iter().filter(|c| c.case == *case).collect());
+        let title = format!("{case}: time against error");
+        plot::write(&path, &title, "milliseconds (median)", "RMS error of radiosity, relative", &curves)?;
     }
-    write(&folder.join("rival.svg"), &rival_plot(&outcome.comparisons).svg())?;
-    let page = [
-        verdict::defaults(&outcome.points),
-        verdict::rivals(&outcome.comparisons),
-        verdict::budgets(&outcome.budgets),
-        verdict::pictures(&outcome.pictures),
-        format!("This run took {}.\n", outcome.took()),
-    ];
-    write(&folder.join("time-error.txt"), &page.join("\n"))
+    Ok(())
 }
 
-/// One row for the merge, and one for each number of rays and each shadow map.
+/// The rivals and the merge in a picture of one case, or at vertices where the camera sees nothing that is lit.
+fn curves(comparisons: Vec<&Comparison>) -> Vec<Curve> {
+    let Some(last) = comparisons.last() else { return Vec::new() };
+    let mut curves = vec![Curve {
+        label: format!("ray casting, {} threads; rays a light", last.threads),
+        points: last.rival.iter().map(|p| (p.wall_ms.median, p.error.rms)).collect(),
+        notes: last.rival.iter().map(|p| p.rays.to_string()).collect(),
+    }];
+    for (filter, label) in [(Filter::Hard, "shadow maps, hard; texels"), (Filter::Pcss, "shadow maps, PCSS; texels")] {
+        let maps: Vec<_> = last.maps.iter().filter(|p| p.filter == filter).collect();
+        curves.push(Curve {
+            label: label.into(),
+            points: maps.iter().map(|p| (p.wall_ms.median, p.error.rms)).collect(),
+            notes: maps.iter().map(|p| p.map_px.to_string()).collect(),
+        });
+    }
+    curves.extend(comparisons.iter().filter(|c| c.place == last.place).map(|c| Curve {
+        label: c.merge_title().into(),
+        points: vec![(c.frame_wall_ms.median, c.merge_error.rms)],
+        notes: Vec::new(),
+    }));
+    curves.retain(|curve| !curve.points.is_empty());
+    curves
+}
+
+/// One row for the merge, and one for each number of rays and each shadow map. Comparisons of one place have the same
+/// rivals.
 fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     let row = |what: String, wall_ms: f64, error| {
         json!({
@@ -189,6 +179,6 @@ fn rival_rows(comparison: &Comparison) -> Vec<Value> {
     let merge = row(comparison.merge_title().into(), comparison.frame_wall_ms.median, comparison.merge_error);
     let cast = comparison.rival.iter().map(|p| row(format!("{} rays", p.rays), p.wall_ms.median, p.error));
     let maps = comparison.maps.iter().map(|p| row(p.title(), p.wall_ms.median, p.error));
-    let rivals = cast.chain(maps).filter(|_| !comparison.repeats_rivals());
+    let rivals = cast.chain(maps);
     std::iter::once(merge).chain(rivals).collect()
 }

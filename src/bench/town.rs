@@ -7,7 +7,6 @@ use glam::Quat;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Parameters of a town.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Town {
     /// Number of entities on the floor, including lights.
@@ -24,10 +23,6 @@ pub struct Town {
 const STEP_M: f64 = 2.0;
 
 impl Town {
-    /// Makes the scene.
-    ///
-    /// # Errors
-    /// `Input` when the scene of this function is malformed; tests run it.
     pub fn scene(&self) -> Result<Scene> {
         let edge = (self.things.max(1) as f64).sqrt().ceil() as usize;
         let size_m = edge as f64 * STEP_M;
@@ -44,8 +39,10 @@ impl Town {
         for i in 0..self.things {
             let at = |k: usize| (k as f64 + 0.5) * STEP_M - edge as f64 * STEP_M / 2.0;
             // Displacements from the grid are the same in each run.
-            let (dx, dz) = (0.3 * (i as f64 * 2.399).sin(), 0.3 * (i as f64 * 1.237).cos());
-            let (x, z) = (at(i % edge) + dx, at(i / edge) + dz);
+            let dx = 0.3 * (i as f64 * 2.399).sin();
+            let dz = 0.3 * (i as f64 * 1.237).cos();
+            let x = at(i % edge) + dx;
+            let z = at(i / edge) + dz;
             let light = self.lights > 0 && i % every == every / 2 && i / every < self.lights;
             let (mesh, y) = [("ball", 0.41), ("house", 0.36), ("ring", 0.52)][if light { 0 } else { i % 3 }];
             let _ = if light {

@@ -19,18 +19,15 @@ use std::sync::Arc;
 pub struct TrialCase {
     /// What is odd about it.
     pub name: String,
-    /// The scene.
     pub scene: Scene,
 }
 
-/// The result of a trial.
 #[derive(Clone, Debug, Serialize)]
 pub struct Trial {
     /// What is odd about it.
     pub name: String,
     /// Number format of the fields.
     pub storage: Storage,
-    /// Vertices that are lit.
     #[serde(rename = "vertex_count")]
     pub vertices: usize,
     /// Whether every number on the device is finite.
@@ -46,16 +43,18 @@ pub struct Trial {
     /// Largest difference of the device to its f64 twin, relative to the twin's largest magnitude; 0 where all is dark.
     #[serde(rename = "twin_error_relative")]
     pub twin_error: f64,
-    /// Whether the trial passed: all numbers are finite, repeatable, within the bound, and within [`NEAR_TWIN`] of the twin.
+    /// Whether the trial passed: all numbers are finite, repeatable, within the bound, and within [`NEAR_TWIN`] of the
+    /// twin.
     pub passed: bool,
 }
 
-/// How far f32 on the device may be from f64, of the brightest radiosity: a thousand products and rotations were off by 3.3e-6, all
-/// else by less than 1e-6. Positions are taken from the receiver, so that they are as exact 10^6 m away.
+/// How far f32 on the device may be from f64, of the brightest radiosity: a thousand products and rotations were off by
+/// 3.3e-6, all else by less than 1e-6. Positions are taken from the receiver, so that they are as exact 10^6 m away.
 pub const NEAR_TWIN: f64 = 2e-5;
 
-/// Scenes of a floor and two balls, and what is odd about each. Two lights stand off the diagonals of the floor's vertices: on these a
-/// direction lies between two faces of a silhouette field's nodes, and f32 and f64 take different ones.
+/// Scenes of a floor and two balls, and what is odd about each. Two lights stand off the diagonals of the floor's
+/// vertices: on these a direction lies between two faces of a silhouette field's nodes, and f32 and f64 take different
+/// ones.
 const TRIALS: &[(&str, &str)] = &[
     ("apart", "position = [0, 1, 0]; position = [1.2, 0.9, 0.3]"),
     ("touching each other", "position = [0, 1, 0]; position = [1, 1, 0]"),
@@ -118,7 +117,7 @@ const SUNS: &[(&str, &str)] = &[
 ];
 
 /// A floor of `cells` x `cells`, two balls and a two-coloured ring to place, and a sky.
-pub(super) fn scene(cells: u32, sky: &str, entities: &str) -> Result<Scene> {
+fn scene(cells: u32, sky: &str, entities: &str) -> Result<Scene> {
     let text = format!(
         "[camera]\neye = [0, 3, 6]\ntarget = [0, 0, 0]\n{sky}\n\
          [[mesh]]\nname = \"floor\"\nplane = {{ size_m = 4, cells = {cells} }}\n\
@@ -129,19 +128,15 @@ pub(super) fn scene(cells: u32, sky: &str, entities: &str) -> Result<Scene> {
     Scene::parse(&text, Path::new("assets/scenes/trial.toml"), &embedded::read)
 }
 
-/// A sky.
-pub(super) const GRADIENT: &str = "[environment]\ngradient = { radiance = [1, 1, 1] }";
+const GRADIENT: &str = "[environment]\ngradient = { radiance = [1, 1, 1] }";
 const FLOOR: &str = "[[entity]]\nmesh = \"floor\"\n";
 
 /// An entity of a mesh of [`scene`], and more of its keys.
-pub(super) fn entity(mesh: &str, more: &str) -> String {
+fn entity(mesh: &str, more: &str) -> String {
     format!("[[entity]]\nmesh = \"{mesh}\"\n{more}\n")
 }
 
 /// All trials; chains of occluders of up to `longest`.
-///
-/// # Errors
-/// `Input` when a scene of this function is malformed; tests run it.
 pub fn cases(longest: usize) -> Result<Vec<TrialCase>> {
     let mut out = Vec::new();
     let mut add = |name: String, scene: Scene| out.push(TrialCase { name, scene });
@@ -201,7 +196,6 @@ pub fn cases(longest: usize) -> Result<Vec<TrialCase>> {
     Ok(out)
 }
 
-/// Changes one mesh of a scene.
 fn change(scene: &mut Scene, index: usize, how: impl FnOnce(&mut Mesh)) -> Result<()> {
     let mut mesh = (*scene.meshes[index]).clone();
     how(&mut mesh);
@@ -248,7 +242,9 @@ fn many_lights(count: usize) -> Result<Scene> {
     let mut rng = fastrand::Rng::with_seed(8);
     let mut entities = format!("{FLOOR}{}", entity("ball", "position = [0, 0.6, 0]\nreceives = false"));
     for _ in 0..count {
-        let (x, y, z) = (4.0 * rng.f64() - 2.0, 1.5 + 2.0 * rng.f64(), 4.0 * rng.f64() - 2.0);
+        let x = 4.0 * rng.f64() - 2.0;
+        let y = 1.5 + 2.0 * rng.f64();
+        let z = 4.0 * rng.f64() - 2.0;
         let light = format!("position = [{x}, {y}, {z}]\nscale = 0.05\nemission = [1, 1, 1]\nreceives = false");
         entities += &entity("lamp", &light);
     }
@@ -260,7 +256,9 @@ fn crowd(count: usize, distinct: bool) -> Result<Scene> {
     let mut rng = fastrand::Rng::with_seed(5);
     let mut entities = FLOOR.to_owned();
     for _ in 0..count {
-        let (mut x, mut y, mut z) = (0.4, 1.1, 0.2);
+        let mut x = 0.4;
+        let mut y = 1.1;
+        let mut z = 0.2;
         if distinct {
             (x, y, z) = (4.0 * rng.f64() - 2.0, 0.7 + 3.0 * rng.f64(), 4.0 * rng.f64() - 2.0);
         }
@@ -269,10 +267,10 @@ fn crowd(count: usize, distinct: bool) -> Result<Scene> {
     scene(6, GRADIENT, &entities)
 }
 
-/// Upper bound of the magnitude of every radiosity of a scene. A guarded chain never lengthens the transfer vector, of which a
-/// lobe of the cosine is the longest; by Cauchy and Schwarz light adds at most the length of its own vector times that. A local
-/// light's is at most its brightest emission times that of a whole sky, sqrt(4 pi), and a tenth for what interpolation and the
-/// fit of samples add.
+/// Upper bound of the magnitude of every radiosity of a scene. A guarded chain never lengthens the transfer vector, of
+/// which a lobe of the cosine is the longest; by Cauchy and Schwarz light adds at most the length of its own vector
+/// times that. A local light's is at most its brightest emission times that of a whole sky, sqrt(4 pi), and a tenth for
+/// what interpolation and the fit of samples add.
 pub fn bound(scene: &Scene, bands: usize) -> f64 {
     let length = |v: &[f64]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
     let sky = scene.environment.coefficients(bands).iter().map(|channel| length(channel)).fold(0.0, f64::max);
@@ -287,9 +285,6 @@ pub fn bound(scene: &Scene, bands: usize) -> f64 {
 }
 
 /// Lights a trial twice on the device, merging everything each time, and once in f64.
-///
-/// # Errors
-/// As [`Frame::render`].
 pub fn run(case: &TrialCase, mut frame: Frame, storage: Storage) -> Result<Trial> {
     let placements = case.scene.at(0.0);
     let vertices = receiver_vertices(&case.scene);

@@ -18,11 +18,8 @@ pub const F16: f64 = 2e-3;
 pub const CASES: [(&str, usize, usize); 3] =
     [("cube:3x4,inner=0.3", 4, 1), ("latlon:2x3x5,inner=0.3", 3, 3), ("cube:1x1", 2, 3)];
 
-/// Assembles random numbers, some of them inside the solid. The largest error relative to 1 + what is wanted; infinite where
-/// anything was written outside the field.
-///
-/// # Errors
-/// As [`Assemble::new`].
+/// Assembles random numbers, some of them inside the solid. The largest error relative to 1 + what is wanted; infinite
+/// where anything was written outside the field.
 pub fn compare(
     baker: &Baker,
     (lattice, bands, channels): (&Lattice, usize, usize),
@@ -68,10 +65,6 @@ pub fn compare(
     Ok(errors.fold(0.0, |worst, error| if error.is_nan() { f64::INFINITY } else { worst.max(error) }))
 }
 
-/// The comparisons of `check`.
-///
-/// # Errors
-/// As [`Assemble::new`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     for (storage, tolerance) in [(Storage::F32, F32), (Storage::F16, F16)] {
         for (text, bands, channels) in CASES {

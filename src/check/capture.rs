@@ -2,10 +2,11 @@
 
 use super::CheckRow;
 use crate::asset::{Mesh, generate};
+use crate::bake::Baker;
+pub use crate::bake::capture::Way;
 use crate::bake::capture::{self, Capture, CaptureKind, Model, NO_SLOT, Slots};
 use crate::bake::self_visibility::FREE;
 use crate::bake::triangles::unit_positions;
-use crate::bake::{self, Baker};
 use crate::error::Result;
 use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
@@ -14,8 +15,8 @@ use bytemuck::Pod;
 use glam::Vec3;
 use std::sync::Arc;
 
-/// Share of texels whose centres may lie so near an edge that device and rays disagree: 1e-3 where corners snap to 1/256 of a
-/// texel, and in proportion to that step on other devices (Vulkan asks for 1/16).
+/// Share of texels whose centres may lie so near an edge that device and rays disagree: 1e-3 where corners snap to
+/// 1/256 of a texel, and in proportion to that step on other devices (Vulkan asks for 1/16).
 pub fn differing_limit(device: &Device) -> f64 {
     1e-3 * snapping(device)
 }
@@ -28,23 +29,13 @@ pub(super) fn snapping(device: &Device) -> f64 {
 /// Colours interpolated in f32, relative: a few roundings, of which those near a silhouette are the largest.
 const COLOR: f64 = 1e-4;
 
-/// Captures the planned faces and brings the atlas to the host: one `T` a texel.
-///
-/// # Errors
-/// As [`Capture::record`].
-pub fn atlas<T: Pod>(
-    device: &Arc<Device>,
-    capture: &Capture,
-    model: &Model,
-    eyes: &[Vec3],
-    plan: &[Slots],
-    cull: bool,
-) -> Result<Vec<T>> {
+/// Captures the faces of a batch and brings the atlas to the host: one `T` a texel.
+pub fn atlas<T: Pod>(device: &Arc<Device>, capture: &Capture, eyes: &[Vec3], slots: &[Slots]) -> Result<Vec<T>> {
     let texels = u64::from(capture.atlas.shape.width) * u64::from(capture.atlas.shape.height);
     let buffer = Buffer::new(device, "atlas on the host", BufferKind::Readback, texels * size_of::<T>() as u64)?;
-    let drawn = capture.choose(model, eyes, plan, cull)?;
+    let drawn = capture.choose(eyes, slots)?;
     let mut commands = Commands::new(device, "capture to host")?;
-    bake::record_captures(&mut commands, capture, model, &drawn, Access::TransferRead)?;
+    capture.record(&mut commands, &drawn, Access::TransferRead)?;
     commands.copy_image(&capture.atlas, &buffer);
     commands.barrier(Access::TransferWrite, Access::HostRead);
     commands.submit()?;
@@ -53,46 +44,54 @@ pub fn atlas<T: Pod>(
 
 /// Place of texel (x, y) of a slot in what [`atlas`] returns.
 pub fn texel_index(capture: &Capture, slot: u32, x: usize, y: usize) -> usize {
-    let (columns, px) = (capture.columns as usize, capture.face_px as usize);
-    let (column, row) = (slot as usize % columns, slot as usize / columns);
+    let columns = capture.columns as usize;
+    let px = capture.face_px as usize;
+    let column = slot as usize % columns;
+    let row = slot as usize / columns;
     (row * px + y) * columns * px + column * px + x
 }
 
 /// Texels of one eye's faces in rows; `None` where the face was not drawn.
 pub type CapturedFaces<T> = [Option<Vec<T>>; FACE_COUNT];
 
-/// How faces are captured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
-    /// By the device's own rasteriser.
-    Drawn,
-    /// By a compute shader, as on software devices.
-    Computed,
+/// Captures of a mesh in faces of `face_px`. Backs of triangles are left out of a closed mesh where `cull` is set.
+pub fn capture_of(
+    baker: &Baker,
+    mesh: &Mesh,
+    (face_px, kind, cull): (u32, CaptureKind, bool),
+    way: Way,
+) -> Result<Capture> {
+    let device = baker.device();
+    let colors = kind == CaptureKind::Radiance;
+    let mut model = if colors { Model::with_colors(device, mesh)? } else { Model::new(device, mesh)? };
+    model.closed &= cull;
+    Capture::new(device, baker.library(), model, face_px, kind, way)
+}
+
+/// The slots of all eyes, which fit into one atlas.
+pub fn only_batch(capture: &Capture, eyes: &[Vec3]) -> Vec<Slots> {
+    let mut batches = capture.plan(eyes);
+    assert_eq!(batches.len(), 1, "all eyes fit one atlas");
+    batches.remove(0)
 }
 
 /// Captures every eye's faces.
-///
-/// # Errors
-/// As [`Capture::new`].
 pub fn faces<T: Pod>(
     baker: &Baker,
     mesh: &Mesh,
     eyes: &[Vec3],
-    (face_px, kind, cull): (u32, CaptureKind, bool),
+    settings: (u32, CaptureKind, bool),
     way: Way,
 ) -> Result<Vec<CapturedFaces<T>>> {
-    let model = Model::new(baker.device(), mesh, kind == CaptureKind::Radiance)?;
-    let mut capture = Capture::new(baker.device(), baker.library(), face_px, kind)?;
-    capture.computes = way == Way::Computed;
-    let plan = capture.plan(&model, eyes);
-    assert_eq!(plan.len(), eyes.len(), "all eyes fit one atlas");
-    let atlas: Vec<T> = atlas(baker.device(), &capture, &model, eyes, &plan, cull)?;
-    let px = face_px as usize;
+    let capture = capture_of(baker, mesh, settings, way)?;
+    let batch = only_batch(&capture, eyes);
+    let atlas: Vec<T> = atlas(baker.device(), &capture, eyes, &batch)?;
+    let px = capture.face_px as usize;
     let face = |slot: u32| {
         let texels = (0..px * px).map(|i| atlas[texel_index(&capture, slot, i % px, i / px)]);
         (slot != NO_SLOT).then(|| texels.collect())
     };
-    Ok(plan.iter().map(|slots| slots.map(face)).collect())
+    Ok(batch.iter().map(|slots| slots.map(face)).collect())
 }
 
 /// How captured coverage and rays agree.
@@ -121,7 +120,8 @@ impl Coverage {
     }
 }
 
-/// Whether a texel, or one that touches it, differs from it, or it lies on the face's rim, where neighbours are unknown.
+/// Whether a texel, or one that touches it, differs from it, or it lies on the face's rim, where neighbours are
+/// unknown.
 fn is_edge(covered: &[bool], px: usize, x: usize, y: usize) -> bool {
     if x == 0 || y == 0 || x + 1 == px || y + 1 == px {
         return true;
@@ -132,9 +132,6 @@ fn is_edge(covered: &[bool], px: usize, x: usize, y: usize) -> bool {
 }
 
 /// Captures coverage and casts the rays.
-///
-/// # Errors
-/// As [`Capture::new`].
 pub fn coverage(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32, way: Way) -> Result<Coverage> {
     let positions = unit_positions(mesh);
     let mut out = Coverage::default();
@@ -163,19 +160,18 @@ pub fn coverage(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32, way: Wa
 
 /// Share of the texels whose captured colour is farther than a few roundings from that of the nearest thing that a ray
 /// meets. Infinite where nothing was seen.
-///
-/// # Errors
-/// As [`Capture::new`].
 pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result<f64> {
     let positions = unit_positions(mesh);
     let white = vec![Vec3::ONE; positions.len()];
     let colors = mesh.colors.as_ref().unwrap_or(&white);
-    let (mut texels, mut differing, mut lit) = (0, 0, 0);
+    let mut texels = 0;
+    let mut differing = 0;
+    let mut lit = 0;
     for (eye, faces) in
         eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, CaptureKind::Radiance, true), Way::Drawn)?)
     {
         for (face, found) in faces.iter().enumerate() {
-            let wanted = capture::twin_colors((&positions, colors), &mesh.triangles, eye.as_dvec3(), face, face_px);
+            let wanted = capture::twin_colors(&positions, colors, &mesh.triangles, eye.as_dvec3(), face, face_px);
             for (i, wanted) in wanted.iter().enumerate() {
                 let found = found.as_ref().map_or([0.0; 3], |texels| [texels[i][0], texels[i][1], texels[i][2]]);
                 let found = Vec3::from_array(found).as_dvec3();
@@ -190,14 +186,13 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
     Ok(if lit == 0 { f64::INFINITY } else { f64::from(differing as u32) / texels as f64 })
 }
 
-/// Share of the texels whose captured distance is more than a step from that of the nearest thing that a ray meets. Infinite where
-/// nothing was seen.
-///
-/// # Errors
-/// As [`Capture::new`].
+/// Share of the texels whose captured distance is more than a step from that of the nearest thing that a ray meets.
+/// Infinite where nothing was seen.
 pub fn distances(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32, way: Way) -> Result<f64> {
     let positions = unit_positions(mesh);
-    let (mut texels, mut differing, mut seen) = (0, 0, 0);
+    let mut texels = 0;
+    let mut differing = 0;
+    let mut seen = 0;
     for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, CaptureKind::Distance, true), way)?) {
         for (face, found) in faces.iter().enumerate() {
             let wanted = capture::twin_distances(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
@@ -224,12 +219,9 @@ pub fn eyes_outside() -> Vec<Vec3> {
     ]
 }
 
-/// The comparisons of `check`.
-///
-/// # Errors
-/// As [`Capture::new`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
-    let (measure, limit) = ("share of texels", differing_limit(baker.device()));
+    let measure = "share of texels";
+    let limit = differing_limit(baker.device());
     let rings = generate::torus_two_colour(0.5, 0.15, 32, 16);
     for (way, word) in [(Way::Drawn, "drawn"), (Way::Computed, "computed")] {
         for mesh in [generate::sphere(0.5, 3), generate::torus(1.0, 0.3, 32, 16)] {

@@ -12,26 +12,24 @@ use crate::scene::Placement;
 
 /// Two half-float steps, and two roundings of interpolated f32.
 pub const HALF: f64 = 2e-3;
-/// Share of pixels whose samples may lie so near an edge that device and rays see different triangles there, or so shifted a
-/// gradient: where corners snap to 1/256 of a pixel, and in proportion to that step on other devices.
+/// Share of pixels whose samples may lie so near an edge that device and rays see different triangles there, or so
+/// shifted a gradient: where corners snap to 1/256 of a pixel, and in proportion to that step on other devices.
 const EDGES: f64 = 2e-3;
 
-/// Draws what the last merge left, on the device and by its twin: the share of pixels that differ by more than [`HALF`] of
-/// 1 + what is wanted. Infinite where the picture is of one colour.
-///
-/// # Errors
-/// As [`Frame::render`].
+/// Draws what the last merge left, on the device and by its twin: the share of pixels that differ by more than [`HALF`]
+/// of 1 + what is wanted. Infinite where the picture is of one colour.
 pub fn against_twin(frame: &mut Frame, placements: &[Placement], white: f32) -> Result<f64> {
     frame.render(placements, Some(white))?;
     let found = frame.picture();
     let wanted = frame.twin_picture(placements, white)?;
     assert_eq!(found.len(), 3 * wanted.len(), "pixels");
     let mut differing = 0;
-    for (found, wanted) in found.chunks_exact(3).zip(&wanted) {
-        let agrees = (0..3).all(|c| (f64::from(found[c]) - wanted[c]).abs() <= HALF * (1.0 + wanted[c].abs()));
+    for (found, [wanted, spread]) in found.chunks_exact(3).zip(&wanted) {
+        let agrees =
+            (0..3).all(|c| (f64::from(found[c]) - wanted[c]).abs() <= HALF * (1.0 + wanted[c].abs()) + spread[c]);
         differing += usize::from(!agrees);
     }
-    let plain = wanted.iter().all(|pixel| pixel == &wanted[0]);
+    let plain = wanted.iter().all(|[color, _]| *color == wanted[0][0]);
     Ok(if plain { f64::INFINITY } else { f64::from(differing as u32) / wanted.len() as f64 })
 }
 
@@ -58,10 +56,6 @@ pub(super) fn compare(
     Ok(())
 }
 
-/// The comparisons of `check`.
-///
-/// # Errors
-/// As [`Frame::new`] and [`Frame::render`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     compare(baker, "draw", Antialias::None, add)?;
     compare(baker, "draw", Antialias::Samples, add)

@@ -1,35 +1,29 @@
-//! "merge" against its twin in f64, which reads the same stored numbers: every variant, lookup, skip, number format and kind
+//! "merge" against its twin in f64, which reads the same stored numbers: every variant, skip, number format and kind
 //! of lattice.
 
 use super::CheckRow;
 use crate::asset::embedded;
 use crate::bake::cache::Cache;
 use crate::bake::{self, Baker};
-use crate::draw::{Antialias, Shading};
+use crate::draw::Shading;
 use crate::error::Result;
-use crate::field::{Lookup, Storage};
+use crate::field::Storage;
+use crate::field::lattice::Directions;
 use crate::frame::{self, Frame};
-use crate::lists::gather::Place;
 use crate::lists::skip::Skip;
 use crate::merge::Variant;
 use crate::merge::variant::VARIANTS;
 use crate::scene::{Lights, Placement, Scene};
 use std::path::Path;
 
-/// Differences of f32 arithmetic between device and twin: some 20 products and rotations of numbers around the brightest
-/// radiosity, each off by 6e-8 of it. The stored numbers are the same in both, f16 or not.
+/// Differences of f32 arithmetic between device and twin: some 20 products and rotations of numbers around the
+/// brightest radiosity, each off by 6e-8 of it. The stored numbers are the same in both, f16 or not.
 pub const ARITHMETIC: f64 = 1e-5;
 /// Vulkan lets a device be off by 4096 units in the last place in atan and acos: 2.4e-4 of an angle.
 pub const ANGLES: f64 = 3e-4;
-/// A sampler may weigh samples in steps of 1/256 in each of three directions; neighbours of these fields differ by about as much as
-/// the brightest radiosity.
-pub const FILTER: f64 = 5e-3;
-/// Rounding decides which sample is nearest where two are equally near, and there the whole step between them shows: the share
-/// of vertices for which that may happen.
-pub const TIES: f64 = 2e-3;
 
-/// A floor, a ball that is lit and shades itself with a ring, two lights of which one has colours of its own, and a sky.
-/// Positions are odd, so that no vertex lies on a border between samples.
+/// A floor, a ball that is lit and shades itself with a ring, two lights of which one has colours of its own, and a
+/// sky. Positions are odd, so that no vertex lies on a border between samples.
 pub const MIXED: &str = r#"
 environment = { uniform = [0.1, 0.12, 0.2], key = { radiance = [2, 1.5, 1], toward = [1, 2, 0.5], sharpness = 3 } }
 [[mesh]]
@@ -67,9 +61,6 @@ emission = [20, 15, 10]
 "#;
 
 /// A scene from the text of its meshes, entities and sky; a camera is added.
-///
-/// # Errors
-/// `Input` as [`Scene::parse`].
 pub fn scene(text: &str) -> Result<Scene> {
     let text = format!("{text}\n[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n");
     Scene::parse(&text, Path::new("assets/scenes/check.toml"), &embedded::read)
@@ -82,13 +73,10 @@ pub fn options() -> frame::Options {
         bake: bake::Options { storage: Storage::F32, lattice, face_px: 16, ..Default::default() },
         lights: Lights::Sh,
         shading: Some(Shading::Vertex),
-        lookup: Lookup::Trilinear,
-        variant: Some(Variant::named("texel").expect("a variant")),
-        skip: Skip::ALL,
+        variant: Some(Variant::named("texel-packed").expect("a variant")),
         eps: 0.0,
-        lists: Some(Place::Host),
         size: [64, 48],
-        antialias: Antialias::Samples,
+        ..frame::Options::default()
     }
 }
 
@@ -97,20 +85,14 @@ pub fn options() -> frame::Options {
 pub struct Agreement {
     /// Largest difference as a share of 1 + the brightest radiosity; infinite where a number is not finite.
     pub worst: f64,
-    /// Share of vertices that are off by more than [`ARITHMETIC`].
-    pub off: f64,
-    /// The brightest radiosity.
     pub brightest: f64,
 }
 
 /// Lights the scene on the device and in f64.
-///
-/// # Errors
-/// As [`Frame::render`].
 pub fn against_twin(frame: &mut Frame, placements: &[Placement]) -> Result<Agreement> {
     frame.render(placements, None)?;
     let twin = frame.twin(placements)?;
-    let (mut worst, mut off, mut count) = (0.0_f64, 0, 0);
+    let mut worst = 0.0_f64;
     let brightest = twin.iter().flat_map(|(_, v)| v.iter().flatten()).fold(0.0_f64, |m, b| m.max(b.abs()));
     for (entity, expected) in &twin {
         let found = frame.radiosity(*entity)?;
@@ -120,13 +102,11 @@ pub fn against_twin(frame: &mut Frame, placements: &[Placement]) -> Result<Agree
             let error =
                 (0..3).map(difference).fold(0.0, |m, e| if e.is_nan() { f64::INFINITY } else { f64::max(m, e) });
             worst = worst.max(error);
-            off += usize::from(error > ARITHMETIC);
-            count += 1;
         }
     }
     // A dark scene shows nothing.
     let worst = if brightest > 0.01 { worst } else { f64::INFINITY };
-    Ok(Agreement { worst, off: f64::from(off as u32) / f64::from(count.max(1)), brightest })
+    Ok(Agreement { worst, brightest })
 }
 
 /// The lattices that are tried besides the pinned one, with what each is allowed to be off by.
@@ -138,10 +118,6 @@ pub const LATTICES: [(&str, f64); 5] = [
     ("cube:5x3,edges", ARITHMETIC),
 ];
 
-/// The comparisons of `check`.
-///
-/// # Errors
-/// As [`Frame::new`] and [`Frame::render`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let scene = scene(MIXED)?;
     let placements = scene.at(0.0);
@@ -157,42 +133,27 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
         } else {
             format!("{what} (as {}: the device's limits)", frame.variant().name)
         };
-        let (tolerance, near) = match options.bake.lattice.directions {
-            _ if frame.variant().image => (FILTER, true),
-            crate::field::lattice::Directions::LatLon { .. } => (ANGLES, true),
-            crate::field::lattice::Directions::Cube { .. } => (ARITHMETIC, options.lookup == Lookup::Trilinear),
+        let tolerance = match options.bake.lattice.directions {
+            Directions::LatLon { .. } => ANGLES,
+            Directions::Cube { .. } => ARITHMETIC,
         };
-        add(if near {
-            CheckRow::new("merge", what, "of 1 + brightest", found.worst, tolerance)
-        } else {
-            let off = if found.worst.is_finite() { found.off } else { f64::INFINITY };
-            CheckRow::new("merge", what, "share of vertices", off, TIES)
-        });
+        add(CheckRow::new("merge", what, "of 1 + brightest", found.worst, tolerance));
         Ok(())
     };
     let base = options();
     for &variant in VARIANTS {
-        let storages = [Storage::F32, Storage::F16];
-        // Images are of halves.
-        for &storage in &storages[usize::from(variant.image)..] {
+        for storage in [Storage::F32, Storage::F16] {
             let bake = bake::Options { storage, ..base.bake };
             let what = format!("{}, {}", variant.name, format!("{storage:?}").to_lowercase());
             compare(what, frame::Options { variant: Some(variant), bake, ..base })?;
         }
     }
     compare("no skip".into(), frame::Options { skip: Skip::NONE, ..base })?;
-    // The twin looks at everything, so these rows hold for lists that the device makes too.
-    let by_device = frame::Options { lists: Some(Place::Device), ..base };
-    compare("lists made on the device".into(), by_device)?;
-    compare("lists made on the device, no skip".into(), frame::Options { skip: Skip::NONE, ..by_device })?;
     for name in ["cones", "horizon", "caps"] {
         compare(format!("without {name}"), frame::Options { skip: Skip::without(name), ..base })?;
     }
     let bake = bake::Options { field_bands: Some(6), ..base.bake };
     compare("6 bands of visibility".into(), frame::Options { bake, ..base })?;
-    for lookup in [Lookup::Nearest, Lookup::Radial] {
-        compare(format!("lookup {lookup:?}").to_lowercase(), frame::Options { lookup, ..base })?;
-    }
     for (lattice, _) in LATTICES {
         let bake = bake::Options { lattice: lattice.parse().expect("a lattice in the table"), ..base.bake };
         compare(lattice.into(), frame::Options { bake, ..base })?;

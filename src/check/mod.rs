@@ -1,12 +1,11 @@
 //! Every pass held against its CPU twin on one device: what `check` prints and what the tests of the passes assert.
 //!
-//! A comparison answers with a [`CheckRow`]: its worst error beside the tolerance and the reason for it. Nothing is read but the
-//! embedded scenes and shaders (or those that replace them), and fields are baked anew.
+//! A comparison answers with a [`CheckRow`]: its worst error beside the tolerance and the reason for it. Nothing is
+//! read but the embedded scenes and shaders (or those that replace them), and fields are baked anew.
 
 pub mod assemble;
 pub mod capture;
 pub mod draw;
-pub mod gather;
 pub mod merge;
 pub mod project;
 pub mod self_visibility;
@@ -19,21 +18,18 @@ use crate::bake::Baker;
 use crate::error::Result;
 use serde::Serialize;
 
-/// One comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct CheckRow {
     /// Pass, by the one word that names it everywhere.
     pub pass: &'static str,
     /// What it was given.
     pub what: String,
-    /// What the error is measured in.
     pub measure: &'static str,
     /// The worst error; infinite where an outcome is no number, differs from run to run or shows nothing to compare.
     #[serde(serialize_with = "finite_or_text")]
     pub worst: f64,
     /// The largest error that passes.
     pub tolerance: f64,
-    /// Whether it passed.
     pub passed: bool,
 }
 
@@ -59,13 +55,12 @@ impl CheckRow {
 type PassCheck = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
 /// Every pass in the order of execution, by the one word that names it everywhere.
-pub const PASSES: [(&str, PassCheck); 11] = [
+pub const PASSES: [(&str, PassCheck); 10] = [
     ("capture", capture::rows),
     ("project", project::rows),
     ("self_visibility", self_visibility::rows),
     ("assemble", assemble::rows),
     ("silhouette", silhouette::rows),
-    ("gather", gather::rows),
     ("merge", merge::rows),
     ("sharp", sharp::rows),
     ("draw", draw::rows),
@@ -74,9 +69,6 @@ pub const PASSES: [(&str, PassCheck); 11] = [
 ];
 
 /// Runs every comparison of the given passes; `told` hears each row as it comes.
-///
-/// # Errors
-/// What a pass returns when it cannot be run at all: a shader that does not compile, a lost device.
 pub fn run(baker: &Baker, passes: &[&str], told: &dyn Fn(&CheckRow)) -> Result<Vec<CheckRow>> {
     let mut rows = Vec::new();
     for (_, part) in PASSES.iter().filter(|(name, _)| passes.contains(name)) {

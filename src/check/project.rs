@@ -1,12 +1,12 @@
 //! "project" against its twin, which projects the same captured texels in f64.
 
 use super::CheckRow;
-use super::capture::{atlas, texel_index};
+use super::capture::{Way, atlas, capture_of, only_batch, texel_index};
 use crate::asset::{Mesh, generate};
-use crate::bake::capture::{Capture, CaptureKind, Drawn, Model, NO_SLOT, Slots};
-use crate::bake::project::{self, Job, Project, Projection};
+use crate::bake::Baker;
+use crate::bake::capture::{Capture, CaptureKind, Drawn, NO_SLOT, Slots};
+use crate::bake::project::{self, Project, Projection, SampleFaces};
 use crate::bake::self_visibility::SelfVisibility;
-use crate::bake::{self, Baker};
 use crate::error::Result;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::BYTES;
@@ -22,44 +22,30 @@ const SENTINEL: f32 = f32::NAN;
 /// Captured faces on the device and on the host.
 pub struct Content<'b> {
     baker: &'b Baker,
-    /// The pass that captured them.
     pub capture: Capture,
-    model: Model,
-    plan: Vec<Slots>,
+    batch: Vec<Slots>,
     drawn: Drawn,
     texels: Vec<[f32; 3]>,
 }
 
 impl<'b> Content<'b> {
-    /// Captures `mesh` from all eyes.
-    ///
-    /// # Errors
-    /// As [`Capture::new`].
-    pub fn new(
-        baker: &'b Baker,
-        mesh: &Mesh,
-        eyes: &[Vec3],
-        (face_px, kind, cull): (u32, CaptureKind, bool),
-    ) -> Result<Self> {
-        let radiance = kind == CaptureKind::Radiance;
-        let model = Model::new(baker.device(), mesh, radiance)?;
-        let capture = Capture::new(baker.device(), baker.library(), face_px, kind)?;
-        let plan = capture.plan(&model, eyes);
-        assert_eq!(plan.len(), eyes.len(), "all eyes fit one atlas");
-        let texels = if radiance {
-            let atlas: Vec<[f32; 4]> = atlas(baker.device(), &capture, &model, eyes, &plan, cull)?;
+    pub fn new(baker: &'b Baker, mesh: &Mesh, eyes: &[Vec3], settings: (u32, CaptureKind, bool)) -> Result<Self> {
+        let capture = capture_of(baker, mesh, settings, Way::usual(baker.device()))?;
+        let batch = only_batch(&capture, eyes);
+        let texels = if settings.1 == CaptureKind::Radiance {
+            let atlas: Vec<[f32; 4]> = atlas(baker.device(), &capture, eyes, &batch)?;
             atlas.iter().map(|t| [t[0], t[1], t[2]]).collect()
         } else {
-            let atlas: Vec<u8> = atlas(baker.device(), &capture, &model, eyes, &plan, cull)?;
+            let atlas: Vec<u8> = atlas(baker.device(), &capture, eyes, &batch)?;
             atlas.iter().map(|t| [f32::from(*t) / 255.0, 0.0, 0.0]).collect()
         };
-        let drawn = capture.choose(&model, eyes, &plan, cull)?;
-        Ok(Content { baker, capture, model, plan, drawn, texels })
+        let drawn = capture.choose(eyes, &batch)?;
+        Ok(Content { baker, capture, batch, drawn, texels })
     }
 
     /// What was captured at a texel.
     pub fn texel(&self, eye: usize, face: usize, x: usize, y: usize, projection: Projection) -> [f32; 3] {
-        match self.plan[eye][face] {
+        match self.batch[eye][face] {
             // What is not in the atlas shows the background.
             NO_SLOT if projection == Projection::Radiance => [0.0; 3],
             NO_SLOT => [1.0, 0.0, 0.0],
@@ -67,102 +53,87 @@ impl<'b> Content<'b> {
         }
     }
 
-    /// A job for every eye, with its normal.
-    pub fn vertex_jobs(&self, normals: &[Vec3]) -> Vec<Job> {
-        let numbered = self.plan.iter().zip(normals).enumerate();
-        numbered
-            .map(|(i, (slots, normal))| {
-                let normal = normal.extend(0.0).to_array();
-                Job { normal, slots: *slots, target: i as u32, scale: 1.0 }
-            })
-            .collect()
-    }
-
-    /// Jobs in another order than their targets, at different scales and normals.
-    pub fn jobs(&self) -> Vec<Job> {
-        let count = self.plan.len() as u32;
-        let job = |(i, slots): (usize, &Slots)| {
-            let normal = [Vec3::new(0.48, -0.6, 0.64), Vec3::new(-0.8, 0.0, 0.6), Vec3::Y][i % 3];
-            Job {
-                normal: normal.extend(0.0).to_array(),
-                slots: *slots,
-                target: count - 1 - i as u32,
-                scale: [1.0, 0.37, 2.5][i % 3],
-            }
+    /// A sample for every eye, with its normal.
+    pub fn vertices(&self, normals: &[Vec3]) -> Vec<SampleFaces> {
+        let sample = |(&slots, normal): (&Slots, &Vec3)| {
+            let normal = normal.extend(0.0).to_array();
+            SampleFaces { normal, slots, scale: 1.0, unused: 0 }
         };
-        self.plan.iter().enumerate().map(job).collect()
+        self.batch.iter().zip(normals).map(sample).collect()
     }
 
-    /// The pass for this content.
-    ///
-    /// # Errors
-    /// As [`Project::new`].
+    /// A sample for every eye, at different scales and normals.
+    pub fn samples(&self) -> Vec<SampleFaces> {
+        let sample = |(i, &slots): (usize, &Slots)| {
+            let normal = [Vec3::new(0.48, -0.6, 0.64), Vec3::new(-0.8, 0.0, 0.6), Vec3::Y][i % 3];
+            let scale = [1.0, 0.37, 2.5][i % 3];
+            SampleFaces { normal: normal.extend(0.0).to_array(), slots, scale, unused: 0 }
+        };
+        self.batch.iter().enumerate().map(sample).collect()
+    }
+
     pub fn pass(&self, bands: usize, projection: Projection) -> Result<Project> {
-        let (device, library) = (self.baker.device(), self.baker.library());
+        let device = self.baker.device();
+        let library = self.baker.library();
         Project::new(device, library, bands, projection, self.capture.face_px, self.capture.columns)
     }
 
-    /// One capture and projection; every float of the samples, what was not written being no number.
-    ///
-    /// # Errors
-    /// As [`Project::record`].
-    pub fn run(&self, project: &Project, jobs: &[Job]) -> Result<Vec<f32>> {
+    /// One capture and projection; every float of the coefficients, what was not written being no number.
+    pub fn run(&self, project: &Project, samples: &[SampleFaces]) -> Result<Vec<f32>> {
         let device = self.baker.device();
         let stride = project.projection.channels() * channel_stride(project.bands);
-        let samples = Buffer::with_data(device, "samples", &vec![SENTINEL; jobs.len() * stride])?;
-        let mut job_buffer = Project::job_buffer(device, jobs.len() as u32)?;
-        job_buffer.write(0, jobs);
+        let coefficients = Buffer::with_data(device, "coefficients", &vec![SENTINEL; samples.len() * stride])?;
+        let count = samples.len() as u32;
+        let mut uploaded = Project::sample_buffer(device, count)?;
+        uploaded.write(0, samples);
         let texels = project.texel_view()?;
         let mut commands = self.captured()?;
-        let count = jobs.len() as u32;
-        commands.pass("project", |c| project.record(c, &self.capture.atlas, &job_buffer, &texels, &samples, count))?;
+        let atlas = &self.capture.atlas;
+        commands.pass("project", |c| project.record(c, atlas, &uploaded, &texels, &coefficients, count))?;
         commands.submit()?;
-        samples.download(jobs.len() * stride)
+        coefficients.download(samples.len() * stride)
     }
 
     /// As [`Content::run`], for maps of self-visibility.
-    ///
-    /// # Errors
-    /// As [`SelfVisibility::record`].
-    pub fn run_self_visibility(&self, jobs: &[Job]) -> Result<Vec<u8>> {
-        let (device, library) = (self.baker.device(), self.baker.library());
+    pub fn run_self_visibility(&self, samples: &[SampleFaces]) -> Result<Vec<u8>> {
+        let device = self.baker.device();
+        let library = self.baker.library();
         let pass = SelfVisibility::new(device, library, self.capture.face_px, self.capture.columns)?;
-        let maps = Buffer::with_data(device, "maps", &vec![0_u8; jobs.len() * BYTES])?;
-        let mut job_buffer = Project::job_buffer(device, jobs.len() as u32)?;
-        job_buffer.write(0, jobs);
+        let maps = Buffer::with_data(device, "maps", &vec![0_u8; samples.len() * BYTES])?;
+        let count = samples.len() as u32;
+        let mut uploaded = Project::sample_buffer(device, count)?;
+        uploaded.write(0, samples);
         let mut commands = self.captured()?;
-        let (atlas, count) = (&self.capture.atlas, jobs.len() as u32);
-        commands.pass("self_visibility", |c| pass.record(c, atlas, &job_buffer, &maps, count))?;
+        let atlas = &self.capture.atlas;
+        commands.pass("self_visibility", |c| pass.record(c, atlas, &uploaded, &maps, count))?;
         commands.submit()?;
-        maps.download(jobs.len() * BYTES)
+        maps.download(samples.len() * BYTES)
     }
 
     /// Commands that capture the faces for a compute pass that follows.
     fn captured(&self) -> Result<Commands<'_>> {
-        let Content { capture, model, drawn, .. } = self;
         let mut commands = Commands::new(self.baker.device(), "check of captured faces")?;
-        bake::record_captures(&mut commands, capture, model, drawn, Access::ComputeSampled)?;
+        self.capture.record(&mut commands, &self.drawn, Access::ComputeSampled)?;
         Ok(commands)
     }
 }
 
-/// The largest error relative to 1 + what is wanted, and the largest magnitude of what is wanted. Infinite where a second
-/// run differs.
-///
-/// # Errors
-/// As [`Project::new`].
+/// The largest error relative to 1 + what is wanted, and the largest magnitude of what is wanted. Infinite where a
+/// second run differs.
 pub fn compare(content: &Content<'_>, bands: usize, projection: Projection) -> Result<(f64, f64)> {
-    let (project, jobs) = (content.pass(bands, projection)?, content.jobs());
-    let found = content.run(&project, &jobs)?;
-    let again = content.run(&project, &jobs)?;
+    let project = content.pass(bands, projection)?;
+    let samples = content.samples();
+    let found = content.run(&project, &samples)?;
+    let again = content.run(&project, &samples)?;
     let bits = |floats: &[f32]| floats.iter().map(|f| f.to_bits()).collect::<Vec<_>>();
     let stride = projection.channels() * channel_stride(bands);
-    let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
-    for (eye, job) in jobs.iter().enumerate() {
-        let normal = Vec3::from_slice(&job.normal[..3]);
+    let mut worst = 0.0_f64;
+    let mut largest = 0.0_f64;
+    for (eye, sample) in samples.iter().enumerate() {
+        let normal = Vec3::from_slice(&sample.normal[..3]);
         let texel = |face, x, y| content.texel(eye, face, x, y, projection);
-        let wanted = project::twin(bands, projection, content.capture.face_px as usize, normal, job.scale, texel);
-        let first = job.target as usize * stride;
+        let wanted = project::twin(bands, projection, content.capture.face_px as usize, normal, sample.scale, texel);
+        let first = eye * stride;
         for (found, wanted) in found[first..first + stride].iter().zip(&wanted) {
             let error = (f64::from(*found) - wanted).abs() / (1.0 + wanted.abs());
             worst = if error.is_nan() { f64::INFINITY } else { worst.max(error) };
@@ -176,10 +147,6 @@ pub fn compare(content: &Content<'_>, bands: usize, projection: Projection) -> R
 /// Eyes near an object.
 pub const EYES: [Vec3; 3] = [Vec3::new(0.9, 0.6, -0.5), Vec3::new(-0.4, 1.3, 2.0), Vec3::new(0.2, -0.1, -1.6)];
 
-/// The comparisons of `check`.
-///
-/// # Errors
-/// As [`Project::new`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let black = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &EYES, (32, CaptureKind::Cover, true))?;
     let bright =
@@ -197,7 +164,7 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     // Faces of this size stand in several rows of the atlas.
     let eyes: Vec<Vec3> = EYES.iter().flat_map(|eye| [*eye, -*eye, 1.5 * *eye, -1.5 * *eye]).collect();
     let large = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &eyes, (128, CaptureKind::Cover, true))?;
-    let rows = large.plan.iter().flatten().any(|slot| *slot != NO_SLOT && *slot >= large.capture.columns);
+    let rows = large.batch.iter().flatten().any(|slot| *slot != NO_SLOT && *slot >= large.capture.columns);
     let (worst, _) = compare(&large, 4, Projection::Transfer)?;
     let worst = if rows { worst } else { f64::INFINITY };
     add(CheckRow::new("project", "transfer, 4 bands, 128 px", "of 1 + coefficient", worst, F32));

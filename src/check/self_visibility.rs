@@ -33,9 +33,6 @@ pub struct Compared {
 }
 
 /// Compares the maps of some vertices of a mesh.
-///
-/// # Errors
-/// As [`Content::new`].
 pub fn compare(baker: &Baker, mesh: &Mesh, face_px: u32) -> Result<Compared> {
     let positions = unit_positions(mesh);
     let room = Capture::columns(baker.device(), face_px, CaptureKind::Distance).pow(2) as usize / FACE_COUNT;
@@ -44,7 +41,7 @@ pub fn compare(baker: &Baker, mesh: &Mesh, face_px: u32) -> Result<Compared> {
     let eyes: Vec<_> =
         chosen.iter().zip(&normals).map(|(&v, normal)| positions[v] + TRANSFER_OFFSET * *normal).collect();
     let content = Content::new(baker, mesh, &eyes, (face_px, CaptureKind::Distance, true))?;
-    let maps = content.run_self_visibility(&content.vertex_jobs(&normals))?;
+    let maps = content.run_self_visibility(&content.vertices(&normals))?;
     let twin_of = |eye: usize| {
         let byte = |face, x, y| (255.0 * content.texel(eye, face, x, y, Projection::Transfer)[0]).round() as u8;
         twin(face_px as usize, normals[eye], byte)
@@ -54,7 +51,8 @@ pub fn compare(baker: &Baker, mesh: &Mesh, face_px: u32) -> Result<Compared> {
     let steps = |byte: &u8| i32::from(byte.cast_signed());
     let angles =
         |maps: &[u8]| -> Vec<i32> { maps.chunks_exact(BYTES).flat_map(|map| &map[..NODES]).map(steps).collect() };
-    let (found, wanted) = (angles(&maps), angles(&twins));
+    let found = angles(&maps);
+    let wanted = angles(&twins);
     let worst = found.iter().zip(&wanted).map(|(map, twin)| (map - twin).abs()).max();
     // Two texels that lie equally near a node may differ in distance.
     let distances =
@@ -67,10 +65,6 @@ pub fn compare(baker: &Baker, mesh: &Mesh, face_px: u32) -> Result<Compared> {
     })
 }
 
-/// The comparisons of `check`.
-///
-/// # Errors
-/// As [`compare`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     // The larger faces take more than 32 words, and more than one a row.
     for face_px in [16, 48] {

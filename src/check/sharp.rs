@@ -7,17 +7,16 @@ use crate::bake::cache::Cache;
 use crate::bake::silhouette::SilhouetteOptions;
 use crate::error::Result;
 use crate::frame::{self, Frame};
-use crate::lists::gather::Place;
 use crate::lists::skip::Skip;
 use crate::merge::Variant;
 use crate::scene::Lights;
 
-/// Differences of f32 arithmetic: a place on a map is off by some 1e-6 of its edge, and the distance found there is divided by the
-/// half-width of a penumbra, which near an outline is a thousandth of the object's radius.
+/// Differences of f32 arithmetic: a place on a map is off by some 1e-6 of its edge, and the distance found there is
+/// divided by the half-width of a penumbra, which near an outline is a thousandth of the object's radius.
 pub const PENUMBRA: f64 = 1e-4;
 
-/// What [`MIXED`] has besides: a light with an outline of its own, a small light, a ball that stands beyond it, a ring around it, a
-/// thin board in whose bounding sphere others stand, and panels of every form.
+/// What [`MIXED`] has besides: a light with an outline of its own, a small light, a ball that stands beyond it, a ring
+/// around it, a thin board in whose bounding sphere others stand, panels of every form, and a spot.
 const MORE: &str = r#"
 [[entity]]
 mesh = "ring"
@@ -61,6 +60,13 @@ position = [-1.613, 2.317, 0.291]
 rotation = { axis = [0, 0.3, 1], angle_deg = 217 }
 emission = [9, 7, 5]
 [[entity]]
+mesh = "ball"
+position = [1.113, 2.517, -0.791]
+rotation = { axis = [0.2, 0.1, 1], angle_deg = 152 }
+scale = 0.2
+emission = [90, 70, 50]
+spot = { inner_deg = 20, outer_deg = 45 }
+[[entity]]
 mesh = "window"
 position = [1.913, 1.517, 0.591]
 rotation = { axis = [0.1, 0.2, 1], angle_deg = 97 }
@@ -75,7 +81,7 @@ emission = [9, 9, 7]
 /// A small frame with sharp lights.
 pub fn sharp_options() -> frame::Options {
     let base = options();
-    let silhouette = SilhouetteOptions { cells: 4, map_px: 16, view_px: 64, levels: false, symmetry: true };
+    let silhouette = SilhouetteOptions { cells: 4, map_px: 16, view_px: 64, levels: false };
     frame::Options { lights: Lights::Sharp, bake: crate::bake::Options { silhouette, ..base.bake }, ..base }
 }
 
@@ -84,21 +90,17 @@ pub fn scene_text() -> String {
     format!("{MIXED}{MORE}")
 }
 
-/// The comparisons of `check`.
-///
-/// # Errors
-/// As [`Frame::new`] and [`Frame::render`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let scene = scene(&scene_text())?;
     let placements = scene.at(0.0);
-    let (cache, base) = (Cache::new(None), sharp_options());
+    let cache = Cache::new(None);
+    let base = sharp_options();
     let named = |name: &str| Some(Variant::named(name).expect("a variant"));
     for (what, options) in [
-        ("texel", base),
+        ("texel-packed", base),
         ("storage", frame::Options { variant: named("storage"), ..base }),
         ("storage-uniform", frame::Options { variant: named("storage-uniform"), ..base }),
         ("no skip", frame::Options { skip: Skip::NONE, ..base }),
-        ("lists made on the device", frame::Options { lists: Some(Place::Device), ..base }),
     ] {
         let mut frame = Frame::new(baker, &cache, &scene, options, &|_, _, _| ())?;
         let found = against_twin(&mut frame, &placements)?;

@@ -1,4 +1,5 @@
-//! "show" against its twin: a picture of radiances from black to above white, on targets that encode sRGB by themselves and others.
+//! "show" against its twin: a picture of radiances from black to above white, on targets that encode sRGB by themselves
+//! and others.
 
 use super::CheckRow;
 use crate::bake::Baker;
@@ -8,16 +9,13 @@ use crate::gpu::{Access, Buffer, BufferKind, Commands, Image, ImageShape, Target
 use ash::vk;
 use half::f16;
 
-/// Largest difference in steps of 8 bits: the shader's curve is off by a twelfth of a step, and a device may round either way.
+/// Largest difference in steps of 8 bits: the shader's curve is off by a twelfth of a step, and a device may round
+/// either way.
 const STEPS: f64 = 1.0;
 /// Radiance that becomes white.
 const WHITE: f32 = 2.0;
 const SIZE: [u32; 2] = [64, 32];
 
-/// The comparisons of `check`.
-///
-/// # Errors
-/// As [`Show::new`]; `Device` when memory ran out.
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     for (format, encodes_srgb, what) in [
         (vk::Format::R8G8B8A8_UNORM, false, "encoded by the shader"),
@@ -34,7 +32,8 @@ fn compare(baker: &Baker, format: vk::Format, encodes_srgb: bool) -> Result<f64>
     let device = baker.device();
     let [width, height] = SIZE;
     let texels = width * height;
-    // From 0 to a fifth above white; green goes the other way, and blue is below a thousandth, where the curve is a line.
+    // From 0 to a fifth above white; green goes the other way, and blue is below a thousandth, where the curve is a
+    // line.
     let ramp = (0..texels).map(|i| 1.2 * WHITE * i as f32 / (texels - 1) as f32);
     let radiances = ramp.map(|r| [r, 1.2 * WHITE - r, 1e-3 * r, 1.0].map(f16::from_f32));
     let radiances: Vec<[f16; 4]> = radiances.collect();

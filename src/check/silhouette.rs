@@ -7,21 +7,23 @@ use crate::bake::silhouette::{SilhouetteOptions, bake_silhouette, silhouette_twi
 use crate::error::Result;
 use crate::field::silhouette::Side;
 
-/// Share of texels that may differ from the twin's by more than two of 255 steps: a device may cover a pixel on an outline that
-/// the twin does not, which moves the outline by a pixel for the few texels nearest to it.
+/// Share of texels that may differ from the twin's by more than two of 255 steps: a device may cover a pixel on an
+/// outline that the twin does not, which moves the outline by a pixel for the few texels nearest to it.
 pub const OFF_SHARE: f64 = 0.01;
 
-/// How far all distances together may be off the twin's: single texels are rounded to a 127th of the reach, their sum is not.
+/// How far all distances together may be off the twin's: single texels are rounded to a 127th of the reach, their sum
+/// is not.
 pub const OFF_SCALE: f64 = 3e-3;
 
-/// The same of maps of halves. Their views have half the pixels, and a pixel on the plane that cuts the halves may be on either side of it.
+/// The same of maps of halves. Their views have half the pixels, and a pixel on the plane that cuts the halves may be
+/// on either side of it.
 pub const OFF_SHARE_HALVES: f64 = 0.02;
 
 /// What differs from the twin.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Apart {
-    /// Share of the texels of whole objects that are off by more than two steps in distance, or in depth near the outline, where depth
-    /// is not a matter of which of two outline points is nearer.
+    /// Share of the texels of whole objects that are off by more than two steps in distance, or in depth near the
+    /// outline, where depth is not a matter of which of two outline points is nearer.
     pub whole: f64,
     /// The same of texels of halves; 0 where there are none.
     pub halves: f64,
@@ -37,16 +39,15 @@ impl Apart {
 }
 
 /// Bakes a small field of `mesh` and compares all of its texels.
-///
-/// # Errors
-/// As [`bake_silhouette`].
 pub fn compare(baker: &Baker, mesh: &Mesh) -> Result<Apart> {
-    let options = SilhouetteOptions { cells: 2, map_px: 32, view_px: 128, levels: false, symmetry: true };
+    let options = SilhouetteOptions { cells: 2, map_px: 32, view_px: 128, levels: false };
     let (field, _) = bake_silhouette(baker, mesh, options, &|_, _| ())?;
     let sides = if field.has_halves() { &Side::ALL[..] } else { &Side::ALL[..1] };
-    let (mut shares, mut sums) = ([0.0; 2], [0_u32; 2]);
+    let mut shares = [0.0; 2];
+    let mut sums = [0_u32; 2];
     for &side in sides {
-        let (mut off, mut texels) = (0_u32, 0_u32);
+        let mut off = 0_u32;
+        let mut texels = 0_u32;
         let px = field.header.edge_px(side) as u32;
         for (map, frame) in field.frames().iter().enumerate() {
             let twin = silhouette_twin(mesh, (frame, side), px, options.view_px * px / options.map_px);
@@ -67,10 +68,6 @@ pub fn compare(baker: &Baker, mesh: &Mesh) -> Result<Apart> {
     Ok(Apart { whole: shares[0], halves: shares[1], scale: (found / wanted - 1.0).abs() })
 }
 
-/// The comparisons of `check`.
-///
-/// # Errors
-/// As [`compare`].
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     // The last lies beside the middle of its sphere in every view.
     let ring = generate::torus(1.0, 0.3, 24, 12);

@@ -8,14 +8,17 @@ use glam::{DMat4, DVec3, DVec4};
 ///
 /// The near plane lies at a thousandth of the distance from eye to target.
 pub fn clip_from_world(camera: &Camera, aspect: f64) -> DMat4 {
-    let (eye, target, near) = (camera.eye.as_dvec3(), camera.target.as_dvec3(), near_m(camera));
+    let eye = camera.eye.as_dvec3();
+    let target = camera.target.as_dvec3();
+    let near = near_m(camera);
     let view = view::look_at_mat4(eye, target, camera.up().as_dvec3());
     vulkan::perspective_infinite_reverse(f64::from(camera.fov_deg).to_radians(), aspect, near) * view
 }
 
 /// Unit direction from the eye through a place in a picture of that size, in pixels from the top left.
 pub fn through_pixels(camera: &Camera, size: [f64; 2]) -> impl Fn([f64; 2]) -> DVec3 {
-    let (eye, to_world) = (camera.eye.as_dvec3(), clip_from_world(camera, size[0] / size[1]).inverse());
+    let eye = camera.eye.as_dvec3();
+    let to_world = clip_from_world(camera, size[0] / size[1]).inverse();
     move |at| {
         let across = |axis: usize| 2.0 * at[axis] / size[axis] - 1.0;
         // Depth 1 is the near plane; any point in front of the eye gives the direction.
@@ -35,7 +38,8 @@ pub fn near_corner_m(camera: &Camera, aspect: f64) -> f64 {
     near_m(camera) * (1.0 + high * high * (1.0 + aspect * aspect)).sqrt()
 }
 
-/// From a mesh's frame, metres from the centre of its bounding sphere, to the world; `centre_m` is that centre in the file's.
+/// From a mesh's frame, metres from the centre of its bounding sphere, to the world; `centre_m` is that centre in the
+/// file's.
 pub fn world_from_centred(placement: &Placement, centre_m: DVec3) -> DMat4 {
     let scale = DVec3::splat(f64::from(placement.scale));
     DMat4::from_scale_rotation_translation(scale, placement.turn(), placement.point(centre_m))

@@ -14,7 +14,7 @@ pub enum Finish {
 }
 
 /// How the edges of what is drawn are kept from showing as stairs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Antialias {
@@ -28,7 +28,8 @@ pub enum Antialias {
 }
 
 impl Antialias {
-    /// What a device draws at interactive rates. On a GPU four samples cost little; a software device stores and averages each.
+    /// What a device draws at interactive rates. On a GPU four samples cost little; a software device stores and
+    /// averages each.
     pub fn usual(device: &Device) -> Self {
         if device.info.is_software() { Antialias::Outlines } else { Antialias::Samples }
     }
@@ -42,7 +43,7 @@ impl Antialias {
 }
 
 /// Where the light of sharp lights is evaluated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Shading {
@@ -53,8 +54,9 @@ pub enum Shading {
 }
 
 impl Shading {
-    /// What pictures have that ask for neither: pixels where they have several samples, as on a GPU and in files. A pixel that evaluates
-    /// lights takes about 1 us of a core on llvmpipe, so frames full of shadow edges take up to 10 times as long as with vertices.
+    /// What pictures have that ask for neither: pixels where they have several samples, as on a GPU and in files. A
+    /// pixel that evaluates lights takes about 1 us of a core on llvmpipe, so frames full of shadow edges take up to 10
+    /// times as long as with vertices.
     pub fn usual(antialias: Antialias) -> Self {
         if antialias == Antialias::Samples { Shading::Pixel } else { Shading::Vertex }
     }

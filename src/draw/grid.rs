@@ -1,11 +1,13 @@
-//! Part of pass "draw": meshes that are grids, each as one parallelogram whose fragment shader finds the triangle of its cell.
+//! Part of pass "draw": meshes that are grids, each as one parallelogram whose fragment shader finds the triangle of
+//! its cell.
 //!
-//! The cells of a floor are small on the screen, so that light on them is smooth. A software rasteriser takes far longer for many
-//! small triangles than for a large one of the same area. The picture is that of the triangles, except for rounding.
+//! The cells of a floor are small on the screen, so that light on them is smooth. A software rasteriser takes far
+//! longer for many small triangles than for a large one of the same area. The picture is that of the triangles, except
+//! for rounding.
 
 use crate::asset::grid::Grid;
 use crate::draw::patches::{BLOCK_CELLS, Patches};
-use crate::draw::pixel_light::texels;
+use crate::draw::pixel_light::{PixelLight, texels};
 use crate::draw::{DrawnEntity, DrawnViewport, EntityPush};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
@@ -19,12 +21,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 const QUADS: vk::Format = vk::Format::R32G32B32A32_UINT;
-/// How much nearer patches are drawn than the grid that they lie on, in steps of depth: 2e-6 of the distance. Rounding of two triangles
-/// in one plane differs by less.
+/// How much nearer patches are drawn than the grid that they lie on, in steps of depth: 2e-6 of the distance. Rounding
+/// of two triangles in one plane differs by less.
 const NEARER_STEPS: f32 = 32.0;
 const FLOATS: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
-/// A grid on the device.
 pub struct DrawnGrid {
     positions: Buffer,
     places: Buffer,
@@ -34,7 +35,6 @@ pub struct DrawnGrid {
     /// [`Patches`]: positions, places and indices.
     patches: [Buffer; 3],
     patch_indices: u32,
-    /// Unit normal.
     normal: Vec3,
     /// Diagonal of a cell at most, metres.
     pub reach_m: f32,
@@ -46,11 +46,8 @@ impl DrawnGrid {
     /// Indices of the two triangles that it is drawn as.
     pub const INDEX_COUNT: u32 = 6;
 
-    /// Uploads a grid. `centre` is that of the mesh's bounding sphere, `place` where each vertex of the mesh stands among those
-    /// that are lit.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// Uploads a grid. `centre` is that of the mesh's bounding sphere, `place` where each vertex of the mesh stands
+    /// among those that are lit.
     pub fn new(device: &Arc<Device>, grid: &Grid, centre: Vec3, normal: Vec3, place: &[u32]) -> Result<Self> {
         let corner = grid.corner - centre;
         let [u, v] = grid.sides;
@@ -105,7 +102,6 @@ struct Push {
     normal: [f32; 4],
 }
 
-/// The pipeline.
 pub struct DrawGrid {
     pipeline: GraphicsPipeline,
     /// The one whose pixels evaluate sharp lights, where the scene has any.
@@ -114,9 +110,6 @@ pub struct DrawGrid {
 
 impl DrawGrid {
     /// For what "draw" draws into; `display` where the picture is encoded.
-    ///
-    /// # Errors
-    /// `Failed` when a shader does not compile.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
@@ -138,16 +131,12 @@ impl DrawGrid {
         })
     }
 
-    /// The row of the fragment shader.
     pub fn row(display: bool, sharp: Option<&SharpPermutation>) -> ShaderPermutation {
         let row = ShaderPermutation::new("grid.frag", 4).define("DISPLAY", display).define("PIXEL", sharp.is_some());
         sharp.map_or(row.clone(), |sharp| sharp.pixel_row(row, false))
     }
 
     /// Draws a range of one's indices in the area that was set, lit by the radiosity of all vertices.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn record<'r>(
         &'r self,
         drawing: &mut Drawing<'_, 'r>,
@@ -163,18 +152,16 @@ impl DrawGrid {
     }
 
     /// Draws an entity's patches over the grid. Their pixels evaluate sharp lights themselves.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn record_patches<'r>(
         &'r self,
         drawing: &mut Drawing<'_, 'r>,
         grid: &'r DrawnGrid,
         entity: &DrawnEntity<'r>,
         viewport: &DrawnViewport<'r>,
+        light: &PixelLight<'r>,
         white: f32,
     ) -> Result<()> {
-        let Some((pipeline, light)) = self.pixel.as_ref().zip(viewport.pixel.as_ref()) else { return Ok(()) };
+        let Some(pipeline) = &self.pixel else { return Ok(()) };
         let [positions, places, indices] = &grid.patches;
         drawing.bind(pipeline, &[(positions, 0), (places, 0)], indices);
         drawing.resources(&light.binds(&Self::own(grid, viewport), &[])?)?;

@@ -1,8 +1,9 @@
 //! Pass "draw": lit vertices to a picture.
 //!
-//! Inputs: for each entity its mesh (positions in metres from the centre of its bounding sphere, emission pattern, indices) and
-//! its range of the radiosity buffer. Output: RGBA of `width` x `height`, linear or encoded for a screen. With one sample a pixel,
-//! alpha holds the tag of the entity that is seen, and the depth image is kept. With more samples they are averaged.
+//! Inputs: for each entity its mesh (positions in metres from the centre of its bounding sphere, emission pattern,
+//! indices) and its range of the radiosity buffer. Output: RGBA of `width` x `height`, linear or encoded for a screen.
+//! With one sample a pixel, alpha holds the tag of the entity that is seen, and the depth image is kept. With more
+//! samples they are averaged.
 
 pub mod camera;
 mod choices;
@@ -34,25 +35,20 @@ use std::sync::Arc;
 
 /// Linear half floats. Their 11 bits are more than a PNG shows, and they take half the bandwidth of f32.
 const COLOR: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
-/// What a screen shows: the shader encodes it, and it takes half the bytes of half floats. With a format that encodes by itself
-/// (_SRGB), llvmpipe takes 1.5 times as long at four samples a pixel.
+/// What a screen shows: the shader encodes it, and it takes half the bytes of half floats. With a format that encodes
+/// by itself (_SRGB), llvmpipe takes 1.5 times as long at four samples a pixel.
 const SHOWN: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
-/// A mesh as it is drawn.
 pub enum DrawnMesh {
-    /// The mesh is drawn by its triangles.
     Triangles(DrawnTriangles),
     /// The mesh is a grid and is drawn as one parallelogram.
     Grid(DrawnGrid, TriangleRun),
 }
 
 impl DrawnMesh {
-    /// Uploads a mesh with its vertices in `order`. The emission pattern of a mesh without colours is white. `vertices` counts the
-    /// vertices of everything that is drawn together.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// Uploads a mesh with its vertices in `order`. The emission pattern of a mesh without colours is white. `vertices`
+    /// counts the vertices of everything that is drawn together.
     pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32], vertices: usize) -> Result<Self> {
         let (centre, _) = mesh.bounding_sphere();
         let mut place = vec![0; order.len()];
@@ -102,9 +98,7 @@ impl DrawnMesh {
     }
 }
 
-/// One entity to draw.
 pub struct DrawnEntity<'d> {
-    /// The entity's mesh.
     pub mesh: &'d DrawnMesh,
     /// From the mesh's frame (metres from its sphere's centre) to clip space, reversed depth.
     pub clip_from_object: Mat4,
@@ -118,7 +112,6 @@ pub struct DrawnEntity<'d> {
     pub radiosity_offset: u64,
     /// What a picture's alpha holds where the entity is seen.
     pub tag: f32,
-    /// Its number.
     pub index: u32,
     /// What its pixels need to evaluate sharp lights, where they may.
     pub by_pixel: Option<ByPixel>,
@@ -149,7 +142,6 @@ pub struct DrawnViewport<'d> {
     pub area: [u32; 4],
     /// The entities that are drawn, in this order.
     pub entities: Vec<DrawnEntity<'d>>,
-    /// Radiosity of their vertices.
     pub radiosity: &'d Buffer,
     /// What pixels read that evaluate sharp lights; `None` where radiosity of vertices is all that is shown.
     pub pixel: Option<PixelLight<'d>>,
@@ -164,10 +156,9 @@ pub struct Draw {
     samples: Option<Image>,
     /// Reversed depth of every sample: 1 at the near plane, 0 at infinity.
     pub depth: Image,
-    /// The picture as it is drawn.
     pub picture: Image,
-    /// The most triangles that one render pass draws; the next one goes on. llvmpipe keeps all triangles of a render pass until its
-    /// end: for two million triangles it held 300 MiB, and 50 MiB when they were divided.
+    /// The most triangles that one render pass draws; the next one goes on. llvmpipe keeps all triangles of a render
+    /// pass until its end: for two million triangles it held 300 MiB, and 50 MiB when they were divided.
     pub batch_triangles: u32,
     /// Pass "smooth", which follows where outlines are smoothed.
     pub smooth: Option<Smooth>,
@@ -175,9 +166,6 @@ pub struct Draw {
 
 impl Draw {
     /// For pictures of `width` x `height`; `sharp` where pixels are to evaluate sharp lights.
-    ///
-    /// # Errors
-    /// `Input` when the picture is larger than the device's images.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
@@ -215,7 +203,8 @@ impl Draw {
 
     /// Device memory of a pixel in the images of [`Draw::new`], bytes, as [`Draw::size_bytes`] counts it.
     pub fn pixel_bytes(device: &Device, antialias: Antialias, finish: Finish) -> u64 {
-        let (samples, color) = (u64::from(antialias.samples(device)), if finish == Finish::Linear { 8 } else { 4 });
+        let samples = u64::from(antialias.samples(device));
+        let color = if finish == Finish::Linear { 8 } else { 4 };
         let colors = 1 + u64::from(antialias == Antialias::Outlines) + if samples > 1 { samples } else { 0 };
         colors * color + samples * 4
     }
@@ -225,17 +214,16 @@ impl Draw {
         if self.picture.shape.format == SHOWN { Finish::Display } else { Finish::Linear }
     }
 
-    /// Samples a pixel.
     pub fn samples(&self) -> u32 {
         self.samples.as_ref().map_or(1, |image| image.shape.samples)
     }
 
-    /// The finished picture.
     pub fn finished(&self) -> &Image {
         self.smooth.as_ref().map_or(&self.picture, |smooth| &smooth.picture)
     }
 
-    /// Images that the pass writes, and how: colour ones first, the depth image last. No picture needs what they held before.
+    /// Images that the pass writes, and how: colour ones first, the depth image last. No picture needs what they held
+    /// before.
     pub fn attachments(&self) -> impl Iterator<Item = (&Image, Access)> {
         let colors = self.samples.iter().chain([&self.picture]).map(|image| (image, Access::ColorWrite));
         colors.chain([(&self.depth, Access::DepthWrite)])
@@ -252,11 +240,8 @@ impl Draw {
         attachments.chain(self.smooth.iter().map(|smooth| &smooth.picture)).map(texels).sum()
     }
 
-    /// Draws all viewports, one after the other, over a background of one colour. Radiance above `white` is brought down to it,
-    /// hue kept. Between the render passes of a large picture stand barriers of the pass's own.
-    ///
-    /// # Errors
-    /// What recording returns.
+    /// Draws all viewports, one after the other, over a background of one colour. Radiance above `white` is brought
+    /// down to it, hue kept. Between the render passes of a large picture stand barriers of the pass's own.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
@@ -313,7 +298,8 @@ impl Draw {
 }
 
 impl Draw {
-    /// Draws the patches of all grids and triangles, after everything that may hide them: a pixel of a patch costs most.
+    /// Draws the patches of all grids and triangles, after everything that may hide them: a pixel of a patch costs
+    /// most.
     fn record_patches<'r>(
         &'r self,
         drawing: &mut Drawing<'_, 'r>,
@@ -324,14 +310,17 @@ impl Draw {
             return Ok(());
         }
         drawing.counted(|drawing| {
-            for viewport in viewports.iter().filter(|viewport| viewport.pixel.is_some()) {
+            for (viewport, light) in viewports.iter().filter_map(|viewport| Some((viewport, viewport.pixel.as_ref()?)))
+            {
                 let [left, top, width, height] = viewport.area;
                 drawing.area(left, top, width, height);
                 for entity in viewport.entities.iter().filter(|e| e.by_pixel.is_some() && !e.indices.is_empty()) {
                     match entity.mesh {
-                        DrawnMesh::Grid(grid, _) => self.grid.record_patches(drawing, grid, entity, viewport, white)?,
+                        DrawnMesh::Grid(grid, _) => {
+                            self.grid.record_patches(drawing, grid, entity, viewport, light, white)?;
+                        }
                         DrawnMesh::Triangles(mesh) => {
-                            self.triangles.record_patches(drawing, mesh, entity, viewport, white)?;
+                            self.triangles.record_patches(drawing, mesh, entity, viewport, light, white)?;
                         }
                     }
                 }
@@ -341,12 +330,14 @@ impl Draw {
     }
 }
 
-/// Divides the indices of all entities into batches of at most `most` indices. There is at least one batch, which may be empty.
+/// Divides the indices of all entities into batches of at most `most` indices. There is at least one batch, which may
+/// be empty.
 fn batches<'v, 'd>(
     entities: impl Iterator<Item = (&'v DrawnViewport<'d>, &'v DrawnEntity<'d>)>,
     most: u32,
 ) -> Vec<Vec<(&'v DrawnViewport<'d>, &'v DrawnEntity<'d>, Range<u32>)>> {
-    let (mut batches, mut room) = (vec![Vec::new()], most);
+    let mut batches = vec![Vec::new()];
+    let mut room = most;
     for (viewport, entity) in entities {
         for &Range { mut start, end } in &entity.indices {
             while start < end {

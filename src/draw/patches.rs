@@ -1,8 +1,8 @@
 //! Blocks of a grid's cells, which are drawn again where their pixels evaluate sharp lights themselves.
 //!
-//! A software rasteriser runs a fragment shader's branches for all pixels of a block of its own, taken or not. So pixels that evaluate
-//! lights are not told from the others in the fragment shader: blocks of cells are drawn over the grid by a shader of their own, whose
-//! vertex shader throws away those that no shadow's edge comes near.
+//! A software rasteriser runs a fragment shader's branches for all pixels of a block of its own, taken or not. So
+//! pixels that evaluate lights are not told from the others in the fragment shader: blocks of cells are drawn over the
+//! grid by a shader of their own, whose vertex shader throws away those that no shadow's edge comes near.
 
 use crate::asset::grid::Grid;
 use glam::Vec3;
@@ -37,7 +37,8 @@ impl Patches {
                 let first = (block * BLOCK_CELLS) as f32;
                 [(first - OVERLAP).max(0.0), (first + BLOCK_CELLS as f32 + OVERLAP).min(cells as f32)]
             };
-            let (across, down) = (reach(x, columns), reach(y, rows));
+            let across = reach(x, columns);
+            let down = reach(y, rows);
             let first = patches.positions.len() as u32;
             for place in [[across[0], down[0]], [across[1], down[0]], [across[0], down[1]], [across[1], down[1]]] {
                 patches.positions.push((corner + steps[0] * place[0] + steps[1] * place[1]).to_array());

@@ -23,13 +23,11 @@ pub struct PixelLight<'d> {
     pub entities: &'d Buffer,
     /// Nodes and cells of all silhouette fields.
     pub silhouettes: [&'d Buffer; 2],
-    /// Entries of chains.
     pub entries: &'d Buffer,
     /// For every cluster of the lit entities: its first entry, and the number of its entries.
     pub chains: &'d Buffer,
     /// Light on vertices without that of sharp lights.
     pub soft: &'d Buffer,
-    /// Cells of self-visibility.
     pub self_cells: &'d Buffer,
     /// Positions and normals of all meshes.
     pub vertices: &'d Buffer,
@@ -37,9 +35,6 @@ pub struct PixelLight<'d> {
 
 impl<'d> PixelLight<'d> {
     /// What a shader reads that includes `glsl/pixel_light.glsl`: corners and radiosity before it, `others` after it.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn binds(
         &self,
         own: &[(&'d Buffer, vk::Format); 2],

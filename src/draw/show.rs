@@ -17,7 +17,6 @@ struct Push {
     encode: u32,
 }
 
-/// The pipeline.
 pub struct Show {
     pipeline: GraphicsPipeline,
     encode: bool,
@@ -25,9 +24,6 @@ pub struct Show {
 
 impl Show {
     /// For targets of `format`; `encodes_srgb` as the format is.
-    ///
-    /// # Errors
-    /// `Failed` when a shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, format: vk::Format, encodes_srgb: bool) -> Result<Self> {
         let state = GraphicsState {
             color: format,
@@ -44,9 +40,6 @@ impl Show {
     }
 
     /// Covers the target with the picture; `white` is the radiance that becomes white.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn record<'r>(&'r self, drawing: &mut Drawing<'_, 'r>, picture: &'r Image, white: f32) -> Result<()> {
         drawing.area(0, 0, picture.shape.width, picture.shape.height);
         let push = Push { gain: 1.0 / white, encode: u32::from(self.encode) };

@@ -1,13 +1,13 @@
 //! Pass "smooth": outlines and creases of a picture with one sample a pixel, smoothed by where they are.
 //!
-//! An outline or crease cuts each pixel that it runs through into two shares. The share beyond the line takes the colour of the
-//! pixel on the line's other side (Persson, *Geometric Post-process Anti-Aliasing*, 2011). Only those pixels are touched, so the
-//! pass is cheap on a software rasteriser. It does not smooth the line where two surfaces run through one another, and what is
-//! thinner than a pixel stays as broken as one sample leaves it.
+//! An outline or crease cuts each pixel that it runs through into two shares. The share beyond the line takes the
+//! colour of the pixel on the line's other side (Persson, *Geometric Post-process Anti-Aliasing*, 2011). Only those
+//! pixels are touched, so the pass is cheap on a software rasteriser. It does not smooth the line where two surfaces
+//! run through one another, and what is thinner than a pixel stays as broken as one sample leaves it.
 //!
-//! Inputs: the picture with the entity's tag in alpha, its reversed depth, and two triangles for each line. They cover the pixels
-//! whose centres lie within half a pixel of the line, measured along x where the line is steep and along y elsewhere. Output: the
-//! smoothed picture.
+//! Inputs: the picture with the entity's tag in alpha, its reversed depth, and two triangles for each line. They cover
+//! the pixels whose centres lie within half a pixel of the line, measured along x where the line is steep and along y
+//! elsewhere. Output: the smoothed picture.
 
 use crate::asset::edges::Line;
 use crate::draw::DrawnViewport;
@@ -25,13 +25,15 @@ use std::sync::Arc;
 /// What lies behind a line may seem nearer by this share of its distance.
 const TOLERANCE: f64 = 1e-3;
 
-/// Pixels that a corner may be moved by: two steps of 1/256, which is what devices have to offer at least, and rounding.
+/// Pixels that a corner may be moved by: two steps of 1/256, which is what devices have to offer at least, and
+/// rounding.
 const SNAPPED: f64 = 0.01;
 
 /// Tags in use; the last value is the background's.
 const TAGS: usize = 254;
 
-/// The tag of an entity in a picture's alpha. The 255th has the first one's again: their lines are then told apart by depth alone.
+/// The tag of an entity in a picture's alpha. The 255th has the first one's again: their lines are then told apart by
+/// depth alone.
 pub fn tag(entity: usize) -> f32 {
     (1 + entity % TAGS) as f32 * TAG_STEP
 }
@@ -88,7 +90,6 @@ impl Strip {
     }
 }
 
-/// Lines on the device.
 pub struct Lines {
     corners: Upload,
     marks: Upload,
@@ -97,9 +98,6 @@ pub struct Lines {
 
 impl Lines {
     /// No lines yet.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Lines {
             corners: Upload::new(device, "line corners", 16)?,
@@ -108,10 +106,6 @@ impl Lines {
         })
     }
 
-    /// Uploads lines.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn write(&mut self, strips: &Strips) -> Result<()> {
         if strips.count() == 0 {
             return Ok(());
@@ -138,12 +132,10 @@ struct Push {
 /// The pipeline and its picture.
 pub struct Smooth {
     pipeline: GraphicsPipeline,
-    /// The smoothed picture.
     pub picture: Image,
 }
 
 impl Smooth {
-    /// The fragment shader.
     pub fn fragment(display: bool) -> ShaderPermutation {
         ShaderPermutation::new("smooth.frag", 4)
             .define("DISPLAY", display)
@@ -152,9 +144,6 @@ impl Smooth {
     }
 
     /// For pictures of a shape. `display` says that they are encoded for a screen.
-    ///
-    /// # Errors
-    /// `Failed` when a shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, shape: ImageShape, display: bool) -> Result<Self> {
         let state = GraphicsState {
             color: shape.format,
@@ -172,11 +161,9 @@ impl Smooth {
         })
     }
 
-    /// Copies `picture` and smooths the copy along the lines of each viewport. Expects the picture as source of a copy, its own one
-    /// as target and the depth to be read, and leaves its own picture as colour attachment, also where no line is in view.
-    ///
-    /// # Errors
-    /// What recording returns.
+    /// Copies `picture` and smooths the copy along the lines of each viewport. Expects the picture as source of a copy,
+    /// its own one as target and the depth to be read, and leaves its own picture as colour attachment, also where no
+    /// line is in view.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
@@ -214,7 +201,8 @@ impl Smooth {
             let (major, minor) = if strip.steep { (1, 0) } else { (0, 1) };
             let step = IVec2::from(if strip.steep { (1, 0) } else { (0, 1) });
             let [from, to] = strip.ends;
-            let (first, end) = (from[major].min(to[major]), from[major].max(to[major]));
+            let first = from[major].min(to[major]);
+            let end = from[major].max(to[major]);
             for column in (first - 0.5).ceil() as i32..(end - 0.5).ceil() as i32 {
                 let share = (f64::from(column) + 0.5 - from[major]) / (to[major] - from[major]);
                 let place = from[minor] + share * (to[minor] - from[minor]);
@@ -254,8 +242,9 @@ impl Smooth {
 /// A pixel as the twin of "smooth" reads it.
 #[derive(Clone, Copy, Debug)]
 pub struct Texel {
-    /// Linear.
     pub color: DVec3,
+    /// How far the color may be off, since a driver chooses where within a triangle it shades a pixel of an edge.
+    pub spread: DVec3,
     /// Reversed: greater is nearer, 0 infinitely far.
     pub depth: f64,
     /// [`tag`] of the entity seen, 1 for the background.

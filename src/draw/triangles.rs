@@ -1,8 +1,10 @@
 //! Part of pass "draw": meshes by their triangles, and those triangles again whose pixels evaluate sharp lights.
 //!
-//! A triangle is drawn again where the pass of sharp lights has marked one of its vertices and its sides span 4 px on the screen.
+//! A triangle is drawn again where the pass of sharp lights has marked one of its vertices and its sides span 4 px on
+//! the screen.
 
 use crate::asset::mesh::Mesh;
+use crate::draw::pixel_light::PixelLight;
 use crate::draw::{DrawnEntity, DrawnViewport, EntityPush};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
@@ -15,8 +17,8 @@ use glam::Vec3;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Triangles in a run. They are few enough that most runs lie on one side of an object, and many enough that a draw call costs
-/// little beside them.
+/// Triangles in a run. They are few enough that most runs lie on one side of an object, and many enough that a draw
+/// call costs little beside them.
 const RUN_TRIANGLES: usize = 128;
 /// Triangles whose sides are all shorter on the screen, in pixels, have edges as fine as their vertices carry.
 const LEAST_PX: f64 = 4.0;
@@ -36,11 +38,8 @@ pub struct DrawnTriangles {
 }
 
 impl DrawnTriangles {
-    /// Uploads a mesh with its vertices in `order`, where vertex v of the mesh stands at `place[v]`. The emission pattern of a mesh
-    /// without colours is white.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// Uploads a mesh with its vertices in `order`, where vertex v of the mesh stands at `place[v]`. The emission
+    /// pattern of a mesh without colours is white.
     pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32], place: &[u32]) -> Result<Self> {
         let (centre, _) = mesh.bounding_sphere();
         let color = |v: usize| mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[v]);
@@ -70,8 +69,8 @@ impl DrawnTriangles {
         self.positions.size_bytes + self.emission.size_bytes + self.indices.size_bytes
     }
 
-    /// Whether a device's texel views hold the mesh, and the vertices and the self-visibility of all meshes, so that its pixels can
-    /// evaluate lights.
+    /// Whether a device's texel views hold the mesh, and the vertices and the self-visibility of all meshes, so that
+    /// its pixels can evaluate lights.
     pub fn fits_views(&self, device: &Device, vertices: &Buffer, self_cells: &Buffer) -> bool {
         TexelView::fits(device, vk::Format::R32_UINT, self.indices.size_bytes)
             && TexelView::fits(device, vk::Format::R32G32_UINT, self_cells.size_bytes)
@@ -92,7 +91,6 @@ struct PatchPush {
     self_first: u32,
 }
 
-/// The pipelines.
 pub struct DrawTriangles {
     /// Draws both sides of triangles.
     open: GraphicsPipeline,
@@ -104,9 +102,6 @@ pub struct DrawTriangles {
 
 impl DrawTriangles {
     /// For what "draw" draws into; `display` where the picture is encoded.
-    ///
-    /// # Errors
-    /// `Failed` when a shader does not compile.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
@@ -120,7 +115,8 @@ impl DrawTriangles {
         let pixel = |sharp: &SharpPermutation| -> Result<GraphicsPipeline> {
             let [vertex, fragment] = Self::patch_rows(display, sharp);
             let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..state };
-            let (vertex, fragment) = (library.shader(&vertex)?, library.shader(&fragment)?);
+            let vertex = library.shader(&vertex)?;
+            let fragment = library.shader(&fragment)?;
             GraphicsPipeline::new(device, "draw triangle pixels", &vertex, &fragment, nearer)
         };
         Ok(DrawTriangles {
@@ -153,20 +149,18 @@ impl DrawTriangles {
         drawing.push(&EntityPush::new(entity, white));
     }
 
-    /// Draws the triangles of an entity again that a shadow's edge comes near. Their pixels evaluate sharp lights themselves.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// Draws the triangles of an entity again that a shadow's edge comes near. Their pixels evaluate sharp lights
+    /// themselves.
     pub fn record_patches<'r>(
         &'r self,
         drawing: &mut Drawing<'_, 'r>,
         mesh: &'r DrawnTriangles,
         entity: &DrawnEntity<'r>,
         viewport: &DrawnViewport<'r>,
+        light: &PixelLight<'r>,
         white: f32,
     ) -> Result<()> {
-        let pixel = self.pixel.as_ref().zip(viewport.pixel.as_ref()).zip(entity.by_pixel);
-        let Some(((pipeline, light), by_pixel)) = pixel else { return Ok(()) };
+        let (Some(pipeline), Some(by_pixel)) = (&self.pixel, entity.by_pixel) else { return Ok(()) };
         drawing.bind(pipeline, &[], &mesh.indices);
         drawing.resources(&light.binds(
             &[(&mesh.indices, vk::Format::R32_UINT), (viewport.radiosity, vk::Format::R32G32B32A32_SFLOAT)],

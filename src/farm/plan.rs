@@ -1,234 +1,142 @@
-//! A plan: works cut into slices, and everything that decides the bytes of each.
+//! A plan: meshes to bake and films to render, cut into slices, with everything that decides the bytes of each.
 
 pub use crate::bake::PROGRAM;
-use crate::bake::kinds::Kind;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
+use crate::gpu::Device;
+use crate::{asset, bake, frame, text};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use serde_json::json;
+use std::path::{Path, PathBuf};
 
-/// Version of the form of a plan.
-pub(super) const FORMAT: u32 = 1;
-/// Estimated seconds that a slice is made to take: slices of one to five minutes remain so where a machine is half or twice as fast.
-pub const SLICE_SECONDS: f64 = 120.0;
-/// Most estimated bytes of a slice's result, which its process holds in memory. Pictures may be 2.7 times as large as estimated: that
-/// is still below the largest result that is read.
-const RESULT_BYTES: f64 = 1e9;
-/// What a process takes without any mesh: the program, the driver and its compiled shaders, in MB.
-const BASE_MB: u32 = 250;
-/// Longest time that a slice is estimated to take: 30 years, beyond which a plan is damaged.
-pub(super) const SECONDS_LIMIT: f32 = 1e9;
+/// Longest plan that is read.
+const LIMIT_BYTES: u64 = 1 << 30;
 
-/// Devices that make the same bytes: of one name and one driver.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct DeviceClass {
-    /// Name of the device.
-    pub name: String,
-    /// Name and version of the driver.
-    pub driver: String,
-}
-
-impl DeviceClass {
-    /// That of an open device.
-    pub fn of(device: &crate::gpu::Device) -> Self {
-        DeviceClass { name: device.info.name.clone(), driver: device.info.driver.clone() }
-    }
-}
-
-impl std::fmt::Display for DeviceClass {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} ({})", self.name, self.driver)
-    }
-}
-
-/// What a plan does: the options of `bake` or `render`, as typed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Work {
-    /// Words of options.
-    pub words: Vec<String>,
-    /// Where pictures go, with a run of # for the number; `None` for bakes.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pictures: Option<String>,
-}
-
-/// A file that tasks read.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A file that slices read.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Input {
-    /// Its path: relative to the plan's folder where it lies below that, else absolute.
+    /// Relative to the plan's folder if it lies below that, else absolute.
     pub path: String,
     /// Hash of its content, and of that of the files that it names.
     pub hash: String,
 }
 
-/// What a task makes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum TaskKind {
-    /// A thing that is baked of a mesh: part `first` of `count`.
-    Bake(Kind),
-    /// Pictures of a scene: `count` from the number `first` on.
-    Frames,
+/// A scene of which pictures are rendered.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Film {
+    pub scene: Input,
+    /// Where pictures go, with a run of # for the number; relative to the plan's folder.
+    pub pictures: String,
+    pub options: frame::Options,
+    /// Scene time of picture 0, in seconds.
+    pub first_s: f64,
+    /// Pictures per second of scene time.
+    pub fps: u16,
 }
 
-/// The least piece of work. In the file it is a row of these five values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(from = "(u32, u32, TaskKind, u32, u32)", into = "(u32, u32, TaskKind, u32, u32)")]
-pub struct Task {
-    /// Index of its work.
-    pub work: u32,
-    /// Index of its input.
-    pub input: u32,
-    /// What it makes.
-    pub kind: TaskKind,
-    /// The part of a bake, or the number of the first picture.
-    pub first: u32,
-    /// Parts of the bake, or pictures.
-    pub count: u32,
+/// Work of one process.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Slice {
+    /// Everything that is baked of these meshes of the plan.
+    Meshes { first: u32, count: u32 },
+    /// Pictures of a film of the plan, by their numbers.
+    Pictures { film: u32, first: u32, count: u32 },
 }
 
-impl From<(u32, u32, TaskKind, u32, u32)> for Task {
-    fn from((work, input, kind, first, count): (u32, u32, TaskKind, u32, u32)) -> Self {
-        Task { work, input, kind, first, count }
-    }
-}
-
-impl From<Task> for (u32, u32, TaskKind, u32, u32) {
-    fn from(task: Task) -> Self {
-        (task.work, task.input, task.kind, task.first, task.count)
-    }
-}
-
-/// Tasks that run together. In the file it is a row of these five values.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(from = "(u32, u32, f32, u32, u32)", into = "(u32, u32, f32, u32, u32)")]
-pub struct Slice {
-    /// Index of the first task.
-    pub first: u32,
-    /// Number of tasks.
-    pub count: u32,
-    /// Estimated seconds on two cores of a software device.
-    pub seconds: f32,
-    /// Memory that it needs, in MB.
-    pub memory_mb: u32,
-    /// Space in the shared folder that its result takes, in KB.
-    pub disk_kb: u32,
-}
-
-impl From<(u32, u32, f32, u32, u32)> for Slice {
-    fn from((first, count, seconds, memory_mb, disk_kb): (u32, u32, f32, u32, u32)) -> Self {
-        Slice { first, count, seconds, memory_mb, disk_kb }
-    }
-}
-
-impl From<Slice> for (u32, u32, f32, u32, u32) {
-    fn from(slice: Slice) -> Self {
-        (slice.first, slice.count, slice.seconds, slice.memory_mb, slice.disk_kb)
-    }
-}
-
-/// A plan.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
-    pub(super) format: u32,
-    /// The program that made it, with its version. Another version refuses it.
-    pub program: String,
-    /// The devices that may run it.
-    pub device: DeviceClass,
+    /// The program that made it, with its version. Another version refuses it. Plans of all versions have this key.
+    pub plan_of: String,
+    /// The devices that may run it, see [`device_class`].
+    pub device: String,
     /// Folder of results, relative to the plan's unless it is absolute.
     pub results: String,
-    /// Options of what is done.
-    pub works: Vec<Work>,
-    /// What is read.
-    pub inputs: Vec<Input>,
-    /// Pieces of work, slice after slice.
-    pub tasks: Vec<Task>,
-    /// What runs together.
+    /// How meshes are baked.
+    pub bake: bake::Options,
+    pub meshes: Vec<Input>,
+    pub films: Vec<Film>,
     pub slices: Vec<Slice>,
-    /// The plan's own folder.
     #[serde(skip)]
     pub folder: PathBuf,
 }
 
-/// What a task is estimated to take.
-#[derive(Clone, Copy, Debug)]
-pub struct TaskCost {
-    /// Seconds on two cores of a software device.
-    pub seconds: f64,
-    /// Memory besides that of the process itself, in MB.
-    pub memory_mb: f64,
-    /// Bytes of the result.
-    pub bytes: f64,
+/// Name and driver of a device: those that agree in both make the same bytes.
+pub fn device_class(device: &Device) -> String {
+    format!("{} ({})", device.info.name, device.info.driver)
+}
+
+/// A path as plans and the scripts of engines have it. A control character would end a line of a script.
+pub fn plain(path: &Path) -> Result<&str> {
+    path.to_str().filter(|text| !text.contains(char::is_control)).ok_or_else(|| {
+        let what = "a farm takes no control characters in paths, and only UTF-8";
+        Error::Usage(format!("{}: {what}", path.display()))
+    })
+}
+
+/// The program that made a plan; `None` where these are not the bytes of one.
+fn maker(bytes: &[u8]) -> Option<String> {
+    #[derive(Deserialize)]
+    struct Made {
+        plan_of: String,
+    }
+    serde_json::from_slice(bytes).ok().map(|made: Made| made.plan_of)
+}
+
+/// First and count of runs of `most` and a rest.
+fn runs(all: u32, most: u32) -> impl Iterator<Item = (u32, u32)> {
+    (0..all).step_by(most as usize).map(move |first| (first, most.min(all - first)))
 }
 
 impl Plan {
     /// An empty plan for this program.
-    pub fn new(device: DeviceClass, results: String) -> Self {
+    pub fn new(device: String, results: String, bake: bake::Options) -> Self {
         Plan {
-            format: FORMAT,
-            program: PROGRAM.into(),
+            plan_of: PROGRAM.into(),
             device,
             results,
-            works: Vec::new(),
-            inputs: Vec::new(),
-            tasks: Vec::new(),
+            bake,
+            meshes: Vec::new(),
+            films: Vec::new(),
             slices: Vec::new(),
             folder: PathBuf::new(),
         }
     }
 
-    /// How many tasks like this one a slice may hold, at least one.
-    pub fn fitting(cost: TaskCost) -> u32 {
-        (SLICE_SECONDS / cost.seconds).min(RESULT_BYTES / cost.bytes).max(1.0) as u32
+    /// Adds meshes, of which a slice bakes `most`.
+    pub fn add_meshes(&mut self, meshes: Vec<Input>, most: u32) {
+        self.slices.extend(runs(meshes.len() as u32, most).map(|(first, count)| Slice::Meshes { first, count }));
+        self.meshes = meshes;
     }
 
-    /// Adds a task. It joins the last slice while that remains below [`SLICE_SECONDS`] and its result below 1 GB.
-    pub fn add(&mut self, task: Task, cost: TaskCost) {
-        let memory = BASE_MB + cost.memory_mb.ceil() as u32;
-        let kilobytes = (cost.bytes / 1e3).ceil() as u32;
-        let fits = |slice: &Slice| {
-            let bytes = 1e3 * f64::from(slice.disk_kb) + cost.bytes;
-            f64::from(slice.seconds) + cost.seconds <= SLICE_SECONDS && bytes <= RESULT_BYTES
-        };
-        let begins = !self.slices.last().is_some_and(fits);
-        if begins {
-            self.slices.push(Slice { first: self.tasks.len() as u32, ..Slice::default() });
-        }
-        let slice = self.slices.last_mut().expect("one was there or is new");
-        slice.count += 1;
-        slice.seconds += cost.seconds as f32;
-        // Besides what its largest task needs, a process holds the result.
-        let largest = slice.memory_mb - slice.disk_kb.div_ceil(1000);
-        slice.disk_kb = slice.disk_kb.saturating_add(kilobytes);
-        slice.memory_mb = largest.max(memory) + slice.disk_kb.div_ceil(1000);
-        self.tasks.push(task);
+    /// Adds the pictures 0 to `frames` - 1 of a film, of which a slice renders `most`.
+    pub fn add_film(&mut self, film: Film, frames: u32, most: u32) {
+        let index = self.films.len() as u32;
+        self.slices.extend(runs(frames, most).map(|(first, count)| Slice::Pictures { film: index, first, count }));
+        self.films.push(film);
     }
 
-    /// How many parts a task of so many seconds is cut into.
-    pub fn parts(seconds: f64) -> u32 {
-        if seconds <= 1.5 * SLICE_SECONDS { 1 } else { (seconds / SLICE_SECONDS).ceil() as u32 }
-    }
-
-    /// The tasks of a slice.
-    pub fn tasks_of(&self, slice: usize) -> &[Task] {
-        let Slice { first, count, .. } = self.slices[slice];
-        &self.tasks[first as usize..(first + count) as usize]
+    /// The meshes `first` to `first + count - 1`.
+    pub fn meshes(&self, first: u32, count: u32) -> &[Input] {
+        &self.meshes[first as usize..][..count as usize]
     }
 
     /// The hash of everything that decides the result of a slice, as 32 hexadecimal digits.
     pub fn key(&self, slice: usize) -> String {
-        let mut hasher = blake3::Hasher::new();
-        let mut add = |text: &str| {
-            hasher.update(&(text.len() as u64).to_le_bytes()).update(text.as_bytes());
+        let work = match self.slices[slice] {
+            Slice::Meshes { first, count } => {
+                let hashes: Vec<&str> = self.meshes(first, count).iter().map(|mesh| mesh.hash.as_str()).collect();
+                json!(["bake", self.bake, hashes])
+            }
+            Slice::Pictures { film, first, count } => {
+                let film = &self.films[film as usize];
+                json!(["render", film.scene.hash, film.options, film.first_s, film.fps, first, count])
+            }
         };
-        [&self.program, &self.device.name, &self.device.driver].into_iter().for_each(|text| add(text));
-        for task in self.tasks_of(slice) {
-            self.works[task.work as usize].words.iter().for_each(|word| add(word));
-            add(&self.inputs[task.input as usize].hash);
-            add(&serde_json::to_string(&(task.kind, task.first, task.count)).expect("plain data"));
-        }
-        hasher.finalize().to_hex()[..32].to_owned()
+        let all = json!([self.plan_of, self.device, work]).to_string();
+        blake3::hash(all.as_bytes()).to_hex()[..32].to_owned()
     }
 
     /// A path of the plan as a file of this machine.
@@ -236,86 +144,71 @@ impl Plan {
         self.folder.join(text)
     }
 
-    /// Fails where a device is of another class than the plan's.
-    ///
-    /// # Errors
-    /// `Unsupported` with the names of both.
-    pub fn check_device(&self, device: &DeviceClass) -> Result<()> {
-        if *device == self.device {
+    /// Fails with both names where a device is of another class than the plan's.
+    pub fn check_device(&self, device: &Device) -> Result<()> {
+        let found = device_class(device);
+        if found == self.device {
             return Ok(());
         }
-        Err(Error::Unsupported(format!("the plan is for {}, and this device is {device}", self.device)))
+        Err(Error::Unsupported(format!("the plan is for {}, and this device is {found}", self.device)))
     }
-}
 
-#[cfg(test)]
-pub(super) mod tests {
-    use super::*;
+    /// Whether a file holds a plan, of this version or another.
+    pub fn is_at(path: &Path) -> bool {
+        asset::read_file(path, LIMIT_BYTES).is_ok_and(|bytes| maker(&bytes).is_some())
+    }
 
-    /// A plan of one mesh in so many parts.
-    pub fn plan(tasks: u32, seconds: f64) -> Plan {
-        let device = DeviceClass { name: "a".into(), driver: "b".into() };
-        let mut plan = Plan::new(device, "results".into());
-        plan.works.push(Work { words: vec!["--quality".into(), "draft".into()], pictures: None });
-        plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
-        for index in 0..tasks {
-            let cost = TaskCost { seconds, memory_mb: 1.0, bytes: 1e6 };
-            plan.add(Task { work: 0, input: 0, kind: TaskKind::Bake(Kind::Shadow), first: index, count: tasks }, cost);
+    /// Writes the plan, whole or not at all.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        text::write(path, serde_json::to_vec(self).expect("a plan is plain data"))
+    }
+
+    /// Reads a plan and checks that this program made it.
+    pub fn read(path: &Path) -> Result<Self> {
+        Self::parse(&asset::read_file(path, LIMIT_BYTES)?, path)
+    }
+
+    /// As [`Plan::read`], of the bytes of the file `path`.
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
+        let bad = |what: &str| Error::input(path, one_line(what));
+        // The version comes first: another program's plan may have another form.
+        let made_by = maker(bytes).ok_or_else(|| bad("not a plan"))?;
+        if made_by != PROGRAM {
+            return Err(Error::Unsupported(format!(
+                "{}: a plan of {}, and this is {PROGRAM}; plan again, or use that program",
+                path.display(),
+                one_line(&made_by)
+            )));
         }
-        plan
+        let mut plan: Plan = serde_json::from_slice(bytes).map_err(|error| bad(&format!("not a plan: {error}")))?;
+        plan.check().map_err(|what| bad(&what))?;
+        let full = std::path::absolute(path).map_err(|error| bad(&format!("cannot be read: {error}")))?;
+        plan.folder = full.parent().unwrap_or(Path::new("/")).to_owned();
+        Ok(plan)
     }
 
-    #[test]
-    fn small_tasks_share_slices_and_a_plan_is_read_as_it_was_written() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("p.json");
-        let mut plan = plan(10, 50.0);
-        assert_eq!(plan.slices.len(), 5);
-        assert!(plan.slices.iter().all(|slice| slice.seconds == 100.0 && slice.disk_kb == 2000));
-        plan.write(&path).unwrap();
-        let written = std::fs::read_to_string(&path).unwrap();
-        assert!(written.contains(r#""tasks":[[0,0,{"bake":"shadow"},0,10],"#), "{written}");
-        assert!(written.contains(r#""slices":[[0,2,100.0,253,2000],"#), "{written}");
-        plan.folder = folder.path().to_owned();
-        assert_eq!(Plan::read(&path).unwrap(), plan);
-        assert_eq!((Plan::parts(150.0), Plan::parts(181.0), Plan::parts(1200.0)), (1, 2, 10));
-    }
-
-    /// A process holds the result of its slice: that is stated, and stays below what is read again.
-    #[test]
-    fn slices_are_short_of_time_and_of_bytes() {
-        let mut plan = plan(1, 1.0);
-        assert_eq!((plan.slices[0].memory_mb, plan.slices[0].disk_kb), (BASE_MB + 1 + 1, 1000));
-        let large = TaskCost { seconds: 1.0, memory_mb: 5.0, bytes: 4e8 };
-        (0..3).for_each(|_| plan.add(plan.tasks[0], large));
-        let stated: Vec<_> = plan.slices.iter().map(|slice| (slice.count, slice.memory_mb, slice.disk_kb)).collect();
-        assert_eq!(stated, [(3, BASE_MB + 5 + 801, 801_000), (1, BASE_MB + 5 + 400, 400_000)]);
-        assert_eq!(Plan::fitting(large), 2);
-        assert_eq!(Plan::fitting(TaskCost { bytes: 2e9, ..large }), 1);
-        assert_eq!(Plan::fitting(TaskCost { bytes: 1.0, ..large }), 120);
-    }
-
-    /// Each thing that decides a result is part of its name.
-    #[test]
-    fn names_of_results_differ_where_anything_differs() {
-        let base = plan(2, 100.0);
-        let mut keys = vec![base.key(0), base.key(1)];
-        let edits: [fn(&mut Plan); 5] = [
-            |p| p.program.push('x'),
-            |p| p.device.driver.push('x'),
-            |p| p.works[0].words[1].push('x'),
-            |p| p.inputs[0].hash.push('x'),
-            |p| p.tasks[0].kind = TaskKind::Bake(Kind::Vertices),
-        ];
-        for edit in edits {
-            let mut other = base.clone();
-            edit(&mut other);
-            keys.push(other.key(0));
+    /// Whether all indices lead somewhere, all numbers make sense, and no path breaks a line.
+    fn check(&self) -> std::result::Result<(), String> {
+        if self.slices.is_empty() {
+            return Err("it has no slices".into());
         }
-        let distinct: std::collections::HashSet<_> = keys.iter().collect();
-        assert_eq!(distinct.len(), keys.len());
-        let mut moved = base.clone();
-        moved.inputs[0].path = "elsewhere/m.obj".into();
-        assert_eq!(moved.key(0), base.key(0), "where an input lies decides nothing");
+        for (index, slice) in self.slices.iter().enumerate() {
+            let (film, first, count, all) = match *slice {
+                Slice::Meshes { first, count } => (None, first, count, self.meshes.len()),
+                Slice::Pictures { film, first, count } => (Some(film as usize), first, count, u32::MAX as usize),
+            };
+            let has_film = film.is_none_or(|film| film < self.films.len());
+            if !has_film || count == 0 || first as usize + count as usize > all {
+                return Err(format!("slice {index} is of things that are not there"));
+            }
+        }
+        let of_films = self.films.iter().flat_map(|film| [&film.scene.path, &film.pictures]);
+        for path in self.meshes.iter().map(|mesh| &mesh.path).chain(of_films).chain([&self.results]) {
+            plain(Path::new(path)).map_err(|error| error.to_string())?;
+        }
+        match self.films.iter().find(|film| film.fps == 0 || !film.first_s.is_finite()) {
+            Some(film) => Err(format!("the film of {} has no time", film.scene.path)),
+            None => Ok(()),
+        }
     }
 }

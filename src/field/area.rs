@@ -1,8 +1,8 @@
-//! Projected area of an object by direction, as a polynomial. It is fitted to the outermost shell of the object's field, so that
-//! values computed from the area agree there with values looked up in the field.
+//! Projected area of an object by direction, as a polynomial. It is fitted to the outermost shell of the object's
+//! field, so that values computed from the area agree there with values looked up in the field.
 
+use super::ShadowField;
 use super::lattice::cap_height;
-use super::{Lookup, ShadowField};
 use crate::sh::basis::{MAX_COEFFICIENTS, Y00};
 use crate::sh::quadrature::sphere_rule;
 use glam::{DMat3, DVec3};
@@ -31,7 +31,7 @@ impl Area {
         let samples: Vec<(DVec3, f64, f64)> = sphere_rule(12)
             .into_iter()
             .map(|(direction, weight)| {
-                field.lookup(outer * direction, Lookup::Trilinear, 0, &mut found);
+                field.lookup(outer * direction, 0, &mut found);
                 (direction, weight, found[0] / (Y00 * 2.0 * PI * cap_height(outer)))
             })
             .collect();
@@ -70,8 +70,8 @@ impl Area {
     }
 }
 
-/// Eigenvectors of a symmetric matrix by Jacobi rotations. If eigenvalues are nearly equal, the frame's own axes are kept, because
-/// meshes tend to be symmetric about them.
+/// Eigenvectors of a symmetric matrix by Jacobi rotations. If eigenvalues are nearly equal, the frame's own axes are
+/// kept, because meshes tend to be symmetric about them.
 fn principal_axes(mut matrix: DMat3) -> DMat3 {
     let mut axes = DMat3::IDENTITY;
     let least = 1e-3 * (matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z);

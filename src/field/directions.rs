@@ -1,15 +1,16 @@
 //! Arrangement of the directions of a shell, and interpolation between them.
 
-use super::lattice::{Lattice, Lookup};
+use super::lattice::Lattice;
 use crate::sh::cube;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
 /// Cells of a cube face have (almost) equal angles: cell coordinate u = s (c0 + c1 s^2 + c2 s^4) for s in [-1, 1]. This
-/// approximates (4/pi) atan(s) within 4.3e-3, with equal value at 1 and equal slope at 0 and 1; a shader evaluates it with three
-/// multiply-adds.
+/// approximates (4/pi) atan(s) within 4.3e-3, with equal value at 1 and equal slope at 0 and 1; a shader evaluates it
+/// with three multiply-adds.
 pub const CELL_WARP: [f64; 3] = {
-    let (slope_0, slope_1) = (4.0 / PI, 2.0 / PI);
+    let slope_0 = 4.0 / PI;
+    let slope_1 = 2.0 / PI;
     let c2 = (slope_1 - slope_0 - 3.0 * (1.0 - slope_0)) / 2.0;
     [slope_0, 1.0 - slope_0 - c2, c2]
 };
@@ -98,7 +99,9 @@ impl Lattice {
             return index;
         }
         let columns = self.columns();
-        let (face, x, y) = (index / (columns * columns), index % columns, index / columns % columns);
+        let face = index / (columns * columns);
+        let x = index % columns;
+        let y = index / columns % columns;
         if [x, y].iter().all(|i| (1..columns - 1).contains(i)) {
             return index;
         }
@@ -118,9 +121,10 @@ impl Lattice {
         if within(x) && within(y) {
             return self.first_of((face * columns + y as u32) * columns + x as u32);
         }
-        // Projection of a point just beyond the edge, and not at its ends, finds the neighbouring face. The node lies one step from
-        // that face's edge.
-        let (hair, off_end) = (1e-6, 1e-3);
+        // Projection of a point just beyond the edge, and not at its ends, finds the neighbouring face. The node lies
+        // one step from that face's edge.
+        let hair = 1e-6;
+        let off_end = 1e-3;
         let st = |i: i64| match i {
             -1 => -1.0 - hair,
             0 => -1.0 + off_end,
@@ -147,13 +151,15 @@ impl Lattice {
     pub fn direction(&self, index: u32) -> DVec3 {
         match self.directions {
             Directions::Cube { cells } if self.has_edges() => {
-                let (index, columns) = (self.first_of(index), cells + 2);
+                let index = self.first_of(index);
+                let columns = cells + 2;
                 let st = |i: u32| node_st(i, columns);
                 let face = (index / (columns * columns)) as usize;
                 cube::direction(face, st(index % columns), st(index / columns % columns))
             }
             Directions::Cube { cells } => {
-                let (face, cell) = (index / (cells * cells), index % (cells * cells));
+                let face = index / (cells * cells);
+                let cell = index % (cells * cells);
                 let st = |i: u32| unwarp((f64::from(i) + 0.5) / f64::from(cells) * 2.0 - 1.0);
                 cube::direction(face as usize, st(cell % cells), st(cell / cells))
             }
@@ -165,8 +171,8 @@ impl Lattice {
         }
     }
 
-    /// For every stored direction, the captured directions of which it is the mean: one for a cell, one for a border, three for
-    /// a corner of a border.
+    /// For every stored direction, the captured directions of which it is the mean: one for a cell, one for a border,
+    /// three for a corner of a border.
     pub fn sources(&self) -> Vec<Vec<u32>> {
         let (Directions::Cube { cells }, false) = (self.directions, self.has_edges()) else {
             return (0..self.direction_count()).map(|i| vec![self.first_of(i)]).collect();
@@ -176,7 +182,8 @@ impl Lattice {
         for face in 0..6 {
             for y in -1..=n {
                 for x in -1..=n {
-                    let (inside_x, inside_y) = (x.clamp(0, n - 1), y.clamp(0, n - 1));
+                    let inside_x = x.clamp(0, n - 1);
+                    let inside_y = y.clamp(0, n - 1);
                     out.push(match (x == inside_x, y == inside_y) {
                         (true, true) => vec![self.cell_index(face, x, y)],
                         (false, false) => vec![
@@ -192,12 +199,16 @@ impl Lattice {
         out
     }
 
-    /// The four captured directions around one direction of a cube lattice, as two opposite pairs. Where three edges meet there are
-    /// only three, and the one on the third edge is opposite to both others.
+    /// The four captured directions around one direction of a cube lattice, as two opposite pairs. Where three edges
+    /// meet there are only three, and the one on the third edge is opposite to both others.
     pub fn cell_neighbours(&self, direction: u32) -> Vec<u32> {
-        let (columns, n) = (self.columns(), i64::from(self.columns()));
-        let (face, x, y) = (direction / (columns * columns), direction % columns, direction / columns % columns);
-        let (x, y) = (i64::from(x), i64::from(y));
+        let columns = self.columns();
+        let n = i64::from(self.columns());
+        let face = direction / (columns * columns);
+        let x = direction % columns;
+        let y = direction / columns % columns;
+        let x = i64::from(x);
+        let y = i64::from(y);
         if self.has_edges() {
             return [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)].map(|(x, y)| self.node(face, x, y)).to_vec();
         }
@@ -230,18 +241,19 @@ impl Lattice {
     }
 
     /// The four cells around a direction within one shell.
-    pub(super) fn plane(&self, direction: DVec3, lookup: Lookup) -> ShellCells {
-        let settle = |x: f64| if lookup == Lookup::Trilinear { x } else { x.round() };
+    pub(super) fn plane(&self, direction: DVec3) -> ShellCells {
         match self.directions {
             Directions::Cube { cells } => {
                 let (face, s, t) = cube::face_st(direction);
                 // Half a row in cells; without borders if those belong to other faces.
                 let half = f64::from(if self.has_edges() { cells + 1 } else { cells }) / 2.0;
-                let place = |s: f64| settle(warp(s) * half + f64::from(cells + 1) / 2.0);
-                let (x, y) = (place(s), place(t));
+                let place = |s: f64| warp(s) * half + f64::from(cells + 1) / 2.0;
+                let x = place(s);
+                let y = place(t);
                 // Rounding may give cells + 1/2 exactly; the index must stay inside the stored rows.
                 let low = |x: f64| (x.floor() as u32).min(cells);
-                let (x0, y0) = (low(x), low(y));
+                let x0 = low(x);
+                let y0 = low(y);
                 ShellCells {
                     base: face as u32 * (cells + 2) * (cells + 2),
                     columns: cells + 2,
@@ -253,9 +265,10 @@ impl Lattice {
             Directions::LatLon { latitudes, longitudes } => {
                 let polar = direction.y.clamp(-1.0, 1.0).acos() / PI * f64::from(latitudes) - 0.5;
                 let azimuth = (direction.z.atan2(direction.x) / TAU).rem_euclid(1.0) * f64::from(longitudes);
-                let y = settle(polar.clamp(0.0, f64::from(latitudes - 1)));
-                let x = settle(azimuth);
-                let (x0, y0) = (x.floor() as u32, (y.floor() as u32).min(latitudes.saturating_sub(2)));
+                let y = polar.clamp(0.0, f64::from(latitudes - 1));
+                let x = azimuth;
+                let x0 = x.floor() as u32;
+                let y0 = (y.floor() as u32).min(latitudes.saturating_sub(2));
                 ShellCells {
                     base: 0,
                     columns: longitudes,

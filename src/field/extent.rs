@@ -13,7 +13,6 @@ pub enum Extent {
     Nothing,
     /// The field is zero outside a cone of directions from the centre, object's frame.
     Cone {
-        /// Unit.
         axis: DVec3,
         /// Less than pi.
         half_angle_rad: f64,
@@ -25,7 +24,8 @@ pub enum Extent {
 /// The extent of a field, computed from its stored numbers; a lookup outside it returns exactly zero.
 pub fn extent(field: &ShadowField) -> Extent {
     let header = &field.header;
-    let (lattice, count) = (header.lattice, coefficient_count(header.bands));
+    let lattice = header.lattice;
+    let count = coefficient_count(header.bands);
     let fit = lattice.fit();
     let channels = if header.kind == FieldKind::Radiance { 3 } else { 1 };
     let stored = lattice.stored_direction_count();

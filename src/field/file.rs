@@ -1,5 +1,5 @@
-//! Format of field files: a prologue with magic bytes, version and lengths, a JSON header, a payload, and one hash over all of
-//! it. Numbers are little-endian. A file is written under a temporary name and then renamed.
+//! Format of field files: a prologue with magic bytes, version and lengths, a JSON header, a payload, and one hash over
+//! all of it. Numbers are little-endian. A file is written under a temporary name and then renamed.
 //!
 //! ```text
 //! 0   8 bytes  magic: what kind of file
@@ -12,9 +12,9 @@
 
 use super::{FieldHeader, ShadowField};
 use crate::error::{Error, Result, one_line};
+use crate::files;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub const TRANSFER_MAGIC: [u8; 8] = *b"SHTRANS\n";
 /// First bytes of a cached file of self-visibility.
 pub const SELF_VISIBILITY_MAGIC: [u8; 8] = *b"SHSELFV\n";
 /// Version that this program writes and reads. It increases whenever the meaning of header or payload changes.
-pub const VERSION: u32 = 8;
+pub const VERSION: u32 = 9;
 /// Longest header that is read.
 const HEADER_LIMIT: u64 = 64 << 10;
 /// Largest payload that is read: 4 GiB.
@@ -38,10 +38,6 @@ fn seal(prologue: &[u8], header: &[u8], payload: &[u8]) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// Writes header and payload to `path`.
-///
-/// # Errors
-/// `Input` when the file cannot be written; then no partial file remains.
 pub fn write<H: Serialize>(path: &Path, magic: [u8; 8], header: &H, payload: &[u8]) -> Result<()> {
     let header = serde_json::to_vec(header).expect("headers are plain data");
     let mut bytes = magic.to_vec();
@@ -51,48 +47,25 @@ pub fn write<H: Serialize>(path: &Path, magic: [u8; 8], header: &H, payload: &[u
     let hash = seal(&bytes, &header, payload);
     bytes.extend(hash);
     bytes.extend(&header);
-    crate::files::replace_parts(path, &[&bytes, payload])
+    files::replace_parts(path, &[&bytes, payload])
         .map_err(|error| Error::input(path, format!("cannot be written: {error}")))
 }
 
 /// Whether a file begins as one of that kind does; `false` where it cannot be read.
 pub fn has_magic(path: &Path, magic: [u8; 8]) -> bool {
     let mut found = [0; 8];
-    File::open(path).and_then(|mut file| file.read_exact(&mut found)).is_ok() && found == magic
-}
-
-/// The header alone of what [`write()`] wrote, without a look at the hash. `None` where there is no such file.
-pub fn read_header<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Option<H> {
-    let mut file = File::open(path).ok()?;
-    let mut prologue = [0; PROLOGUE];
-    file.read_exact(&mut prologue).ok()?;
-    let length = u64::from(u32::from_le_bytes(prologue[12..16].try_into().ok()?));
-    if prologue[..8] != magic || prologue[8..12] != VERSION.to_le_bytes() || length > HEADER_LIMIT {
-        return None;
-    }
-    let mut header = vec![0; length as usize];
-    file.read_exact(&mut header).ok()?;
-    serde_json::from_slice(&header).ok()
+    files::open(path).and_then(|mut file| file.read_exact(&mut found)).is_ok() && found == magic
 }
 
 /// Reads what [`write()`] wrote. Lengths are checked against the file's size before memory is allocated for them.
-///
-/// # Errors
-/// `Input` when the file is missing, truncated, damaged, of another kind or version, or its header is malformed.
 pub fn read<H: DeserializeOwned>(path: &Path, magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
     let unread = |error| Error::input(path, format!("cannot be read: {error}"));
-    let file = File::open(path).map_err(unread)?;
-    let about = file.metadata().map_err(unread)?;
-    if about.is_dir() {
-        return Err(Error::input(path, "cannot be read: Is a directory"));
-    }
-    read_from(file, about.len(), path, magic)
+    let file = files::open(path).map_err(unread)?;
+    let size = file.metadata().map_err(unread)?.len();
+    read_from(file, size, path, magic)
 }
 
 /// As [`read`], of the bytes of the file `path`.
-///
-/// # Errors
-/// As [`read`].
 pub fn parse<H: DeserializeOwned>(bytes: &[u8], path: &Path, magic: [u8; 8]) -> Result<(H, Vec<u8>)> {
     read_from(bytes, bytes.len() as u64, path, magic)
 }
@@ -140,30 +113,22 @@ fn read_from<H: DeserializeOwned>(
 
 impl ShadowField {
     /// Writes the field to an `.sf` file.
-    ///
-    /// # Errors
-    /// As [`write()`].
     pub fn write(&self, path: &Path) -> Result<()> {
         write(path, FIELD_MAGIC, &self.header, &self.payload)
     }
 
     /// Reads an `.sf` file.
-    ///
-    /// # Errors
-    /// As [`read`]; also when the header's numbers are out of range or do not fit the payload.
     pub fn read(path: &Path) -> Result<Self> {
         let (header, payload) = read(path, FIELD_MAGIC)?;
         Self::new(header, payload).map_err(|error| Error::input(path, error))
     }
 
     /// A field of what a file holds.
-    ///
-    /// # Errors
-    /// `Input` when the header's numbers are out of range or do not fit the payload.
     pub fn new(header: FieldHeader, payload: Vec<u8>) -> Result<Self> {
         header.validate()?;
         if header.payload_bytes() != payload.len() as u64 {
-            let (claimed, found) = (header.payload_bytes(), payload.len());
+            let claimed = header.payload_bytes();
+            let found = payload.len();
             return Err(Error::Input(format!("the header claims {claimed} bytes of samples, {found} are there")));
         }
         Ok(ShadowField { header, payload })

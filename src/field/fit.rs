@@ -1,15 +1,16 @@
-//! Fits a lattice to an object that is not round: shells lie about the middle of its box, and its short axes are stretched.
+//! Fits a lattice to an object that is not round: shells lie about the middle of its box, and its short axes are
+//! stretched.
 //!
-//! The blocked part changes fastest near the surface. Spherical shells about the bounding sphere's centre do not follow most
-//! surfaces: the first shell must start where the surface is nearest, so elsewhere shells lie inside the solid. Stretching each
-//! axis by the square root of longest edge over edge halves the box's proportions (in logarithms) and costs a lookup three
-//! multiply-adds.
+//! The blocked part changes fastest near the surface. Spherical shells about the bounding sphere's centre do not follow
+//! most surfaces: the first shell must start where the surface is nearest, so elsewhere shells lie inside the solid.
+//! Stretching each axis by the square root of longest edge over edge halves the box's proportions (in logarithms) and
+//! costs a lookup three multiply-adds.
 
 use glam::{DMat3, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// Maps a point p (object's frame, in r from the bounding sphere's centre) to (p - centre) * stretch in the lattice's space, in
-/// which directions and distances are measured.
+/// Maps a point p (object's frame, in r from the bounding sphere's centre) to (p - centre) * stretch in the lattice's
+/// space, in which directions and distances are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// Centre of the shells in r from the bounding sphere's centre, a multiple of 1/1024.
@@ -18,8 +19,8 @@ pub struct Fit {
     pub stretch: [f64; 3],
 }
 
-/// A box thinner than this share of its longest edge is a sheet and is not stretched: captures on its two sides differ however
-/// near they are.
+/// A box thinner than this share of its longest edge is a sheet and is not stretched: captures on its two sides differ
+/// however near they are.
 const SHEET: f64 = 0.02;
 
 impl Fit {
@@ -29,12 +30,14 @@ impl Fit {
     /// Largest factor of an axis.
     pub const MOST: f64 = 2.0;
 
-    /// The fit of a mesh, whose positions are in r from the bounding sphere's centre: the middle of its box, and the square
-    /// root of longest edge over edge. A ball and a cube keep spherical shells.
+    /// The fit of a mesh, whose positions are in r from the bounding sphere's centre: the middle of its box, and the
+    /// square root of longest edge over edge. A ball and a cube keep spherical shells.
     pub fn new(positions: &[Vec3]) -> Self {
         let (low, high) = positions.iter().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
-        let (low, high) = (low.as_dvec3(), high.as_dvec3());
-        let (size, middle) = (high - low, (high + low) / 2.0);
+        let low = low.as_dvec3();
+        let high = high.as_dvec3();
+        let size = high - low;
+        let middle = (high + low) / 2.0;
         let longest = size.max_element();
         if !(size.min_element() > SHEET * longest && longest.is_finite()) {
             return Fit::ROUND;
@@ -68,12 +71,14 @@ impl Fit {
 
     /// Whether a turn or mirror about the bounding sphere's centre leaves the lattice's space as it is.
     pub fn keeps(&self, matrix: DMat3) -> bool {
-        let (centre, stretch) = (DVec3::from(self.centre), DMat3::from_diagonal(DVec3::from(self.stretch)));
+        let centre = DVec3::from(self.centre);
+        let stretch = DMat3::from_diagonal(DVec3::from(self.stretch));
         let same = |a: DMat3, b: DMat3| (a - b).to_cols_array().iter().all(|x| x.abs() < 1e-9);
         (matrix * centre - centre).length() < 1e-9 && same(matrix * stretch, stretch * matrix)
     }
 
-    /// For a shader: x, y, z are added after stretching; w holds the three factors, in 64ths above 1, as one whole number.
+    /// For a shader: x, y, z are added after stretching; w holds the three factors, in 64ths above 1, as one whole
+    /// number.
     pub fn packed(&self) -> [f32; 4] {
         let shift = -DVec3::from(self.centre) * DVec3::from(self.stretch);
         let [x, y, z] = self.stretch.map(|s| ((s - 1.0) * 64.0).round() as u32);

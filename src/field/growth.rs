@@ -1,28 +1,32 @@
 //! The growth certificate of an occlusion field: no product with a visibility that is looked up in it lengthens an
 //! expansion T (in the sum of squares) by more than this factor.
 //!
-//! With M(b) the symmetric matrix of multiplication by b, a product with visibility is T' = (I - M(b)) T. What is looked up
-//! at distance d is b = u sum_k w_k s_k: stored samples s_k with convex weights w_k, and u = [`Lattice::unscale`] at d.
-//! The norm of I - u sum w_k M(s_k) is at most the largest of |I - u M(s_k)|, because sum w_k = 1. This is convex in u. Since u falls
-//! with d, it lies between its values on the two interpolated shells, or beyond the last shell between that shell's value and 0.
-//! So it suffices to test every sample with u of its own shell and of the neighbouring shells. Rotations do not change norms.
+//! With M(b) the symmetric matrix of multiplication by b, a product with visibility is T' = (I - M(b)) T. What is
+//! looked up at distance d is b = u sum_k w_k s_k: stored samples s_k with convex weights w_k, and u =
+//! [`Lattice::unscale`] at d. The norm of I - u sum w_k M(s_k) is at most the largest of |I - u M(s_k)|, because sum
+//! w_k = 1. This is convex in u. Since u falls with d, it lies between its values on the two interpolated shells, or
+//! beyond the last shell between that shell's value and 0. So it suffices to test every sample with u of its own shell
+//! and of the neighbouring shells. Rotations do not change norms.
 //!
-//! A factor between 0 and 1 lengthens no function, but its projection to few bands can: by up to 1.058 for a cap of 30 degrees at
-//! 4 bands.
+//! A factor between 0 and 1 lengthens no function, but its projection to few bands can: by up to 1.058 for a cap of 30
+//! degrees at 4 bands.
 
 use super::{Lattice, ShadowField};
 use crate::sh::basis::coefficient_count;
 use crate::sh::product::{Tensor, eigenvalues};
 use rayon::prelude::*;
 
-/// SH bands of the transfers that the certificate covers, independent of the field's bands. It also holds for fewer bands, whose
-/// matrix is a principal submatrix with eigenvalues between this one's (Cauchy interlacing), but not for more.
+/// SH bands of the transfers that the certificate covers, independent of the field's bands. It also holds for fewer
+/// bands, whose matrix is a principal submatrix with eigenvalues between this one's (Cauchy interlacing), but not for
+/// more.
 pub const TRANSFER_BANDS: usize = 4;
 
-/// Largest factor, computed from the stored, quantised numbers. It is at least 1, because a visibility of 1 changes nothing.
+/// Largest factor, computed from the stored, quantised numbers. It is at least 1, because a visibility of 1 changes
+/// nothing.
 pub fn growth(field: &ShadowField) -> f64 {
     let header = &field.header;
-    let (lattice, bands) = (header.lattice, header.bands);
+    let lattice = header.lattice;
+    let bands = header.bands;
     let tensor = Tensor::new(TRANSFER_BANDS, bands, TRANSFER_BANDS);
     let directions = lattice.stored_direction_count();
     // Border samples of a cube's face are copies of other faces' samples, except corners, which are means.
@@ -56,9 +60,9 @@ pub fn growth(field: &ShadowField) -> f64 {
 /// One in so many samples gives a first bound.
 const SOME: usize = 32;
 
-/// Whether no eigenvalue of I - u M, for any u from 0 to `most`, is larger in magnitude than a bound of at least 1: whether
-/// (bound - 1) / most + M and (bound + 1) / most - M are positive definite. The margin is far above rounding, and where it decides, the
-/// answer is no.
+/// Whether no eigenvalue of I - u M, for any u from 0 to `most`, is larger in magnitude than a bound of at least 1:
+/// whether (bound - 1) / most + M and (bound + 1) / most - M are positive definite. The margin is far above rounding,
+/// and where it decides, the answer is no.
 fn is_within(matrix: &[f64], most: f64, bound: f64) -> bool {
     let bound = bound * (1.0 - 1e-9);
     let n = matrix.len().isqrt();
@@ -95,7 +99,7 @@ fn neighbouring(lattice: &Lattice, shell: u32) -> impl Iterator<Item = f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{FieldHeader, FieldKind, Lookup, Storage};
+    use crate::field::{FieldHeader, FieldKind, Storage};
     use crate::sh::basis::MAX_COEFFICIENTS;
     use crate::sh::lobe;
     use glam::DVec3;
@@ -127,11 +131,9 @@ mod tests {
             storage: Storage::F32,
             lattice,
             face_px: 64,
-            shortcuts: Default::default(),
             level_texels: 0.0,
             filled_samples: 0,
             captured_samples: 0,
-            symmetry: String::new(),
             growth: 0.0,
             centre_m: [0.0; 3],
             radius_m: 1.0,
@@ -150,7 +152,8 @@ mod tests {
         let mut within = 0;
         for _ in 0..500 {
             let coefficients: Vec<f64> = (0..16).map(|k| (rng.f64() - 0.5) / f64::from(1 + k)).collect();
-            let (matrix, most) = (tensor.matrix(&coefficients), 0.3 + rng.f64());
+            let matrix = tensor.matrix(&coefficients);
+            let most = 0.3 + rng.f64();
             let norm = |u: f64| eigenvalues(&matrix).iter().map(|l| (1.0 - u * l).abs()).fold(0.0, f64::max);
             let bound = 1.0 + 0.5 * rng.f64();
             let expected = norm(most) < bound && norm(0.5 * most) < bound;
@@ -174,15 +177,15 @@ mod tests {
             let unit = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5).normalize();
             let distance = 1.0 + 9.0 * rng.f64() * rng.f64();
             let mut blocked = [0.0; MAX_COEFFICIENTS];
-            field.lookup(unit * distance, Lookup::Trilinear, 0, &mut blocked[..16]);
+            field.lookup(unit * distance, 0, &mut blocked[..16]);
             let values = eigenvalues(&tensor.matrix(&blocked[..16]));
             worst = values.iter().map(|lambda| (1.0 - lambda).abs()).fold(worst, f64::max);
         }
         assert!(worst <= bound + 1e-12 && worst > 1.02, "{worst} of {bound}");
     }
 
-    /// Seven bands of a factor between 0 and 1 give four bands of transfer eigenvalues in [0, 1]; what is left is that u of the
-    /// neighbouring shells is not the sample's own.
+    /// Seven bands of a factor between 0 and 1 give four bands of transfer eigenvalues in [0, 1]; what is left is that
+    /// u of the neighbouring shells is not the sample's own.
     #[test]
     fn more_stored_bands_grow_less() {
         let lattice = "cube:24x2,inner=1.3".parse().expect("a lattice");

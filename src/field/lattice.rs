@@ -1,10 +1,10 @@
 //! Where a field is sampled around its object, and which samples a receiver interpolates.
 //!
-//! Distances are in units of the bounding-sphere radius r, and directions are in the object's frame. Both are taken in the space
-//! that [`Fit`] makes of that frame. A lattice is a product of shells (radii) and directions. Interpolation runs over a *stored*
-//! arrangement in which every cube face has a border of one cell, copied from its neighbours. A corner cell is the mean of the
-//! three cells that meet there. With the border, bilinear interpolation needs no branch and is continuous across face edges, since
-//! both faces see the same two rows of cells there.
+//! Distances are in units of the bounding-sphere radius r, and directions are in the object's frame. Both are taken in
+//! the space that [`Fit`] makes of that frame. A lattice is a product of shells (radii) and directions. Interpolation
+//! runs over a *stored* arrangement in which every cube face has a border of one cell, copied from its neighbours. A
+//! corner cell is the mean of the three cells that meet there. With the border, bilinear interpolation needs no branch
+//! and is continuous across face edges, since both faces see the same two rows of cells there.
 
 use super::Fit;
 pub use super::directions::{CELL_WARP, Directions, unwarp, warp};
@@ -21,8 +21,9 @@ pub const MAX_SAMPLES: u64 = 4_000_000;
 #[serde(rename_all = "lowercase")]
 pub enum Spacing {
     /// q = sin(theta / 2), where theta is the half-angle under which the bounding sphere is seen: cos theta = c(d) of
-    /// [`cap_cosine`], taken at [`Lattice::reach`]. The steps of half-angle are nearly equal, and shells are dense around d = 1,
-    /// where the blocked part varies fastest. A shader needs two square roots for it. b / (1 - c) is stored.
+    /// [`cap_cosine`], taken at [`Lattice::reach`]. The steps of half-angle are nearly equal, and shells are dense
+    /// around d = 1, where the blocked part varies fastest. A shader needs two square roots for it. b / (1 - c) is
+    /// stored.
     Chord,
     /// d itself, as in the paper of Zhou et al. (2005). b is stored.
     Linear,
@@ -36,9 +37,9 @@ pub fn cap_cosine(d: f64) -> f64 {
 
 /// 1 - c(d), which is proportional to the solid angle of the bounding sphere. The formula does not cancel far away.
 ///
-/// The blocked part of a sphere has the zonal coefficients of a cap: sqrt(pi) (1 - c) in band 0, and
-/// sqrt(pi / (2l + 1)) (P_l-1(c) - P_l+1(c)) in band l, with Legendre polynomials P. The bracket has degree l + 1 and is 0 at
-/// c = 1, so band l divided by 1 - c is a polynomial of degree l in c. Such a polynomial interpolates well.
+/// The blocked part of a sphere has the zonal coefficients of a cap: sqrt(pi) (1 - c) in band 0, and sqrt(pi / (2l +
+/// 1)) (P_l-1(c) - P_l+1(c)) in band l, with Legendre polynomials P. The bracket has degree l + 1 and is 0 at c = 1, so
+/// band l divided by 1 - c is a polynomial of degree l in c. Such a polynomial interpolates well.
 pub fn cap_height(d: f64) -> f64 {
     let c = cap_cosine(d);
     if d >= 1.0 { d.powi(-2) / (1.0 + c) } else { 1.0 - c }
@@ -53,26 +54,24 @@ pub struct Lattice {
     pub inner: f64,
     /// Radius of the outermost shell, in r. Beyond it the field falls off as (outer/d)^2.
     pub outer: f64,
-    /// Spacing of shells.
     pub spacing: Spacing,
-    /// Directions of every shell.
     pub directions: Directions,
-    /// Whether b / (1 - c) is what is stored and interpolated rather than b itself: [`cap_height`] at [`Lattice::reach`]. The spacing
-    /// decides it; files and names in the cache hold both.
+    /// Whether b / (1 - c) is what is stored and interpolated rather than b itself: [`cap_height`] at
+    /// [`Lattice::reach`]. The spacing decides it; files and names in the cache hold both.
     pub scaled: bool,
     /// Where the lattice lies around the object. `None` leaves that to the bake and counts as round until then.
     pub fit: Option<Fit>,
-    /// Whether the samples of a cube's faces reach their edges. If so, each row of a face has cells + 2 samples, and the first and
-    /// last lie on edges and are shared with the neighbours. If not, each row has `cells` samples at the cells' centres, between
-    /// copies of the neighbours' samples. Both take the same bytes; the first has finer steps. `None` leaves that to the bake and
-    /// counts as centres until then.
+    /// Whether the samples of a cube's faces reach their edges. If so, each row of a face has cells + 2 samples, and
+    /// the first and last lie on edges and are shared with the neighbours. If not, each row has `cells` samples at the
+    /// cells' centres, between copies of the neighbours' samples. Both take the same bytes; the first has finer steps.
+    /// `None` leaves that to the bake and counts as centres until then.
     #[serde(default)]
     pub edges: Option<bool>,
 }
 
 impl Default for Lattice {
-    /// 18 shells to 8 r in equal steps of sin(half-angle / 2), 6 x 7 x 7 cells of directions, and b / (1 - c) is interpolated. The
-    /// object's shape decides the fit, the first shell, and whether samples lie on the faces' edges.
+    /// 18 shells to 8 r in equal steps of sin(half-angle / 2), 6 x 7 x 7 cells of directions, and b / (1 - c) is
+    /// interpolated. The object's shape decides the fit, the first shell, and whether samples lie on the faces' edges.
     fn default() -> Self {
         Lattice {
             shells: 18,
@@ -99,21 +98,7 @@ pub const ROOMY_INNER: f64 = 0.25;
 pub struct Corners {
     /// Stored indices.
     pub index: [u32; 8],
-    /// Weights.
     pub weight: [f64; 8],
-}
-
-/// Which samples a lookup takes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Lookup {
-    /// The one nearest sample.
-    Nearest,
-    /// The nearest direction, linear between two shells.
-    Radial,
-    /// Bilinear in direction, linear between shells.
-    #[default]
-    Trilinear,
 }
 
 impl Spacing {
@@ -142,7 +127,8 @@ impl Lattice {
         if self.shells == 1 {
             return (0.0, 0.0);
         }
-        let (from, to) = (self.coordinate(self.inner), self.coordinate(self.outer));
+        let from = self.coordinate(self.inner);
+        let to = self.coordinate(self.outer);
         let slope = f64::from(self.shells - 1) / (to - from);
         (slope, -slope * from)
     }
@@ -160,9 +146,9 @@ impl Lattice {
         }
     }
 
-    /// What is added to squared distances before [`cap_cosine`] is taken: 1 - inner^2, or 0 where the first shell lies outside the
-    /// sphere. It makes the cosine 0 on the first shell of an object with room in its sphere. The cosine itself has a kink at
-    /// d = 1, where the field of such an object has none.
+    /// What is added to squared distances before [`cap_cosine`] is taken: 1 - inner^2, or 0 where the first shell lies
+    /// outside the sphere. It makes the cosine 0 on the first shell of an object with room in its sphere. The cosine
+    /// itself has a kink at d = 1, where the field of such an object has none.
     fn room(&self) -> f64 {
         (1.0 - self.inner * self.inner).max(0.0)
     }
@@ -185,8 +171,9 @@ impl Lattice {
         self
     }
 
-    /// This lattice around an object. A fit and a first shell that were chosen before stay. Otherwise the lattice takes the given fit,
-    /// and the first shell that `first` finds for the fit in force. A lattice with a first shell but no fit is round.
+    /// This lattice around an object. A fit and a first shell that were chosen before stay. Otherwise the lattice takes
+    /// the given fit, and the first shell that `first` finds for the fit in force. A lattice with a first shell but no
+    /// fit is round.
     pub fn fitted(mut self, fit: Fit, first: impl FnOnce(&Fit) -> f64) -> Self {
         let fit = *self.fit.get_or_insert(if self.inner == AUTOMATIC { fit } else { Fit::ROUND });
         if self.inner == AUTOMATIC {
@@ -200,14 +187,15 @@ impl Lattice {
         self.fit.unwrap_or(Fit::ROUND)
     }
 
-    /// The lattice as a shader reads it: [`Fit::packed`], where the bit above the factors says whether samples lie on edges.
+    /// The lattice as a shader reads it: [`Fit::packed`], where the bit above the factors says whether samples lie on
+    /// edges.
     pub fn packed(&self) -> [f32; 4] {
         let [x, y, z, factors] = self.fit().packed();
         [x, y, z, factors + if self.has_edges() { (1_u32 << FIT_BITS) as f32 } else { 0.0 }]
     }
 
-    /// Distance of a place (object's frame, in r) from the shells' centre, in the lattice's space. All distances of this module are
-    /// of this kind.
+    /// Distance of a place (object's frame, in r) from the shells' centre, in the lattice's space. All distances of
+    /// this module are of this kind.
     pub fn distance(&self, position: DVec3) -> f64 {
         self.fit().apply(position).length()
     }
@@ -217,15 +205,14 @@ impl Lattice {
         if self.scaled { 1.0 / cap_height(self.reach(d)) } else { 1.0 }
     }
 
-    /// Factor by which an interpolated value is multiplied at distance d to give the blocked part. Inside the first shell
-    /// the first shell holds, beyond the last the value falls off as (outer / d)^2.
+    /// Factor by which an interpolated value is multiplied at distance d to give the blocked part. Inside the first
+    /// shell the first shell holds, beyond the last the value falls off as (outer / d)^2.
     pub fn unscale(&self, d: f64) -> f64 {
         let near = d.clamp(self.inner, self.outer);
         let within = if self.scaled { cap_height(self.reach(near)) } else { 1.0 };
         within * (self.outer / d.max(self.outer)).powi(2)
     }
 
-    /// Samples that are captured.
     pub fn sample_count(&self) -> u32 {
         self.shells * self.direction_count()
     }
@@ -235,31 +222,30 @@ impl Lattice {
         self.shells * self.stored_direction_count()
     }
 
-    /// Position of the `index`-th captured sample, in r from the sphere's centre, object's frame; shells come one after another,
-    /// innermost first.
+    /// Position of the `index`-th captured sample, in r from the sphere's centre, object's frame; shells come one after
+    /// another, innermost first.
     pub fn position(&self, index: u32) -> DVec3 {
         let at = self.shell(index / self.direction_count()) * self.direction(index % self.direction_count());
         self.fit().invert(at)
     }
 
-    /// Stored samples around a receiver at `position` (in r, object's frame). The weights are at least 0 and sum to 1. A
-    /// receiver at the very centre takes direction +x.
-    pub fn corners(&self, position: DVec3, lookup: Lookup) -> Corners {
+    /// Stored samples around a receiver at `position` (in r, object's frame). The weights are at least 0 and sum to 1.
+    /// A receiver at the very centre takes direction +x.
+    pub fn corners(&self, position: DVec3) -> Corners {
         let within = self.fit().apply(position);
         let d = within.length();
         let direction = if d > 0.0 { within / d } else { DVec3::X };
         let (slope, offset) = self.radial_map();
         let last = f64::from(self.shells - 1);
-        let mut t = (slope * self.coordinate(d.max(self.inner)) + offset).clamp(0.0, last);
-        if lookup == Lookup::Nearest {
-            t = t.round();
-        }
+        let t = (slope * self.coordinate(d.max(self.inner)) + offset).clamp(0.0, last);
         let shell = t.floor();
         let radial = t - shell;
-        let plane = self.plane(direction, lookup);
+        let plane = self.plane(direction);
         let mut corners = Corners { index: [0; 8], weight: [0.0; 8] };
         for k in 0..8 {
-            let (x, y, z) = (k & 1, (k >> 1) & 1, k >> 2);
+            let x = k & 1;
+            let y = (k >> 1) & 1;
+            let z = k >> 2;
             // The shell beyond the last one weighs nothing.
             let base = (shell as u32 + z as u32).min(self.shells - 1) * self.stored_direction_count();
             let side = |fraction: f64, upper: usize| if upper == 1 { fraction } else { 1.0 - fraction };
@@ -270,10 +256,6 @@ impl Lattice {
     }
 
     /// Checks counts and radii, and that what is stored goes with the spacing.
-    ///
-    /// # Errors
-    /// `Input` when a count is 0, radii are not increasing and finite, the samples are more than [`MAX_SAMPLES`], or what is stored is the
-    /// other spacing's.
     pub fn validate(&self) -> Result<()> {
         let bad = |what: String| Err(Error::Input(format!("lattice {self}: {what}")));
         let directions = match self.directions {

@@ -9,7 +9,6 @@ pub mod growth;
 pub mod lattice;
 pub mod quantity;
 pub mod self_visibility;
-pub mod shortcuts;
 pub mod silhouette;
 pub mod silhouette_header;
 pub mod silhouette_nodes;
@@ -18,9 +17,8 @@ mod text;
 
 pub use area::Area;
 pub use fit::Fit;
-pub use lattice::{Lattice, Lookup};
+pub use lattice::Lattice;
 pub use quantity::{FieldKind, Storage};
-pub use shortcuts::Shortcuts;
 
 use crate::error::{Error, Result};
 use crate::sh::basis::coefficient_count;
@@ -28,10 +26,8 @@ use glam::DVec3;
 use half::f16;
 use serde::{Deserialize, Serialize};
 
-/// All parameters of a field.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FieldHeader {
-    /// What the field holds.
     pub kind: FieldKind,
     /// SH bands; bands^2 coefficients a channel.
     pub bands: usize,
@@ -41,27 +37,23 @@ pub struct FieldHeader {
     pub lattice: Lattice,
     /// Edge of the captured cube faces in texels.
     pub face_px: u32,
-    /// What the bake did in place of capturing everything; left out of files where all shortcuts were taken.
-    #[serde(default, skip_serializing_if = "Shortcuts::are_default")]
-    pub shortcuts: Shortcuts,
-    /// Share of a texel by which what was captured may miss the mesh, since fewer and larger triangles stood for what was far off; 0
-    /// where all triangles were drawn.
+    /// Share of a texel by which what was captured may miss the mesh, since fewer and larger triangles stood for what
+    /// was far off; 0 where all triangles were drawn.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub level_texels: f64,
     /// Number of sample points inside the solid. They hold captures from just outside the nearest surface.
     pub filled_samples: u32,
-    /// Number of captured samples; the others follow from these by the mesh's symmetries or from neighbours.
+    /// Number of captured samples; the others lie at the same places, or see nothing and follow from their neighbours.
     pub captured_samples: u32,
-    /// The symmetries that the bake found, in words.
-    pub symmetry: String,
-    /// Occlusion fields: largest factor by which one product lengthens a transfer vector (see [`growth`]), from the stored
-    /// numbers. It is 0 before the bake, and in radiance fields, which are not multiplied.
+    /// Occlusion fields: largest factor by which one product lengthens a transfer vector (see [`growth`]), from the
+    /// stored numbers. It is 0 before the bake, and in radiance fields, which are not multiplied.
     pub growth: f64,
     /// Centre of the bounding sphere in the mesh's own frame, metres.
     pub centre_m: [f32; 3],
     /// Radius of the bounding sphere, metres.
     pub radius_m: f32,
-    /// Radiance fields: factor on the stored coefficients, so that f16 can represent any brightness. Occlusion fields: 1.
+    /// Radiance fields: factor on the stored coefficients, so that f16 can represent any brightness. Occlusion fields:
+    /// 1.
     pub radiance_scale: f32,
     /// Name of the mesh, for messages.
     pub mesh: String,
@@ -85,15 +77,11 @@ impl FieldHeader {
         self.kind.channels() * self.channel_stride()
     }
 
-    /// Bytes of the payload.
     pub fn payload_bytes(&self) -> u64 {
         u64::from(self.lattice.stored_count()) * (self.sample_stride() * self.storage.bytes()) as u64
     }
 
     /// Checks every number against its range.
-    ///
-    /// # Errors
-    /// `Input` naming the number.
     pub fn validate(&self) -> Result<()> {
         self.lattice.validate()?;
         let bad = |what: String| Err(Error::Input(what));
@@ -115,15 +103,15 @@ impl FieldHeader {
 /// A field in host memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShadowField {
-    /// Parameters.
     pub header: FieldHeader,
-    /// Stored coefficients, little-endian: samples in stored order, channels within a sample, coefficients within a channel.
+    /// Stored coefficients, little-endian: samples in stored order, channels within a sample, coefficients within a
+    /// channel.
     pub payload: Vec<u8>,
 }
 
 impl ShadowField {
-    /// Stored coefficient by stored sample, channel and coefficient, in the field's unit (blocked part or radiance), still
-    /// multiplied by [`Lattice::scale`].
+    /// Stored coefficient by stored sample, channel and coefficient, in the field's unit (blocked part or radiance),
+    /// still multiplied by [`Lattice::scale`].
     pub fn stored(&self, sample: u32, channel: usize, coefficient: usize) -> f64 {
         let header = &self.header;
         let at = sample as usize * header.sample_stride() + channel * header.channel_stride() + coefficient;
@@ -150,11 +138,11 @@ impl ShadowField {
         ShadowField { header: FieldHeader { storage: Storage::F32, ..self.header.clone() }, payload }
     }
 
-    /// The field at `position` (object's frame, in r from the sphere's centre): coefficients of one channel. The twin of
-    /// `glsl/field.glsl`.
-    pub fn lookup(&self, position: DVec3, lookup: Lookup, channel: usize, out: &mut [f64]) {
+    /// The field at `position` (object's frame, in r from the sphere's centre): coefficients of one channel. The twin
+    /// of `glsl/field.glsl`.
+    pub fn lookup(&self, position: DVec3, channel: usize, out: &mut [f64]) {
         let lattice = &self.header.lattice;
-        let corners = lattice.corners(position, lookup);
+        let corners = lattice.corners(position);
         let unscale = lattice.unscale(lattice.distance(position));
         for (coefficient, value) in out.iter_mut().enumerate().take(coefficient_count(self.header.bands)) {
             *value = (0..8)

@@ -1,31 +1,32 @@
 //! Self-visibility: what a mesh blocks of its own vertices' view, for lights too small for four SH bands.
 //!
-//! Every vertex has a map of [`SIDE`] x [`SIDE`] nodes over the hemisphere about its normal, two bytes each. One is the angle from the
-//! node's direction to the nearest edge of what the vertex sees past its own mesh, positive where that direction is free. The other is
-//! how far away the mesh is there, or at that edge where the direction is free: what lies beyond a light leaves it free. A lookup
-//! is bilinear, and the edge counts as straight over a small light ([`blocked_share`]).
+//! Every vertex has a map of [`SIDE`] x [`SIDE`] nodes over the hemisphere about its normal, two bytes each. One is the
+//! angle from the node's direction to the nearest edge of what the vertex sees past its own mesh, positive where that
+//! direction is free. The other is how far away the mesh is there, or at that edge where the direction is free: what
+//! lies beyond a light leaves it free. A lookup is bilinear, and the edge counts as straight over a small light
+//! ([`blocked_share`]).
 //!
-//! A direction's place on the map is that of the octahedron |x| + |y| + z = 1, unfolded to a square and enlarged by 1 / [`RIM`]. Light
-//! that comes from lower than the square's rim, 12 to 17 degrees above the horizon, reads the rim: the cosine makes it small, and
-//! the nodes serve better higher up.
+//! A direction's place on the map is that of the octahedron |x| + |y| + z = 1, unfolded to a square and enlarged by 1 /
+//! [`RIM`]. Light that comes from lower than the square's rim, 12 to 17 degrees above the horizon, reads the rim: the
+//! cosine makes it small, and the nodes serve better higher up.
 //!
-//! Direct light of the teapot's vertices by faces of 64 px is wrong by 0.059 under lights of 1 degree and by 0.022 under lights of 30
-//! degrees: root mean square against rays, over that of the unoccluded light (`tests/self_visibility.rs`). SH transfer of 4 bands gives
-//! 0.143 and 0.040. A rim on the horizon, or an equal-area square, gives larger errors. Most of what is left comes from 8 nodes a side.
+//! Direct light of the teapot's vertices by faces of 64 px is wrong by 0.059 under lights of 1 degree and by 0.022
+//! under lights of 30 degrees: root mean square against rays, over that of the unoccluded light
+//! (`tests/self_visibility.rs`). SH transfer of 4 bands gives 0.143 and 0.040. A rim on the horizon, or an equal-area
+//! square, gives larger errors. Most of what is left comes from 8 nodes a side.
 
 use super::silhouette::{blocked_share, decode, encode};
 use glam::{DMat3, DVec2, DVec3};
 
 /// Nodes along an edge of a map.
 pub const SIDE: usize = 8;
-/// Nodes of a map.
 pub const NODES: usize = SIDE * SIDE;
 /// Bytes of a map: the angles of all nodes, row by row, and then the distances.
 pub const BYTES: usize = 2 * NODES;
 /// Steps of a distance's byte to r: 250 of them reach across the mesh.
 pub const DISTANCE_STEPS: f64 = 125.0;
-/// How much nearer than a light, in r, the mesh has to be to block it whole; where it is as much farther it leaves the light free. Several
-/// steps of a distance's byte, and less than what a mesh leaves between a lamp and itself.
+/// How much nearer than a light, in r, the mesh has to be to block it whole; where it is as much farther it leaves the
+/// light free. Several steps of a distance's byte, and less than what a mesh leaves between a lamp and itself.
 pub const RAMP: f64 = 0.05;
 /// Cells of a map: the squares between four nodes.
 pub const CELLS: usize = (SIDE - 1) * (SIDE - 1);
@@ -38,8 +39,8 @@ const RADIUS_MINIMUM_RAD: f64 = 1e-6;
 
 /// The axes of a vertex's hemisphere in the object's frame, as columns: tangent, bitangent, and the normal itself.
 ///
-/// Duff, Burgess, Christensen, Hery, Kensler, Liani, Villemin, *Building an Orthonormal Basis, Revisited*, JCGT 6(1), 2017. The axes
-/// jump where the normal's z changes its sign, so a lookup needs the very normal that the bake had.
+/// Duff, Burgess, Christensen, Hery, Kensler, Liani, Villemin, *Building an Orthonormal Basis, Revisited*, JCGT 6(1),
+/// 2017. The axes jump where the normal's z changes its sign, so a lookup needs the very normal that the bake had.
 pub fn frame(normal: DVec3) -> DMat3 {
     let sign = if normal.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + normal.z);
@@ -48,8 +49,8 @@ pub fn frame(normal: DVec3) -> DMat3 {
     DMat3::from_cols(tangent, DVec3::new(b, sign + normal.y * normal.y * a, -normal.y), normal)
 }
 
-/// Place of a direction (any length but 0; z along the normal) on the map: nodes lie at whole numbers from 0 to SIDE - 1, which the
-/// place never leaves.
+/// Place of a direction (any length but 0; z along the normal) on the map: nodes lie at whole numbers from 0 to SIDE -
+/// 1, which the place never leaves.
 pub fn place(local: DVec3) -> DVec2 {
     let up = local.z.max(0.0);
     let flat = local.truncate() / (local.x.abs() + local.y.abs() + up).max(1e-20);
@@ -75,8 +76,8 @@ pub fn decode_angle(byte: u8) -> f64 {
     decode(byte, LIMIT_RAD)
 }
 
-/// What a map of [`BYTES`] holds at a direction (z along the normal): the signed angle in radians to the edge of what the vertex sees, and
-/// how far away the mesh is, in r.
+/// What a map of [`BYTES`] holds at a direction (z along the normal): the signed angle in radians to the edge of what
+/// the vertex sees, and how far away the mesh is, in r.
 pub fn lookup(map: &[u8], local: DVec3) -> [f64; 2] {
     let place = place(local);
     let cell = place.floor().min(DVec2::splat((SIDE - 2) as f64));
@@ -87,17 +88,18 @@ pub fn lookup(map: &[u8], local: DVec3) -> [f64; 2] {
     (row(0) * (1.0 - within.y) + row(1) * within.y).to_array()
 }
 
-/// Share of a round light that the mesh itself leaves free: 0 to 1. `map` has the vertex's [`BYTES`]; its normal and the light's
-/// direction are in the object's frame, the normal as the mesh has it. The light's radius spans `radius_rad`; it should be small, or
-/// one part of a light ([`super::sub_light`]). It is `distance` away, in r. What the horizon leaves of it is the cosine's affair.
+/// Share of a round light that the mesh itself leaves free: 0 to 1. `map` has the vertex's [`BYTES`]; its normal and
+/// the light's direction are in the object's frame, the normal as the mesh has it. The light's radius spans
+/// `radius_rad`; it should be small, or one part of a light ([`super::sub_light`]). It is `distance` away, in r. What
+/// the horizon leaves of it is the cosine's affair.
 pub fn visible(map: &[u8], normal: DVec3, direction: DVec3, radius_rad: f64, distance: f64) -> f64 {
     let [angle, away] = lookup(map, frame(normal).transpose() * direction);
     let blocks = ((distance - away) / (2.0 * RAMP) + 0.5).clamp(0.0, 1.0);
     1.0 - (1.0 - blocked_share(angle / radius_rad.max(RADIUS_MINIMUM_RAD))) * blocks
 }
 
-/// A map as `glsl/self_visibility.glsl` reads it: two words for each cell, row by row, with the angles and the distances of its corners
-/// (0, 0), (1, 0), (0, 1) and (1, 1), the first in the lowest bits. There is no padding.
+/// A map as `glsl/self_visibility.glsl` reads it: two words for each cell, row by row, with the angles and the
+/// distances of its corners (0, 0), (1, 0), (0, 1) and (1, 1), the first in the lowest bits. There is no padding.
 pub fn cells(map: &[u8]) -> [[u32; 2]; CELLS] {
     std::array::from_fn(|cell| {
         let first = cell / (SIDE - 1) * SIDE + cell % (SIDE - 1);

@@ -1,13 +1,15 @@
 //! Silhouette fields: what an object blocks along any ray that passes it, for lights too small for four SH bands.
 //!
-//! Outside an object, what a ray meets depends on the ray alone: on its direction and on its offset from the object's centre. So a
-//! silhouette field has no shells. It holds one map for each direction of a [`NodeGrid`]: the object's outline as parallel light of
-//! that direction sees it. A texel holds the signed distance to the outline, positive inside, and the depth of the outline's nearest
-//! point along the direction. Both are in units of the bounding radius r about the sphere's centre, as all lengths in this file.
+//! Outside an object, what a ray meets depends on the ray alone: on its direction and on its offset from the object's
+//! centre. So a silhouette field has no shells. It holds one map for each direction of a [`NodeGrid`]: the object's
+//! outline as parallel light of that direction sees it. A texel holds the signed distance to the outline, positive
+//! inside, and the depth of the outline's nearest point along the direction. Both are in units of the bounding radius r
+//! about the sphere's centre, as all lengths in this file.
 //!
-//! A lookup ([`SilhouetteField::outline`]) blends the four maps around a direction. Each sees an outline point that lies off the
-//! centre's plane at another place, so the depth is read first and the place corrected by it (parallax). How much of a small round
-//! light the outline leaves ([`blocked_share`]) follows from the distance and from how far away the outline's point is.
+//! A lookup ([`SilhouetteField::outline`]) blends the four maps around a direction. Each sees an outline point that
+//! lies off the centre's plane at another place, so the depth is read first and the place corrected by it (parallax).
+//! How much of a small round light the outline leaves ([`blocked_share`]) follows from the distance and from how far
+//! away the outline's point is.
 //!
 //! Within the bounding sphere a part of the object may lie behind the receiver, or beyond the light, and its outline
 //! hides that of the rest. So a mesh that is not convex has maps of its two halves besides ([`Side`]), at half the
@@ -34,12 +36,15 @@ pub const REACH: f64 = 0.5;
 pub const MARGIN: f64 = 0.08;
 /// Least distance of an outline from a receiver that a penumbra is computed for, in r.
 pub const NEAREST: f64 = 0.02;
-/// Distance from the centre, in r, of a receiver or a light up to which halves count, and from which only the whole does.
+/// Distance from the centre, in r, of a receiver or a light up to which halves count, and from which only the whole
+/// does.
 pub const INSIDE: [f64; 2] = [0.9, 1.05];
-/// How deep in the object a receiver or a light lies, along the ray from the centre's plane towards its own end and in r, up to which only
-/// the whole counts, and from which halves do. Nearer to the rim almost all of the object lies between the two.
+/// How deep in the object a receiver or a light lies, along the ray from the centre's plane towards its own end and in
+/// r, up to which only the whole counts, and from which halves do. Nearer to the rim almost all of the object lies
+/// between the two.
 pub const DEEP: [f64; 2] = [-0.6, -0.2];
-/// Coordinate in r from which on a convex object reaches so far toward its bounding sphere that a box tells nothing more.
+/// Coordinate in r from which on a convex object reaches so far toward its bounding sphere that a box tells nothing
+/// more.
 pub const ROUND: f64 = 0.9;
 /// Half the edge of a box that tells nothing, in r.
 pub const NO_BOX: f64 = 1e30;
@@ -51,7 +56,8 @@ pub const LEAST_STEP: f64 = 1e-7;
 /// Least half-width of a penumbra, in r: it keeps a light of no size from dividing by nothing.
 pub const LEAST_PENUMBRA: f64 = 1e-9;
 
-/// Where a map lies: the plane through the sphere's centre at right angles to its direction, and a rectangle in that plane.
+/// Where a map lies: the plane through the sphere's centre at right angles to its direction, and a rectangle in that
+/// plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapFrame {
     /// Unit direction of the parallel light.
@@ -60,7 +66,6 @@ pub struct MapFrame {
     pub axes: [DVec3; 2],
     /// Centre of the rectangle along the axes.
     pub centre: DVec2,
-    /// Half its edges.
     pub half: DVec2,
 }
 
@@ -75,8 +80,8 @@ impl MapFrame {
         MapFrame { direction, axes, centre: stored((low + high) / 2.0), half: stored((high - low) / 2.0 + MARGIN) }
     }
 
-    /// Turns and mirrors of a cube move the axes of a direction onto those of the moved direction, but for their order and signs: unless
-    /// two of the direction's parts are equally small.
+    /// Turns and mirrors of a cube move the axes of a direction onto those of the moved direction, but for their order
+    /// and signs: unless two of the direction's parts are equally small.
     fn axes_of(direction: DVec3) -> [DVec3; 2] {
         let across = DVec3::AXES[direction.abs().min_position()];
         let across = (across - across.dot(direction) * direction).normalize();
@@ -141,7 +146,6 @@ impl NearMap {
 /// A silhouette field in host memory.
 #[derive(Clone, Debug)]
 pub struct SilhouetteField {
-    /// Parameters.
     pub header: SilhouetteHeader,
     nodes: NodeGrid,
     frames: Vec<MapFrame>,
@@ -159,15 +163,13 @@ pub fn decode(byte: u8, most: f64) -> f64 {
 }
 
 impl SilhouetteField {
-    /// A field from its stored bytes: maps in the order of [`NodeGrid::map_direction`], each a rectangle (centre x, y, half x, y as
-    /// little-endian f32) and then texels row by row, a signed byte of distance and one of depth.
-    ///
-    /// # Errors
-    /// `Input` when a number is out of range or the payload has another length.
+    /// A field from its stored bytes: maps in the order of [`NodeGrid::map_direction`], each a rectangle (centre x, y,
+    /// half x, y as little-endian f32) and then texels row by row, a signed byte of distance and one of depth.
     pub fn new(header: SilhouetteHeader, payload: Vec<u8>) -> Result<Self> {
         header.validate()?;
         if payload.len() != header.payload_bytes() {
-            let (claimed, found) = (header.payload_bytes(), payload.len());
+            let claimed = header.payload_bytes();
+            let found = payload.len();
             return Err(Error::Input(format!("the header claims {claimed} bytes of maps, {found} are there")));
         }
         let nodes = NodeGrid::new(header.cells);
@@ -175,7 +177,8 @@ impl SilhouetteField {
         for (index, map) in payload.chunks_exact(header.map_bytes()).enumerate() {
             let number =
                 |i: usize| f64::from(f32::from_le_bytes(map[4 * i..4 * i + 4].try_into().expect("four bytes")));
-            let (centre, half) = (DVec2::new(number(0), number(1)), DVec2::new(number(2), number(3)));
+            let centre = DVec2::new(number(0), number(1));
+            let half = DVec2::new(number(2), number(3));
             if !(centre.is_finite() && half.is_finite() && half.min_element() > 0.0 && half.max_element() < 4.0) {
                 return Err(Error::Input(format!("the rectangle of map {index} is not usable")));
             }
@@ -190,7 +193,6 @@ impl SilhouetteField {
         &self.payload
     }
 
-    /// Where each map lies.
     pub fn frames(&self) -> &[MapFrame] {
         &self.frames
     }
@@ -225,8 +227,9 @@ impl SilhouetteField {
         self.header.half_px > 0
     }
 
-    /// The cells of all maps and sides, row by row: the signed bytes of four neighbouring distances, and of their depths. The first byte
-    /// of each word is the corner nearest to the map's first texel, the second is its neighbour in the row.
+    /// The cells of all maps and sides, row by row: the signed bytes of four neighbouring distances, and of their
+    /// depths. The first byte of each word is the corner nearest to the map's first texel, the second is its neighbour
+    /// in the row.
     pub fn cells(&self) -> Vec<[u32; 2]> {
         let of_side = |map: usize, side: Side| {
             let px = self.header.edge_px(side);
@@ -249,17 +252,11 @@ impl SilhouetteField {
     }
 
     /// Writes the field to an `.sf` file.
-    ///
-    /// # Errors
-    /// As [`file::write()`].
     pub fn write(&self, path: &Path) -> Result<()> {
         file::write(path, SILHOUETTE_MAGIC, &self.header, &self.payload)
     }
 
     /// Reads an `.sf` file.
-    ///
-    /// # Errors
-    /// As [`file::read`] and [`SilhouetteField::new`].
     pub fn read(path: &Path) -> Result<Self> {
         let (header, payload) = file::read(path, SILHOUETTE_MAGIC)?;
         Self::new(header, payload).map_err(|error| Error::input(path, error))
@@ -271,14 +268,16 @@ impl SilhouetteField {
         [decode(texel[0], REACH), decode(texel[1], 1.0)]
     }
 
-    /// Distance and depth of a map at a point of the plane, between four texels. Beyond the middles of the outermost texels, the
-    /// distance there less the way to them.
+    /// Distance and depth of a map at a point of the plane, between four texels. Beyond the middles of the outermost
+    /// texels, the distance there less the way to them.
     fn sample(&self, map: usize, side: Side, place: DVec2) -> [f64; 2] {
         let px = self.header.edge_px(side);
         let beyond = (place + 1.0) / 2.0 * px as f64 - 0.5;
         let at = beyond.clamp(DVec2::ZERO, DVec2::splat((px - 1) as f64));
-        let (x, y) = ((at.x as usize).min(px - 2), (at.y as usize).min(px - 2));
-        let (u, v) = (at.x - x as f64, at.y - y as f64);
+        let x = (at.x as usize).min(px - 2);
+        let y = (at.y as usize).min(px - 2);
+        let u = at.x - x as f64;
+        let v = at.y - y as f64;
         let corner = |i, j| DVec2::from_array(self.texel(map, side, x + i, y + j));
         let low = corner(0, 0).lerp(corner(1, 0), u);
         let high = corner(0, 1).lerp(corner(1, 1), u);
@@ -308,7 +307,8 @@ impl SilhouetteField {
         near.sign * self.sample(near.map, near.side(side), near.foot)[1]
     }
 
-    /// The outline of one side of the object near the ray along the unit vector `direction`. Halves are those of a field that has them.
+    /// The outline of one side of the object near the ray along the unit vector `direction`. Halves are those of a
+    /// field that has them.
     pub fn outline(&self, near: &Near, side: Side, direction: DVec3) -> Outline {
         let along = near.point.dot(direction);
         let mut found = Outline { distance: 0.0, depth: 0.0 };
@@ -321,7 +321,8 @@ impl SilhouetteField {
         found
     }
 
-    /// Least and largest corner of the box around the object, in r: a boundless one where halves or the bounding sphere tell as much.
+    /// Least and largest corner of the box around the object, in r: a boundless one where halves or the bounding sphere
+    /// tell as much.
     pub fn extent(&self) -> [DVec3; 2] {
         let [low, high] = self.header.extent.map(|corner| DVec3::from_array(corner.map(f64::from)));
         let tells = !self.has_halves() && low.max(-high).max_element() > -ROUND;
@@ -343,8 +344,9 @@ impl SilhouetteField {
         if ends[0] > ends[1] { [-NO_BOX, NO_BOX] } else { ends }
     }
 
-    /// Share of a small round light that the object blocks, as seen from the point of `near`: the light's middle lies in that
-    /// unit direction, `distance` away (in r, infinite for distant light), and `tangent` is that of its angular radius.
+    /// Share of a small round light that the object blocks, as seen from the point of `near`: the light's middle lies
+    /// in that unit direction, `distance` away (in r, infinite for distant light), and `tangent` is that of its angular
+    /// radius.
     pub fn blocked(&self, near: &Near, direction: DVec3, distance: f64, tangent: f64) -> f64 {
         let along = near.point.dot(direction);
         // Share that an outline blocks, and how far it counts.
@@ -368,21 +370,23 @@ impl SilhouetteField {
     }
 }
 
-/// How far an outline counts that lies that far away (in r): one behind the receiver or beyond the limit blocks nothing. Its nearest point
-/// may lie off the ray, as of a wide thin slab below the receiver, and the object then stands where the ray passes its box.
+/// How far an outline counts that lies that far away (in r): one behind the receiver or beyond the limit blocks
+/// nothing. Its nearest point may lie off the ray, as of a wide thin slab below the receiver, and the object then
+/// stands where the ray passes its box.
 fn counts_between(away: f64, limit: f64, [enters, leaves]: [f64; 2]) -> f64 {
     let apart = leaves < TOUCHING || enters > limit - TOUCHING;
     let stands = away.max(enters).min(leaves);
     if apart { 0.0 } else { fade(stands) * fade(limit - stands) }
 }
 
-/// 1 where a length (in r) is positive and 0 where it is negative, with a ramp between that hides the depth's own steps.
+/// 1 where a length (in r) is positive and 0 where it is negative, with a ramp between that hides the depth's own
+/// steps.
 fn fade(length: f64) -> f64 {
     (length / NEAREST + 0.5).clamp(0.0, 1.0)
 }
 
-/// Area of a unit disc on one side of a straight edge, over pi: `x` is the signed distance of the disc's centre from the edge in
-/// radii, positive on the side that counts.
+/// Area of a unit disc on one side of a straight edge, over pi: `x` is the signed distance of the disc's centre from
+/// the edge in radii, positive on the side that counts.
 pub fn blocked_share(x: f64) -> f64 {
     let x = x.clamp(-1.0, 1.0);
     0.5 + (x * (1.0 - x * x).sqrt() + x.asin()) / PI

@@ -4,10 +4,10 @@ use super::silhouette_nodes::NodeGrid;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// The part of an object that a map shows. Halves meet in the plane through the sphere's centre at right angles to the map's direction.
+/// The part of an object that a map shows. Halves meet in the plane through the sphere's centre at right angles to the
+/// map's direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// All of it.
     Whole,
     /// What lies beyond the centre along the direction.
     Far,
@@ -50,14 +50,13 @@ pub struct SilhouetteHeader {
     pub map_px: u32,
     /// Pixels along an edge of the view that a map is reduced from, a multiple of `map_px`.
     pub view_px: u32,
-    /// Texels along an edge of the maps of the object's two halves: half of `map_px`, or 0 where a field has none, as of convex meshes.
+    /// Texels along an edge of the maps of the object's two halves: half of `map_px`, or 0 where a field has none, as
+    /// of convex meshes.
     #[serde(default, skip_serializing_if = "super::is_zero")]
     pub half_px: u32,
     /// Share of a view's pixel by which what was drawn may miss the mesh; 0 where all of its triangles were drawn.
     #[serde(default, skip_serializing_if = "super::is_zero")]
     pub level_pixels: f64,
-    /// Whether maps of a symmetric mesh were copied from those that a symmetry moves onto them.
-    pub symmetry: bool,
     /// Centre of the bounding sphere in the mesh's own frame, metres.
     pub centre_m: [f32; 3],
     /// Radius of the bounding sphere, metres.
@@ -101,15 +100,11 @@ impl SilhouetteHeader {
         }
     }
 
-    /// Bytes of all maps.
     pub fn payload_bytes(&self) -> usize {
         self.map_count() * self.map_bytes()
     }
 
     /// Checks every number against its range.
-    ///
-    /// # Errors
-    /// `Input` naming the number.
     pub fn validate(&self) -> Result<()> {
         let bad = |what: String| Err(Error::Input(what));
         if !(1..=64).contains(&self.cells) {

@@ -5,8 +5,8 @@ use crate::sh::cube::{FACE_COUNT, direction, face_basis, face_st};
 use glam::{DVec2, DVec3, IVec3, Vec2Swizzles};
 use std::collections::HashMap;
 
-/// Nodes at the corners of `cells` x `cells` cells of almost equal angles on every cube face, edges and corners shared. Opposite
-/// nodes see the same outline from its two sides, so they share a map.
+/// Nodes at the corners of `cells` x `cells` cells of almost equal angles on every cube face, edges and corners shared.
+/// Opposite nodes see the same outline from its two sides, so they share a map.
 #[derive(Clone, Debug)]
 pub struct NodeGrid {
     cells: u32,
@@ -37,10 +37,10 @@ pub struct Cell {
 
 /// How far beyond a cell its nodes are extrapolated, in cells.
 pub const BEYOND: f64 = 0.25;
-/// Distance from a cell's border, in cells, within which directions beside the cell's own count less and less, until on the border itself
-/// the weights are those of the cell's own direction: there the next cell has the same, so shadows have no step where the cell changes.
-/// Errors stay those of weights without easing (0.0121 and 0.0127 below a torus under 8 degrees); if directions never counted, they would
-/// be 0.0189.
+/// Distance from a cell's border, in cells, within which directions beside the cell's own count less and less, until on
+/// the border itself the weights are those of the cell's own direction: there the next cell has the same, so shadows
+/// have no step where the cell changes. Errors stay those of weights without easing (0.0121 and 0.0127 below a torus
+/// under 8 degrees); if directions never counted, they would be 0.0189.
 pub const EASED: f64 = 1.0 / 6.0;
 /// Least part of a direction along the face's own, against directions that leave the face's half of the sphere.
 pub const LEAST_AHEAD: f64 = 0.1;
@@ -75,7 +75,6 @@ impl NodeGrid {
         NodeGrid { cells, nodes, directions, known }
     }
 
-    /// Unit direction of a map.
     pub fn map_direction(&self, map: usize) -> DVec3 {
         self.directions[map]
     }
@@ -105,8 +104,9 @@ impl NodeGrid {
         Cell { face, low, middle, eased, nodes: [node(0, 0), node(1, 0), node(0, 1), node(1, 1)] }
     }
 
-    /// Bilinear weights of a cell's nodes for a direction near the one that the cell lies around. They add up to 1. Beyond the cell they
-    /// extrapolate as far as [`BEYOND`]. They are continuous in both directions, also where the cell changes ([`EASED`]).
+    /// Bilinear weights of a cell's nodes for a direction near the one that the cell lies around. They add up to 1.
+    /// Beyond the cell they extrapolate as far as [`BEYOND`]. They are continuous in both directions, also where the
+    /// cell changes ([`EASED`]).
     pub fn weights(&self, cell: &Cell, toward: DVec3) -> [f64; 4] {
         let (forward, right, down) = face_basis(cell.face);
         let ahead = toward.dot(forward).max(LEAST_AHEAD);
@@ -153,10 +153,13 @@ mod tests {
         let grid = NodeGrid::new(8);
         let mut rng = fastrand::Rng::with_seed(3);
         let mut random = || DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0)).normalize();
-        let (mut changed, mut faces, mut worst) = (0, 0, 0_f64);
+        let mut changed = 0;
+        let mut faces = 0;
+        let mut worst = 0_f64;
         for _ in 0..20_000 {
             // The border between two directions' cells, found by halving.
-            let (mut from, mut to) = (random(), random());
+            let mut from = random();
+            let mut to = random();
             to = (from + 0.1 * to).normalize();
             if grid.cell(from).nodes == grid.cell(to).nodes {
                 continue;

@@ -1,25 +1,25 @@
 //! A ball or a panel of light cut into small round lights, so that several occluders and wide lights come out right.
 //!
-//! One straight edge before a disc is exact only where the occluder's outline is straight over the whole light, and two occluders
-//! multiply only where each blocks its share of every part alike. Both get better as the parts get smaller. Parts come in blocks of
-//! four at the corners of a square around the block's middle, so that every block keeps its centre of mass. For one straight edge four
-//! such parts are as good as a middle and a ring of six: 0.012 of the light in the root mean square. A wide light is four blocks, each a
-//! light of half its radius at a corner of the same square. Where the horizon cuts a light, so it cuts
-//! each part. Parts of a panel lie on its own face ([`Pattern`]), and each is a round light of its part's solid angle.
+//! One straight edge before a disc is exact only where the occluder's outline is straight over the whole light, and two
+//! occluders multiply only where each blocks its share of every part alike. Both get better as the parts get smaller.
+//! Parts come in blocks of four at the corners of a square around the block's middle, so that every block keeps its
+//! centre of mass. For one straight edge four such parts are as good as a middle and a ring of six: 0.012 of the light
+//! in the root mean square. A wide light is four blocks, each a light of half its radius at a corner of the same
+//! square. Where the horizon cuts a light, so it cuts each part. Parts of a panel lie on its own face ([`Pattern`]),
+//! and each is a round light of its part's solid angle.
 
 use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::PI;
 
 /// Largest sine of a light's angular radius.
 pub const MOST_SINE: f64 = 0.9999;
-/// Parts of a block.
 pub const BLOCK: usize = 4;
 /// Sine of the angular radius up to which a light is one block: 12 degrees. Larger lights are four.
 pub const LIMIT_SINE: f64 = 0.207_911_690_817_759_34;
 /// A light whose sine lies this much above the limit has four blocks alone; between, one block and four by shares.
 pub const BLEND: f64 = 1.25;
-/// Distance of the corners of a square from its middle, on a disc of radius 1: with the square of a part's own radius over 2, four
-/// parts have the disc's mean square.
+/// Distance of the corners of a square from its middle, on a disc of radius 1: with the square of a part's own radius
+/// over 2, four parts have the disc's mean square.
 pub const CORNER: f64 = 0.612_372_435_695_794_5;
 
 /// Edges that differ by more than this factor make a rectangle a strip, whose parts lie in one row.
@@ -42,14 +42,6 @@ impl LampFace {
             LampFace::Rectangle(ratio) => DVec2::new(1.0, ratio) / ratio.hypot(1.0),
         }
     }
-
-    /// As shaders have it: less than 0 is a disc, more a rectangle.
-    pub fn packed(self) -> f32 {
-        match self {
-            LampFace::Disc(share) => -share as f32,
-            LampFace::Rectangle(ratio) => ratio as f32,
-        }
-    }
 }
 
 /// Corners of a square on a disc of radius 1.
@@ -59,9 +51,7 @@ pub const CORNERS: [DVec2; BLOCK] =
 /// Middles of four parts of a whole, and how much smaller than the whole they are along the way from one to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pattern {
-    /// Their places.
     pub places: [DVec2; BLOCK],
-    /// Their size.
     pub scale: f64,
 }
 
@@ -69,8 +59,8 @@ impl Pattern {
     /// The pattern of a disc of radius 1.
     pub const DISC: Pattern = Pattern { places: CORNERS, scale: 0.5 };
 
-    /// The pattern of a square with corners at (1, 1) and (-1, -1) that stands for a rectangle with these half edges: quarters, or four
-    /// parts in a row along an edge that is more than [`STRIP`] times the other.
+    /// The pattern of a square with corners at (1, 1) and (-1, -1) that stands for a rectangle with these half edges:
+    /// quarters, or four parts in a row along an edge that is more than [`STRIP`] times the other.
     pub fn rectangle(half: DVec2) -> Pattern {
         let row = |axis: DVec2| Pattern { places: [-0.75, -0.25, 0.25, 0.75].map(|x| x * axis), scale: 0.25 };
         if half.x > STRIP * half.y {
@@ -98,7 +88,6 @@ pub struct Block {
 }
 
 impl Block {
-    /// Places of its parts.
     pub fn places(&self, pattern: &Pattern) -> [DVec2; BLOCK] {
         pattern.places.map(|place| self.middle + self.scale * place)
     }
@@ -109,8 +98,8 @@ pub fn fine_share(sine: f64) -> f64 {
     ((sine / LIMIT_SINE - 1.0) / (BLEND - 1.0)).clamp(0.0, 1.0)
 }
 
-/// A direction that the squares of parts are turned by: at right angles to it and to the light stands their first axis. Only lights in
-/// this very direction or opposite to it have neighbours whose squares turn fast.
+/// A direction that the squares of parts are turned by: at right angles to it and to the light stands their first axis.
+/// Only lights in this very direction or opposite to it have neighbours whose squares turn fast.
 pub const TURNED_BY: [f64; 3] = [0.36, -0.48, 0.8];
 
 /// A light as seen from a point.
@@ -161,8 +150,8 @@ impl SeenLight {
         SeenLight { toward: to.normalize_or(DVec3::Y), distance, sine, fine: fine_share(sine), panel: None }
     }
 
-    /// The light with an outline of its own, which is always four blocks: four parts err by 0.07 of the light of a torus and by 0.10 of
-    /// a teapot's, sixteen by 0.02 and 0.04.
+    /// The light with an outline of its own, which is always four blocks: four parts err by 0.07 of the light of a
+    /// torus and by 0.10 of a teapot's, sixteen by 0.02 and 0.04.
     pub fn outlined(to: DVec3, radius: f64) -> Self {
         SeenLight { fine: 1.0, ..Self::new(to, radius) }
     }
@@ -210,8 +199,8 @@ impl SeenLight {
         self.tilt(place) * self.toward + self.sine * (place.x * across + place.y * down)
     }
 
-    /// On a disc at right angles to the light's middle a direction has the density 1 / tilt, so that the parts of a light above the
-    /// horizon send exactly pi sin^2 n.w.
+    /// On a disc at right angles to the light's middle a direction has the density 1 / tilt, so that the parts of a
+    /// light above the horizon send exactly pi sin^2 n.w.
     fn part_of_ball(&self, block: &Block, place: DVec2) -> LightPart {
         let tilt = self.tilt(place);
         LightPart {
@@ -227,10 +216,12 @@ impl SeenLight {
         self.distance * self.toward + place.x * panel.half[0] + place.y * panel.half[1]
     }
 
-    /// A part of a panel is a round light of the solid angle that a disc of its area has, which is below 2 pi however near it is.
+    /// A part of a panel is a round light of the solid angle that a disc of its area has, which is below 2 pi however
+    /// near it is.
     fn part_of_panel(&self, panel: &SeenPanel, block: &Block, place: DVec2) -> LightPart {
         let to = self.place_on(panel, place);
-        let (distance, toward) = (to.length(), to.normalize_or(self.toward));
+        let distance = to.length();
+        let toward = to.normalize_or(self.toward);
         let area = panel.area * block.area;
         let whole = area * (-panel.normal.dot(toward)).max(0.0) / (distance * distance + area / PI);
         LightPart { toward, distance, sine: (whole / PI).sqrt().min(MOST_SINE), weight: whole * block.weight }
@@ -243,8 +234,8 @@ impl LightPart {
         self.weight * self.cosine(normal)
     }
 
-    /// Mean over the part of the cosine to the normal, zero below the horizon; (c + s)^2 / 4 s where the horizon cuts the part, which
-    /// meets the cosine at both ends.
+    /// Mean over the part of the cosine to the normal, zero below the horizon; (c + s)^2 / 4 s where the horizon cuts
+    /// the part, which meets the cosine at both ends.
     pub fn cosine(&self, normal: DVec3) -> f64 {
         let cosine = normal.dot(self.toward);
         let cut = (cosine + self.sine).clamp(0.0, 2.0 * self.sine);
@@ -257,8 +248,8 @@ impl LightPart {
     }
 }
 
-/// The blocks of a light of which four blocks have that share; areas of their parts times weights add up to 1. While one number of parts
-/// fades into the other there are blocks of both, so that nothing jumps as a light comes nearer.
+/// The blocks of a light of which four blocks have that share; areas of their parts times weights add up to 1. While
+/// one number of parts fades into the other there are blocks of both, so that nothing jumps as a light comes nearer.
 pub fn blocks(fine: f64, pattern: &Pattern) -> Vec<Block> {
     let whole = Block { middle: DVec2::ZERO, scale: 1.0, area: 0.25, weight: 1.0 - fine };
     let quarters = pattern.places.map(|middle| Block { middle, scale: pattern.scale, area: 0.0625, weight: fine });
@@ -316,8 +307,8 @@ mod tests {
         }
     }
 
-    /// A rectangle below which a surface lies: Lambert's formula of a polygon, the sum over its edges of the angle they fill times the
-    /// cosine of their plane's normal to the surface's.
+    /// A rectangle below which a surface lies: Lambert's formula of a polygon, the sum over its edges of the angle they
+    /// fill times the cosine of their plane's normal to the surface's.
     fn polygon(corners: &[DVec3], normal: DVec3) -> f64 {
         let edges = corners.iter().zip(corners.iter().cycle().skip(1));
         edges.map(|(a, b)| a.angle_between(*b) * a.cross(*b).normalize().dot(normal)).sum::<f64>().abs() / 2.0
@@ -333,7 +324,8 @@ mod tests {
                 let light = SeenLight::panel(to, f64::hypot(x, z), panel, turned);
                 let corner = |(i, j): (f64, f64)| to + turned * DVec3::new(i * x, 0.0, j * z);
                 let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(corner);
-                let (found, exact) = (light.irradiance(DVec3::Y), polygon(&corners, DVec3::Y));
+                let found = light.irradiance(DVec3::Y);
+                let exact = polygon(&corners, DVec3::Y);
                 let error = found / exact - 1.0;
                 assert!(error.abs() < limit, "{x} x {z} at {to}: {found} {exact} {error}");
                 let behind = SeenLight::panel(to, f64::hypot(x, z), panel, DQuat::IDENTITY);
@@ -344,7 +336,8 @@ mod tests {
         for (distance, limit) in [(8.0, 1e-3), (2.0, 5e-3), (0.5, 0.03)] {
             let turned = DQuat::from_rotation_z(PI);
             let light = SeenLight::panel(distance * DVec3::Y, 0.5, LampFace::Disc(1.0), turned);
-            let (found, exact) = (light.irradiance(DVec3::Y), PI * 0.25 / (distance * distance + 0.25));
+            let found = light.irradiance(DVec3::Y);
+            let exact = PI * 0.25 / (distance * distance + 0.25);
             assert!((found / exact - 1.0).abs() < limit, "{distance}: {found} {exact}");
         }
     }

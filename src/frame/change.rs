@@ -9,8 +9,8 @@ use crate::scene::{Camera, Scene};
 use crate::sharp::{Sharp, SharpPermutation};
 
 impl Frame {
-    /// Whether the fields that `scene` needs are here, and the passes that its sharp lights need; it has the meshes and entities
-    /// that this frame was made for.
+    /// Whether the fields that `scene` needs are here, and the passes that its sharp lights need; it has the meshes and
+    /// entities that this frame was made for.
     pub fn covers(&self, scene: &Scene) -> bool {
         let methods = methods(scene, self.options.lights);
         let wanted = permutation::sharp(&self.options, &self.merge.permutation, &methods, scene, &self.buffers);
@@ -21,10 +21,8 @@ impl Frame {
         self.buffers.covers(scene, self.options.lights) && wanted.is_none_or(has)
     }
 
-    /// Takes over lights, switches, sky and camera of a scene that has the meshes and receivers that this frame was made for.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out, `Failed` when a shader does not compile.
+    /// Takes over lights, switches, sky and camera of a scene that has the meshes and receivers that this frame was
+    /// made for.
     ///
     /// # Panics
     /// When entities or receivers are others.
@@ -50,56 +48,23 @@ impl Frame {
         self.scene.data.camera = camera.clone();
     }
 
-    /// Draws at most so many triangles in one render pass from now on, see [`crate::draw::Draw::batch_triangles`]; at least one.
+    /// Draws at most so many triangles in one render pass from now on, see [`crate::draw::Draw::batch_triangles`]; at
+    /// least one.
     pub fn set_batch(&mut self, triangles: u32) {
         self.picture.draw.batch_triangles = triangles.max(1);
     }
 
     /// Merges by another variant from now on; `None` is the device's fastest.
-    ///
-    /// # Errors
-    /// `Failed` when its shader does not compile.
     pub fn set_variant(&mut self, variant: Option<Variant>) -> Result<()> {
         let variant = variant.unwrap_or_else(|| calibrate::best_known(&self.device));
         self.compile_merge(MergePermutation { variant, ..self.merge.permutation })
     }
 
-    /// Goes over to storage blocks where texel views cannot hold the clusters and lists that the next merge reads. Returns whether the
-    /// merge was compiled anew, which wants them to be prepared again: entities name their fields by other places than those of an image.
-    pub(super) fn fit_lists(&mut self) -> Result<bool> {
-        if self.work.fits_views(&self.device) {
-            return Ok(false);
-        }
-        if let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.texel) {
-            let permutation = SharpPermutation { texel: false, ..sharp.permutation };
-            *sharp = Sharp::new(&self.device, &self.library, permutation)?;
-        }
-        let MergePermutation { variant, .. } = self.merge.permutation;
-        let without_views = variant.restricted(false, false, false);
-        if variant.texel {
-            log::info!("the lists are too long for texel views; using \"{}\"", without_views.name);
-            self.compile_merge(MergePermutation { variant: without_views, ..self.merge.permutation })?;
-        }
-        Ok(variant.texel)
-    }
-
-    /// Has the pass of sharp lights mark the edges of shadows where pixels by now read the marks, and leave them out where none does. Where
-    /// they are new, every cluster is merged again.
-    pub(super) fn fit_edges(&mut self) -> Result<()> {
-        let edges = self.pixel.is_some() && self.options.evaluates_pixels();
-        let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.edges != edges) else { return Ok(()) };
-        *sharp = Sharp::new(&self.device, &self.library, SharpPermutation { edges, ..sharp.permutation })?;
-        if edges {
-            self.forget();
-        }
-        Ok(())
-    }
-
-    /// Compiles the merge for what is wanted, as far as the device allows it. If it was compiled for something else, every cluster is
-    /// merged again.
+    /// Compiles the merge for what is wanted, as far as the device allows it. If it was compiled for something else,
+    /// every cluster is merged again.
     fn compile_merge(&mut self, wanted: MergePermutation) -> Result<()> {
-        let usable = usable(&self.device, &self.buffers, self.scene.entities.len(), wanted)?;
-        if usable.0 != self.merge.permutation {
+        let usable = usable(&self.device, &self.buffers, self.scene.entities.len(), wanted);
+        if usable != self.merge.permutation {
             self.merge = CompiledMerge::new(&self.device, &self.library, usable)?;
             self.forget();
         }
@@ -107,11 +72,9 @@ impl Frame {
     }
 
     /// Builds anew what is made from any of the shader files named. What does not compile stays as it was.
-    ///
-    /// # Errors
-    /// `Failed` with the compiler's lines.
     pub fn reload(&mut self, changed: &[String]) -> Result<()> {
-        let uses = |entry: &str| self.library.files(entry).iter().any(|file| changed.contains(file));
+        let library = self.library.clone();
+        let uses = |entry: &str| library.files(entry).iter().any(|file| changed.contains(file));
         let drawing = [
             "draw.vert",
             "draw.frag",
@@ -122,12 +85,8 @@ impl Frame {
             "smooth.vert",
             "smooth.frag",
         ];
-        let [draws, gathers, merges] = [drawing.into_iter().any(uses), uses("gather.comp"), uses("merge.comp")];
-        if draws {
-            self.picture.draw = self.draw(&self.options, self.picture.draw.finish())?;
-        }
-        if gathers {
-            self.work.rebuild(&self.library, self.scene.entities.len())?;
+        if drawing.into_iter().any(uses) {
+            self.set_pictures(self.options, self.picture.draw.finish())?;
         }
         if uses("sharp.comp")
             && let Some(sharp) = &mut self.sharp
@@ -135,7 +94,7 @@ impl Frame {
             *sharp = Sharp::new(&self.device, &self.library, sharp.permutation)?;
             self.forget();
         }
-        if merges {
+        if uses("merge.comp") {
             self.merge.rebuild(&self.device, &self.library)?;
             self.forget();
         }

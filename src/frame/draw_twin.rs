@@ -33,26 +33,21 @@ impl Frame {
         self.picture.draw.samples()
     }
 
-    /// The picture that the radiosity on the device should give, rows from the top; `white` as in [`Frame::render`].
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    pub fn twin_picture(&self, placements: &[Placement], white: f32) -> Result<Vec<[f64; 3]>> {
+    /// The picture that the radiosity on the device should give, rows from the top, and how far each pixel may be off it;
+    /// `white` as in [`Frame::render`].
+    pub fn twin_picture(&self, placements: &[Placement], white: f32) -> Result<Vec<[DVec3; 2]>> {
         let [width, height] = self.options.size;
         let samples: &[DVec2] = if self.samples() > 1 { &FOUR } else { &ONE };
         let texels = self.twin_texels(placements, white, samples)?;
         if self.picture.draw.smooth.is_none() {
-            return Ok(texels.iter().map(|texel| texel.color.to_array()).collect());
+            return Ok(texels.iter().map(|texel| [texel.color, texel.spread]).collect());
         }
         let lines = self.outlines(placements, f64::from(width) / f64::from(height));
-        Ok(Smooth::twin(&texels, [width, height], &lines).iter().map(|color| color.to_array()).collect())
+        Ok(Smooth::twin(&texels, [width, height], &lines).iter().map(|color| [*color, DVec3::ZERO]).collect())
     }
 
-    /// The texels of that picture before outlines are smoothed, from samples at these places of a pixel, (0, 0) to (1, 1). Depth and tag
-    /// are those of the last sample.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// The texels of that picture before outlines are smoothed, from samples at these places of a pixel, (0, 0) to (1,
+    /// 1). Depth and tag are those of the last sample.
     pub fn twin_texels(&self, placements: &[Placement], white: f32, samples: &[DVec2]) -> Result<Vec<Texel>> {
         let [width, height] = self.options.size;
         let triangles = self.triangles(placements)?;
@@ -63,19 +58,38 @@ impl Frame {
             let clip =
                 |at: DVec2| DVec3::new(2.0 * at.x / f64::from(width) - 1.0, 2.0 * at.y / f64::from(height) - 1.0, 1.0);
             let near: Vec<&ScreenTriangle> = triangles.iter().filter(|t| t.may_touch(corner)).collect();
-            let mut texel = Texel { color: DVec3::ZERO, depth: 0.0, tag: 1.0 };
+            let mut texel = Texel { color: DVec3::ZERO, spread: DVec3::ZERO, depth: 0.0, tag: 1.0 };
             for sample in samples {
                 let at = clip(corner + *sample);
                 let seen = near.iter().filter_map(|t| Some((t.nearness(at)?, t)));
                 let color = match seen.max_by(|a, b| a.0.total_cmp(&b.0)) {
-                    // The shader runs once a pixel, at its centre, for all samples that a triangle covers.
+                    // The shader runs once a pixel for all samples that a triangle covers: at the pixel's centre where
+                    // these are all, else at any place within the triangle ("centroid" leaves it to the driver).
                     Some((nearness, triangle)) => {
                         (texel.depth, texel.tag) = (near_m * nearness, triangle.tag);
-                        let centre = clip(corner + DVec2::splat(0.5));
-                        // That of a grid looks there for the triangle too.
-                        let same = near.iter().filter(|t| triangle.grid.is_some() && t.grid == triangle.grid);
-                        let at_centre = same.max_by(|a, b| a.depth_within(centre).total_cmp(&b.depth_within(centre)));
-                        shown(at_centre.unwrap_or(triangle).at(centre), f64::from(white))
+                        // A grid is drawn as one parallelogram, and its shader looks for the triangle.
+                        let is_drawn = |t: &ScreenTriangle| match triangle.grid {
+                            Some(_) => t.grid == triangle.grid,
+                            None => std::ptr::eq(t, *triangle),
+                        };
+                        let drawn: Vec<&&ScreenTriangle> = near.iter().filter(|t| is_drawn(t)).collect();
+                        let is_covered = |at: &DVec3| drawn.iter().any(|t| t.nearness(*at).is_some());
+                        let covered: Vec<DVec3> =
+                            samples.iter().map(|s| clip(corner + *s)).filter(is_covered).collect();
+                        let shaded = |at: DVec3| {
+                            let nearest = drawn.iter().max_by(|a, b| a.depth_within(at).total_cmp(&b.depth_within(at)));
+                            shown(nearest.map_or(DVec3::ZERO, |t| t.at(at)), f64::from(white))
+                        };
+                        let whole = covered.len() == samples.len();
+                        let at = if whole { clip(corner + DVec2::splat(0.5)) } else { covered[0] };
+                        let color = shaded(at);
+                        // The two triangles that a grid is drawn as may share any of its pixels.
+                        if !whole || triangle.grid.is_some() {
+                            let off = |&at: &DVec3| (shaded(at) - color).abs();
+                            let farthest = covered.iter().map(off).fold(DVec3::ZERO, DVec3::max);
+                            texel.spread += farthest / samples.len() as f64;
+                        }
+                        color
                     }
                     None => {
                         (texel.depth, texel.tag) = (0.0, 1.0);
@@ -89,7 +103,6 @@ impl Frame {
         Ok((0..width * height).into_par_iter().map(shade).collect())
     }
 
-    /// Every triangle of the scene.
     fn triangles(&self, placements: &[Placement]) -> Result<Vec<ScreenTriangle>> {
         let [width, height] = self.options.size.map(f64::from);
         let clip_from_world = camera::clip_from_world(&self.scene.data.camera, width / height);

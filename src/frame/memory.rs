@@ -2,13 +2,11 @@
 
 use super::Frame;
 use super::pixel::PixelChains;
-use crate::gpu::Volume;
 use serde::Serialize;
 
 /// Bytes by use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Memory {
-    /// Fields.
     pub fields: u64,
     /// Silhouette fields and self-visibility, for sharp lights.
     pub silhouettes: u64,
@@ -46,7 +44,7 @@ impl Frame {
     /// Memory that the scene takes now. Meshes as they were read from their files are not counted.
     pub fn memory(&self) -> Memory {
         Memory {
-            fields: self.buffers.fields.size_bytes + self.merge.image.as_ref().map_or(0, Volume::size_bytes),
+            fields: self.buffers.fields.size_bytes,
             silhouettes: self.buffers.sharp().map(|buffer| buffer.size_bytes).iter().sum(),
             transfers: self.buffers.transfers.size_bytes,
             vertices: self.buffers.vertices.size_bytes,
@@ -55,7 +53,7 @@ impl Frame {
             lists: self.work.size_bytes()
                 + self.sky.coefficients.all_bytes()
                 + self.picture.lines.size_bytes()
-                + self.pixel.as_ref().map_or(0, PixelChains::size_bytes),
+                + self.chains.as_ref().map_or(0, PixelChains::size_bytes),
             pictures: self.picture.readback.size_bytes + self.picture.draw.size_bytes(),
             host_lists: self.work.lists.size_bytes(),
         }

@@ -1,9 +1,9 @@
-//! A scene on a device, lit and drawn again and again. [`record()`] is one frame from top to bottom: its passes in order, with all
-//! barriers between them. The other files prepare what those passes read.
+//! A scene on a device, lit and drawn again and again. [`record()`] is one frame from top to bottom: its passes in
+//! order, with all barriers between them. The other files prepare what those passes read.
 //!
 //! ```text
-//! placements -> what an entity is now (pose) -> clusters to merge and their lists (work) -+-> record -> window, image or file
-//!            -> what each viewport shows of it (viewport), outlines (picture) ------------+
+//! placements -> what an entity is now (pose) -> dirty clusters, chains of pixels, outlines (prepare) -> record -> window, image or file
+//!            -> what each viewport shows of it (viewport) --------------------------------------^
 //! ```
 
 mod change;
@@ -14,13 +14,13 @@ mod permutation;
 mod picture;
 mod pixel;
 mod pose;
+mod prepare;
 mod radiosity;
 mod record;
 mod room;
 mod sky;
 mod twin;
 mod viewport;
-mod work;
 
 use crate::bake::cache::Cache;
 use crate::bake::ensure::SceneProgress;
@@ -29,8 +29,6 @@ use crate::draw::Shading;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Timing};
 use crate::layout::{CLUSTER_FORMAT, ENTRY_FORMAT};
-use crate::lists::gather::Place;
-use crate::lists::gathering::Gathering;
 use crate::lists::incremental::{ClusterLists, Merged};
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
@@ -40,16 +38,19 @@ use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
 use ash::vk;
-use permutation::{CompiledMerge, harmonic_lights, permutation, usable};
+use permutation::{CompiledMerge, PixelShading, harmonic_lights, permutation, usable};
 use picture::FramePicture;
 use pixel::PixelChains;
+use prepare::ClusterWork;
 use radiosity::RadiosityBuffers;
 use sky::SkyLight;
 use std::ops::Range;
 use std::sync::Arc;
-use work::ClusterWork;
 
-pub use options::Options;
+#[cfg(feature = "cli")]
+pub use options::picture_size;
+pub use options::{Options, RenderOptions};
+pub use prepare::Relight;
 pub use record::{MergeWork, PictureTarget, PictureWork, record};
 pub use room::PictureMemory;
 pub use viewport::{RadiositySource, Viewport};
@@ -74,18 +75,16 @@ pub struct Frame {
     sharp: Option<Sharp>,
     work: ClusterWork,
     sky: SkyLight,
-    /// Chains of sharp lights for pixels.
-    pixel: Option<PixelChains>,
+    /// Where pictures evaluate sharp lights.
+    pixels: PixelShading,
+    /// Chains of sharp lights for pixels, once a picture evaluates any.
+    chains: Option<PixelChains>,
     radiosity: RadiosityBuffers,
     picture: FramePicture,
 }
 
 impl Frame {
     /// Bakes or finds what the scene needs and builds the passes.
-    ///
-    /// # Errors
-    /// As [`bake::ensure()`], [`crate::merge::Merge::new`] and [`crate::draw::Draw::new`]; `Input` where the device cannot hold
-    /// the scene or its picture.
     pub fn new(
         baker: &Baker,
         cache: &Cache,
@@ -93,7 +92,8 @@ impl Frame {
         options: Options,
         progress: SceneProgress<'_>,
     ) -> Result<Self> {
-        let (device, library) = (baker.device(), baker.library());
+        let device = baker.device();
+        let library = baker.library();
         let needs = SceneNeeds::of(scene, &options.bake, options.lights);
         limits::check(device, scene, &needs)?;
         PictureMemory::new(device, &options).check(device)?;
@@ -103,7 +103,7 @@ impl Frame {
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
         let methods = methods(scene, options.lights);
         let wanted = permutation(&options, wanted, harmonic_lights(scene, &methods), uniform_entities(device));
-        let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted)?)?;
+        let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted))?;
         let sharp = permutation::sharp(&options, &merge.permutation, &methods, scene, &buffers);
         let radiosity = RadiosityBuffers::new(device, scene, &buffers, sharp.is_some())?;
         let mut lists = ClusterLists::default();
@@ -111,24 +111,16 @@ impl Frame {
             let device_mesh = &buffers.meshes[entity.mesh];
             lists.add(index, pose::clusters(index, device_mesh, radiosity.offsets[index] / 16, options.bake.bands));
         }
-        let [nodes, cells, _] = buffers.sharp();
-        let by_pixel = options.shading != Some(Shading::Vertex)
-            && SharpPermutation::fits_views(device, [nodes, cells, radiosity.soft()]);
-        if options.shading == Some(Shading::Pixel) && sharp.is_some() && !by_pixel {
+        let sharp = sharp.map(|wanted| wanted.fitting(device, buffers.sharp(), radiosity.soft()));
+        let pixels = PixelShading::new(device, &options, &buffers, radiosity.soft(), sharp);
+        if options.shading == Some(Shading::Pixel) && sharp.is_some() && pixels.pixels().is_none() {
             log::warn!(
                 "no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields or the light of all vertices"
             );
         }
-        let edges = by_pixel && options.evaluates_pixels();
-        let sharp = sharp
-            .map(|wanted| wanted.fitting(device, buffers.sharp(), radiosity.soft()))
-            .map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting }))
-            .transpose()?;
-        let by_pixel = sharp.as_ref().map(|sharp| sharp.permutation).filter(|_| by_pixel);
-        let pixel = by_pixel.map(|_| PixelChains::new(device, scene, &buffers)).transpose()?;
-        let place = options.lists.unwrap_or_else(|| Place::quicker(device, entity_count));
-        let gathers = place == Place::Device && !lists.clusters.is_empty();
-        let gathering = gathers.then(|| Gathering::new(device, library, &lists, entity_count)).transpose()?;
+        let edges = pixels.pixels().is_some();
+        let sharp =
+            sharp.map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting })).transpose()?;
         let entity_room = entity_count.max(merge.permutation.entity_limit as usize);
         let mut sky = SkyLight::new(device, options.bake.bands)?;
         sky.write(scene, options.bake.bands)?;
@@ -140,32 +132,28 @@ impl Frame {
             sharp,
             options,
             merge,
-            work: ClusterWork::new(device, lists, gathering, entity_room)?,
+            work: ClusterWork::new(device, lists, entity_room)?,
             sky,
             radiosity,
-            picture: FramePicture::new(device, library, &options, by_pixel)?,
-            pixel,
+            picture: FramePicture::new(device, library, &options, &pixels)?,
+            pixels,
+            chains: None,
             buffers,
         })
     }
 
-    /// Lights every receiver as far as anything has changed since the last call, and draws the picture where `white` is given:
-    /// radiance above it is brought down to it, hue kept, before samples are averaged, so that edges of lights are smooth;
-    /// infinity leaves radiance as it is. The host can read the picture afterwards. Returns each pass's duration.
+    /// Lights every receiver as far as anything has changed since the last call, and draws the picture where `white` is
+    /// given: radiance above it is brought down to it, hue kept, before samples are averaged, so that edges of lights
+    /// are smooth; infinity leaves radiance as it is. The host can read the picture afterwards. Returns each pass's
+    /// duration.
     ///
     /// While entities move a picture lights only what it may show ([`crate::lists::skip::Skip::hidden`]). Without
     /// `white` everything is lit, for those who want radiosity rather than a picture.
-    ///
-    /// # Errors
-    /// `Device` when the device was lost, `Failed` when a barrier is missing.
     pub fn render(&mut self, placements: &[Placement], white: Option<f32>) -> Result<Vec<Timing>> {
         self.light_and_draw(placements, white, true)
     }
 
     /// As [`Frame::render`] with a picture that stays on the device, where a window would show it.
-    ///
-    /// # Errors
-    /// As [`Frame::render`].
     pub fn show(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
         self.light_and_draw(placements, Some(white), false)
     }
@@ -181,41 +169,28 @@ impl Frame {
 
     fn try_light_and_draw(&mut self, placements: &[Placement], white: Option<f32>, reads: bool) -> Result<Vec<Timing>> {
         let viewports: &[Viewport] = if white.is_some() { &[self.whole()] } else { &[] };
-        if white.is_some() {
-            self.prepare_picture(placements, viewports)?;
-        }
-        loop {
-            self.prepare_light(placements, viewports)?;
-            let picture = white.map(|white| self.picture_work(placements, white));
-            let timings = self.run(self.merge_work()?.as_ref(), picture.as_ref(), reads)?;
-            drop(picture);
-            if self.work.all_gathered() {
-                return Ok(timings);
-            }
-        }
+        self.prepare(placements, viewports, Relight::Seen)?;
+        let picture = white.map(|white| self.picture_work(placements, white));
+        self.run(self.merge_work()?.as_ref(), picture.as_ref(), reads)
     }
 
     /// Draws the picture from the radiosity as it stands, the last merge's or what [`Frame::set_radiosity`] put there.
-    ///
-    /// # Errors
-    /// As [`Frame::render`].
     pub fn redraw(&mut self, placements: &[Placement], white: f32) -> Result<Vec<Timing>> {
-        self.prepare_pixels()?;
-        self.prepare_picture(placements, &[Viewport { by_vertex: self.radiosity.replaced, ..self.whole() }])?;
+        let viewport = Viewport { by_vertex: self.radiosity.replaced, ..self.whole() };
+        self.prepare(placements, &[viewport], Relight::Nothing)?;
         self.run(None, Some(&self.picture_work(placements, white)), true)
     }
 
     /// As [`Frame::redraw`] for values that are not radiance: no emission, no limit to white, and the given background.
-    ///
-    /// # Errors
-    /// As [`Frame::render`].
     pub fn redraw_unlit(&mut self, placements: &[Placement], background: [f32; 3]) -> Result<Vec<Timing>> {
-        self.prepare_picture(placements, &[Viewport { adds_emission: false, by_vertex: true, ..self.whole() }])?;
+        let viewport = Viewport { adds_emission: false, by_vertex: true, ..self.whole() };
+        self.prepare(placements, &[viewport], Relight::Nothing)?;
         let picture = self.picture_work(placements, f32::INFINITY);
         self.run(None, Some(&PictureWork { background: background.into(), ..picture }), true)
     }
 
-    /// Records a frame for a file or a bench, and waits for its end. The picture, if there is one, is read back where `reads` says so.
+    /// Records a frame for a file or a bench, and waits for its end. The picture, if there is one, is read back where
+    /// `reads` says so.
     fn run<'f>(
         &'f self,
         merge: Option<&MergeWork<'f>>,
@@ -229,38 +204,14 @@ impl Frame {
         commands.submit()
     }
 
-    /// Writes what the next merge reads, in buffers of that flight's own. While things move only what may be seen in `viewports`
-    /// that show merged light is merged. Where there are none, or nothing has changed since the last call, everything is merged
-    /// that is not merged yet. The merge has to be recorded next, or every cluster is merged again.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    pub fn prepare_light(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
-        self.fit_edges()?;
-        let sights = self.sights(placements, viewports);
-        self.radiosity.replaced = false;
-        self.work.prepare(self.state(placements), sights.as_deref())?;
-        if self.fit_lists()? {
-            // The old pipeline has waited for all frames to end, so that every buffer may be written again.
-            self.work.prepare(self.state(placements), sights.as_deref())?;
-        }
-        if viewports.is_empty() { Ok(()) } else { self.prepare_pixels() }
-    }
-
-    /// What [`record()`] needs to do the merge that [`Frame::prepare_light`] has prepared; `None` where no cluster has changed. When
-    /// the recording does not run, call [`Frame::forget`].
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// What [`record()`] needs to do the merge that [`Frame::prepare`] has prepared; `None` where no cluster has
+    /// changed. When the recording does not run, call [`Frame::forget`].
     pub fn merge_work(&self) -> Result<Option<MergeWork<'_>>> {
         let cluster_count = self.work.start();
         if cluster_count == 0 {
             return Ok(None);
         }
         Ok(Some(MergeWork {
-            gathering: self.work.gathering(),
-            entities: &self.work.entities,
-            clusters: &self.work.clusters,
             cluster_count,
             inputs: self.inputs()?,
             merge: &self.merge.pass,
@@ -273,7 +224,7 @@ impl Frame {
     fn sharp_inputs(&self) -> sharp::SharpInputs<'_> {
         sharp::SharpInputs {
             entities: &self.work.entities,
-            entries: self.work.entries(),
+            entries: &self.work.entries,
             clusters: &self.work.clusters,
             nodes: &self.buffers.silhouettes.nodes,
             cells: &self.buffers.silhouettes.cells,
@@ -285,12 +236,12 @@ impl Frame {
 
     fn inputs(&self) -> Result<MergeInputs<'_>> {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
-        let CompiledMerge { permutation, image, .. } = &self.merge;
+        let permutation = &self.merge.permutation;
         Ok(MergeInputs {
             entities: Readable::shared(&self.work.entities, permutation.variant)?,
-            entries: Readable::new(self.work.entries(), permutation.variant, ENTRY_FORMAT)?,
+            entries: Readable::new(&self.work.entries, permutation.variant, ENTRY_FORMAT)?,
             clusters: Readable::new(&self.work.clusters, permutation.variant, CLUSTER_FORMAT)?,
-            fields: Readable::fields(&self.buffers.fields, image.as_ref(), permutation)?,
+            fields: Readable::new(&self.buffers.fields, permutation.variant, permutation.field_format())?,
             transfers: Readable::new(&self.buffers.transfers, permutation.variant, floats)?,
             vertices: Readable::new(&self.buffers.vertices, permutation.variant, floats)?,
             sky: Readable::new(&self.sky.coefficients, permutation.variant, floats)?,
@@ -302,38 +253,30 @@ impl Frame {
         &self.buffers.meshes[self.scene.entities[entity].mesh].order
     }
 
-    /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what was computed
-    /// elsewhere.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what
+    /// was computed elsewhere.
     pub fn set_radiosity(&mut self, entity: usize, radiosity: &[[f32; 3]]) -> Result<()> {
         self.forget();
         let order = &self.buffers.meshes[self.scene.entities[entity].mesh].order;
         self.radiosity.write(entity, order, radiosity)
     }
 
-    /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without emission;
-    /// zero where it does not receive. After a picture of things that move, what it does not show may be of an earlier time;
-    /// see [`Frame::render`].
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// Radiosity of an entity's vertices in the mesh's order: linear RGB radiance that leaves the surface, without
+    /// emission; zero where it does not receive. After a picture of things that move, what it does not show may be of
+    /// an earlier time; see [`Frame::render`].
     pub fn radiosity(&self, entity: usize) -> Result<Vec<[f32; 3]>> {
         self.radiosity.read(entity, self.order(entity))
     }
 
-    /// The buffer of all radiosity, and for every entity its bytes in it and the order in which its mesh's vertices stand there.
+    /// The buffer of all radiosity, and for every entity its bytes in it and the order in which its mesh's vertices
+    /// stand there.
     pub fn light_buffer(&self) -> (&Buffer, Vec<(Range<u64>, &[u32])>) {
         let of = |entity| (self.radiosity.bytes(entity, self.order(entity).len()), self.order(entity));
         (&self.radiosity.merged, (0..self.scene.entities.len()).map(of).collect())
     }
 
-    /// Radiosity of every entity's vertices from elsewhere, by entity in the mesh's order, for [`RadiositySource::Comparison`] of
-    /// that place: 0 or 1. Entities that are not named are `rest`.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// Radiosity of every entity's vertices from elsewhere, by entity in the mesh's order, for
+    /// [`RadiositySource::Comparison`] of that place: 0 or 1. Entities that are not named are `rest`.
     pub fn set_comparison(&mut self, place: usize, radiosity: &[(usize, Vec<[f32; 3]>)], rest: [f32; 3]) -> Result<()> {
         let order = |entity: usize| &self.buffers.meshes[self.scene.entities[entity].mesh].order[..];
         let entities = radiosity.iter().map(|(entity, values)| (*entity, order(*entity), &values[..]));
@@ -350,7 +293,6 @@ impl Frame {
         self.options.size
     }
 
-    /// The variant that it merges by.
     pub fn variant(&self) -> Variant {
         self.merge.permutation.variant
     }

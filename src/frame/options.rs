@@ -1,15 +1,16 @@
-//! Options of a frame: what decides it besides the scene.
+//! What decides light and pictures besides the scene: as users say it, and as a frame takes it.
 
-use crate::bake;
+use crate::bake::cache::Cache;
+use crate::bake::{self, BakeOptions};
 use crate::draw::{Antialias, Shading};
-use crate::field::Lookup;
-use crate::lists::gather::Place;
+use crate::error::{Error, Result};
 use crate::lists::skip::{EPS, Skip};
 use crate::merge::variant::Variant;
-use crate::scene::Lights;
+use crate::scene::data::check_picture;
+use crate::scene::{Lights, Scene};
 
 /// Options of a frame: what decides it besides the scene.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Options {
     /// Fields and transfers.
     pub bake: bake::Options,
@@ -17,28 +18,17 @@ pub struct Options {
     pub lights: Lights,
     /// Where their light is evaluated for pictures; `None` takes [`Shading::usual`].
     pub shading: Option<Shading>,
-    /// Which samples a lookup takes.
-    pub lookup: Lookup,
     /// How the merge is done; `None` takes what was measured to be the device's fastest.
     pub variant: Option<Variant>,
     /// What the merge leaves out.
     pub skip: Skip,
-    /// Light that the merge leaves out: contributions to a vertex that are bounded below this share of the radiance that the
-    /// scene's exposure shows as white; 0 leaves none out.
+    /// Light that the merge leaves out: contributions to a vertex that are bounded below this share of the radiance
+    /// that the scene's exposure shows as white; 0 leaves none out.
     pub eps: f32,
-    /// Where the lists of clusters are made; `None` takes what is known to be quicker on the device.
-    pub lists: Option<Place>,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
     /// How edges are kept from showing as stairs.
     pub antialias: Antialias,
-}
-
-impl Options {
-    /// Whether pixels of pictures evaluate sharp lights, where the device can.
-    pub fn evaluates_pixels(&self) -> bool {
-        self.shading.unwrap_or_else(|| Shading::usual(self.antialias)) == Shading::Pixel
-    }
 }
 
 impl Default for Options {
@@ -48,13 +38,114 @@ impl Default for Options {
             bake: bake::Options::default(),
             lights: Lights::default(),
             shading: None,
-            lookup: Lookup::Trilinear,
             variant: None,
             skip: Skip::ALL,
             eps: EPS,
-            lists: None,
             size: [960, 640],
             antialias: Antialias::default(),
         }
+    }
+}
+
+/// What a user decides besides the scene: one list for programs, the command line and the window.
+#[derive(Clone)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
+pub struct RenderOptions {
+    /// Width and height of pictures in pixels, 1 to 16 384 each; default: the scene's
+    #[cfg_attr(feature = "cli", arg(long, value_name = "WxH", value_parser = picture_size))]
+    pub size: Option<[u32; 2]>,
+    /// How edges are smoothed: by four samples a pixel, by redrawing outlines and creases (faster on a software
+    /// device), or not at all. Default: samples, but outlines in a window on a software device
+    #[cfg_attr(feature = "cli", arg(long, value_name = "HOW"))]
+    pub antialias: Option<Antialias>,
+    /// Variant of the merge shader: storage, storage-uniform, texel-packed or texel-shifted. They differ in how they
+    /// read fields. Default: the fastest on this device, measured once
+    #[cfg_attr(feature = "cli", arg(long, help_heading = LIGHTING, value_name = "NAME", value_parser = Variant::named))]
+    pub variant: Option<Variant>,
+    /// Work to leave out: all, none, or a list of these with commas:
+    ///   horizon  lights and occluders below the horizon of the surface *
+    ///   cones    occluders beside the light, as seen from the vertex *
+    ///   behind   occluders farther away than the light
+    ///   caps     fields of occluders that look small from the vertex, which become points *
+    ///   passed   occluders that no ray to a sharp light meets
+    ///   covered  sharp lights that one occluder covers whole
+    ///   unmoved  clusters of vertices for which nothing has changed
+    ///   hidden   clusters of vertices that the camera cannot see, while entities move
+    /// Skips with * change pictures a little; the others do not change what is shown
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, help_heading = LIGHTING, default_value = "all", value_name = "all|none|LIST", verbatim_doc_comment)
+    )]
+    pub skip: Skip,
+    /// Leave out an entity's light or shadow on a vertex where it is bounded below this share of white, 0 to 1; 0
+    /// leaves out nothing
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            help_heading = LIGHTING,
+            default_value_t = EPS,
+            value_name = "SHARE",
+            value_parser = crate::text::number::<f32>(0.0..=1.0),
+            allow_negative_numbers = true
+        )
+    )]
+    pub eps: f32,
+    /// How lights of one colour are computed
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, help_heading = LIGHTING, value_enum, default_value = "sharp", value_name = "sh|sharp")
+    )]
+    pub lights: Lights,
+    /// Where sharp lights are evaluated for pictures. Default: pixel with four samples a pixel, vertex with one
+    #[cfg_attr(feature = "cli", arg(long, help_heading = LIGHTING, value_enum, value_name = "vertex|pixel"))]
+    pub shading: Option<Shading>,
+    /// How fields are baked.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub bake: BakeOptions,
+    /// Where what is baked is kept; `None` is below the cache folder of the device, or in memory where it has none.
+    #[cfg_attr(feature = "cli", arg(skip))]
+    pub cache: Option<Cache>,
+}
+
+/// Heading of the options of light in help texts.
+#[cfg(feature = "cli")]
+const LIGHTING: &str = "Lighting";
+
+/// Width and height from `WxH`.
+#[cfg(feature = "cli")]
+pub fn picture_size(text: &str) -> std::result::Result<[u32; 2], String> {
+    let pair = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    pair.filter(|size| check_picture(*size).is_ok())
+        .ok_or_else(|| format!("expected a size like 1280x720, got \"{text}\""))
+}
+
+impl Default for RenderOptions {
+    /// What `shadow-fields render` does without options.
+    fn default() -> Self {
+        let Options { lights, shading, variant, skip, eps, .. } = Options::default();
+        let bake = BakeOptions::default();
+        RenderOptions { size: None, antialias: None, variant, skip, eps, lights, shading, bake, cache: None }
+    }
+}
+
+impl RenderOptions {
+    /// The options of a frame of a scene.
+    pub fn frame(&self, scene: &Scene) -> Result<Options> {
+        let size = self.size.unwrap_or([scene.data.output.width, scene.data.output.height]);
+        check_picture(size).map_err(Error::Input)?;
+        if !(0.0..=1.0).contains(&self.eps) {
+            return Err(Error::Input(format!("eps {} is not within 0 to 1", self.eps)));
+        }
+        Ok(Options {
+            bake: self.bake.resolve()?,
+            lights: self.lights,
+            shading: self.shading,
+            variant: self.variant,
+            skip: self.skip,
+            eps: self.eps,
+            size,
+            antialias: self.antialias.unwrap_or_default(),
+        })
     }
 }

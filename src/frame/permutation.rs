@@ -1,9 +1,10 @@
-//! The merge pass as it is compiled for a scene: what was asked for, less what scene or device do not allow.
+//! What the passes of a scene are compiled for: what was asked for, less what scene or device do not allow.
 
 use super::Options;
+use crate::draw::Shading;
 use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
-use crate::gpu::{Device, TexelView, Volume};
+use crate::gpu::{Buffer, Device, TexelView};
 use crate::layout::{DeviceEntity, NONE};
 use crate::merge::Merge;
 use crate::merge::variant::{MergePermutation, Variant};
@@ -19,27 +20,15 @@ pub(super) struct CompiledMerge {
     pub pass: Merge,
     /// What its shader was compiled for.
     pub permutation: MergePermutation,
-    /// The fields as an image, where the variant samples one.
-    pub image: Option<Volume>,
 }
 
 impl CompiledMerge {
     /// Compiles it for what [`usable`] returned.
-    ///
-    /// # Errors
-    /// As [`Merge::new`].
-    pub fn new(
-        device: &Arc<Device>,
-        library: &Library,
-        (permutation, image): (MergePermutation, Option<Volume>),
-    ) -> Result<Self> {
-        Ok(CompiledMerge { pass: Merge::new(device, library, permutation)?, permutation, image })
+    pub fn new(device: &Arc<Device>, library: &Library, permutation: MergePermutation) -> Result<Self> {
+        Ok(CompiledMerge { pass: Merge::new(device, library, permutation)?, permutation })
     }
 
     /// Compiles its shader anew, from files that have changed.
-    ///
-    /// # Errors
-    /// As [`Merge::new`].
     pub fn rebuild(&mut self, device: &Arc<Device>, library: &Library) -> Result<()> {
         self.pass = Merge::new(device, library, self.permutation)?;
         Ok(())
@@ -52,16 +41,14 @@ pub(super) fn usable(
     buffers: &SceneBuffers,
     entity_count: usize,
     permutation: MergePermutation,
-) -> Result<(MergePermutation, Option<Volume>)> {
+) -> MergePermutation {
     let floats = vk::Format::R32G32B32A32_SFLOAT;
     let entity_room = entity_count.max(permutation.entity_limit as usize);
     let fits = TexelView::fits(device, permutation.field_format(), buffers.fields.size_bytes)
         && TexelView::fits(device, floats, buffers.transfers.size_bytes)
         && TexelView::fits(device, floats, buffers.vertices.size_bytes)
         && TexelView::fits(device, floats, (entity_room * size_of::<DeviceEntity>()) as u64);
-    let image = (permutation.variant.image && permutation.fits_image()).then(|| buffers.image()).transpose()?.flatten();
-    let variant =
-        permutation.variant.restricted(fits, entity_count <= permutation.entity_limit as usize, image.is_some());
+    let variant = permutation.variant.restricted(fits, entity_count <= permutation.entity_limit as usize);
     if variant != permutation.variant {
         log::info!(
             "the scene is too large for the variant \"{}\"; using \"{}\"",
@@ -69,7 +56,7 @@ pub(super) fn usable(
             variant.name
         );
     }
-    Ok((MergePermutation { variant, ..permutation }, image.filter(|_| variant.image)))
+    MergePermutation { variant, ..permutation }
 }
 
 /// The permutation of the pass of sharp lights beside that merge; `None` where no light is sharp.
@@ -86,8 +73,7 @@ pub(super) fn sharp(
         buffers.meshes.iter().any(|mesh| mesh.silhouette.as_ref().is_some_and(|slot| wanted(&slot.field)))
     };
     (!lights.is_empty()).then(|| SharpPermutation {
-        texel: merge.variant.texel,
-        uniform: merge.variant.uniform,
+        reads: merge.variant.reads,
         entity_limit: merge.entity_limit,
         silhouette: options.bake.silhouette,
         outlines: lights.contains(&&LightMethod::Outline),
@@ -101,12 +87,44 @@ pub(super) fn sharp(
     })
 }
 
+/// Where pictures evaluate sharp lights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum PixelShading {
+    /// At vertices alone; pixels interpolate.
+    Vertices,
+    /// Also at pixels that a shadow's edge comes near, by shaders of this permutation.
+    Pixels(SharpPermutation),
+}
+
+impl PixelShading {
+    /// Decides it for pictures with these options; `sharp` is the permutation of the pass of sharp lights, where the
+    /// scene has any.
+    pub fn new(
+        device: &Device,
+        options: &Options,
+        buffers: &SceneBuffers,
+        soft: &Buffer,
+        sharp: Option<SharpPermutation>,
+    ) -> Self {
+        let [nodes, cells, _] = buffers.sharp();
+        let wants = options.shading.unwrap_or_else(|| Shading::usual(options.antialias)) == Shading::Pixel;
+        match sharp {
+            Some(sharp) if wants && SharpPermutation::fits_views(device, [nodes, cells, soft]) => Self::Pixels(sharp),
+            _ => Self::Vertices,
+        }
+    }
+
+    /// The permutation of the shaders of these pixels, if any evaluates lights.
+    pub fn pixels(&self) -> Option<&SharpPermutation> {
+        if let Self::Pixels(sharp) = self { Some(sharp) } else { None }
+    }
+}
+
 /// Whether any light of the scene meets the chains of the merge. The sky does in any case.
 pub(super) fn harmonic_lights(scene: &Scene, methods: &[LightMethod]) -> bool {
     scene.entities.iter().zip(methods).any(|(entity, method)| entity.emits && !method.is_sharp())
 }
 
-/// The permutation of the merge shader.
 pub(super) fn permutation(options: &Options, variant: Variant, lights: bool, entity_limit: u32) -> MergePermutation {
     MergePermutation {
         variant,
@@ -114,7 +132,6 @@ pub(super) fn permutation(options: &Options, variant: Variant, lights: bool, ent
         field_bands: options.bake.occlusion_bands(),
         storage: options.bake.storage,
         lattice: options.bake.lattice,
-        lookup: options.lookup,
         skip: options.skip,
         lights,
         entity_limit,

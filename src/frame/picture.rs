@@ -1,5 +1,6 @@
 //! Pictures of a frame: prepared, drawn into images of one size, read back.
 
+use super::permutation::PixelShading;
 use super::record::PictureWork;
 use super::room::READBACK_PIXEL_BYTES;
 use super::viewport::{RadiositySource, Viewport};
@@ -7,13 +8,12 @@ use super::{Frame, Options};
 use crate::asset::edges::Edges;
 use crate::asset::picture::linear_from_srgb;
 use crate::draw::pixel_light::PixelLight;
-use crate::draw::smooth::{Lines, Strips};
+use crate::draw::smooth::Lines;
 use crate::draw::{Antialias, Draw, DrawnViewport, Finish};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image, Timing};
 use crate::scene::Placement;
 use crate::shaders::Library;
-use crate::sharp::SharpPermutation;
 use half::f16;
 use std::ops::Range;
 use std::sync::Arc;
@@ -21,32 +21,21 @@ use std::sync::Arc;
 /// The pass "draw" with its images and buffers.
 pub(super) struct FramePicture {
     pub draw: Draw,
-    /// The permutation of shaders whose pixels evaluate sharp lights, if any.
-    pub sharp: Option<SharpPermutation>,
     /// Where the host reads a picture.
     pub readback: Buffer,
     /// Outlines and creases of the picture that was prepared last.
     pub lines: Lines,
     /// Its viewports, and which of the lines belong to each.
-    prepared: Vec<(Viewport, Range<u32>)>,
+    pub prepared: Vec<(Viewport, Range<u32>)>,
     /// Edges of each mesh, once a picture wants its outlines.
     pub edges: Vec<Edges>,
 }
 
 impl FramePicture {
     /// Makes linear pictures of the size in `options`.
-    ///
-    /// # Errors
-    /// As [`Draw::new`].
-    pub fn new(
-        device: &Arc<Device>,
-        library: &Library,
-        options: &Options,
-        sharp: Option<SharpPermutation>,
-    ) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, library: &Library, options: &Options, pixels: &PixelShading) -> Result<Self> {
         Ok(FramePicture {
-            draw: draw(device, library, options, Finish::Linear, sharp)?,
-            sharp,
+            draw: draw(device, library, options, Finish::Linear, pixels)?,
             readback: readback(device, options.size)?,
             lines: Lines::new(device)?,
             prepared: Vec::new(),
@@ -74,10 +63,9 @@ fn draw(
     library: &Library,
     options: &Options,
     finish: Finish,
-    sharp: Option<SharpPermutation>,
+    pixels: &PixelShading,
 ) -> Result<Draw> {
-    let sharp = sharp.filter(|_| options.evaluates_pixels());
-    Draw::new(device, library, options.size, options.antialias, finish, sharp.as_ref())
+    Draw::new(device, library, options.size, options.antialias, finish, pixels.pixels())
 }
 
 /// Room for a picture of either finish.
@@ -86,32 +74,6 @@ fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
 }
 
 impl Frame {
-    /// Divides the next picture into viewports, and finds the outlines and creases of each where they are smoothed. What it writes
-    /// lies in buffers of that flight's own.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    pub fn prepare_picture(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
-        let smooths = self.picture.draw.smooth.is_some();
-        if smooths && self.picture.edges.is_empty() {
-            self.picture.edges = self.scene.meshes.iter().map(|mesh| Edges::new(mesh)).collect();
-        }
-        let mut strips = Strips::default();
-        let mut prepared = Vec::with_capacity(viewports.len());
-        for viewport in viewports {
-            let first = strips.count() as u32;
-            let [_, _, width, height] = viewport.area;
-            if smooths {
-                for (line, tag) in self.outlines(placements, f64::from(width) / f64::from(height.max(1))) {
-                    strips.add(&line, [width, height], tag);
-                }
-            }
-            prepared.push((*viewport, first..strips.count() as u32));
-        }
-        self.picture.prepared = prepared;
-        self.picture.lines.write(&strips)
-    }
-
     /// What [`super::record()`] needs to draw the picture that was prepared last; `white` as in [`Frame::render`].
     pub fn picture_work(&self, placements: &[Placement], white: f32) -> PictureWork<'_> {
         let viewport = |(viewport, lines): &(Viewport, Range<u32>)| DrawnViewport {
@@ -135,85 +97,76 @@ impl Frame {
         self.picture.draw.finished()
     }
 
-    /// The last picture: linear RGB, three floats a pixel, rows from the top. A picture made for a screen is decoded: white is 1.
+    /// The last picture: linear RGB, three floats a pixel, rows from the top. A picture made for a screen is decoded:
+    /// white is 1.
     pub fn picture(&self) -> Vec<f32> {
         self.picture.read()
     }
 
-    /// The pass "draw" for pictures of another kind.
-    pub(super) fn draw(&self, options: &Options, finish: Finish) -> Result<Draw> {
-        draw(&self.device, &self.library, options, finish, self.picture.sharp)
-    }
-
-    /// Makes the chains of the time that was merged last, for pictures whose pixels evaluate sharp lights.
-    pub(super) fn prepare_pixels(&mut self) -> Result<()> {
-        let shows = self.options.evaluates_pixels() && self.work.lists.is_updated();
-        let Some(pixel) = self.pixel.as_mut().filter(|_| shows) else { return Ok(()) };
-        pixel.prepare(&self.work.lists)
+    /// Makes pictures with these options from now on. Returns the pass that made them so far.
+    pub(super) fn set_pictures(&mut self, options: Options, finish: Finish) -> Result<Draw> {
+        let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
+        let pixels = PixelShading::new(&self.device, &options, &self.buffers, self.radiosity.soft(), sharp);
+        let draw = draw(&self.device, &self.library, &options, finish, &pixels)?;
+        self.options = options;
+        self.pixels = pixels;
+        Ok(std::mem::replace(&mut self.picture.draw, draw))
     }
 
     /// What pixels read that evaluate sharp lights in a viewport.
     fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
-        let pixel = self.pixel.as_ref()?;
-        let by_pixel = self.options.evaluates_pixels() && pixel.is_ready();
-        let shown = by_pixel && viewport.radiosity == RadiositySource::Merged && !viewport.by_vertex;
-        shown.then(|| PixelLight {
-            entities: &pixel.entities,
+        self.pixels.pixels()?;
+        let chains = self.chains.as_ref().filter(|chains| chains.is_ready())?;
+        let shows_light = viewport.radiosity == RadiositySource::Merged && !viewport.by_vertex;
+        shows_light.then(|| PixelLight {
+            entities: &chains.entities,
             silhouettes: [&self.buffers.silhouettes.nodes, &self.buffers.silhouettes.cells],
-            entries: &pixel.entries,
-            chains: &pixel.chains,
+            entries: &chains.entries,
+            chains: &chains.chains,
             soft: self.radiosity.soft(),
             self_cells: &self.buffers.self_cells,
             vertices: &self.buffers.vertices,
         })
     }
 
-    /// Pixels of a picture that evaluated sharp lights themselves, by the timings of its passes: the samples that they wrote over the
-    /// samples of a pixel. `None` where the device does not count, or no pixel was to.
+    /// Pixels of a picture that evaluated sharp lights themselves, by the timings of its passes: the samples that they
+    /// wrote over the samples of a pixel. `None` where the device does not count, or no pixel was to.
     pub fn pixels_evaluated(&self, timings: &[Timing]) -> Option<u64> {
         let samples = u64::from(self.picture.draw.samples());
         timings.iter().find_map(|timing| timing.samples).map(|written| written.div_ceil(samples))
     }
 
     /// Makes pictures of another size from now on.
-    ///
-    /// # Errors
-    /// `Input` when it is larger than the device's images.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
         if size != self.options.size {
             let options = Options { size, ..self.options };
-            self.picture.draw = self.draw(&options, self.picture.draw.finish())?;
+            self.set_pictures(options, self.picture.draw.finish())?;
             self.picture.readback = readback(&self.device, size)?;
-            self.options = options;
         }
         Ok(())
     }
 
-    /// Makes pictures for files or for a screen from now on, edges smoothed one way or another. A frame begins with linear ones.
-    ///
-    /// # Errors
-    /// `Failed` when a shader does not compile.
+    /// Makes pictures for files or for a screen from now on, edges smoothed one way or another. A frame begins with
+    /// linear ones.
     pub fn set_finish(&mut self, finish: Finish, antialias: Antialias) -> Result<()> {
         if (finish, antialias) != (self.picture.draw.finish(), self.options.antialias) {
             let options = Options { antialias, ..self.options };
-            self.picture.draw = self.draw(&options, finish)?;
-            self.options = options;
+            self.set_pictures(options, finish)?;
         }
         Ok(())
     }
 
-    /// The picture at full quality, whatever is shown: multisampled where the device can, linear RGB, three floats a pixel, rows
-    /// from the top; `white` as in [`Frame::render`]. Waits.
-    ///
-    /// # Errors
-    /// As [`Frame::render`].
+    /// The picture at full quality, whatever is shown: multisampled where the device can, linear RGB, three floats a
+    /// pixel, rows from the top; `white` as in [`Frame::render`]. Waits.
     pub fn still(&mut self, placements: &[Placement], white: f32) -> Result<Vec<f32>> {
         self.device.settle();
-        let options = Options { antialias: Antialias::Samples, ..self.options };
-        let fine = self.draw(&options, Finish::Linear)?;
-        let usual = (std::mem::replace(&mut self.picture.draw, fine), std::mem::replace(&mut self.options, options));
+        let options = self.options;
+        let pixels = self.pixels;
+        let draw = self.set_pictures(Options { antialias: Antialias::Samples, ..options }, Finish::Linear)?;
         let outcome = self.render(placements, Some(white)).map(|_| self.picture());
-        (self.picture.draw, self.options) = usual;
+        self.options = options;
+        self.pixels = pixels;
+        self.picture.draw = draw;
         outcome
     }
 }

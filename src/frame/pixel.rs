@@ -16,12 +16,11 @@ use std::sync::Arc;
 pub(super) struct PixelChains {
     /// Entities at the time of the picture.
     pub entities: Upload,
-    /// Entries of all chains.
     pub entries: Upload,
     /// For every cluster of the lit entities: its first entry, and the number of its entries.
     pub chains: Upload,
-    /// For every lit entity: where its pixels find their data, and how far the pixels of a cluster may lie from its vertices, metres of
-    /// the mesh's frame. `None` for the others.
+    /// For every lit entity: where its pixels find their data, and how far the pixels of a cluster may lie from its
+    /// vertices, metres of the mesh's frame. `None` for the others.
     receivers: Vec<Option<(ByPixel, f32)>>,
     /// Entities as they were when the chains were made, and their bounds with what each of them takes part in.
     known: Option<(Vec<layout::DeviceEntity>, Vec<EntityBounds>)>,
@@ -29,9 +28,6 @@ pub(super) struct PixelChains {
 
 impl PixelChains {
     /// Empty chains for the lit entities of a scene.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers) -> Result<Self> {
         let mut clusters = 0;
         let mut receivers = Vec::with_capacity(scene.entities.len());
@@ -65,7 +61,8 @@ impl PixelChains {
         self.receivers[entity].map(|(by_pixel, _)| by_pixel)
     }
 
-    /// Whether chains have been made that pixels can read: a device's texel views may be too short for them, and then vertices evaluate.
+    /// Whether chains have been made that pixels can read: a device's texel views may be too short for them, and then
+    /// vertices evaluate.
     pub fn is_ready(&self) -> bool {
         let device = self.entries.device();
         self.known.is_some()
@@ -75,9 +72,6 @@ impl PixelChains {
     }
 
     /// Makes the chains of this time.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn prepare(&mut self, lists: &ClusterLists) -> Result<()> {
         let State { entities, scene_bounds, .. } = lists.now();
         let is_known = self.known.as_ref().is_some_and(|(known, bounds)| {
@@ -87,7 +81,8 @@ impl PixelChains {
         if is_known {
             return Ok(());
         }
-        let (mut entries, mut chains) = (Vec::new(), Vec::new());
+        let mut entries = Vec::new();
+        let mut chains = Vec::new();
         for (receiver, reach_m) in self.receivers.iter().enumerate().filter_map(|(i, lit)| Some((i, (*lit)?.1))) {
             let (places, listed) = lists.sharp_chains(receiver, reach_m);
             chains.extend(places.iter().map(|[first, count]| [first + entries.len() as u32, *count]));
@@ -103,7 +98,6 @@ impl PixelChains {
         Ok(())
     }
 
-    /// Bytes on the device.
     pub fn size_bytes(&self) -> u64 {
         self.entities.all_bytes() + self.entries.all_bytes() + self.chains.all_bytes()
     }

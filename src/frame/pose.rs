@@ -4,6 +4,7 @@ use super::Frame;
 use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
+use crate::field::sub_light::LampFace;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
 use crate::lists::gather::{ClusterBounds, EntityBounds, OutlineView, SceneBounds};
@@ -54,10 +55,12 @@ impl Frame {
         let sharp = entity.emits && self.light_method(index).is_sharp();
         let source = if coloured { &device_mesh.radiance } else { &device_mesh.blocked };
         let rotation = placement.turn();
-        let facing = source.as_ref().filter(|_| !sharp).and_then(|slot| match slot.extent {
+        let of_field = source.as_ref().filter(|_| !sharp).and_then(|slot| match slot.extent {
             Extent::Cone { axis, half_angle_rad } => Some((rotation * axis, half_angle_rad)),
             Extent::Nothing | Extent::All => None,
         });
+        let of_spot = entity.spot.map(|spot| (rotation * DVec3::Y, f64::from(spot.outer_deg).to_radians()));
+        let facing = of_spot.or(of_field);
         let brightest = device_mesh.radiance.as_ref().filter(|_| coloured).map_or(1.0, |s| s.header.radiance_scale);
         EntityBounds {
             centre: self.centre(index, placement),
@@ -82,7 +85,6 @@ impl Frame {
             Some(slot) if entity.emits => entity.emission * slot.header.radiance_scale,
             _ => entity.emission,
         };
-        let base = |slot: &FieldSlot| if self.merge.image.is_some() { slot.channel } else { slot.quad() };
         let slot = device_mesh.blocked.as_ref().or(device_mesh.radiance.as_ref());
         // Both fields of a mesh have the same shells.
         let radial = slot.map_or([0.0; 4], |slot| {
@@ -93,31 +95,37 @@ impl Frame {
         let area = device_mesh.blocked.as_ref().map_or(Area::default(), |slot| slot.area);
         let [area_x, area_y] = area.axes.map(|axis| (rotation * axis).as_vec3());
         let terms = area.terms.map(|term| term as f32);
-        let (share, panel) = match self.light_method(index) {
-            LightMethod::Ball(share) => (share, 0.0),
-            LightMethod::LampFace(panel) => (1.0, panel.packed()),
-            LightMethod::Harmonics | LightMethod::Outline => (0.0, 0.0),
+        let method = self.light_method(index);
+        let light_share = match method {
+            LightMethod::Ball(share) | LightMethod::LampFace(LampFace::Disc(share)) => share,
+            _ => 0.0,
+        };
+        let light_ratio = match method {
+            LightMethod::LampFace(LampFace::Rectangle(ratio)) => ratio,
+            _ => 0.0,
         };
         let shift = slot.map_or(Fit::ROUND.packed(), |slot| slot.header.lattice.packed());
         layout::DeviceEntity {
             centre: centre.extend((1.0 / radius_m) as f32).to_array(),
             alpha_beta: [cos_a, sin_a, cos_b, sin_b],
             gamma: [cos_c, sin_c],
-            emission: emission.extend(entity.albedo.max_element()).to_array(),
+            emission: emission.to_array(),
+            reflectance: entity.albedo.max_element(),
             shift,
-            albedo: (entity.albedo.as_dvec3() / PI).as_vec3().extend(placement.scale).to_array(),
+            albedo: (entity.albedo.as_dvec3() / PI).as_vec3().to_array(),
+            scale: placement.scale,
             radial,
             area_x: area_x.extend(terms[0]).to_array(),
             area_y: area_y.extend(terms[1]).to_array(),
             area_terms: [terms[2], terms[3], terms[4], terms[5]],
-            sharp: [
-                f32::from_bits(device_mesh.silhouette.as_ref().map_or(0, |slot| slot.first_quad)),
-                share as f32,
-                panel,
-                0.0,
-            ],
-            blocked_base: device_mesh.blocked.as_ref().map_or(0, base),
-            radiance_base: device_mesh.radiance.as_ref().map_or(0, base),
+            silhouette: device_mesh.silhouette.as_ref().map_or(0, |slot| slot.first_quad),
+            light_kind: method.kind() as u32,
+            light_share: light_share as f32,
+            light_ratio: light_ratio as f32,
+            light_ramp: entity.spot.map_or([0.0, 1.0], |spot| spot.ramp().map(|x| x as f32)),
+            unused: [0.0; 2],
+            blocked_base: device_mesh.blocked.as_ref().map_or(0, FieldSlot::quad),
+            radiance_base: device_mesh.radiance.as_ref().map_or(0, FieldSlot::quad),
         }
     }
 

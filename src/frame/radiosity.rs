@@ -7,10 +7,9 @@ use crate::scene::Scene;
 use crate::scene_buffers::SceneBuffers;
 use std::sync::Arc;
 
-/// Four floats a vertex: linear RGB radiance that leaves the surface, and 0. The vertices of one entity follow those of another, each
-/// in the order of its mesh's [`crate::scene_buffers::DeviceMesh`].
+/// Four floats a vertex: linear RGB radiance that leaves the surface, and 0. The vertices of one entity follow those of
+/// another, each in the order of its mesh's [`crate::scene_buffers::DeviceMesh`].
 pub(super) struct RadiosityBuffers {
-    /// Light of all lights.
     pub merged: Buffer,
     /// Light without that of sharp lights, in a scene that has any: what the merge writes then.
     soft: Option<Buffer>,
@@ -23,11 +22,9 @@ pub(super) struct RadiosityBuffers {
 
 impl RadiosityBuffers {
     /// Zero for every vertex of a scene.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers, sharp: bool) -> Result<Self> {
-        let (mut offsets, mut size_bytes) = (Vec::new(), 0);
+        let mut offsets = Vec::new();
+        let mut size_bytes = 0;
         for entity in &scene.entities {
             offsets.push(size_bytes);
             size_bytes += 16 * buffers.meshes[entity.mesh].vertices.len() as u64;
@@ -55,15 +52,11 @@ impl RadiosityBuffers {
         self.soft.as_ref().unwrap_or(&self.merged)
     }
 
-    /// Bytes on the device.
     pub fn size_bytes(&self) -> u64 {
         self.merged.size_bytes + self.soft.as_ref().map_or(0, |soft| soft.size_bytes)
     }
 
     /// Replaces an entity's values. They come in the mesh's order of vertices, which `order` lists as they are stored.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn write(&mut self, entity: usize, order: &[u32], values: &[[f32; 3]]) -> Result<()> {
         assert_eq!(values.len(), order.len(), "radiosity of entity {entity}");
         self.replaced = true;
@@ -71,9 +64,6 @@ impl RadiosityBuffers {
     }
 
     /// An entity's values in the mesh's order of vertices.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn read(&self, entity: usize, order: &[u32]) -> Result<Vec<[f32; 3]>> {
         let quads: Vec<[f32; 4]> = self.merged.download_range(self.bytes(entity, order.len()))?;
         let mut values = vec![[0.0; 3]; quads.len()];
@@ -83,10 +73,8 @@ impl RadiosityBuffers {
         Ok(values)
     }
 
-    /// Writes one of the two comparisons: for each entity its order of vertices and its values; what is not given is `rest`.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// Writes one of the two comparisons: for each entity its order of vertices and its values; what is not given is
+    /// `rest`.
     pub fn compare<'v>(
         &mut self,
         place: usize,

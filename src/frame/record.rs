@@ -1,23 +1,19 @@
 //! One frame from top to bottom: every pass in its order, with every barrier between passes.
 //!
-//! Files, benches and the window record their frames by this one function. They differ in the target of the picture, and in who
-//! waits: a file submits the recording and waits for its end, the window launches it and goes on to the next frame.
+//! Files, benches and the window record their frames by this one function. They differ in the target of the picture,
+//! and in who waits: a file submits the recording and waits for its end, the window launches it and goes on to the next
+//! frame.
 
 use crate::draw::smooth::Lines;
 use crate::draw::{Draw, DrawnViewport};
 use crate::error::Result;
 use crate::gpu::{self, Access, Buffer, Commands, Drawing, Image};
-use crate::lists::gathering::Gathering;
 use crate::merge::{Merge, MergeInputs};
 use crate::sharp::{self, Sharp};
 use glam::Vec3;
 
 /// The clusters to light, and all that lights them.
 pub struct MergeWork<'f> {
-    /// The lists that the device makes; `None` where the host has made them.
-    pub(super) gathering: Option<&'f Gathering>,
-    pub(super) entities: &'f Buffer,
-    pub(super) clusters: &'f Buffer,
     pub(super) cluster_count: u32,
     pub(super) inputs: MergeInputs<'f>,
     pub(super) merge: &'f Merge,
@@ -28,7 +24,6 @@ pub struct MergeWork<'f> {
     pub(super) radiosity: &'f Buffer,
 }
 
-/// The picture to draw.
 pub struct PictureWork<'f> {
     pub(super) draw: &'f Draw,
     pub(super) viewports: Vec<DrawnViewport<'f>>,
@@ -42,12 +37,7 @@ pub enum PictureTarget<'t, 'f> {
     /// It stays on the device, where a fragment shader may read it.
     Device,
     /// Into a buffer that the host reads.
-    Host {
-        /// The finished picture.
-        picture: &'f Image,
-        /// As large as the picture.
-        readback: &'f Buffer,
-    },
+    Host { picture: &'f Image, readback: &'f Buffer },
     /// Onto an image of a window, or onto one that stands for it.
     Screen {
         /// Its content is thrown away first.
@@ -61,14 +51,11 @@ pub enum PictureTarget<'t, 'f> {
     },
 }
 
-/// Records one frame: lights `merge`'s clusters, draws `picture`, and brings it to the target. Where one of them is `None`, light or
-/// picture stay as the last frame left them.
+/// Records one frame: lights `merge`'s clusters, draws `picture`, and brings it to the target. Where one of them is
+/// `None`, light or picture stay as the last frame left them.
 ///
 /// On a software device every pass begins and ends with a full barrier besides the ones below, see
 /// [`Commands::separates_passes`]: timestamps need it there. No pass may rely on it, and the tracker does not count it.
-///
-/// # Errors
-/// `Device` when memory ran out, `Input` when a buffer is larger than the device can bind.
 pub fn record<'f>(
     commands: &mut Commands<'f>,
     merge: Option<&MergeWork<'f>>,
@@ -76,18 +63,11 @@ pub fn record<'f>(
     target: PictureTarget<'_, 'f>,
 ) -> Result<()> {
     if matches!(target, PictureTarget::Screen { .. }) || merge.is_none() || commands.is_shared() {
-        // The frame before may be under way, and uses the same buffers and images; a picture alone shows its light. A caller that
-        // shares the device may still read that light.
+        // The frame before may be under way, and uses the same buffers and images; a picture alone shows its light. A
+        // caller that shares the device may still read that light.
         commands.after_flights();
     }
     if let Some(work) = merge {
-        if let Some(gathering) = work.gathering {
-            commands.pass("gather", |c| gathering.record(c, work.entities, work.clusters))?;
-            // The merge reads the lists, and the host reads how long they are.
-            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
-            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
-            commands.barrier(Access::ComputeWrite, Access::HostRead);
-        }
         commands.pass("merge", |c| work.merge.record(c, &work.inputs, work.soft, work.cluster_count))?;
         if let Some((sharp, inputs)) = &work.sharp {
             // The pass reads what the merge has written.

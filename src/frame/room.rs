@@ -1,4 +1,5 @@
-//! The memory that a picture takes. It is compared with what the device and the host have before any work is done for the picture.
+//! The memory that a picture takes. It is compared with what the device and the host have before any work is done for
+//! the picture.
 
 use super::Options;
 use crate::draw::{Draw, Finish};
@@ -11,7 +12,6 @@ const HOST_PIXEL_BYTES: u64 = 4 * 2 + 3 * 4;
 /// Bytes for a pixel in the buffer that a picture is read back through.
 pub(super) const READBACK_PIXEL_BYTES: u64 = 8;
 
-/// Memory that a picture takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PictureMemory {
     /// Width and height in pixels.
@@ -37,23 +37,16 @@ impl PictureMemory {
         }
     }
 
-    /// All bytes.
     pub fn all(&self) -> u64 {
         self.device + self.host
     }
 
     /// Compares it with what the device and the host have.
-    ///
-    /// # Errors
-    /// `Input` with the numbers where it is more.
     pub fn check(&self, device: &Device) -> Result<()> {
         self.fits(device.heap_bytes(), host_bytes())
     }
 
     /// Compares it with bytes of the device's largest heap and of the host; what is not known limits nothing.
-    ///
-    /// # Errors
-    /// `Input` with the numbers where it is more.
     pub fn fits(&self, heap: u64, host: Option<u64>) -> Result<()> {
         let wanted = self.host + if self.shared { self.device } else { 0 };
         let has = match host {
@@ -80,8 +73,8 @@ fn gigabytes(bytes: u64) -> String {
     format!("{:.2} GB", bytes as f64 * 1e-9)
 }
 
-/// Bytes that this process can still take: what the system has free or can free, and what the limit on its address space leaves.
-/// `None` where the system does not say.
+/// Bytes that this process can still take: what the system has free or can free, and what the limit on its address
+/// space leaves. `None` where the system does not say.
 fn host_bytes() -> Option<u64> {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let number = |text: &str, key: &str| -> Option<u64> {

@@ -21,18 +21,12 @@ pub(super) struct SkyLight {
 
 impl SkyLight {
     /// A sky that has still to be written.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, bands: usize) -> Result<Self> {
         let coefficients = Upload::new(device, "sky", 12 * channel_stride(bands) as u64)?;
         Ok(SkyLight { coefficients, brightest: 0.0, background: Vec3::ZERO })
     }
 
     /// Takes over a scene's environment.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn write(&mut self, scene: &Scene, bands: usize) -> Result<()> {
         let channels = scene.environment.coefficients(bands);
         let stride = channel_stride(bands);

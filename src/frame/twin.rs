@@ -4,8 +4,9 @@ use super::Frame;
 use crate::error::Result;
 use crate::field::{Area, ShadowField};
 use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
-use crate::lists::gather::{self, Candidates, Counts, SLACK, Scope};
+use crate::lists::gather::{self, Candidates, Counts};
 use crate::lists::incremental::State;
+use crate::lists::scope::Scope;
 use crate::merge::twin::{MergeObject, MergeTwin};
 use crate::scene::{Entity, LightMethod, Placement, Scene};
 use crate::scene_buffers;
@@ -16,8 +17,8 @@ use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
 
 impl Frame {
-    /// What the lists of all clusters leave off at this time, and why, and a bound of the light in it: by looking at every
-    /// cluster and entity, which no frame does.
+    /// What the lists of all clusters leave off at this time, and why, and a bound of the light in it: by looking at
+    /// every cluster and entity, which no frame does.
     pub fn counts(&self, placements: &[Placement]) -> Counts {
         let entities = || self.scene.entities.iter().filter(|entity| entity.occludes || entity.emits);
         let empty = |entity: &&Entity| self.buffers.meshes[entity.mesh].is_empty(entity.emits);
@@ -36,23 +37,16 @@ impl Frame {
     }
 
     /// The CPU twin of the merge in f64: radiosity of every receiver's vertices, by entity. Reads the fields back.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn twin(&self, placements: &[Placement]) -> Result<Vec<(usize, Vec<[f64; 3]>)>> {
         Ok(self.frame_twin(placements)?.run())
     }
 
-    /// Lights whose method is wanted.
     fn lights(&self, wanted: impl Fn(LightMethod) -> bool) -> Vec<usize> {
         let emits = |&index: &usize| self.scene.entities[index].emits && wanted(self.light_method(index));
         (0..self.scene.entities.len()).filter(emits).collect()
     }
 
     /// Everything that the CPU twin of a merge reads.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     fn frame_twin<'f>(&'f self, placements: &'f [Placement]) -> Result<FrameTwin<'f>> {
         let mut fields: Vec<[Option<ShadowField>; 2]> = Vec::new();
         for device_mesh in &self.buffers.meshes {
@@ -152,7 +146,6 @@ impl FrameTwin<'_> {
                 normals: &receiver.normals,
                 transfer: receiver.transfer.as_ref().map(|(floats, stride)| (&floats[..], *stride)),
                 bands: options.bake.bands,
-                lookup: options.lookup,
                 skip: options.skip,
                 leaves: &leaves,
             };
@@ -176,7 +169,6 @@ impl FrameTwin<'_> {
         }
     }
 
-    /// Adds the light of sharp lights.
     fn add_sharp(
         &self,
         receiver: &Receiver,
@@ -189,6 +181,7 @@ impl FrameTwin<'_> {
             entity,
             emission: self.frame.scene.entities[entity].emission.as_dvec3(),
             method: self.frame.light_method(entity),
+            spot: self.frame.scene.entities[entity].spot,
         };
         let lights: Vec<SharpLight> = self.sharp_lights.iter().filter(|l| **l != receiver.index).map(light).collect();
         let occluders: Vec<usize> =
@@ -217,11 +210,13 @@ impl FrameTwin<'_> {
     }
 }
 
-/// The cluster of every vertex of a mesh, and what stands on each cluster's list: entity and light, or the sky's number.
+/// The cluster of every vertex of a mesh, and what stands on each cluster's list: entity and light, or the sky's
+/// number.
 type Listed = (Vec<usize>, Vec<HashSet<(u32, u32)>>);
 
 fn listed(state: &State, receiver: usize, device_mesh: &DeviceMesh) -> Listed {
-    let (scene_bounds, entity) = (&state.scene_bounds, &state.entities[receiver]);
+    let scene_bounds = &state.scene_bounds;
+    let entity = &state.entities[receiver];
     let mut cluster_of = vec![0; device_mesh.order.len()];
     for (place, &v) in device_mesh.order.iter().enumerate() {
         cluster_of[v as usize] = place / CLUSTER_VERTICES as usize;
@@ -229,8 +224,8 @@ fn listed(state: &State, receiver: usize, device_mesh: &DeviceMesh) -> Listed {
     let candidates = Candidates::all(scene_bounds, receiver as u32);
     let of_cluster = |bounds| {
         let mut entries = Vec::new();
-        let scope = Scope::new(scene_bounds, entity, bounds, SLACK);
-        gather::twin(&scope, &candidates, &mut entries);
+        let scope = Scope::new(scene_bounds, entity, bounds);
+        gather::gather(&scope, &candidates, &mut entries);
         entries.into_iter().map(|entry| ListEntry::entities(entry).into()).collect()
     };
     (cluster_of, device_mesh.clusters.iter().map(of_cluster).collect())

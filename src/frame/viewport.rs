@@ -24,9 +24,9 @@ pub enum RadiositySource {
 pub struct Viewport {
     /// Left, top, width and height in pixels.
     pub area: [u32; 4],
-    /// The radiosity that it shows.
     pub radiosity: RadiositySource,
-    /// Whether what entities emit is added. It is not where radiosity stands for something else, as the colours of an error do.
+    /// Whether what entities emit is added. It is not where radiosity stands for something else, as the colours of an
+    /// error do.
     pub adds_emission: bool,
     /// Whether only the radiosity of vertices is shown, and no pixel evaluates a light itself.
     pub by_vertex: bool,
@@ -40,19 +40,9 @@ impl Viewport {
 }
 
 impl Frame {
-    /// All of the picture.
     pub(super) fn whole(&self) -> Viewport {
         let [width, height] = self.options.size;
         Viewport::merged([0, 0, width, height])
-    }
-
-    /// How each entity is seen in each of the viewports that show merged light; `None` where none does, and light is for others to
-    /// read.
-    pub(super) fn sights(&self, placements: &[Placement], viewports: &[Viewport]) -> Option<Vec<Vec<Sight>>> {
-        let shown = viewports.iter().filter(|viewport| viewport.radiosity == RadiositySource::Merged);
-        let cameras: Vec<_> = shown.map(|viewport| self.camera([viewport.area[2], viewport.area[3]])).collect();
-        let of = |(index, placement)| cameras.iter().map(|camera| self.sight(camera, index, placement)).collect();
-        (!cameras.is_empty()).then(|| placements.iter().enumerate().map(of).collect())
     }
 
     /// Clusters that the camera does not see in the whole picture.
@@ -69,7 +59,7 @@ impl Frame {
     }
 
     /// The camera for a viewport of `size` pixels.
-    fn camera(&self, size: [u32; 2]) -> sight::SightCamera {
+    pub(super) fn camera(&self, size: [u32; 2]) -> sight::SightCamera {
         let camera = &self.scene.data.camera;
         let aspect = f64::from(size[0]) / f64::from(size[1].max(1));
         sight::SightCamera {
@@ -82,7 +72,7 @@ impl Frame {
     }
 
     /// How an entity is seen.
-    fn sight(&self, camera: &sight::SightCamera, index: usize, placement: &Placement) -> Sight {
+    pub(super) fn sight(&self, camera: &sight::SightCamera, index: usize, placement: &Placement) -> Sight {
         let mesh = self.scene.entities[index].mesh;
         let device_mesh = &self.buffers.meshes[mesh];
         let world_from_object = camera::world_from_centred(placement, device_mesh.centre_m);
@@ -106,14 +96,14 @@ impl Frame {
                 radiosity_offset: self.radiosity.offsets[index],
                 tag: smooth::tag(index),
                 index: index as u32,
-                by_pixel: self.pixel.as_ref().and_then(|pixel| pixel.of(index)),
+                by_pixel: self.chains.as_ref().and_then(|chains| chains.of(index)),
             };
             let radius_m = device_mesh.radius_m * f64::from(placement.scale);
             let distance_m = self.centre(index, placement).distance(camera.eye) - radius_m;
             (drawn.mesh.grid().is_some(), distance_m, drawn)
         });
-        // From near to far, so that few fragments are shaded that something nearer hides later. Grids come last: a fragment of a
-        // grid costs most.
+        // From near to far, so that few fragments are shaded that something nearer hides later. Grids come last: a
+        // fragment of a grid costs most.
         let mut drawn: Vec<(bool, f64, DrawnEntity<'_>)> = drawn.collect();
         drawn.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         drawn.into_iter().map(|(_, _, entity)| entity).collect()

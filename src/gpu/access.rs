@@ -1,8 +1,8 @@
 //! Kinds of access, the barriers between them, and the tracker that reports a missing barrier.
 //!
-//! The validation layer of Debian 12 misses a hazard between two dispatches on one storage buffer; the tracker finds it. It
-//! knows every use that a recording declares (reflected from the shaders) and every barrier, and checks each pair of
-//! overlapping uses of which at least one writes.
+//! The validation layer of Debian 12 misses a hazard between two dispatches on one storage buffer; the tracker finds
+//! it. It knows every use that a recording declares (reflected from the shaders) and every barrier, and checks each
+//! pair of overlapping uses of which at least one writes.
 
 use crate::error::{Error, Result};
 use ash::vk;
@@ -157,7 +157,8 @@ impl Tracker {
         self.use_range(image, name, 0..u64::MAX, access, pass);
     }
 
-    /// Notes a use of a byte range, and an objection for each earlier conflicting use that no barrier separates from it.
+    /// Notes a use of a byte range, and an objection for each earlier conflicting use that no barrier separates from
+    /// it.
     pub fn use_range(&mut self, resource: u64, name: &str, range: Range<u64>, access: Access, pass: &str) {
         self.order += 1;
         let uses = self.uses.entry(resource).or_default();
@@ -181,9 +182,6 @@ impl Tracker {
     }
 
     /// Reports all objections together.
-    ///
-    /// # Errors
-    /// `Failed` when a barrier was missing or an image was in another layout than its use needs.
     pub fn verdict(&self) -> Result<()> {
         if self.objections.is_empty() {
             return Ok(());

@@ -2,7 +2,6 @@
 
 use super::image::Image;
 use super::memory::{Buffer, TexelView};
-use super::volume::Volume;
 use std::ops::Range;
 
 /// A resource given to a pass; its position in the list is its binding number.
@@ -16,8 +15,6 @@ pub enum Bind<'r> {
     Texel(TexelView<'r>),
     /// An image that is read with `texelFetch`.
     Image(&'r Image),
-    /// An image of three dimensions with its sampler.
-    Volume(&'r Volume),
     /// No resource: the shader permutation does not have this binding.
     None,
 }

@@ -11,8 +11,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 /// `Fma` of the extended instruction set GLSL.std.450.
 const FMA: u32 = 50;
 
-/// Counts for one iteration of the longest loop, or for the whole shader if it has no loop. The code is not executed: both
-/// sides of a branch count, which is what they cost on devices that mask lanes.
+/// Counts for one iteration of the longest loop, or for the whole shader if it has no loop. The code is not executed:
+/// both sides of a branch count, which is what they cost on devices that mask lanes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Census {
     /// Additions, subtractions and multiplications of floats, component by component.
@@ -27,9 +27,6 @@ pub struct Census {
 
 impl Census {
     /// Counts a shader.
-    ///
-    /// # Errors
-    /// `Failed` when the words are no SPIR-V.
     pub fn new(shader: &Shader) -> Result<Self> {
         let module = rspirv::dr::load_words(&shader.spirv)
             .map_err(|error| Error::Failed(format!("{}: unreadable SPIR-V: {error}", shader.name)))?;
@@ -48,9 +45,6 @@ impl Census {
 }
 
 /// SPIR-V as text, one instruction per line.
-///
-/// # Errors
-/// `Failed` when the words are no SPIR-V.
 pub fn disassemble(shader: &Shader) -> Result<String> {
     use rspirv::binary::Disassemble;
     let module = rspirv::dr::load_words(&shader.spirv)
@@ -75,7 +69,8 @@ fn loops<'m>(blocks: &[&'m Block]) -> Vec<Vec<&'m Block>> {
     let body = |header: &&'m Block| {
         let merge = header.instructions.iter().find(|i| i.class.opcode == Op::LoopMerge)?;
         let end = ids(merge).next()?;
-        let (mut seen, mut open) = (BTreeSet::from([end]), vec![label(header)]);
+        let mut seen = BTreeSet::from([end]);
+        let mut open = vec![label(header)];
         let mut body = Vec::new();
         while let Some(next) = open.pop() {
             if let (true, Some(&block)) = (seen.insert(next), by_label.get(&next)) {

@@ -1,7 +1,8 @@
 //! Recording and submitting: dispatches, draws, copies, barriers, timers and labels.
 //!
-//! A [`Commands`] borrows every resource that is recorded into it. `submit` waits for the device; `launch` does not. Dropping
-//! a resource waits for every launched recording ([`Device::settle`]), so nothing is destroyed while the device uses it.
+//! A [`Commands`] borrows every resource that is recorded into it. `submit` waits for the device; `launch` does not.
+//! Dropping a resource waits for every launched recording ([`Device::settle`]), so nothing is destroyed while the
+//! device uses it.
 
 use super::access::{Access, Tracker};
 use super::bind::Bind;
@@ -43,9 +44,6 @@ pub struct Commands<'r> {
 
 impl<'r> Commands<'r> {
     /// Starts a recording; messages and captures show `name`.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, name: &str) -> Result<Self> {
         Ok(Commands {
             recording: Recording::new(device, name)?,
@@ -59,9 +57,6 @@ impl<'r> Commands<'r> {
 
     /// Runs `record` as one labelled, timed pass. On some devices full barriers stand around it, see
     /// [`Commands::separates_passes`].
-    ///
-    /// # Errors
-    /// What `record` returns.
     ///
     /// # Panics
     /// When passes nest or a recording has more than 64 of them.
@@ -93,9 +88,6 @@ impl<'r> Commands<'r> {
     }
 
     /// Lets [`super::Drawing::counted`] count in this recording, on devices that count exactly. Outside a render pass.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn count_samples(&mut self) -> Result<()> {
         if self.recording.device.info.counts_samples { self.recording.count_samples() } else { Ok(()) }
     }
@@ -117,15 +109,16 @@ impl<'r> Commands<'r> {
         }
     }
 
-    /// Whether a barrier between all commands stands on both sides of each pass, so that passes do not overlap. This is so on
-    /// software devices, whose timestamps need it. The tracker does not count these barriers, so they cannot replace one
-    /// between passes.
+    /// Whether a barrier between all commands stands on both sides of each pass, so that passes do not overlap. This is
+    /// so on software devices, whose timestamps need it. The tracker does not count these barriers, so they cannot
+    /// replace one between passes.
     pub fn separates_passes(&self) -> bool {
         self.recording.device.info.is_software()
     }
 
-    /// The barrier of [`Commands::separates_passes`], after a timestamp. It orders execution and makes no memory visible. llvmpipe
-    /// takes a timestamp when it next rasterises or meets a barrier, not at its place among dispatches.
+    /// The barrier of [`Commands::separates_passes`], after a timestamp. It orders execution and makes no memory
+    /// visible. llvmpipe takes a timestamp when it next rasterises or meets a barrier, not at its place among
+    /// dispatches.
     fn timestamp_barrier(&self, stage: vk::PipelineStageFlags2) {
         let barriers = [vk::MemoryBarrier2::default().src_stage_mask(stage).dst_stage_mask(stage)];
         let info = vk::DependencyInfo::default().memory_barriers(&barriers);
@@ -137,7 +130,8 @@ impl<'r> Commands<'r> {
         self.recording.passes.last().unwrap_or(&self.recording.name).clone()
     }
 
-    /// Memory barrier: all `from` accesses before it are complete and visible to all `to` accesses after it, for every buffer.
+    /// Memory barrier: all `from` accesses before it are complete and visible to all `to` accesses after it, for every
+    /// buffer.
     pub fn barrier(&mut self, from: Access, to: Access) {
         if self.skip_barrier() {
             return;
@@ -153,8 +147,8 @@ impl<'r> Commands<'r> {
         unsafe { self.recording.device.handle.cmd_pipeline_barrier2(self.recording.buffer, &info) };
     }
 
-    /// As [`Commands::barrier`] for one image, which moves to the layout that `to` needs. With `from` of `None` its content
-    /// is discarded.
+    /// As [`Commands::barrier`] for one image, which moves to the layout that `to` needs. With `from` of `None` its
+    /// content is discarded.
     pub fn image_barrier(&mut self, image: &'r Image, from: Option<Access>, to: Access) {
         if from.is_some() && self.skip_barrier() {
             return;
@@ -190,9 +184,6 @@ impl<'r> Commands<'r> {
     }
 
     /// Runs a compute pipeline over `elements` invocations in x, y and z; `resources` stand at their binding numbers.
-    ///
-    /// # Errors
-    /// `Input` when a buffer is larger than the device can bind or there are more elements than it can dispatch.
     ///
     /// # Panics
     /// When the resources or push constants do not match the shader's declarations.
@@ -326,18 +317,12 @@ impl<'r> Commands<'r> {
     }
 
     /// Ends the recording, submits it and waits. Returns the duration of each pass, in order.
-    ///
-    /// # Errors
-    /// `Failed` when the tracker found a missing barrier (then nothing is submitted); `Device` when the device was lost.
     pub fn submit(self) -> Result<Vec<Timing>> {
         self.end()?.run(Signals::default())?.wait()
     }
 
-    /// Ends the recording and submits it without waiting. The recording must begin with [`Commands::after_flights`], because
-    /// earlier recordings may still use its resources.
-    ///
-    /// # Errors
-    /// As [`Commands::submit`].
+    /// Ends the recording and submits it without waiting. The recording must begin with [`Commands::after_flights`],
+    /// because earlier recordings may still use its resources.
     ///
     /// # Panics
     /// When [`FLIGHTS`](super::FLIGHTS) recordings are already in flight.

@@ -1,4 +1,5 @@
-//! What is being compiled now. A shader of seven bands takes a minute, so whoever runs in a terminal can say what it waits for.
+//! What is being compiled now. A shader of seven bands takes a minute, so whoever runs in a terminal can say what it
+//! waits for.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;

@@ -1,5 +1,5 @@
-//! Resources of a dispatch: writes descriptor sets in binding order, checks them against the shader and reports them to the
-//! tracker.
+//! Resources of a dispatch: writes descriptor sets in binding order, checks them against the shader and reports them to
+//! the tracker.
 
 use super::Checked;
 use super::access::Access;
@@ -67,8 +67,9 @@ impl<'r> Commands<'r> {
                 .dst_binding(binding.index)
                 .descriptor_type(descriptor_type(binding.kind))
                 .descriptor_count(1);
-            let (mut buffers, mut views, mut images) =
-                ([Default::default()], [Default::default()], [Default::default()]);
+            let mut buffers = [Default::default()];
+            let mut views = [Default::default()];
+            let mut images = [Default::default()];
             match (binding.kind, resource) {
                 (BindingKind::Storage | BindingKind::Uniform, Bind::Buffer(_) | Bind::Range(..)) => {
                     let (buffer, range) = self.buffer_range(binding, resource, name)?;
@@ -94,12 +95,6 @@ impl<'r> Commands<'r> {
                         image_view: image.view(),
                         image_layout: sampled.layout(),
                     }];
-                    write = write.image_info(&images);
-                }
-                (BindingKind::Volume, Bind::Volume(volume)) => {
-                    let access = Access::ComputeSampled;
-                    self.tracker.use_image(volume.id, &volume.name, access, &pass);
-                    images = [volume.descriptor(access.layout())];
                     write = write.image_info(&images);
                 }
                 _ => complain(name, binding, "another kind of resource, or none, was given"),
@@ -179,7 +174,7 @@ impl<'r> Commands<'r> {
         // SAFETY: the pool has room (counted); freed with it.
         let sets = unsafe { handle.allocate_descriptor_sets(&allocate) }
             .checked("vkAllocateDescriptorSets", &self.recording.name)?;
-        // The set has no name beside its pool's: lavapipe of Mesa 22.3 never frees those, which took 142 bytes a frame of `bench soak`.
+        // The set has no name beside its pool's: lavapipe of Mesa 22.3 never frees those, which took 142 bytes a frame.
         Ok(sets[0])
     }
 }

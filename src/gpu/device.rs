@@ -67,18 +67,12 @@ pub struct Device {
 
 impl Device {
     /// Every physical device, in the loader's order.
-    ///
-    /// # Errors
-    /// `Unsupported` without a loader.
     pub fn list() -> Result<Vec<Candidate>> {
         let instance = Instance::new(Validation::Off, &[])?;
         Ok(physical_devices(&instance.handle)?.into_iter().map(|(_, candidate)| candidate).collect())
     }
 
     /// Opens the chosen device with Vulkan 1.3 core features and no extension.
-    ///
-    /// # Errors
-    /// `Unsupported` without a loader, a suitable device, or the validation layer that was asked for.
     pub fn new(options: &DeviceOptions) -> Result<Arc<Self>> {
         Self::with_extensions(options, &[], &[])
     }
@@ -130,9 +124,6 @@ impl Device {
     }
 
     /// A device of its parts: made here, or shared by a caller.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub(super) fn complete(instance: &Arc<Instance>, parts: Parts, cache_dir: Option<PathBuf>) -> Result<Arc<Self>> {
         let Parts { physical, handle, queue, queue_family, info, is_shared } = parts;
         // SAFETY: queries on a handle that the live instance returned.
@@ -194,8 +185,8 @@ impl Device {
         self.instance.messages.clone()
     }
 
-    /// Makes every recording omit its `index`-th barrier, counted from 0, so that a test can show that the tracker reports it;
-    /// `None` restores normal recording.
+    /// Makes every recording omit its `index`-th barrier, counted from 0, so that a test can show that the tracker
+    /// reports it; `None` restores normal recording.
     pub fn omit_barrier(&self, index: Option<usize>) {
         self.omitted_barrier.store(index.unwrap_or(usize::MAX), Ordering::Relaxed);
     }
@@ -216,8 +207,9 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: every owner of a child object holds an `Arc` of this device, so no child object is left. What was submitted has
-        // ended, as its owners wait for it; a shared device may still work for its caller, who destroys it.
+        // SAFETY: every owner of a child object holds an `Arc` of this device, so no child object is left. What was
+        // submitted has ended, as its owners wait for it; a shared device may still work for its caller, who destroys
+        // it.
         unsafe {
             if !self.is_shared {
                 let _ = self.handle.device_wait_idle();

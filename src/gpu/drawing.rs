@@ -26,9 +26,6 @@ pub struct Target<'r> {
 
 impl<'r> Commands<'r> {
     /// Renders into `target` what `record` draws, in order.
-    ///
-    /// # Errors
-    /// What `record` returns.
     pub fn render(
         &mut self,
         target: &Target<'r>,
@@ -37,11 +34,8 @@ impl<'r> Commands<'r> {
         self.render_part(target, [true, true], record)
     }
 
-    /// As [`Commands::render`] for a picture that several render passes draw, with barriers between them. `ends` says whether
-    /// this pass is the first, which clears, and whether it is the last, which resolves.
-    ///
-    /// # Errors
-    /// What `record` returns.
+    /// As [`Commands::render`] for a picture that several render passes draw, with barriers between them. `ends` says
+    /// whether this pass is the first, which clears, and whether it is the last, which resolves.
     pub fn render_part(
         &mut self,
         target: &Target<'r>,
@@ -130,11 +124,8 @@ impl<'r> Drawing<'_, 'r> {
         self.pipeline = Some(pipeline);
     }
 
-    /// Draws one triangle that covers the area, with a pipeline whose vertex shader makes it from `gl_VertexIndex`; `resources`
-    /// are images that its fragment shader reads, at their binding numbers.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// Draws one triangle that covers the area, with a pipeline whose vertex shader makes it from `gl_VertexIndex`;
+    /// `resources` are images that its fragment shader reads, at their binding numbers.
     ///
     /// # Panics
     /// When resources or push constants are not what the shaders declare.
@@ -142,8 +133,10 @@ impl<'r> Drawing<'_, 'r> {
         assert!(pipeline.inputs.is_empty(), "{}: makes its own vertices", pipeline.name);
         self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)?;
         self.commands.push(&pipeline.layout, &pipeline.name, push);
-        let (handle, buffer) = (&self.commands.recording.device.handle, self.commands.recording.buffer);
-        // SAFETY: pipeline and resources are borrowed until the commands are submitted; the vertex shader reads no buffer.
+        let handle = &self.commands.recording.device.handle;
+        let buffer = self.commands.recording.buffer;
+        // SAFETY: pipeline and resources are borrowed until the commands are submitted; the vertex shader reads no
+        // buffer.
         unsafe {
             handle.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
             handle.cmd_draw(buffer, 3, 1, 0, 0);
@@ -153,9 +146,6 @@ impl<'r> Drawing<'_, 'r> {
 
     /// Binds images that the bound pipeline's fragment shader reads, at their binding numbers.
     ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    ///
     /// # Panics
     /// Before [`Drawing::bind`], and when resources are not what the shaders declare.
     pub fn resources(&mut self, resources: &[Bind<'r>]) -> Result<()> {
@@ -163,11 +153,8 @@ impl<'r> Drawing<'_, 'r> {
         self.commands.bind(&pipeline.layout, &pipeline.name, vk::PipelineBindPoint::GRAPHICS, resources)
     }
 
-    /// Counts the samples that `record` draws, once a pass; its [`super::Timing`] holds the number. Nothing is counted without
-    /// [`Commands::count_samples`] before, or by a device that cannot count exactly.
-    ///
-    /// # Errors
-    /// What `record` returns.
+    /// Counts the samples that `record` draws, once a pass; its [`super::Timing`] holds the number. Nothing is counted
+    /// without [`Commands::count_samples`] before, or by a device that cannot count exactly.
     ///
     /// # Panics
     /// When a pass counts twice.
@@ -179,7 +166,8 @@ impl<'r> Drawing<'_, 'r> {
         let query = recording.passes.len() as u32 - 1;
         assert!(!recording.counted.contains(&query), "{}: a pass counts once", recording.name);
         recording.counted.push(query);
-        // SAFETY: for both calls, the command buffer is recording inside a render pass, and the query was reset before it.
+        // SAFETY: for both calls, the command buffer is recording inside a render pass, and the query was reset before
+        // it.
         unsafe {
             let Recording { device, buffer, samples, .. } = &self.commands.recording;
             device.handle.cmd_begin_query(*buffer, *samples, query, vk::QueryControlFlags::PRECISE);
@@ -193,11 +181,6 @@ impl<'r> Drawing<'_, 'r> {
         outcome
     }
 
-    #[cfg(feature = "view")]
-    pub(super) fn raw(&self) -> vk::CommandBuffer {
-        self.commands.recording.buffer
-    }
-
     /// Sets viewport and scissor to a rectangle in pixels.
     pub fn area(&mut self, x: u32, y: u32, width: u32, height: u32) {
         let viewport = vk::Viewport {
@@ -208,16 +191,21 @@ impl<'r> Drawing<'_, 'r> {
             min_depth: 0.0,
             max_depth: 1.0,
         };
+        let handle = &self.commands.recording.device.handle;
+        // SAFETY: the command buffer is recording.
+        unsafe { handle.cmd_set_viewport(self.commands.recording.buffer, 0, &[viewport]) };
+        self.clip([x, y, width, height]);
+    }
+
+    /// Sets the scissor alone.
+    pub fn clip(&mut self, [x, y, width, height]: [u32; 4]) {
         let scissor = vk::Rect2D {
             offset: vk::Offset2D { x: x.cast_signed(), y: y.cast_signed() },
             extent: vk::Extent2D { width, height },
         };
         let handle = &self.commands.recording.device.handle;
         // SAFETY: the command buffer is recording.
-        unsafe {
-            handle.cmd_set_viewport(self.commands.recording.buffer, 0, &[viewport]);
-            handle.cmd_set_scissor(self.commands.recording.buffer, 0, &[scissor]);
-        }
+        unsafe { handle.cmd_set_scissor(self.commands.recording.buffer, 0, &[scissor]) };
     }
 
     /// Sets the bound pipeline's push constants.
@@ -229,8 +217,8 @@ impl<'r> Drawing<'_, 'r> {
         self.commands.push(&pipeline.layout, &pipeline.name, push);
     }
 
-    /// Draws the triangles of a range of corners, three a triangle, with a pipeline whose vertex shader finds corner `gl_VertexIndex` by
-    /// itself.
+    /// Draws the triangles of a range of corners, three a triangle, with a pipeline whose vertex shader finds corner
+    /// `gl_VertexIndex` by itself.
     ///
     /// # Panics
     /// Before [`Drawing::bind`].

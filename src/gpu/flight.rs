@@ -1,7 +1,7 @@
 //! What a recording owns, and its execution: either submitted and waited for, or launched without waiting.
 //!
-//! A one-shot recording waits. A frame of the window is launched: at most [`FLIGHTS`] frames are in flight, and the owner of
-//! anything that they may use waits for all of them before it destroys it ([`Device::settle`]).
+//! A one-shot recording waits. A frame of the window is launched: at most [`FLIGHTS`] frames are in flight, and the
+//! owner of anything that they may use waits for all of them before it destroys it ([`Device::settle`]).
 
 use super::Checked;
 use super::device::Device;
@@ -73,7 +73,8 @@ impl Recording {
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         let queries =
             vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_PASSES);
-        // SAFETY: for the whole block, every handle is stored in `recording` as soon as it exists and destroyed in its `Drop`.
+        // SAFETY: for the whole block, every handle is stored in `recording` as soon as it exists and destroyed in its
+        // `Drop`.
         unsafe {
             recording.pool = handle.create_command_pool(&pool, None).checked("vkCreateCommandPool", name)?;
             recording.fence =
@@ -96,15 +97,13 @@ impl Recording {
     }
 
     /// Makes the queries that count samples, if there are none yet. The recording is outside a render pass.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn count_samples(&mut self) -> Result<()> {
         if self.samples != vk::QueryPool::null() {
             return Ok(());
         }
         let create = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION).query_count(MAX_PASSES);
-        // SAFETY: the pool is stored at once and destroyed in `Drop`; the command buffer is recording outside a render pass.
+        // SAFETY: the pool is stored at once and destroyed in `Drop`; the command buffer is recording outside a render
+        // pass.
         unsafe {
             let handle = &self.device.handle;
             self.samples = handle.create_query_pool(&create, None).checked("vkCreateQueryPool", &self.name)?;
@@ -145,8 +144,8 @@ impl Recording {
             .command_buffer_infos(&buffers)
             .wait_semaphore_infos(wait.as_slice())
             .signal_semaphore_infos(signal.as_slice())];
-        // SAFETY: for the whole block, the recording is complete; what it uses outlives it because its owners settle the device
-        // first, or because the caller waits; the queue is locked.
+        // SAFETY: for the whole block, the recording is complete; what it uses outlives it because its owners settle
+        // the device first, or because the caller waits; the queue is locked.
         unsafe {
             handle.end_command_buffer(self.buffer).checked("vkEndCommandBuffer", &self.name)?;
             let queue = self.device.queue();
@@ -193,9 +192,6 @@ pub struct Flight {
 
 impl Flight {
     /// Waits for its end. Returns the duration of each pass, in order.
-    ///
-    /// # Errors
-    /// `Device` when the device was lost.
     pub fn wait(mut self) -> Result<Vec<Timing>> {
         let recording = &mut self.recording;
         recording.wait()?;
@@ -249,8 +245,8 @@ impl Device {
         self.flights().len()
     }
 
-    /// Waits until the device has finished all launched recordings; returns at once if there are none. Owners of Vulkan objects
-    /// call it before they destroy them.
+    /// Waits until the device has finished all launched recordings; returns at once if there are none. Owners of Vulkan
+    /// objects call it before they destroy them.
     pub fn settle(&self) {
         let flights = self.flights();
         if !flights.is_empty() {

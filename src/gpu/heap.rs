@@ -1,15 +1,16 @@
 //! Settings of the host's allocator for a software device, and for a program that stays.
 
-/// Keeps freed memory in the process. llvmpipe allocates megabytes of transformed vertices and binned triangles for every
-/// draw; by default the C library returns them to the system after every frame, and the page faults of the next frame take
-/// about half of the time before rasterisation. The process keeps its peak amount of memory.
+/// Keeps freed memory in the process. llvmpipe allocates megabytes of transformed vertices and binned triangles for
+/// every draw; by default the C library returns them to the system after every frame, and the page faults of the next
+/// frame take about half of the time before rasterisation. The process keeps its peak amount of memory.
 pub(super) fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
         /// Bytes, more than a frame frees; the largest value that the library accepts for the second threshold.
         const BYTES: libc::c_int = 1 << 25;
-        /// Bytes of the largest piece of which the library makes the heaps of threads. Neither room of that size nor the
-        /// pieces are ever given back; a bake in one thread (LP_NUM_THREADS=0) would spend a quarter of its time on their page faults.
+        /// Bytes of the largest piece of which the library makes the heaps of threads. Neither room of that size nor
+        /// the pieces are ever given back; a bake in one thread (LP_NUM_THREADS=0) would spend a quarter of its time on
+        /// their page faults.
         const PIECE: libc::c_int = 1 << 26;
         // SAFETY: `mallopt` may be called at any time and only changes when memory goes back to the system.
         unsafe {
@@ -22,9 +23,10 @@ pub(super) fn keep_freed_memory() {
 
 /// Keeps all threads to one arena of the allocator; to be called before there are any.
 ///
-/// Each thread would have its own, up to eight for every processor, and keep there what it frees (`keep_freed_memory`). A driver's
-/// and a bake's threads come and go, and each arena grows to what the largest of them needed: a window in which lights were switched
-/// and scenes opened for two minutes held 770 MB, and 320 MB with one arena. Processor time of bakes and frames is the same.
+/// Each thread would have its own, up to eight for every processor, and keep there what it frees (`keep_freed_memory`).
+/// A driver's and a bake's threads come and go, and each arena grows to what the largest of them needed: a window in
+/// which lights were switched and scenes opened for two minutes held 770 MB, and 320 MB with one arena. Processor time
+/// of bakes and frames is the same.
 #[cfg(feature = "view")]
 pub fn share_arena() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
@@ -34,7 +36,8 @@ pub fn share_arena() {
     }
 }
 
-/// Returns to the system what the process has freed, wherever it lies. Pages that are used again are faulted in once more.
+/// Returns to the system what the process has freed, wherever it lies. Pages that are used again are faulted in once
+/// more.
 #[cfg(feature = "view")]
 pub fn give_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]

@@ -34,7 +34,8 @@ struct ImageHandle {
 impl Drop for ImageHandle {
     fn drop(&mut self) {
         self.device.settle();
-        // SAFETY: recordings that use the image borrow it until they are submitted, and no submission is under way (settled).
+        // SAFETY: recordings that use the image borrow it until they are submitted, and no submission is under way
+        // (settled).
         unsafe {
             self.device.handle.destroy_image_view(self.view, None);
             if self.owner.is_none() {
@@ -57,14 +58,12 @@ pub struct Image {
 
 impl Image {
     /// An image without content. Depth formats become depth attachments, all else colour attachments.
-    ///
-    /// # Errors
-    /// `Input` when it exceeds the device's largest image, `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, name: &str, shape: ImageShape) -> Result<Self> {
         use vk::ImageUsageFlags as Use;
         let most = device.most_image_px();
         if shape.width == 0 || shape.height == 0 || shape.width > most || shape.height > most {
-            let (width, height) = (shape.width, shape.height);
+            let width = shape.width;
+            let height = shape.height;
             return Err(Error::Input(format!("{name}: {width}x{height} is outside the device's 1..={most}")));
         }
         let depth = shape.format == vk::Format::D32_SFLOAT;

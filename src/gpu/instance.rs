@@ -25,11 +25,8 @@ pub(super) struct OwnInstance {
     pub(super) has_debug_utils: bool,
 }
 
-/// Checks that the loader has Vulkan 1.3, the validation layer if it is asked for, and the extensions in `surface`, which a window
-/// needs. Answers whether the loader has debug utils, which name objects in captures.
-///
-/// # Errors
-/// `Unsupported` with what is missing.
+/// Checks that the loader has Vulkan 1.3, the validation layer if it is asked for, and the extensions in `surface`,
+/// which a window needs. Answers whether the loader has debug utils, which name objects in captures.
 fn check_loader(entry: &ash::Entry, validation: Validation, surface: &[&'static CStr]) -> Result<bool> {
     // SAFETY: this and the two enumerations below are plain queries on a live entry.
     let version = unsafe { entry.try_enumerate_instance_version() }
@@ -136,7 +133,8 @@ impl Instance {
 impl Drop for Instance {
     fn drop(&mut self) {
         let Some(own) = &self.own else { return };
-        // SAFETY: the logical device was dropped before (field order of `Device`); the messenger goes before its instance.
+        // SAFETY: the logical device was dropped before (field order of `Device`); the messenger goes before its
+        // instance.
         unsafe {
             if let Some((loader, messenger)) = &own.debug {
                 loader.destroy_debug_utils_messenger(*messenger, None);

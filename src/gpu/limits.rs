@@ -6,9 +6,6 @@ use crate::error::{Error, Result};
 use ash::vk;
 
 /// Refuses what exceeds a limit.
-///
-/// # Errors
-/// `Unsupported` with what is asked for, how much of it, and how much the device takes.
 pub(super) fn check(
     limits: &vk::PhysicalDeviceLimits,
     name: &str,
@@ -18,13 +15,12 @@ pub(super) fn check(
     let push_bytes = shaders.iter().map(|s| s.reflection.push_bytes).max().unwrap_or(0);
     at_most(name, "bytes of push constants", push_bytes, limits.max_push_constants_size)?;
     let count = |kinds: &[BindingKind]| bindings.iter().filter(|b| kinds.contains(&b.kind)).count() as u32;
-    // A texel buffer counts as a sampled image, and a sampler's image as a sampler too.
-    let sampled = [BindingKind::Texel, BindingKind::Image, BindingKind::Volume];
+    // A texel buffer counts as a sampled image.
+    let sampled = [BindingKind::Texel, BindingKind::Image];
     for (what, asked, most) in [
         ("storage buffers a stage", count(&[BindingKind::Storage]), limits.max_per_stage_descriptor_storage_buffers),
         ("uniform buffers a stage", count(&[BindingKind::Uniform]), limits.max_per_stage_descriptor_uniform_buffers),
         ("sampled images a stage", count(&sampled), limits.max_per_stage_descriptor_sampled_images),
-        ("samplers a stage", count(&[BindingKind::Volume]), limits.max_per_stage_descriptor_samplers),
         ("resources a stage", bindings.len() as u32, limits.max_per_stage_resources),
     ] {
         at_most(name, what, asked, most)?;

@@ -6,19 +6,18 @@ use std::sync::OnceLock;
 
 static BEFORE: OnceLock<vk::PFN_vkGetInstanceProcAddr> = OnceLock::new();
 
-/// Puts a function before the system's loader, for the rest of the process: every function of every instance and device that is made
-/// from now on is asked of it. A test finds calls, makes them fail and counts objects with it. The first caller decides.
+/// Puts a function before the system's loader, for the rest of the process: every function of every instance and device
+/// that is made from now on is asked of it. A test finds calls, makes them fail and counts objects with it. The first
+/// caller decides.
 ///
 /// # Safety
-/// The function keeps the contract of `vkGetInstanceProcAddr`, and so do the functions that it returns, until the process ends.
+/// The function keeps the contract of `vkGetInstanceProcAddr`, and so do the functions that it returns, until the
+/// process ends.
 pub unsafe fn stand_before(function: vk::PFN_vkGetInstanceProcAddr) {
     BEFORE.get_or_init(|| function);
 }
 
 /// The functions that need no instance.
-///
-/// # Errors
-/// `Unsupported` when there is no loader.
 pub(super) fn entry() -> Result<ash::Entry> {
     if let Some(function) = BEFORE.get() {
         // SAFETY: whoever stands before the loader keeps its contract.

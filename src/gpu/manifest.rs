@@ -26,7 +26,7 @@ pub(super) fn broken() -> Option<Error> {
     let named = VARIABLES.iter().filter_map(std::env::var_os);
     let named: Vec<PathBuf> = named.flat_map(|value| std::env::split_paths(&value).collect::<Vec<_>>()).collect();
     named.into_iter().chain(FOLDERS.map(PathBuf::from)).flat_map(|place| files(&place)).find_map(|file| {
-        let text = std::fs::read(&file).ok()?;
+        let text = crate::files::read(&file).ok()?;
         let error = serde_json::from_slice::<serde_json::Value>(&text).err()?;
         let why = one_line(&error.to_string());
         Some(Error::Unsupported(format!("{}: the description of a Vulkan driver is not JSON: {why}", file.display())))

@@ -94,7 +94,8 @@ impl Drop for BufferHandle {
     fn drop(&mut self) {
         self.device.settle();
         let views = self.views.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
-        // SAFETY: recordings that use the buffer borrow it until they are submitted, and no submission is under way (settled).
+        // SAFETY: recordings that use the buffer borrow it until they are submitted, and no submission is under way
+        // (settled).
         unsafe {
             for (_, view) in views.drain(..) {
                 self.device.handle.destroy_buffer_view(view, None);
@@ -117,17 +118,14 @@ pub struct Buffer {
     pub(super) id: u64,
 }
 
-// SAFETY: the mapped pointer is only used through `&self`/`&mut self` methods that copy whole slices; Vulkan handles may be
-// used from any thread.
+// SAFETY: the mapped pointer is only used through `&self`/`&mut self` methods that copy whole slices; Vulkan handles
+// may be used from any thread.
 unsafe impl Send for Buffer {}
 // SAFETY: as above; `write` takes `&mut self`, so two threads cannot write at once.
 unsafe impl Sync for Buffer {}
 
 impl Buffer {
     /// An uninitialised buffer of `size_bytes` (at least 4 are allocated).
-    ///
-    /// # Errors
-    /// `Input` when the device can never hold it, `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, name: &str, kind: BufferKind, size_bytes: u64) -> Result<Self> {
         use vk::BufferUsageFlags as Use;
         let size_bytes = size_bytes.max(4);
@@ -147,7 +145,8 @@ impl Buffer {
         // SAFETY: the handle is alive.
         let needs = unsafe { device.handle.get_buffer_memory_requirements(handle.buffer) };
         let memory = Allocation::new(device, name, needs, kind.preferences())?;
-        // SAFETY: fresh buffer and memory of sufficient size; the whole allocation is mapped once and unmapped by freeing.
+        // SAFETY: fresh buffer and memory of sufficient size; the whole allocation is mapped once and unmapped by
+        // freeing.
         let mapped = unsafe {
             device.handle.bind_buffer_memory(handle.buffer, memory.handle, 0).checked("vkBindBufferMemory", name)?;
             if memory.host_coherent {
@@ -164,22 +163,16 @@ impl Buffer {
         Ok(Buffer { handle, memory, mapped, kind, size_bytes, name: name.to_owned(), id })
     }
 
-    /// A device buffer that holds `data`, copied directly if the host can map device memory, else through a staging buffer
-    /// and a submission of its own.
-    ///
-    /// # Errors
-    /// As [`Buffer::new`].
+    /// A device buffer that holds `data`, copied directly if the host can map device memory, else through a staging
+    /// buffer and a submission of its own.
     pub fn with_data<T: Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
         let mut buffer = Self::new(device, name, BufferKind::Device, size_of_val(data) as u64)?;
         buffer.fill(0, data)?;
         Ok(buffer)
     }
 
-    /// Writes `data` at a byte offset (a multiple of 4), directly or through a staging buffer as the memory allows. It first
-    /// waits for all recordings in flight.
-    ///
-    /// # Errors
-    /// As [`Buffer::new`].
+    /// Writes `data` at a byte offset (a multiple of 4), directly or through a staging buffer as the memory allows. It
+    /// first waits for all recordings in flight.
     pub fn fill<T: Pod>(&mut self, offset_bytes: u64, data: &[T]) -> Result<()> {
         if self.mapped.is_some() {
             self.device().settle();
@@ -228,24 +221,19 @@ impl Buffer {
         assert!(end <= self.size_bytes, "{}: read to byte {end} of {}", self.name, self.size_bytes);
         let mut out = vec![T::zeroed(); count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut out);
-        // SAFETY: in bounds of the mapping (asserted); every submission that writes it has finished, as the caller sees to.
+        // SAFETY: in bounds of the mapping (asserted); every submission that writes it has finished, as the caller sees
+        // to.
         unsafe { std::ptr::copy_nonoverlapping(pointer.add(offset_bytes as usize), bytes.as_mut_ptr(), bytes.len()) };
         out
     }
 
-    /// Copies `count` elements from the start of a device buffer to the host, through a staging buffer and a submission of its
-    /// own.
-    ///
-    /// # Errors
-    /// As [`Buffer::new`].
+    /// Copies `count` elements from the start of a device buffer to the host, through a staging buffer and a submission
+    /// of its own.
     pub fn download<T: Pod>(&self, count: usize) -> Result<Vec<T>> {
         self.download_range(0..(count * size_of::<T>()) as u64)
     }
 
     /// As [`Buffer::download`] for a byte range.
-    ///
-    /// # Errors
-    /// As [`Buffer::new`].
     pub fn download_range<T: Pod>(&self, range: Range<u64>) -> Result<Vec<T>> {
         let device = self.device().clone();
         let size = range.end - range.start;
@@ -272,7 +260,8 @@ impl Buffer {
     }
 }
 
-/// A typed view of a whole buffer, which shaders read as `textureBuffer`. The buffer owns the view, so it is created once.
+/// A typed view of a whole buffer, which shaders read as `textureBuffer`. The buffer owns the view, so it is created
+/// once.
 #[derive(Clone, Copy)]
 pub struct TexelView<'b> {
     pub(super) handle: vk::BufferView,
@@ -296,9 +285,6 @@ impl<'b> TexelView<'b> {
     }
 
     /// A view of the whole of `buffer`.
-    ///
-    /// # Errors
-    /// `Input` when it has more texels than the device's views can hold.
     pub fn new(buffer: &'b Buffer, format: vk::Format) -> Result<Self> {
         let device = buffer.device();
         if !Self::fits(device, format, buffer.size_bytes) {

@@ -1,7 +1,7 @@
 //! A thin layer over `ash`: device, memory, shaders, pipelines, command recording.
 //!
-//! It knows nothing of spherical harmonics, fields or scenes, and it holds all of the crate's `unsafe`. Every Vulkan object
-//! has one owner whose `Drop` destroys it; every owner keeps the [`Device`] alive.
+//! It knows nothing of spherical harmonics, fields or scenes, and it holds all of the crate's `unsafe`. Every Vulkan
+//! object has one owner whose `Drop` destroys it; every owner keeps the [`Device`] alive.
 
 pub mod access;
 mod bind;
@@ -17,14 +17,10 @@ pub mod flight;
 pub mod heap;
 pub mod image;
 mod instance;
-#[cfg(feature = "view")]
-mod ledger;
 mod limits;
 pub mod loader;
 mod manifest;
 pub mod memory;
-#[cfg(feature = "view")]
-pub mod overlay;
 pub mod pipeline;
 pub mod pipeline_cache;
 #[cfg(feature = "view")]
@@ -36,7 +32,6 @@ pub mod share;
 pub mod signals;
 pub mod upload;
 pub mod validation;
-pub mod volume;
 #[cfg(feature = "view")]
 pub mod window;
 
@@ -54,10 +49,7 @@ pub use shader::{Shader, Stage};
 pub use share::Gpu;
 pub use upload::Upload;
 pub use validation::Validation;
-pub use volume::Volume;
 
-#[cfg(feature = "view")]
-pub use overlay::{Overlay, Paint};
 #[cfg(feature = "view")]
 pub use present::PresentMode;
 #[cfg(feature = "view")]

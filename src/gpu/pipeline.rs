@@ -72,7 +72,8 @@ impl Layout {
 impl Drop for Layout {
     fn drop(&mut self) {
         self.device.settle();
-        // SAFETY: recordings that use the pipeline borrow it until they are submitted, and no submission is under way (settled).
+        // SAFETY: recordings that use the pipeline borrow it until they are submitted, and no submission is under way
+        // (settled).
         unsafe {
             self.device.handle.destroy_pipeline_layout(self.pipeline, None);
             self.device.handle.destroy_descriptor_set_layout(self.set, None);
@@ -94,7 +95,6 @@ pub(super) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
         BindingKind::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
         BindingKind::Texel => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
         BindingKind::Image => vk::DescriptorType::SAMPLED_IMAGE,
-        BindingKind::Volume => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
     }
 }
 
@@ -142,9 +142,6 @@ pub struct ComputePipeline {
 
 impl ComputePipeline {
     /// Builds the pipeline; `constants` sets specialisation constants by the name they have in the source.
-    ///
-    /// # Errors
-    /// `Unsupported` when the shader exceeds a device limit; `Failed` for a constant that the shader does not have.
     pub fn new(device: &Arc<Device>, name: &str, shader: &Shader, constants: &[(&str, u32)]) -> Result<Self> {
         let layout = Layout::new(device, name, &[shader])?;
         let local_size = shader.reflection.local_size;
@@ -189,6 +186,8 @@ pub enum Keeps {
     Smallest,
     /// The largest, likewise.
     Largest,
+    /// The last over what was there before, by its alpha, with which its colour is premultiplied.
+    Over,
 }
 
 /// Fixed-function state that differs between graphics pipelines. All have filled triangles, counter-clockwise
@@ -223,9 +222,6 @@ pub struct GraphicsPipeline {
 
 impl GraphicsPipeline {
     /// Builds the pipeline.
-    ///
-    /// # Errors
-    /// As [`ComputePipeline::new`].
     pub fn new(
         device: &Arc<Device>,
         name: &str,
@@ -314,10 +310,18 @@ fn vertex_layout(
 }
 
 fn color_blend(keeps: Keeps) -> vk::PipelineColorBlendAttachmentState {
-    let operation = if keeps == Keeps::Smallest { vk::BlendOp::MIN } else { vk::BlendOp::MAX };
+    let operation = match keeps {
+        Keeps::Smallest => vk::BlendOp::MIN,
+        Keeps::Largest => vk::BlendOp::MAX,
+        Keeps::Last | Keeps::Over => vk::BlendOp::ADD,
+    };
     vk::PipelineColorBlendAttachmentState::default()
         .color_write_mask(vk::ColorComponentFlags::RGBA)
         .blend_enable(keeps != Keeps::Last)
+        .src_color_blend_factor(vk::BlendFactor::ONE)
+        .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
+        .src_alpha_blend_factor(vk::BlendFactor::ONE)
+        .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
         .color_blend_op(operation)
         .alpha_blend_op(operation)
 }

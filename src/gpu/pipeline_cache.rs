@@ -15,11 +15,8 @@ impl Device {
     }
 
     /// A pipeline cache that begins with what is on disk.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub(super) fn load_pipeline_cache(&self, properties: &vk::PhysicalDeviceProperties) -> Result<vk::PipelineCache> {
-        let file = self.pipeline_cache_path().and_then(|path| std::fs::read(path).ok()).unwrap_or_default();
+        let file = self.pipeline_cache_path().and_then(|path| crate::files::read(&path).ok()).unwrap_or_default();
         let data = trusted(&file, properties).unwrap_or_default();
         if data.is_empty() && !file.is_empty() {
             log::info!("the pipeline cache on disk is damaged or belongs to another driver, and is replaced");
@@ -47,8 +44,8 @@ pub fn sealed(data: &[u8]) -> Vec<u8> {
     file
 }
 
-/// The data of a file; `None` if it was not sealed, or if it does not start with a version-one header of this very device (Vulkan
-/// specification, "Pipeline Cache Header").
+/// The data of a file; `None` if it was not sealed, or if it does not start with a version-one header of this very
+/// device (Vulkan specification, "Pipeline Cache Header").
 pub fn trusted<'f>(file: &'f [u8], properties: &vk::PhysicalDeviceProperties) -> Option<&'f [u8]> {
     let (seal, data) = file.split_at_checked(SEAL)?;
     let word = |at: usize| data.get(at..at + 4).map(|b| u32::from_le_bytes(b.try_into().expect("four bytes")));

@@ -34,10 +34,11 @@ impl PresentMode {
     }
 }
 
-/// The swapchain's size in pixels: the surface's, or if it has none, the window's clamped to the surface's bounds. `None` if
-/// a side is 0.
+/// The swapchain's size in pixels: the surface's, or if it has none, the window's clamped to the surface's bounds.
+/// `None` if a side is 0.
 pub(super) fn extent(can: &vk::SurfaceCapabilitiesKHR, size: [u32; 2]) -> Option<[u32; 2]> {
-    let (least, most) = (can.min_image_extent, can.max_image_extent);
+    let least = can.min_image_extent;
+    let most = can.max_image_extent;
     let own = can.current_extent;
     let [width, height] = if own.width == u32::MAX { size } else { [own.width, own.height] };
     if width == 0 || height == 0 || size.contains(&0) || most.width == 0 || most.height == 0 {
@@ -50,8 +51,8 @@ pub(super) fn is_srgb(format: vk::Format) -> bool {
     matches!(format, vk::Format::B8G8R8A8_SRGB | vk::Format::R8G8B8A8_SRGB)
 }
 
-/// An sRGB format if there is one, because the device then encodes and blends linearly; else an 8-bit format that the shader
-/// encodes for.
+/// An sRGB format if there is one, because the device then encodes and blends linearly; else an 8-bit format that the
+/// shader encodes for.
 pub(super) fn best_format(formats: &[vk::SurfaceFormatKHR]) -> Result<vk::SurfaceFormatKHR> {
     let plain = |f: &vk::SurfaceFormatKHR| matches!(f.format, vk::Format::B8G8R8A8_UNORM | vk::Format::R8G8B8A8_UNORM);
     let shown = || formats.iter().filter(|f| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR);
@@ -98,7 +99,8 @@ mod tests {
     #[test]
     fn srgb_before_plain_before_none() {
         let of = |format| vk::SurfaceFormatKHR { format, color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR };
-        let (plain, srgb) = (of(vk::Format::B8G8R8A8_UNORM), of(vk::Format::B8G8R8A8_SRGB));
+        let plain = of(vk::Format::B8G8R8A8_UNORM);
+        let srgb = of(vk::Format::B8G8R8A8_SRGB);
         assert_eq!(best_format(&[plain, srgb]).unwrap().format, srgb.format);
         assert_eq!(best_format(&[plain]).unwrap().format, plain.format);
         assert_eq!(best_format(&[of(vk::Format::R5G6B5_UNORM_PACK16)]).unwrap_err().exit_code(), 3);

@@ -18,8 +18,6 @@ pub enum BindingKind {
     Texel,
     /// `texture2D` without a sampler.
     Image,
-    /// `sampler3D`.
-    Volume,
 }
 
 /// One binding of descriptor set 0.
@@ -81,10 +79,6 @@ pub struct Reflection {
 
 impl Reflection {
     /// Reads a module's declarations.
-    ///
-    /// # Errors
-    /// `Failed` when the words are no SPIR-V, or declare something that this layer does not use (other sets than 0,
-    /// unknown descriptor kinds).
     pub fn new(spirv: &[u32]) -> Result<Self> {
         let mut declarations = Declarations(Loader::new());
         match parse_words(spirv, &mut declarations) {
@@ -285,12 +279,6 @@ impl<'m> Reader<'m> {
                 Operand::Dim(Dim::Dim2D) => (BindingKind::Image, false),
                 ref other => return Err(Error::Failed(format!("{name}: images of {other:?} are not in use"))),
             },
-            (StorageClass::UniformConstant, Op::TypeSampledImage) => {
-                match self.definitions[&id(&definition.operands[0])].operands[1] {
-                    Operand::Dim(Dim::Dim3D) => (BindingKind::Volume, false),
-                    ref other => return Err(Error::Failed(format!("{name}: samplers of {other:?} are not in use"))),
-                }
-            }
             (class, opcode) => return Err(Error::Failed(format!("{name}: no binding for {class:?} of {opcode:?}"))),
         };
         let block_bytes = if definition.class.opcode == Op::TypeStruct { self.size_bytes(target) } else { 0 };

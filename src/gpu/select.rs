@@ -60,8 +60,8 @@ impl Candidate {
     }
 }
 
-/// Selects a device by index, UUID (hyphens are ignored) or part of its name; without `word`, the first of the best kind, GPUs
-/// before CPUs.
+/// Selects a device by index, UUID (hyphens are ignored) or part of its name; without `word`, the first of the best
+/// kind, GPUs before CPUs.
 ///
 /// # Errors
 /// `Unsupported` when there is no device, when none or several match, or when the match lacks a required feature.
@@ -110,8 +110,9 @@ pub(super) fn serves(family: &vk::QueueFamilyProperties) -> bool {
 }
 
 pub(super) fn version_text(version: u32) -> String {
-    let (major, minor, patch) =
-        (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version));
+    let major = vk::api_version_major(version);
+    let minor = vk::api_version_minor(version);
+    let patch = vk::api_version_patch(version);
     format!("{major}.{minor}.{patch}")
 }
 
@@ -126,8 +127,8 @@ pub(super) fn physical_devices(instance: &ash::Instance) -> Result<Vec<(vk::Phys
 
 /// What is to be told of one physical device.
 pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
-    // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are only
-    // chained if the device supports 1.3.
+    // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are
+    // only chained if the device supports 1.3.
     let (properties, unsuitable, counts_samples, identity, driver) = unsafe {
         let properties = instance.get_physical_device_properties(physical);
         let mut identity = vk::PhysicalDeviceIDProperties::default();
@@ -160,7 +161,8 @@ pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::Phy
         let bytes: Vec<u8> = chars.iter().map(|&c| c.cast_unsigned()).collect();
         CStr::from_bytes_until_nul(&bytes).map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
     };
-    let (driver_name, driver_info) = (text(&driver.driver_name), text(&driver.driver_info));
+    let driver_name = text(&driver.driver_name);
+    let driver_info = text(&driver.driver_info);
     let driver = match (driver_name.is_empty(), driver_info.is_empty()) {
         (true, _) => format!("driver version {}", properties.driver_version),
         (false, true) => driver_name,
@@ -183,9 +185,9 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, |cores| cores.get())
 }
 
-/// Gives a new process, one of so many at a time, its share of the cores as threads of llvmpipe besides the one that asks for a drawing,
-/// unless the environment says how many. Where every core has a process, none: with a thread besides, two processes on two cores took
-/// 11.1 s for what they did in 10.3 s without.
+/// Gives a new process, one of so many at a time, its share of the cores as threads of llvmpipe besides the one that
+/// asks for a drawing, unless the environment says how many. Where every core has a process, none: with a thread
+/// besides, two processes on two cores took 11.1 s for what they did in 10.3 s without.
 pub fn share_cores(command: &mut Command, processes: usize) {
     if std::env::var_os("LP_NUM_THREADS").is_none() {
         let threads = if processes >= cores() { 0 } else { cores() / processes };

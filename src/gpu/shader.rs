@@ -59,16 +59,13 @@ pub struct Shader {
 const INCLUDE_DEPTH: usize = 16;
 
 impl Shader {
-    /// Compiles `source`, or reads the words from `cache_dir` if the same source, includes and defines were compiled by the same
-    /// compiler before.
-    ///
-    /// # Errors
-    /// `Failed` with the compiler's messages, or when an include is missing.
+    /// Compiles `source`, or reads the words from `cache_dir` if the same source, includes and defines were compiled by
+    /// the same compiler before.
     pub fn compile(source: &ShaderSource<'_>, cache_dir: Option<&Path>) -> Result<Self> {
         let includes = gather(source)?;
         let key = key(source, &includes);
         let path = cache_dir.map(|folder| folder.join("spirv").join(format!("{key}.spv")));
-        let cached = path.as_ref().and_then(|path| std::fs::read(path).ok()).and_then(|bytes| words(&key, &bytes));
+        let cached = path.as_ref().and_then(|path| crate::files::read(path).ok()).and_then(|bytes| words(&key, &bytes));
         let shader = |spirv: Vec<u32>| -> Result<Self> {
             let reflection = Reflection::new(&spirv).map_err(|error| error.context(source.name))?;
             Ok(Shader { name: source.name.to_owned(), stage: source.stage, spirv, reflection })
@@ -174,8 +171,8 @@ fn compile(source: &ShaderSource<'_>, includes: &BTreeMap<String, String>) -> Re
     Ok(artifact.as_binary().to_vec())
 }
 
-/// Content of a cache file: a hash of the key and the words, then the words. Neither a damaged file nor one that was copied over
-/// another reaches a driver.
+/// Content of a cache file: a hash of the key and the words, then the words. Neither a damaged file nor one that was
+/// copied over another reaches a driver.
 fn seal(key: &str, spirv: &[u32]) -> Vec<u8> {
     let bytes: &[u8] = bytemuck::cast_slice(spirv);
     let mut out = hash(key, bytes).as_bytes().to_vec();

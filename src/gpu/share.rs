@@ -23,28 +23,28 @@ impl Gpu {
 
     /// Works on a device that the caller has made. Compiled shaders are kept in the folder `cache_dir`, or nowhere.
     ///
-    /// The library makes buffers, images, pipelines and command pools of its own and destroys them with the [`Gpu`] and what was
-    /// made with it. It never destroys the instance or the device, and never waits for the whole device.
+    /// The library makes buffers, images, pipelines and command pools of its own and destroys them with the [`Gpu`] and
+    /// what was made with it. It never destroys the instance or the device, and never waits for the whole device.
     ///
-    /// *Who waits.* Every method that submits waits with a fence of its own until its work has ended; nothing of the library's is under
-    /// way between two calls. Each recording starts behind all that the caller has submitted to the queue before, so that no light
-    /// is overwritten while a command of the caller's reads it; and what it writes is visible to all that the caller submits to
-    /// the queue afterwards. On another queue the caller needs a semaphore and, as the buffers are exclusive to this queue
-    /// family, a transfer of ownership.
+    /// *Who waits.* Every method that submits waits with a fence of its own until its work has ended; nothing of the
+    /// library's is under way between two calls. Each recording starts behind all that the caller has submitted to the
+    /// queue before, so that no light is overwritten while a command of the caller's reads it; and what it writes is
+    /// visible to all that the caller submits to the queue afterwards. On another queue the caller needs a semaphore
+    /// and, as the buffers are exclusive to this queue family, a transfer of ownership.
     ///
     /// # Errors
-    /// `Unsupported` where the physical device, the queue family or the version that the device was made for does not do;
-    /// `Device` when memory ran out.
+    /// `Unsupported` where the physical device, the queue family or the version that the device was made for does not
+    /// do; `Device` when memory ran out.
     ///
     /// # Safety
-    /// - `instance`, `physical` and `device` belong together and are alive, and so they stay until this [`Gpu`], its clones and all
-    ///   that was made with them are dropped.
+    /// - `instance`, `physical` and `device` belong together and are alive, and so they stay until this [`Gpu`], its
+    ///   clones and all that was made with them are dropped.
     /// - The instance was made for Vulkan 1.3 or later. The device was made with the features of
     ///   [`required_features`](super::device::required_features): dynamic rendering and synchronization2. No extension
     ///   and no other feature is needed.
     /// - `queue` is a queue of the family `queue_family` of that device, without special flags.
-    /// - While a call of this library runs on one thread, another one submits to `queue` or waits for it (or for the whole device)
-    ///   only while it holds [`Gpu::lock_queue`].
+    /// - While a call of this library runs on one thread, another one submits to `queue` or waits for it (or for the
+    ///   whole device) only while it holds [`Gpu::lock_queue`].
     /// - Handles that the library shows are not destroyed by the caller, and what they hold is only read.
     pub unsafe fn from_vulkan(
         instance: &ash::Instance,
@@ -80,8 +80,8 @@ impl Gpu {
         Device::complete(&instance, parts, cache_dir.map(Path::to_owned)).map(Gpu)
     }
 
-    /// Keeps the library off the queue until the guard is dropped: for another thread that uses the queue of a shared device.
-    /// A thread that holds it calls nothing of the library that submits, which would wait for ever.
+    /// Keeps the library off the queue until the guard is dropped: for another thread that uses the queue of a shared
+    /// device. A thread that holds it calls nothing of the library that submits, which would wait for ever.
     pub fn lock_queue(&self) -> MutexGuard<'_, vk::Queue> {
         self.0.queue()
     }

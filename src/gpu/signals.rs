@@ -1,6 +1,7 @@
 //! Signals that would end the program without a message, and an end without ceremony.
 
-/// Lets a write beyond the limit on file sizes (`ulimit -f`) fail like one to a full disk, instead of ending the program.
+/// Lets a write beyond the limit on file sizes (`ulimit -f`) fail like one to a full disk, instead of ending the
+/// program.
 pub fn fail_writes_beyond_limit() {
     // SAFETY: ignoring a signal installs no handler, so no code runs in a signal's context.
     #[cfg(unix)]

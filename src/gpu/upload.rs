@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 /// One buffer per flight, written in turn; readers use the one that was written last.
 ///
-/// A frame writes it at most once, after it has waited for the flight that read the same buffer [`FLIGHTS`] frames before.
+/// A frame writes it at most once, after it has waited for the flight that read the same buffer [`FLIGHTS`] frames
+/// before.
 pub struct Upload {
     buffers: [Buffer; FLIGHTS],
     last: usize,
@@ -18,19 +19,13 @@ pub struct Upload {
 
 impl Upload {
     /// Buffers of `size_bytes` each.
-    ///
-    /// # Errors
-    /// As [`Buffer::new`].
     pub fn new(device: &Arc<Device>, name: &str, size_bytes: u64) -> Result<Self> {
         let one = || Buffer::new(device, name, BufferKind::Upload, size_bytes);
         Ok(Upload { buffers: [one()?, one()?], last: 0 })
     }
 
-    /// Writes the whole content. A buffer that is too small is replaced by one that is half as large again as needed, so that
-    /// a slowly growing scene does not reallocate in each frame.
-    ///
-    /// # Errors
-    /// As [`Buffer::new`].
+    /// Writes the whole content. A buffer that is too small is replaced by one that is half as large again as needed,
+    /// so that a slowly growing scene does not reallocate in each frame.
     pub fn write<T: Pod>(&mut self, data: &[T]) -> Result<()> {
         self.last = (self.last + 1) % FLIGHTS;
         let buffer = &mut self.buffers[self.last];
@@ -40,16 +35,6 @@ impl Upload {
         }
         buffer.write(0, data);
         Ok(())
-    }
-
-    /// Index of the buffer that was written last.
-    pub fn place(&self) -> usize {
-        self.last
-    }
-
-    /// The buffer at that index, to read what the device wrote into it after its flight has ended.
-    pub fn at(&self, place: usize) -> &Buffer {
-        &self.buffers[place]
     }
 
     /// Bytes of all buffers together.

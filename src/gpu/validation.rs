@@ -8,7 +8,8 @@ use std::sync::Mutex;
 /// Name of the Khronos layer, as the loader lists it.
 pub const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// Message id names that are known to be harmless, each with the reason. Empty, because no tested driver needs an exception.
+/// Message id names that are known to be harmless, each with the reason. Empty, because no tested driver needs an
+/// exception.
 const ACCEPTED: &[(&str, &str)] = &[];
 
 /// How much of the validation layer is switched on.
@@ -83,7 +84,8 @@ pub(super) unsafe extern "system" fn on_message(
         // SAFETY: a non-null string of the callback data is NUL-terminated and outlives the call.
         unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
     };
-    let (id, body) = (text(data.p_message_id_name), text(data.p_message));
+    let id = text(data.p_message_id_name);
+    let body = text(data.p_message);
     if ACCEPTED.iter().any(|(accepted, _)| *accepted == id) || id == "Loader Message" {
         return vk::FALSE;
     }

@@ -14,9 +14,6 @@ use std::sync::Arc;
 
 impl Device {
     /// As [`Device::new`], with the extensions that windows of a display need.
-    ///
-    /// # Errors
-    /// As [`Device::new`], and `Unsupported` when the driver cannot open windows on that display.
     pub fn for_display(options: &DeviceOptions, display: RawDisplayHandle) -> Result<Arc<Self>> {
         let names = ash_window::enumerate_required_extensions(display)
             .checked("surface extensions", "display")
@@ -45,8 +42,8 @@ impl WindowSurface {
         let own = device.instance.own.as_ref();
         let entry = &own.ok_or_else(|| Error::Unsupported("a shared device opens no windows".into()))?.entry;
         let loader = khr::surface::Instance::new(entry, instance);
-        // SAFETY: the handles are those of a live window, which this surface keeps alive; destroyed in `Drop`, before the
-        // instance, which the device keeps alive.
+        // SAFETY: the handles are those of a live window, which this surface keeps alive; destroyed in `Drop`, before
+        // the instance, which the device keeps alive.
         let handle = unsafe { ash_window::create_surface(entry, instance, display, handle, None) }
             .checked("vkCreateSurfaceKHR", "window")?;
         let surface = WindowSurface { device: device.clone(), loader, handle, _window: Box::new(window.clone()) };
@@ -146,7 +143,8 @@ pub struct Window {
     device: Arc<Device>,
     /// Dropped before the surface.
     chain: Option<Swapchain>,
-    /// Signalled when an image may be drawn into. There is one more than flights, since one image may be acquired ahead.
+    /// Signalled when an image may be drawn into. There is one more than flights, since one image may be acquired
+    /// ahead.
     acquired: Vec<Semaphore>,
     next: usize,
     format: vk::SurfaceFormatKHR,
@@ -159,9 +157,6 @@ pub struct Window {
 
 impl Window {
     /// Prepares to draw into a window of `size` pixels.
-    ///
-    /// # Errors
-    /// `Unsupported` when the device cannot draw into it or has no such present mode.
     pub fn new<W: HasDisplayHandle + HasWindowHandle + 'static>(
         device: &Arc<Device>,
         window: &Arc<W>,
@@ -218,11 +213,8 @@ impl Window {
         }
     }
 
-    /// Acquires the next image, after rebuilding the swapchain if it no longer fits the window. `None` if nothing can be shown,
-    /// as in a minimised window.
-    ///
-    /// # Errors
-    /// `Device` when the device or the surface was lost.
+    /// Acquires the next image, after rebuilding the swapchain if it no longer fits the window. `None` if nothing can
+    /// be shown, as in a minimised window.
     pub fn acquire(&mut self) -> Result<Option<Shot>> {
         // A window that is being resized may change again while its swapchain is built.
         for _ in 0..8 {
@@ -232,7 +224,8 @@ impl Window {
             let chain = self.chain.as_ref().expect("made above");
             let swapchain = &chain.handle;
             let semaphore = self.acquired[self.next].1;
-            // SAFETY: the semaphore was waited for by a flight that has ended, since there are more of them than flights.
+            // SAFETY: the semaphore was waited for by a flight that has ended, since there are more of them than
+            // flights.
             match unsafe {
                 swapchain.loader.acquire_next_image(swapchain.handle, u64::MAX, semaphore, vk::Fence::null())
             } {
@@ -249,12 +242,9 @@ impl Window {
         Ok(None)
     }
 
-    /// Launches a recording that draws into the shot's image and leaves it as [`Access::Present`](super::Access::Present), and
-    /// shows it. A swapchain that no longer fits is rebuilt by the next [`Window::acquire`]; if it fits so little that nothing is
-    /// shown, the answer is false.
-    ///
-    /// # Errors
-    /// As [`Commands::launch`]; `Device` when the surface was lost.
+    /// Launches a recording that draws into the shot's image and leaves it as
+    /// [`Access::Present`](super::Access::Present), and shows it. A swapchain that no longer fits is rebuilt by the
+    /// next [`Window::acquire`]; if it fits so little that nothing is shown, the answer is false.
     ///
     /// # Panics
     /// When the shot belongs to another swapchain, because [`Window::resize`] was called in between.
@@ -263,7 +253,9 @@ impl Window {
         assert!(Arc::ptr_eq(&chain.images[shot.index as usize], &shot.image), "a shot of another swapchain");
         let drawn = chain.drawn[shot.index as usize].1;
         let flight = commands.end()?.launch(Signals { wait: Some(shot.acquired), signal: Some(drawn) })?;
-        let (semaphores, swapchains, indices) = ([drawn], [chain.handle.handle], [shot.index]);
+        let semaphores = [drawn];
+        let swapchains = [chain.handle.handle];
+        let indices = [shot.index];
         let info =
             vk::PresentInfoKHR::default().wait_semaphores(&semaphores).swapchains(&swapchains).image_indices(&indices);
         let queue = self.device.queue();

@@ -1,16 +1,16 @@
-//! Which clusters a frame merges, and their entries where the host makes them: a cluster is merged again only when its receiver
-//! or an entity that stands on its list has changed. "On its list" is asked with twice the slack ([`crate::lists::scope`]), before
-//! and after the change, so that it holds for lists that host or device made.
+//! Which clusters a frame merges, and their entries: a cluster is merged again only when its receiver or an entity that
+//! stands on its list, before or after the change, has changed.
 //!
-//! What a cluster's merge reads is its receiver, its list and the entities on it, and nothing else that ever changes; and what
-//! keeps an entity on or off a list is that entity, the receiver and, for an occluder, a light that stands there itself. So a
-//! cluster for which none of these has changed would come to the same bits again.
+//! What a cluster's merge reads is its receiver, its list and the entities on it, and nothing else that ever changes;
+//! and what keeps an entity on or off a list is that entity, the receiver and, for an occluder, a light that stands
+//! there itself. So a cluster for which none of these has changed would come to the same bits again.
 //!
-//! What the camera cannot see is left as it is while things move, and remembered as stale: it is merged once it may be seen, or
-//! once nothing moves any more.
+//! What the camera cannot see is left as it is while things move, and remembered as stale: it is merged once it may be
+//! seen, or once nothing moves any more.
 
 use crate::layout::{self, ListEntry};
-use crate::lists::gather::{self, Candidates, ClusterBounds, Counts, GROUP_CLUSTERS, SLACK, SceneBounds, Scope};
+use crate::lists::gather::{self, Candidates, ClusterBounds, Counts, GROUP_CLUSTERS, SceneBounds};
+use crate::lists::scope::Scope;
 use crate::lists::sight::{Sight, TriangleRun};
 use crate::scene::Placement;
 use rayon::prelude::*;
@@ -34,6 +34,13 @@ struct WatchedGroup {
     bounds: ClusterBounds,
 }
 
+/// Clusters of one group that have changed since they were merged.
+struct GroupChange {
+    /// Those that the camera may see.
+    seen: Dirty,
+    hidden: Dirty,
+}
+
 /// Clusters of one group that are to be merged.
 pub(crate) struct Dirty {
     group: usize,
@@ -51,7 +58,6 @@ impl Dirty {
 pub(crate) struct Member {
     /// The cluster; its list follows separately.
     pub cluster: layout::Cluster,
-    /// Bounds of its vertices.
     pub bounds: ClusterBounds,
     /// The triangles by which its light is seen.
     pub faces: TriangleRun,
@@ -76,11 +82,10 @@ pub(crate) struct ClusterLists {
 /// What a frame did about its clusters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Merged {
-    /// Clusters of all receivers.
     pub clusters: usize,
     /// Clusters that were merged; the others kept their light.
     pub merged_clusters: usize,
-    /// Lookups in the lists of those, one for 64 vertices. In a window with lists made on the device, of an earlier frame.
+    /// Lookups in the lists of those, one for 64 vertices.
     pub merged_entries: usize,
     /// Clusters that have changed since they were merged and are not seen.
     pub stale_clusters: usize,
@@ -102,16 +107,11 @@ impl ClusterLists {
             start = end;
         }
         for Member { cluster, bounds, faces } in clusters {
-            self.clusters.push(layout::Cluster { bounds: self.clusters.len() as u32, ..cluster });
+            self.clusters.push(cluster);
             self.bounds.push(bounds);
             self.faces.push(faces);
             self.stale.push(false);
         }
-    }
-
-    /// Bounds of all clusters and then of all groups.
-    pub fn all_bounds(&self) -> Vec<ClusterBounds> {
-        self.bounds.iter().copied().chain(self.groups.iter().map(|group| group.bounds)).collect()
     }
 
     /// Forgets what was merged: the next update takes every cluster.
@@ -119,14 +119,14 @@ impl ClusterLists {
         self.now = None;
     }
 
-    /// Takes every cluster for changed, as when the sky is another.
+    /// Marks every cluster dirty, as when the sky has changed.
     pub fn renew(&mut self) {
         self.renewed = true;
     }
 
-    /// Brings the lists to this time and returns the clusters to merge: those that have changed, and where `sights` are given, of
-    /// every entity, those of them that may be seen by one. At first and where nothing has changed since the last update, none is
-    /// left out.
+    /// Brings the lists to this time and returns the clusters to merge: those that have changed, and where `sights` are
+    /// given, of every entity, those of them that may be seen by one. At first and where nothing has changed since the
+    /// last update, none is left out.
     pub fn update(&mut self, now: State, sights: Option<&[Vec<Sight>]>) -> Vec<Dirty> {
         let before = self.now.take();
         let first = before.is_none();
@@ -137,14 +137,14 @@ impl ClusterLists {
         let sights = sights.filter(|_| now.scene_bounds.skip.hidden && !first && !at_rest);
         // Without the skip all clusters count as changed.
         let moved = moved.filter(|_| now.scene_bounds.skip.unmoved);
-        let found: Vec<[Dirty; 2]> = if moved.is_some() && at_rest && self.stale_count == 0 {
+        let found: Vec<GroupChange> = if moved.is_some() && at_rest && self.stale_count == 0 {
             Vec::new()
         } else {
             let groups = (0..self.groups.len()).into_par_iter();
             groups.filter_map(|group| self.changed(group, &now, moved.as_ref(), sights)).collect()
         };
         let mut dirty = Vec::with_capacity(found.len());
-        for [seen, hidden] in found {
+        for GroupChange { seen, hidden } in found {
             for (list, stale) in [(&seen, false), (&hidden, true)] {
                 for &cluster in &list.clusters {
                     let was = std::mem::replace(&mut self.stale[cluster], stale);
@@ -185,17 +185,16 @@ impl ClusterLists {
         self.now.as_ref().expect("updated before")
     }
 
-    /// Clusters of a group that have changed since they were merged: those that are seen, and the others.
     fn changed(
         &self,
         index: usize,
         now: &State,
         moved: Option<&Moved<'_>>,
         sights: Option<&[Vec<Sight>]>,
-    ) -> Option<[Dirty; 2]> {
+    ) -> Option<GroupChange> {
         let group = &self.groups[index];
         let mut clusters: Vec<usize> = group.clusters.clone().collect();
-        if let Some(moved) = moved.filter(|moved| !(moved.most || moved.flags[group.receiver])) {
+        if let Some(moved) = moved.filter(|moved| !(moved.merges_all || moved.flags[group.receiver])) {
             let near = moved.near(now, group.receiver, &group.bounds);
             let on_list = |cluster: usize| {
                 !near.is_empty() && moved.any_on_list(now, group.receiver, &self.bounds[cluster], &near)
@@ -207,10 +206,13 @@ impl ClusterLists {
         }
         let is_seen = |cluster: &usize| sights.is_none_or(|sights| self.is_seen(*cluster, sights));
         let (seen, hidden) = clusters.into_iter().partition(is_seen);
-        Some([seen, hidden].map(|clusters| Dirty { group: index, clusters }))
+        Some(GroupChange {
+            seen: Dirty { group: index, clusters: seen },
+            hidden: Dirty { group: index, clusters: hidden },
+        })
     }
 
-    /// The entries of clusters at the last update's time, by the host: clusters that know their place among the entries, and the
+    /// The entries of clusters at the last update's time: clusters that know their place among the entries, and the
     /// entries.
     pub fn gather(&self, dirty: &[Dirty]) -> (Vec<layout::Cluster>, Vec<u32>) {
         let now = self.now();
@@ -218,10 +220,11 @@ impl ClusterLists {
             let group = &self.groups[dirty.group];
             let entity = &now.entities[group.receiver];
             let candidates = Candidates::of_group(&now.scene_bounds, group.receiver as u32, entity, &group.bounds);
-            let (mut ends, mut entries) = (Vec::with_capacity(dirty.clusters.len()), Vec::new());
+            let mut ends = Vec::with_capacity(dirty.clusters.len());
+            let mut entries = Vec::new();
             for &cluster in &dirty.clusters {
-                let scope = Scope::new(&now.scene_bounds, entity, &self.bounds[cluster], SLACK);
-                let sharp = gather::twin(&scope, &candidates, &mut entries);
+                let scope = Scope::new(&now.scene_bounds, entity, &self.bounds[cluster]);
+                let sharp = gather::gather(&scope, &candidates, &mut entries);
                 ends.push((entries.len(), sharp as u32));
             }
             (ends, entries)
@@ -231,7 +234,8 @@ impl ClusterLists {
         for (dirty, (ends, entries)) in dirty.iter().zip(found) {
             let mut start = 0;
             for (&cluster, (end, sharp_count)) in dirty.clusters.iter().zip(ends) {
-                let (entry_first, entry_count) = ((all.len() + start) as u32, (end - start) as u32);
+                let entry_first = (all.len() + start) as u32;
+                let entry_count = (end - start) as u32;
                 clusters.push(layout::Cluster { entry_first, entry_count, sharp_count, ..self.clusters[cluster] });
                 start = end;
             }
@@ -240,9 +244,10 @@ impl ClusterLists {
         (clusters, all)
     }
 
-    /// The chains of sharp lights of all clusters of a receiver at the last update's time, for what lies as far as `margin_m` (mesh's
-    /// frame) around their vertices. For each cluster the first of its entries and how many they are: none where no occluder stands on
-    /// them, so that light changes there no faster than vertices show.
+    /// The chains of sharp lights of all clusters of a receiver at the last update's time, for what lies as far as
+    /// `margin_m` (mesh's frame) around their vertices. For each cluster the first of its entries and how many they
+    /// are: none where neither an occluder nor a spot stands on them, so that light changes there no faster than
+    /// vertices show.
     pub fn sharp_chains(&self, receiver: usize, margin_m: f32) -> (Vec<[u32; 2]>, Vec<u32>) {
         let now = self.now();
         let entity = &now.entities[receiver];
@@ -253,36 +258,26 @@ impl ClusterLists {
             let chains = |cluster: usize| {
                 let mut entries = Vec::new();
                 let bounds = around(&self.bounds[cluster]);
-                let scope = Scope::new(&now.scene_bounds, entity, &bounds, SLACK);
-                let sharp = gather::twin(&scope, &candidates, &mut entries);
+                let scope = Scope::new(&now.scene_bounds, entity, &bounds);
+                let sharp = gather::gather(&scope, &candidates, &mut entries);
                 entries.truncate(sharp);
-                let shadowed = entries.iter().any(|&entry| !ListEntry::is_light(entry));
-                if shadowed { entries } else { Vec::new() }
+                let has_edge = |&entry: &u32| {
+                    let [entity, _] = ListEntry::entities(entry);
+                    !ListEntry::is_light(entry) || now.entities[entity as usize].is_spot()
+                };
+                if entries.iter().any(has_edge) { entries } else { Vec::new() }
             };
             group.clusters.clone().map(chains).collect::<Vec<_>>()
         };
         let groups: Vec<&WatchedGroup> = self.groups.iter().filter(|group| group.receiver == receiver).collect();
         let found: Vec<Vec<Vec<u32>>> = groups.par_iter().map(of_group).collect();
-        let (mut places, mut all) = (Vec::new(), Vec::new());
+        let mut places = Vec::new();
+        let mut all = Vec::new();
         for entries in found.into_iter().flatten() {
             places.push([all.len() as u32, entries.len() as u32]);
             all.extend(entries);
         }
         (places, all)
-    }
-
-    /// Clusters to merge, and groups of them, for the gather on the device.
-    pub fn groups(&self, dirty: &[Dirty]) -> (Vec<layout::Cluster>, Vec<gather::Group>) {
-        let (mut clusters, mut groups) = (Vec::new(), Vec::new());
-        for dirty in dirty {
-            let count = dirty.clusters.len();
-            // One alone is its own group.
-            let bounds = if count == 1 { dirty.clusters[0] } else { self.clusters.len() + dirty.group };
-            let (first, count, bounds) = (clusters.len() as u32, count as u32, bounds as u32);
-            groups.push(gather::Group { first, count, bounds, left: 0 });
-            clusters.extend(dirty.clusters.iter().map(|&cluster| self.clusters[cluster]));
-        }
-        (clusters, groups)
     }
 
     /// What all lists of a time leave off, and why.
@@ -291,7 +286,7 @@ impl ClusterLists {
             let entity = &state.entities[group.receiver];
             let clusters = self.bounds[group.clusters.clone()].iter();
             clusters.fold(Counts::default(), |mut counts, bounds| {
-                let scope = Scope::new(&state.scene_bounds, entity, bounds, SLACK);
+                let scope = Scope::new(&state.scene_bounds, entity, bounds);
                 counts += gather::counts(&scope, group.receiver as u32);
                 counts
             })
@@ -304,12 +299,13 @@ impl ClusterLists {
 
     /// Entities on the lists of a receiver's clusters at a time.
     pub fn entities_on(&self, state: &State, receiver: usize) -> BTreeSet<usize> {
-        let (mut entries, entity) = (Vec::new(), &state.entities[receiver]);
+        let mut entries = Vec::new();
+        let entity = &state.entities[receiver];
         for group in self.groups.iter().filter(|group| group.receiver == receiver) {
             let candidates = Candidates::of_group(&state.scene_bounds, receiver as u32, entity, &group.bounds);
             for bounds in &self.bounds[group.clusters.clone()] {
-                let scope = Scope::new(&state.scene_bounds, entity, bounds, SLACK);
-                gather::twin(&scope, &candidates, &mut entries);
+                let scope = Scope::new(&state.scene_bounds, entity, bounds);
+                gather::gather(&scope, &candidates, &mut entries);
             }
         }
         entries.into_iter().map(|entry| ListEntry::entities(entry)[0] as usize).collect()
@@ -327,8 +323,8 @@ struct Moved<'b> {
     before: &'b State,
     flags: Vec<bool>,
     list: Vec<usize>,
-    /// Whether so many have changed that to ask of each whether it matters costs more than merging anew.
-    most: bool,
+    /// Whether so many have changed that to ask of each whether it matters costs more than to merge every cluster.
+    merges_all: bool,
 }
 
 impl<'b> Moved<'b> {
@@ -340,22 +336,22 @@ impl<'b> Moved<'b> {
         };
         let flags: Vec<bool> = (0..now.placements.len()).map(|i| !same(i)).collect();
         let list: Vec<usize> = (0..flags.len()).filter(|&i| flags[i]).collect();
-        Moved { before, most: list.len() * 8 > flags.len().max(64), flags, list }
+        Moved { before, merges_all: list.len() * 8 > flags.len().max(64), flags, list }
     }
 
-    /// Moved entities that may stand on the list of a cluster within these bounds, before or now; its receiver has not moved.
+    /// Moved entities that may stand on the list of a cluster within these bounds, before or now; its receiver has not
+    /// moved.
     fn near(&self, now: &State, receiver: usize, bounds: &ClusterBounds) -> Vec<usize> {
         let both = [&self.before.scene_bounds, &now.scene_bounds];
-        let scopes = both.map(|scene| Scope::new(scene, &now.entities[receiver], bounds, 2.0 * SLACK));
+        let scopes = both.map(|scene| Scope::new(scene, &now.entities[receiver], bounds));
         let near = |j: usize| j != receiver && scopes.iter().any(|scope| scope.may_list(j));
         self.list.iter().copied().filter(|&j| near(j)).collect()
     }
 
-    /// Whether any of `list` may stand on the list of a cluster, before or now: with twice the slack, so that it holds for lists that
-    /// either host or device made.
+    /// Whether any of `list` stands on the list of a cluster, before or now.
     fn any_on_list(&self, now: &State, receiver: usize, bounds: &ClusterBounds, list: &[usize]) -> bool {
         let on = |scene: &SceneBounds| {
-            let scope = Scope::new(scene, &now.entities[receiver], bounds, 2.0 * SLACK);
+            let scope = Scope::new(scene, &now.entities[receiver], bounds);
             list.iter().any(|&j| scope.lists(j, receiver as u32))
         };
         on(&self.before.scene_bounds) || on(&now.scene_bounds)

@@ -1,8 +1,6 @@
 //! Cluster lists: which entities concern which cluster of 64 vertices, and which clusters have to be merged again.
 
 pub mod gather;
-pub mod gathering;
-pub mod host;
 pub mod incremental;
 pub mod scene_bounds;
 pub mod scope;

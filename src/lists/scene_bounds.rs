@@ -1,4 +1,5 @@
-//! Bounds of clusters, entities and lights at one time, from which cluster lists are made, and counts of what lists leave off.
+//! Bounds of clusters, entities and lights at one time, from which cluster lists are made, and counts of what lists
+//! leave off.
 
 use crate::field::silhouette::SilhouetteField;
 use crate::lists::skip::Skip;
@@ -9,7 +10,8 @@ use serde::Serialize;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Angle by which cones are widened: their cosines are stored in f32, which near 1 tells angles apart by 0.00035 rad only.
+/// Angle by which cones are widened: their cosines are stored in f32, which near 1 tells angles apart by 0.00035 rad
+/// only.
 const CONE_ROUNDING_RAD: f64 = 1e-3;
 
 /// Where a cluster's vertices are and where they face, in its mesh's frame: metres from the bounding sphere's centre.
@@ -18,7 +20,6 @@ const CONE_ROUNDING_RAD: f64 = 1e-3;
 pub struct ClusterBounds {
     /// Centre of a sphere around the vertices.
     pub centre: [f32; 3],
-    /// Its radius in metres.
     pub radius_m: f32,
     /// Unit axis of a cone around the normals.
     pub axis: [f32; 3],
@@ -73,7 +74,6 @@ impl ClusterBounds {
 pub struct EntityBounds {
     /// Centre of the bounding sphere in the world, metres.
     pub centre: DVec3,
-    /// Its radius in the world, metres.
     pub radius_m: f64,
     /// Whether it casts shadows.
     pub occludes: bool,
@@ -92,7 +92,6 @@ pub struct EntityBounds {
 /// The outline of an occluder at one time.
 #[derive(Clone)]
 pub struct OutlineView {
-    /// Its silhouette field.
     pub field: Arc<SilhouetteField>,
     /// Rotation from the world to the object.
     pub to_object: DQuat,
@@ -102,12 +101,11 @@ pub struct OutlineView {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct ListLight {
-    /// Axis (world) and cosine of the half-angle, with `CONE_ROUNDING_RAD`, of a cone of directions outside of which its radiance
-    /// field is zero; cosine -2 where it shines all round.
+    /// Axis (world) and cosine of the half-angle, with `CONE_ROUNDING_RAD`, of a cone of directions outside of which
+    /// its radiance field is zero; cosine -2 where it shines all round.
     pub facing: [f32; 4],
     /// Largest radiance that it shines with, of any colour.
     pub radiance: f32,
-    /// The entity.
     pub entity: u32,
     /// 1 where it shines through a radiance field of three channels, else 0.
     pub coloured: u32,
@@ -117,13 +115,11 @@ pub struct ListLight {
 
 /// What the lists are made from at one time.
 pub struct SceneBounds {
-    /// All entities.
     pub entities: Vec<EntityBounds>,
     /// Their bounding spheres: centre in the world and radius, metres.
     pub spheres: Vec<[f32; 4]>,
     /// Outlines of those that have a silhouette field, by entity; empty where no light is sharp.
     pub outlines: Vec<Option<OutlineView>>,
-    /// Those that occlude.
     pub tree: Tree,
     /// Indices of those that occlude.
     pub occluders: Vec<u32>,
@@ -170,19 +166,17 @@ impl SceneBounds {
             && (self.sky, self.skip, self.eps) == (other.sky, other.skip, other.eps)
     }
 
-    /// The key by which the occluders of a receiver are ordered, near to far from the centre of its bounding sphere: products
-    /// truncated in another order differ (by up to 0.006 over twelve occluders), which would show as seams, so there is one order
-    /// for a whole receiver. Equal distances go by index.
+    /// The key by which the occluders of a receiver are ordered, near to far from the centre of its bounding sphere:
+    /// products truncated in another order differ (by up to 0.006 over twelve occluders), which would show as seams, so
+    /// there is one order for a whole receiver. Equal distances go by index.
     pub fn order(&self, receiver: u32, occluder: u32) -> (u32, u32) {
         let [[x, y, z, _], [cx, cy, cz, _]] = [occluder, receiver].map(|i| self.spheres[i as usize]);
         (distance_key([x, y, z], [cx, cy, cz]), occluder)
     }
 }
 
-/// The key by which [`SceneBounds::order`] goes: the bits of the squared distance of two centres in f32, which rise with it as it is not
-/// negative. `distance_key` in `gather.comp` has the same bits: products and sums are rounded alike on every device as long as a
-/// compiler does not contract them, which Rust never does and `precise` forbids there. Centres whose distances differ
-/// by less than a part in 10^7 may have equal keys; the f64 twins go by this key too.
+/// The key by which [`SceneBounds::order`] goes: the bits of the squared distance of two centres in f32, which rise
+/// with it as it is not negative. The f64 twins go by it too.
 pub fn distance_key(a: [f32; 3], b: [f32; 3]) -> u32 {
     let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     (x * x + y * y + z * z).to_bits()

@@ -1,13 +1,8 @@
-//! The rule that keeps an entity off a cluster's list: what a cluster of vertices, or a group of clusters, sees of bounding spheres.
+//! The rule that keeps an entity off a cluster's list: what a cluster of vertices, or a group of clusters, sees of
+//! bounding spheres.
 //!
-//! The rule has a slack ([`SLACK`]). Without slack it lists what may change a vertex of the cluster and nothing that cannot. With
-//! slack it lists a little more. The host computes it in f64; `glsl/gather_scope.glsl` computes it in f32. Lists of both are made
-//! with one slack, so each holds everything of the rule without slack, and nothing beyond the rule with twice the slack. A search
-//! for a whole group takes twice the slack, and so does the test whether an entity that has moved stands on a list
-//! ([`crate::lists::incremental`]): neither misses what a list of either kind holds.
-//!
-//! An entity that is listed for the slack alone adds no light of its own: the weights of cone, horizon and cap in the merge have
-//! faded to exactly zero where the rule without slack ends, and what is bounded below eps stays below eps.
+//! It lists what may change a vertex of the cluster and leaves off what cannot: the weights of cone, horizon and cap in
+//! the merge have faded to exactly zero where the rule ends, and what is bounded below eps may be missing.
 
 use crate::field::silhouette::{INSIDE, REACH, Side};
 use crate::layout;
@@ -17,21 +12,12 @@ use crate::lists::skip::{CAP_SINES, SKIP_FADE_RAD};
 use crate::lists::tree::Crowd;
 use glam::{DVec2, DVec3};
 
-/// How much larger a cluster's bounding sphere is taken, as a share of the distance of what is seen from it. So every angle gains
-/// at least as many radians, and every length gains at least this share of itself.
-///
-/// It has to exceed the error of f32 on the device. A length or a weight there is off by less than a share of 1e-5. A cosine is off by
-/// at most 5e-7 (eight roundings of 6e-8), so an angle near 0 or pi is off by at most sqrt(2 * 5e-7) = 0.001 rad. Only one
-/// angle of each comparison, that of the direction, comes from a computed cosine; that of the normals' cone is off by at most
-/// 0.00035 rad.
-pub const SLACK: f64 = 0.002;
 /// What an outline's distance may be off by, in r: more than the step of a map and what blending four of them errs by.
 const OUTLINE_MARGIN: f64 = 0.06;
 
 /// What becomes of an entity in a chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CullResult {
-    /// It stands on the list.
     Listed,
     /// It stands there as a cap alone.
     Cap,
@@ -92,7 +78,6 @@ pub struct SphereView {
     /// Least and largest distance of the sphere's centre from a vertex, metres.
     nearest: f64,
     farthest: f64,
-    /// Radius of the sphere, metres.
     radius: f64,
     /// Its half-angle at most, with the turn; `None` when a vertex may be inside.
     spread: Option<Angle>,
@@ -106,19 +91,19 @@ pub struct SphereView {
     pub cap: bool,
 }
 
-/// Share of the irradiance under a uniform sky that a small cap takes whose nearest point to the normal stands at this cosine,
-/// per cap of the same size at the zenith. The chain's cosine lobe has few bands and does not vanish at the horizon: it is 0.094
-/// there with four bands (Ramamoorthi, Hanrahan 2001, section 5).
+/// Share of the irradiance under a uniform sky that a small cap takes whose nearest point to the normal stands at this
+/// cosine, per cap of the same size at the zenith. The chain's cosine lobe has few bands and does not vanish at the
+/// horizon: it is 0.094 there with four bands (Ramamoorthi, Hanrahan 2001, section 5).
 fn lobe(cosine: f64) -> f64 {
     let c = cosine.max(0.0);
     let [at_0, slope, bend] = COSINE_LOBE;
     c.max(at_0 + c * (slope + c * bend))
 }
 
-/// What a sphere takes at most of the light of a uniform distant light of radiance 1, or sends with that radiance, as radiosity
-/// of a white surface: its form factor with a bound of the cosine. `half` is at least its half-angle, `cosine` at least that of
-/// the angle between its nearest point and the normal. It bounds true visibility, and the chain's own change to first order,
-/// since the lobe is that of the chain.
+/// What a sphere takes at most of the light of a uniform distant light of radiance 1, or sends with that radiance, as
+/// radiosity of a white surface: its form factor with a bound of the cosine. `half` is at least its half-angle,
+/// `cosine` at least that of the angle between its nearest point and the normal. It bounds true visibility, and the
+/// chain's own change to first order, since the lobe is that of the chain.
 fn weight(half: Angle, cosine: f64) -> f64 {
     2.0 * half.sine * half.sine / (1.0 + half.cosine) * lobe(cosine)
 }
@@ -133,23 +118,21 @@ pub struct Scope<'m> {
     radius_m: f64,
     axis: DVec3,
     spread: Angle,
-    slack: f64,
 }
 
 impl<'m> Scope<'m> {
     /// Places bounds of a receiver's mesh in the world.
-    pub fn new(scene: &'m SceneBounds, receiver: &layout::DeviceEntity, bounds: &ClusterBounds, slack: f64) -> Self {
-        let scale = f64::from(receiver.albedo[3]);
+    pub fn new(scene: &'m SceneBounds, receiver: &layout::DeviceEntity, bounds: &ClusterBounds) -> Self {
+        let scale = f64::from(receiver.scale);
         let [x, y, z, _] = receiver.centre;
         let vector = |[x, y, z]: [f32; 3]| DVec3::new(x.into(), y.into(), z.into());
         Scope {
             scene,
-            reflectance: receiver.emission[3].into(),
+            reflectance: receiver.reflectance.into(),
             centre: vector([x, y, z]) + to_world(receiver, vector(bounds.centre) * scale),
             radius_m: f64::from(bounds.radius_m) * scale,
             axis: to_world(receiver, vector(bounds.axis)),
             spread: Angle::of_cosine(bounds.cosine.into()),
-            slack,
         }
     }
 
@@ -160,16 +143,18 @@ impl<'m> Scope<'m> {
 
     /// A sphere of the scene: centre in the world, radius.
     pub fn view(&self, [x, y, z, sphere_radius]: [f32; 4]) -> SphereView {
-        let (skip, sphere_radius) = (self.scene.skip, f64::from(sphere_radius));
+        let skip = self.scene.skip;
+        let sphere_radius = f64::from(sphere_radius);
         let to = DVec3::new(x.into(), y.into(), z.into()) - self.centre;
         let distance = to.length().max(1e-15);
         let toward = to / distance;
-        let radius = self.radius_m + self.slack * distance;
-        let (nearest, farthest) = (distance - radius, distance + radius);
+        let nearest = distance - self.radius_m;
+        let farthest = distance + self.radius_m;
         let from_axis = Angle::of_cosine(toward.dot(self.axis));
-        let turn = Angle::of_sine(radius / distance);
-        // The highest that any vertex sees the centre above its horizon, against what `above_horizon` in the merge asks for.
-        let highest = distance * from_axis.cosine_less(self.spread) + radius;
+        let turn = Angle::of_sine(self.radius_m / distance);
+        // The highest that any vertex sees the centre above its horizon, against what `above_horizon` in the merge asks
+        // for.
+        let highest = distance * from_axis.cosine_less(self.spread) + self.radius_m;
         let below = skip.horizon && highest < -(sphere_radius + SKIP_FADE_RAD.sin() * farthest);
         let half = (nearest > sphere_radius).then(|| Angle::of_sine(sphere_radius / nearest));
         let spread = half.map(|half| half.plus(turn));
@@ -181,7 +166,6 @@ impl<'m> Scope<'m> {
         SphereView { toward, nearest, farthest, radius: sphere_radius, spread, turn, below, weight, whole, cap }
     }
 
-    /// What becomes of a light.
     pub fn light_result(&self, light: &ListLight, view: &SphereView) -> CullResult {
         if view.below {
             return CullResult::BelowHorizon;
@@ -201,11 +185,11 @@ impl<'m> Scope<'m> {
         if reflected < self.scene.eps.into() { CullResult::BelowEps(reflected) } else { CullResult::Listed }
     }
 
-    /// What becomes of an occluder in the chain of a light (`None`: of the sky). It takes at most what comes from its part of the view,
-    /// and at most what the light brings.
+    /// What becomes of an occluder in the chain of a light (`None`: of the sky). It takes at most what comes from its
+    /// part of the view, and at most what the light brings.
     ///
-    /// Before a sharp light an occluder counts where any part of it may be nearer than any part of the light's middle plane, and
-    /// where their cones meet, without the fade that bands need.
+    /// Before a sharp light an occluder counts where any part of it may be nearer than any part of the light's middle
+    /// plane, and where their cones meet, without the fade that bands need.
     pub fn occluder_result(
         &self,
         view: &SphereView,
@@ -229,9 +213,10 @@ impl<'m> Scope<'m> {
         self.of_weight(radiance * view.weight.min(light.weight))
     }
 
-    /// What becomes of an occluder whose cone meets that of a sharp light (centre in the world, radius). All rays from the cluster to the
-    /// light stay within a cone around the ray between the two middles. Where the object's outline is farther from that ray than
-    /// the cone is wide beside the object, all of them miss the object, or all of them meet it.
+    /// What becomes of an occluder whose cone meets that of a sharp light (centre in the world, radius). All rays from
+    /// the cluster to the light stay within a cone around the ray between the two middles. Where the object's outline
+    /// is farther from that ray than the cone is wide beside the object, all of them miss the object, or all of them
+    /// meet it.
     pub fn outline_result(&self, occluder: usize, [x, y, z, light_radius]: [f32; 4]) -> CullResult {
         let skip = self.scene.skip;
         let Some(Some(outline)) = self.scene.outlines.get(occluder).filter(|_| skip.passed || skip.covered) else {
@@ -240,8 +225,9 @@ impl<'m> Scope<'m> {
         let EntityBounds { centre, radius_m, .. } = self.scene.entities[occluder];
         let to_light = DVec3::new(x.into(), y.into(), z.into()) - self.centre;
         let distance = to_light.length().max(1e-15);
-        let (toward, radius) = (to_light / distance, self.radius_m + self.slack * (centre - self.centre).length());
-        let width = |way: f64| radius + (f64::from(light_radius) - radius) * (way / distance).clamp(0.0, 1.0);
+        let toward = to_light / distance;
+        let width =
+            |way: f64| self.radius_m + (f64::from(light_radius) - self.radius_m) * (way / distance).clamp(0.0, 1.0);
         let along = (centre - self.centre).dot(toward);
         let clear = width(along - radius_m).max(width(along + radius_m)) / radius_m + OUTLINE_MARGIN;
         // Maps hold no larger distance.
@@ -252,7 +238,7 @@ impl<'m> Scope<'m> {
             outline.field.near(outline.to_object * (self.centre - centre) / radius_m, outline.to_object * toward);
         let found = outline.field.outline(&near, Side::Whole, outline.to_object * toward).distance;
         // An object covers a light only if all of it lies between.
-        let between = along - INSIDE[1] * radius_m - radius > 0.0
+        let between = along - INSIDE[1] * radius_m - self.radius_m > 0.0
             && distance - along - INSIDE[1] * radius_m - f64::from(light_radius) > 0.0;
         match found {
             found if skip.passed && found < -clear => CullResult::PassedBy,
@@ -261,18 +247,19 @@ impl<'m> Scope<'m> {
         }
     }
 
-    /// Whether no member of a crowd matters to any cluster within the bounds: their weight under the brightest light is negligible.
+    /// Whether no member of a crowd matters to any cluster within the bounds: their weight under the brightest light is
+    /// negligible.
     pub fn leaves_out(&self, crowd: &Crowd) -> bool {
         let [x, y, z] = crowd.centre.map(f64::from);
-        let (reach, largest) = (f64::from(crowd.reach_m), f64::from(crowd.radius_m));
+        let reach = f64::from(crowd.reach_m);
+        let largest = f64::from(crowd.radius_m);
         let to = DVec3::new(x, y, z) - self.centre;
         let distance = to.length().max(1e-15);
-        let radius = self.radius_m + self.slack * distance;
-        let blur = radius + reach;
+        let blur = self.radius_m + reach;
         let nearest = distance - blur;
-        let weight = if nearest > largest.max(radius) {
+        let weight = if nearest > largest.max(self.radius_m) {
             // Directions differ by at most asin(blur / distance) between member and crowd; a cluster adds its own turn.
-            let turn = Angle::of_sine(radius / nearest).plus(Angle::of_sine(blur / distance));
+            let turn = Angle::of_sine(self.radius_m / nearest).plus(Angle::of_sine(blur / distance));
             let half = Angle::of_sine(largest / nearest);
             let from_axis = Angle::of_cosine(to.dot(self.axis) / distance);
             weight(half, from_axis.cosine_less(self.spread.plus(half.plus(turn))))
@@ -331,7 +318,8 @@ mod tests {
         use std::f64::consts::PI;
         let mut rng = fastrand::Rng::with_seed(6);
         for _ in 0..10_000 {
-            let (a, b) = (PI * rng.f64(), PI * rng.f64());
+            let a = PI * rng.f64();
+            let b = PI * rng.f64();
             let sum = Angle::of_cosine(a.cos()).plus(Angle::of_cosine(b.cos()));
             assert!((sum.cosine - (a + b).min(PI).cos()).abs() < 1e-12, "{a} {b}");
             let less = Angle::of_cosine(a.cos()).cosine_less(Angle::of_cosine(b.cos()));

@@ -1,9 +1,11 @@
-//! Which runs of a mesh's triangles the camera may see. What it cannot see is not drawn, and while things move it is not lit.
+//! Which runs of a mesh's triangles the camera may see. What it cannot see is not drawn, and while things move it is
+//! not lit.
 //!
-//! The test is conservative: it never calls a run unseen that a pixel shows. A run lies outside the picture where the sphere or the box
-//! around it lies outside by at least a pixel. Its triangles are backs where the cone of their normals says so for every point of that
-//! sphere, with a margin of `BACK_RAD`. Backs count as unseen only where the draw culls them, which it does for solid meshes
-//! ([`Mesh::is_solid`]) with the eye outside, because at an outline the rasteriser decides whether a pixel shows a front or a back.
+//! The test is conservative: it never calls a run unseen that a pixel shows. A run lies outside the picture where the
+//! sphere or the box around it lies outside by at least a pixel. Its triangles are backs where the cone of their
+//! normals says so for every point of that sphere, with a margin of `BACK_RAD`. Backs count as unseen only where the
+//! draw culls them, which it does for solid meshes ([`Mesh::is_solid`]) with the eye outside, because at an outline the
+//! rasteriser decides whether a pixel shows a front or a back.
 
 use crate::asset::grid::Grid;
 use crate::asset::mesh::Mesh;
@@ -11,33 +13,33 @@ use crate::lists::scene_bounds::ClusterBounds;
 use glam::{DMat4, DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 
-/// Angle beyond edge-on from which triangles count as backs: vertices that a rasteriser moves to its grid of 1/256 pixel turn over
-/// no triangle of a third of a pixel or more that is tilted so far.
+/// Angle beyond edge-on from which triangles count as backs: vertices that a rasteriser moves to its grid of 1/256
+/// pixel turn over no triangle of a third of a pixel or more that is tilted so far.
 const BACK_RAD: f64 = 0.02;
 /// Width in pixels of the margin around the picture that counts as seen.
 const RIM_PX: f64 = 1.0;
 /// Largest relative error of lengths by rounding, of the matrix and in the vertex shader, times 8 as a margin.
 const ROUNDING: f32 = 4e-6;
 
-/// A run of triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleRun {
     /// Centre of a sphere around their corners, metres from that of the mesh's bounding sphere.
     centre: Vec3,
-    /// Its radius in metres.
     radius_m: f32,
     /// Half the edges of a box around them with that centre, metres.
     half_m: Vec3,
     /// Axis of a cone around their normals.
     axis: Vec3,
-    /// Cosine and sine of its half-angle plus [`BACK_RAD`]. Where the cosine is not positive, the triangles are never all backs.
+    /// Cosine and sine of its half-angle plus [`BACK_RAD`]. Where the cosine is not positive, the triangles are never
+    /// all backs.
     spread: [f32; 2],
     /// Whether they stand at the rim of a grid, whose light pixels beyond the rim show.
     rim: bool,
 }
 
 impl TriangleRun {
-    /// For each run of `count` vertices of a mesh, in a given order, the triangles that use one of them: these show its light.
+    /// For each run of `count` vertices of a mesh, in a given order, the triangles that use one of them: these show its
+    /// light.
     pub fn around(mesh: &Mesh, order: &[u32], count: usize) -> Vec<TriangleRun> {
         let runs = order.len().div_ceil(count);
         let mut run_of = vec![0_u32; order.len()];
@@ -96,9 +98,9 @@ impl TriangleRun {
 
     /// Whether a place sees only the backs of these triangles.
     ///
-    /// The direction to any point of the sphere is within asin(radius / distance) of that to the centre, a normal within the cone
-    /// of the axis: all are backs where these two, [`BACK_RAD`] and the angle between axis and direction stay below a right angle
-    /// together.
+    /// The direction to any point of the sphere is within asin(radius / distance) of that to the centre, a normal
+    /// within the cone of the axis: all are backs where these two, [`BACK_RAD`] and the angle between axis and
+    /// direction stay below a right angle together.
     fn are_backs(&self, eye: Vec3) -> bool {
         let way = self.centre - eye;
         let distance = way.length();
@@ -135,7 +137,6 @@ struct Plane {
 /// The camera of a part of the picture.
 #[derive(Clone, Copy, Debug)]
 pub struct SightCamera {
-    /// World to clip space.
     pub clip_from_world: DMat4,
     /// Where it stands, metres.
     pub eye: DVec3,
@@ -185,7 +186,8 @@ impl Sight {
 
     /// Whether any of some triangles may be seen.
     pub fn may_see(&self, faces: &TriangleRun) -> bool {
-        // A pixel whose centre lies beyond the rim of a grid shows the light of the nearest cell, which may be any cell of the rim.
+        // A pixel whose centre lies beyond the rim of a grid shows the light of the nearest cell, which may be any cell
+        // of the rim.
         if self.samples && faces.rim {
             return true;
         }
@@ -203,7 +205,8 @@ mod tests {
     use crate::bake::chunk::morton;
     use glam::dcamera::rh::{proj::vulkan, view};
 
-    /// Every triangle of an unseen run is outside the picture or turned away, and most runs of which that is true are found.
+    /// Every triangle of an unseen run is outside the picture or turned away, and most runs of which that is true are
+    /// found.
     #[test]
     fn nothing_that_is_seen_is_called_unseen() {
         let meshes = [
@@ -221,10 +224,13 @@ mod tests {
             let mut run_of = vec![0; order.len()];
             order.iter().enumerate().for_each(|(place, &v)| run_of[v as usize] = place / 64);
             let faces = TriangleRun::around(mesh, &order, 64);
-            let (mut unseen, mut all, mut backs) = (0, 0, 0);
+            let mut unseen = 0;
+            let mut all = 0;
+            let mut backs = 0;
             for _ in 0..60 {
                 let mut point = |reach: f64| reach * DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5);
-                let (eye, target) = (point(12.0), point(3.0));
+                let eye = point(12.0);
+                let target = point(3.0);
                 let near = 1e-3 * eye.distance(target);
                 let clip_from_world =
                     vulkan::perspective_infinite_reverse(0.5, 1.5, near) * view::look_at_mat4(eye, target, DVec3::Y);

@@ -1,5 +1,5 @@
-//! A tree of spheres over the entities of a scene, so that a group of clusters finds those that matter to it without looking at
-//! the rest.
+//! A tree of spheres over the entities of a scene, so that a group of clusters finds those that matter to it without
+//! looking at the rest.
 
 use glam::Vec3;
 use std::ops::Range;
@@ -12,7 +12,6 @@ const LEAF_ENTITIES: usize = 4;
 pub struct Crowd {
     /// World, metres.
     pub centre: [f32; 3],
-    /// Metres.
     pub reach_m: f32,
     /// Largest bounding radius, metres.
     pub radius_m: f32,
@@ -123,7 +122,8 @@ mod tests {
             let tree = Tree::new(entities.iter().copied());
             let mut visited = 0;
             for _ in 0..20 {
-                let (eye, reach) = (point(&mut rng), 0.3 * rng.f32());
+                let eye = point(&mut rng);
+                let reach = 0.3 * rng.f32();
                 let far = |[x, y, z]: [f32; 3], radius: f32| Vec3::new(x, y, z).distance(eye) - radius > reach;
                 let mut found = Vec::new();
                 tree.find(|crowd| far(crowd.centre, crowd.reach_m + crowd.radius_m), |entity| found.push(entity));

@@ -1,5 +1,5 @@
-//! Which variant of the merge is fastest on a device: measured once on a small made-up scene, when a command has done its work,
-//! and kept in the cache folder. Until then a device gets a default.
+//! Which variant of the merge is fastest on a device: measured once on a small made-up scene, when a command has done
+//! its work, and kept in the cache folder. Until then a device gets a default.
 
 use crate::error::{Error, Result};
 use crate::gpu::Device;
@@ -35,32 +35,24 @@ fn path(device: &Device) -> Option<PathBuf> {
     Some(device.cache_dir.as_ref()?.join(format!("calibration-{}.json", device.info.uuid)))
 }
 
-/// Variants that compute the same function.
-fn candidates() -> impl Iterator<Item = Variant> {
-    VARIANTS.iter().copied().filter(|variant| !variant.image)
-}
-
 /// What was measured on the device before, with this driver and program, of the variants that there are now.
 fn known(device: &Device) -> Option<Variant> {
-    let calibration: Calibration = serde_json::from_slice(&std::fs::read(path(device)?).ok()?).ok()?;
+    let calibration: Calibration = serde_json::from_slice(&crate::files::read(&path(device)?).ok()?).ok()?;
     let names = calibration.milliseconds.iter().map(|(name, _)| name.as_str());
     let same = calibration.driver == device.info.driver
         && calibration.program == env!("CARGO_PKG_VERSION")
-        && names.eq(candidates().map(|variant| variant.name));
+        && names.eq(VARIANTS.iter().map(|variant| variant.name));
     same.then(|| Variant::named(&calibration.fastest).ok())?
 }
 
-/// The device's fastest variant as far as it is known, at once: as measured, or [`Variant::sane_default`] on a device that was
-/// never measured.
+/// The device's fastest variant as far as it is known, at once: as measured, or [`Variant::sane_default`] on a device
+/// that was never measured.
 pub fn best_known(device: &Device) -> Variant {
     known(device).unwrap_or_else(|| Variant::sane_default(device))
 }
 
-/// Measures a device that was never measured and keeps the outcome in its cache folder; nothing where it is known or where there
-/// is no such folder. It takes some seconds, most of them the driver's compiler.
-///
-/// # Errors
-/// As [`measure`].
+/// Measures a device that was never measured and keeps the outcome in its cache folder; nothing where it is known or
+/// where there is no such folder. It takes some seconds, most of them the driver's compiler.
 pub fn learn(device: &Arc<Device>, library: &Library) -> Result<Option<Calibration>> {
     let Some(path) = path(device).filter(|_| known(device).is_none()) else { return Ok(None) };
     let calibration = measure(device, library)?;
@@ -74,15 +66,12 @@ pub fn learn(device: &Arc<Device>, library: &Library) -> Result<Option<Calibrati
     Ok(Some(calibration))
 }
 
-/// Times every variant on a made-up scene: a sky and some turned occluders with fields of default shape. What a driver refuses
-/// to compile takes no part.
-///
-/// # Errors
-/// `Failed` when it refuses all, `Device` when the device is lost.
+/// Times every variant on a made-up scene: a sky and some turned occluders with fields of default shape. What a driver
+/// refuses to compile takes no part.
 pub fn measure(device: &Arc<Device>, library: &Library) -> Result<Calibration> {
     let workload = Workload::new(device, VERTICES, OCCLUDERS)?;
     let mut contenders = Vec::new();
-    for variant in candidates() {
+    for &variant in VARIANTS {
         let merge = match Merge::new(device, library, workload.permutation(variant)) {
             Err(error @ (Error::Failed(_) | Error::Shader(_))) => {
                 log::warn!("calibration: {} takes no part: {error}", variant.name);

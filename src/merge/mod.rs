@@ -1,56 +1,36 @@
 //! Pass "merge": light on every vertex of every receiver.
 //!
 //! MergeInputs: entities, clusters and their entries (see [`crate::lists::gather`]), the fields, transfer vectors,
-//! vertices (position and normal, object frame, two quads each), the sky's coefficients. Output: `radiosity`, four floats a
-//! vertex: radiance that leaves the surface, albedo / pi times the integral of incoming light, without emission.
+//! vertices (position and normal, object frame, two quads each), the sky's coefficients. Output: `radiosity`, four
+//! floats a vertex: radiance that leaves the surface, albedo / pi times the integral of incoming light, without
+//! emission.
 
 pub mod calibrate;
 pub mod chain;
-pub mod product;
-pub mod shelf;
 pub mod twin;
 pub mod variant;
 pub mod workload;
 
 use crate::error::Result;
-use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView, Volume};
+use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::CLUSTER_VERTICES;
 use crate::shaders::Library;
 use ash::vk;
 use std::sync::Arc;
-use variant::MergePermutation;
 pub use variant::Variant;
+use variant::{MergePermutation, Reads};
 
-/// A resource that a variant reads as a block, through a texel view, or through a sampler.
+/// A resource that a variant reads as a block or through a texel view.
 pub struct Readable<'b>(Bind<'b>);
 
 impl<'b> Readable<'b> {
-    /// Prepares `buffer` for `variant`.
-    ///
-    /// # Errors
-    /// `Input` when a texel view of the device cannot hold it.
     pub fn new(buffer: &'b Buffer, variant: Variant, format: vk::Format) -> Result<Self> {
-        Self::either(buffer, variant.texel.then_some(format))
+        Self::either(buffer, (variant.reads == Reads::Texels).then_some(format))
     }
 
     /// As [`Readable::new`] for what is the same in a whole workgroup, which some variants read as uniform blocks.
-    ///
-    /// # Errors
-    /// As [`Readable::new`].
     pub fn shared(buffer: &'b Buffer, variant: Variant) -> Result<Self> {
-        let texel = variant.texel && !variant.uniform;
-        Self::either(buffer, texel.then_some(vk::Format::R32G32B32A32_SFLOAT))
-    }
-
-    /// Fields: the image where there is one, else as [`Readable::new`].
-    ///
-    /// # Errors
-    /// As [`Readable::new`].
-    pub fn fields(buffer: &'b Buffer, image: Option<&'b Volume>, permutation: &MergePermutation) -> Result<Self> {
-        image.map_or_else(
-            || Self::new(buffer, permutation.variant, permutation.field_format()),
-            |image| Ok(Readable(Bind::Volume(image))),
-        )
+        Self::new(buffer, variant, vk::Format::R32G32B32A32_SFLOAT)
     }
 
     fn either(buffer: &'b Buffer, texels: Option<vk::Format>) -> Result<Self> {
@@ -69,38 +49,29 @@ impl<'b> Readable<'b> {
 pub struct MergeInputs<'b> {
     /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: Readable<'b>,
-    /// Entries of all clusters.
     pub entries: Readable<'b>,
     /// [`crate::layout::Cluster`] of every cluster.
     pub clusters: Readable<'b>,
-    /// Fields of the scene.
     pub fields: Readable<'b>,
     /// Transfer vectors.
     pub transfers: Readable<'b>,
     /// Positions and normals.
     pub vertices: Readable<'b>,
-    /// Coefficients of the sky, a channel after the other, [`crate::field::quantity::channel_stride`] floats apart; zero without one.
+    /// Coefficients of the sky, a channel after the other, [`crate::field::quantity::channel_stride`] floats apart;
+    /// zero without one.
     pub sky: Readable<'b>,
 }
 
-/// The pipeline.
 pub struct Merge {
     pipeline: ComputePipeline,
 }
 
 impl Merge {
-    /// The pipeline of one permutation.
-    ///
-    /// # Errors
-    /// `Failed` when the shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, permutation: MergePermutation) -> Result<Self> {
         Ok(Merge { pipeline: ComputePipeline::new(device, "merge", &library.shader(&permutation.row())?, &[])? })
     }
 
     /// Lights the first `cluster_count` clusters.
-    ///
-    /// # Errors
-    /// `Input` when a buffer is larger than the device can bind, or the clusters are more than it can dispatch.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,

@@ -1,8 +1,8 @@
 //! The CPU twin of "merge", in f64 and vertex by vertex, from the same stored numbers.
 
-use crate::field::{Area, Lookup, ShadowField};
+use crate::field::{Area, ShadowField};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
-use crate::merge::chain::{Chain, ChainState, Multiplier};
+use crate::merge::chain::{ChainState, Multiplier};
 use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use crate::sh::rotation::Rotation;
@@ -14,13 +14,10 @@ use std::f64::consts::PI;
 pub struct MergeObject<'f> {
     /// Centre of the bounding sphere in the world, metres.
     pub centre: DVec3,
-    /// Rotation to the world.
     pub rotation: DQuat,
-    /// Uniform scale.
     pub scale: f64,
     /// Bounding radius after scaling, metres.
     pub radius_m: f64,
-    /// Albedo / pi.
     pub albedo_over_pi: [f64; 3],
     /// Radiance factor of its light.
     pub emission: [f64; 3],
@@ -34,13 +31,11 @@ pub struct MergeObject<'f> {
 
 /// One receiver under all lights.
 pub struct MergeTwin<'t> {
-    /// All objects.
     pub objects: &'t [MergeObject<'t>],
     /// Index of the one that is lit.
     pub receiver: usize,
     /// Occluders in the order in which they are multiplied.
     pub occluders: &'t [usize],
-    /// Lights.
     pub lights: &'t [usize],
     /// Red, green and blue of the distant light.
     pub sky: Option<&'t [Vec<f64>; 3]>,
@@ -52,12 +47,10 @@ pub struct MergeTwin<'t> {
     pub transfer: Option<(&'t [f32], usize)>,
     /// SH bands of transfer and light; an occlusion field has its own.
     pub bands: usize,
-    /// Which samples a lookup takes.
-    pub lookup: Lookup,
     /// What is left out.
     pub skip: Skip,
-    /// Whether a vertex leaves out an entity in the chain of a light (`None`: of the sky), or the light itself where both are the
-    /// same, for another reason.
+    /// Whether a vertex leaves out an entity in the chain of a light (`None`: of the sky), or the light itself where
+    /// both are the same, for another reason.
     pub leaves: &'t (dyn Fn(usize, usize, Option<usize>) -> bool + Sync),
 }
 
@@ -67,7 +60,7 @@ impl MergeTwin<'_> {
     /// Radiosity of every vertex: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self) -> Vec<[f64; 3]> {
         let field_bands = self.field_bands();
-        let multiplier = Multiplier::new(Chain::default(), self.bands, field_bands);
+        let multiplier = Multiplier::new(self.bands, field_bands);
         let bands = self.bands.max(field_bands);
         let rotations: Vec<Rotation> = self.objects.iter().map(|o| Rotation::new(bands, o.rotation)).collect();
         (0..self.positions.len()).into_par_iter().map(|v| self.vertex(v, &multiplier, &rotations)).collect()
@@ -155,8 +148,9 @@ impl MergeTwin<'_> {
             _ => (object.blocked.expect("what blocks or shines in one colour has an occlusion field"), 0),
         };
         let local = object.rotation.inverse() * (position - object.centre) / object.radius_m;
-        let (mut found, mut out) = ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
-        field.lookup(local, self.lookup, channel, &mut found);
+        let mut found = [0.0; MAX_COEFFICIENTS];
+        let mut out = [0.0; MAX_COEFFICIENTS];
+        field.lookup(local, channel, &mut found);
         rotations[j].apply(&found, &mut out);
         out
     }
@@ -256,7 +250,8 @@ fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// As a light passes an occluder its share goes from all to none without a step, ever less; so does a field's as it becomes a cap.
+    /// As a light passes an occluder its share goes from all to none without a step, ever less; so does a field's as it
+    /// becomes a cap.
     #[test]
     fn shares_fade_without_a_step() {
         let cone = |rad: f64, sine: f64| Cone::new(DVec3::new(rad.cos(), rad.sin(), 0.0) / sine, 1.0, DVec3::ZERO);

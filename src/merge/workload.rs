@@ -1,13 +1,12 @@
-//! A made-up merge of known size, for timing: a floor of vertices under turned occluders and a sky, every vertex meeting every
-//! occluder, fields of one shape filled with a constant.
+//! A made-up merge of known size, for timing: a floor of vertices under turned occluders and a sky, every vertex
+//! meeting every occluder, fields of one shape filled with a constant.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::field::Lattice;
 use crate::field::quantity::{Storage, channel_stride};
-use crate::field::{Lattice, Lookup};
-use crate::gpu::{Buffer, BufferKind, Commands, Device, Volume};
+use crate::gpu::{Buffer, BufferKind, Commands, Device};
 use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, Cluster, DeviceEntity, ENTRY_FORMAT, ListEntry, NONE};
 use crate::lists::skip::Skip;
-use crate::merge::shelf::ImageShelf;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
 use crate::merge::{Merge, MergeInputs, Readable};
 use crate::sh::rotation::turns;
@@ -28,7 +27,6 @@ pub struct Workload {
     entries: Buffer,
     clusters: Buffer,
     fields: Buffer,
-    image: Volume,
     transfers: Buffer,
     vertices: Buffer,
     sky: Buffer,
@@ -36,11 +34,8 @@ pub struct Workload {
 }
 
 impl Workload {
-    /// `vertex_count` vertices (rounded up to whole clusters) on a square floor of 8 x 8 m under `occluder_count` occluders of
-    /// 1 m radius with fields of default shape, f16 and 4 bands.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// `vertex_count` vertices (rounded up to whole clusters) on a square floor of 8 x 8 m under `occluder_count`
+    /// occluders of 1 m radius with fields of default shape, f16 and 4 bands.
     pub fn new(device: &Arc<Device>, vertex_count: u32, occluder_count: u32) -> Result<Self> {
         let vertex_count = vertex_count.next_multiple_of(CLUSTER_VERTICES);
         let lattice = Lattice::default().starting_at(1.0);
@@ -50,8 +45,10 @@ impl Workload {
         let count = (1 + occluder_count).max(entity_limit) as usize;
         let mut entities = vec![DeviceEntity::default(); count];
         for (i, entity) in entities.iter_mut().enumerate().take(1 + occluder_count as usize) {
-            // Golden-angle spiral over the floor, so that all faces and shells of the fields are read. Entity 0 is the floor.
-            let (angle, at) = (2.4 * i as f64, i as f64 / f64::from(occluder_count.max(1)));
+            // Golden-angle spiral over the floor, so that all faces and shells of the fields are read. Entity 0 is the
+            // floor.
+            let angle = 2.4 * i as f64;
+            let at = i as f64 / f64::from(occluder_count.max(1));
             let rotation = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 0.7 + angle);
             let [a, b, c, d, e, f] = turns(if i == 0 { DQuat::IDENTITY } else { rotation }).map(|x| x as f32);
             let radius = 3.5 * at.sqrt();
@@ -60,7 +57,8 @@ impl Workload {
                 centre: [(radius * angle.cos()) as f32, height, (radius * angle.sin()) as f32, 1.0],
                 alpha_beta: [a, b, c, d],
                 gamma: [e, f],
-                albedo: [0.3, 0.3, 0.3, 1.0],
+                albedo: [0.3; 3],
+                scale: 1.0,
                 shift,
                 radial: [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32],
                 ..Default::default()
@@ -72,8 +70,10 @@ impl Workload {
         let place = |tile: u32, inside: u32| 8.0 * (tile * edge + inside) as f32 / (tiles * edge) as f32 - 4.0;
         let vertices: Vec<[f32; 4]> = (0..vertex_count)
             .flat_map(|v| {
-                let (tile, inside) = (v / CLUSTER_VERTICES, v % CLUSTER_VERTICES);
-                let (x, z) = (place(tile % tiles, inside % edge), place(tile / tiles, inside / edge));
+                let tile = v / CLUSTER_VERTICES;
+                let inside = v % CLUSTER_VERTICES;
+                let x = place(tile % tiles, inside % edge);
+                let z = place(tile / tiles, inside / edge);
                 [[x, 0.0, z, 0.0], [0.0, 1.0, 0.0, 0.0]]
             })
             .collect();
@@ -92,8 +92,6 @@ impl Workload {
         // Small enough that the running product neither grows without end nor becomes denormal.
         const HALF: u16 = 0x2000;
         let fields = vec![[HALF; 4]; quads];
-        let shelf = ImageShelf::new(device, lattice, BANDS, 1)
-            .ok_or_else(|| Error::Unsupported("the device's images are too small for one field".into()))?;
         Ok(Workload {
             vertex_count,
             occluder_count,
@@ -103,8 +101,6 @@ impl Workload {
             entries: Buffer::with_data(device, "workload entries", &list)?,
             clusters: Buffer::with_data(device, "workload clusters", &clusters)?,
             fields: Buffer::with_data(device, "workload fields", &fields)?,
-            image: shelf
-                .fill(device, std::iter::once(Box::new(|_, _| [HALF; 4]) as Box<dyn Fn(usize, usize) -> [u16; 4]>))?,
             transfers: Buffer::with_data(device, "workload transfers", &[0.0_f32; 4])?,
             vertices: Buffer::with_data(device, "workload vertices", &vertices)?,
             sky: Buffer::with_data(device, "workload sky", &[1.0_f32; 3 * BANDS * BANDS])?,
@@ -140,24 +136,19 @@ impl Workload {
             field_bands: BANDS,
             storage: Storage::F16,
             lattice: self.lattice,
-            lookup: Lookup::Trilinear,
             skip: Skip::NONE,
             lights: false,
             entity_limit: self.entity_limit,
         }
     }
 
-    /// What a variant reads.
-    ///
-    /// # Errors
-    /// As [`Readable::new`].
     pub fn inputs(&self, variant: Variant) -> Result<MergeInputs<'_>> {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         Ok(MergeInputs {
             entities: Readable::shared(&self.entities, variant)?,
             entries: Readable::new(&self.entries, variant, ENTRY_FORMAT)?,
             clusters: Readable::new(&self.clusters, variant, CLUSTER_FORMAT)?,
-            fields: Readable::fields(&self.fields, variant.image.then_some(&self.image), &self.permutation(variant))?,
+            fields: Readable::new(&self.fields, variant, self.permutation(variant).field_format())?,
             transfers: Readable::new(&self.transfers, variant, floats)?,
             vertices: Readable::new(&self.vertices, variant, floats)?,
             sky: Readable::new(&self.sky, variant, floats)?,
@@ -165,9 +156,6 @@ impl Workload {
     }
 
     /// Runs the merge once and returns its milliseconds.
-    ///
-    /// # Errors
-    /// `Device` when the device was lost.
     pub fn run(&self, merge: &Merge, inputs: &MergeInputs<'_>) -> Result<f64> {
         let device = self.radiosity.device();
         let mut commands = Commands::new(device, "workload")?;

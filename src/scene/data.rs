@@ -1,4 +1,5 @@
-//! The tables of a scene file. README has a table of all keys with units, ranges and defaults; a test compares it with this file.
+//! The tables of a scene file. `docs/scene.md` has a table of all keys with units, ranges and defaults; a test compares it with
+//! this file.
 //!
 //! ```toml
 //! [camera]
@@ -28,6 +29,7 @@
 //! scale = 1
 //! albedo = [0.7, 0.4, 0.2]
 //! emission = [40, 36, 30]                    # makes it a light; emits, occludes and receives override the defaults
+//! spot = { inner_deg = 20, outer_deg = 35 }  # its light shines along its own +y alone
 //! motion = [                                 # applied from first to last; each is a function of time alone
 //!     { keyframes = { repeat = true, interpolation = "smooth", keys = [    # Catmull-Rom, or "linear"; rotations use slerp
 //!         { time_s = 0, position = [0, 0.6, 0] }, { time_s = 2, position = [1, 0.9, 0] }, { time_s = 4, position = [0, 0.6, 0] } ] } },
@@ -42,11 +44,12 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::light::Spot;
 use super::motion::{Motion, Placement, PlacementF64, RotationData};
 use super::{check_counts, values};
 use crate::asset::Generator;
 use crate::asset::environment::EnvironmentData;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 
 /// Largest width or height of a picture, in pixels.
 pub const PICTURE_LIMIT_PX: u32 = 16_384;
@@ -182,7 +185,8 @@ impl TryFrom<OutputWritten> for Output {
     fn try_from(written: OutputWritten) -> std::result::Result<Self, String> {
         let usual = Self::default();
         let exposure_ev = written.exposure_ev.unwrap_or(usual.exposure_ev);
-        let (width, height) = (written.width.unwrap_or(usual.width), written.height.unwrap_or(usual.height));
+        let width = written.width.unwrap_or(usual.width);
+        let height = written.height.unwrap_or(usual.height);
         check_picture([width, height])?;
         if !(-32.0..=32.0).contains(&exposure_ev) {
             return Err(format!("exposure_ev {exposure_ev} is not within -32 to 32"));
@@ -191,8 +195,8 @@ impl TryFrom<OutputWritten> for Output {
     }
 }
 
-/// A mesh, read from a file or made by a generator. In a scene that was read from a glTF file it may be neither: then only
-/// [`super::Scene::meshes`] has it, and a scene file can name it once it is written ([`super::export`]).
+/// A mesh, read from a file or made by a generator. In a scene that was read from a glTF file it may be neither: then
+/// only [`super::Scene::meshes`] has it, and a scene file can name it once it is written ([`super::export`]).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeshData {
     /// The name that entities use; it is unique.
@@ -247,9 +251,13 @@ pub struct EntityData {
     /// Linear reflectance, 0 to 1. The default is a grey of 0.7.
     #[serde(default = "grey", deserialize_with = "values::albedo")]
     pub albedo: Vec3,
-    /// Linear radiance in W m^-2 sr^-1, at most 1e15. It multiplies the colours of a mesh that has them. The default is 0.
+    /// Linear radiance in W m^-2 sr^-1, at most 1e15. It multiplies the colours of a mesh that has them. The default is
+    /// 0.
     #[serde(default, deserialize_with = "values::radiance")]
     pub emission: Vec3,
+    /// Makes its light a spot along its own +y. It takes a mesh without colours of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spot: Option<Spot>,
     /// Whether it lights others. By default it does if it has emission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub emits: Option<bool>,
@@ -279,6 +287,7 @@ impl EntityData {
             scale: values::one(),
             albedo: grey(),
             emission: Vec3::ZERO,
+            spot: None,
             emits: None,
             occludes: None,
             receives: None,
@@ -301,7 +310,7 @@ impl Data {
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let data: Data = toml::from_str(text).map_err(|e| {
             let line = e.span().map_or(1, |span| line_of(text, span.start));
-            Error::input_at(path, line, plain(&e.message().trim().replace('\n', ", ")))
+            Error::input_at(path, line, plain(&flat(e.message())))
         })?;
         check_counts(data.meshes.len(), data.entities.len()).map_err(|what| Error::input(path, what))?;
         Ok(data)
@@ -321,12 +330,21 @@ impl Data {
 /// # Errors
 /// [`Error::Input`] in one line that starts with `what`.
 pub(super) fn check<T: Serialize + serde::de::DeserializeOwned>(what: impl std::fmt::Display, data: &T) -> Result<()> {
-    let fail = |message: &str| Error::Input(format!("{what}: {}", plain(&message.trim().replace('\n', ", "))));
+    let fail = |message: &str| Error::Input(format!("{what}: {}", plain(&flat(message))));
     let text = toml::to_string(data).map_err(|error| fail(&error.to_string()))?;
     toml::from_str::<T>(&text).map(|_| ()).map_err(|error| fail(error.message()))
 }
 
-/// Replaces the name of one of this program's types in a message by "a table", which is what the file has to hold there.
+/// A message of the TOML reader on one line: its own lines are joined, those of a key in backquotes are escaped.
+fn flat(message: &str) -> String {
+    let part = |(index, part): (usize, &str)| {
+        if index % 2 == 1 { one_line(part) } else { part.replace('\n', ", ") }
+    };
+    message.trim().split('`').enumerate().map(part).collect::<Vec<_>>().join("`")
+}
+
+/// Replaces the name of one of this program's types in a message by "a table", which is what the file has to hold
+/// there.
 fn plain(message: &str) -> String {
     let Some((before, rest)) = message.split_once("expected struct ") else { return message.to_owned() };
     let after = rest.find(|c: char| !c.is_alphanumeric() && c != '_').map_or("", |end| &rest[end..]);

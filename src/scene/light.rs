@@ -1,7 +1,9 @@
 //! How a scene's lights are computed: by spherical harmonics, or as sharp lights whose shadows have edges.
 
-use super::Scene;
+use super::{Entity, Scene};
 use crate::field::sub_light::LampFace;
+use crate::layout::LightKind;
+use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// Which lights are sharp.
@@ -9,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Lights {
-    /// Spherical harmonics for all lights; shadows have no edges.
+    /// Spherical harmonics for all lights but spots; shadows have no edges.
     Sh,
     /// Every entity that glows in one colour, or on one flat side, is a sharp light, as every sun is; all other light
     /// stays in spherical harmonics.
@@ -17,12 +19,60 @@ pub enum Lights {
     Sharp,
 }
 
+/// The cone of a spot about its entity's own +y.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, try_from = "SpotWritten")]
+pub struct Spot {
+    /// Within this angle to the axis it shines in full, degrees, 0 to `outer_deg`.
+    pub inner_deg: f32,
+    /// Beyond this angle it is dark, degrees, up to 90.
+    pub outer_deg: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SpotWritten {
+    #[serde(default)]
+    inner_deg: f32,
+    outer_deg: f32,
+}
+
+impl TryFrom<SpotWritten> for Spot {
+    type Error = String;
+
+    fn try_from(SpotWritten { inner_deg, outer_deg }: SpotWritten) -> Result<Self, String> {
+        if !(outer_deg > 0.0 && outer_deg <= 90.0 && (0.0..=outer_deg).contains(&inner_deg)) {
+            return Err(format!("the angles {inner_deg} and {outer_deg} of a spot are not 0 <= inner <= outer <= 90"));
+        }
+        Ok(Spot { inner_deg, outer_deg })
+    }
+}
+
+impl Spot {
+    /// Factor and summand that turn the cosine to the axis into the square root of the share that shines: the falloff
+    /// of KHR_lights_punctual.
+    pub fn ramp(&self) -> [f64; 2] {
+        let [inner, outer] = [self.inner_deg, self.outer_deg].map(|deg| f64::from(deg).to_radians().cos());
+        let factor = 1.0 / (inner - outer).max(1e-3);
+        [factor, -outer * factor]
+    }
+
+    /// Share of its light that shines at a point, for a light turned by `rotation` whose centre is at `to_light` from
+    /// there.
+    pub fn share(&self, rotation: DQuat, to_light: DVec3) -> f64 {
+        let [factor, summand] = self.ramp();
+        let cosine = -(rotation * DVec3::Y).dot(to_light.normalize_or(DVec3::Y));
+        (cosine * factor + summand).clamp(0.0, 1.0).powi(2)
+    }
+}
+
 /// How one light is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightMethod {
     /// By its field of spherical harmonics.
     Harmonics,
-    /// As a sharp light that is a ball; its mesh covers this share of its bounding sphere's disc, on average over all directions.
+    /// As a sharp light that is a ball; its mesh covers this share of its bounding sphere's disc, on average over all
+    /// directions.
     Ball(f64),
     /// As a sharp light of the mesh's own outline.
     Outline,
@@ -33,9 +83,11 @@ pub enum LightMethod {
 impl LightMethod {
     /// How the light of an entity is computed; of no meaning for one that does not emit.
     pub fn of(scene: &Scene, entity: usize, lights: Lights) -> Self {
-        let mesh = &scene.meshes[scene.entities[entity].mesh];
+        let Entity { mesh, spot, .. } = scene.entities[entity];
+        let mesh = &scene.meshes[mesh];
         match mesh.panel() {
-            _ if lights == Lights::Sh => LightMethod::Harmonics,
+            // Four bands would blur the rim of a spot's cone.
+            _ if lights == Lights::Sh && spot.is_none() => LightMethod::Harmonics,
             Some(panel) => LightMethod::LampFace(panel),
             None if mesh.colors.is_some() => LightMethod::Harmonics,
             None => mesh.ball_share().map_or(LightMethod::Outline, LightMethod::Ball),
@@ -45,6 +97,17 @@ impl LightMethod {
     /// Whether its shadows have edges.
     pub fn is_sharp(self) -> bool {
         self != LightMethod::Harmonics
+    }
+
+    /// Its shape, as shaders know it.
+    pub fn kind(self) -> LightKind {
+        match self {
+            LightMethod::Harmonics => LightKind::None,
+            LightMethod::Ball(_) => LightKind::Ball,
+            LightMethod::Outline => LightKind::Outline,
+            LightMethod::LampFace(LampFace::Disc(_)) => LightKind::Disc,
+            LightMethod::LampFace(LampFace::Rectangle(_)) => LightKind::Rectangle,
+        }
     }
 
     /// What people read.

@@ -5,6 +5,8 @@
 pub mod builder;
 pub mod data;
 pub mod export;
+#[cfg(feature = "cli")]
+pub(crate) mod files;
 pub mod gltf;
 pub mod keys;
 pub mod light;
@@ -25,7 +27,7 @@ use crate::asset::{Mesh, embedded, obj, read_file, utf8};
 use crate::error::{Error, Result};
 pub use builder::{SceneBuilder, Shape};
 pub use data::{Camera, Data, EntityData, MeshData, Output};
-pub use light::{LightMethod, Lights};
+pub use light::{LightMethod, Lights, Spot};
 pub use motion::{Motion, Placement};
 
 /// Largest number of entities in a scene.
@@ -61,6 +63,8 @@ pub struct Entity {
     pub albedo: Vec3,
     /// Linear radiance in W m^-2 sr^-1. It is multiplied by the mesh's colours, if there are any.
     pub emission: Vec3,
+    /// The cone of its light, if it is a spot.
+    pub spot: Option<Spot>,
     /// Whether it lights other entities.
     pub emits: bool,
     /// Whether it casts shadows.
@@ -76,8 +80,8 @@ impl Scene {
     }
 
     /// Reads a scene and the files that it names, relative to it. If the path does not exist, an embedded scene is read
-    /// (`assets/scenes/NAME.toml`, or NAME alone). A `.glb` or `.gltf` file is read as [`gltf`] says; what is left out of it is
-    /// logged. An `.obj` file becomes the scene that [`single`] says.
+    /// (`assets/scenes/NAME.toml`, or NAME alone). A `.glb` or `.gltf` file is read as [`gltf`] says; what is left out
+    /// of it is logged. An `.obj` file becomes the scene that [`single`] says.
     ///
     /// # Errors
     /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line.
@@ -116,8 +120,9 @@ impl Scene {
         Self::parse(utf8(path, &bytes, FILE_LIMIT_BYTES, "scene")?, path, &read_named)
     }
 
-    /// Reads a scene from text. `path` names it in messages; `read` is given the paths of files, which already start with
-    /// the folder of `path`. If `read` fails, the file is searched among the embedded ones, such as `assets/meshes/torus.obj`.
+    /// Reads a scene from text. `path` names it in messages; `read` is given the paths of files, which already start
+    /// with the folder of `path`. If `read` fails, the file is searched among the embedded ones, such as
+    /// `assets/meshes/torus.obj`.
     ///
     /// # Errors
     /// As [`Scene::load`].
@@ -161,12 +166,14 @@ impl Scene {
     /// Replaces the data of an entity; its mesh stays the same.
     ///
     /// # Errors
-    /// [`Error::Input`] in one line: a number out of the range that README states for scene files, or no such entity.
+    /// [`Error::Input`] in one line: a number out of the range that `docs/scene.md` states, or no such entity.
     pub fn set_entity(&mut self, index: usize, data: EntityData) -> Result<()> {
         if index >= self.data.entities.len() {
             return Err(Error::Input(format!("there is no entity {index}")));
         }
         data::check(format!("entity {index}"), &data)?;
+        check_spot(&data, &self.meshes[self.entities[index].mesh])
+            .map_err(|what| Error::Input(format!("entity {index}: {what}")))?;
         self.put_entity(index, data);
         Ok(())
     }
@@ -205,17 +212,26 @@ fn check_counts(meshes: usize, entities: usize) -> std::result::Result<(), Strin
     over.map_or(Ok(()), |(what, count, limit)| Err(format!("{count} {what} are over the limit of {limit}")))
 }
 
-/// The entities of `data` with their meshes found by name. `fail` is given the number of an entity that names none, and the message.
+/// The entities of `data` with their meshes found by name. `fail` is given the number of an entity that names none, and
+/// the message.
 fn resolve_all(data: &Data, meshes: &[Arc<Mesh>], fail: impl Fn(usize, String) -> Error) -> Result<Vec<Entity>> {
     let entity = |(i, entity): (usize, &EntityData)| {
         let mesh = data.meshes.iter().position(|mesh| mesh.name == entity.mesh);
         let mesh = mesh.ok_or_else(|| fail(i, format!("there is no mesh {:?}", entity.mesh)))?;
+        check_spot(entity, &meshes[mesh]).map_err(|what| fail(i, what.to_owned()))?;
         Ok(resolve(i, entity, mesh, &meshes[mesh]))
     };
     data.entities.iter().enumerate().map(entity).collect()
 }
 
-/// Resolves the switches. By default, an entity emits if it has emission, occludes unless it emits or is flat, and receives.
+/// Refuses a spot that would be computed by spherical harmonics, which have no cone.
+fn check_spot(data: &EntityData, mesh: &Mesh) -> std::result::Result<(), &'static str> {
+    let has_colors = mesh.colors.is_some() && mesh.panel().is_none();
+    if data.spot.is_some() && has_colors { Err("a spot takes a mesh without colours of its own") } else { Ok(()) }
+}
+
+/// Resolves the switches. By default, an entity emits if it has emission, occludes unless it emits or is flat, and
+/// receives.
 fn resolve(index: usize, data: &EntityData, mesh: usize, shape: &Mesh) -> Entity {
     let emits = data.emits.unwrap_or(data.emission != Vec3::ZERO);
     Entity {
@@ -223,6 +239,7 @@ fn resolve(index: usize, data: &EntityData, mesh: usize, shape: &Mesh) -> Entity
         mesh,
         albedo: data.albedo,
         emission: data.emission,
+        spot: data.spot,
         emits,
         occludes: data.occludes.unwrap_or(!emits && !shape.is_flat()),
         receives: data.receives.unwrap_or(true),

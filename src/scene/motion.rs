@@ -36,8 +36,8 @@ impl Placement {
     }
 }
 
-/// A rotation in a scene file: `{ axis = [0, 1, 0], angle_deg = 30 }` (right-handed) or `{ quaternion = [x, y, z, w] }` of any
-/// length but zero.
+/// A rotation in a scene file: `{ axis = [0, 1, 0], angle_deg = 30 }` (right-handed) or `{ quaternion = [x, y, z, w] }`
+/// of any length but zero.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Written", into = "Written")]
 pub enum RotationData {
@@ -221,17 +221,18 @@ impl Node {
     }
 }
 
-/// Interpolation of positions and scales between keys. Rotations always take the short way at a constant rate (spherical
-/// linear interpolation).
+/// Interpolation of positions and scales between keys. Rotations always take the short way at a constant rate
+/// (spherical linear interpolation).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Interpolation {
     /// Straight lines at a constant rate.
     #[default]
     Linear,
-    /// A Catmull-Rom spline through the keys: Hermite cubics whose slope at a key is the difference of the neighbouring keys over
-    /// the difference of their times. The first and last slopes are those of the first and last stretch, unless the motion repeats
-    /// and its last key equals its first. The spline may overshoot the keys; scales stay above a tenth of their keys' scales.
+    /// A Catmull-Rom spline through the keys: Hermite cubics whose slope at a key is the difference of the neighbouring
+    /// keys over the difference of their times. The first and last slopes are those of the first and last stretch,
+    /// unless the motion repeats and its last key equals its first. The spline may overshoot the keys; scales stay
+    /// above a tenth of their keys' scales.
     Smooth,
 }
 
@@ -342,7 +343,8 @@ fn interpolate(
     rest: PlacementF64,
     time_s: f64,
 ) -> PlacementF64 {
-    let (first, last) = (keys[0].time_s, keys[keys.len() - 1].time_s);
+    let first = keys[0].time_s;
+    let last = keys[keys.len() - 1].time_s;
     let time = if repeat && last > first { first + (time_s - first).rem_euclid(last - first) } else { time_s };
     let place = |key: &Keyframe| PlacementF64 {
         position: key.position.map_or(rest.position, |p| p.as_dvec3()),
@@ -353,7 +355,8 @@ fn interpolate(
     if next == 0 || next == keys.len() {
         return place(&keys[next.saturating_sub(1)]);
     }
-    let (from, to) = (place(&keys[next - 1]), place(&keys[next]));
+    let from = place(&keys[next - 1]);
+    let to = place(&keys[next]);
     let span_s = keys[next].time_s - keys[next - 1].time_s;
     let part = (time - keys[next - 1].time_s) / span_s;
     let rotation = from.rotation.slerp(to.rotation, part);
@@ -366,7 +369,8 @@ fn interpolate(
             // Slope at a key from its neighbours, in units of this stretch.
             let slope = |key: usize| {
                 let end = keys.len() - 1;
-                // The first and the last key of a closed path are the same; its neighbours lie on both sides of the seam.
+                // The first and the last key of a closed path are the same; its neighbours lie on both sides of the
+                // seam.
                 let at = |key: usize| place(&keys[key]).position_and_scale();
                 let (before, after, took_s) = match key {
                     _ if closed && (key == 0 || key == end) => {

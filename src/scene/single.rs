@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 const FLOOR_RADII: f32 = 8.0;
 /// Squares along an edge of the floor.
 const FLOOR_CELLS: u32 = 64;
-/// Position of the eye from the mesh's centre, in radii: from before, above and the right, at a distance from which a view of 40
-/// degrees holds the bounding sphere with a margin.
+/// Position of the eye from the mesh's centre, in radii: from before, above and the right, at a distance from which a
+/// view of 40 degrees holds the bounding sphere with a margin.
 const EYE_RADII: Vec3 = Vec3::new(1.4, 1.5, 3.0);
 
 /// Whether a path names an OBJ file, by its ending.
@@ -23,9 +23,6 @@ pub fn is_obj(path: &Path) -> bool {
 }
 
 /// Reads an OBJ file as a scene.
-///
-/// # Errors
-/// As [`Mesh::load`], and [`Error::Input`](crate::Error::Input) where the mesh is smaller or larger than a scene's lengths may be.
 pub(super) fn load(path: &Path) -> Result<Scene> {
     let mesh = Mesh::load(path)?;
     let (centre, radius_m) = mesh.bounding_sphere();

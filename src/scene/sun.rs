@@ -1,8 +1,9 @@
 //! Distant discs as entities: balls so far beyond a scene that all of it sees them alike.
 //!
-//! Lists, merge, pass "sharp", pictures and rays need to know nothing of them: a ball of angular radius a at distance d has the radius
-//! d sin(a), and its irradiance is that of a disc at infinity. Over a scene of 100 km its direction changes by 1e-4 radians. The distance
-//! is the same for every scene, so that no edit of anything else moves a sun by the last bit.
+//! Lists, merge, pass "sharp", pictures and rays need to know nothing of them: a ball of angular radius a at distance d
+//! has the radius d sin(a), and its irradiance is that of a disc at infinity. Over a scene of 100 km its direction
+//! changes by 1e-4 radians. The distance is the same for every scene, so that no edit of anything else moves a sun by
+//! the last bit.
 
 use super::{Entity, Placement, Scene};
 use crate::asset::disc::Disc;
@@ -42,6 +43,7 @@ impl Scene {
                 mesh,
                 albedo: Vec3::ZERO,
                 emission: (radiance / share).as_vec3(),
+                spot: None,
                 emits: radiance != DVec3::ZERO,
                 occludes: false,
                 receives: false,

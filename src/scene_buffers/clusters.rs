@@ -1,9 +1,10 @@
-//! Clusters are runs of [`CLUSTER_VERTICES`] vertices. This finds the order of a mesh's vertices in which every cluster is small and
-//! faces one way, and the bounds of each.
+//! Clusters are runs of [`CLUSTER_VERTICES`] vertices. This finds the order of a mesh's vertices in which every cluster
+//! is small and faces one way, and the bounds of each.
 //!
-//! The vertices are halved, and each half again, across the longest edge of the box around their places and normals. Each cut lies
-//! at a whole number of clusters, so a cluster is as compact as its neighbourhood lets it be. A space-filling curve would do worse:
-//! it leaps within some clusters, and a cluster that spans a leap has half of the scene on its list.
+//! The vertices are halved, and each half again, across the longest edge of the box around their places and normals.
+//! Each cut lies at a whole number of clusters, so a cluster is as compact as its neighbourhood lets it be. A
+//! space-filling curve would do worse: it leaps within some clusters, and a cluster that spans a leap has half of the
+//! scene on its list.
 
 use crate::asset::mesh::Mesh;
 use crate::bake::triangles::unit_positions;
@@ -11,11 +12,12 @@ use crate::layout::CLUSTER_VERTICES;
 use crate::lists::gather::{ClusterBounds, GROUP_CLUSTERS};
 use glam::Vec3;
 
-/// The distance, in bounding radii, that the length of a normal counts as. It is a little more than the edge of a cube with that radius
-/// (1.15), so that the sides of a cube come apart first. Weights from 0.25 to 5 change the sum of all lists by 10 % at most.
+/// The distance, in bounding radii, that the length of a normal counts as. It is a little more than the edge of a cube
+/// with that radius (1.15), so that the sides of a cube come apart first. Weights from 0.25 to 5 change the sum of all
+/// lists by 10 % at most.
 const NORMAL_WEIGHT: f32 = 1.25;
-/// Sizes of the runs that stay whole: groups whose lists are gathered together, clusters, and neighbours within a cluster, which
-/// share lines of the cache.
+/// Sizes of the runs that stay whole: groups whose lists are gathered together, clusters, and neighbours within a
+/// cluster, which share lines of the cache.
 const RUNS: [usize; 3] = [GROUP_CLUSTERS * CLUSTER_VERTICES as usize, CLUSTER_VERTICES as usize, 8];
 /// Below this number of vertices another thread costs more than it saves.
 const ALONE: usize = 1 << 14;

@@ -6,8 +6,7 @@ use crate::error::Result;
 use crate::field::extent::{Extent, extent};
 use crate::field::quantity::channel_stride;
 use crate::field::{Area, FieldHeader, FieldKind, ShadowField};
-use crate::gpu::{Buffer, BufferKind, Device, Volume};
-use crate::merge::shelf::ImageShelf;
+use crate::gpu::{Buffer, BufferKind, Device};
 use crate::scene::Scene;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -16,12 +15,9 @@ use std::sync::Arc;
 /// The place of a field in the atlas, and what a merge has to know of the field.
 #[derive(Clone)]
 pub struct FieldSlot {
-    /// The parameters of the field.
     pub header: FieldHeader,
     /// The bytes of the field in the atlas.
     pub bytes: Range<u64>,
-    /// Index of its first channel among the channels of all fields, as they stand in an image.
-    pub channel: u32,
     /// Directions in which the field is not zero.
     pub extent: Extent,
     /// The area that its object covers from afar, if this is an occlusion field.
@@ -35,18 +31,15 @@ impl FieldSlot {
     }
 }
 
-/// Puts the fields of a scene's meshes into one buffer. Returns the places of each mesh's occlusion and radiance fields. Meshes that
-/// share a field share its place.
-///
-/// # Errors
-/// `Device` when memory ran out.
+/// Puts the fields of a scene's meshes into one buffer. Returns the places of each mesh's occlusion and radiance
+/// fields. Meshes that share a field share its place.
 pub(super) fn field_atlas(
     device: &Arc<Device>,
     scene: &Scene,
     baked: &[BakedMesh],
     options: &bake::Options,
 ) -> Result<(Buffer, Vec<[Option<FieldSlot>; 2]>)> {
-    let (mut total, mut channels) = (0, 0);
+    let mut total = 0;
     let mut known = HashMap::<*const ShadowField, FieldSlot>::new();
     let mut distinct: Vec<(Arc<ShadowField>, u64)> = Vec::new();
     let mut slot = |field: &Arc<ShadowField>, name: &str| {
@@ -54,11 +47,9 @@ pub(super) fn field_atlas(
             let bytes = total..total + field.payload.len() as u64;
             total = bytes.end.next_multiple_of(ALIGNMENT);
             distinct.push((field.clone(), bytes.start));
-            let channel = channels;
-            channels += field.header.kind.channels() as u32;
             let is_occlusion = field.header.kind == FieldKind::Occlusion;
             let area = if is_occlusion { Area::new(field) } else { Area::default() };
-            FieldSlot { header: field.header.clone(), bytes, channel, extent: extent(field), area }
+            FieldSlot { header: field.header.clone(), bytes, extent: extent(field), area }
         });
         FieldSlot { header: FieldHeader { mesh: name.to_owned(), ..slot.header.clone() }, ..slot.clone() }
     };
@@ -66,7 +57,8 @@ pub(super) fn field_atlas(
         [&baked.blocked, &baked.radiance].map(|field| field.as_ref().map(|field| slot(field, &mesh.name)))
     });
     let slots = slots.collect();
-    // Where bands differ, the shader reads as much of any sample as the kind with more bands has. After the last sample it reads on.
+    // Where bands differ, the shader reads as much of any sample as the kind with more bands has. After the last sample
+    // it reads on.
     let overrun = if options.field_bands.is_some() { 8 * channel_stride(options.most_bands()) as u64 } else { 0 };
     let mut fields = Buffer::new(device, "fields", BufferKind::Device, total.max(ALIGNMENT) + overrun)?;
     for (field, first) in distinct {
@@ -76,32 +68,6 @@ pub(super) fn field_atlas(
 }
 
 /// A copy of one field in host memory.
-///
-/// # Errors
-/// `Device` when memory ran out.
 pub(super) fn download(fields: &Buffer, slot: &FieldSlot) -> Result<ShadowField> {
     Ok(ShadowField { header: slot.header.clone(), payload: fields.download_range(slot.bytes.clone())? })
-}
-
-/// The fields as one image, or `None` if the device or their shape rules that out.
-///
-/// # Errors
-/// `Device` when memory ran out.
-pub(super) fn image(device: &Arc<Device>, fields: &[ShadowField], bands: usize) -> Result<Option<Volume>> {
-    let Some(lattice) = fields.first().map(|field| field.header.lattice) else { return Ok(None) };
-    let count = fields.iter().map(|field| field.header.kind.channels() as u32).sum();
-    let Some(shelf) = ImageShelf::new(device, lattice, bands, count) else { return Ok(None) };
-    type Quads<'f> = Box<dyn Fn(usize, usize) -> [u16; 4] + 'f>;
-    let channels = fields.iter().flat_map(|field| {
-        (0..field.header.kind.channels()).map(move |channel| {
-            let stride = field.header.channel_stride();
-            Box::new(move |sample: usize, quad: usize| {
-                let first = sample * field.header.sample_stride() + channel * stride + 4 * quad;
-                [0, 1, 2, 3]
-                    .map(|k| 2 * (first + k))
-                    .map(|at| u16::from_le_bytes([field.payload[at], field.payload[at + 1]]))
-            }) as Quads<'_>
-        })
-    });
-    Ok(Some(shelf.fill(device, channels)?))
 }

@@ -5,14 +5,10 @@ use crate::bake::{SceneNeeds, bakes_transfer};
 use crate::error::{Error, Result};
 use crate::field::quantity::channel_stride;
 use crate::gpu::Device;
-use crate::lists::gather::TURNS;
 use crate::scene::Scene;
 use ash::vk;
 
 /// Refuses a scene that the device cannot hold, before anything is baked.
-///
-/// # Errors
-/// `Input` as [`Needs::check`].
 pub fn check(device: &Device, scene: &Scene, baked: &SceneNeeds) -> Result<()> {
     let needs = Needs::of(scene, baked.field_bytes(ALIGNMENT), baked.options.bands);
     needs.check(&device.limits, device.heap_bytes())
@@ -21,7 +17,6 @@ pub fn check(device: &Device, scene: &Scene, baked: &SceneNeeds) -> Result<()> {
 /// Bytes that a scene keeps on the device, by buffer. Each is bound as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Needs {
-    /// Fields of all meshes.
     pub fields: u64,
     /// Transfer vectors of the lit meshes that can shadow themselves.
     pub transfers: u64,
@@ -38,7 +33,8 @@ impl Needs {
     pub fn of(scene: &Scene, fields: u64, bands: usize) -> Self {
         let vertices = |mesh: usize| scene.meshes[mesh].positions.len() as u64;
         let lit = |mesh: usize| scene.entities.iter().any(|e| e.mesh == mesh && e.receives);
-        let (mut needs, channel) = (Needs { fields, ..Default::default() }, 4 * channel_stride(bands) as u64);
+        let mut needs = Needs { fields, ..Default::default() };
+        let channel = 4 * channel_stride(bands) as u64;
         for (index, mesh) in scene.meshes.iter().enumerate() {
             needs.vertices += 32 * vertices(index);
             needs.drawables += 24 * vertices(index) + 12 * mesh.triangles.len() as u64;
@@ -51,9 +47,6 @@ impl Needs {
     }
 
     /// Refuses what the device cannot hold.
-    ///
-    /// # Errors
-    /// `Input` with what is too large, how large it is, the limit, and what would help.
     pub fn check(&self, limits: &vk::PhysicalDeviceLimits, heap_bytes: u64) -> Result<()> {
         let most = u64::from(limits.max_storage_buffer_range);
         let fewer = "use fewer vertices";
@@ -76,14 +69,15 @@ impl Needs {
     }
 }
 
+/// Entries that a merge takes on a software device: llvmpipe (Mesa 22.3) ends all loops of an invocation after 65 535
+/// iterations together, without a word, and an entry takes up to two.
+const SOFTWARE_ENTRIES: u32 = 30_000;
+
 /// Refuses a list of entries that is longer than a software device goes through.
-///
-/// # Errors
-/// `Input` with how long it is, the limit, and what would help.
 pub fn check_entries(longest: u32) -> Result<()> {
-    if longest > TURNS {
+    if longest > SOFTWARE_ENTRIES {
         return Err(Error::Input(format!(
-            "{longest} lookups of occluders and lights matter to one cluster of vertices, a software device makes at most {TURNS}: \
+            "{longest} lookups of occluders and lights matter to one cluster of vertices, a software device makes at most {SOFTWARE_ENTRIES}: \
              use fewer lights or occluders, or a larger --eps"
         )));
     }
@@ -129,8 +123,8 @@ mod tests {
 
     #[test]
     fn a_list_beyond_the_loop_limit_is_refused_with_numbers() {
-        check_entries(TURNS).unwrap();
-        let error = check_entries(TURNS + 1).unwrap_err();
+        check_entries(SOFTWARE_ENTRIES).unwrap();
+        let error = check_entries(SOFTWARE_ENTRIES + 1).unwrap_err();
         assert_eq!(error.exit_code(), 4);
         assert!(error.to_string().contains("30001") && error.to_string().contains("--eps"), "{error}");
     }

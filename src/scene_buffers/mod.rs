@@ -1,5 +1,5 @@
-//! The data that a scene keeps on the device from frame to frame: fields, transfer vectors, vertices, and meshes to draw. Only what
-//! its entities need is uploaded.
+//! The data that a scene keeps on the device from frame to frame: fields, transfer vectors, vertices, and meshes to
+//! draw. Only what its entities need is uploaded.
 
 pub mod clusters;
 mod field_atlas;
@@ -15,7 +15,7 @@ use crate::field::ShadowField;
 use crate::field::extent::Extent;
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::self_visibility::{self, BYTES};
-use crate::gpu::{Buffer, Device, Volume};
+use crate::gpu::{Buffer, Device};
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::ClusterBounds;
 use crate::lists::sight::TriangleRun;
@@ -27,7 +27,8 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Alignment, in bytes, of everything that a pass may bind as a range. It is the largest that Vulkan lets a device ask for.
+/// Alignment, in bytes, of everything that a pass may bind as a range. It is the largest that Vulkan lets a device ask
+/// for.
 pub const ALIGNMENT: u64 = 256;
 
 /// One mesh of the scene: where its vertices, transfer vectors and fields lie, and how it is drawn.
@@ -52,13 +53,11 @@ pub struct DeviceMesh {
     pub self_maps: Option<Arc<Vec<u8>>>,
     /// Silhouette field, if an entity needs one.
     pub silhouette: Option<SilhouetteSlot>,
-    /// The mesh as it is drawn.
     pub drawn: DrawnMesh,
     /// How far a point of a triangle may lie from a vertex of it, metres.
     pub reach_m: f32,
     /// Centre of the bounding sphere, metres.
     pub centre_m: DVec3,
-    /// Bounding radius, metres.
     pub radius_m: f64,
 }
 
@@ -72,17 +71,15 @@ impl DeviceMesh {
 
 /// The data of a scene on the device.
 pub struct SceneBuffers {
-    /// All fields.
     pub fields: Buffer,
-    /// All silhouette fields.
     pub silhouettes: Silhouettes,
-    /// Cells of self-visibility, [`self_visibility::CELLS`] of two words a vertex of the lit meshes that can shadow themselves.
+    /// Cells of self-visibility, [`self_visibility::CELLS`] of two words a vertex of the lit meshes that can shadow
+    /// themselves.
     pub self_cells: Buffer,
     /// Transfer vectors of all receivers' meshes.
     pub transfers: Buffer,
     /// Positions and normals of all meshes, one quad for each.
     pub vertices: Buffer,
-    /// The scene's meshes.
     pub meshes: Vec<DeviceMesh>,
     /// The bakes that were not found in the cache.
     pub baked: Vec<Baked>,
@@ -96,8 +93,8 @@ pub struct SceneBuffers {
 
 /// Vertices and transfer vectors of a scene on their way into its buffers.
 struct Packing {
-    /// Two quads a vertex: its position about the centre of the mesh's bounding sphere and how far its farthest neighbour is, metres; and
-    /// its normal.
+    /// Two quads a vertex: its position about the centre of the mesh's bounding sphere and how far its farthest
+    /// neighbour is, metres; and its normal.
     vertices: Vec<[f32; 4]>,
     transfers: Vec<f32>,
     /// First quad of the transfer vectors of each distinct mesh, by the hash of its content. Equal meshes share theirs.
@@ -128,9 +125,6 @@ impl Packing {
     }
 
     /// Adds one mesh in the order of its clusters.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     fn add(
         &mut self,
         device: &Arc<Device>,
@@ -187,9 +181,6 @@ impl Packing {
 
 impl SceneBuffers {
     /// Uploads what was baked of a scene with `options`, and its meshes.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn new(device: &Arc<Device>, scene: &Scene, options: &bake::Options, baked: BakedScene) -> Result<Self> {
         let (fields, slots) = field_atlas::field_atlas(device, scene, &baked.meshes, options)?;
         let mut packing = Packing::new(scene, channel_stride(options.bands));
@@ -237,28 +228,11 @@ impl SceneBuffers {
     }
 
     /// A copy of one field in host memory, for the CPU twin.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn field(&self, slot: &FieldSlot) -> Result<ShadowField> {
         field_atlas::download(&self.fields, slot)
     }
 
-    /// All fields as one image, or `None` if the device or their shape rules that out.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
-    pub fn image(&self) -> Result<Option<Volume>> {
-        let device = self.fields.device();
-        let slots = self.meshes.iter().flat_map(|g| [&g.blocked, &g.radiance]).flatten();
-        let fields = slots.map(|slot| self.field(slot)).collect::<Result<Vec<_>>>()?;
-        field_atlas::image(device, &fields, self.bands)
-    }
-
     /// A copy of a mesh's transfer vectors, in the mesh's order of vertices, and the floats of each.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
     pub fn transfer(&self, device_mesh: &DeviceMesh) -> Result<Option<(Vec<f32>, usize)>> {
         if device_mesh.transfer_first == NONE {
             return Ok(None);

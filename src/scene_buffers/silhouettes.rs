@@ -22,17 +22,15 @@ pub struct Silhouettes {
 pub struct SilhouetteSlot {
     /// Its first quad, and bit 31 where it has maps of halves.
     pub first_quad: u32,
-    /// The field, for the twin.
     pub field: Arc<SilhouetteField>,
 }
 
 impl Silhouettes {
-    /// Uploads the fields of a scene's meshes, and returns each mesh's place. Meshes that share a field share its place.
-    ///
-    /// # Errors
-    /// `Device` when memory ran out.
+    /// Uploads the fields of a scene's meshes, and returns each mesh's place. Meshes that share a field share its
+    /// place.
     pub fn new(device: &Arc<Device>, baked: &[BakedMesh]) -> Result<(Self, Vec<Option<SilhouetteSlot>>)> {
-        let (mut nodes, mut cells) = (Vec::<[f32; 4]>::new(), Vec::<[u32; 2]>::new());
+        let mut nodes = Vec::<[f32; 4]>::new();
+        let mut cells = Vec::<[u32; 2]>::new();
         let mut known = HashMap::<*const SilhouetteField, u32>::new();
         let mut slot = |field: &Arc<SilhouetteField>| {
             let first_quad = *known.entry(Arc::as_ptr(field)).or_insert_with(|| {
@@ -51,7 +49,6 @@ impl Silhouettes {
         Ok((Silhouettes { nodes, cells: Buffer::with_data(device, "silhouette cells", &cells)? }, slots))
     }
 
-    /// Bytes on the device.
     pub fn size_bytes(&self) -> u64 {
         self.nodes.size_bytes + self.cells.size_bytes
     }

@@ -53,7 +53,8 @@ static RECURRENCE: LazyLock<Recurrence> = LazyLock::new(|| {
         }
         table.start[m] = start;
         for l in m + 1..MAX_BANDS {
-            let (lf, span) = (l as f64, (l * l - m * m) as f64);
+            let lf = l as f64;
+            let span = (l * l - m * m) as f64;
             table.rise[m][l] = ((4.0 * lf * lf - 1.0) / span).sqrt();
             if l > m + 1 {
                 let numerator = (2 * l + 1) * ((l - 1) * (l - 1) - m * m);
@@ -87,9 +88,11 @@ fn evaluate_bands<const BANDS: usize>(direction: DVec3, out: &mut [f64]) {
     let out = &mut out[..coefficient_count(BANDS)];
     let table = &*RECURRENCE;
     let DVec3 { x, y, z } = direction;
-    let (mut cos, mut sin) = (1.0, 0.0);
+    let mut cos = 1.0;
+    let mut sin = 0.0;
     for m in 0..BANDS {
-        let (mut below, mut q) = (0.0, table.start[m]);
+        let mut below = 0.0;
+        let mut q = table.start[m];
         for l in m..BANDS {
             if l > m {
                 (below, q) = (q, table.rise[m][l] * z * q - table.fall[m][l] * below);
@@ -104,7 +107,8 @@ fn evaluate_bands<const BANDS: usize>(direction: DVec3, out: &mut [f64]) {
 /// Coefficients of Q_lm by power of z.
 fn polynomial(l: usize, m: usize) -> Vec<f64> {
     let table = &*RECURRENCE;
-    let (mut below, mut q) = (vec![0.0; l - m + 1], vec![0.0; l - m + 1]);
+    let mut below = vec![0.0; l - m + 1];
+    let mut q = vec![0.0; l - m + 1];
     q[0] = table.start[m];
     for i in m + 1..=l {
         let next = (0..q.len())
@@ -125,7 +129,8 @@ pub fn basis_program(bands: usize) -> Program {
     let [x, y, z] = [0, 1, 2].map(Value::Input);
     let mut values = vec![None; coefficient_count(bands)];
     let z_squared = (bands > 2).then(|| program.define(vec![Term::new(1.0, &[z, z])]));
-    let (mut cos, mut sin) = (x, y);
+    let mut cos = x;
+    let mut sin = y;
     for m in 0..bands {
         if m > 1 {
             let next_cos = program.define(vec![Term::new(1.0, &[x, cos]), Term::new(-1.0, &[y, sin])]);

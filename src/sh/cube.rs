@@ -1,9 +1,10 @@
 //! The cube around a capture point: faces, texels, directions and solid angles are defined only here.
 //!
-//! Faces are +X -X +Y -Y +Z -Z, numbered 0 to 5. On a face, s runs to the right and t *down*, both in [-1, 1], as in the
-//! table "Cube Map Face Selection" of the Vulkan specification, so that texel (x, y) of layer `face` of a cube image lies
-//! at `direction(face, texel_st(x, face_px), texel_st(y, face_px))`. Every face is a mirror image of what a camera there
-//! would see: seen along `forward`, `right` and `down` are a left-handed frame, and the winding of triangles flips.
+//! Faces are +X -X +Y -Y +Z -Z, numbered 0 to 5. On a face, s runs to the right and t *down*, both in [-1, 1], as in
+//! the table "Cube Map Face Selection" of the Vulkan specification, so that texel (x, y) of layer `face` of a cube
+//! image lies at `direction(face, texel_st(x, face_px), texel_st(y, face_px))`. Every face is a mirror image of what a
+//! camera there would see: seen along `forward`, `right` and `down` are a left-handed frame, and the winding of
+//! triangles flips.
 
 use glam::DVec3;
 
@@ -36,7 +37,8 @@ pub fn direction(face: usize, s: f64, t: f64) -> DVec3 {
 
 /// The face that `direction` (any length but 0) meets, and where: (face, s, t) with s and t in [-1, 1].
 ///
-/// On an edge or corner, where faces tie, z wins over y and y over x, as the specification's "largest magnitude" allows.
+/// On an edge or corner, where faces tie, z wins over y and y over x, as the specification's "largest magnitude"
+/// allows.
 pub fn face_st(direction: DVec3) -> (usize, f64, f64) {
     let magnitude = direction.abs();
     let axis = if magnitude.z >= magnitude.x && magnitude.z >= magnitude.y {
@@ -63,7 +65,8 @@ pub fn texel_st(x: usize, face_px: usize) -> f64 {
 pub fn solid_angle(face_px: usize) -> Vec<f64> {
     assert!(face_px > 0, "a face needs a texel");
     let corner = |x: usize, y: usize| {
-        let (s, t) = (2.0 * x as f64 / face_px as f64 - 1.0, 2.0 * y as f64 / face_px as f64 - 1.0);
+        let s = 2.0 * x as f64 / face_px as f64 - 1.0;
+        let t = 2.0 * y as f64 / face_px as f64 - 1.0;
         (s * t).atan2((s * s + t * t + 1.0).sqrt())
     };
     let mut angles = Vec::with_capacity(face_px * face_px);

@@ -74,12 +74,13 @@ pub fn clamped_cosine(bands: usize, normal: DVec3) -> Vec<f64> {
     zonal(bands, &z, normal)
 }
 
-/// GLSL 460 text of `void sh_cosine(vec3 n, out float f[N])`, N = bands^2: [`clamped_cosine`] of the unit vector `n`. Needs
-/// [`super::basis::glsl_basis`] before it.
+/// GLSL 460 text of `void sh_cosine(vec3 n, out float f[N])`, N = bands^2: [`clamped_cosine`] of the unit vector `n`.
+/// Needs [`super::basis::glsl_basis`] before it.
 pub fn glsl_clamped_cosine(bands: usize) -> String {
     let count = coefficient_count(bands);
     // Along an axis only m = 0 is left, with Y_l0(z) = sqrt((2l + 1) / 4 pi): the band's factor is their quotient.
-    let (mut along_z, lobe) = ([0.0; MAX_COEFFICIENTS], clamped_cosine(bands, DVec3::Z));
+    let mut along_z = [0.0; MAX_COEFFICIENTS];
+    let lobe = clamped_cosine(bands, DVec3::Z);
     evaluate(bands, DVec3::Z, &mut along_z);
     let scaled = (0..bands).flat_map(|l| {
         let factor = lobe[l * (l + 1)] / along_z[l * (l + 1)];

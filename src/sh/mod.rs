@@ -1,9 +1,9 @@
 //! Spherical harmonics in f64: the maths that bakes, shaders and their tests use. It needs no Vulkan and no files.
 //!
-//! Conventions, tested in `tests/sh_*.rs` and `tests/cube.rs`:
+//! Conventions, tested in `tests/sh`:
 //!
-//! - real orthonormal basis with the Condon-Shortley phase (reference 1): Y1,-1 = -0.488603 y, Y1,0 = 0.488603 z,
-//!   Y1,1 = -0.488603 x; coefficient l (l + 1) + m; n bands are n^2 coefficients, 1 to [`MAX_BANDS`];
+//! - real orthonormal basis with the Condon-Shortley phase (reference 1): Y1,-1 = -0.488603 y, Y1,0 = 0.488603 z, Y1,1
+//!   = -0.488603 x; coefficient l (l + 1) + m; n bands are n^2 coefficients, 1 to [`MAX_BANDS`];
 //! - directions are unit vectors of a right-handed space, taken as they stand: no axes are swapped;
 //! - a function is a blocked part, a radiance or a transfer; its coefficients have its unit;
 //! - cube faces +X -X +Y -Y +Z -Z with Vulkan's s and t ([`cube`]).
@@ -16,7 +16,6 @@
 //! | [`mod@project`] | texels to coefficients |
 //! | [`product`] | the triple-product tensor, products, growth certificates |
 //! | [`product_program`] | the product as straight-line code, and its GLSL |
-//! | [`points`] | products at the 32 points of a rule |
 //! | [`rotation`] | block-diagonal rotation, and its GLSL |
 //! | [`lobe`] | closed forms: caps, spheres, the clamped cosine |
 //! | [`program`] | straight-line programs: run by tests, printed for shaders |
@@ -25,16 +24,16 @@
 //!
 //! 1. P.-P. Sloan, *Stupid Spherical Harmonics (SH) Tricks*, GDC 2008: basis, phase, zonal rotation, triple products.
 //! 2. P.-P. Sloan, *Efficient Spherical Harmonic Evaluation*, JCGT 2 (2), 2013: polynomials in x, y, z.
-//! 3. J. Snyder, *Code Generation and Factoring for Fast Evaluation of Low-order Spherical Harmonic Products and Squares*,
-//!    MSR-TR-2006-53, 2006: the product's sparsity and what factoring saves.
+//! 3. J. Snyder, *Code Generation and Factoring for Fast Evaluation of Low-order Spherical Harmonic Products and
+//!    Squares*, MSR-TR-2006-53, 2006: the product's sparsity and what factoring saves.
 //! 4. R. Ramamoorthi, P. Hanrahan, *An Efficient Representation for Irradiance Environment Maps*, SIGGRAPH 2001: the
 //!    clamped cosine.
-//! 5. A. D. McLaren, *Optimal Numerical Integration on a Sphere*, Mathematics of Computation 17, 1963: the 32-point rule.
+//! 5. A. D. McLaren, *Optimal Numerical Integration on a Sphere*, Mathematics of Computation 17, 1963: the 32-point
+//!    rule.
 
 pub mod basis;
 pub mod cube;
 pub mod lobe;
-pub mod points;
 pub mod product;
 pub mod product_program;
 pub mod program;

@@ -1,13 +1,13 @@
 //! Products of SH expansions: `c = P[(sum a_i Y_i) (sum b_j Y_j)]`, the projection of the pointwise product.
 //!
-//! `c_k = sum_ij G_ijk a_i b_j` with the Gaunt tensor `G_ijk`, the integral of `Y_i Y_j Y_k` over the sphere: symmetric in
-//! its three indices and mostly zero (353 of 4096 entries at 4 bands).
+//! `c_k = sum_ij G_ijk a_i b_j` with the Gaunt tensor `G_ijk`, the integral of `Y_i Y_j Y_k` over the sphere: symmetric
+//! in its three indices and mostly zero (353 of 4096 entries at 4 bands).
 
 use super::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use super::quadrature::sphere_rule;
 
-/// Entries below this are zeros with rounding errors. The smallest true magnitudes are 0.0584 at 4 bands and above 1e-4 at 8
-/// bands, and the errors of the sums are below 1e-14.
+/// Entries below this are zeros with rounding errors. The smallest true magnitudes are 0.0584 at 4 bands and above 1e-4
+/// at 8 bands, and the errors of the sums are below 1e-14.
 const ZERO: f64 = 1e-9;
 
 /// One non-zero entry of a tensor.
@@ -28,12 +28,12 @@ pub struct Entry {
 pub struct Tensor {
     bands: [usize; 3],
     entries: Vec<Entry>,
-    /// The same entries as [`Tensor::multiply`] uses them. For coefficients that both expansions have, `a_i b_j + a_j b_i` is
-    /// computed once and added to a run of targets.
+    /// The same entries as [`Tensor::multiply`] uses them. For coefficients that both expansions have, `a_i b_j + a_j
+    /// b_i` is computed once and added to a run of targets.
     pairs: Vec<Pair>,
     targets: Vec<(u8, f64)>,
-    /// The other entries, `a_i b_j`, as a flat list: most have one target, and the branch at the end of a loop of one iteration is
-    /// mispredicted.
+    /// The other entries, `a_i b_j`, as a flat list: most have one target, and the branch at the end of a loop of one
+    /// iteration is mispredicted.
     single: Vec<Single>,
 }
 
@@ -107,14 +107,16 @@ impl Tensor {
         let [a_count, b_count, c_count] = self.bands.map(coefficient_count);
         // Fixed sizes and masked indices (coefficients number at most 64) leave the inner loop without bounds checks.
         const MASK: usize = MAX_COEFFICIENTS - 1;
-        let (mut left, mut right, mut sums) =
-            ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
+        let mut left = [0.0; MAX_COEFFICIENTS];
+        let mut right = [0.0; MAX_COEFFICIENTS];
+        let mut sums = [0.0; MAX_COEFFICIENTS];
         left[..a_count].copy_from_slice(&a[..a_count]);
         right[..b_count].copy_from_slice(&b[..b_count]);
         let mut targets = self.targets.as_slice();
         let mut start = 0;
         for pair in &self.pairs {
-            let (i, j) = (pair.i as usize & MASK, pair.j as usize & MASK);
+            let i = pair.i as usize & MASK;
+            let j = pair.j as usize & MASK;
             let mirrored = if i == j { 0.0 } else { left[j] * right[i] };
             let product = left[i] * right[j] + mirrored;
             let (run, rest) = targets.split_at((pair.end - start) as usize);
@@ -129,8 +131,8 @@ impl Tensor {
         out[..c_count].copy_from_slice(&sums[..c_count]);
     }
 
-    /// The row-major matrix M of multiplication by `b`: product = M a, with as many rows as the product has coefficients.
-    /// Symmetric where the first factor and the product have the same bands.
+    /// The row-major matrix M of multiplication by `b`: product = M a, with as many rows as the product has
+    /// coefficients. Symmetric where the first factor and the product have the same bands.
     pub fn matrix(&self, b: &[f64]) -> Vec<f64> {
         let [a_count, _, c_count] = self.bands.map(coefficient_count);
         let mut matrix = vec![0.0; c_count * a_count];
@@ -143,7 +145,8 @@ impl Tensor {
 
 /// Groups the entries with `i <= j` by pair of factors; each also stands for its mirror image.
 fn pair_up(entries: &[Entry]) -> (Vec<Pair>, Vec<(u8, f64)>) {
-    let (mut pairs, mut targets) = (Vec::new(), Vec::new());
+    let mut pairs = Vec::new();
+    let mut targets = Vec::new();
     for run in entries.chunk_by(|x, y| (x.i, x.j) == (y.i, y.j)).filter(|run| run[0].i <= run[0].j) {
         targets.extend(run.iter().map(|entry| (entry.k as u8, entry.value)));
         let end = u16::try_from(targets.len()).expect("8 bands have fewer than 65536 entries");
@@ -152,8 +155,9 @@ fn pair_up(entries: &[Entry]) -> (Vec<Pair>, Vec<(u8, f64)>) {
     (pairs, targets)
 }
 
-/// Eigenvalues, ascending, of a symmetric row-major matrix, by cyclic Jacobi rotations (to about 1e-14 of the largest). Multiplying by
-/// a factor whose [`Tensor::matrix`] it is lengthens no expansion by more than the largest magnitude among them.
+/// Eigenvalues, ascending, of a symmetric row-major matrix, by cyclic Jacobi rotations (to about 1e-14 of the largest).
+/// Multiplying by a factor whose [`Tensor::matrix`] it is lengthens no expansion by more than the largest magnitude
+/// among them.
 pub fn eigenvalues(matrix: &[f64]) -> Vec<f64> {
     let n = matrix.len().isqrt();
     assert_eq!(n * n, matrix.len(), "the matrix must be square");
@@ -190,7 +194,8 @@ fn rotate_away(a: &mut [f64], n: usize, [p, q]: [usize; 2]) {
         (row[p], row[q]) = (cos * row[p] - sin * row[q], sin * row[p] + cos * row[q]);
     }
     for k in 0..n {
-        let (pk, qk) = (a[p * n + k], a[q * n + k]);
+        let pk = a[p * n + k];
+        let qk = a[q * n + k];
         (a[p * n + k], a[q * n + k]) = (cos * pk - sin * qk, sin * pk + cos * qk);
     }
 }

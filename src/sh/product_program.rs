@@ -1,56 +1,30 @@
-//! Multiplication by 1 - b as straight-line code, `t -= product(t, b)`, in several [`Style`]s that compute the same numbers. A program has
-//! the inputs t, here called a, and b, and the outputs t.
+//! Multiplication by 1 - b as straight-line code, `t -= product(t, b)`. A program has the inputs t, here called a, and
+//! b, and the outputs t.
 //!
-//! "pairs" forms `p_ij = a_i b_j + a_j b_i` once for every unordered pair, then `c_k += G_ijk p_ij`; products with coefficient
-//! 0 scale by Y00, which is applied once to `a_0` and `b_0`. "factored" also forms `p + ratio q` once where several `c_k`
-//! contain two pairs in the same proportion (the linear half of the greedy factoring of reference 3 of [`crate::sh`]).
-//! "matrix" forms the elements `q_ik = sum_j G_ijk b_j` of the symmetric matrix of multiplication by b, and `c_k += q_ik a_i`,
-//! `c_i += q_ik a_k`: the only one here for a second factor of more or fewer bands. "points" is in [`super::points`].
+//! Factors of as many bands as t form `p_ij = a_i b_j + a_j b_i` once for every unordered pair, then `c_k += G_ijk
+//! p_ij`; products with coefficient 0 scale by Y00, which is applied once to `a_0` and `b_0`. Where several `c_k`
+//! contain two pairs in the same proportion, `p + ratio q` is formed once (the linear half of the greedy factoring of
+//! reference 3 of [`crate::sh`]). At 4 bands that takes 394 multiply-adds.
 //!
-//! Multiply-adds at 4 bands: factored 394 (392 multiplications and 268 additions), pairs 414, matrix 426, points 467; matrix of
-//! 4 by 5, 6 and 7 bands: 533, 596, 644.
+//! Factors of more or fewer bands form the elements `q_ik = sum_j G_ijk b_j` of the symmetric matrix of multiplication
+//! by b, and `c_k += q_ik a_i`, `c_i += q_ik a_k`.
 
 use std::collections::BTreeMap;
 
 use super::basis::{Y00, coefficient_count};
-use super::points;
 use super::product::Tensor;
 use super::program::{Program, Term, Value, elements};
-
-/// How a product is computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Style {
-    /// Tensor pairs.
-    Pairs,
-    /// Pairs with shared sums factored out.
-    Factored,
-    /// The matrix of multiplication by the second factor, an element at a time.
-    Matrix,
-    /// Both factors at the 32 points of an exact rule, multiplied there and projected: up to 4 bands.
-    Points,
-}
-
-/// Every style; shaders identify a style by its index here.
-pub const STYLES: [Style; 4] = [Style::Factored, Style::Pairs, Style::Matrix, Style::Points];
-
-impl Style {
-    /// Whether the style can multiply expansions of `a_bands` by those of `b_bands`.
-    pub fn fits(self, a_bands: usize, b_bands: usize) -> bool {
-        match self {
-            Style::Matrix => true,
-            Style::Pairs | Style::Factored => a_bands == b_bands,
-            Style::Points => a_bands == b_bands && a_bands <= points::BANDS,
-        }
-    }
-}
 
 /// A value that rows of the product are summed from.
 #[derive(Clone, Copy, Debug)]
 enum Column {
     /// `a_i b_j + a_j b_i`, or `a_i b_i`.
     Pair(usize, usize),
-    /// `columns[first] + ratio * columns[second]`.
-    Sum { first: usize, second: usize, ratio: f64 },
+    Sum {
+        first: usize,
+        second: usize,
+        ratio: f64,
+    },
 }
 
 /// `c_k = sum over columns of rows[k][column] * column`, without the terms of coefficient 0 of either factor.
@@ -74,7 +48,8 @@ impl Linear {
         Self { columns, rows }
     }
 
-    /// Introduces the sum that the most rows share, until no sum is shared by two rows. Each saves one operation per further row.
+    /// Introduces the sum that the most rows share, until no sum is shared by two rows. Each saves one operation per
+    /// further row.
     fn factor(&mut self) {
         while let Some((first, second, ratio, users)) = self.most_shared() {
             let sum = self.columns.len();
@@ -87,13 +62,15 @@ impl Linear {
         }
     }
 
-    /// Returns (first, second, ratio, rows). Ties go to the smallest columns, so that every run generates the same text.
+    /// Returns (first, second, ratio, rows). Ties go to the smallest columns, so that every run generates the same
+    /// text.
     fn most_shared(&self) -> Option<(usize, usize, f64, Vec<usize>)> {
         let mut shared: BTreeMap<(usize, usize, i64), (f64, Vec<usize>)> = BTreeMap::new();
         for (k, row) in self.rows.iter().enumerate() {
             for (&first, x) in row {
                 for (&second, y) in row.range(first + 1..) {
-                    // Ratios that are equal in exact arithmetic differ by rounding only, which is far below this step of 1e-9.
+                    // Ratios that are equal in exact arithmetic differ by rounding only, which is far below this step
+                    // of 1e-9.
                     let key = (first, second, (y / x * 1e9).round() as i64);
                     shared.entry(key).or_insert_with(|| (y / x, Vec::new())).1.push(k);
                 }
@@ -132,31 +109,24 @@ impl Emitter<'_> {
     }
 }
 
-/// The multiplication of an expansion of `a_bands` by one of `b_bands`, cut to `a_bands`, in a style that [`Style::fits`] them.
-pub fn product_program(style: Style, a_bands: usize, b_bands: usize) -> Program {
-    assert!(style.fits(a_bands, b_bands), "{style:?} cannot multiply {a_bands} bands by {b_bands}");
-    if style == Style::Points {
-        return points::product_program(a_bands);
-    }
+/// The multiplication of an expansion of `a_bands` by one of `b_bands`, cut to `a_bands`.
+pub fn product_program(a_bands: usize, b_bands: usize) -> Program {
     let counts = [a_bands, b_bands].map(coefficient_count);
     let mut program = Program::new([elements("t", counts[0]), elements("b", counts[1])].concat());
-    let sums = match style {
-        Style::Matrix => matrix_sums(&mut program, a_bands, b_bands),
-        _ => pair_sums(&mut program, a_bands, style == Style::Factored),
-    };
+    let sums =
+        if a_bands == b_bands { pair_sums(&mut program, a_bands) } else { matrix_sums(&mut program, a_bands, b_bands) };
     for (text, sum) in elements("t", counts[0]).into_iter().zip(sums) {
         program.output(text, sum.expect("every coefficient has a term"));
     }
     program
 }
 
-fn pair_sums(program: &mut Program, bands: usize, factored: bool) -> Vec<Option<Value>> {
+fn pair_sums(program: &mut Program, bands: usize) -> Vec<Option<Value>> {
     let count = coefficient_count(bands);
-    let (a, b) = (Value::Input, |j: usize| Value::Input(count + j));
+    let a = Value::Input;
+    let b = |j: usize| Value::Input(count + j);
     let mut linear = Linear::new(bands);
-    if factored {
-        linear.factor();
-    }
+    linear.factor();
     // The terms of coefficient 0: c_0 = Y00 a_0 b_0, c_k = Y00 (a_0 b_k + a_k b_0).
     let a_0 = program.define(vec![Term::new(Y00, &[a(0)])]);
     let b_0 = first_factor(program, b(0));
@@ -186,7 +156,8 @@ fn first_factor(program: &mut Program, b_0: Value) -> Value {
 
 fn matrix_sums(program: &mut Program, a_bands: usize, b_bands: usize) -> Vec<Option<Value>> {
     let count = coefficient_count(a_bands);
-    let (a, b) = (Value::Input, |j: usize| Value::Input(count + j));
+    let a = Value::Input;
+    let b = |j: usize| Value::Input(count + j);
     let mut elements: BTreeMap<(usize, usize), Vec<(usize, f64)>> = BTreeMap::new();
     for entry in Tensor::new(a_bands, b_bands, a_bands).entries() {
         if entry.i <= entry.k && entry.j > 0 {
@@ -211,8 +182,8 @@ fn matrix_sums(program: &mut Program, a_bands: usize, b_bands: usize) -> Vec<Opt
 
 /// GLSL 460 text of `void sh_subtract_product(inout float t[N], float b[M])`, N = a_bands^2, M = b_bands^2:
 /// t -= product(t, b), multiplication by the visibility 1 - b of a factor that is stored as its blocked part b.
-pub fn glsl_subtract(style: Style, a_bands: usize, b_bands: usize) -> String {
+pub fn glsl_subtract(a_bands: usize, b_bands: usize) -> String {
     let [a_count, b_count] = [a_bands, b_bands].map(coefficient_count);
-    let body = product_program(style, a_bands, b_bands).glsl_body();
+    let body = product_program(a_bands, b_bands).glsl_body();
     format!("void sh_subtract_product(inout float t[{a_count}], float b[{b_count}]) {{\n{body}}}\n")
 }

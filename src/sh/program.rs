@@ -1,7 +1,7 @@
 //! Straight-line programs: one list of instructions, run in f64 by the tests and printed as GLSL for the shaders.
 //!
-//! All generators of these modules build a [`Program`]. Because the tests run the same list that the shaders' text is printed
-//! from, only two short functions here have to agree.
+//! All generators of these modules build a [`Program`]. Because the tests run the same list that the shaders' text is
+//! printed from, only two short functions here have to agree.
 
 use std::fmt::Write;
 
@@ -24,7 +24,6 @@ pub struct Term {
 }
 
 impl Term {
-    /// A term with a coefficient.
     pub fn new(coefficient: f64, factors: &[Value]) -> Self {
         Self { coefficient, factors: factors.to_vec() }
     }

@@ -1,7 +1,7 @@
 //! Rotation of SH expansions: block-diagonal, a (2l+1) x (2l+1) orthogonal matrix for each band.
 //!
-//! The block of a rotation Q is `R_ij = integral of Y_i(Q w) Y_j(w)`, a polynomial of degree 2l: the sum over an exact rule
-//! gives it without angles, special cases or error beyond rounding.
+//! The block of a rotation Q is `R_ij = integral of Y_i(Q w) Y_j(w)`, a polynomial of degree 2l: the sum over an exact
+//! rule gives it without angles, special cases or error beyond rounding.
 
 use std::sync::OnceLock;
 
@@ -102,12 +102,14 @@ impl Rotation {
     }
 }
 
-/// A rotation as turns about two axes, `Rz(alpha) Ry(beta) Rz(gamma)`: cosine and sine of alpha, beta and gamma. Any unit
-/// quaternion has such angles; where beta is 0 or pi, alpha and gamma are one of many pairs.
+/// A rotation as turns about two axes, `Rz(alpha) Ry(beta) Rz(gamma)`: cosine and sine of alpha, beta and gamma. Any
+/// unit quaternion has such angles; where beta is 0 or pi, alpha and gamma are one of many pairs.
 pub fn turns(rotation: DQuat) -> [f64; 6] {
     let DQuat { x, y, z, w } = rotation;
-    let (half_sum, half_difference) = (z.atan2(w), (-x).atan2(y));
-    let (alpha, gamma) = (half_sum + half_difference, half_sum - half_difference);
+    let half_sum = z.atan2(w);
+    let half_difference = (-x).atan2(y);
+    let alpha = half_sum + half_difference;
+    let gamma = half_sum - half_difference;
     let cos_beta = (w * w + z * z) - (x * x + y * y);
     let sin_beta = 2.0 * x.hypot(y) * w.hypot(z);
     [alpha.cos(), alpha.sin(), cos_beta, sin_beta, gamma.cos(), gamma.sin()]
@@ -115,9 +117,9 @@ pub fn turns(rotation: DQuat) -> [f64; 6] {
 
 /// The rotation as a program: inputs are the coefficients, then [`turns`].
 ///
-/// A turn about z mixes only the pair m, -m. A turn about y is a turn about z between two quarter turns about x, which are
-/// constant and sparse. At 4 bands this takes 128 multiply-adds instead of the 83 of [`Rotation`]'s blocks, but a shader reads 6
-/// numbers per rotation instead of 83.
+/// A turn about z mixes only the pair m, -m. A turn about y is a turn about z between two quarter turns about x, which
+/// are constant and sparse. At 4 bands this takes 128 multiply-adds instead of the 83 of [`Rotation`]'s blocks, but a
+/// shader reads 6 numbers per rotation instead of 83.
 pub fn rotate_program(bands: usize) -> Program {
     let count = coefficient_count(bands);
     let angles = ["alpha_beta.x", "alpha_beta.y", "alpha_beta.z", "alpha_beta.w", "gamma.x", "gamma.y"];
@@ -138,7 +140,8 @@ pub fn rotate_program(bands: usize) -> Program {
 
 /// Appends a turn about z by the angle of the given cosine and sine.
 fn turn_about_z(program: &mut Program, bands: usize, [cosine, sine]: [Value; 2], values: &mut [Value]) {
-    let (mut c, mut s) = (cosine, sine);
+    let mut c = cosine;
+    let mut s = sine;
     for m in 1..bands {
         if m > 1 {
             let next = program.define(vec![Term::new(1.0, &[c, cosine]), Term::new(-1.0, &[s, sine])]);
@@ -146,8 +149,10 @@ fn turn_about_z(program: &mut Program, bands: usize, [cosine, sine]: [Value; 2],
             c = next;
         }
         for l in m..bands {
-            let (plus, minus) = (l * (l + 1) + m, l * (l + 1) - m);
-            let (a, b) = (values[plus], values[minus]);
+            let plus = l * (l + 1) + m;
+            let minus = l * (l + 1) - m;
+            let a = values[plus];
+            let b = values[minus];
             values[plus] = program.define(vec![Term::new(1.0, &[c, a]), Term::new(-1.0, &[s, b])]);
             values[minus] = program.define(vec![Term::new(1.0, &[s, a]), Term::new(1.0, &[c, b])]);
         }

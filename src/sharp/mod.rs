@@ -1,10 +1,10 @@
 //! Pass "sharp": light of sharp lights on every vertex of every receiver, with what the merge has written.
 //!
-//! SharpInputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and vertices
-//! (position and normal, object frame, two quads each). A light is cut into parts ([`crate::field::sub_light`]); in
-//! each part the visibilities past all occluders are multiplied. Output: `radiosity`, as [`crate::merge`] has it, and
-//! albedo / pi times the irradiance of sharp lights. Where pixels read them, the fourth number is 1 on vertices that a
-//! shadow's edge comes near.
+//! SharpInputs: entities, clusters and the front of their lists (chains of sharp lights), silhouette fields, and
+//! vertices (position and normal, object frame, two quads each). A light is cut into parts
+//! ([`crate::field::sub_light`]); in each part the visibilities past all occluders are multiplied. Output: `radiosity`,
+//! as [`crate::merge`] has it, and albedo / pi times the irradiance of sharp lights. Where pixels read them, the fourth
+//! number is 1 on vertices that a shadow's edge comes near.
 
 pub mod twin;
 
@@ -16,12 +16,13 @@ use crate::field::silhouette_nodes::{BEYOND, EASED, LEAST_AHEAD};
 use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, STRIP, TURNED_BY};
 use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView};
 use crate::layout::{CLUSTER_FORMAT, CLUSTER_VERTICES, ENTRY_BITS, ENTRY_FORMAT};
+use crate::merge::variant::Reads;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use std::sync::Arc;
 
-/// How near a shadow's edge must come to a vertex for pixels around it to evaluate lights, in steps to its neighbours: more than the 0.71
-/// that the middle of a grid's cell is away from its corners.
+/// How near a shadow's edge must come to a vertex for pixels around it to evaluate lights, in steps to its neighbours:
+/// more than the 0.71 that the middle of a grid's cell is away from its corners.
 const EDGE_REACH: f64 = 0.75;
 /// Half-width, in the same steps, of the widest penumbra that pixels evaluate, for a light that is all the light of a
 /// vertex. For one that is a share of it, it is narrower by the share's square root, because what vertices miss goes
@@ -41,10 +42,8 @@ const BALL_WIDER: f64 = 1.15;
 /// What the shader is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharpPermutation {
-    /// Whether everything is read through texel views rather than storage blocks.
-    pub texel: bool,
-    /// Whether entities are a uniform block.
-    pub uniform: bool,
+    /// How it reads what it is given.
+    pub reads: Reads,
     /// Entities that the uniform block holds.
     pub entity_limit: u32,
     /// Sizes of the silhouette fields.
@@ -70,14 +69,13 @@ pub struct SharpPermutation {
 }
 
 impl SharpPermutation {
-    /// The row of the shader table.
     pub fn row(&self) -> ShaderPermutation {
         self.shared(ShaderPermutation::new("sharp.comp", 4)).define("WORKGROUP", CLUSTER_VERTICES)
     }
 
     /// A fragment shader that evaluates sharp lights. It reads everything through texel views.
     pub fn pixel_row(&self, row: ShaderPermutation, self_shadows: bool) -> ShaderPermutation {
-        SharpPermutation { texel: true, uniform: false, self_shadows, edges: false, ..*self }
+        SharpPermutation { reads: Reads::Texels, self_shadows, edges: false, ..*self }
             .shared(row)
             .define("WORKGROUP", CLUSTER_VERTICES)
     }
@@ -85,8 +83,8 @@ impl SharpPermutation {
     /// The macros of every shader that evaluates sharp lights.
     fn shared(&self, row: ShaderPermutation) -> ShaderPermutation {
         let row = row
-            .define("TEXEL", self.texel)
-            .define("UNIFORM", self.uniform)
+            .define("TEXEL", self.reads == Reads::Texels)
+            .define("UNIFORM", self.reads == Reads::StorageUniform)
             .define("ENTITY_LIMIT", self.entity_limit)
             .define("ENTRY_BITS", ENTRY_BITS)
             .define("OUTLINES", self.outlines)
@@ -133,14 +131,17 @@ impl SharpPermutation {
         numbers.into_iter().fold(row, |row, (name, value)| row.number(name, value)).self_visibility()
     }
 
-    /// The permutation with the loops that the device wants, and with storage blocks where its texel views cannot hold the scene's buffers.
+    /// The permutation with the loops that the device wants, and with storage blocks where its texel views cannot hold
+    /// the scene's buffers.
     pub fn fitting(self, device: &Device, [nodes, cells, self_cells]: [&Buffer; 3], soft: &Buffer) -> Self {
         let fits = TexelView::fits(device, vk::Format::R32G32_UINT, self_cells.size_bytes);
-        let texel = self.texel && fits && Self::fits_views(device, [nodes, cells, soft]);
-        SharpPermutation { texel, rolled: device.info.wants_loops(), ..self }
+        let fits = fits && Self::fits_views(device, [nodes, cells, soft]);
+        let reads = if self.reads == Reads::Texels && !fits { Reads::Storage } else { self.reads };
+        SharpPermutation { reads, rolled: device.info.wants_loops(), ..self }
     }
 
-    /// Whether the device's texel views hold nodes and cells of silhouette fields, and a quad of light for every vertex.
+    /// Whether the device's texel views hold nodes and cells of silhouette fields, and a quad of light for every
+    /// vertex.
     pub fn fits_views(device: &Device, [nodes, cells, soft]: [&Buffer; 3]) -> bool {
         let quads = vk::Format::R32G32B32A32_SFLOAT;
         [nodes, soft].into_iter().all(|buffer| TexelView::fits(device, quads, buffer.size_bytes))
@@ -152,23 +153,19 @@ impl SharpPermutation {
 pub struct SharpInputs<'b> {
     /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: &'b Buffer,
-    /// Entries of all clusters.
     pub entries: &'b Buffer,
     /// [`crate::layout::Cluster`] of every cluster.
     pub clusters: &'b Buffer,
     /// Nodes of all silhouette fields.
     pub nodes: &'b Buffer,
-    /// Their cells.
     pub cells: &'b Buffer,
     /// Positions and normals.
     pub vertices: &'b Buffer,
-    /// Cells of self-visibility.
     pub self_cells: &'b Buffer,
     /// What the merge has written.
     pub soft: &'b Buffer,
 }
 
-/// The pipeline.
 pub struct Sharp {
     pipeline: ComputePipeline,
     /// What it was compiled for.
@@ -176,19 +173,12 @@ pub struct Sharp {
 }
 
 impl Sharp {
-    /// The pipeline of one permutation.
-    ///
-    /// # Errors
-    /// `Failed` when the shader does not compile.
     pub fn new(device: &Arc<Device>, library: &Library, permutation: SharpPermutation) -> Result<Self> {
         let pipeline = ComputePipeline::new(device, "sharp", &library.shader(&permutation.row())?, &[])?;
         Ok(Sharp { pipeline, permutation })
     }
 
     /// Adds the sharp lights' light to the first `cluster_count` clusters.
-    ///
-    /// # Errors
-    /// `Input` when a buffer is larger than the device can bind, or the clusters are more than it can dispatch.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
@@ -196,21 +186,21 @@ impl Sharp {
         radiosity: &'r Buffer,
         cluster_count: u32,
     ) -> Result<()> {
-        let SharpPermutation { texel, uniform, self_shadows, .. } = self.permutation;
-        let read = |buffer: &'r Buffer, format, texel: bool| -> Result<Bind<'r>> {
-            Ok(if texel { Bind::Texel(TexelView::new(buffer, format)?) } else { Bind::Buffer(buffer) })
+        let SharpPermutation { reads, self_shadows, .. } = self.permutation;
+        let read = |buffer: &'r Buffer, format| -> Result<Bind<'r>> {
+            Ok(if reads == Reads::Texels { Bind::Texel(TexelView::new(buffer, format)?) } else { Bind::Buffer(buffer) })
         };
         let quads = vk::Format::R32G32B32A32_SFLOAT;
         let resources = [
-            read(inputs.entities, quads, texel && !uniform)?,
-            read(inputs.entries, ENTRY_FORMAT, texel)?,
-            read(inputs.clusters, CLUSTER_FORMAT, texel)?,
-            read(inputs.nodes, quads, texel)?,
-            read(inputs.cells, vk::Format::R32G32_UINT, texel)?,
-            read(inputs.vertices, quads, texel)?,
+            read(inputs.entities, quads)?,
+            read(inputs.entries, ENTRY_FORMAT)?,
+            read(inputs.clusters, CLUSTER_FORMAT)?,
+            read(inputs.nodes, quads)?,
+            read(inputs.cells, vk::Format::R32G32_UINT)?,
+            read(inputs.vertices, quads)?,
             Bind::Buffer(radiosity),
-            if self_shadows { read(inputs.self_cells, vk::Format::R32G32_UINT, texel)? } else { Bind::None },
-            read(inputs.soft, quads, texel)?,
+            if self_shadows { read(inputs.self_cells, vk::Format::R32G32_UINT)? } else { Bind::None },
+            read(inputs.soft, quads)?,
         ];
         commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])
     }

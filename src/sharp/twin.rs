@@ -4,6 +4,7 @@ use crate::field::self_visibility::{self, BYTES};
 use crate::field::silhouette::{Near, SilhouetteField};
 use crate::field::sub_light::{BLOCK, LightPart, SeenLight};
 use crate::scene::LightMethod;
+use crate::scene::light::Spot;
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -12,28 +13,25 @@ use std::f64::consts::PI;
 pub struct SharpObject<'f> {
     /// Centre of the bounding sphere in the world, metres.
     pub centre: DVec3,
-    /// Rotation to the world.
     pub rotation: DQuat,
     /// Bounding radius after scaling, metres.
     pub radius_m: f64,
-    /// Silhouette field, if it needs one.
     pub silhouette: Option<&'f SilhouetteField>,
 }
 
-/// A sharp light.
 #[derive(Clone, Copy, Debug)]
 pub struct SharpLight {
-    /// The entity.
     pub entity: usize,
     /// Linear RGB radiance.
     pub emission: DVec3,
     /// How its light is computed: as a sharp light's.
     pub method: LightMethod,
+    /// Its cone, if it is a spot.
+    pub spot: Option<Spot>,
 }
 
 /// One receiver under all sharp lights.
 pub struct SharpTwin<'t> {
-    /// All objects.
     pub objects: &'t [SharpObject<'t>],
     /// Objects that occlude the receiver.
     pub occluders: &'t [usize],
@@ -43,7 +41,6 @@ pub struct SharpTwin<'t> {
     pub radius_m: f64,
     /// Self-visibility of its points, [`BYTES`] each, if it can shadow itself.
     pub self_maps: Option<&'t [u8]>,
-    /// Lights of the receiver.
     pub lights: &'t [SharpLight],
     /// Whether a vertex leaves out an occluder before a light, or the light itself where both are the same.
     pub leaves: &'t (dyn Fn(usize, usize, usize) -> bool + Sync),
@@ -52,9 +49,7 @@ pub struct SharpTwin<'t> {
 /// A vertex in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint {
-    /// Position, metres.
     pub position: DVec3,
-    /// Unit normal.
     pub normal: DVec3,
     /// Unit normal in the receiver's own frame.
     pub own_normal: DVec3,
@@ -67,14 +62,19 @@ impl SharpTwin<'_> {
     }
 
     fn vertex(&self, v: usize, point: &SurfacePoint) -> DVec3 {
-        let lit = |light: &SharpLight| light.emission * self.irradiance(v, point, light) / PI;
+        let cone = |light: &SharpLight| {
+            let shining = &self.objects[light.entity];
+            light.spot.map_or(1.0, |spot| spot.share(shining.rotation, shining.centre - point.position))
+        };
+        let lit = |light: &SharpLight| light.emission * cone(light) * self.irradiance(v, point, light) / PI;
         self.lights.iter().filter(|light| !(self.leaves)(v, light.entity, light.entity)).map(lit).sum()
     }
 
     /// Irradiance of a light of radiance 1.
     fn irradiance(&self, v: usize, point: &SurfacePoint, light: &SharpLight) -> f64 {
         let shining = &self.objects[light.entity];
-        let (to, radius) = (shining.centre - point.position, shining.radius_m);
+        let to = shining.centre - point.position;
+        let radius = shining.radius_m;
         // The light's parts, and the share of each that shines; `None` where its own outline tells.
         let (seen, share) = match light.method {
             LightMethod::Ball(share) => (SeenLight::new(to, radius), Some(share)),

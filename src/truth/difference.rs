@@ -17,11 +17,8 @@ pub enum Values {
 /// A pixel, counted from 0 at the upper left, and how two pictures differ there.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct PixelDifference {
-    /// Column.
     pub x: usize,
-    /// Row.
     pub y: usize,
-    /// The difference there.
     pub difference: f64,
     /// Red, green and blue of the first picture there.
     pub a: [f32; 3],
@@ -32,11 +29,8 @@ pub struct PixelDifference {
 /// The difference of two pictures over the pixels that count.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct PictureDifference {
-    /// Width of the pictures in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
-    /// Pixels that count.
     pub pixel_count: usize,
     /// Pixels that count and have a value that is not finite in one picture and another value in the other.
     pub not_finite_count: usize,
@@ -57,13 +51,12 @@ pub struct PictureDifference {
 }
 
 impl PictureDifference {
-    /// Compares two pictures where `mask` is true, or everywhere. Pixels that do not count have no effect on those that do. Linear
-    /// pictures are brightened by `exposure_ev` stops where they are shown: for FLIP, and beside a picture that is stored in sRGB.
-    ///
-    /// # Errors
-    /// [`Error::Input`] where the sizes differ, or the mask leaves no pixel.
+    /// Compares two pictures where `mask` is true, or everywhere. Pixels that do not count have no effect on those that
+    /// do. Linear pictures are brightened by `exposure_ev` stops where they are shown: for FLIP, and beside a picture
+    /// that is stored in sRGB.
     pub fn new(a: &Picture, b: &Picture, mask: Option<&[bool]>, exposure_ev: f32) -> Result<Self> {
-        let (width, height) = (a.width, a.height);
+        let width = a.width;
+        let height = a.height;
         if (b.width, b.height) != (width, height) {
             let sizes = format!("{} x {} pixels against {width} x {height}", b.width, b.height);
             return Err(Error::Input(format!("the pictures have different sizes: {sizes}")));
@@ -83,7 +76,8 @@ impl PictureDifference {
             {
                 return (f64::INFINITY, f64::INFINITY);
             }
-            let (mut square, mut largest) = (0.0, 0.0_f64);
+            let mut square = 0.0;
+            let mut largest = 0.0_f64;
             for (a, b) in rgb(&of_a, pixel).into_iter().zip(rgb(&of_b, pixel)) {
                 // A pixel that is not finite is so in both pictures; it counts as equal.
                 let difference = if a.is_finite() { f64::from(a) - f64::from(b) } else { 0.0 };
@@ -93,8 +87,10 @@ impl PictureDifference {
             (square, largest)
         };
         let mut flip = flips(a, b, mask, exposure_ev);
-        let (mut not_finite_count, mut square) = (0, 0.0);
-        let (mut largest, mut largest_flip) = ((0, -1.0), (0, -1.0));
+        let mut not_finite_count = 0;
+        let mut square = 0.0;
+        let mut largest = (0, -1.0);
+        let mut largest_flip = (0, -1.0);
         for pixel in (0..width * height).filter(|pixel| counts(*pixel)) {
             let (own, most) = apart(pixel);
             if own.is_infinite() {

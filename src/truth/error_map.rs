@@ -9,10 +9,8 @@ use crate::scene::Placement;
 use serde::Serialize;
 use std::path::Path;
 
-/// Metadata of an error picture.
 #[derive(Clone, Debug, Serialize)]
 pub struct ErrorPicture {
-    /// Path of the picture.
     pub picture: String,
     /// Mapping from errors to colours.
     pub scale: ColorScale,
@@ -35,7 +33,8 @@ pub struct ErrorMap {
 }
 
 impl ErrorMap {
-    /// Compares radiosity by entity (linear RGB per vertex) with a reference for the same entities, such as [`super::picture`]'s.
+    /// Compares radiosity by entity (linear RGB per vertex) with a reference for the same entities, such as
+    /// [`super::picture`]'s.
     pub fn new(found: &[EntityRadiosity], reference: &[EntityRadiosity], scheme: Scheme) -> Self {
         let squares = || reference.iter().flat_map(|(_, v)| v.iter().flatten()).map(|c| f64::from(*c).powi(2));
         let unit = (squares().sum::<f64>() / squares().count().max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
@@ -83,9 +82,6 @@ impl ErrorMap {
 
     /// Draws a frame in the errors' colours. Entities that are not lit are grey, and emission is not drawn. The frame's
     /// radiosity is replaced until the next merge.
-    ///
-    /// # Errors
-    /// As [`Frame::redraw`].
     pub fn draw(&self, frame: &mut Frame, placements: &[Placement], scale: &ColorScale) -> Result<()> {
         for entity in 0..frame.scene().entities.len() {
             let count = frame.scene().meshes[frame.scene().entities[entity].mesh].positions.len();
@@ -98,11 +94,8 @@ impl ErrorMap {
         Ok(())
     }
 
-    /// Draws the errors and writes the picture with its scale bar. `limit` replaces the fitting limit of the scale; the title
-    /// states the reference's own standard error.
-    ///
-    /// # Errors
-    /// As [`Frame::redraw`], and `Failed` when the file cannot be written.
+    /// Draws the errors and writes the picture with its scale bar. `limit` replaces the fitting limit of the scale; the
+    /// title states the reference's own standard error.
     pub fn write(
         &self,
         path: &Path,
@@ -122,9 +115,6 @@ impl ErrorMap {
 }
 
 /// Radiosity of a frame's vertices by receiving entity, to compare with [`super::picture`].
-///
-/// # Errors
-/// `Device` when memory ran out.
 pub fn radiosity(frame: &Frame) -> Result<Vec<EntityRadiosity>> {
     let receives = |entity: &usize| frame.scene().entities[*entity].receives;
     let entities = (0..frame.scene().entities.len()).filter(receives);

@@ -1,12 +1,12 @@
-//! T1: the merge's chain of products on exact factors. Each occluder's visibility and each light's radiance is ray cast from
-//! the vertex itself, projected to SH, and multiplied in f64.
+//! T1: the merge's chain of products on exact factors. Each occluder's visibility and each light's radiance is ray cast
+//! from the vertex itself, projected to SH, and multiplied in f64.
 
 use super::Vertex;
 use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
 use super::world::{EntityView, VertexView, World};
 use crate::lists::gather::distance_key;
 use crate::lists::skip::Skip;
-use crate::merge::chain::{Chain, Multiplier};
+use crate::merge::chain::Multiplier;
 use crate::merge::twin::{Cap, Cone};
 use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
@@ -16,7 +16,6 @@ use std::f64::consts::PI;
 
 type Coefficients = [f64; MAX_COEFFICIENTS];
 
-/// Parameters of the exact chain.
 #[derive(Clone, Copy, Debug)]
 pub struct ExactChain {
     /// SH bands of transfer, light and every product.
@@ -27,24 +26,22 @@ pub struct ExactChain {
     pub rays: u32,
     /// Seed of the ray directions.
     pub seed: u64,
-    /// How factors are multiplied.
-    pub chain: Chain,
-    /// Lookups that the chain skips, by the merge's rules. Skips matter because the band-limited product is not zero where the
-    /// true visibility is zero.
+    /// Lookups that the chain skips, by the merge's rules. Skips matter because the band-limited product is not zero
+    /// where the true visibility is zero.
     pub skip: Skip,
 }
 
 impl Default for ExactChain {
     /// 4 bands throughout, 4096 rays a factor, the merge's chain, every skip.
     fn default() -> Self {
-        ExactChain { bands: 4, visibility_bands: 4, rays: 4096, seed: 2, chain: Chain::default(), skip: Skip::ALL }
+        ExactChain { bands: 4, visibility_bands: 4, rays: 4096, seed: 2, skip: Skip::ALL }
     }
 }
 
 impl ExactChain {
     /// Radiosity of the given vertices: linear RGB radiance that leaves the surface, without emission.
     pub fn run(&self, world: &World<'_>, vertices: &[Vertex]) -> Vec<[f64; 3]> {
-        let multiplier = Multiplier::new(self.chain, self.bands, self.visibility_bands);
+        let multiplier = Multiplier::new(self.bands, self.visibility_bands);
         let sky = world.scene.environment.coefficients(self.bands);
         vertices.par_iter().map(|&vertex| self.vertex(world, &multiplier, &sky, vertex)).collect()
     }
@@ -97,7 +94,7 @@ impl ExactChain {
             });
             let reach = behind.above_horizon(view.normal, self.skip);
             let radiance = self.radiance(world, &light, points(1 + light.entity));
-            let emission = world.scene.entities[light.entity].emission.as_dvec3();
+            let emission = world.emission_at(light.entity, view.position);
             sum +=
                 reach * emission * DVec3::from_array(radiance.each_ref().map(|channel| multiplier.meet(&t, channel)));
         }
@@ -112,7 +109,8 @@ impl ExactChain {
             out[..count].copy_from_slice(&clamped_cosine(self.bands, view.normal));
             return out;
         }
-        let (axes, mut basis) = (Axes::new(view.normal), [0.0; MAX_COEFFICIENTS]);
+        let axes = Axes::new(view.normal);
+        let mut basis = [0.0; MAX_COEFFICIENTS];
         for ray in 0..self.rays {
             let direction = axes.cosine(points.point(ray));
             if !world.blocks_itself(view, direction, f64::INFINITY) {
@@ -125,7 +123,8 @@ impl ExactChain {
 
     fn blocked(&self, world: &World<'_>, occluder: &EntityView, points: Sequence) -> Coefficients {
         let cone = occluder.cone();
-        let (mut out, mut basis) = ([0.0; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS]);
+        let mut out = [0.0; MAX_COEFFICIENTS];
+        let mut basis = [0.0; MAX_COEFFICIENTS];
         for ray in 0..self.rays {
             let direction = cone.axes.cone(points.point(ray), cone.height);
             if world.blocks(occluder, direction, f64::INFINITY) {
@@ -138,7 +137,8 @@ impl ExactChain {
 
     fn radiance(&self, world: &World<'_>, light: &EntityView, points: Sequence) -> [Coefficients; 3] {
         let cone = light.cone();
-        let (mut out, mut basis) = ([[0.0; MAX_COEFFICIENTS]; 3], [0.0; MAX_COEFFICIENTS]);
+        let mut out = [[0.0; MAX_COEFFICIENTS]; 3];
+        let mut basis = [0.0; MAX_COEFFICIENTS];
         for ray in 0..self.rays {
             let direction = cone.axes.cone(points.point(ray), cone.height);
             if let Some(pattern) = world.emission(light, direction) {

@@ -1,9 +1,10 @@
 //! LDR-FLIP: how different two pictures look when one flips between them.
 //!
-//! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild, *FLIP: A Difference Evaluator for Alternating Images*, HPG 2020.
-//! The colours of both are blurred as the eye blurs them at a distance, and compared in a space where distances are alike; then
-//! edges and points that only one of them has raise the difference. 0 is no difference at a pixel, 1 the largest there is.
-//! The one crate for it builds the authors' C++; this is the paper's text in Rust, tested against the authors' program.
+//! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild, *FLIP: A Difference Evaluator for Alternating
+//! Images*, HPG 2020. The colours of both are blurred as the eye blurs them at a distance, and compared in a space
+//! where distances are alike; then edges and points that only one of them has raise the difference. 0 is no difference
+//! at a pixel, 1 the largest there is. The one crate for it builds the authors' C++; this is the paper's text in Rust,
+//! tested against the authors' program.
 
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -11,8 +12,8 @@ use std::f64::consts::PI;
 /// The authors' viewing conditions, on which published means rest: a screen of 3840 pixels and 0.7 m, seen from 0.7 m.
 const PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;
 
-/// Contrast sensitivity as sums of two Gaussians, amplitude and squared width of each, in degrees: of luminance, red to green, and
-/// blue to yellow (the paper's table 1).
+/// Contrast sensitivity as sums of two Gaussians, amplitude and squared width of each, in degrees: of luminance, red to
+/// green, and blue to yellow (the paper's table 1).
 const SENSITIVITY: [[[f64; 2]; 2]; 3] =
     [[[1.0, 0.0047], [0.0, 1e-5]], [[1.0, 0.0053], [0.0, 1e-5]], [[34.1, 0.04], [13.5, 0.025]]];
 /// Exponent of colour differences, and the share of the largest that is mapped to which share of the range.
@@ -78,7 +79,8 @@ impl Plane {
         rows.pass(down, |i| (i % self.width, i / self.width, height, self.width))
     }
 
-    /// `line` gives for a pixel the start of its row or column, its place in it, the row's length and the step along it.
+    /// `line` gives for a pixel the start of its row or column, its place in it, the row's length and the step along
+    /// it.
     fn pass(&self, kernel: &[f64], line: impl Fn(usize) -> (usize, usize, usize, usize) + Sync) -> Plane {
         let radius = (kernel.len() / 2) as isize;
         let at = |i: usize| {
@@ -131,13 +133,15 @@ fn features(luminance: &Plane) -> Vec<[f64; 2]> {
     // Positive weights sum to 1 and negative ones to -1, so that the strongest edge or point is 1.
     let balanced = |raw: Vec<f64>| {
         let of = |sign: f64| raw.iter().map(|k| (sign * k).max(0.0)).sum::<f64>();
-        let (positive, negative) = (of(1.0), of(-1.0));
+        let positive = of(1.0);
+        let negative = of(-1.0);
         raw.iter().map(|k| if *k > 0.0 { k / positive } else { k / negative }).collect::<Vec<f64>>()
     };
     let edge = balanced(kernel(radius, |x| -x * gauss(x)));
     let point = balanced(kernel(radius, |x| (x * x / (sd * sd) - 1.0) * gauss(x)));
     let [edges, points] = [edge, point].map(|feature| {
-        let (x, y) = (luminance.filtered(&feature, &smooth), luminance.filtered(&smooth, &feature));
+        let x = luminance.filtered(&feature, &smooth);
+        let y = luminance.filtered(&smooth, &feature);
         x.values.iter().zip(&y.values).map(|(x, y)| x.hypot(*y)).collect::<Vec<f64>>()
     });
     edges.into_iter().zip(points).map(|(edge, point)| [edge, point]).collect()
@@ -167,15 +171,16 @@ impl Seen {
     }
 }
 
-/// FLIP of every pixel, 0 to 1, of two pictures in linear Rec.709 (three floats a pixel, rows of `width` pixels) as a screen shows
-/// them: exposed, and clamped to 0 to 1. Neither counts as the better one.
+/// FLIP of every pixel, 0 to 1, of two pictures in linear Rec.709 (three floats a pixel, rows of `width` pixels) as a
+/// screen shows them: exposed, and clamped to 0 to 1. Neither counts as the better one.
 ///
 /// # Panics
 /// When the pictures have different sizes, or no whole rows.
 pub fn flip(width: usize, a: &[f32], b: &[f32]) -> Vec<f64> {
     assert!(a.len() == b.len() && width > 0 && a.len().is_multiple_of(3 * width), "{width}: {}, {}", a.len(), b.len());
     let space = ColorSpace::new();
-    let (a, b) = (Seen::new(&space, width, a), Seen::new(&space, width, b));
+    let a = Seen::new(&space, width, a);
+    let b = Seen::new(&space, width, b);
     let largest = hyab(space.lab(glam::DVec3::Y), space.lab(glam::DVec3::Z)).powf(COLOR_EXPONENT);
     let [share, range] = COLOR_KNEE;
     let color = |i: usize| {

@@ -10,13 +10,15 @@
 //! | T2 | fields looked up, f64 | [`crate::merge::twin`] |
 //! | T3 | the merge on the device, f32 | [`crate::merge`] |
 //!
-//! All rungs use the same rules as the merge for what emits, occludes and receives. A receiver does not occlude itself through its
-//! field; if it is neither flat nor convex, its self-shadowing is judged from [`crate::bake::TRANSFER_OFFSET`] off its surface. A
-//! light that does not occlude is transparent, and no light lights or shadows itself.
+//! All rungs use the same rules as the merge for what emits, occludes and receives. A receiver does not occlude itself
+//! through its field; if it is neither flat nor convex, its self-shadowing is judged from
+//! [`crate::bake::TRANSFER_OFFSET`] off its surface. A light that does not occlude is transparent, and no light lights
+//! or shadows itself.
 //!
-//! T0 is physical: an occluder, or a part of the receiver itself, blocks a ray only where the ray meets it before the light. From
-//! T0c on an occluder precedes a light as a whole or not at all, if its bounding sphere's centre is nearer to the vertex (ties by
-//! index), and the receiver shadows itself from what lies beyond the light too. Without local lights T0 and T0c are the same.
+//! T0 is physical: an occluder, or a part of the receiver itself, blocks a ray only where the ray meets it before the
+//! light. From T0c on an occluder precedes a light as a whole or not at all, if its bounding sphere's centre is nearer
+//! to the vertex (ties by index), and the receiver shadows itself from what lies beyond the light too. Without local
+//! lights T0 and T0c are the same.
 
 pub mod difference;
 #[cfg(feature = "cli")]
@@ -38,10 +40,8 @@ pub use world::World;
 
 use crate::scene::{Placement, Scene};
 
-/// A lit vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Vertex {
-    /// Index of the entity.
     pub entity: usize,
     /// Index of the vertex in the entity's mesh.
     pub index: usize,

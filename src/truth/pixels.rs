@@ -8,8 +8,8 @@ use crate::scene::{Placement, Scene};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// What the middle of each pixel shows that is lit and does not emit: its entity with the pixel's number, row by row from the top left,
-/// and the view from there.
+/// What the middle of each pixel shows that is lit and does not emit: its entity with the pixel's number, row by row
+/// from the top left, and the view from there.
 pub fn lit_points(world: &World<'_>, [width, height]: [u32; 2]) -> Vec<(Vertex, VertexView)> {
     let camera = &world.scene.data.camera;
     let eye = camera.eye.as_dvec3();
@@ -23,7 +23,8 @@ pub fn lit_points(world: &World<'_>, [width, height]: [u32; 2]) -> Vec<(Vertex, 
     (0..width * height).into_par_iter().filter_map(surface).collect()
 }
 
-/// The pixels of [`lit_points`], and the linear RGB radiance that leaves what they show. `cast` decides the rays a pixel.
+/// The pixels of [`lit_points`], and the linear RGB radiance that leaves what they show. `cast` decides the rays a
+/// pixel.
 pub fn pixels(scene: &Scene, placements: &[Placement], size: [u32; 2], cast: &RayCast) -> Vec<(usize, Estimate)> {
     let shapes = RayMeshes::new(scene);
     let world = World::new(scene, &shapes, placements);

@@ -61,14 +61,15 @@ impl RayMesh {
         }
     }
 
-    /// Whether a ray (unit direction) meets the mesh nearer than `limit` bounding radii; infinity is no limit. The first
-    /// triangle found ends the search.
+    /// Whether a ray (unit direction) meets the mesh nearer than `limit` bounding radii; infinity is no limit. The
+    /// first triangle found ends the search.
     pub fn blocks(&self, origin: Vec3A, direction: Vec3A, limit: f32) -> bool {
         if limit <= 0.0 {
             return false;
         }
         let ray = Ray::new(origin, direction, 0.0, limit);
-        // The distance that `intersect_embree` returns has a scale that depends on the triangle, but its test of the limit has not.
+        // The distance that `intersect_embree` returns has a scale that depends on the triangle, but its test of the
+        // limit has not.
         let met = |ray: &Ray, id: usize| {
             if self.triangles[id].intersect_embree(ray).is_finite() { 0.0 } else { f32::INFINITY }
         };
@@ -80,24 +81,29 @@ impl RayMesh {
         self.nearest(origin, direction).map(|hit| hit.t)
     }
 
-    /// A ray's first intersection: its distance, the triangle's number in the mesh, and the weights of the triangle's corners there.
+    /// A ray's first intersection: its distance, the triangle's number in the mesh, and the weights of the triangle's
+    /// corners there.
     pub fn corners_hit(&self, origin: Vec3A, direction: Vec3A) -> Option<(f32, usize, [f32; 3])> {
         let hit = self.nearest(origin, direction)?;
         let weights = self.weights(hit.primitive_id as usize, origin + hit.t * direction);
         Some((hit.t, self.hierarchy.primitive_indices[hit.primitive_id as usize] as usize, weights))
     }
 
-    /// Areas of the three parts that a point cuts a triangle into, as shares; of a triangle without area, its first corner.
+    /// Areas of the three parts that a point cuts a triangle into, as shares; of a triangle without area, its first
+    /// corner.
     fn weights(&self, triangle: usize, at: Vec3A) -> [f32; 3] {
         let triangle = &self.triangles[triangle];
-        let (a, b, c) = (triangle.v0 - at, triangle.v1 - at, triangle.v2 - at);
+        let a = triangle.v0 - at;
+        let b = triangle.v1 - at;
+        let c = triangle.v2 - at;
         let areas = [b.cross(c).length(), c.cross(a).length(), a.cross(b).length()];
         let total: f32 = areas.iter().sum();
         if total > 0.0 { areas.map(|area| area / total) } else { [1.0, 0.0, 0.0] }
     }
 
     fn nearest(&self, origin: Vec3A, direction: Vec3A) -> Option<RayHit> {
-        let (ray, mut hit) = (Ray::new_inf(origin, direction), RayHit::none());
+        let ray = Ray::new_inf(origin, direction);
+        let mut hit = RayHit::none();
         // `intersect_embree` is no alternative: its distance has a scale that depends on the triangle.
         self.hierarchy.ray_traverse(ray, &mut hit, |ray, id| self.triangles[id].intersect(ray)).then_some(hit)
     }

@@ -27,22 +27,19 @@ pub enum Distant {
 pub enum Order {
     /// What a ray meets before the light's surface.
     Surfaces,
-    /// The merge's rule for SH fields, [`EntityView::precedes`]: an occluder counts as a whole or not at all, by the centres of
-    /// the bounding spheres, and the receiver shadows itself from what lies beyond the light too.
+    /// The merge's rule for SH fields, [`EntityView::precedes`]: an occluder counts as a whole or not at all, by the
+    /// centres of the bounding spheres, and the receiver shadows itself from what lies beyond the light too.
     Centres,
 }
 
-/// Parameters of ray casting.
 #[derive(Clone, Copy, Debug)]
 pub struct RayCast {
-    /// Rays per vertex for the distant light, and the same number for every local light; at least `runs`. Powers of two are
-    /// stratified best.
+    /// Rays per vertex for the distant light, and the same number for every local light; at least `runs`. Powers of two
+    /// are stratified best.
     pub rays: u32,
     /// Number of independent runs that share the rays, at least 1; the standard error needs 2.
     pub runs: u32,
-    /// Seed of the ray directions.
     pub seed: u64,
-    /// Distant light.
     pub distant: Distant,
     /// Whether occluders block rays; if not, the result is the unoccluded value.
     pub shadows: bool,
@@ -133,7 +130,8 @@ impl RayCast {
             .collect();
 
         let albedo = world.scene.entities[vertex.entity].albedo.as_dvec3();
-        let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+        let mut sum = DVec3::ZERO;
+        let mut squares = DVec3::ZERO;
         for run in 0..self.runs {
             let sequence = |stream: usize| {
                 Sequence::new(
@@ -200,12 +198,12 @@ impl RayCast {
                 sum += cosine * pattern;
             }
         }
-        let emission = world.scene.entities[light.entity].emission.as_dvec3();
+        let emission = world.emission_at(light.entity, view.position);
         sum * emission * (cone_solid_angle(cone.height) / f64::from(self.rays_a_run()))
     }
 
-    /// Whether the orders can differ at a vertex: whether what might shadow a light there, the receiver itself included, lies
-    /// neither wholly before nor wholly beyond it.
+    /// Whether the orders can differ at a vertex: whether what might shadow a light there, the receiver itself
+    /// included, lies neither wholly before nor wholly beyond it.
     pub fn order_matters(world: &World<'_>, vertex: Vertex) -> bool {
         let view = world.view(vertex);
         let occluders = world.occluders(&view);
@@ -216,8 +214,8 @@ impl RayCast {
     }
 }
 
-/// Distances along a ray that differ by less than this share are equal: rays are cast in f32, each in units of its mesh. Where
-/// two surfaces coincide, the light's counts as the nearer one.
+/// Distances along a ray that differ by less than this share are equal: rays are cast in f32, each in units of its
+/// mesh. Where two surfaces coincide, the light's counts as the nearer one.
 const TIE: f64 = 1e-5;
 
 /// A local light as seen from a vertex, and what may hide it there.
@@ -239,7 +237,8 @@ impl Shadowed {
             Order::Surfaces => o.entity != light.entity && o.range_m()[0] < far && o.overlaps(&light),
             Order::Centres => o.precedes(&light) && o.overlaps(&light),
         };
-        let (mut before, mut beside) = (Vec::new(), Vec::new());
+        let mut before = Vec::new();
+        let mut beside = Vec::new();
         for occluder in occluders.iter().filter(nearer) {
             let wholly = order == Order::Centres || occluder.range_m()[1] <= near;
             if wholly { &mut before } else { &mut beside }.push(*occluder);
@@ -248,8 +247,8 @@ impl Shadowed {
         Shadowed { light, before, beside, limits_itself }
     }
 
-    /// Whether a ray that meets the light is blocked before it. Only a ray that meets what lies beside the light is asked where
-    /// it meets the light.
+    /// Whether a ray that meets the light is blocked before it. Only a ray that meets what lies beside the light is
+    /// asked where it meets the light.
     fn hidden(&self, world: &World<'_>, view: &VertexView, direction: DVec3) -> bool {
         let anywhere = f64::INFINITY;
         if self.before.iter().any(|occluder| world.blocks(occluder, direction, anywhere))

@@ -1,9 +1,9 @@
-//! Low-discrepancy points: the first two dimensions of Sobol's sequence, scrambled by nested uniform (Owen) scrambling, and
-//! their maps to disk, hemisphere, cone and sphere.
+//! Low-discrepancy points: the first two dimensions of Sobol's sequence, scrambled by nested uniform (Owen) scrambling,
+//! and their maps to disk, hemisphere, cone and sphere.
 //!
-//! Every power-of-two prefix puts one point into each elementary interval; the error at an edge falls about as n^-3/4, for
-//! smooth integrands as n^-3/2. Scrambling by hashes: Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020, after
-//! Laine, Karras 2011.
+//! Every power-of-two prefix puts one point into each elementary interval; the error at an edge falls about as n^-3/4,
+//! for smooth integrands as n^-3/2. Scrambling by hashes: Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4),
+//! 2020, after Laine, Karras 2011.
 
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
@@ -38,7 +38,8 @@ fn mix(mut z: u64) -> u64 {
 
 /// Sobol's second dimension: direction numbers of the primitive polynomial x + 1, that is Pascal's triangle modulo 2.
 fn second(mut index: u32) -> u32 {
-    let (mut bits, mut direction) = (0, 1_u32 << 31);
+    let mut bits = 0;
+    let mut direction = 1_u32 << 31;
     while index != 0 {
         if index & 1 != 0 {
             bits ^= direction;
@@ -98,8 +99,8 @@ impl Axes {
         self.direction(across, (1.0 - across.length_squared()).max(0.0).sqrt())
     }
 
-    /// A direction of uniform density in the cone of [`cone_solid_angle`] `height` x 2 pi, height being 1 - cosine: 2 is
-    /// the whole sphere.
+    /// A direction of uniform density in the cone of [`cone_solid_angle`] `height` x 2 pi, height being 1 - cosine: 2
+    /// is the whole sphere.
     pub fn cone(&self, point: DVec2, height: f64) -> DVec3 {
         // The disk's squared radius is uniform in [0, 1]: it becomes the height.
         let across = disk(point);
@@ -141,7 +142,8 @@ mod tests {
     #[test]
     fn cosine_and_cone_have_their_means() {
         let axis = DVec3::new(0.48, -0.6, 0.64);
-        let (axes, sequence) = (Axes::new(axis), Sequence::new(7, [0; 3]));
+        let axes = Axes::new(axis);
+        let sequence = Sequence::new(7, [0; 3]);
         let mean = |direction: &dyn Fn(DVec2) -> DVec3| {
             (0..4096).map(|i| direction(sequence.point(i))).sum::<DVec3>() / 4096.0
         };

@@ -8,15 +8,11 @@ use crate::field::lattice::cap_height;
 use crate::scene::{Placement, Scene};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
-/// An entity with its placement.
 pub struct PlacedEntity<'s> {
-    /// Its mesh.
     pub mesh: &'s RayMesh,
     /// Centre of the bounding sphere, metres.
     pub centre: DVec3,
-    /// Bounding radius, metres.
     pub radius_m: f64,
-    /// Rotation to the world.
     pub rotation: glam::DQuat,
     to_object: Mat3A,
 }
@@ -25,7 +21,6 @@ pub struct PlacedEntity<'s> {
 pub struct World<'s> {
     /// The scene without placements.
     pub scene: &'s Scene,
-    /// Its entities, in order.
     pub entities: Vec<PlacedEntity<'s>>,
     /// Entities that occlude.
     pub occluders: Vec<usize>,
@@ -36,9 +31,7 @@ pub struct World<'s> {
 /// A vertex from which the world is seen.
 #[derive(Clone, Copy)]
 pub struct VertexView {
-    /// Position in metres.
     pub position: DVec3,
-    /// Unit normal.
     pub normal: DVec3,
     /// Its own entity as seen from just off its surface; `None` if it cannot shadow itself.
     own: Option<EntityView>,
@@ -48,11 +41,9 @@ pub struct VertexView {
 /// An entity as seen from a point: everything that all rays from there share.
 #[derive(Clone, Copy)]
 pub struct EntityView {
-    /// Index of the entity.
     pub entity: usize,
     /// Distance of the sphere's centre, metres.
     pub distance_m: f64,
-    /// Its radius, metres.
     radius_m: f64,
     /// Vector to the sphere's centre, in bounding radii.
     toward: Vec3A,
@@ -95,7 +86,6 @@ impl<'s> World<'s> {
         }
     }
 
-    /// A vertex's view of the world.
     pub fn view(&self, vertex: Vertex) -> VertexView {
         let mesh = &self.scene.meshes[self.scene.entities[vertex.entity].mesh];
         let (centre, radius_m) = mesh.bounding_sphere();
@@ -103,7 +93,8 @@ impl<'s> World<'s> {
         self.surface(vertex.entity, local, mesh.normals[vertex.index].as_dvec3())
     }
 
-    /// The view from a point of an entity's surface, given in bounding radii from the centre of its mesh, with the normal there.
+    /// The view from a point of an entity's surface, given in bounding radii from the centre of its mesh, with the
+    /// normal there.
     pub fn surface(&self, entity: usize, local: DVec3, normal: DVec3) -> VertexView {
         let placed = &self.entities[entity];
         let place = |local: DVec3| placed.centre + placed.rotation * (local * placed.radius_m);
@@ -160,8 +151,8 @@ impl<'s> World<'s> {
         })
     }
 
-    /// Where a ray (unit direction) meets the entity first, in bounding radii from the centre of its mesh, and the normal there as
-    /// smooth shading interpolates it; `None` if it misses.
+    /// Where a ray (unit direction) meets the entity first, in bounding radii from the centre of its mesh, and the
+    /// normal there as smooth shading interpolates it; `None` if it misses.
     pub fn surface_hit(&self, sight: &EntityView, direction: DVec3) -> Option<(DVec3, DVec3)> {
         let direction = sight.to_object * direction.as_vec3a();
         let (distance, triangle, weights) = self.entities[sight.entity].mesh.corners_hit(sight.origin, direction)?;
@@ -176,6 +167,14 @@ impl<'s> World<'s> {
         let placed = &self.entities[sight.entity];
         let found = placed.mesh.first_hit(sight.origin, sight.to_object * direction.as_vec3a())?;
         Some(f64::from(found) * placed.radius_m)
+    }
+
+    /// Emission of a light at a point, without its pattern: less where the point is off the axis of a spot.
+    pub fn emission_at(&self, light: usize, point: DVec3) -> DVec3 {
+        let entity = &self.scene.entities[light];
+        let placed = &self.entities[light];
+        let share = entity.spot.map_or(1.0, |spot| spot.share(placed.rotation, placed.centre - point));
+        entity.emission.as_dvec3() * share
     }
 
     /// Emission pattern of an entity along a ray, without the entity's emission factor; `None` if the ray misses.
@@ -208,8 +207,8 @@ impl EntityView {
         (self.distance_m, self.entity) < (light.distance_m, light.entity)
     }
 
-    /// Distances in metres between which all of the entity lies: those of its bounding sphere, of which the first is negative
-    /// within it.
+    /// Distances in metres between which all of the entity lies: those of its bounding sphere, of which the first is
+    /// negative within it.
     pub fn range_m(&self) -> [f64; 2] {
         [self.distance_m - self.radius_m, self.distance_m + self.radius_m]
     }
@@ -239,12 +238,13 @@ impl EntityView {
         self.toward.as_dvec3().angle_between(other.toward.as_dvec3()) < half_angle(self) + half_angle(other)
     }
 
-    /// Distance (in bounding radii) at which a ray enters a sphere of that radius (in bounding radii) around the centre: 0 or
-    /// less from within the sphere, `None` if it misses. What lies around a sphere within a convex mesh is met before that.
+    /// Distance (in bounding radii) at which a ray enters a sphere of that radius (in bounding radii) around the
+    /// centre: 0 or less from within the sphere, `None` if it misses. What lies around a sphere within a convex mesh is
+    /// met before that.
     fn entry(&self, direction: Vec3A, radius: f32) -> Option<f32> {
         let along = self.toward.dot(direction);
-        // Half the chord, squared. The distance from the axis is taken from the vector, because far away the difference of two
-        // squares keeps no digits.
+        // Half the chord, squared. The distance from the axis is taken from the vector, because far away the difference
+        // of two squares keeps no digits.
         let half = radius * radius - (self.toward - along * direction).length_squared();
         let within = self.beyond + 1.0 <= radius * radius;
         (within || (along > 0.0 && half > 0.0)).then(|| if within { 0.0 } else { along - half.sqrt() })

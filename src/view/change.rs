@@ -1,74 +1,25 @@
 //! The editor's changes of the scene, all of which can be undone.
 
-use super::command::{Changed, Command, Effect, Step};
-use super::edit;
+use super::command::{Changed, Command, Effect};
 use super::editor::Editor;
 use super::history::{EditKind, Slider, Snapshot};
 use crate::asset::environment::EnvironmentData;
-use crate::scene::EntityData;
-use glam::{DQuat, DVec3, Vec3};
-
-/// Angle in degrees of a step that turns an entity or the sky.
-pub const TURN_STEP_DEG: f64 = 5.0;
-/// Scale factor of a step that enlarges.
-pub const SCALE_STEP: f64 = 1.05;
-/// Length of a step, as a share of the distance from eye to target, so that steps look the same in scenes of any size.
-pub const MOVE_STEP: f64 = 0.02;
+use glam::Vec3;
 
 impl Editor {
     /// Executes a command that changes the scene.
     pub(super) fn change(&mut self, command: Command) -> Effect {
         self.drag = None;
         match command {
-            Command::Step { step, repeat } => self.step(step, repeat),
             Command::ToggleLight => self.toggle_light(),
             Command::Undo => self.travel(false),
             Command::Redo => self.travel(true),
-            Command::TurnSky { by_deg, repeat } => {
-                let turn_deg = wrapped(self.sky_turn_deg() + by_deg);
-                self.set_environment(EditKind::SkyTurn, repeat, |e| e.turn_deg = turn_deg)
-            }
-            Command::SetSkyTurn(turn_deg) => {
-                self.set_environment(EditKind::Slide(Slider::SkyTurn), true, |e| e.turn_deg = wrapped(turn_deg))
-            }
-            Command::SetSky(strength) => {
-                self.set_environment(EditKind::Slide(Slider::Sky), true, |e| e.strength = strength)
-            }
+            Command::SetSkyTurn(turn_deg) => self.set_environment(Slider::SkyTurn, |e| e.turn_deg = wrapped(turn_deg)),
+            Command::SetSky(strength) => self.set_environment(Slider::Sky, |e| e.strength = strength),
             Command::SetLight(ev) => self.set_light(ev),
             Command::SetExposure(ev) => self.set_exposure(ev),
             _ => Effect::default(),
         }
-    }
-
-    fn step(&mut self, step: Step, repeat: bool) -> Effect {
-        let length_m = MOVE_STEP * self.orbit.distance_m;
-        let turn = |deg: f64| DQuat::from_rotation_y(deg.to_radians());
-        let (right, ahead) = (self.orbit.right(), self.orbit.ahead());
-        let change = |entity: &EntityData| match step {
-            Step::Left => edit::moved(entity, -length_m * right),
-            Step::Right => edit::moved(entity, length_m * right),
-            Step::Up => edit::moved(entity, length_m * DVec3::Y),
-            Step::Down => edit::moved(entity, -length_m * DVec3::Y),
-            Step::Forth => edit::moved(entity, length_m * ahead),
-            Step::Back => edit::moved(entity, -length_m * ahead),
-            Step::Larger => edit::scaled(entity, SCALE_STEP),
-            Step::Smaller => edit::scaled(entity, 1.0 / SCALE_STEP),
-            Step::TurnLeft => Some(edit::turned(entity, turn(TURN_STEP_DEG))),
-            Step::TurnRight => Some(edit::turned(entity, turn(-TURN_STEP_DEG))),
-        };
-        let entities: Vec<usize> = self.affected_of(self.selection).collect();
-        let after: Option<Vec<EntityData>> = entities.iter().map(|i| change(&self.scene.data.entities[*i])).collect();
-        let Some(after) = after else {
-            return Effect {
-                message: Some("this step would leave the range of a scene file".into()),
-                ..Effect::default()
-            };
-        };
-        self.note_entities(EditKind::Step(step), repeat, &entities);
-        for (index, data) in entities.into_iter().zip(after) {
-            self.scene.put_entity(index, data);
-        }
-        Changed { placements: true, ..Changed::default() }.into()
     }
 
     fn toggle_light(&mut self) -> Effect {
@@ -90,8 +41,8 @@ impl Editor {
         Changed { emission: true, roles: true, ..Changed::default() }.into()
     }
 
-    /// Emission in the entity's colour that lights a white surface at the distance of the scene's size to a radiance of about 1:
-    /// a Lambertian sphere of radius r gives the irradiance pi L (r / d)^2 at distance d.
+    /// Emission in the entity's colour that lights a white surface at the distance of the scene's size to a radiance of
+    /// about 1: a Lambertian sphere of radius r gives the irradiance pi L (r / d)^2 at distance d.
     fn fitting_emission(&self, index: usize) -> Vec3 {
         let (_, radius_m) = self.sphere(index, &self.placements()[index]);
         let (_, distance_m) = self.bounds();
@@ -101,7 +52,8 @@ impl Editor {
         hue / hue.max_element() * (needed.clamp(1.0, 1e4) as f32)
     }
 
-    /// Emission that [`Command::SetLight`] changes, in stops: the largest channel of the lights concerned; `None` if there are none.
+    /// Emission that [`Command::SetLight`] changes, in stops: the largest channel of the lights concerned; `None` if
+    /// there are none.
     pub fn light_ev(&self) -> Option<f32> {
         let lights = self.lights();
         let largest = lights.iter().map(|i| self.scene.entities[*i].emission.max_element()).fold(0.0, f32::max);
@@ -116,7 +68,8 @@ impl Editor {
 
     fn set_light(&mut self, ev: f32) -> Effect {
         let Some(now) = self.light_ev().filter(|_| (-16.0..=32.0).contains(&ev)) else { return Effect::default() };
-        let (lights, factor) = (self.lights(), (ev - now).exp2());
+        let lights = self.lights();
+        let factor = (ev - now).exp2();
         self.note_entities(EditKind::Slide(Slider::Light), true, &lights);
         for index in lights {
             let mut data = self.scene.data.entities[index].clone();
@@ -136,7 +89,7 @@ impl Editor {
         Changed { exposure: true, ..Changed::default() }.into()
     }
 
-    fn set_environment(&mut self, kind: EditKind, joins: bool, change: impl FnOnce(&mut EnvironmentData)) -> Effect {
+    fn set_environment(&mut self, slider: Slider, change: impl FnOnce(&mut EnvironmentData)) -> Effect {
         let before = self.scene.data.environment.clone();
         let mut after = before.clone();
         change(&mut after);
@@ -146,7 +99,8 @@ impl Editor {
         if let Err(error) = self.scene.set_environment(&after) {
             return Effect { message: Some(error.to_string()), ..Effect::default() };
         }
-        self.history.note(kind, None, joins, || Snapshot { environment: Some(before), ..Snapshot::default() });
+        let before = Snapshot { environment: Some(before), ..Snapshot::default() };
+        self.history.note(EditKind::Slide(slider), None, true, || before);
         Changed { sky: true, ..Changed::default() }.into()
     }
 
@@ -193,7 +147,7 @@ impl Editor {
             return effect;
         }
         let message = (!found).then(|| format!("nothing to {}", if forth { "redo" } else { "undo" }));
-        Effect { changed, message, request: None }
+        Effect { changed, message }
     }
 }
 

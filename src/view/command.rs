@@ -1,32 +1,13 @@
 //! Commands of the user and their effects.
 
-/// A step of the selected entity, or of all entities that occlude or emit if none is selected. Left, right, back and forth are
-/// relative to the camera, in the ground plane; up and down are the world's.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Step {
-    /// To the left of the picture.
-    Left,
-    /// To the right of the picture.
-    Right,
-    /// Towards +y.
-    Up,
-    /// Towards -y.
-    Down,
-    /// Away from the camera.
-    Forth,
-    /// Towards the camera.
-    Back,
-    /// Larger about its origin.
-    Larger,
-    /// Smaller about its origin.
-    Smaller,
-    /// Turned about +y through its origin, counter-clockwise seen from above.
-    TurnLeft,
-    /// Turned about +y through its origin, clockwise seen from above.
-    TurnRight,
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Panel {
+    Keys,
+    Figures,
 }
 
-/// A command. Positions and distances in the picture are in pixels, x to the right, y down; [`Command::Resize`] sets its size.
+/// A command. Positions and distances in the picture are in pixels, x to the right, y down; [`Command::Resize`] sets
+/// its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
     /// Sets the picture's width and height; sides of 0 (a minimised window) are ignored.
@@ -37,23 +18,12 @@ pub enum Command {
     Pan([f32; 2]),
     /// Moves the camera nearer by notches of the wheel; negative moves it away.
     Zoom(f32),
-    /// Shows the whole scene.
     Home,
-    /// Selects the next entity.
     SelectNext,
-    /// Selects the previous entity.
     SelectPrevious,
-    /// Selects no entity; steps then move all that occlude or emit.
     SelectNone,
     /// Selects the entity that is seen at a position, or none.
     Pick([f32; 2]),
-    /// Makes one step. `repeat` says that a held key repeats it, so that one undo reverts all of these steps.
-    Step {
-        /// Kind of step.
-        step: Step,
-        /// Whether it continues the previous step.
-        repeat: bool,
-    },
     /// Grabs the selected entity at a position, if it is seen there (see [`Editor::grabs`](super::Editor::grabs)).
     DragStart([f32; 2]),
     /// Moves the grabbed entity in the ground plane to a position.
@@ -64,33 +34,21 @@ pub enum Command {
     ToggleLight,
     /// Reverts the last change of the scene; if there is none, returns to the changed scene that this one replaced.
     Undo,
-    /// Repeats the change that was undone last.
     Redo,
-    /// Loads the next built-in scene.
     NextScene,
-    /// Runs or pauses the motion.
     ToggleRunning,
-    /// Shows the ray-cast reference beside the merged picture.
     ToggleReference,
-    /// Shows the error in false colour.
     ToggleError,
-    /// Shows or hides the overlay.
     ToggleOverlay,
-    /// Folds or unfolds the list of keys.
+    /// Folds or unfolds the list of keys; shows all panels with it where they are hidden.
     ToggleKeys,
-    /// Turns the distant light about +y.
-    TurnSky {
-        /// Angle in degrees, counter-clockwise seen from above.
-        by_deg: f32,
-        /// Whether it continues the previous turn.
-        repeat: bool,
-    },
+    Fold(Panel, bool),
     /// Slider: angle of the distant light, degrees.
     SetSkyTurn(f32),
     /// Slider: strength of the distant light.
     SetSky(f32),
-    /// Slider: emission in stops; 2^value is the largest channel in W m^-2 sr^-1. It concerns the selected light; if none is
-    /// selected, the brightest light, and all others change in proportion.
+    /// Slider: emission in stops; 2^value is the largest channel in W m^-2 sr^-1. It concerns the selected light; if
+    /// none is selected, the brightest light, and all others change in proportion.
     SetLight(f32),
     /// Slider: exposure in stops.
     SetExposure(f32),
@@ -98,9 +56,7 @@ pub enum Command {
     EndSlide,
     /// Merge variant by name (see [`crate::merge::variant::VARIANTS`]); `None` is the device's fastest.
     SetVariant(Option<&'static str>),
-    /// Writes the picture as PNG and EXR.
     Screenshot,
-    /// Writes the scene as TOML.
     Save,
     /// Closes the window.
     Quit,
@@ -158,26 +114,9 @@ impl std::ops::BitOrAssign for Changed {
     }
 }
 
-/// A request that only the window can fulfil.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Request {
-    /// Write the picture as PNG and EXR.
-    Screenshot,
-    /// Call [`Editor::save`](super::Editor::save).
-    Save,
-    /// Fold or unfold the list of keys.
-    ToggleKeys,
-    /// Close the window.
-    Quit,
-}
-
-/// The effect of a command.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Effect {
-    /// What changed.
     pub changed: Changed,
-    /// What else the window must do.
-    pub request: Option<Request>,
     /// One line for the user, if nothing happened or the effect is not visible.
     pub message: Option<String>,
 }
@@ -185,11 +124,5 @@ pub struct Effect {
 impl From<Changed> for Effect {
     fn from(changed: Changed) -> Self {
         Effect { changed, ..Effect::default() }
-    }
-}
-
-impl From<Request> for Effect {
-    fn from(request: Request) -> Self {
-        Effect { request: Some(request), ..Effect::default() }
     }
 }

@@ -12,7 +12,7 @@ use crate::truth::error_map::{self, ErrorMap};
 impl Viewer {
     /// Starts casting rays if they are wanted, receives results, and compares.
     pub(super) fn look_at_rays(&mut self) -> Result<()> {
-        let wanted = self.editor.shows_reference() || self.editor.shows_error();
+        let wanted = self.editor.reference || self.editor.error;
         if !wanted || self.frame.is_none() {
             self.rays = None;
             return Ok(());
@@ -27,18 +27,20 @@ impl Viewer {
             self.tolerate(Err::<(), _>(error)).map(|_| ())?;
         }
         let current = self.reference.as_ref().is_some_and(|r| r.version == self.version);
-        // Rays for an outdated state end after their first round, so that a coarse reference is visible while entities move.
+        // Rays for an outdated state end after their first round, so that a coarse reference is visible while entities
+        // move.
         let known = self.reference.as_ref().map(|r| r.version);
         let stale = self.rays_version != self.version && known == Some(self.rays_version);
         if (self.rays.is_none() && !current)
             || stale
             || (!current && !self.rays.as_ref().is_some_and(BackgroundTask::is_running))
         {
-            let (scene, placements) = (self.editor.scene().clone(), self.editor.placements());
+            let scene = self.editor.scene().clone();
+            let placements = self.editor.placements();
             self.rays = Some(reference::cast(scene, placements, self.version, self.setup.seed));
             self.rays_version = self.version;
         }
-        if self.editor.shows_error() && current && !self.pending.light() {
+        if self.editor.error && current && !self.pending.light() {
             self.compare()?;
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! The state of the editor behind the window.
 
-use super::command::{Changed, Command, Effect, Request};
+use super::command::{Changed, Command, Effect, Panel};
 use super::history::History;
 use super::orbit_camera::OrbitCamera;
 use super::picker::{EntityDrag, Picker};
@@ -9,10 +9,17 @@ use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
 use crate::bake;
 use crate::field::quantity;
-use crate::scene::{Camera, Data, Placement, Scene};
+use crate::scene::{Camera, Data, Entity, Placement, Scene};
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Panels {
+    pub(super) keys: bool,
+    /// The figures; `None` where the user has not chosen.
+    pub(super) figures: Option<bool>,
+}
 
 /// The state that `view` shows and that commands change.
 pub struct Editor {
@@ -20,12 +27,18 @@ pub struct Editor {
     path: PathBuf,
     pub(super) orbit: OrbitCamera,
     size: [u32; 2],
-    pub(super) selection: Option<usize>,
-    time_s: f64,
-    running: bool,
-    reference: bool,
-    error: bool,
-    overlay: bool,
+    /// The selected entity; `None` if none is selected.
+    pub selection: Option<usize>,
+    pub time_s: f64,
+    /// Whether the motion runs.
+    pub running: bool,
+    /// Whether the ray-cast reference is shown beside the merged picture.
+    pub reference: bool,
+    /// Whether the error is shown in false colour.
+    pub error: bool,
+    /// Whether the overlay is shown.
+    pub overlay: bool,
+    pub(super) panels: Panels,
     variant: Option<&'static str>,
     pub(super) history: History,
     /// Emission of each entity before it stopped being a light.
@@ -41,8 +54,8 @@ pub struct Editor {
 }
 
 impl Editor {
-    /// The state in which a scene is first shown: running, with nothing selected. `path` is the scene's file. A scene without
-    /// distant light gets a generated sky, which is saved with it.
+    /// The state in which a scene is first shown: running, with nothing selected. `path` is the scene's file. A scene
+    /// without distant light gets a generated sky, which is saved with it.
     pub fn new(mut scene: Scene, path: &Path) -> Self {
         if scene.data.environment.is_empty() {
             let source = EnvironmentData { sky: Some(Sky::default()), ..scene.data.environment.clone() };
@@ -59,6 +72,7 @@ impl Editor {
             reference: false,
             error: false,
             overlay: true,
+            panels: Panels::default(),
             variant: None,
             history: History::default(),
             former_emission: vec![None; scene.entities.len()],
@@ -72,17 +86,14 @@ impl Editor {
         }
     }
 
-    /// The edited scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// File from which the scene was read.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.scene.data.camera
     }
@@ -92,42 +103,10 @@ impl Editor {
         self.scene.at(self.time_s)
     }
 
-    /// Width and height of the picture in pixels.
     pub fn size(&self) -> [u32; 2] {
         self.size
     }
 
-    /// The selected entity; `None` if none is selected.
-    pub fn selection(&self) -> Option<usize> {
-        self.selection
-    }
-
-    /// Scene time in seconds.
-    pub fn time_s(&self) -> f64 {
-        self.time_s
-    }
-
-    /// Whether the motion runs.
-    pub fn is_running(&self) -> bool {
-        self.running
-    }
-
-    /// Whether the ray-cast reference is shown beside the merged picture.
-    pub fn shows_reference(&self) -> bool {
-        self.reference
-    }
-
-    /// Whether the error is shown in false colour.
-    pub fn shows_error(&self) -> bool {
-        self.error
-    }
-
-    /// Whether the overlay is shown.
-    pub fn shows_overlay(&self) -> bool {
-        self.overlay
-    }
-
-    /// The chosen merge variant; `None` is the device's fastest.
     pub fn variant(&self) -> Option<&'static str> {
         self.variant
     }
@@ -137,12 +116,10 @@ impl Editor {
         self.scene.data.output.white()
     }
 
-    /// Exposure in stops.
     pub fn exposure_ev(&self) -> f32 {
         self.scene.data.output.exposure_ev
     }
 
-    /// Strength of the distant light.
     pub fn sky(&self) -> f32 {
         self.scene.data.environment.strength
     }
@@ -152,7 +129,6 @@ impl Editor {
         self.scene.data.environment.turn_deg
     }
 
-    /// Number of changes that can be undone.
     pub fn undo_count(&self) -> usize {
         self.history.len()
     }
@@ -172,7 +148,6 @@ impl Editor {
         Changed { placements: moves, ..Changed::default() }.into()
     }
 
-    /// Executes a command.
     pub fn apply(&mut self, command: Command) -> Effect {
         let unchanged = Changed::default();
         match command {
@@ -208,6 +183,18 @@ impl Editor {
                 self.overlay = !self.overlay;
                 Changed { display: true, ..unchanged }.into()
             }
+            Command::ToggleKeys => {
+                self.panels.keys = !(self.panels.keys && self.overlay);
+                self.overlay = true;
+                Changed { display: true, ..unchanged }.into()
+            }
+            Command::Fold(panel, folds) => {
+                match panel {
+                    Panel::Keys => self.panels.keys = !folds,
+                    Panel::Figures => self.panels.figures = Some(!folds),
+                }
+                Changed { display: true, ..unchanged }.into()
+            }
             Command::EndSlide => {
                 self.history.close();
                 Effect::default()
@@ -216,18 +203,22 @@ impl Editor {
                 self.variant = name;
                 Changed { variant: true, ..unchanged }.into()
             }
-            Command::Screenshot => Request::Screenshot.into(),
-            Command::Save => Request::Save.into(),
-            Command::ToggleKeys => Request::ToggleKeys.into(),
-            Command::Quit => Request::Quit.into(),
+            // The window's own.
+            Command::Screenshot | Command::Save | Command::Quit => Effect::default(),
             edit => self.change(edit),
         }
     }
 
-    /// Centre and radius in metres of a sphere around all entities that occlude or emit; around all entities if none does.
+    /// Centre and radius in metres of a sphere around all entities that occlude or emit; around all entities if none
+    /// does.
     pub fn bounds(&self) -> (DVec3, f64) {
         let placements = self.placements();
-        let spheres: Vec<(DVec3, f64)> = self.affected_of(None).map(|i| self.sphere(i, &placements[i])).collect();
+        // Suns stand behind the entities of the file.
+        let entities = &self.scene.entities[..self.scene.data.entities.len()];
+        let acts = |entity: &Entity| entity.occludes || entity.emits;
+        let any = entities.iter().any(acts);
+        let shown = (0..entities.len()).filter(|i| !any || acts(&entities[*i]));
+        let spheres: Vec<(DVec3, f64)> = shown.map(|i| self.sphere(i, &placements[i])).collect();
         around_spheres(&spheres).unwrap_or((self.orbit.target, self.orbit.distance_m))
     }
 
@@ -236,21 +227,9 @@ impl Editor {
         placement.sphere(self.scene.meshes[self.scene.entities[entity].mesh].bounding_sphere())
     }
 
-    /// Entities that a step moves: the selected one; else all that occlude or emit; if none does, all.
-    pub(super) fn affected_of(&self, selection: Option<usize>) -> impl Iterator<Item = usize> {
-        // Suns stand behind the entities of the file, and nobody moves them.
-        let entities = &self.scene.entities[..self.scene.data.entities.len()];
-        let acts = |i: &usize| entities[*i].occludes || entities[*i].emits;
-        let any = (0..entities.len()).any(|i| acts(&i));
-        let chosen: Vec<usize> = match selection {
-            Some(entity) => vec![entity],
-            None => (0..entities.len()).filter(|i| !any || acts(i)).collect(),
-        };
-        chosen.into_iter()
-    }
-
     fn see(&mut self, change: impl FnOnce(&mut OrbitCamera, [u32; 2], (DVec3, f64))) -> Effect {
-        let (size, bounds) = (self.size, self.bounds());
+        let size = self.size;
+        let bounds = self.bounds();
         let before = self.orbit;
         change(&mut self.orbit, size, bounds);
         if self.orbit == before {
@@ -289,6 +268,7 @@ impl Editor {
             reference: self.reference,
             error: self.error,
             overlay: self.overlay,
+            panels: self.panels,
             variant: self.variant,
             saved: self.saved.clone(),
             ..next

@@ -6,22 +6,19 @@ use super::graph;
 use super::status::{Status, grouped};
 use crate::merge::variant::VARIANTS;
 use crate::scene::light;
-use egui::collapsing_header::CollapsingState;
-use egui::{Id, RichText, Ui};
+use egui::{RichText, Ui};
 
 /// Width of the panel, points.
 pub(super) const FIGURES_WIDTH: f32 = 268.0;
-/// Title of the part that is folded at first, which is its id as well.
-pub(super) const DETAILS: &str = "Details";
 
 /// Adds the figures: scene, times, sliders, details.
 pub(super) fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec<Command>) {
     ui.set_width(FIGURES_WIDTH - ui.spacing().window_margin.sum().x - 2.0);
     let [width, height] = status.size;
     let name = editor.path().file_stem().unwrap_or_default().to_string_lossy();
-    let paused = if editor.is_running() { "" } else { ", paused" };
-    ui.label(format!("{name}, {width} x {height}, {:.2} s{paused}", editor.time_s()));
-    let selected = editor.selection().map_or("all".to_owned(), |i| {
+    let paused = if editor.running { "" } else { ", paused" };
+    ui.label(format!("{name}, {width} x {height}, {:.2} s{paused}", editor.time_s));
+    let selected = editor.selection.map_or("nothing".to_owned(), |i| {
         let entity = &editor.scene().entities[i];
         let role = if entity.emits {
             "light"
@@ -37,9 +34,7 @@ pub(super) fn figures(ui: &mut Ui, editor: &Editor, status: &Status<'_>, command
     ui.separator();
     sliders(ui, editor, commands);
     ui.separator();
-    let id = Id::new(DETAILS).with("collapsing");
-    let folding = CollapsingState::load_with_default_open(ui.ctx(), id, status.unfolded.details);
-    folding.show_header(ui, |ui| ui.label(DETAILS)).body_unindented(|ui| details(ui, editor, status, commands));
+    egui::CollapsingHeader::new("Details").show_unindented(ui, |ui| details(ui, editor, status, commands));
 }
 
 fn details(ui: &mut Ui, editor: &Editor, status: &Status<'_>, commands: &mut Vec<Command>) {

@@ -1,6 +1,7 @@
 //! Updates the viewer after a change: at once, after a background bake, or by a rebuild.
 
 use super::command::Changed;
+use super::preview::preview;
 use super::task::{BackgroundTask, TaskWorker};
 use super::viewer::Viewer;
 use crate::bake::{self, Baker, SceneNeeds};
@@ -24,12 +25,22 @@ impl Viewer {
         }
         if changed.scene {
             self.settle()?;
-            (self.frame, self.reference, self.error_shown, self.rays) = (None, None, None, None);
+            self.frame = None;
+            self.preview = None;
+            self.previewed = false;
+            self.reference = None;
+            self.error_shown = None;
+            self.rays = None;
             self.counts = None;
             self.edges.clear();
             self.timings.clear();
             self.outgrown = true;
             return Ok(());
+        }
+        if changed.camera
+            && let Some(frame) = self.frame.as_mut().or(self.preview.as_mut())
+        {
+            frame.set_camera(self.editor.camera());
         }
         let Some(frame) = &mut self.frame else { return Ok(()) };
         if changed.variant {
@@ -37,9 +48,6 @@ impl Viewer {
             let outcome = frame.set_variant(chosen);
             self.tolerate(outcome)?;
             return Ok(());
-        }
-        if changed.camera {
-            frame.set_camera(self.editor.camera());
         }
         if changed.emission || changed.sky || changed.roles || changed.placements {
             if frame.covers(self.editor.scene()) {
@@ -52,7 +60,8 @@ impl Viewer {
         Ok(())
     }
 
-    /// Gives back the memory of the frame before, and of a bake. A driver frees its share when the first picture is submitted.
+    /// Gives back the memory of the frame before, and of a bake. A driver frees its share when the first picture is
+    /// submitted.
     pub(super) fn give_back(&mut self) {
         if self.drawn_before.is_some_and(|before| self.frame_count > before) {
             self.drawn_before = None;
@@ -60,9 +69,9 @@ impl Viewer {
         }
     }
 
-    /// Rebuilds a frame that changes have outgrown: once for all events that waited while the last one was built. One for each
-    /// would fall behind a hand that is quicker than the driver's compiler, and Mesa 22.3 keeps what is destroyed until the next
-    /// submission, which would come after the last event.
+    /// Rebuilds a frame that changes have outgrown: once for all events that waited while the last one was built. One
+    /// for each would fall behind a hand that is quicker than the driver's compiler, and Mesa 22.3 keeps what is
+    /// destroyed until the next submission, which would come after the last event.
     pub(super) fn catch_up(&mut self) -> Result<()> {
         if std::mem::take(&mut self.outgrown) { self.prepare() } else { Ok(()) }
     }
@@ -70,25 +79,44 @@ impl Viewer {
     /// Builds the frame if all its fields are cached, else starts a bake.
     fn prepare(&mut self) -> Result<()> {
         self.bake = None;
-        let (cache, scene) = (self.setup.cache.clone(), self.editor.scene().clone());
+        let cache = self.setup.cache.clone();
+        let scene = self.editor.scene().clone();
         let needs = SceneNeeds::of(&scene, &self.setup.frame.bake, self.setup.frame.lights);
         if needs.are_cached(&scene, &cache) {
             return self.build();
         }
-        let (options, library) = (self.setup.options.clone(), self.setup.library.clone());
-        let workers = self.setup.workers.clone();
+        let options = self.setup.options.clone();
+        let library = self.setup.library.clone();
         self.bake = Some(BackgroundTask::new(move |worker: &TaskWorker<()>| {
-            worker.report("opening the device for it", 0, 1);
+            let missing = needs.missing(&scene, &cache);
+            let all: u32 = missing.iter().map(|(_, captures)| captures).sum();
+            worker.report("shadows", 0, all);
             let device = Device::new(&options)?;
-            let baker = match workers {
-                Some(workers) => Baker::with_workers(&device, &library, workers),
-                None => Baker::new(&device, &library),
-            };
+            let baker = Baker::new(&device, &library);
             limits::check(&device, &scene, &needs)?;
-            bake::ensure(&baker, &cache, &scene, &needs, &|what, done, all| worker.report(what, done, all))?;
+            bake::ensure(&baker, &cache, &scene, &needs, &|what, now, of| {
+                let Some(place) = missing.iter().position(|(name, _)| name == what) else { return };
+                let before: u32 = missing[..place].iter().map(|(_, captures)| captures).sum();
+                let share = f64::from(now) / f64::from(of.max(1));
+                worker.report("shadows", before + (share * f64::from(missing[place].1)) as u32, all);
+            })?;
             drop(baker);
             Messages::into_result(device.take_validation_messages())
         }));
+        Ok(())
+    }
+
+    /// Shows the scene without shadows where they take longer than a moment.
+    pub(super) fn preview(&mut self) -> Result<()> {
+        let waits = self.bake.as_ref().is_some_and(|bake| bake.elapsed() >= self.setup.preview_after);
+        if self.frame.is_some() || self.previewed || !waits {
+            return Ok(());
+        }
+        self.previewed = true;
+        let options = frame::Options { size: self.size, ..self.setup.frame };
+        let preview = preview(&self.baker, &self.setup.cache, &self.editor, options);
+        self.preview = self.tolerate(preview)?;
+        self.pending.camera = true;
         Ok(())
     }
 
@@ -100,6 +128,7 @@ impl Viewer {
         if let Some(frame) = self.tolerate(built)? {
             log::info!("ready: the first picture of {}", self.editor.path().display());
             self.frame = Some(frame);
+            self.preview = None;
             self.build_count += 1;
             self.drawn_before = Some(self.frame_count);
             self.pending |= Changed { placements: true, camera: true, ..Changed::default() };
@@ -117,9 +146,11 @@ impl Viewer {
         } else {
             Ok(())
         };
+        let overlay = if uses("overlay.vert") || uses("overlay.frag") { self.overlay.reload(library) } else { Ok(()) };
         let frame = self.frame.as_mut().map_or(Ok(()), |frame| frame.reload(files));
         self.baker = Baker::new(&self.setup.device, library);
-        let errors: Vec<String> = [show, frame].into_iter().filter_map(|r| r.err().map(|e| e.to_string())).collect();
+        let errors: Vec<String> =
+            [show, overlay, frame].into_iter().filter_map(|r| r.err().map(|e| e.to_string())).collect();
         if errors.is_empty() {
             log::info!("shaders rebuilt: {}", files.join(", "));
             self.say(Some(format!("shaders rebuilt: {}", files.join(", "))));

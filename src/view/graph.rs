@@ -24,8 +24,8 @@ const MARKS: [(f64, &str); 2] = [(1000.0 / 30.0, "30/s"), (1000.0 / 60.0, "60/s"
 /// Ranges of the graph, in milliseconds.
 const RANGES: [f64; 9] = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 1280.0];
 
-/// Labels and where they stand: that of the range at the top right, and those of marks on their lines at the left. A mark whose label
-/// would overlap another or leave the graph is left out. `size` measures a text.
+/// Labels and where they stand: that of the range at the top right, and those of marks on their lines at the left. A
+/// mark whose label would overlap another or leave the graph is left out. `size` measures a text.
 fn labels(area: Rect, top: f64, size: impl Fn(&str) -> Vec2) -> Vec<(Rect, String)> {
     let range = format!("{top} ms");
     let corner = Align2::RIGHT_TOP.anchor_size(area.right_top(), size(&range));

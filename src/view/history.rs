@@ -11,26 +11,18 @@ pub const ENTITY_LIMIT: usize = 1 << 18;
 /// The parts of a scene that a change concerns, at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Snapshot {
-    /// Entities by index.
     pub entities: Vec<(usize, EntityData)>,
     /// Distant light.
     pub environment: Option<EnvironmentData>,
-    /// Exposure in stops.
     pub exposure_ev: Option<f32>,
 }
 
 /// Kind of a change. Consecutive changes of the same kind may be undone as one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EditKind {
-    /// A key that moves, scales or turns.
-    Step(super::Step),
-    /// A drag.
     Drag,
     /// Change between occluder and light.
     Role,
-    /// A turn of the distant light by key.
-    SkyTurn,
-    /// A slider.
     Slide(Slider),
 }
 
@@ -41,9 +33,7 @@ pub enum Slider {
     SkyTurn,
     /// Strength of the distant light.
     Sky,
-    /// Emission.
     Light,
-    /// Exposure.
     Exposure,
 }
 
@@ -57,8 +47,8 @@ pub struct History {
 }
 
 impl History {
-    /// Notes that a change of `kind` follows; `before` makes a snapshot of what it will change. If `joins`, and the last change
-    /// had the same kind and selection, the change becomes part of the last one.
+    /// Notes that a change of `kind` follows; `before` makes a snapshot of what it will change. If `joins`, and the
+    /// last change had the same kind and selection, the change becomes part of the last one.
     pub fn note(&mut self, kind: EditKind, selection: Option<usize>, joins: bool, before: impl FnOnce() -> Snapshot) {
         if joins && self.open == Some((kind, selection)) {
             return;
@@ -77,7 +67,8 @@ impl History {
         self.open = None;
     }
 
-    /// Undoes the last change: `swap` restores a snapshot and returns the replaced state. Returns whether there was a change.
+    /// Undoes the last change: `swap` restores a snapshot and returns the replaced state. Returns whether there was a
+    /// change.
     pub fn undo(&mut self, swap: impl FnOnce(Snapshot) -> Snapshot) -> bool {
         self.open = None;
         let Some(snapshot) = self.done.pop() else { return false };

@@ -1,57 +1,43 @@
 //! Maps keys and pointer events to commands, independent of the window library, and lists them as help.
 
-use super::command::{Command, Step};
+use super::command::Command;
 use super::editor::Editor;
 use std::fmt::Write;
 
 /// A press is a click if the pointer moves less than this, in pixels of a 96 dpi screen.
 const CLICK_SLACK_PX: f32 = 4.0;
-/// Angle in degrees by which a key turns the distant light.
-const SKY_STEP_DEG: f32 = 5.0;
 
 /// A key, named by what it types without Shift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Key {
-    /// A lower-case letter.
     Letter(char),
-    /// Space bar.
     Space,
-    /// Esc.
     Escape,
-    /// Home.
     Home,
-    /// A function key by its number.
     Function(u8),
 }
 
-/// A button of the pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Button {
-    /// Picks, grabs, turns the camera.
     Left,
-    /// Moves the camera.
     Right,
-    /// Moves the camera, as the right button does.
     Middle,
 }
 
-/// An event of the window. Positions are in pixels of the window, x to the right, y down; the edited picture is at its left.
+/// An event of the window. Positions are in pixels of the window, x to the right, y down; the edited picture is at its
+/// left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// A key was pressed, or repeats because it is held.
     Key {
-        /// The key.
         key: Key,
-        /// Whether Ctrl is held.
         control: bool,
-        /// Whether the event repeats a held key.
         repeat: bool,
     },
     /// A button was pressed at a position.
     Press(Button, [f32; 2]),
     /// The pointer moved to a position.
     Move([f32; 2]),
-    /// A button was released.
     Release(Button),
     /// Notches of the wheel, positive away from the user.
     Wheel(f32),
@@ -61,23 +47,16 @@ pub enum Event {
 
 /// One line of the help with its key bindings.
 pub struct KeyHelp {
-    /// Names of the keys in the help.
     pub keys: &'static str,
-    /// Description of what they do.
     pub what: &'static str,
     /// Each key, whether with Ctrl, and its command. Empty for lines about the pointer.
     bindings: &'static [(Key, bool, Command)],
 }
 
 impl KeyHelp {
-    /// The commands of its keys.
     pub fn commands(&self) -> Vec<Command> {
         self.bindings.iter().map(|(.., command)| *command).collect()
     }
-}
-
-const fn step(key: char, step: Step) -> (Key, bool, Command) {
-    (Key::Letter(key), false, Command::Step { step, repeat: false })
 }
 
 const fn letter(key: char, command: Command) -> (Key, bool, Command) {
@@ -94,7 +73,7 @@ pub const CONTROLS: &[KeyHelp] = &[
     row("right drag", "move the camera", &[]),
     row("wheel", "nearer, farther", &[]),
     row("Home", "show the whole scene", &[(Key::Home, false, Command::Home)]),
-    row("click", "select; with none selected, keys move all occluders and lights", &[]),
+    row("click", "select", &[]),
     row(
         "Q / A",
         "select the next, the previous",
@@ -102,20 +81,7 @@ pub const CONTROLS: &[KeyHelp] = &[
     ),
     row("Esc", "select nothing", &[(Key::Escape, false, Command::SelectNone)]),
     row("drag the selected", "move it in the ground plane", &[]),
-    row("J / L", "left, right as the camera sees it", &[step('j', Step::Left), step('l', Step::Right)]),
-    row("I / K", "up, down in the world", &[step('i', Step::Up), step('k', Step::Down)]),
-    row("O / P", "back, forth as the camera sees it", &[step('o', Step::Back), step('p', Step::Forth)]),
-    row("N / M", "enlarge, shrink the selected", &[step('n', Step::Larger), step('m', Step::Smaller)]),
-    row("R / T", "turn left, right about the vertical", &[step('r', Step::TurnLeft), step('t', Step::TurnRight)]),
     row("E", "turn an occluder into a light and back", &[letter('e', Command::ToggleLight)]),
-    row(
-        "C / V",
-        "turn the sky left, right",
-        &[
-            letter('c', Command::TurnSky { by_deg: SKY_STEP_DEG, repeat: false }),
-            letter('v', Command::TurnSky { by_deg: -SKY_STEP_DEG, repeat: false }),
-        ],
-    ),
     row("Space", "run, pause", &[(Key::Space, false, Command::ToggleRunning)]),
     row("Z", "next demo scene", &[letter('z', Command::NextScene)]),
     row("G", "ray-cast reference on the right", &[letter('g', Command::ToggleReference)]),
@@ -187,7 +153,8 @@ impl Input {
             Event::Key { key, control, repeat } => of_key(key, control, repeat).into_iter().collect(),
             Event::Press(button, at) => {
                 let out = self.let_go();
-                // The reference beside the picture has the same camera, so positions in it are used as positions in the picture.
+                // The reference beside the picture has the same camera, so positions in it are used as positions in the
+                // picture.
                 let width = editor.size()[0] as f32;
                 let left = if at[0] >= width { width } else { 0.0 };
                 let at = [at[0] - left, at[1]];
@@ -242,13 +209,11 @@ impl Input {
     }
 }
 
-/// The command of a key. Held keys repeat steps, turns, undo, redo and selection; other commands do not repeat.
+/// The command of a key. Held keys repeat undo, redo and selection; other commands do not repeat.
 fn of_key(key: Key, control: bool, repeat: bool) -> Option<Command> {
     let mut bindings = CONTROLS.iter().flat_map(|row| row.bindings);
     let (.., command) = bindings.find(|(k, c, _)| (*k, *c) == (key, control))?;
     match *command {
-        Command::Step { step, .. } => Some(Command::Step { step, repeat }),
-        Command::TurnSky { by_deg, .. } => Some(Command::TurnSky { by_deg, repeat }),
         other @ (Command::Undo | Command::Redo | Command::SelectNext | Command::SelectPrevious) => Some(other),
         other => (!repeat).then_some(other),
     }

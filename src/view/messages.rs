@@ -16,7 +16,7 @@ impl Viewer {
 
     /// The messages that are shown, oldest first.
     pub fn messages(&self) -> Vec<&str> {
-        let shown = self.messages.iter().filter(|message| message.insists || self.editor.shows_overlay());
+        let shown = self.messages.iter().filter(|message| message.insists || self.editor.overlay);
         shown.map(|message| message.text.as_str()).collect()
     }
 
@@ -27,7 +27,7 @@ impl Viewer {
     }
 
     /// As [`Viewer::say`], also where the overlay is hidden.
-    pub(super) fn insist(&mut self, text: String) {
+    pub fn insist(&mut self, text: String) {
         self.add(text, true);
     }
 

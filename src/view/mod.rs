@@ -1,8 +1,8 @@
 //! The state and the drawing of `shadow-fields view`.
 //!
-//! [`Editor`] owns the scene, the camera and the clock, and needs no device. The window turns events into a [`Command`], passes
-//! it to [`Editor::apply`], and acts on the returned [`Effect`]: merge again, bake a field, write a picture. Tests run all of it
-//! without a display.
+//! [`Editor`] owns the scene, the camera and the clock, and needs no device. The window turns events into a
+//! [`Command`], passes it to [`Editor::apply`], and acts on the returned [`Effect`]: merge again, bake a field, write a
+//! picture. Tests run all of it without a display.
 
 mod change;
 pub mod command;
@@ -27,18 +27,19 @@ mod open;
 pub mod orbit_camera;
 pub mod outline;
 #[cfg(feature = "view")]
+mod overlay;
+#[cfg(feature = "view")]
 pub mod panel;
 pub mod pick;
 mod picker;
 #[cfg(feature = "view")]
 mod picture;
+#[cfg(feature = "view")]
+mod preview;
 pub mod reference;
 pub mod reload;
-mod rescue;
 mod save;
 pub mod scenes;
-#[cfg(feature = "view")]
-pub mod settings;
 #[cfg(feature = "view")]
 pub mod status;
 pub mod task;
@@ -47,7 +48,7 @@ mod ui;
 #[cfg(feature = "view")]
 pub mod viewer;
 
-pub use command::{Changed, Command, Effect, Request, Step};
+pub use command::{Changed, Command, Effect};
 pub use editor::Editor;
 pub use input::{Event, Input};
 #[cfg(feature = "view")]

@@ -2,18 +2,19 @@
 
 use super::Editor;
 use super::status::{ERROR, LEAST_TEXT, MARGIN, Status, WARNING, grouped};
+use super::task::TaskProgress;
 use crate::asset::false_color::{ColorScale, Scheme};
 use crate::asset::picture::srgb_from_linear;
-use egui::{Align2, Color32, Context, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
+use egui::{Align2, Color32, Context, FontId, Frame, Id, Rect, RichText, Sense, Ui, pos2, vec2};
 
 /// Labels the two halves beside the line where they meet.
 pub(super) fn halves(context: &Context, editor: &Editor) {
-    if !editor.shows_reference() {
+    if !editor.reference {
         return;
     }
     let painter = context.layer_painter(egui::LayerId::background());
     let screen = context.content_rect();
-    let own = if editor.shows_error() { "error of the merge" } else { "merged" };
+    let own = if editor.error { "error of the merge" } else { "merged" };
     for (text, align, side) in [(own, Align2::RIGHT_TOP, -1.0), ("ray cast", Align2::LEFT_TOP, 1.0)] {
         let text = painter.layout_no_wrap(text.to_owned(), FontId::proportional(14.0), Color32::WHITE);
         let place = align.anchor_size(pos2(screen.center().x + side * 10.0, screen.top() + MARGIN + 4.0), text.size());
@@ -25,9 +26,9 @@ pub(super) fn halves(context: &Context, editor: &Editor) {
 /// Draws the notes at the bottom: messages, and unless the overlay is hidden, reference and error, and shader errors.
 pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
     let mut lines: Vec<(String, Color32)> = Vec::new();
-    let shows = editor.shows_overlay();
+    let shows = editor.overlay;
     let shader_error = status.shader_error.filter(|_| shows);
-    if shows && (editor.shows_reference() || editor.shows_error()) {
+    if shows && (editor.reference || editor.error) {
         lines.push(match status.reference {
             Some((rays, error, true)) => (
                 format!("reference: {rays} rays a vertex, {} % standard error", two_digits(100.0 * error)),
@@ -45,7 +46,7 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
             ));
         }
     }
-    if shows && editor.shows_error() {
+    if shows && editor.error {
         lines.push(match status.error {
             Some((scale, fresh)) => (
                 format!(
@@ -59,26 +60,39 @@ pub(super) fn notes(context: &Context, editor: &Editor, status: &Status<'_>) {
         });
     }
     lines.extend(status.messages.iter().map(|text| ((*text).to_owned(), Color32::WHITE)));
-    if lines.is_empty() && shader_error.is_none() {
+    if lines.is_empty() && shader_error.is_none() && status.bake.is_none() {
         return;
     }
-    egui::Window::new("notes")
-        .title_bar(false)
-        .resizable(false)
-        .anchor(Align2::CENTER_BOTTOM, vec2(0.0, -MARGIN))
-        .max_width((context.content_rect().width() - 4.0 * MARGIN).max(100.0))
-        .show(context, |ui| {
+    let screen = context.content_rect();
+    let area = egui::Area::new(Id::new("notes")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -MARGIN)).fade_in(false);
+    area.show(context, |ui| {
+        ui.set_max_size(vec2((screen.width() - 4.0 * MARGIN).max(100.0), screen.height()));
+        Frame::window(&context.global_style()).show(ui, |ui| {
+            if let Some(bake) = &status.bake {
+                ui.add(egui::ProgressBar::new(bake.share()).desired_width(320.0).text(bake_text(bake)));
+            }
             for (text, color) in lines {
                 ui.colored_label(color, text);
             }
-            if let Some((scale, _)) = status.error.filter(|_| shows && editor.shows_error()) {
+            if let Some((scale, _)) = status.error.filter(|_| shows && editor.error) {
                 bar(ui, scale.limit);
             }
             if let Some(error) = shader_error {
                 ui.colored_label(WARNING, "a shader does not compile; the previous one stays in use");
                 ui.label(RichText::new(error.trim()).monospace().color(ERROR));
             }
-        });
+        })
+    });
+}
+
+/// How far a bake is, and how long it still takes at the pace so far.
+fn bake_text(bake: &TaskProgress) -> String {
+    let share = bake.share();
+    if share < 0.02 {
+        return "computing shadows".to_owned();
+    }
+    let left_s = bake.elapsed.as_secs_f32() * (1.0 - share) / share;
+    format!("computing shadows: {:.0} %, {left_s:.0} s left", 100.0 * share)
 }
 
 /// Draws the colour bar of errors from -`limit` to `limit`.

@@ -6,12 +6,9 @@ use crate::scene::Scene;
 use std::path::Path;
 
 impl Viewer {
-    /// Shows another scene in place of this one: a scene file, a glTF file or an OBJ file, such as one that was dropped on the window.
-    /// What is left out of it is said. A file that cannot be opened is one line over the picture, and the scene stays. Edits that are
-    /// not saved are kept: undo returns to them, and a line says so.
-    ///
-    /// # Errors
-    /// As [`Viewer::apply`].
+    /// Shows another scene in place of this one: a scene file, a glTF file or an OBJ file, such as one that was dropped
+    /// on the window. What is left out of it is said. A file that cannot be opened is one line over the picture, and
+    /// the scene stays. Edits that are not saved are kept: undo returns to them, and a line says so.
     pub fn open(&mut self, path: &Path) -> Result<()> {
         let (scene, notes) = match self.read(path) {
             Ok(read) => read,

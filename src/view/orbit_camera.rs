@@ -29,9 +29,9 @@ pub struct OrbitCamera {
 }
 
 impl OrbitCamera {
-    /// The camera of a scene.
     pub fn new(camera: &Camera) -> Self {
-        let (eye, target) = (camera.eye.as_dvec3(), camera.target.as_dvec3());
+        let eye = camera.eye.as_dvec3();
+        let target = camera.target.as_dvec3();
         let offset = eye - target;
         let distance_m = offset.length();
         let pitch_rad = (offset.y / distance_m).clamp(-1.0, 1.0).asin();
@@ -52,12 +52,6 @@ impl OrbitCamera {
     pub fn right(&self) -> DVec3 {
         let (sin, cos) = self.yaw_rad.sin_cos();
         DVec3::new(cos, 0.0, -sin)
-    }
-
-    /// Unit vector away from the camera in the ground plane.
-    pub fn ahead(&self) -> DVec3 {
-        let (sin, cos) = self.yaw_rad.sin_cos();
-        DVec3::new(-sin, 0.0, -cos)
     }
 
     /// Unit vector up in the picture.

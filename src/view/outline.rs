@@ -5,8 +5,8 @@ use crate::draw::camera::world_from_centred;
 use crate::scene::Placement;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
-/// Line segments of an outline in a picture of `size` (in any unit), with x to the right and y down. Segments are clipped to the
-/// picture. `centre_m` is the centre of the mesh's bounding sphere.
+/// Line segments of an outline in a picture of `size` (in any unit), with x to the right and y down. Segments are
+/// clipped to the picture. `centre_m` is the centre of the mesh's bounding sphere.
 pub fn outline(
     edges: &Edges,
     centre_m: DVec3,

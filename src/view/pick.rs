@@ -13,12 +13,9 @@ use glam::DVec3;
 /// A drag reaches at most this many scene radii from the eye, because near the horizon a pixel covers kilometres.
 const REACH: f64 = 30.0;
 
-/// A ray in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
-    /// Origin in metres.
     pub origin: DVec3,
-    /// Unit direction.
     pub direction: DVec3,
 }
 
@@ -70,16 +67,15 @@ impl Editor {
         Some(enters_m + f64::from(hit) * radius_m)
     }
 
-    /// Whether a drag from a position moves the selected entity instead of the camera: the entity is seen there, and occludes or
-    /// emits.
+    /// Whether a drag from a position moves the selected entity instead of the camera: the entity is seen there, and
+    /// occludes or emits.
     pub fn grabs(&self, at: [f32; 2]) -> bool {
-        self.selection().is_some_and(|selected| {
+        self.selection.is_some_and(|selected| {
             let entity = &self.scene.entities[selected];
             (entity.occludes || entity.emits) && self.hit(at).is_some_and(|(seen, _)| seen == selected)
         })
     }
 
-    /// Executes a command of the pointer.
     pub(super) fn point(&mut self, command: Command) -> Effect {
         match command {
             Command::Pick(at) => {
@@ -115,7 +111,8 @@ impl Editor {
         }
         let by = (ray.origin + along * ray.direction - drag.anchor) * DVec3::new(1.0, 0.0, 1.0);
         let Some(after) = edit::moved(&drag.before, by) else { return Effect::default() };
-        let (entity, joins) = (drag.entity, drag.moved);
+        let entity = drag.entity;
+        let joins = drag.moved;
         drag.moved = true;
         let before = || Snapshot { entities: vec![(entity, drag.before.clone())], ..Snapshot::default() };
         self.history.note(EditKind::Drag, Some(entity), joins, before);

@@ -1,4 +1,4 @@
-//! What the pointer works with: the shapes that rays meet, and the entity that is dragged.
+//! State of the pointer: the shapes that rays meet, and the entity that is dragged.
 
 use crate::scene::EntityData;
 use crate::truth::ray_mesh::RayMesh;
@@ -21,7 +21,6 @@ impl Picker {
 /// An entity that is being dragged.
 pub(super) struct EntityDrag {
     pub(super) entity: usize,
-    /// The entity before the drag.
     pub(super) before: EntityData,
     /// The point where it was grabbed, metres.
     pub(super) anchor: DVec3,

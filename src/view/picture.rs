@@ -1,6 +1,7 @@
 //! Draws the viewer's frames into a window, an image or files.
 
 use super::outline::outline;
+use super::preview;
 use super::save::unedited;
 use super::status::HISTORY;
 use super::viewer::{ERROR, REFERENCE, Viewer};
@@ -8,19 +9,17 @@ use crate::asset::edges::Edges;
 use crate::asset::picture;
 use crate::draw::camera::clip_from_world;
 use crate::error::{Error, Result};
-use crate::frame::{self, RadiositySource, Viewport, record};
+use crate::frame::{self, RadiositySource, Relight, Viewport, record};
 use crate::gpu::{Access, Commands, FLIGHTS, Image, Window};
 use glam::DVec2;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Time without events after which hidden clusters are lit. It is longer than the interval between events of a drag, and short
-/// enough not to be noticed.
+/// Time without events after which hidden clusters are lit. It is longer than the interval between events of a drag,
+/// and short enough not to be noticed.
 const REST: Duration = Duration::from_millis(100);
 
-/// The target of a frame.
 pub enum FrameTarget<'c> {
-    /// A window, which presents the frame.
     Window(&'c mut Window),
     /// An image of the setup's format; it is left ready to be copied from.
     Image(&'c Image),
@@ -28,9 +27,6 @@ pub enum FrameTarget<'c> {
 
 impl Viewer {
     /// Draws a frame. Returns false if the target has no image, as in a minimised window.
-    ///
-    /// # Errors
-    /// `Device` when the device or the surface was lost.
     pub fn draw(&mut self, canvas: FrameTarget<'_>) -> Result<bool> {
         self.catch_up()?;
         let pending = self.pending;
@@ -62,29 +58,37 @@ impl Viewer {
             (FrameTarget::Window(_), None) => unreachable!("a window gave a shot"),
         };
         let size = [target.shape.width, target.shape.height];
-        let resized = self.frame.as_ref().is_some_and(|frame| frame.size() != size);
         let viewports = self.viewports(size);
-        let placements = self.editor.placements();
+        let mut placements = self.editor.placements();
         let white = self.editor.white();
         let pending = std::mem::take(&mut self.pending);
         // Clusters that were hidden during motion are lit when motion has ended.
         let stale = self.frame.as_ref().is_some_and(|frame| frame.stale_count() > 0);
-        let light = pending.light() || pending.variant || stale;
-        let draws = pending.any() || resized;
-        if let Some(frame) = &mut self.frame {
-            frame.resize(size)?;
-            if light {
-                // The error needs all clusters, not only the visible ones.
-                frame.prepare_light(&placements, if self.editor.shows_error() { &[] } else { &viewports })?;
-            }
-            if draws {
-                frame.prepare_picture(&placements, &viewports)?;
-            }
+        let light = self.frame.is_some() && (pending.light() || pending.variant || stale);
+        let mut frame = self.frame.as_mut();
+        if let (None, Some(preview)) = (&frame, &mut self.preview) {
+            // It has no suns, which stand behind the entities of the file.
+            placements.truncate(preview.scene().entities.len());
+            frame = Some(preview);
         }
-        let (frame, show, overlay, paint) = (self.frame.as_ref(), &self.show, &mut self.overlay, &self.paint);
+        let resized = frame.as_ref().is_some_and(|frame| frame.size() != size);
+        let draws = pending.any() || resized;
+        if let Some(frame) = &mut frame {
+            frame.resize(size)?;
+            let relight = match light {
+                false => Relight::Nothing,
+                // The error needs all clusters, not only the visible ones.
+                true if self.editor.error => Relight::Everything,
+                true => Relight::Seen,
+            };
+            frame.prepare(&placements, if draws { &viewports } else { &[] }, relight)?;
+        }
+        self.overlay.prepare(&self.paint, size)?;
+        let frame = frame.as_deref();
+        let show = &self.show;
+        let overlay = &self.overlay;
         let merge = frame.filter(|_| light).map_or(Ok(None), |frame| frame.merge_work())?;
         let picture = frame.filter(|_| draws).map(|frame| frame.picture_work(&placements, white));
-        let mut overlay = Some(overlay);
         let screen = frame::PictureTarget::Screen {
             image: target,
             clear: [0.02, 0.02, 0.025, 1.0],
@@ -92,7 +96,7 @@ impl Viewer {
                 if let Some(frame) = frame {
                     show.record(drawing, frame.shown(), white)?;
                 }
-                overlay.take().map_or(Ok(()), |overlay| drawing.overlay(overlay, target, paint))
+                overlay.record(drawing)
             },
             next: if shot.is_some() { Access::Present } else { Access::TransferRead },
         };
@@ -116,9 +120,6 @@ impl Viewer {
     }
 
     /// Waits for all frames.
-    ///
-    /// # Errors
-    /// `Device` when the device was lost.
     pub fn settle(&mut self) -> Result<()> {
         while !self.flights.is_empty() {
             self.land()?;
@@ -139,13 +140,16 @@ impl Viewer {
 
     /// Viewports of the picture: the merged light or its error, and the reference on the right of it.
     fn viewports(&self, [width, height]: [u32; 2]) -> Vec<Viewport> {
+        if self.frame.is_none() {
+            return vec![preview::viewport([width, height])];
+        }
         let [own_width, _] = self.own_size_of([width, height]);
         let mut own = Viewport::merged([0, 0, own_width, height]);
-        if self.editor.shows_error() && self.error_shown.is_some() {
+        if self.editor.error && self.error_shown.is_some() {
             own = Viewport { radiosity: RadiositySource::Comparison(ERROR), adds_emission: false, ..own };
         }
         let mut viewports = vec![own];
-        if self.editor.shows_reference() && self.reference.is_some() && width > own_width {
+        if self.editor.reference && self.reference.is_some() && width > own_width {
             let right = Viewport::merged([own_width, 0, width - own_width, height]);
             viewports.push(Viewport { radiosity: RadiositySource::Comparison(REFERENCE), ..right });
         }
@@ -157,7 +161,9 @@ impl Viewer {
         self.catch_up()?;
         let Some(frame) = &mut self.frame else { return Err(Error::Failed("no picture has been drawn yet".into())) };
         let [width, height] = frame.size();
-        let (placements, ev, white) = (self.editor.placements(), self.editor.exposure_ev(), self.editor.white());
+        let placements = self.editor.placements();
+        let ev = self.editor.exposure_ev();
+        let white = self.editor.white();
         let png = free_name(&self.editor.save_path());
         let exr = png.with_extension("exr");
         for flight in self.flights.drain(..) {
@@ -170,7 +176,7 @@ impl Viewer {
 
     /// The outline of the selected entity in points.
     pub(super) fn outline(&mut self) -> Vec<[egui::Pos2; 2]> {
-        let Some(selected) = self.editor.selection() else { return Vec::new() };
+        let Some(selected) = self.editor.selection else { return Vec::new() };
         let scene = self.editor.scene();
         let mesh = scene.entities[selected].mesh;
         let edges = self.edges.entry(mesh).or_insert_with(|| Edges::new(&scene.meshes[mesh]));

@@ -1,4 +1,5 @@
-//! The ray-cast reference beside the picture. A background task casts it, first coarsely, then more finely while nothing changes.
+//! The ray-cast reference beside the picture. A background task casts it, first coarsely, then more finely while
+//! nothing changes.
 
 use super::task::{BackgroundTask, TaskWorker};
 use crate::error::Result;
@@ -20,7 +21,6 @@ pub struct Reference {
     pub rays: u32,
     /// Relative standard error.
     pub error: f64,
-    /// Radiosity by entity.
     pub radiosity: Vec<EntityRadiosity>,
 }
 

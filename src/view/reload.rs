@@ -24,7 +24,8 @@ impl Watch {
         Watch { folder: folder.to_owned(), stamps: stamps(folder), looked: Instant::now(), changed: BTreeSet::new() }
     }
 
-    /// If a file changed since the last poll, returns all files that changed since the last call of [`Watch::compiled`].
+    /// If a file changed since the last poll, returns all files that changed since the last call of
+    /// [`Watch::compiled`].
     pub fn poll(&mut self) -> Option<Vec<String>> {
         if self.looked.elapsed() < PERIOD {
             return None;

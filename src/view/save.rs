@@ -3,16 +3,16 @@
 use super::editor::Editor;
 use crate::asset::embedded;
 use crate::error::{Error, Result};
-use crate::scene::{Data, export};
+use crate::scene::{Data, export::Export};
 use std::path::{Path, PathBuf};
 
 /// Suffix of a saved scene's name, so that the original file with its comments is kept.
 const SUFFIX: &str = "-edited";
 
 impl Editor {
-    /// Default path of [`Editor::save`]: `NAME-edited.toml` beside the scene's file, or in the current folder for a built-in
-    /// scene. If another program wrote such a file, the name gets the next free number. An edited scene that was opened is
-    /// overwritten.
+    /// Default path of [`Editor::save`]: `NAME-edited.toml` beside the scene's file, or in the current folder for a
+    /// built-in scene. If another program wrote such a file, the name gets the next free number. An edited scene that
+    /// was opened is overwritten.
     pub fn save_path(&self) -> PathBuf {
         let stem = self.stem();
         if self.path().exists() && unedited(&stem) != stem {
@@ -46,15 +46,12 @@ impl Editor {
         (1..).map(path).find(usable).expect("numbers do not end")
     }
 
-    /// The current state as scene data for a file in `folder`, so that its first picture is the one shown now. Paths in it are
-    /// relative to `folder`; files of built-in scenes keep their built-in names.
-    ///
-    /// # Errors
-    /// `Failed` when the path of a file is not UTF-8.
+    /// The current state as scene data for a file in `folder`, so that its first picture is the one shown now. Paths in
+    /// it are relative to `folder`; files of built-in scenes keep their built-in names.
     pub fn data(&self, folder: &Path) -> Result<Data> {
         let mut data = self.scene().data.clone();
         [data.output.width, data.output.height] = self.size();
-        data.output.time_s = self.time_s();
+        data.output.time_s = self.time_s;
         let from = self.path().parent().unwrap_or(Path::new(""));
         let files = data.meshes.iter_mut().filter_map(|m| m.file.as_mut());
         for file in files.chain(data.environment.image.iter_mut().map(|image| &mut image.file)) {
@@ -67,19 +64,58 @@ impl Editor {
     }
 
     /// Writes the state as a scene file, and meshes that no file has beside it.
-    ///
-    /// # Errors
-    /// `Failed` when it cannot be written; then an older file is unchanged.
     pub fn save(&mut self, path: &Path) -> Result<()> {
         let data = self.data(path.parent().unwrap_or(Path::new("")))?;
         let head = "Written by shadow-fields view; `shadow-fields render` gives the same picture.";
-        export::write(&data, &self.scene().meshes, path, head).map_err(|error| match error {
+        let export = Export::new(&data, &self.scene().meshes, path)?;
+        export.write(head).map_err(|error| match error {
             Error::Input(message) => Error::Failed(message),
             other => other,
         })?;
         self.saved.insert(path.to_owned());
         self.kept = self.scene().data.clone();
         Ok(())
+    }
+
+    /// Whether the scene was edited since it was opened or saved. A camera that moved is no edit.
+    pub fn is_edited(&self) -> bool {
+        let now = &self.scene().data;
+        *now != Data { camera: now.camera.clone(), ..self.kept.clone() }
+    }
+
+    /// Writes every edited scene, this one and the one that undo would return to, to a file that does not exist yet:
+    /// beside the scene's own file as [`Editor::save_path`] names it, or in the folder of temporary files if that
+    /// cannot be written. Returns the paths, which is none where nothing was edited.
+    pub fn rescue(&mut self) -> Result<Vec<PathBuf>> {
+        let mut paths = match &mut self.former {
+            Some(former) => former.rescue()?,
+            None => Vec::new(),
+        };
+        if self.is_edited() {
+            let first = self.unused_path(&self.folder());
+            let path = match self.save(&first) {
+                Ok(()) => first,
+                Err(error) => {
+                    let second = self.unused_path(&std::env::temp_dir());
+                    self.save(&second).map_err(|_| error)?;
+                    second
+                }
+            };
+            paths.push(path);
+        }
+        Ok(paths)
+    }
+
+    /// What follows from an error that ends the window: edits are saved first, and the message says where.
+    pub fn rescued(&mut self, error: Error) -> Error {
+        match self.rescue() {
+            Ok(paths) if paths.is_empty() => error,
+            Ok(paths) => {
+                let paths: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
+                error.followed_by(format!("the edited scene was saved as {}", paths.join(" and ")))
+            }
+            Err(lost) => error.followed_by(format!("the edited scene could not be saved: {lost}")),
+        }
     }
 }
 

@@ -13,8 +13,9 @@ use std::sync::Arc;
 pub const FORMER_LIMIT: usize = 16;
 
 impl Editor {
-    /// Shows another scene in place of this one. If there are edits of this one that are not saved, the message says how to return.
-    /// Beyond [`FORMER_LIMIT`] scenes the oldest one goes: its edits are saved, and the message says where.
+    /// Shows another scene in place of this one. If there are edits of this one that are not saved, the message says
+    /// how to return. Beyond [`FORMER_LIMIT`] scenes the oldest one goes: its edits are saved, and the message says
+    /// where.
     pub fn open(&mut self, mut scene: Scene, path: &Path) -> Effect {
         self.share_meshes(&mut scene);
         let message = self
@@ -26,7 +27,7 @@ impl Editor {
         let changed = former.undo_count() > 0 || former.is_edited();
         self.former = if changed { Some(Box::new(former)) } else { former.former };
         let message = self.let_go_of_oldest().or(message);
-        Effect { changed: Changed { scene: true, ..Changed::default() }, message, request: None }
+        Effect { changed: Changed { scene: true, ..Changed::default() }, message }
     }
 
     /// Takes meshes of this scene for equal ones of the next, as a scene that is opened again has them.
@@ -77,7 +78,7 @@ impl Editor {
         let former = self.former.take()?;
         self.replace(*former);
         let message = Some(format!("back to {}", self.path().display()));
-        Some(Effect { changed: Changed { scene: true, ..Changed::default() }, message, request: None })
+        Some(Effect { changed: Changed { scene: true, ..Changed::default() }, message })
     }
 
     /// The next built-in scene; the first one if this is not a built-in scene.

@@ -1,6 +1,5 @@
 //! What the overlay's panels and notes show of the viewer's state, and their common style.
 
-use super::settings::Settings;
 use super::task::TaskProgress;
 use crate::gpu::Timing;
 use crate::lists::gather::Counts;
@@ -14,7 +13,6 @@ pub(super) const LEAST_TEXT: f32 = 12.0;
 pub(super) const MARGIN: f32 = 8.0;
 /// Colour of warnings.
 pub(super) const WARNING: Color32 = Color32::from_rgb(255, 190, 90);
-/// Colour of errors.
 pub(super) const ERROR: Color32 = Color32::from_rgb(255, 120, 110);
 /// Number of frames whose times are kept for the graph.
 pub(super) const HISTORY: usize = 120;
@@ -30,9 +28,7 @@ pub struct ErrorScale {
 
 /// The viewer's state that the overlay shows besides the editor's.
 pub struct Status<'s> {
-    /// Name of the device.
     pub device: &'s str,
-    /// Its driver.
     pub driver: &'s str,
     /// Width and height of the picture, pixels.
     pub size: [u32; 2],
@@ -44,13 +40,10 @@ pub struct Status<'s> {
     pub merged: Option<(usize, usize)>,
     /// Number of lit vertices.
     pub vertices: usize,
-    /// Which lights are sharp.
     pub lights: Lights,
     /// Merge variant in use; `None` before the first frame of a scene.
     pub variant: Option<&'s str>,
-    /// Progress of the background bake.
     pub bake: Option<TaskProgress>,
-    /// Progress of the background rays.
     pub rays: Option<TaskProgress>,
     /// Reference: rays per vertex, relative standard error, and whether it is up to date.
     pub reference: Option<(u32, f64, bool)>,
@@ -60,8 +53,6 @@ pub struct Status<'s> {
     pub shader_error: Option<&'s str>,
     /// Messages for the user, oldest first.
     pub messages: Vec<&'s str>,
-    /// The panels that are unfolded at the start.
-    pub unfolded: Settings,
 }
 
 /// A number with spaces between groups of three digits: 12 345.

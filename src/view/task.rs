@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
-/// Progress of a task.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TaskProgress {
     /// Description of the current work.
@@ -17,11 +17,21 @@ pub struct TaskProgress {
     pub done: u32,
     /// Number of parts.
     pub all: u32,
+    /// Time since the task began.
+    pub elapsed: Duration,
+}
+
+impl TaskProgress {
+    /// Share of the parts that are done.
+    pub fn share(&self) -> f32 {
+        self.done as f32 / self.all.max(1) as f32
+    }
 }
 
 /// The thread's side of a task: it reports progress and sends results.
 pub struct TaskWorker<T> {
     stop: Arc<AtomicBool>,
+    start: Instant,
     progress: Arc<Mutex<TaskProgress>>,
     results: Sender<T>,
 }
@@ -36,11 +46,10 @@ impl<T> TaskWorker<T> {
             // Unlike a panic, `resume_unwind` prints nothing; `BackgroundTask` expects the payload.
             resume_unwind(Box::new(Stopped));
         }
-        let progress = TaskProgress { what: what.to_owned(), done, all };
+        let progress = TaskProgress { what: what.to_owned(), done, all, elapsed: self.start.elapsed() };
         *self.progress.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = progress;
     }
 
-    /// Sends a result.
     pub fn send(&self, result: T) {
         let _ = self.results.send(result); // fails only if the task was dropped, which needs no result
     }
@@ -49,6 +58,7 @@ impl<T> TaskWorker<T> {
 /// A running task. Dropping it stops it and waits for its thread.
 pub struct BackgroundTask<T> {
     thread: Option<JoinHandle<Result<()>>>,
+    start: Instant,
     stop: Arc<AtomicBool>,
     progress: Arc<Mutex<TaskProgress>>,
     results: Receiver<T>,
@@ -57,11 +67,13 @@ pub struct BackgroundTask<T> {
 impl<T: Send + 'static> BackgroundTask<T> {
     /// Starts `work` on a thread.
     pub fn new(work: impl FnOnce(&TaskWorker<T>) -> Result<()> + Send + 'static) -> Self {
-        let (stop, progress) = (Arc::<AtomicBool>::default(), Arc::<Mutex<TaskProgress>>::default());
+        let stop = Arc::<AtomicBool>::default();
+        let progress = Arc::<Mutex<TaskProgress>>::default();
         let (sender, results) = channel();
-        let worker = TaskWorker { stop: stop.clone(), progress: progress.clone(), results: sender };
+        let start = Instant::now();
+        let worker = TaskWorker { stop: stop.clone(), start, progress: progress.clone(), results: sender };
         let thread = std::thread::spawn(move || work(&worker));
-        BackgroundTask { thread: Some(thread), stop, progress, results }
+        BackgroundTask { thread: Some(thread), start, stop, progress, results }
     }
 
     /// Results since the last call, oldest first.
@@ -69,7 +81,11 @@ impl<T: Send + 'static> BackgroundTask<T> {
         self.results.try_iter().collect()
     }
 
-    /// Its progress.
+    /// Time since it began.
+    pub fn elapsed(&self) -> Duration {
+        self.start.elapsed()
+    }
+
     pub fn progress(&self) -> TaskProgress {
         self.progress.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).clone()
     }

@@ -1,20 +1,16 @@
 //! Runs the overlay of the viewer.
 
-use super::command::Command;
+use super::overlay::Paint;
 use super::panel;
 use super::status::Status;
 use super::task::BackgroundTask;
 use super::viewer::Viewer;
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::gpu::Paint;
 use std::time::Instant;
 
 impl Viewer {
     /// Runs the overlay on egui's input and executes the commands of its widgets.
-    ///
-    /// # Errors
-    /// As [`Viewer::apply`].
     pub fn ui(&mut self, input: egui::RawInput) -> Result<egui::PlatformOutput> {
         let lines = self.outline();
         let status = self.status();
@@ -32,26 +28,10 @@ impl Viewer {
             pixels_per_point: output.pixels_per_point,
         };
         self.overlay.update(output.textures_delta)?;
-        let unfolded = panel::unfolded(&context);
-        if let (Some(now), Some(before)) = (unfolded, self.unfolded)
-            && now != before
-        {
-            self.settings = self.settings.changed(before, now);
-            self.setup.settings.iter().for_each(|file| self.settings.keep(file));
-        }
-        self.unfolded = unfolded;
         for command in commands {
             self.apply(command)?;
         }
         Ok(output.platform_output)
-    }
-
-    /// Folds or unfolds the list of keys; in a hidden overlay, shows that and unfolds it.
-    pub(super) fn toggle_keys(&mut self) -> Result<()> {
-        let hidden = !self.editor.shows_overlay();
-        panel::fold_keys(&self.egui, hidden);
-        self.pending.display = true;
-        if hidden { self.apply(Command::ToggleOverlay) } else { Ok(()) }
     }
 
     fn status(&self) -> Status<'_> {
@@ -72,7 +52,6 @@ impl Viewer {
             error: self.error_shown.as_ref().map(|(version, _, scale)| (*scale, *version == self.version)),
             shader_error: self.shader_error.as_deref(),
             messages: self.messages(),
-            unfolded: self.settings,
         }
     }
 }

@@ -3,26 +3,25 @@
 //! A frame is drawn into a window or into an image, so everything here also runs without a display.
 
 use super::Editor;
-use super::command::{Changed, Command, Effect, Request};
+use super::command::{Changed, Command, Effect};
 use super::input::{Event, Input};
+use super::overlay::{Overlay, Paint};
 use super::panel;
 use super::reference::Reference;
 use super::reload::Watch;
-use super::settings::Settings;
 use super::status::ErrorScale;
 use super::task::{BackgroundTask, TaskProgress};
 use crate::asset::edges::Edges;
+use crate::bake::Baker;
 use crate::bake::cache::Cache;
-use crate::bake::{Baker, WorkerOptions};
 use crate::draw::show::Show;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame};
-use crate::gpu::{self, Device, Flight, Overlay, Paint, Timing};
+use crate::gpu::{self, Device, Flight, Timing};
 use crate::lists::gather::Counts;
 use crate::shaders::Library;
 use ash::vk;
 use std::collections::{HashMap, VecDeque};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -32,13 +31,9 @@ pub(super) const ERROR: usize = 1;
 
 /// Parameters of a viewer.
 pub struct Setup {
-    /// The device on which it draws.
     pub device: Arc<Device>,
     /// Options with which background bakes open their own device.
     pub options: gpu::DeviceOptions,
-    /// Processes that background bakes are shared out among; `None` for this one alone.
-    pub workers: Option<WorkerOptions>,
-    /// Shaders.
     pub library: Library,
     /// Where bakes are kept: on disk, or in memory.
     pub cache: Cache,
@@ -52,8 +47,8 @@ pub struct Setup {
     pub seed: u64,
     /// Whether a glTF file of which something is left out is refused.
     pub strict: bool,
-    /// File of the [`Settings`]; `None` where nothing is remembered.
-    pub settings: Option<PathBuf>,
+    /// Time of a bake after which the scene is shown without shadows.
+    pub preview_after: Duration,
 }
 
 /// A line for the user.
@@ -71,6 +66,10 @@ pub struct Viewer {
     pub(super) input: Input,
     pub(super) baker: Baker,
     pub(super) frame: Option<Frame>,
+    /// The scene without shadows, while the first bake takes longer than a moment.
+    pub(super) preview: Option<Frame>,
+    /// Whether that was begun.
+    pub(super) previewed: bool,
     pub(super) show: Show,
     pub(super) overlay: Overlay,
     pub(super) egui: egui::Context,
@@ -96,10 +95,6 @@ pub struct Viewer {
     pub(super) quit: bool,
     /// Whether it was said that closing loses edits, since the last edit.
     pub(super) asked_to_close: bool,
-    /// The settings of this start.
-    pub(super) settings: Settings,
-    /// The panels that are unfolded, once they were shown.
-    pub(super) unfolded: Option<Settings>,
     /// Width and height of the window's picture, pixels.
     pub(super) size: [u32; 2],
     /// Time at which egui wants to be drawn again without an event.
@@ -118,9 +113,6 @@ pub struct Viewer {
 
 impl Viewer {
     /// Starts with a scene; missing fields are baked in the background.
-    ///
-    /// # Errors
-    /// `Failed` when a shader does not compile, `Device` when memory ran out.
     pub fn new(setup: Setup, editor: Editor, scale: f32) -> Result<Self> {
         let device = &setup.device;
         let egui = egui::Context::default();
@@ -128,11 +120,13 @@ impl Viewer {
         let mut viewer = Viewer {
             baker: Baker::new(device, &setup.library),
             show: Show::new(device, &setup.library, setup.format, setup.encodes_srgb)?,
-            overlay: Overlay::new(device, setup.format, setup.encodes_srgb)?,
+            overlay: Overlay::new(device, &setup.library, setup.format, setup.encodes_srgb)?,
             egui,
             paint: Paint { primitives: Vec::new(), pixels_per_point: scale },
             input: Input::new(scale),
             frame: None,
+            preview: None,
+            previewed: false,
             flights: VecDeque::new(),
             pending: Changed { scene: true, ..Changed::default() },
             outgrown: false,
@@ -149,8 +143,6 @@ impl Viewer {
             edges: HashMap::new(),
             quit: false,
             asked_to_close: false,
-            settings: setup.settings.as_deref().map(Settings::start).unwrap_or_default(),
-            unfolded: None,
             size: editor.size(),
             repaint_at: Some(Instant::now()),
             told: [None, None],
@@ -177,6 +169,11 @@ impl Viewer {
         // The saved picture has the size of the window.
         self.editor.apply(Command::Resize(self.size));
         self.editor.rescued(error)
+    }
+
+    /// Width and height of the window's picture, pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
     }
 
     /// The frame, once its fields are baked.
@@ -216,7 +213,7 @@ impl Viewer {
 
     /// Whether the error's colours are up to date.
     pub fn shows_error_colors(&self) -> bool {
-        self.editor.shows_error() && self.error_shown.as_ref().is_some_and(|(version, ..)| *version == self.version)
+        self.editor.error && self.error_shown.as_ref().is_some_and(|(version, ..)| *version == self.version)
     }
 
     /// The compiler's messages about the last change of a shader file.
@@ -236,7 +233,7 @@ impl Viewer {
 
     /// Whether a frame would show something new.
     pub fn wants_frame(&self) -> bool {
-        let moves = self.editor.is_running() && self.editor.scene().data.entities.iter().any(|e| !e.motion.is_empty());
+        let moves = self.editor.running && self.editor.scene().data.entities.iter().any(|e| !e.motion.is_empty());
         self.pending.any() || moves && self.frame.is_some() || self.repaint_at.is_some_and(|at| at <= Instant::now())
     }
 
@@ -250,9 +247,6 @@ impl Viewer {
     }
 
     /// Handles an event of the window that egui does not use.
-    ///
-    /// # Errors
-    /// As [`Viewer::apply`].
     pub fn event(&mut self, event: Event) -> Result<()> {
         for command in self.input.commands(event, &self.editor) {
             self.apply(command)?;
@@ -261,9 +255,6 @@ impl Viewer {
     }
 
     /// Executes a command, including the files that it writes.
-    ///
-    /// # Errors
-    /// `Device` when the device was lost. Errors that the user can resolve become messages instead.
     pub fn apply(&mut self, command: Command) -> Result<()> {
         match command {
             Command::Orbit(_) | Command::Pan(_) | Command::DragTo(_) | Command::Resize(_) => {
@@ -279,37 +270,35 @@ impl Viewer {
             }
             other => other,
         };
-        let Effect { mut changed, request, message } = self.editor.apply(command);
+        match command {
+            Command::Quit => self.close(),
+            Command::Save => self.save(),
+            Command::Screenshot => {
+                let outcome = self.screenshot();
+                let said = self.tolerate(outcome)?;
+                self.say(said);
+            }
+            _ => {}
+        }
+        let Effect { mut changed, message } = self.editor.apply(command);
         self.asked_to_close &= !(changed.light() || changed.exposure);
         if command == Command::ToggleReference {
             changed |= self.editor.apply(Command::Resize(self.own_size())).changed;
         }
         self.say(message);
-        self.follow(changed)?;
-        match request {
-            None => {}
-            Some(Request::Quit) => self.close(),
-            Some(Request::ToggleKeys) => self.toggle_keys()?,
-            Some(Request::Save) => {
-                let path = self.editor.save_path();
-                self.editor.apply(Command::Resize(self.size));
-                let outcome = self.editor.save(&path).map(|()| format!("wrote {}", path.display()));
-                self.editor.apply(Command::Resize(self.own_size()));
-                self.say(Some(outcome.unwrap_or_else(|error| error.to_string())));
-            }
-            Some(Request::Screenshot) => {
-                let outcome = self.screenshot();
-                let said = self.tolerate(outcome)?;
-                self.say(said);
-            }
-        }
-        Ok(())
+        self.follow(changed)
+    }
+
+    /// Saves the scene with the window's size, whatever part of the window shows it.
+    fn save(&mut self) {
+        let path = self.editor.save_path();
+        self.editor.apply(Command::Resize(self.size));
+        let outcome = self.editor.save(&path).map(|()| format!("wrote {}", path.display()));
+        self.editor.apply(Command::Resize(self.own_size()));
+        self.say(Some(outcome.unwrap_or_else(|error| error.to_string())));
     }
 
     /// Advances the time by `dt_s` seconds and receives results of background tasks.
-    ///
-    /// # Errors
-    /// As [`Viewer::apply`].
     pub fn update(&mut self, dt_s: f64) -> Result<()> {
         self.catch_up()?;
         self.give_back();
@@ -331,6 +320,7 @@ impl Viewer {
                 Err(error) => self.tolerate(Err::<(), _>(error)).map(|_| ())?,
             }
         }
+        self.preview()?;
         self.count();
         let files = self.watch.as_mut().and_then(Watch::poll);
         if let Some(files) = files {
@@ -343,7 +333,7 @@ impl Viewer {
     fn count(&mut self) {
         let Some(frame) = &self.frame else { return };
         let known = self.counts.as_ref().is_some_and(|(version, _)| *version == self.version);
-        if !known && self.editor.shows_overlay() && Instant::now() >= self.count_at {
+        if !known && self.editor.overlay && Instant::now() >= self.count_at {
             let start = Instant::now();
             self.counts = Some((self.version, frame.counts(&self.editor.placements())));
             self.count_at = Instant::now() + (20 * start.elapsed()).max(Duration::from_millis(500));
@@ -358,6 +348,6 @@ impl Viewer {
 
     /// The same in a window of another size.
     pub(super) fn own_size_of(&self, [width, height]: [u32; 2]) -> [u32; 2] {
-        [if self.editor.shows_reference() { (width / 2).max(1) } else { width }, height]
+        [if self.editor.reference { (width / 2).max(1) } else { width }, height]
     }
 }

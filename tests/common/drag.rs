@@ -1,4 +1,5 @@
-//! Drags a file onto a window of an X11 display and drops it there, as a file manager does: version 5 of the protocol XDND.
+//! Drags a file onto a window of an X11 display and drops it there, as a file manager does: version 5 of the protocol
+//! XDND.
 
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -1,7 +1,8 @@
-//! What the GPU tests share: one validated device a test binary, used by one test at a time, and helpers that read images back.
+//! What the GPU tests share: one validated device a test binary, used by one test at a time, and helpers that read
+//! images back.
 //!
-//! With SHADOW_FIELDS_REQUIRE_DEVICE=1 a missing device, validation layer or tool fails the tests; without it they are skipped
-//! with a line on stderr.
+//! With SHADOW_FIELDS_REQUIRE_DEVICE=1 a missing device, validation layer or tool fails the tests; without it they are
+//! skipped with a line on stderr.
 
 #![allow(dead_code)] // every test binary uses its own part
 
@@ -11,7 +12,7 @@ use bytemuck::Pod;
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::Baker;
-use shadow_fields::bake::capture::{Capture, Model, Slots};
+use shadow_fields::bake::capture::{Capture, Slots};
 use shadow_fields::check;
 use shadow_fields::gpu::{Device, DeviceOptions, Validation};
 use shadow_fields::shaders::Library;
@@ -51,7 +52,8 @@ pub fn open() -> shadow_fields::Result<Arc<Device>> {
     Device::new(&DeviceOptions { device: None, validation: Validation::Sync, cache_dir: Some(cache_dir()) })
 }
 
-/// The device of this test binary, held by one test. At the end it fails the test if the validation layer said anything.
+/// The device of this test binary, held by one test. At the end it fails the test if the validation layer said
+/// anything.
 pub struct Gpu {
     pub device: Arc<Device>,
     pub library: Library,
@@ -88,9 +90,9 @@ impl Gpu {
         Baker::new(&self.device, &self.library)
     }
 
-    /// Captures the planned faces and brings the atlas to the host; `C` values of `T` a texel.
-    pub fn atlas<T: Pod>(&self, capture: &Capture, model: &Model, eyes: &[Vec3], plan: &[Slots], cull: bool) -> Vec<T> {
-        check::capture::atlas(&self.device, capture, model, eyes, plan, cull).unwrap()
+    /// Captures the faces of a batch and brings the atlas to the host; `C` values of `T` a texel.
+    pub fn atlas<T: Pod>(&self, capture: &Capture, eyes: &[Vec3], slots: &[Slots]) -> Vec<T> {
+        check::capture::atlas(&self.device, capture, eyes, slots).unwrap()
     }
 }
 

@@ -1,4 +1,5 @@
-//! Makes glTF models for tests: JSON with accessors into one buffer, written as GLB, or as JSON with a buffer beside it or within.
+//! Makes glTF models for tests: JSON with accessors into one buffer, written as GLB, or as JSON with a buffer beside it
+//! or within.
 
 #![allow(dead_code)] // every test binary uses its own part
 

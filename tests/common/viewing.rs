@@ -37,6 +37,11 @@ impl<'d> View<'d> {
         });
         let mut view = View { display, child: Running(child), lines, heard: Vec::new(), window: String::new() };
         view.hears("the first picture");
+        let end = Instant::now() + PATIENCE;
+        while display.look(SIZE).windows(2).all(|pair| pair[0] == pair[1]) {
+            assert!(Instant::now() < end, "the window is of one colour");
+            std::thread::sleep(Duration::from_millis(50));
+        }
         view.window = display.xdotool(&["search", "--name", "shadow-fields"]).trim().to_owned();
         display.xdotool(&["windowfocus", "--sync", &view.window]);
         view
@@ -90,7 +95,8 @@ impl<'d> View<'d> {
         }
     }
 
-    /// Closes the window by its key: the program ends well, and the validation layers have said nothing. Everything that was logged.
+    /// Closes the window by its key: the program ends well, and the validation layers have said nothing. Everything
+    /// that was logged.
     pub fn close(self) -> Vec<String> {
         self.display.xdotool(&["key", "ctrl+q"]);
         let (code, heard) = self.end();

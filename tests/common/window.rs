@@ -46,7 +46,6 @@ impl Stand {
                 validation: Validation::Core,
                 cache_dir: Some(common::cache_dir()),
             },
-            workers: None,
             library: gpu.library.clone(),
             cache: Cache::new(Some(&cache)),
             frame: frame::Options { size: SIZE, ..small() },
@@ -54,7 +53,7 @@ impl Stand {
             encodes_srgb: true,
             seed: 1,
             strict: false,
-            settings: None,
+            preview_after: Duration::from_secs(60),
         };
         change(&mut setup);
         let options = setup.frame;
@@ -113,7 +112,7 @@ impl Stand {
         let cache = Cache::new(Some(&self.cache));
         let mut frame = Frame::new(&baker, &cache, scene, self.options, &|_, _, _| ()).unwrap();
         let white = (-editor.exposure_ev()).exp2();
-        frame.render(&scene.at(editor.time_s()), Some(white)).unwrap();
+        frame.render(&scene.at(editor.time_s), Some(white)).unwrap();
         let encode = |c: f32| (255.0 * srgb_from_linear(c / white)).round() as u8;
         frame.picture().chunks_exact(3).map(|p| [encode(p[0]), encode(p[1]), encode(p[2]), 255]).collect()
     }

@@ -1,6 +1,6 @@
 //! The engines of others: Slurm, Dask, OpenJD, and lines of commands.
 
-use super::{Farm, common, finish, has_device, processes, whole};
+use super::{Farm, MESHES, cli, common, finish, has_device, processes, whole};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -19,9 +19,13 @@ fn engine(name: &str, is_there: bool) -> bool {
 }
 
 /// The path of programs, with those of the virtual environment that `scripts/setup test` makes first.
-fn search_path() -> String {
+pub fn search_path() -> String {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join(".build/farm/bin");
     format!("{}:{}:/usr/sbin", own.display(), std::env::var("PATH").unwrap())
+}
+
+pub fn has_dask() -> bool {
+    engine("Dask", succeeds("python3", &["-c", "import distributed"]))
 }
 
 fn succeeds(program: &str, arguments: &[&str]) -> bool {
@@ -32,15 +36,94 @@ fn succeeds(program: &str, arguments: &[&str]) -> bool {
 
 #[test]
 fn dask_runs_slices_in_two_workers() {
-    if !has_device() || !engine("Dask", succeeds("python3", &["-c", "import distributed"])) {
+    if !has_device() || !has_dask() {
         return;
     }
     let farm = Farm::new();
-    farm.plan(1);
+    farm.plan();
     let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", "dask", "--workers", "2", "-q"]);
     let ran = finish(submit.env("PATH", search_path()));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(farm.collected() == whole().files);
+}
+
+/// A package that is missing and a scheduler that does not answer end in one line.
+#[test]
+fn a_dask_that_cannot_run_says_so_in_a_line() {
+    if !has_device() {
+        return;
+    }
+    let farm = Farm::new();
+    farm.plan();
+    std::fs::create_dir(farm.path("stub")).unwrap();
+    std::fs::write(farm.path("stub/distributed.py"), "raise ImportError").unwrap();
+    let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", "dask"]);
+    let ran = finish(submit.env("PYTHONPATH", farm.path("stub")));
+    assert_eq!((ran.code, ran.stderr.as_str()), (1, "shadow-fields: dask: python3 has no package distributed\n"));
+    if !has_dask() {
+        return;
+    }
+    let mut other = farm.read("p.json");
+    other["device"] = "another (driver)".into();
+    std::fs::write(farm.path("other.json"), other.to_string()).unwrap();
+    let mut submit = farm.command(&["farm", "submit", "other.json", "--engine", "dask", "--workers", "2"]);
+    let ran = finish(submit.env("PATH", search_path()));
+    let said = "shadow-fields: dask: 6 of 6 slices failed; slice ";
+    assert!(ran.code == 1 && ran.stderr.lines().count() == 1 && ran.stderr.starts_with(said), "{}", ran.stderr);
+    let started = std::time::Instant::now();
+    let dead = "tcp://127.0.0.1:9";
+    let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", "dask", "--scheduler", dead]);
+    let ran = finish(submit.env("PATH", search_path()));
+    assert!(ran.code == 1 && ran.stderr.lines().count() == 1 && ran.stderr.contains(dead), "{}", ran.stderr);
+    assert!(started.elapsed().as_secs() < 30, "{:?}", started.elapsed());
+}
+
+/// No path of a plan, whoever wrote it, becomes a line of a script.
+#[test]
+fn control_characters_in_paths_are_refused_by_plan_and_by_engines() {
+    if !has_device() {
+        return;
+    }
+    let farm = Farm::new();
+    farm.plan();
+    let evil = "p\n$(touch x)\n.json";
+    let refused = |ran: super::Ran, code, words: &[&str]| {
+        assert_eq!((ran.code, ran.stdout.as_str()), (code, ""), "{words:?}: {}", ran.stderr);
+        assert!(
+            ran.stderr.lines().count() == 1 && ran.stderr.contains("\\n$(touch x)\\n"),
+            "{words:?}: {}",
+            ran.stderr
+        );
+    };
+    std::fs::create_dir(farm.path("m\n$(touch x)\n")).unwrap();
+    std::fs::copy(farm.path("meshes/a.obj"), farm.path("m\n$(touch x)\n/a.obj")).unwrap();
+    for words in [
+        &["farm", "plan", "meshes", "-q", "-o", evil][..],
+        &["farm", "plan", "meshes", "-q", "-o", "q.json", "--results", evil],
+        &["farm", "plan", "m\n$(touch x)\n", "-q", "-o", "q.json"],
+        &["farm", "plan", "film.toml", "-q", "-o", "q.json", "--frames", "1", "--pictures", "\n$(touch x)\n#.png"],
+    ] {
+        refused(farm.run(words), 2, words);
+    }
+    std::fs::copy(farm.path("p.json"), farm.path(evil)).unwrap();
+    let mut plan = farm.read("p.json");
+    plan["results"] = evil.into();
+    std::fs::write(farm.path("inner.json"), plan.to_string()).unwrap();
+    for engine in [&["local"][..], &["slurm"], &["slurm", "--dry-run"], &["dask"], &["print"], &["openjd"]] {
+        let submit = |plan| [&["farm", "submit", plan, "--engine"], engine].concat();
+        refused(farm.run(&submit(evil)), 2, engine);
+        refused(farm.run(&submit("inner.json")), 4, engine);
+        let mut other_cache = Command::new(super::PROGRAM);
+        other_cache.current_dir(farm.folder.path()).args(submit("p.json")).args(["--cache-dir", evil]);
+        refused(finish(&mut other_cache), 2, engine);
+    }
+    assert!(!farm.path("x").exists() && farm.results().is_empty());
+    // What only one kind of template cannot have.
+    for (name, engine) in [("p{{.json", "openjd"), ("p\\.json", "slurm")] {
+        std::fs::copy(farm.path("p.json"), farm.path(name)).unwrap();
+        let ran = farm.run(&["farm", "submit", name, "--engine", engine, "--dry-run"]);
+        assert!(ran.code == 2 && ran.stderr.contains(" takes no "), "{engine}: {}", ran.stderr);
+    }
 }
 
 #[test]
@@ -49,15 +132,15 @@ fn templates_and_commands_are_what_other_farms_take() {
         return;
     }
     let farm = Farm::new();
-    let slices = farm.plan(1);
+    farm.plan();
     let commands = farm.good(&["farm", "submit", "p.json", "--engine", "print"]);
-    assert_eq!(commands.lines().count(), slices);
+    assert_eq!(commands.lines().count(), MESHES);
     assert!(Command::new("sh").args(["-c", commands.lines().next().unwrap()]).output().unwrap().status.success());
-    assert_eq!(farm.results().len(), 1);
+    assert!(farm.results().len() == 1 && !farm.path("x").exists());
     let template = farm.good(&["farm", "submit", "p.json", "--engine", "openjd"]);
     let json: Value = serde_json::from_str(&template).unwrap();
     let range = &json["steps"][0]["parameterSpace"]["taskParameterDefinitions"][0]["range"];
-    assert_eq!(*range, format!("1-{}", slices - 1), "only what is missing");
+    assert_eq!(*range, format!("1-{}", MESHES - 1), "only what is missing");
     if engine("OpenJD", succeeds("openjd", &["--version"]) || succeeds("openjd", &["--help"])) {
         let path = farm.path("job.template.json");
         std::fs::write(&path, template).unwrap();
@@ -103,19 +186,21 @@ fn slurm_runs_an_array_and_requeues_what_dies() {
         return;
     }
     let farm = Farm::new();
-    let slices = farm.plan(1);
+    farm.plan();
     let node = SlurmNode(tempfile::tempdir().unwrap());
     assert!(node.script("start"));
     let submit = ["farm", "submit", "p.json", "--engine", "slurm", "--workers", "2"];
     let dry = finish(node.on(&mut farm.command(&[&submit[..], &["--dry-run"]].concat())));
-    assert!(dry.stdout.contains(&format!("--array=0-{}%2 --export=ALL,FIRST=0", slices - 1)), "{}", dry.stdout);
+    assert!(dry.stdout.contains(&format!("--array=0-{}%2 '--output=", MESHES - 1)), "{}", dry.stdout);
     let ran = finish(node.on(&mut farm.command(&submit)));
     assert!(ran.code == 0 && ran.stdout.starts_with("Submitted batch job "), "{} {}", ran.stdout, ran.stderr);
     let job = ran.stdout.trim().rsplit(' ').next().unwrap().to_owned();
     // The first start of slice 0 is killed; Slurm puts it back into the queue.
-    let first = [farm.path("p.json").as_os_str().as_encoded_bytes(), b"\0--slice\x000\0"].concat();
+    let plan = farm.path("p.json");
+    let words = [plan.to_str().unwrap(), "--no-progress", "--quiet", "--cache-dir", cli::cache().to_str().unwrap()];
+    let first = format!("{}\0--slice\x000\0", words.join("\0")).into_bytes();
     let (start, mut killed) = (std::time::Instant::now(), false);
-    while farm.results().len() < slices {
+    while farm.results().len() < MESHES {
         assert!(start.elapsed().as_secs() < 200, "{}", farm.good(&["farm", "status", "p.json"]));
         if let Some(id) = processes(&first).first().filter(|_| !killed) {
             killed = Command::new("kill").args(["-9", &id.to_string()]).status().unwrap().success();
@@ -127,7 +212,8 @@ fn slurm_runs_an_array_and_requeues_what_dies() {
         }
         std::thread::sleep(std::time::Duration::from_millis(50));
     }
-    assert!(killed && farm.collected() == whole().files);
+    assert!(killed && !farm.path("x").exists());
+    assert!(farm.collected() == whole().files);
     let log = std::fs::read_to_string(farm.path(&format!("p.logs/{job}_0.log"))).unwrap();
     assert!(log.contains("start 0") && log.contains("start 1"), "{log}");
 }

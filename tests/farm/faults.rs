@@ -1,6 +1,8 @@
-//! What goes wrong on machines: kills, damage, folders that cannot be written. Nothing is lost then, and nothing is wrong.
+//! What goes wrong on machines: kills, damage, folders that cannot be written. Nothing is lost then, and nothing is
+//! wrong.
 
-use super::{Farm, common, finish, has_device, processes, whole};
+use super::engines::{has_dask, search_path};
+use super::{Farm, MESHES, common, finish, has_device, processes, whole};
 use serde_json::{Value, json};
 use shadow_fields::farm::{Plan, results};
 use std::process::Command;
@@ -11,7 +13,7 @@ fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
         return;
     }
     let farm = Farm::new();
-    let slices = farm.plan(1);
+    farm.plan();
     let mut twice: Vec<_> =
         (0..2).map(|_| farm.command(&["farm", "run", "p.json", "--slice", "0", "-q"]).spawn().unwrap()).collect();
     assert!(twice.iter_mut().all(|process| process.wait().unwrap().success()));
@@ -19,7 +21,7 @@ fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
     farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
     assert!(farm.collected() == whole().files);
     let plan = Plan::read(&farm.path("p.json")).unwrap();
-    let results: Vec<_> = (0..slices).map(|slice| results::path(&plan, slice)).collect();
+    let results: Vec<_> = (0..MESHES).map(|slice| results::path(&plan, slice)).collect();
     // One byte is turned, one file is cut, one is another slice's, one is gone.
     let bytes: Vec<Vec<u8>> = results.iter().map(|path| std::fs::read(path).unwrap()).collect();
     let mut turned = bytes[0].clone();
@@ -30,7 +32,7 @@ fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
     std::fs::remove_file(&results[4]).unwrap();
     let found = farm.run(&["farm", "collect", "p.json", "--into", "cache", "--json"]);
     assert_eq!(found.code, 1, "{}", found.stderr);
-    let again = format!("4 of {slices} slices have to run again, missing: 4, damaged: 0-2");
+    let again = format!("4 of {MESHES} slices to run again, missing: 4, damaged: 0-2");
     assert!(found.stderr.contains(&again), "{}", found.stderr);
     let said: Value = serde_json::from_str(&found.stdout).unwrap();
     assert_eq!((&said["missing"], &said["damaged"]), (&json!([4]), &json!([0, 1, 2])));
@@ -43,14 +45,15 @@ fn damaged_results_and_slices_that_run_twice_at_once_end_well() {
     assert!(farm.collected() == whole().files);
 }
 
-/// A full disk, a read-only folder and a limit on the sizes of files: the slice fails with one line, and leaves nothing half-written.
+/// A full disk, a read-only folder and a limit on the sizes of files: the slice fails with one line, and leaves nothing
+/// half-written.
 #[test]
 fn folders_that_cannot_be_written_lose_nothing() {
     if !has_device() {
         return;
     }
     let farm = Farm::new();
-    farm.plan(1);
+    farm.plan();
     std::fs::create_dir(farm.path("results")).unwrap();
     for (words, how) in [
         (&["unshare", "-m", "sh"][..], "mount -t tmpfs -o size=8k none results"),
@@ -73,11 +76,47 @@ fn folders_that_cannot_be_written_lose_nothing() {
         }
         assert_eq!((ran.code, ran.stdout.as_str()), (1, ""), "{how}: {}", ran.stderr);
         // With the limit, the folder that the slice works in is the first that cannot be written.
-        let said = ["cannot be written", "nothing was written"];
-        assert!(said.iter().any(|words| ran.stderr.contains(words)), "{how}: {}", ran.stderr);
+        assert!(
+            ["cannot be written", "were written"].iter().any(|words| ran.stderr.contains(words)),
+            "{how}: {}",
+            ran.stderr
+        );
     }
     farm.good(&["farm", "submit", "p.json", "--engine", "local"]);
     assert!(farm.collected() == whole().files);
+}
+
+/// Slices end when what waits for them is killed, and leave no result.
+#[test]
+fn slices_end_with_a_killed_submitter() {
+    if !has_device() {
+        return;
+    }
+    let farm = Farm::new();
+    farm.good(&["farm", "plan", "meshes/a.obj", "-o", "p.json", "--quality", "high"]);
+    let slice = [farm.path("p.json").as_os_str().as_encoded_bytes(), b"\0"].concat();
+    let wait = |seconds, what: &str, done: &dyn Fn() -> bool| {
+        let start = std::time::Instant::now();
+        while !done() {
+            assert!(start.elapsed().as_secs() < seconds, "{what}");
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+    };
+    for engine in ["local", "dask"] {
+        let is_there = engine == "local" || has_dask();
+        let mut submit = farm.command(&["farm", "submit", "p.json", "--engine", engine, "--workers", "1", "-q"]);
+        if !is_there {
+            continue;
+        }
+        let mut submit = submit.env("PATH", search_path()).spawn().unwrap();
+        wait(60, "a slice begins", &|| !processes(&slice).is_empty());
+        std::thread::sleep(std::time::Duration::from_millis(500));
+        submit.kill().unwrap();
+        submit.wait().unwrap();
+        let folder = farm.folder.path().as_os_str().as_encoded_bytes();
+        wait(10, "slices end", &|| processes(folder).is_empty());
+        assert_eq!(farm.results(), [] as [std::path::PathBuf; 0], "{engine}: it was ended, not waited for");
+    }
 }
 
 /// Process ids of all that descend from a process, and its own.
@@ -101,7 +140,8 @@ fn descendants(parent: u32) -> Vec<u32> {
     all
 }
 
-/// Slices, workers and submitters are killed at random moments. Afterwards what is there is whole, and the rest is done.
+/// Slices, workers and submitters are killed at random moments. Afterwards what is there is whole, and the rest is
+/// done.
 #[test]
 fn kills_lose_at_most_the_slice() {
     if !has_device() {
@@ -109,7 +149,7 @@ fn kills_lose_at_most_the_slice() {
     }
     let kills: usize = std::env::var("SHADOW_FIELDS_FARM_KILLS").map_or(4, |text| text.parse().unwrap());
     let farm = Farm::new();
-    let slices = farm.plan(2);
+    farm.plan();
     let mut random = fastrand::Rng::with_seed(7);
     let (mut done, mut killed) = (0, 0);
     for kill in 0..kills {
@@ -119,7 +159,7 @@ fn kills_lose_at_most_the_slice() {
         let before = farm.results();
         let mut command = match kill % 2 {
             0 => farm.command(&["farm", "submit", "p.json", "--engine", "local", "--workers", "2", "-q"]),
-            _ => farm.command(&["farm", "run", "p.json", "--slice", &random.usize(0..slices).to_string(), "-q"]),
+            _ => farm.command(&["farm", "run", "p.json", "--slice", &random.usize(0..MESHES).to_string(), "-q"]),
         };
         let mut process = command.stdout(std::process::Stdio::null()).spawn().unwrap();
         std::thread::sleep(std::time::Duration::from_millis(random.u64(50..1500)));
@@ -136,7 +176,7 @@ fn kills_lose_at_most_the_slice() {
             killed += usize::from(status.unwrap().success());
         }
         process.wait().unwrap();
-        // Slices of a submitter that was killed go on to their ends.
+        // Slices of a submitter that was killed end too.
         let start = std::time::Instant::now();
         while !processes(farm.folder.path().as_os_str().as_encoded_bytes()).is_empty() {
             assert!(start.elapsed().as_secs() < 60, "slices of a killed submitter end");
@@ -147,7 +187,7 @@ fn kills_lose_at_most_the_slice() {
         let found = farm.run(&["farm", "collect", "p.json", "--into", "cache", "--json"]);
         let said: Value = serde_json::from_str(&found.stdout).unwrap();
         assert_eq!(said["damaged"], serde_json::json!([]), "nothing is wrong: {}", found.stderr);
-        assert_eq!(said["missing"].as_array().unwrap().len(), slices - after.len());
+        assert_eq!(said["missing"].as_array().unwrap().len(), MESHES - after.len());
         done += usize::from(found.code == 0);
     }
     farm.good(&["farm", "submit", "p.json", "--engine", "local"]);

@@ -1,7 +1,8 @@
-//! Farms: bakes and pictures in slices have the bytes of a run without a farm, whatever happens to slices, engines and folders.
+//! Farms: bakes and pictures in slices have the bytes of a run without a farm, whatever happens to slices, engines and
+//! folders.
 //!
-//! The engines of other projects are tried where they are installed; with SHADOW_FIELDS_REQUIRE_FARM=1 they have to be there. With
-//! SHADOW_FIELDS_FARM_KILLS=N slices, workers and submitters are killed N times instead of a few.
+//! The engines of other projects are tried where they are installed; with SHADOW_FIELDS_REQUIRE_FARM=1 they have to be
+//! there. With SHADOW_FIELDS_FARM_KILLS=N slices, workers and submitters are killed N times instead of a few.
 #![cfg(target_os = "linux")]
 
 #[path = "../common/cli.rs"]
@@ -21,7 +22,7 @@ use std::sync::OnceLock;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_shadow-fields");
 /// Options of bakes that make them short.
-const DRAFT: [&str; 7] = ["--", "--quality", "draft", "--lattice", "cube:4x3", "--face-px", "16"];
+const DRAFT: [&str; 6] = ["--quality", "draft", "--lattice", "cube:4x3", "--face-px", "16"];
 const SCENE: &str = r#"
 camera = { eye = [0, 1, 4], target = [0, 0, 0] }
 environment = { gradient = { radiance = [0.3, 0.35, 0.4] } }
@@ -39,12 +40,15 @@ mesh = "ring"
 motion = [{ spin = { period_s = 3 } }]
 "#;
 
-/// A folder with two meshes and a scene.
+/// Meshes of a farm: a ring and balls.
+const MESHES: usize = 6;
+
+/// A folder with meshes and a scene.
 struct Farm {
     folder: tempfile::TempDir,
 }
 
-/// The plan of the two meshes, and the cache files that it makes undivided: what a run without a farm makes.
+/// The plan of the meshes, and the cache files that it makes as one slice.
 struct Whole {
     plan: Value,
     files: BTreeMap<String, Vec<u8>>,
@@ -64,13 +68,16 @@ fn whole() -> &'static Whole {
 impl Farm {
     fn new() -> Self {
         // A name that engines have to quote.
-        let folder = tempfile::Builder::new().prefix("a farm's 5%").tempdir().unwrap();
+        let name = "a farm's \"5%\" $(touch x) `touch x` {command} {slices} {a";
+        let folder = tempfile::Builder::new().prefix(name).tempdir().unwrap();
         std::fs::create_dir(folder.path().join("meshes")).unwrap();
-        for (name, mesh) in
-            [("a", crate::common::generate::torus(0.6, 0.2, 12, 8)), ("b", crate::common::generate::sphere(1.0, 1))]
-        {
-            let text = shadow_fields::asset::obj::write_obj(&mesh);
-            std::fs::write(folder.path().join(format!("meshes/{name}.obj")), text).unwrap();
+        for index in 0..MESHES {
+            let mesh = match index {
+                0 => common::generate::torus(0.6, 0.2, 12, 8),
+                _ => common::generate::sphere(index as f32, 1),
+            };
+            let path = folder.path().join(format!("meshes/{}.obj", ["a", "b", "c", "d", "e", "f"][index]));
+            std::fs::write(path, shadow_fields::asset::obj::write_obj(&mesh)).unwrap();
         }
         std::fs::write(folder.path().join("film.toml"), SCENE).unwrap();
         Farm { folder }
@@ -87,9 +94,8 @@ impl Farm {
     /// The program in the folder. Compiled shaders are shared by all tests; what is baked is not.
     fn command(&self, words: &[&str]) -> Command {
         let mut command = Command::new(PROGRAM);
-        let at = words.iter().position(|word| *word == "--").unwrap_or(words.len());
-        command.current_dir(self.folder.path()).args(&words[..at]).arg("--cache-dir").arg(cli::cache());
-        command.args(&words[at..]).env_remove("RUST_LOG").env("NO_COLOR", "1");
+        command.current_dir(self.folder.path()).args(words).arg("--cache-dir").arg(cli::cache());
+        command.env_remove("RUST_LOG").env("NO_COLOR", "1");
         command
     }
 
@@ -103,20 +109,12 @@ impl Farm {
         ran.stdout
     }
 
-    /// Writes the plan of the two meshes, each bake cut into so many parts as `cut` says. Answers with the number of slices.
-    fn plan(&self, cut: u32) -> usize {
+    /// Writes the plan of the meshes, each a slice of its own.
+    fn plan(&self) {
         let mut plan = whole().plan.clone();
-        // Short bakes would all be one slice: each task becomes one, and fields are cut as long ones are.
-        let tasks: Vec<Value> = plan["tasks"].as_array().unwrap().clone();
-        let cut = tasks.iter().flat_map(|task| {
-            let parts = if task[2]["bake"] == "silhouette" { 1 } else { cut };
-            (0..parts).map(move |part| json!([task[0], task[1], task[2], part, parts]))
-        });
-        let cut: Vec<Value> = cut.collect();
-        plan["slices"] = (0..cut.len()).map(|index| json!([index, 1, 5.0, 300, 100])).collect();
-        plan["tasks"] = Value::Array(cut);
+        let slice = |index| json!({ "meshes": { "first": index, "count": 1 } });
+        plan["slices"] = (0..MESHES).map(slice).collect();
         self.write(&plan);
-        plan["tasks"].as_array().unwrap().len()
     }
 
     fn write(&self, plan: &Value) {
@@ -155,53 +153,76 @@ fn processes(words: &[u8]) -> Vec<u32> {
 }
 
 #[test]
-fn slices_of_bakes_make_the_bytes_of_an_undivided_bake() {
+fn slices_of_bakes_make_the_bytes_of_a_run_without_a_farm() {
     if !has_device() {
         return;
     }
     let farm = Farm::new();
-    let slices = farm.plan(3);
-    // A ring: field and what is baked of vertices in three parts each, silhouettes in one. A convex ball: field and silhouettes.
-    assert_eq!(slices, 7 + 4);
+    farm.plan();
     let status: Value = serde_json::from_str(&farm.good(&["farm", "status", "p.json", "--json"])).unwrap();
-    assert_eq!((&status["slices"], &status["done"], &status["left_s"]), (&11.into(), &0.into(), &55.0.into()));
+    assert_eq!(status, json!({ "slices": 6, "done": 0 }));
     let early = farm.run(&["farm", "collect", "p.json", "--into", "cache"]);
     assert_eq!(early.code, 1);
-    assert!(early.stderr.contains("11 of 11 slices have to run again, missing: 0-10"), "{}", early.stderr);
+    assert!(early.stderr.contains("6 of 6 slices to run again, missing: 0-5"), "{}", early.stderr);
     farm.good(&["farm", "submit", "p.json", "--engine", "local", "--workers", "2"]);
-    assert!(farm.good(&["farm", "status", "p.json"]).contains("11 of 11 slices, about 0 s of work left"));
+    assert!(farm.good(&["farm", "status", "p.json"]).contains("6 of 6 slices done"));
     assert!(farm.good(&["farm", "run", "p.json", "--slice", "3"]).contains("there and intact"));
-    // What another driver left in the cache is replaced, as by results that were not cut.
+    // What another driver left in the cache is replaced.
     farm.collected();
     let known: Vec<PathBuf> = whole().files.keys().map(|name| farm.path("cache/fields").join(name)).collect();
     known.iter().for_each(|path| std::fs::write(path, "another driver's").unwrap());
     let collected = farm.collected();
-    assert_eq!(collected.len(), 6);
+    // The field and outlines of each mesh, and what is baked of the vertices of the one that is not convex.
+    assert_eq!(collected.len(), 2 * MESHES + 2);
     assert!(collected == whole().files, "{:?}", collected.keys());
-    // The files are those that a scene finds: nothing is baked for it, and the bake of a field on its own is the same.
-    farm.good(&[&["bake", "meshes/a.obj", "-o", "a.sf"][..], &DRAFT[1..]].concat());
+    // The field of `bake` is the same, and a scene finds what it needs: nothing is baked for it.
+    farm.good(&[&["bake", "meshes/a.obj", "-o", "a.sf"][..], &DRAFT].concat());
     assert!(collected.values().any(|bytes| *bytes == std::fs::read(farm.path("a.sf")).unwrap()), "the field of bake");
+    let mut render = Command::new(PROGRAM);
+    render
+        .args(["render", "film.toml", "-o", "f.png", "--size", "48x32", "--json", "--cache-dir", "cache"])
+        .args(DRAFT);
+    let report: Value = serde_json::from_str(&finish(render.current_dir(farm.folder.path())).stdout).unwrap();
+    let baked = report["baked"].as_array().unwrap();
+    assert!(baked.iter().all(|bake| !bake["what"].as_str().unwrap().starts_with("ring")), "{baked:?}");
 }
 
 #[test]
-fn slices_of_frames_are_the_pictures_of_render() {
+fn slices_of_pictures_are_those_of_render() {
     if !has_device() {
         return;
     }
     let farm = Farm::new();
-    let options = ["--size", "48x32", "--variant", "storage", "--quality", "draft", "--lattice", "cube:4x3"];
-    let plan = ["farm", "plan", "film.toml", "--frames", "5", "--pictures", "out/f_###.png", "-o", "p.json", "--"];
-    farm.good(&[&plan[..], &options].concat());
-    let mut plan = farm.read("p.json");
-    assert_eq!(plan["tasks"], json!([[0, 0, "frames", 0, 5]]));
-    plan["tasks"] = json!([[0, 0, "frames", 0, 2], [0, 0, "frames", 2, 3]]);
-    plan["slices"] = json!([[0, 1, 1.0, 300, 1], [1, 1, 1.0, 300, 1]]);
-    farm.write(&plan);
+    std::fs::copy(farm.path("film.toml"), farm.path("other.toml")).unwrap();
+    let options = [&["--size", "48x32", "--variant", "storage", "--time", "0.5"][..], &DRAFT].concat();
+    let plan = [
+        "farm",
+        "plan",
+        "film.toml",
+        "other.toml",
+        "--frames",
+        "5",
+        "--pictures",
+        "out/$_###.png",
+        "-o",
+        "p.json",
+        "--per-slice",
+        "3",
+    ];
+    let said = farm.good(&[&plan[..], &options].concat());
+    assert!(said.contains("p.json: 4 slices"), "{said}");
+    let slice = |film, first, count| json!({ "pictures": { "film": film, "first": first, "count": count } });
+    assert_eq!(farm.read("p.json")["slices"], json!([slice(0, 0, 3), slice(0, 3, 2), slice(1, 0, 3), slice(1, 3, 2)]));
     farm.good(&["farm", "submit", "p.json", "--engine", "local", "--workers", "1"]);
     farm.good(&["farm", "collect", "p.json"]);
     std::fs::create_dir(farm.path("plain")).unwrap();
-    farm.good(&[&["render", "film.toml", "-o", "plain/f_###.png", "--frames", "5"][..], &options].concat());
+    for film in ["film", "other"] {
+        let scene = format!("{film}.toml");
+        let pictures = format!("plain/{film}_###.png");
+        farm.good(&[&["render", &scene, "-o", &pictures, "--frames", "5"][..], &options].concat());
+    }
     let (found, plain) = (files(&farm.path("out")), files(&farm.path("plain")));
-    assert_eq!(found.keys().collect::<Vec<_>>(), ["f_000.png", "f_001.png", "f_002.png", "f_003.png", "f_004.png"]);
+    assert_eq!(found.len(), 10);
+    assert!(found.contains_key("film_000.png") && found["film_000.png"] != found["film_004.png"]);
     assert!(found == plain);
 }

@@ -1,7 +1,11 @@
-//! What is refused before any work is done: other programs, devices and inputs, and works and options that make no plan.
+//! What is refused before any work is done: other programs, devices and inputs, and works and options that make no
+//! plan.
 
 use super::{DRAFT, Farm, has_device};
 use serde_json::{Value, json};
+use shadow_fields::farm::results::{self, SliceResult};
+use shadow_fields::farm::{Film, Input, Plan};
+use shadow_fields::{bake, field::file, frame};
 
 #[test]
 fn other_programs_devices_and_inputs_are_refused_with_both_names() {
@@ -9,7 +13,7 @@ fn other_programs_devices_and_inputs_are_refused_with_both_names() {
         return;
     }
     let farm = Farm::new();
-    farm.plan(1);
+    farm.plan();
     let good = farm.read("p.json");
     let refused = |edit: &dyn Fn(&mut Value)| {
         let mut plan = good.clone();
@@ -19,35 +23,27 @@ fn other_programs_devices_and_inputs_are_refused_with_both_names() {
         assert!(farm.results().is_empty());
         (ran.code, ran.stderr)
     };
-    let (code, said) = refused(&|plan| plan["program"] = "shadow-fields 0.0.1 0123456".into());
+    let (code, said) = refused(&|plan| plan["plan_of"] = "shadow-fields 0.0.1 0123456".into());
     assert!(code == 3 && said.contains("a plan of shadow-fields 0.0.1 0123456, and this is shadow-fields "), "{said}");
-    let (code, said) = refused(&|plan| plan["inputs"][0]["hash"] = "00".into());
+    let (code, said) = refused(&|plan| plan["meshes"][0]["hash"] = "00".into());
     assert!(code == 4 && said.contains("a.obj: it has changed since the plan was made"), "{said}");
     let (code, said) = refused(&|plan| plan["slices"] = json!([]));
     assert!(code == 4 && said.contains("p.json: it has no slices"), "{said}");
-    let (code, said) = refused(&|plan| plan["device"]["driver"] = "llvmpipe, Mesa 1.2".into());
+    for (key, value) in [
+        ("slices", json!([{ "meshes": { "first": 5, "count": 2 } }])),
+        ("slices", json!([{ "meshes": { "first": 0, "count": 0 } }])),
+        ("slices", json!([{ "pictures": { "film": 0, "first": 0, "count": 1 } }])),
+        ("slices", json!([{ "meshes": { "first": 4_294_967_295_u32, "count": 4_294_967_295_u32 } }])),
+    ] {
+        let (code, said) = refused(&|plan| plan[key] = value.clone());
+        assert!(code == 4 && said.contains("p.json: slice 0 is of things that are not there"), "{value}: {said}");
+    }
+    let (code, said) = refused(&|plan| plan["device"] = "llvmpipe (Mesa 1.2)".into());
     assert!(code == 3 && said.contains("Mesa 1.2), and this device is "), "{said}");
     // An engine says the same, and tries it once.
     let ran = farm.run(&["farm", "submit", "p.json", "--engine", "local", "-v"]);
     assert!(ran.code == 1 && ran.stderr.contains("and this device is"), "{}", ran.stderr);
     assert!(ran.stderr.contains("slice 0, try 1") && !ran.stderr.contains("try 2"), "{}", ran.stderr);
-}
-
-/// A plan whose parts do not make up a bake is not whole, though every slice has its result.
-#[test]
-fn parts_that_no_slice_has_are_told() {
-    if !has_device() {
-        return;
-    }
-    let farm = Farm::new();
-    farm.plan(2);
-    let mut plan = farm.read("p.json");
-    plan["tasks"] = json!([plan["tasks"][0]]);
-    plan["slices"] = json!([plan["slices"][0]]);
-    farm.write(&plan);
-    farm.good(&["farm", "run", "p.json", "--slice", "0"]);
-    let ran = farm.run(&["farm", "collect", "p.json", "--into", "cache"]);
-    assert!(ran.code == 4 && ran.stderr.contains("1 bakes have parts that are in no slice"), "{}", ran.stderr);
 }
 
 #[test]
@@ -67,14 +63,11 @@ fn works_and_options_that_make_no_plan_are_refused_in_a_line() {
         (vec!["film.toml"], 2, "film.toml: a scene needs --frames and --pictures"),
         (vec!["meshes", "--frames", "2", "--pictures", "o_#.png"], 2, "are for scenes, and there is none"),
         (film(&["--pictures", "o.png"]), 2, "--pictures o.png: the name needs a run of #"),
-        (film(&["--pictures", "o_#.exr"]), 2, "o_#.exr: the name of this picture must end in .png"),
+        (film(&["--pictures", "o_#.exr"]), 2, "--pictures o_#.exr: the name must end in .png"),
         (film(&["other/film.toml", "--pictures", "$_#.png"]), 2, "the names of all scenes have to differ"),
-        (film(&["--pictures", "#.png", "--", "--exr", "a.exr"]), 2, "writes pictures alone"),
         (film(&["--pictures", "#.png", "--seed", "2"]), 2, "farm does not take --shader-dir and --seed"),
         (vec!["meshes", "--shader-dir", "."], 2, "--shader-dir and"),
-        (vec!["meshes", "--", "--quality"], 2, "the options after --: a value is required for '--quality"),
-        (vec!["meshes", "--", "--seed", "2"], 2, "options of every command go before"),
-        (vec!["meshes", "--", "--size", "9x9"], 2, "the options after --: unexpected argument '--size'"),
+        (vec!["meshes", "--size", "9x9"], 2, "are for scenes, and there is none"),
     ] {
         let ran = farm.run(&[&["farm", "plan", "-o", "p.json", "-q"], &words[..]].concat());
         assert!(ran.code == code && ran.stderr.contains(what), "{words:?}: {} {}", ran.code, ran.stderr);
@@ -93,11 +86,102 @@ fn equal_meshes_are_planned_once() {
     std::fs::copy(farm.path("meshes/b.obj"), farm.path("meshes/c.obj")).unwrap();
     farm.good(&[&["farm", "plan", "meshes", "-o", "p.json"][..], &DRAFT].concat());
     let plan = farm.read("p.json");
-    let paths: Vec<&str> = plan["inputs"].as_array().unwrap().iter().filter_map(|i| i["path"].as_str()).collect();
-    assert_eq!(paths, ["meshes/a.obj", "meshes/b.obj"]);
-    assert_eq!(
-        plan["tasks"].as_array().unwrap().len(),
-        5,
-        "field and outlines of both, vertices of the one that is not convex"
-    );
+    let paths: Vec<&str> = plan["meshes"].as_array().unwrap().iter().filter_map(|i| i["path"].as_str()).collect();
+    assert_eq!(paths, ["a", "b", "d", "e", "f"].map(|name| format!("meshes/{name}.obj")));
+    assert_eq!(plan["slices"][0], json!({ "meshes": { "first": 0, "count": 5 } }));
+}
+
+/// A plan replaces a plan, and nothing else unless it is told to; never an input.
+#[test]
+fn a_plan_replaces_no_other_file() {
+    if !has_device() {
+        return;
+    }
+    let farm = Farm::new();
+    std::fs::create_dir(farm.path("meshes/more")).unwrap();
+    for _ in 0..2 {
+        let ran = farm.run(&[&["farm", "plan", "meshes", "-o", "p.json"][..], &DRAFT].concat());
+        assert!(ran.code == 0 && ran.stdout.starts_with("p.json: 1 slice\n"), "{}{}", ran.stdout, ran.stderr);
+        assert!(ran.stderr.contains("note: meshes: 1 folder in it left out"), "{}", ran.stderr);
+    }
+    std::fs::write(farm.path("other.json"), "{}").unwrap();
+    std::fs::hard_link(farm.path("meshes/a.obj"), farm.path("a.json")).unwrap();
+    for (output, words, what) in [
+        ("meshes/a.obj", &[][..], "must end in .json"),
+        ("other.json", &[], "is no plan; --force replaces it"),
+        ("a.json", &["--force"], "the input meshes/a.obj"),
+    ] {
+        let before = std::fs::read(farm.path(output)).unwrap();
+        let ran = farm.run(&[&["farm", "plan", "meshes", "-q", "-o", output], words].concat());
+        assert!(ran.code == 2 && ran.stderr.contains(what), "{output}: {} {}", ran.code, ran.stderr);
+        assert!(before == std::fs::read(farm.path(output)).unwrap(), "{output}");
+    }
+    std::fs::write(farm.path("out_1.png"), "").unwrap();
+    std::fs::hard_link(farm.path("film.toml"), farm.path("f_2.png")).unwrap();
+    for (pattern, code) in [("out_#.png", 0), ("f_#.png", 2)] {
+        let ran =
+            farm.run(&["farm", "plan", "film.toml", "-q", "-o", "f.json", "--frames", "3", "--pictures", pattern]);
+        assert!(ran.code == code && (code == 0 || ran.stderr.contains("the input film.toml")), "{}", ran.stderr);
+    }
+    farm.good(&["farm", "plan", "meshes", "-o", "other.json", "--force"]);
+    assert!(farm.read("other.json")["slices"].is_array());
+}
+
+/// A plan of two meshes and of two pictures.
+fn example() -> Plan {
+    let mut plan = Plan::new("a (b)".into(), "results".into(), bake::Options::default());
+    let input = |path: &str| Input { path: path.into(), hash: path.into() };
+    plan.add_meshes(["a.obj", "b.obj"].map(input).into(), 1);
+    let options = frame::Options::default();
+    let film = Film { scene: input("s.toml"), pictures: "f_#.png".into(), options, first_s: 0.0, fps: 24 };
+    plan.add_film(film, 2, 1);
+    plan
+}
+
+/// Each thing that decides a result is part of its name.
+#[test]
+fn names_of_results_differ_where_anything_differs() {
+    let base = example();
+    let mut keys: Vec<String> = (0..4).map(|slice| base.key(slice)).collect();
+    let edits: [(usize, fn(&mut Plan)); 9] = [
+        (0, |p| p.plan_of.push('x')),
+        (0, |p| p.device.push('x')),
+        (0, |p| p.bake.face_px += 1),
+        (0, |p| p.meshes[0].hash.push('x')),
+        (2, |p| p.device.push('x')),
+        (2, |p| p.films[0].scene.hash.push('x')),
+        (2, |p| p.films[0].options.size[0] += 1),
+        (2, |p| p.films[0].first_s = 0.5),
+        (2, |p| p.films[0].fps += 1),
+    ];
+    for (slice, edit) in edits {
+        let mut other = base.clone();
+        edit(&mut other);
+        keys.push(other.key(slice));
+    }
+    let distinct: std::collections::HashSet<_> = keys.iter().collect();
+    assert_eq!(distinct.len(), keys.len());
+    let mut moved = base.clone();
+    moved.meshes[0].path = "elsewhere/m.obj".into();
+    moved.films[0].pictures = "g_#.png".into();
+    assert_eq!([0, 2].map(|slice| moved.key(slice)), [0, 2].map(|slice| base.key(slice)), "where files lie");
+}
+
+/// A result whose seal is right, but not its words, is damaged: a name leads nowhere else.
+#[test]
+fn results_with_other_names_are_damaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = Plan { folder: folder.path().to_owned(), ..example() };
+    let found = |key: &str, files: Value, payload: &[u8]| {
+        file::write(&results::path(&plan, 0), *b"SHSLICE\n", &json!({ "key": key, "files": files }), payload).unwrap();
+        results::find(&plan, 0)
+    };
+    let key = plan.key(0);
+    assert!(matches!(found(&key, json!([["a.sf", 3]]), b"abc"), SliceResult::Whole(files) if files[0].1 == b"abc"));
+    assert!(matches!(found("other", json!([["a.sf", 3]]), b"abc"), SliceResult::Damaged(_)));
+    for files in
+        [json!([["a.sf", 4]]), json!([["a.sf", 2]]), json!([["../a", 3]]), json!([["", 3]]), json!([[".a", 3]])]
+    {
+        assert!(matches!(found(&key, files.clone(), b"abc"), SliceResult::Damaged(_)), "{files}");
+    }
 }

@@ -1,9 +1,9 @@
-//! Calls that can fail, with the errors that the specification allows, and calls that destroy what those make.
+//! Calls that can fail, with errors that the specification allows, and calls that destroy what those make.
 
 #![allow(unsafe_code)]
 
 use super::claimed::*;
-use super::layer::{Function, born, dies, fault};
+use super::layer::{Function, HOST_MEMORY, LOST, MEMORY, born, dies, fault};
 use super::special::*;
 use ash::vk;
 use std::ffi::c_void;
@@ -11,9 +11,9 @@ use std::sync::OnceLock;
 
 macro_rules! layer {
     (
-        makes { $($make:ident: $make_pfn:ident($owner:ident, $info:ident, $object:ident) [$($make_error:ident)*];)* }
+        makes { $($make:ident: $make_pfn:ident($owner:ident, $info:ident, $object:ident) [$make_error:ident];)* }
         destroys { $($destroy:ident: $destroy_pfn:ident($keeper:ident, $victim:ident);)* }
-        others { $($other:ident: $other_pfn:ident($($parameter:ident: $type:ty),*) [$($other_error:ident)*];)* }
+        others { $($other:ident: $other_pfn:ident($($parameter:ident: $type:ty),*) [$other_error:ident];)* }
         special { $($special:ident),* $(,)? }
     ) => {
         $(module! {
@@ -21,10 +21,11 @@ macro_rules! layer {
                 owner: vk::$owner, info: *const vk::$info<'_>, allocator: *const vk::AllocationCallbacks<'_>,
                 object: *mut vk::$object
             ) -> vk::Result {
-                if let Some(error) = fault(stringify!($make), &[$(vk::Result::$make_error),*]) {
+                if let Some(error) = fault(stringify!($make), $make_error) {
                     return error;
                 }
-                // SAFETY: the caller keeps the contract of this very function, which writes the handle where it succeeds.
+                // SAFETY: the caller keeps the contract of this very function, which writes the handle where it
+                // succeeds.
                 unsafe {
                     let result = REAL.get().expect("wrapped")(owner, info, allocator, object);
                     if result == vk::Result::SUCCESS {
@@ -45,7 +46,7 @@ macro_rules! layer {
         })*
         $(module! {
             $other: $other_pfn($($parameter: $type),*) -> vk::Result {
-                if let Some(error) = fault(stringify!($other), &[$(vk::Result::$other_error),*]) {
+                if let Some(error) = fault(stringify!($other), $other_error) {
                     return error;
                 }
                 // SAFETY: the caller keeps the contract of this very function.
@@ -72,46 +73,27 @@ macro_rules! layer {
 
 layer! {
     makes {
-        vkCreateDevice: PFN_vkCreateDevice(PhysicalDevice, DeviceCreateInfo, Device)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_INITIALIZATION_FAILED ERROR_EXTENSION_NOT_PRESENT
-             ERROR_FEATURE_NOT_PRESENT ERROR_TOO_MANY_OBJECTS ERROR_DEVICE_LOST];
+        vkCreateDevice: PFN_vkCreateDevice(PhysicalDevice, DeviceCreateInfo, Device) [LOST];
         vkCreateDebugUtilsMessengerEXT: PFN_vkCreateDebugUtilsMessengerEXT(
-            Instance, DebugUtilsMessengerCreateInfoEXT, DebugUtilsMessengerEXT) [ERROR_OUT_OF_HOST_MEMORY];
-        vkCreateXlibSurfaceKHR: PFN_vkCreateXlibSurfaceKHR(Instance, XlibSurfaceCreateInfoKHR, SurfaceKHR)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateXcbSurfaceKHR: PFN_vkCreateXcbSurfaceKHR(Instance, XcbSurfaceCreateInfoKHR, SurfaceKHR)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateSwapchainKHR: PFN_vkCreateSwapchainKHR(Device, SwapchainCreateInfoKHR, SwapchainKHR)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_DEVICE_LOST ERROR_SURFACE_LOST_KHR
-             ERROR_NATIVE_WINDOW_IN_USE_KHR ERROR_INITIALIZATION_FAILED];
-        vkCreatePipelineCache: PFN_vkCreatePipelineCache(Device, PipelineCacheCreateInfo, PipelineCache)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateBuffer: PFN_vkCreateBuffer(Device, BufferCreateInfo, Buffer)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateBufferView: PFN_vkCreateBufferView(Device, BufferViewCreateInfo, BufferView)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateImage: PFN_vkCreateImage(Device, ImageCreateInfo, Image)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateImageView: PFN_vkCreateImageView(Device, ImageViewCreateInfo, ImageView)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateSampler: PFN_vkCreateSampler(Device, SamplerCreateInfo, Sampler)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_TOO_MANY_OBJECTS];
-        vkCreateShaderModule: PFN_vkCreateShaderModule(Device, ShaderModuleCreateInfo, ShaderModule)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreatePipelineLayout: PFN_vkCreatePipelineLayout(Device, PipelineLayoutCreateInfo, PipelineLayout)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
+            Instance, DebugUtilsMessengerCreateInfoEXT, DebugUtilsMessengerEXT) [HOST_MEMORY];
+        vkCreateXlibSurfaceKHR: PFN_vkCreateXlibSurfaceKHR(Instance, XlibSurfaceCreateInfoKHR, SurfaceKHR) [MEMORY];
+        vkCreateXcbSurfaceKHR: PFN_vkCreateXcbSurfaceKHR(Instance, XcbSurfaceCreateInfoKHR, SurfaceKHR) [MEMORY];
+        vkCreateSwapchainKHR: PFN_vkCreateSwapchainKHR(Device, SwapchainCreateInfoKHR, SwapchainKHR) [LOST];
+        vkCreatePipelineCache: PFN_vkCreatePipelineCache(Device, PipelineCacheCreateInfo, PipelineCache) [MEMORY];
+        vkCreateBuffer: PFN_vkCreateBuffer(Device, BufferCreateInfo, Buffer) [MEMORY];
+        vkCreateBufferView: PFN_vkCreateBufferView(Device, BufferViewCreateInfo, BufferView) [MEMORY];
+        vkCreateImage: PFN_vkCreateImage(Device, ImageCreateInfo, Image) [MEMORY];
+        vkCreateImageView: PFN_vkCreateImageView(Device, ImageViewCreateInfo, ImageView) [MEMORY];
+        vkCreateSampler: PFN_vkCreateSampler(Device, SamplerCreateInfo, Sampler) [MEMORY];
+        vkCreateShaderModule: PFN_vkCreateShaderModule(Device, ShaderModuleCreateInfo, ShaderModule) [MEMORY];
+        vkCreatePipelineLayout: PFN_vkCreatePipelineLayout(Device, PipelineLayoutCreateInfo, PipelineLayout) [MEMORY];
         vkCreateDescriptorSetLayout: PFN_vkCreateDescriptorSetLayout(
-            Device, DescriptorSetLayoutCreateInfo, DescriptorSetLayout) [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateDescriptorPool: PFN_vkCreateDescriptorPool(Device, DescriptorPoolCreateInfo, DescriptorPool)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_FRAGMENTATION];
-        vkCreateCommandPool: PFN_vkCreateCommandPool(Device, CommandPoolCreateInfo, CommandPool)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateFence: PFN_vkCreateFence(Device, FenceCreateInfo, Fence)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateSemaphore: PFN_vkCreateSemaphore(Device, SemaphoreCreateInfo, Semaphore)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkCreateQueryPool: PFN_vkCreateQueryPool(Device, QueryPoolCreateInfo, QueryPool)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
+            Device, DescriptorSetLayoutCreateInfo, DescriptorSetLayout) [MEMORY];
+        vkCreateDescriptorPool: PFN_vkCreateDescriptorPool(Device, DescriptorPoolCreateInfo, DescriptorPool) [MEMORY];
+        vkCreateCommandPool: PFN_vkCreateCommandPool(Device, CommandPoolCreateInfo, CommandPool) [MEMORY];
+        vkCreateFence: PFN_vkCreateFence(Device, FenceCreateInfo, Fence) [MEMORY];
+        vkCreateSemaphore: PFN_vkCreateSemaphore(Device, SemaphoreCreateInfo, Semaphore) [MEMORY];
+        vkCreateQueryPool: PFN_vkCreateQueryPool(Device, QueryPoolCreateInfo, QueryPool) [MEMORY];
     }
     destroys {
         vkDestroyDebugUtilsMessengerEXT: PFN_vkDestroyDebugUtilsMessengerEXT(Instance, DebugUtilsMessengerEXT);
@@ -135,64 +117,45 @@ layer! {
         vkFreeMemory: PFN_vkFreeMemory(Device, DeviceMemory);
     }
     others {
-        vkEnumerateInstanceVersion: PFN_vkEnumerateInstanceVersion(version: *mut u32) [ERROR_OUT_OF_HOST_MEMORY];
+        vkEnumerateInstanceVersion: PFN_vkEnumerateInstanceVersion(version: *mut u32) [HOST_MEMORY];
         vkEnumerateInstanceLayerProperties: PFN_vkEnumerateInstanceLayerProperties(
-            count: *mut u32, properties: *mut vk::LayerProperties) [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
+            count: *mut u32, properties: *mut vk::LayerProperties) [MEMORY];
         vkEnumeratePhysicalDevices: PFN_vkEnumeratePhysicalDevices(
-            instance: vk::Instance, count: *mut u32, devices: *mut vk::PhysicalDevice)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_INITIALIZATION_FAILED];
+            instance: vk::Instance, count: *mut u32, devices: *mut vk::PhysicalDevice) [MEMORY];
         vkGetPipelineCacheData: PFN_vkGetPipelineCacheData(
-            device: vk::Device, cache: vk::PipelineCache, size: *mut usize, data: *mut c_void)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
+            device: vk::Device, cache: vk::PipelineCache, size: *mut usize, data: *mut c_void) [MEMORY];
         vkBindBufferMemory: PFN_vkBindBufferMemory(
-            device: vk::Device, buffer: vk::Buffer, memory: vk::DeviceMemory, offset: vk::DeviceSize)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
+            device: vk::Device, buffer: vk::Buffer, memory: vk::DeviceMemory, offset: vk::DeviceSize) [MEMORY];
         vkBindImageMemory: PFN_vkBindImageMemory(
-            device: vk::Device, image: vk::Image, memory: vk::DeviceMemory, offset: vk::DeviceSize)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
+            device: vk::Device, image: vk::Image, memory: vk::DeviceMemory, offset: vk::DeviceSize) [MEMORY];
         vkAllocateCommandBuffers: PFN_vkAllocateCommandBuffers(
-            device: vk::Device, info: *const vk::CommandBufferAllocateInfo<'_>, buffers: *mut vk::CommandBuffer)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
+            device: vk::Device, info: *const vk::CommandBufferAllocateInfo<'_>, buffers: *mut vk::CommandBuffer) [MEMORY];
         vkAllocateDescriptorSets: PFN_vkAllocateDescriptorSets(
-            device: vk::Device, info: *const vk::DescriptorSetAllocateInfo<'_>, sets: *mut vk::DescriptorSet)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_FRAGMENTED_POOL ERROR_OUT_OF_POOL_MEMORY];
+            device: vk::Device, info: *const vk::DescriptorSetAllocateInfo<'_>, sets: *mut vk::DescriptorSet) [MEMORY];
         vkBeginCommandBuffer: PFN_vkBeginCommandBuffer(
-            buffer: vk::CommandBuffer, info: *const vk::CommandBufferBeginInfo<'_>)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
-        vkEndCommandBuffer: PFN_vkEndCommandBuffer(buffer: vk::CommandBuffer)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
+            buffer: vk::CommandBuffer, info: *const vk::CommandBufferBeginInfo<'_>) [MEMORY];
+        vkEndCommandBuffer: PFN_vkEndCommandBuffer(buffer: vk::CommandBuffer) [MEMORY];
         vkQueueSubmit: PFN_vkQueueSubmit(
-            queue: vk::Queue, count: u32, infos: *const vk::SubmitInfo<'_>, fence: vk::Fence)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_DEVICE_LOST];
+            queue: vk::Queue, count: u32, infos: *const vk::SubmitInfo<'_>, fence: vk::Fence) [LOST];
         vkQueueSubmit2: PFN_vkQueueSubmit2(
-            queue: vk::Queue, count: u32, infos: *const vk::SubmitInfo2<'_>, fence: vk::Fence)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_DEVICE_LOST];
+            queue: vk::Queue, count: u32, infos: *const vk::SubmitInfo2<'_>, fence: vk::Fence) [LOST];
         vkWaitForFences: PFN_vkWaitForFences(
-            device: vk::Device, count: u32, fences: *const vk::Fence, all: vk::Bool32, timeout: u64)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_DEVICE_LOST];
-        vkQueueWaitIdle: PFN_vkQueueWaitIdle(queue: vk::Queue)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_DEVICE_LOST];
-        vkDeviceWaitIdle: PFN_vkDeviceWaitIdle(device: vk::Device)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_DEVICE_LOST];
+            device: vk::Device, count: u32, fences: *const vk::Fence, all: vk::Bool32, timeout: u64) [LOST];
+        vkQueueWaitIdle: PFN_vkQueueWaitIdle(queue: vk::Queue) [LOST];
+        vkDeviceWaitIdle: PFN_vkDeviceWaitIdle(device: vk::Device) [LOST];
         vkGetQueryPoolResults: PFN_vkGetQueryPoolResults(
             device: vk::Device, pool: vk::QueryPool, first: u32, count: u32, size: usize, data: *mut c_void,
-            stride: vk::DeviceSize, flags: vk::QueryResultFlags)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_DEVICE_LOST];
+            stride: vk::DeviceSize, flags: vk::QueryResultFlags) [LOST];
         vkGetPhysicalDeviceSurfaceSupportKHR: PFN_vkGetPhysicalDeviceSurfaceSupportKHR(
-            physical: vk::PhysicalDevice, family: u32, surface: vk::SurfaceKHR, supported: *mut vk::Bool32)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_SURFACE_LOST_KHR];
+            physical: vk::PhysicalDevice, family: u32, surface: vk::SurfaceKHR, supported: *mut vk::Bool32) [MEMORY];
         vkGetPhysicalDeviceSurfaceCapabilitiesKHR: PFN_vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
-            physical: vk::PhysicalDevice, surface: vk::SurfaceKHR, capabilities: *mut vk::SurfaceCapabilitiesKHR)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_SURFACE_LOST_KHR];
+            physical: vk::PhysicalDevice, surface: vk::SurfaceKHR, capabilities: *mut vk::SurfaceCapabilitiesKHR) [MEMORY];
         vkGetPhysicalDeviceSurfaceFormatsKHR: PFN_vkGetPhysicalDeviceSurfaceFormatsKHR(
-            physical: vk::PhysicalDevice, surface: vk::SurfaceKHR, count: *mut u32, formats: *mut vk::SurfaceFormatKHR)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_SURFACE_LOST_KHR];
+            physical: vk::PhysicalDevice, surface: vk::SurfaceKHR, count: *mut u32, formats: *mut vk::SurfaceFormatKHR) [MEMORY];
         vkGetPhysicalDeviceSurfacePresentModesKHR: PFN_vkGetPhysicalDeviceSurfacePresentModesKHR(
-            physical: vk::PhysicalDevice, surface: vk::SurfaceKHR, count: *mut u32, modes: *mut vk::PresentModeKHR)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY ERROR_SURFACE_LOST_KHR];
+            physical: vk::PhysicalDevice, surface: vk::SurfaceKHR, count: *mut u32, modes: *mut vk::PresentModeKHR) [MEMORY];
         vkGetSwapchainImagesKHR: PFN_vkGetSwapchainImagesKHR(
-            device: vk::Device, swapchain: vk::SwapchainKHR, count: *mut u32, images: *mut vk::Image)
-            [ERROR_OUT_OF_HOST_MEMORY ERROR_OUT_OF_DEVICE_MEMORY];
+            device: vk::Device, swapchain: vk::SwapchainKHR, count: *mut u32, images: *mut vk::Image) [MEMORY];
     }
     special {
         vkEnumerateInstanceExtensionProperties, vkSetDebugUtilsObjectNameEXT, vkCreateInstance, vkDestroyInstance, vkDestroyDevice, vkGetDeviceProcAddr,

@@ -81,8 +81,8 @@ module! {
         physical: vk::PhysicalDevice, out: *mut vk::PhysicalDeviceFeatures2<'_>
     ) {
         let change = state().claims.features;
-        // SAFETY: the caller keeps the contract of this very function, which writes the structs of a chain, each of which begins
-        // with its type and the next.
+        // SAFETY: the caller keeps the contract of this very function, which writes the structs of a chain, each of
+        // which begins with its type and the next.
         unsafe {
             REAL.get().expect("wrapped")(physical, out);
             let mut next = (*out).p_next.cast::<vk::BaseOutStructure<'_>>();
@@ -101,7 +101,8 @@ module! {
         physical: vk::PhysicalDevice, count: *mut u32, out: *mut vk::QueueFamilyProperties
     ) {
         let change = state().claims.family;
-        // SAFETY: the caller keeps the contract of this very function, which writes `count` structs if there is room for them.
+        // SAFETY: the caller keeps the contract of this very function, which writes `count` structs if there is room
+        // for them.
         unsafe {
             REAL.get().expect("wrapped")(physical, count, out);
             if !out.is_null() {

@@ -1,4 +1,5 @@
-//! Devices that have less than the one at hand: each is refused with the number, or worked around with the same picture.
+//! Devices that have less than the one at hand: each is refused with the number, or worked around with the same
+//! picture.
 
 use super::claimed::Claims;
 use super::layer::watch;
@@ -64,19 +65,18 @@ const LIMITS: &[Row<fn(&mut ash::vk::PhysicalDeviceLimits)>] = &[
         Refused(3, "storage buffers a stage, the device takes 4")),
     ("12 uniform buffers a stage", &[], |l| l.max_per_stage_descriptor_uniform_buffers = 12, Same),
     ("16 sampled images a stage", &[], |l| l.max_per_stage_descriptor_sampled_images = 16, Same),
-    ("no sampled images", &["--variant", "texel"], |l| l.max_per_stage_descriptor_sampled_images = 0,
+    ("no sampled images", &["--variant", "texel-packed"], |l| l.max_per_stage_descriptor_sampled_images = 0,
         Refused(3, "sampled images a stage, the device takes 0")),
     ("storage buffers of 128 MiB", &[], |l| l.max_storage_buffer_range = 1 << 27, Same),
     ("storage buffers of 512 bytes", &[], |l| l.max_storage_buffer_range = 512,
         Refused(4, "the device can bind 512")),
     ("uniform buffers of 16 KiB", &["--variant", "storage-uniform"], |l| l.max_uniform_buffer_range = 1 << 14, Same),
-    ("texel buffers of 65536 texels", &["--variant", "texel"], |l| l.max_texel_buffer_elements = 1 << 16, Same),
-    ("texel buffers of 4 texels", &["--variant", "texel"], |l| l.max_texel_buffer_elements = 4, Refused(4, "(4)")),
+    ("texel buffers of 65536 texels", &["--variant", "texel-packed"], |l| l.max_texel_buffer_elements = 1 << 16, Same),
+    ("texel buffers of 4 texels", &["--variant", "texel-packed"], |l| l.max_texel_buffer_elements = 4, Refused(4, "(4)")),
     ("images of 4096 pixels", &[], |l| l.max_image_dimension2_d = 4096, Same),
     ("images of 8 pixels", &[], |l| l.max_image_dimension2_d = 8, Refused(4, "at most 8 px")),
     ("framebuffers 32 pixels high", &["--size", "40x40", "--lights", "sh"], |l| l.max_framebuffer_height = 32,
         Refused(4, "40x40 is outside the device's 1..=32")),
-    ("volumes of one texel", &["--variant", "image"], |l| l.max_image_dimension3_d = 1, Same),
     ("one workgroup", &[], |l| l.max_compute_work_group_count = [1; 3],
         Refused(4, "the device takes [1, 1, 1]")),
     ("buffers at 256 bytes", &[],

@@ -1,5 +1,5 @@
-//! A layer between the program and Vulkan, in the same process: it counts the calls that can fail and makes one of them fail, keeps
-//! a census of objects, and changes what a device claims to have.
+//! A layer between the program and Vulkan, in the same process: it counts the calls that can fail and makes one of them
+//! fail, keeps a census of objects, and changes what a device claims to have.
 
 #![allow(unsafe_code)]
 
@@ -11,8 +11,12 @@ use ash::vk::{self, Handle};
 use std::ffi::{CStr, c_char};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// A call that can fail, with the errors that the specification allows and that do not need an extension or a structure which the
-/// program does not use.
+/// Errors of calls that can fail: of the many that the specification allows, those that happen.
+pub const MEMORY: &[vk::Result] = &[vk::Result::ERROR_OUT_OF_DEVICE_MEMORY];
+pub const HOST_MEMORY: &[vk::Result] = &[vk::Result::ERROR_OUT_OF_HOST_MEMORY];
+pub const LOST: &[vk::Result] = &[vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_DEVICE_LOST];
+
+/// A call that can fail, and its errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Call {
     pub name: &'static str,
@@ -58,7 +62,8 @@ pub fn state() -> MutexGuard<'static, State> {
 
 /// Runs something and tells what was seen. One watch at a time.
 pub fn watch<R>(plan: Option<Plan>, claims: Claims, run: impl FnOnce() -> R) -> (R, Heard) {
-    // SAFETY: the function answers with the loader's functions or with wrappers of the same kind, all of which are static.
+    // SAFETY: the function answers with the loader's functions or with wrappers of the same kind, all of which are
+    // static.
     unsafe { shadow_fields::gpu::loader::stand_before(instance_address) };
     *state() = State { plan, claims, ..State::default() };
     let outcome = run();
@@ -69,7 +74,8 @@ pub fn watch<R>(plan: Option<Plan>, claims: Claims, run: impl FnOnce() -> R) -> 
     (outcome, heard)
 }
 
-/// Keeps an instance for as long as the process runs, and with it the drivers: loading them again takes a third of a short run.
+/// Keeps an instance for as long as the process runs, and with it the drivers: loading them again takes a third of a
+/// short run.
 pub fn keep_drivers() {
     static KEPT: OnceLock<Option<(ash::Entry, ash::Instance)>> = OnceLock::new();
     // SAFETY: the system's loader is trusted, the structure outlives the call, and the instance is never destroyed.

@@ -3,14 +3,12 @@
 #![allow(unsafe_code)]
 
 use super::claimed::OF_DEVICE;
-use super::layer::{Function, born, device_address, dies, fault, state};
+use super::layer::{Function, MEMORY, born, device_address, dies, fault, state};
 use ash::vk::{self, Handle};
 use std::ffi::{c_char, c_void};
 use std::sync::OnceLock;
 
 type Allocator<'a> = vk::AllocationCallbacks<'a>;
-
-const OUT_OF_MEMORY: &[vk::Result] = &[vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY];
 
 module! {
     vkGetDeviceProcAddr: PFN_vkGetDeviceProcAddr(device: vk::Device, name: *const c_char) -> Option<Function> {
@@ -23,10 +21,7 @@ module! {
     vkEnumerateInstanceExtensionProperties: PFN_vkEnumerateInstanceExtensionProperties(
         layer: *const c_char, count: *mut u32, out: *mut vk::ExtensionProperties
     ) -> vk::Result {
-        const ERRORS: &[vk::Result] = &[
-            vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_LAYER_NOT_PRESENT,
-        ];
-        if let Some(error) = fault("vkEnumerateInstanceExtensionProperties", ERRORS) {
+        if let Some(error) = fault("vkEnumerateInstanceExtensionProperties", MEMORY) {
             return error;
         }
         let has = state().claims.extension;
@@ -49,7 +44,7 @@ module! {
     vkSetDebugUtilsObjectNameEXT: PFN_vkSetDebugUtilsObjectNameEXT(
         device: vk::Device, info: *const vk::DebugUtilsObjectNameInfoEXT<'_>
     ) -> vk::Result {
-        if let Some(error) = fault("vkSetDebugUtilsObjectNameEXT", OUT_OF_MEMORY) {
+        if let Some(error) = fault("vkSetDebugUtilsObjectNameEXT", MEMORY) {
             return error;
         }
         // SAFETY: the caller keeps the contract of this very function.
@@ -66,12 +61,7 @@ module! {
     vkCreateInstance: PFN_vkCreateInstance(
         info: *const vk::InstanceCreateInfo<'_>, allocator: *const Allocator<'_>, out: *mut vk::Instance
     ) -> vk::Result {
-        const ERRORS: &[vk::Result] = &[
-            vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
-            vk::Result::ERROR_INITIALIZATION_FAILED, vk::Result::ERROR_LAYER_NOT_PRESENT,
-            vk::Result::ERROR_EXTENSION_NOT_PRESENT, vk::Result::ERROR_INCOMPATIBLE_DRIVER,
-        ];
-        if let Some(error) = fault("vkCreateInstance", ERRORS) {
+        if let Some(error) = fault("vkCreateInstance", MEMORY) {
             return error;
         }
         // SAFETY: the caller keeps the contract of this very function, which writes the handle where it succeeds.
@@ -107,10 +97,7 @@ module! {
         device: vk::Device, info: *const vk::MemoryAllocateInfo<'_>, allocator: *const Allocator<'_>,
         out: *mut vk::DeviceMemory
     ) -> vk::Result {
-        const ERRORS: &[vk::Result] = &[
-            vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_TOO_MANY_OBJECTS,
-        ];
-        if let Some(error) = fault("vkAllocateMemory", ERRORS) {
+        if let Some(error) = fault("vkAllocateMemory", MEMORY) {
             return error;
         }
         let splits = state().claims.splits_memory;
@@ -137,10 +124,7 @@ module! {
         device: vk::Device, memory: vk::DeviceMemory, offset: vk::DeviceSize, size: vk::DeviceSize,
         flags: vk::MemoryMapFlags, data: *mut *mut c_void
     ) -> vk::Result {
-        const ERRORS: &[vk::Result] = &[
-            vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_MEMORY_MAP_FAILED,
-        ];
-        if let Some(error) = fault("vkMapMemory", ERRORS) {
+        if let Some(error) = fault("vkMapMemory", MEMORY) {
             return error;
         }
         let mut state = state();
@@ -160,7 +144,7 @@ macro_rules! pipelines {
                 device: vk::Device, cache: vk::PipelineCache, count: u32, infos: *const vk::$info<'_>,
                 allocator: *const Allocator<'_>, out: *mut vk::Pipeline
             ) -> vk::Result {
-                if let Some(error) = fault(stringify!($name), OUT_OF_MEMORY) {
+                if let Some(error) = fault(stringify!($name), MEMORY) {
                     // SAFETY: the caller has room for `count` handles, which are null where creation fails.
                     unsafe { std::slice::from_raw_parts_mut(out, count as usize) }.fill(vk::Pipeline::null());
                     return error;
@@ -182,11 +166,9 @@ pipelines!(vkCreateGraphicsPipelines, PFN_vkCreateGraphicsPipelines, GraphicsPip
 
 /// What showing a picture may answer; a suboptimal swapchain has shown it all the same.
 const SHOWING: &[vk::Result] = &[
-    vk::Result::ERROR_OUT_OF_HOST_MEMORY,
     vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
     vk::Result::ERROR_DEVICE_LOST,
     vk::Result::ERROR_OUT_OF_DATE_KHR,
-    vk::Result::ERROR_SURFACE_LOST_KHR,
     vk::Result::SUBOPTIMAL_KHR,
 ];
 

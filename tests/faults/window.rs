@@ -5,11 +5,12 @@ use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::gpu::{Access, Buffer, BufferKind, Commands, Device, DeviceOptions, Image, ImageShape};
 use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::shaders::Library;
-use shadow_fields::view::command::{Command, Step};
+use shadow_fields::view::command::Command;
 use shadow_fields::view::{Editor, FrameTarget, Setup, Viewer};
 use shadow_fields::{Error, Result, bake, check, frame};
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 pub const SIZE: [u32; 2] = [48, 32];
 const FORMAT: ash::vk::Format = ash::vk::Format::R8G8B8A8_SRGB;
@@ -43,7 +44,6 @@ pub fn viewer(
     let setup = Setup {
         device,
         options,
-        workers: None,
         library: Library { shader_dir: None, cache_dir: Some(cache_dir.clone()) },
         cache: Cache::new(Some(&cache_dir)),
         frame: frame_options(),
@@ -51,7 +51,7 @@ pub fn viewer(
         encodes_srgb,
         seed: 1,
         strict: false,
-        settings: None,
+        preview_after: Duration::from_secs(60),
     };
     let editor = Editor::new(Scene::load(&path)?, &path);
     let mut viewer = Viewer::new(setup, editor, 1.0)?;
@@ -64,7 +64,8 @@ pub fn viewer(
     Ok(viewer)
 }
 
-/// Shows a still scene, then the same edited, then without the overlay. `draw` is called until it answers that a frame is seen.
+/// Shows a still scene, then the same edited, then without the overlay. `draw` is called until it answers that a frame
+/// is seen.
 pub fn show(viewer: &mut Viewer, draw: &mut dyn FnMut(&mut Viewer) -> Result<bool>) -> Result<()> {
     let [width, height] = SIZE.map(|side| side as f32);
     let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
@@ -73,7 +74,7 @@ pub fn show(viewer: &mut Viewer, draw: &mut dyn FnMut(&mut Viewer) -> Result<boo
         let _ = viewer.ui(egui::RawInput { screen_rect: Some(screen), ..Default::default() })?;
         draw(viewer)
     };
-    for command in [None, Some(Command::Step { step: Step::Up, repeat: false }), Some(Command::ToggleOverlay)] {
+    for command in [None, Some(Command::SetSky(0.5)), Some(Command::ToggleOverlay)] {
         command.map_or(Ok(()), |command| viewer.apply(command))?;
         for turns in 0.. {
             assert!(turns < 100, "the window never comes to rest");

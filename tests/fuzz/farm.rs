@@ -1,25 +1,21 @@
 //! Plans of farms and results of slices, as any machine may find them in a shared folder.
 
 use super::targets::{NAME, bordered, sealed, with_file};
-use shadow_fields::Result;
-use shadow_fields::bake::kinds::Kind;
 use shadow_fields::error::Error;
 use shadow_fields::farm::engines::{self, Call};
-use shadow_fields::farm::plan::{DeviceClass, Input, Plan, Task, TaskCost, TaskKind, Work};
-use shadow_fields::farm::results::{self, Content, SliceResult};
-use shadow_fields::farm::status::{Status, missing};
+use shadow_fields::farm::results::{self, SliceResult, missing};
+use shadow_fields::farm::{Film, Input, Plan};
+use shadow_fields::{Result, bake, frame};
 use std::path::{Path, PathBuf};
 
 pub const TOKENS: &[&str] = &[
-    "\"works\":[",
-    "\"tasks\":[",
+    "\"films\":[",
+    "\"meshes\":[",
     "\"slices\":[",
     "\"pictures\":\"#.png\"",
-    "\"frames\"",
-    "{\"bake\":\"silhouette\"}",
-    "\"seconds\":",
+    "{\"meshes\":{\"first\":0,\"count\":1}}",
     "4294967295",
-    "1e38",
+    "4294967290",
     "-1",
     "null",
     "[",
@@ -28,15 +24,12 @@ pub const TOKENS: &[&str] = &[
 ];
 
 fn example() -> Plan {
-    let device = DeviceClass { name: "none".into(), driver: "none".into() };
-    let mut plan = Plan::new(device, "results".into());
-    let words = vec!["--quality".into(), "draft".into()];
-    plan.works = vec![Work { words: words.clone(), pictures: None }, Work { words, pictures: Some("f_#.png".into()) }];
-    plan.inputs.push(Input { path: "m.obj".into(), hash: "00".into() });
-    let cost = TaskCost { seconds: 50.0, memory_mb: 1.0, bytes: 1e6 };
-    let task = |first| Task { work: 0, input: 0, kind: TaskKind::Bake(Kind::Shadow), first, count: 3 };
-    (0..3).for_each(|part| plan.add(task(part), cost));
-    plan.add(Task { work: 1, input: 0, kind: TaskKind::Frames, first: 5, count: 7 }, cost);
+    let mut plan = Plan::new("none (none)".into(), "results".into(), bake::Options::default());
+    let input = |path: &str| Input { path: path.into(), hash: "00".into() };
+    plan.add_meshes(["a.obj", "b.obj", "c.obj"].map(input).into(), 2);
+    let options = frame::Options::default();
+    let film = Film { scene: input("s.toml"), pictures: "f_#.png".into(), options, first_s: 0.0, fps: 24 };
+    plan.add_film(film, 7, 100);
     plan
 }
 
@@ -52,14 +45,13 @@ pub fn plan(bytes: &[u8]) -> Result<()> {
     let path = Path::new(NAME);
     let plan = Plan::parse(bytes, path)?;
     let slices = missing(&plan);
-    let call = Call { program: "p".into(), plan: path.to_owned(), words: Vec::new() };
-    let said = engines::slurm(&plan, &call, Path::new("logs")).len() + Status::of(&plan).line(8).len();
-    assert!(said > 0 && engines::openjd(&plan, &call, &slices).is_object());
-    assert!(slices.is_empty() || !engines::arrays(&slices, Some(2)).is_empty());
+    let call = Call::new(Path::new("p"), path, Vec::new()).unwrap();
+    assert!(!engines::slurm(&call).is_empty() && engines::openjd(&call, &slices).is_ok());
     Ok(())
 }
 
-/// A plan whose results lie beside the file of inputs, and the result of its first slice. Naming that takes as long as reading it.
+/// A plan whose results lie beside the file of inputs, and the result of its first slice. Naming that takes as long as
+/// reading it.
 fn with_plan<R>(run: impl FnOnce(&Plan, &Path) -> R) -> R {
     thread_local! {
         static PLAN: (Plan, PathBuf) = {
@@ -74,10 +66,10 @@ fn with_plan<R>(run: impl FnOnce(&Plan, &Path) -> R) -> R {
 
 pub fn slices() -> Vec<Vec<u8>> {
     with_plan(|plan, path| {
-        let mut content = Content::default();
-        content.add(0, "a.sf", &[7; 20]);
-        content.add(1, "part", &[]);
-        content.write(plan, 0, 2.5).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.sf"), [7; 20]).unwrap();
+        std::fs::write(folder.path().join("b"), []).unwrap();
+        results::write(plan, 0, folder.path(), 2).unwrap();
         vec![bordered(std::fs::read(path).unwrap())]
     })
 }
@@ -85,10 +77,10 @@ pub fn slices() -> Vec<Vec<u8>> {
 pub fn slice(bytes: &[u8]) -> Result<()> {
     with_plan(|plan, path| {
         std::fs::write(path, sealed(bytes)).unwrap();
-        assert!(Status::of(plan).line(8).contains("1 of 2 slices"));
+        assert_eq!(missing(plan), [1, 2]);
         match results::find(plan, 0) {
-            SliceResult::Whole(about, entries) => {
-                assert!(about.key == plan.key(0) && entries.iter().all(|(task, ..)| *task < 2));
+            SliceResult::Whole(files) => {
+                assert!(files.iter().all(|(name, _)| !name.contains('/') && !name.starts_with('.')));
                 Ok(())
             }
             SliceResult::Damaged(error) => Err(error),

@@ -1,15 +1,15 @@
-//! What bakes store: fields, outlines, what vertices see of their own mesh, and parts of bakes that were stopped.
+//! What bakes store: fields, outlines, and what vertices see of their own mesh.
 
 use super::common::generate;
 use super::targets::{NAME, bordered, sealed, with_file};
 use glam::DVec3;
 use serde::de::DeserializeOwned;
 use shadow_fields::Result;
-use shadow_fields::bake::{self, partial::Partial};
+use shadow_fields::bake;
 use shadow_fields::error::Error;
 use shadow_fields::field::file::{self, FIELD_MAGIC, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC};
 use shadow_fields::field::silhouette::{SILHOUETTE_MAGIC, SilhouetteField, SilhouetteHeader};
-use shadow_fields::field::{FieldKind, Lookup, ShadowField, Storage};
+use shadow_fields::field::{FieldKind, ShadowField, Storage};
 use std::path::Path;
 
 /// The file that `write` writes, with a zero byte between header and payload so that [`sealed`] finds the border.
@@ -44,9 +44,7 @@ pub fn field(bytes: &[u8]) -> Result<()> {
     let field = ShadowField::new(header, payload).map_err(|error| Error::input(Path::new(NAME), error))?;
     let mut out = vec![0.0; field.header.bands * field.header.bands];
     for at in [DVec3::new(0.0, 1.5, 0.2), DVec3::new(-30.0, 1.0, 4.0), DVec3::ZERO] {
-        for lookup in [Lookup::Trilinear, Lookup::Nearest] {
-            field.lookup(at, lookup, 0, &mut out);
-        }
+        field.lookup(at, 0, &mut out);
     }
     Ok(())
 }
@@ -58,7 +56,6 @@ fn outline_field() -> SilhouetteField {
         view_px: 16,
         half_px: 4,
         level_pixels: 0.0,
-        symmetry: true,
         centre_m: [0.0; 3],
         radius_m: 1.0,
         extent: [[-0.5; 3], [0.5; 3]],
@@ -97,18 +94,4 @@ pub fn payload(bytes: &[u8]) -> Result<()> {
     let sealed = sealed(bytes);
     let [first, ..] = MAGICS.map(|magic| file::parse::<serde_json::Value>(&sealed, Path::new(NAME), magic).map(|_| ()));
     first
-}
-
-pub fn parts() -> Vec<Vec<u8>> {
-    let header = serde_json::json!({ "done": 2, "all": 3, "numbers": 12 });
-    vec![written(|path| file::write(path, *b"SHPART\n\0", &header, &[7; 48]).unwrap())]
-}
-
-pub fn part(bytes: &[u8]) -> Result<()> {
-    with_file(&sealed(bytes), |path| {
-        let mut values = [0_f32; 12];
-        let done = Partial::new(Some(path.to_owned())).load(&mut values, 3);
-        assert!(done <= 3, "{done} of 3 samples are kept");
-        if done == 0 { Err(Error::Failed("it counts as none".into())) } else { Ok(()) }
-    })
 }

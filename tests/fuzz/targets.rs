@@ -39,7 +39,6 @@ pub const TARGETS: &[Target] = &[
     Target { name: "sf", seeds: stored::fields, tokens: HEADER, parse: stored::field, reads_file: true },
     Target { name: "outlines", seeds: stored::outlines, tokens: HEADER, parse: stored::outline, reads_file: true },
     Target { name: "selfvis", seeds: stored::payloads, tokens: HEADER, parse: stored::payload, reads_file: true },
-    Target { name: "part", seeds: stored::parts, tokens: HEADER, parse: stored::part, reads_file: false },
     Target {
         name: "picture",
         seeds: pictures,
@@ -362,7 +361,7 @@ fn calibration(bytes: &[u8]) -> Result<()> {
 fn options() -> Vec<Vec<u8>> {
     [
         "render\ns.toml\n-o\np.png\n--frames\n3\n--time\n1.5\n--size\n64x48\n--skip\nall\n--eps\n0.01\n--lattice\ncube:2x2",
-        "bake\nm.obj\n-o\nf.sf\n--radiance\n1,0.5,0.2\n--quality\nhigh\n--symmetry\noff",
+        "bake\nm.obj\n-o\nf.sf\n--radiance\n1,0.5,0.2\n--quality\nhigh",
         "inspect\nf.sf\n--faces\nsheet.png",
         "bench\ntime-error\n--out\no\n--json",
         "check\nmerge\n--seed\n7\n-vv",

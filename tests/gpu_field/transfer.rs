@@ -4,14 +4,14 @@ use super::common::{Gpu, generate, gpu, report};
 use super::{difference, norm, quiet, torus};
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::Mesh;
-use shadow_fields::bake::{self, Baker};
+use shadow_fields::bake::{self, Baker, Vertices, Wanted};
 use shadow_fields::field::quantity::channel_stride;
 use shadow_fields::sh::lobe;
 
 pub fn bake_transfer(gpu: &Gpu, mesh: &Mesh, bands: usize) -> Vec<f32> {
-    let (transfer, report) = Baker::new(&gpu.device, &gpu.library)
-        .transfer(mesh, &bake::Options { bands, ..Default::default() }, &quiet)
-        .unwrap();
+    let options = bake::Options { bands, ..Default::default() };
+    let baker = Baker::new(&gpu.device, &gpu.library);
+    let (Vertices { transfer, .. }, report) = baker.vertices(mesh, &options, Wanted::TRANSFER, &quiet).unwrap();
     assert_eq!(report.samples as usize, mesh.positions.len());
     assert_eq!(transfer.len(), mesh.positions.len() * channel_stride(bands));
     assert!(transfer.iter().all(|t| t.is_finite()));

@@ -1,12 +1,12 @@
 //! Which samples a lookup takes, and by what weights.
 
-use super::{LOOKUPS, ROUNDING, interpolate, lattices, noise, store};
+use super::{ROUNDING, interpolate, lattices, noise, store};
 use crate::generate;
 use fastrand::Rng;
 use glam::DVec3;
 use shadow_fields::bake;
 use shadow_fields::field::lattice::Directions;
-use shadow_fields::field::{FieldHeader, FieldKind, Lattice, Lookup, ShadowField, Storage};
+use shadow_fields::field::{FieldHeader, FieldKind, Lattice, ShadowField, Storage};
 use shadow_fields::sh::quadrature::random_direction;
 use std::f64::consts::{PI, TAU};
 
@@ -20,12 +20,10 @@ fn weights_are_convex_everywhere() {
         let corners = (0..8).map(|k| DVec3::new(1.0, f64::from(k & 2) - 1.0, f64::from((k & 1) * 2) - 1.0));
         let edges = [DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.0, -1.0, 1.0), DVec3::new(-2.0, 0.3, 2.0)];
         for position in radial.chain(far).chain(axes).chain(corners).chain(edges) {
-            for lookup in LOOKUPS {
-                let found = lattice.corners(position, lookup);
-                assert!(found.weight.iter().all(|w| *w >= 0.0 && w.is_finite()), "{lattice} {position} {found:?}");
-                assert!((found.weight.iter().sum::<f64>() - 1.0).abs() < ROUNDING, "{lattice} {position} {found:?}");
-                assert!(found.index.iter().all(|i| *i < lattice.stored_count()), "{lattice} {position} {found:?}");
-            }
+            let found = lattice.corners(position);
+            assert!(found.weight.iter().all(|w| *w >= 0.0 && w.is_finite()), "{lattice} {position} {found:?}");
+            assert!((found.weight.iter().sum::<f64>() - 1.0).abs() < ROUNDING, "{lattice} {position} {found:?}");
+            assert!(found.index.iter().all(|i| *i < lattice.stored_count()), "{lattice} {position} {found:?}");
             let unscale = lattice.unscale(position.length());
             assert!(unscale.is_finite() && unscale >= 0.0, "{lattice} {position}");
         }
@@ -39,37 +37,11 @@ fn a_sample_point_gives_its_sample() {
         let captured = noise(&lattice, &mut rng);
         let stored = store(&lattice, &captured);
         for index in 0..lattice.sample_count() {
-            for lookup in LOOKUPS {
-                let value = interpolate(&lattice, &stored, lattice.position(index), lookup);
-                let wanted = captured[index as usize];
-                assert!(
-                    (value - wanted).abs() < ROUNDING,
-                    "{lattice} {lookup:?} sample {index}: {value}, not {wanted}"
-                );
-            }
+            let value = interpolate(&lattice, &stored, lattice.position(index));
+            let wanted = captured[index as usize];
+            assert!((value - wanted).abs() < ROUNDING, "{lattice} sample {index}: {value}, not {wanted}");
         }
     }
-}
-
-#[test]
-fn nearest_takes_a_near_sample() {
-    let mut rng = Rng::with_seed(4);
-    let lattice: Lattice = "cube:16x8,inner=1.02".parse().unwrap();
-    let directions: Vec<DVec3> = (0..lattice.direction_count()).map(|i| lattice.direction(i)).collect();
-    let index: Vec<f64> = (0..lattice.sample_count()).map(f64::from).collect();
-    let stored = store(&lattice, &index);
-    let mut wrong = 0;
-    for _ in 0..2000 {
-        let direction = random_direction(&mut rng);
-        let position = direction * (1.02 * (8.0_f64 / 1.02).powf(rng.f64()));
-        // A corner of a border holds a mean: there the value is no index, and any of the three is as near.
-        let value = interpolate(&lattice, &stored, position, Lookup::Nearest);
-        let sample = value.round() as u32 % lattice.direction_count();
-        let best = directions.iter().map(|d| d.angle_between(direction)).fold(4.0, f64::min);
-        // Nearest in the cell coordinate, which the projection skews: it may take a sample a little farther away.
-        wrong += usize::from(directions[sample as usize].angle_between(direction) > best + 2.5_f64.to_radians());
-    }
-    assert!(wrong <= 20, "{wrong} of 2000 lookups took a far sample");
 }
 
 #[test]
@@ -83,21 +55,19 @@ fn linear_in_the_shell_coordinate_is_exact() {
         for _ in 0..500 {
             let d = lattice.inner + (lattice.outer - lattice.inner) * rng.f64();
             let wanted = 3.0 - 0.25 * (slope * lattice.coordinate(d) + offset);
-            for lookup in [Lookup::Radial, Lookup::Trilinear] {
-                let value = interpolate(&lattice, &stored, d * random_direction(&mut rng), lookup);
-                assert!((value - wanted).abs() < ROUNDING, "{lattice} {d}: {value}, not {wanted}");
-            }
+            let value = interpolate(&lattice, &stored, d * random_direction(&mut rng));
+            assert!((value - wanted).abs() < ROUNDING, "{lattice} {d}: {value}, not {wanted}");
         }
     }
 }
 
-/// Walks from direction to direction and through the shells; the stored values are noise in [0, 1], so that a wrong border
-/// shows as a jump of the size of the noise.
+/// Walks from direction to direction and through the shells; the stored values are noise in [0, 1], so that a wrong
+/// border shows as a jump of the size of the noise.
 ///
-/// Bound: along one axis of a cell an interpolated value changes by at most the cell coordinate's change times the range of
-/// the values, 1. A step of angle h moves s or t by at most h sqrt((1 + s^2)(1 + s^2 + t^2)) <= h sqrt 6, u by 4/pi times
-/// that, and a cell coordinate by cells / 2 times that again; there are two such axes. The shell coordinate and the unscale
-/// factor are computed.
+/// Bound: along one axis of a cell an interpolated value changes by at most the cell coordinate's change times the
+/// range of the values, 1. A step of angle h moves s or t by at most h sqrt((1 + s^2)(1 + s^2 + t^2)) <= h sqrt 6, u by
+/// 4/pi times that, and a cell coordinate by cells / 2 times that again; there are two such axes. The shell coordinate
+/// and the unscale factor are computed.
 #[test]
 fn interpolation_is_continuous() {
     let mut rng = Rng::with_seed(6);
@@ -108,7 +78,7 @@ fn interpolation_is_continuous() {
         let (slope, offset) = lattice.radial_map();
         let last = f64::from(lattice.shells - 1);
         let shell_at = |d: f64| (slope * lattice.coordinate(d) + offset).clamp(0.0, last);
-        let at = |p: DVec3| interpolate(&lattice, &stored, p, Lookup::Trilinear) * lattice.unscale(p.length());
+        let at = |p: DVec3| interpolate(&lattice, &stored, p) * lattice.unscale(p.length());
         let mut paths: Vec<(DVec3, DVec3)> =
             (0..12).map(|_| (random_direction(&mut rng), random_direction(&mut rng))).collect();
         // Across corners, along edges, and along them on either side.
@@ -163,7 +133,7 @@ fn longitudes_wrap() {
     let stored = store(&lattice, &captured);
     let at = |polar: f64, azimuth: f64| {
         let p = DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin());
-        interpolate(&lattice, &stored, 1.3 * p, Lookup::Trilinear)
+        interpolate(&lattice, &stored, 1.3 * p)
     };
     for polar in [0.2, 1.0, 1.6, 3.0] {
         let count = 40_000;
@@ -182,7 +152,7 @@ fn longitudes_wrap() {
     let (polar, azimuth) = (2.5 * PI / 5.0, 6.5 * TAU / 7.0);
     let p = DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin());
     let mean = (captured[ring as usize + 6] + captured[ring as usize]) / 2.0;
-    assert!((interpolate(&lattice, &stored, inner_shell * p, Lookup::Trilinear) - mean).abs() < ROUNDING);
+    assert!((interpolate(&lattice, &stored, inner_shell * p) - mean).abs() < ROUNDING);
 }
 
 #[test]
@@ -206,15 +176,13 @@ fn lookup_of_a_field_is_the_lattice_and_the_factor() {
     assert_eq!(field.header.payload_bytes(), field.payload.len() as u64);
     for _ in 0..300 {
         let position = random_direction(&mut rng) * (0.3 + 12.0 * rng.f64());
-        for lookup in LOOKUPS {
-            for channel in 0..3 {
-                let mut out = [0.0; 4];
-                field.lookup(position, lookup, channel, &mut out);
-                let value = 2.5 * interpolate(&lattice, &stored, position, lookup) * lattice.unscale(position.length());
-                for (k, found) in out.into_iter().enumerate() {
-                    let wanted = value * (4 * channel + k + 1) as f64;
-                    assert!((found - wanted).abs() < 1e-6 * wanted.abs() + 1e-9, "{position}: {found}, not {wanted}");
-                }
+        for channel in 0..3 {
+            let mut out = [0.0; 4];
+            field.lookup(position, channel, &mut out);
+            let value = 2.5 * interpolate(&lattice, &stored, position) * lattice.unscale(position.length());
+            for (k, found) in out.into_iter().enumerate() {
+                let wanted = value * (4 * channel + k + 1) as f64;
+                assert!((found - wanted).abs() < 1e-6 * wanted.abs() + 1e-9, "{position}: {found}, not {wanted}");
             }
         }
     }

@@ -8,14 +8,12 @@ use fastrand::Rng;
 use glam::DVec3;
 use shadow_fields::bake;
 use shadow_fields::field::lattice::{CELL_WARP, OUTSIDE_INNER, Spacing, cap_cosine, cap_height, unwarp, warp};
-use shadow_fields::field::{FieldKind, Fit, Lattice, Lookup};
+use shadow_fields::field::{FieldKind, Fit, Lattice};
 use shadow_fields::sh::quadrature::random_direction;
 use std::f64::consts::PI;
 
 /// A few f64 roundings, widened by the steepest slope of a shell coordinate (some hundreds a unit of distance).
 const ROUNDING: f64 = 1e-9;
-
-const LOOKUPS: [Lookup; 3] = [Lookup::Nearest, Lookup::Radial, Lookup::Trilinear];
 
 /// Both spacings, both arrangements, one shell, one cell, both first shells that a bake takes.
 fn lattices() -> Vec<Lattice> {
@@ -49,8 +47,8 @@ fn store(lattice: &Lattice, captured: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn interpolate(lattice: &Lattice, stored: &[f64], position: DVec3, lookup: Lookup) -> f64 {
-    let corners = lattice.corners(position, lookup);
+fn interpolate(lattice: &Lattice, stored: &[f64], position: DVec3) -> f64 {
+    let corners = lattice.corners(position);
     (0..8).map(|k| corners.weight[k] * stored[corners.index[k] as usize]).sum()
 }
 
@@ -66,7 +64,8 @@ fn noise(lattice: &Lattice, rng: &mut Rng) -> Vec<f64> {
 
 #[test]
 fn default_counts() {
-    // Samples on the edges of faces, a row and column more than cells; or in cells' centres, with a border of copies around.
+    // Samples on the edges of faces, a row and column more than cells; or in cells' centres, with a border of copies
+    // around.
     for (edges, side) in [(Some(true), 9), (Some(false), 7)] {
         let lattice = Lattice { edges, ..Lattice::default() };
         assert_eq!((lattice.sample_count(), lattice.stored_count()), (18 * 6 * side * side, 18 * 6 * 9 * 9));
@@ -147,7 +146,7 @@ fn fitted_lattices_are_round_ones_in_their_own_space() {
         let q = random_direction(&mut rng) * 10.0 * rng.f64();
         let p = DVec3::new(q.x + 0.125, q.y / 1.5 - 0.25, q.z / 1.25);
         assert!((fitted.distance(p) - q.length()).abs() < 1e-12);
-        let (a, b) = (fitted.corners(p, Lookup::Trilinear), round.corners(q, Lookup::Trilinear));
+        let (a, b) = (fitted.corners(p), round.corners(q));
         assert_eq!(a.index, b.index, "{p}");
         assert!(a.weight.iter().zip(b.weight).all(|(a, b)| (a - b).abs() < 1e-9), "{p}");
     }
@@ -215,7 +214,8 @@ fn shells_of_a_roomy_object_are_dense_from_the_first_on() {
     let roomy = Lattice::default().starting_at(0.4);
     let radii: Vec<f64> = (0..roomy.shells).map(|i| roomy.shell(i)).collect();
     assert!((radii[0] - 0.4).abs() < 1e-12 && (radii[radii.len() - 1] - 8.0).abs() < 1e-9, "{radii:?}");
-    // No gap is wider than what is in proportion to the distance, and none collapses where d = 1, where nothing happens.
+    // No gap is wider than what is in proportion to the distance, and none collapses where d = 1, where nothing
+    // happens.
     for pair in radii.windows(2) {
         assert!(pair[1] > pair[0] && pair[1] - pair[0] < 0.45 * pair[1], "{radii:?}");
     }

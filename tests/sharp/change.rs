@@ -1,4 +1,5 @@
-//! What a frame with sharp lights shows once something is switched: an entity, a light, or the way in which edges are smoothed.
+//! What a frame with sharp lights shows once something is switched: an entity, a light, or the way in which edges are
+//! smoothed.
 
 use super::common::{gpu, report};
 use super::{HEAD, parse, scenes};
@@ -37,8 +38,8 @@ fn pixels_follow_switches_of_entities() {
     assert!(without == show(&mut new(&bare)), "a frame that was made for the other scene shows something else");
 }
 
-/// Vertices are marked that a shadow's edge comes near, but only while pixels read the marks: a frame that goes over to four samples a pixel
-/// shows what a frame does that began with them.
+/// Vertices are marked that a shadow's edge comes near, but only while pixels read the marks: a frame that goes over to
+/// four samples a pixel shows what a frame does that began with them.
 #[test]
 fn edges_are_marked_where_pixels_read_them() {
     let Some(gpu) = gpu() else { return };

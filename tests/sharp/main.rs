@@ -10,7 +10,6 @@ use shadow_fields::bake::cache::Cache;
 use shadow_fields::check::sharp as check;
 use shadow_fields::draw::{Antialias, Shading};
 use shadow_fields::frame::{self, Frame};
-use shadow_fields::lists::gather::Place;
 use shadow_fields::lists::scene_bounds::Counts;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::scene::{Lights, Scene};
@@ -118,6 +117,73 @@ fn scenes_are_lit_as_by_rays() {
     }
 }
 
+/// A ball under a lamp that shines down on it: in a cone, if one is named.
+fn under_a_spot(spot: &str, cells: usize) -> Scene {
+    let head = HEAD.replace("cells = 60", &format!("cells = {cells}"));
+    parse(&format!(
+        "{head}[[entity]]\nmesh = \"ball\"\nposition = [0, 0.6, 0]\n[[entity]]\nmesh = \"ball\"\nposition = [1.2, 2.6, 0.8]\n\
+        rotation = {{ axis = [0.4, 0, 1], angle_deg = 155 }}\nscale = 0.1\nemission = [900, 800, 700]\n{spot}"
+    ))
+}
+
+/// Spots that fade, that are narrow and that end sharply are as near to rays as the same lamp without a cone, and
+/// spherical harmonics for all other lights leave them as they are.
+#[test]
+fn spots_are_lit_as_by_rays() {
+    let Some(gpu) = gpu() else { return };
+    let base = check::sharp_options();
+    let bake = shadow_fields::bake::Options { silhouette: Default::default(), face_px: 32, ..base.bake };
+    let sharp = frame::Options { bake, ..base };
+    for (name, spot) in [
+        ("no spot", ""),
+        ("a spot of 15 to 40 degrees", "spot = { inner_deg = 15, outer_deg = 40 }"),
+        ("a spot of 0 to 20 degrees", "spot = { outer_deg = 20 }"),
+        ("a spot of 30 degrees without a fade", "spot = { inner_deg = 30, outer_deg = 30 }"),
+        ("a spot of 90 degrees", "spot = { inner_deg = 45, outer_deg = 90 }"),
+    ] {
+        let scene = under_a_spot(spot, 60);
+        let found = error(&gpu, &scene, sharp, 1024);
+        report(&format!("{name}: error {found:.4}"));
+        assert!(found < 0.03, "{name}: {found}");
+        if !spot.is_empty() {
+            let harmonics = error(&gpu, &scene, frame::Options { lights: Lights::Sh, ..sharp }, 1024);
+            assert_eq!(harmonics, found, "{name}");
+        }
+    }
+}
+
+/// Pixels carry the rim of a spot on a floor of few cells, and its vertices do not.
+#[test]
+fn pixels_carry_the_rim_of_a_spot() {
+    let Some(gpu) = gpu() else { return };
+    let show =
+        |cells, shading| picture(&gpu, &under_a_spot("spot = { inner_deg = 19, outer_deg = 20 }", cells), shading).0;
+    let fine = show(300, Shading::Vertex);
+    let [pixels, vertices] = [Shading::Pixel, Shading::Vertex].map(|shading| {
+        let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
+        (show(12, shading).iter().zip(&fine).map(square).sum::<f64>() / fine.len() as f64).sqrt()
+    });
+    report(&format!("of 12 cells pixels are off by {pixels:.4}, vertices by {vertices:.4}"));
+    assert!(pixels < 0.2 * vertices && vertices > 0.004, "{pixels} and {vertices}");
+}
+
+#[test]
+fn spots_that_cannot_be_are_refused() {
+    let refused = |text: String, part: &str| {
+        let error = Scene::parse(&text, "test.toml".as_ref(), &embedded::read).unwrap_err();
+        assert!(error.line().contains(part), "{error}");
+    };
+    let mesh = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"m\"\n";
+    let ball = "sphere = { radius_m = 0.5, subdivisions = 1 }";
+    for spot in ["inner_deg = 30, outer_deg = 20", "outer_deg = 91", "outer_deg = 0", "inner_deg = -1, outer_deg = 9"] {
+        let entity = format!("[[entity]]\nmesh = \"m\"\nemission = [1, 1, 1]\nspot = {{ {spot} }}\n");
+        refused(format!("{mesh}{ball}\n{entity}"), "of a spot are not 0 <= inner <= outer <= 90");
+    }
+    let entity = "[[entity]]\nmesh = \"m\"\nemission = [1, 1, 1]\nspot = { outer_deg = 30 }\n";
+    let two = "torus_two_colour = { major_m = 0.5, minor_m = 0.2, segments = 9, sides = 5 }";
+    refused(format!("{mesh}{two}\n{entity}"), "a spot takes a mesh without colours of its own");
+}
+
 /// A picture of a scene, linear RGB, and the pixels that evaluated lights where the device counts them.
 fn picture(gpu: &common::Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Option<u64>) {
     let options = frame::Options {
@@ -131,7 +197,8 @@ fn picture(gpu: &common::Gpu, scene: &Scene, shading: Shading) -> (Vec<f32>, Opt
     (frame.picture(), frame.pixels_evaluated(&timings))
 }
 
-/// On floors and slabs of few cells pixels show what the vertices of fine ones show, and the coarse ones' own vertices do not.
+/// On floors and slabs of few cells pixels show what the vertices of fine ones show, and the coarse ones' own vertices
+/// do not.
 #[test]
 fn pixels_carry_edges_that_vertices_do_not() {
     let Some(gpu) = gpu() else { return };
@@ -173,8 +240,8 @@ fn faint_edges_are_left_to_vertices() {
     assert!(alone > 300 && drowned < alone / 10, "{alone} and {drowned}");
 }
 
-/// Where nothing blocks a light, pixels of a mesh that shadows itself blend what its vertices see, as vertices do: a speck that hangs before
-/// a coarse ring has its pixels evaluate a sun, and only those that it shades differ.
+/// Where nothing blocks a light, pixels of a mesh that shadows itself blend what its vertices see, as vertices do: a
+/// speck that hangs before a coarse ring has its pixels evaluate a sun, and only those that it shades differ.
 #[test]
 fn pixels_that_nothing_shades_look_as_vertices_show_them() {
     let Some(gpu) = gpu() else { return };
@@ -196,8 +263,8 @@ fn pixels_that_nothing_shades_look_as_vertices_show_them() {
     assert!(differing > 0, "the speck shades nothing");
 }
 
-/// A ring's bounding sphere stands before a light for many clusters whose rays all pass through its hole or beside it, and a ball covers a
-/// light from clusters in the middle of its shadow.
+/// A ring's bounding sphere stands before a light for many clusters whose rays all pass through its hole or beside it,
+/// and a ball covers a light from clusters in the middle of its shadow.
 #[test]
 fn what_outlines_leave_off_lists_changes_nothing() {
     let Some(gpu) = gpu() else { return };
@@ -207,24 +274,23 @@ fn what_outlines_leave_off_lists_changes_nothing() {
     small_clusters.meshes[0] = fine.meshes[0].clone();
     for (scene, name) in [(ring, "passed"), (small_clusters, "covered")] {
         let placements = scene.at(0.0);
-        let lit = |lists, skip| {
-            let options = frame::Options { lists: Some(lists), skip, ..check::sharp_options() };
+        let lit = |skip| {
+            let options = frame::Options { skip, ..check::sharp_options() };
             let mut frame = Frame::new(&gpu.baker(), &Cache::new(None), &scene, options, &|_, _, _| ()).unwrap();
             frame.render(&placements, None).unwrap();
             (frame.counts(&placements), frame.radiosity(0).unwrap())
         };
-        // Lists of the device keep what outlines would leave off.
-        let ((counts, host), (_, device)) = (lit(Place::Host, Skip::ALL), lit(Place::Device, Skip::ALL));
-        let (without, kept) = lit(Place::Host, Skip::without(name));
+        let (counts, light) = lit(Skip::ALL);
+        let (without, kept) = lit(Skip::without(name));
         let left_off = |counts: &Counts| if name == "passed" { counts.passed_by } else { counts.covered };
         report(&format!("{name}: {} of {} lookups, {} apart", left_off(&counts), counts.considered, counts.apart));
         assert!(left_off(&counts) > 0 && left_off(&without) == 0, "{name}");
-        assert!(host == device && host == kept, "{name}: what is left off blocks exactly nothing or everything");
+        assert!(light == kept, "{name}: what is left off blocks exactly nothing or everything");
     }
 }
 
-/// Under several lights points leave out what stands outside a light's cone, under one they do not: lights of all forms add up, and a
-/// light that reaches nothing changes no pixel.
+/// Under several lights points leave out what stands outside a light's cone, under one they do not: lights of all forms
+/// add up, and a light that reaches nothing changes no pixel.
 #[test]
 fn lights_add_up_where_points_leave_out_what_stands_beside() {
     let Some(gpu) = gpu() else { return };
@@ -274,7 +340,8 @@ fn lights_add_up_where_points_leave_out_what_stands_beside() {
     assert!(differing.is_empty(), "{differing:?}");
 }
 
-/// A sun's light on a floor that nothing shades, against its closed form: radiance * sin^2(a / 2) * cosine of a white surface.
+/// A sun's light on a floor that nothing shades, against its closed form: radiance * sin^2(a / 2) * cosine of a white
+/// surface.
 #[test]
 fn a_sun_lights_as_its_closed_form() {
     let Some(gpu) = gpu() else { return };

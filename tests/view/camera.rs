@@ -14,8 +14,8 @@ fn the_first_picture_is_the_files() {
         let editor = built_in(name);
         let scene = Scene::load(Path::new(&format!("assets/scenes/{name}.toml"))).unwrap();
         assert_eq!(editor.camera(), &scene.data.camera, "{name}");
-        assert_eq!((editor.placements(), editor.selection()), (scene.at(0.0), None));
-        assert!(editor.is_running() && editor.undo_count() == 0 && editor.shows_overlay());
+        assert_eq!((editor.placements(), editor.selection), (scene.at(0.0), None));
+        assert!(editor.running && editor.undo_count() == 0 && editor.overlay);
     }
 }
 

@@ -1,9 +1,9 @@
 //! Keys and the pointer give the commands that the help names.
 
-use super::{SMALL, from_text, picture_place, step};
+use super::{SMALL, from_text, picture_place};
 use glam::DVec3;
 use shadow_fields::view::input::{Button, CONTROLS, Event, Input, Key, help};
-use shadow_fields::view::{Command, Editor, Request, Step};
+use shadow_fields::view::{Command, Editor};
 
 #[test]
 fn every_control_has_its_command() {
@@ -15,16 +15,6 @@ fn every_control_has_its_command() {
         (letter('q'), false, Command::SelectNext),
         (letter('a'), false, Command::SelectPrevious),
         (Key::Escape, false, Command::SelectNone),
-        (letter('j'), false, step(Step::Left)),
-        (letter('l'), false, step(Step::Right)),
-        (letter('i'), false, step(Step::Up)),
-        (letter('k'), false, step(Step::Down)),
-        (letter('o'), false, step(Step::Back)),
-        (letter('p'), false, step(Step::Forth)),
-        (letter('n'), false, step(Step::Larger)),
-        (letter('m'), false, step(Step::Smaller)),
-        (letter('r'), false, step(Step::TurnLeft)),
-        (letter('t'), false, step(Step::TurnRight)),
         (letter('e'), false, Command::ToggleLight),
         (letter('z'), false, Command::NextScene),
         (letter('z'), true, Command::Undo),
@@ -40,10 +30,9 @@ fn every_control_has_its_command() {
         (Key::Home, false, Command::Home),
     ] {
         assert_eq!(key(k, control, false), [expected], "{k:?}");
-        // Held, a toggle does not flutter and a step goes on.
+        // Held, a toggle does not flutter and undo goes on.
         let repeated = key(k, control, true);
         match expected {
-            Command::Step { step, .. } => assert_eq!(repeated, [Command::Step { step, repeat: true }]),
             Command::Undo | Command::Redo | Command::SelectNext | Command::SelectPrevious => {
                 assert_eq!(repeated, [expected])
             }
@@ -80,7 +69,7 @@ fn the_pointer_clicks_turns_pans_and_drags() {
     assert_eq!(input.commands(Event::Move(ball), &editor), []);
     // Selected: it is dragged from where it was grabbed.
     editor.apply(Command::Pick(ball));
-    assert_eq!(editor.selection(), Some(1));
+    assert_eq!(editor.selection, Some(1));
     input.commands(Event::Press(Button::Left, ball), &editor);
     assert_eq!(input.commands(Event::Move(far), &editor), [Command::DragStart(ball), Command::DragTo(far)]);
     assert!(input.is_dragging());
@@ -97,7 +86,8 @@ fn the_pointer_clicks_turns_pans_and_drags() {
         assert_eq!(input.commands(Event::Release(button), &editor), []);
     }
     assert_eq!(input.commands(Event::Wheel(-2.0), &editor), [Command::Zoom(-2.0)]);
-    // In the reference beside the picture, a place stands for the same place of the picture, and so does a drag from there.
+    // In the reference beside the picture, a place stands for the same place of the picture, and so does a drag from
+    // there.
     let beside = |[x, y]: [f32; 2]| [x + 200.0, y];
     input.commands(Event::Press(Button::Left, beside(ball)), &editor);
     assert_eq!(input.commands(Event::Move(far), &editor).len(), 2);
@@ -112,25 +102,19 @@ fn the_pointer_clicks_turns_pans_and_drags() {
 }
 
 #[test]
-fn requests_reach_the_window() {
+fn switches_are_said_to_have_changed() {
     let mut editor = from_text(SMALL);
-    for (command, request) in [
-        (Command::Screenshot, Request::Screenshot),
-        (Command::Save, Request::Save),
-        (Command::ToggleKeys, Request::ToggleKeys),
-        (Command::Quit, Request::Quit),
-    ] {
-        let effect = editor.apply(command);
-        assert!(effect.request == Some(request) && !effect.changed.any());
+    for command in [Command::Screenshot, Command::Save, Command::Quit] {
+        assert!(!editor.apply(command).changed.any(), "the window's own");
     }
-    let flags = |e: &Editor| [e.is_running(), e.shows_reference(), e.shows_error(), e.shows_overlay()];
+    let flags = |e: &Editor| [e.running, e.reference, e.error, e.overlay];
     let before = flags(&editor);
     for command in [Command::ToggleRunning, Command::ToggleReference, Command::ToggleError, Command::ToggleOverlay] {
         assert!(editor.apply(command).changed.display);
     }
     assert_eq!(flags(&editor), before.map(|flag| !flag));
-    assert!(editor.apply(Command::SetVariant(Some("texel"))).changed.variant);
-    assert_eq!(editor.variant(), Some("texel"));
+    assert!(editor.apply(Command::SetVariant(Some("texel-packed"))).changed.variant);
+    assert_eq!(editor.variant(), Some("texel-packed"));
     assert!(!editor.apply(Command::Resize([0, 0])).changed.any(), "a minimised window has no picture");
     assert_eq!(editor.size(), [200, 100]);
 }

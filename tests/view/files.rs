@@ -1,11 +1,11 @@
 //! Time, the next scene, and what is saved.
 
-use super::{SMALL, built_in, from_text, step};
+use super::{SMALL, built_in, edit, from_text};
 use glam::DVec3;
 use shadow_fields::asset::embedded;
 use shadow_fields::scene::Scene;
 use shadow_fields::view::scenes::FORMER_LIMIT;
-use shadow_fields::view::{Command, Editor, Step};
+use shadow_fields::view::{Command, Editor};
 use std::path::Path;
 
 #[test]
@@ -16,9 +16,9 @@ fn time_passes_by_its_sum_alone() {
     steps.iter().for_each(|dt| drop(fine.advance(*dt)));
     coarse.advance(steps.iter().sum());
     // Binary fractions, so that the sums are equal to the bit, and so must be the scenes.
-    assert_eq!(coarse.time_s(), fine.time_s());
+    assert_eq!(coarse.time_s, fine.time_s);
     assert_eq!(coarse.placements(), fine.placements());
-    assert_eq!(coarse.placements(), coarse.scene().at(coarse.time_s()));
+    assert_eq!(coarse.placements(), coarse.scene().at(coarse.time_s));
     coarse.apply(Command::ToggleRunning);
     for dt in [1.0, f64::NAN, -1.0, f64::INFINITY] {
         assert!(!coarse.advance(dt).changed.any());
@@ -27,7 +27,7 @@ fn time_passes_by_its_sum_alone() {
     for dt in [f64::NAN, -1.0, f64::INFINITY, 0.0] {
         assert!(!coarse.advance(dt).changed.any());
     }
-    assert_eq!(coarse.time_s(), fine.time_s());
+    assert_eq!(coarse.time_s, fine.time_s);
     assert!(coarse.advance(0.5).changed.placements);
     // Where nothing moves, time changes nothing.
     let mut still = from_text(&SMALL.replace("motion", "# motion"));
@@ -38,14 +38,14 @@ fn time_passes_by_its_sum_alone() {
 fn the_next_scene_comes_round() {
     let mut editor = built_in("glowing_torus");
     editor.apply(Command::Resize([300, 200]));
-    editor.apply(step(Step::Left));
+    editor.apply(edit());
     editor.apply(Command::ToggleRunning);
     let mut names = Vec::new();
     for round in 0..7 {
         let effect = editor.apply(Command::NextScene);
         assert_eq!((effect.changed.scene, effect.message.is_some()), (true, round == 0), "the first was edited");
-        assert_eq!((editor.size(), editor.undo_count(), editor.selection()), ([300, 200], 0, None));
-        assert!(!editor.is_running() && editor.hit([150.0, 120.0]).is_some());
+        assert_eq!((editor.size(), editor.undo_count(), editor.selection), ([300, 200], 0, None));
+        assert!(!editor.running && editor.hit([150.0, 120.0]).is_some());
         names.push(editor.path().file_stem().unwrap().to_str().unwrap().to_owned());
     }
     assert_eq!(
@@ -61,7 +61,7 @@ fn the_next_scene_comes_round() {
         ]
     );
     let mut own = from_text(SMALL);
-    own.apply(step(Step::Left));
+    own.apply(edit());
     let data = own.scene().data.clone();
     own.apply(Command::NextScene);
     assert_eq!(own.path(), Path::new("assets/scenes/glowing_torus.toml"));
@@ -70,7 +70,7 @@ fn the_next_scene_comes_round() {
     let effect = own.apply(Command::Undo);
     assert!(effect.changed.scene && effect.message.unwrap().contains("t.toml"));
     assert_eq!((own.path(), &own.scene().data, own.size()), (Path::new("t.toml"), &data, [90, 60]));
-    assert!(own.apply(Command::Undo).changed.placements && own.apply(Command::Undo).message.is_some());
+    assert!(own.apply(Command::Undo).changed.exposure && own.apply(Command::Undo).message.is_some());
     // An unchanged scene leaves nothing to go back to.
     own.apply(Command::NextScene);
     assert!(!own.apply(Command::Undo).changed.any());
@@ -83,7 +83,7 @@ fn edits_of_every_scene_outlast_those_that_follow() {
         editor.open(built_in(name).scene().clone(), path)
     };
     let mut editor = from_text(SMALL);
-    editor.apply(step(Step::Left));
+    editor.apply(edit());
     let edited = editor.scene().data.clone();
     let said = open(&mut editor, "glowing_torus").message.unwrap();
     assert!(said.contains("t.toml") && said.contains("Ctrl-Z"), "{said}");
@@ -145,12 +145,9 @@ fn a_saved_scene_reads_back_as_the_state() {
             Command::Zoom(3.0),
             Command::SelectNext,
             Command::SelectNext,
-            step(Step::Left),
-            step(Step::TurnRight),
-            step(Step::Larger),
             Command::ToggleLight,
             Command::SetSky(1.7),
-            Command::TurnSky { by_deg: 33.0, repeat: false },
+            Command::SetSkyTurn(33.0),
             Command::SetExposure(0.3),
         ] {
             editor.apply(command);
@@ -160,7 +157,7 @@ fn a_saved_scene_reads_back_as_the_state() {
         let path = folder.path().join(format!("{name}-edited.toml"));
         editor.save(&path).unwrap();
         let scene = Scene::load(&path).unwrap();
-        assert_eq!(scene.data.output.time_s, editor.time_s());
+        assert_eq!(scene.data.output.time_s, editor.time_s);
         assert_eq!([scene.data.output.width, scene.data.output.height], [321, 123]);
         assert_eq!(scene.data.output.exposure_ev, 0.3);
         assert_eq!(scene.data.camera, *editor.camera());
@@ -239,7 +236,7 @@ fn what_an_earlier_session_saved_is_kept() {
     // The same scene loaded again in one session is still that session.
     let mut editor = open("s.toml");
     editor.save(&editor.save_path()).unwrap();
-    editor.apply(Command::Step { step: Step::Right, repeat: false });
+    editor.apply(edit());
     editor.apply(Command::NextScene);
     editor.apply(Command::Undo);
     assert_eq!((editor.path(), editor.save_path()), (&*at("s.toml"), at("s-edited-4.toml")));
@@ -255,7 +252,7 @@ fn edits_that_would_be_lost_are_saved_beside_the_scene() {
     editor.apply(Command::Zoom(2.0));
     editor.apply(Command::SelectNext);
     assert_eq!((editor.is_edited(), editor.rescue().unwrap().len()), (false, 0), "a look is no edit");
-    editor.apply(step(Step::Left));
+    editor.apply(edit());
     assert!(editor.is_edited());
     editor.apply(Command::Undo);
     assert!(!editor.is_edited(), "what was taken back is no edit");
@@ -273,7 +270,7 @@ fn edits_are_saved_elsewhere_where_the_folder_cannot_be_written() {
     // A file in a folder in which nobody can make files.
     let path = Path::new("/proc/version");
     let mut editor = Editor::new(from_text(SMALL).scene().clone(), path);
-    editor.apply(step(Step::Left));
+    editor.apply(edit());
     let said = editor.rescued(shadow_fields::Error::Failed("gone".into())).to_string();
     let saved = said.strip_prefix("gone; the edited scene was saved as ").unwrap();
     assert!(Scene::load(Path::new(saved)).is_ok(), "{said}");

@@ -1,10 +1,10 @@
 //! A glTF file behind the window: it moves, it can be edited, and what is saved is a scene file with its meshes.
 
 use super::model::robot;
-use super::step;
+use super::picture_place;
 use glam::DVec3;
 use shadow_fields::scene::Scene;
-use shadow_fields::view::{Command, Editor, Step};
+use shadow_fields::view::{Command, Editor};
 
 #[test]
 fn a_gltf_file_is_edited_and_saved_as_a_scene_file() {
@@ -21,8 +21,11 @@ fn a_gltf_file_is_edited_and_saved_as_a_scene_file() {
     // The hand is moved: at all times, and nothing else.
     let unmoved = editor.scene().at(1.3);
     (0..3).for_each(|_| drop(editor.apply(Command::SelectNext)));
-    assert_eq!(editor.selection(), Some(2));
-    editor.apply(step(Step::Left));
+    assert_eq!(editor.selection, Some(2));
+    let (centre, _) = editor.sphere(2, &editor.placements()[2]);
+    let at = picture_place(&editor, centre);
+    editor.apply(Command::DragStart(at));
+    assert!(editor.apply(Command::DragTo([at[0] - 30.0, at[1]])).changed.placements, "the hand is seen at {at:?}");
     let moved = editor.scene().at(1.3);
     let by = moved[2].position.as_dvec3() - unmoved[2].position.as_dvec3();
     let now = editor.placements()[2].position.as_dvec3() - editor.scene().at(0.75)[2].position.as_dvec3();

@@ -1,24 +1,22 @@
 //! Undo and redo.
 
-use super::{SMALL, from_text, step};
+use super::{SMALL, from_text};
 use proptest::prelude::*;
 use shadow_fields::scene::Data;
+use shadow_fields::view::Command;
 use shadow_fields::view::input::CONTROLS;
-use shadow_fields::view::{Command, Step};
 use std::path::Path;
 
 #[test]
-fn a_held_key_is_one_step_of_undo_and_two_presses_are_two() {
+fn a_slide_is_one_step_of_undo_and_two_are_two() {
     let mut editor = from_text(SMALL);
-    editor.apply(Command::SelectNext);
-    editor.apply(Command::SelectNext);
     let start = editor.scene().data.clone();
-    editor.apply(step(Step::Left));
-    for _ in 0..9 {
-        editor.apply(Command::Step { step: Step::Left, repeat: true });
+    for ev in 1..9 {
+        editor.apply(Command::SetLight(ev as f32));
     }
+    editor.apply(Command::EndSlide);
     let first = editor.scene().data.clone();
-    editor.apply(step(Step::Left));
+    editor.apply(Command::SetLight(10.0));
     assert_eq!(editor.undo_count(), 2);
     editor.apply(Command::Undo);
     assert_eq!(editor.scene().data, first);
@@ -27,15 +25,16 @@ fn a_held_key_is_one_step_of_undo_and_two_presses_are_two() {
     editor.apply(Command::Redo);
     assert_eq!(editor.scene().data, first);
     // A new change forgets what was taken back.
-    editor.apply(step(Step::Up));
+    editor.apply(Command::SetExposure(2.0));
     assert!(editor.apply(Command::Redo).message.is_some());
 }
 
 #[test]
 fn history_is_bounded() {
     let mut editor = from_text(SMALL);
+    editor.apply(Command::SelectNext);
     for _ in 0..2000 {
-        editor.apply(step(Step::TurnLeft));
+        editor.apply(Command::ToggleLight);
     }
     assert_eq!(editor.undo_count(), shadow_fields::view::history::STEP_LIMIT);
 }
@@ -54,37 +53,9 @@ fn any_command() -> impl Strategy<Value = Command> {
         number().prop_map(Command::SetSky),
         number().prop_map(Command::SetLight),
         number().prop_map(Command::SetExposure),
-        (number(), any::<bool>()).prop_map(|(by_deg, repeat)| Command::TurnSky { by_deg, repeat }),
         [0_u32..2000, 0_u32..2000].prop_map(Command::Resize),
-        (0_usize..CONTROLS.len(), any::<bool>()).prop_flat_map(|(row, repeat)| {
-            let keys: Vec<Command> = row_commands(row).into_iter().map(|c| repeated(c, repeat)).collect();
-            proptest::sample::select(keys)
-        }),
-        (0_usize..10, any::<bool>()).prop_map(|(i, repeat)| repeated(
-            step(
-                [
-                    Step::Left,
-                    Step::Right,
-                    Step::Up,
-                    Step::Down,
-                    Step::Forth,
-                    Step::Back,
-                    Step::Larger,
-                    Step::Smaller,
-                    Step::TurnLeft,
-                    Step::TurnRight
-                ][i]
-            ),
-            repeat
-        )),
+        (0_usize..CONTROLS.len()).prop_flat_map(|row| proptest::sample::select(row_commands(row))),
     ]
-}
-
-fn repeated(command: Command, repeat: bool) -> Command {
-    match command {
-        Command::Step { step, .. } => Command::Step { step, repeat },
-        other => other,
-    }
 }
 
 fn row_commands(row: usize) -> Vec<Command> {
@@ -95,7 +66,8 @@ fn row_commands(row: usize) -> Vec<Command> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 150, rng_seed: proptest::test_runner::RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is done: everything stays finite and within what a scene file holds, undo takes it all back, redo brings it again.
+    /// Whatever is done: everything stays finite and within what a scene file holds, undo takes it all back, redo
+    /// brings it again.
     #[test]
     fn any_commands(commands in prop::collection::vec(any_command(), 1..60)) {
         let mut editor = from_text(SMALL);

@@ -5,8 +5,9 @@ mod controls;
 mod files;
 mod gltf;
 mod history;
+mod lights;
+mod panel;
 mod selection;
-mod steps;
 
 #[path = "../common/model.rs"]
 mod model;
@@ -15,7 +16,7 @@ use glam::DVec3;
 use shadow_fields::asset::embedded;
 use shadow_fields::draw::camera::clip_from_world;
 use shadow_fields::scene::Scene;
-use shadow_fields::view::{Command, Editor, Step};
+use shadow_fields::view::{Command, Editor};
 use std::path::Path;
 
 fn built_in(name: &str) -> Editor {
@@ -38,8 +39,9 @@ const SMALL: &str = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n[output]\n
     [[entity]]\nname = \"lamp\"\nmesh = \"ball\"\nposition = [1.5, 2, 0]\nscale = 0.5\nemission = [40, 40, 30]\n\
     motion = [{ orbit = { centre = [0, 2, 0], period_s = 4 } }]\n";
 
-fn step(step: Step) -> Command {
-    Command::Step { step, repeat: false }
+/// An edit.
+fn edit() -> Command {
+    Command::SetExposure(0.75)
 }
 
 fn picture_place(editor: &Editor, point: DVec3) -> [f32; 2] {

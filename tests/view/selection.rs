@@ -1,15 +1,15 @@
 //! What is selected, by keys and by the pointer.
 
-use super::{SMALL, built_in, from_text, picture_place, step};
+use super::{SMALL, built_in, from_text, picture_place};
 use glam::DVec3;
-use shadow_fields::view::{Command, Editor, Step};
+use shadow_fields::view::{Command, Editor};
 
 #[test]
 fn selection_walks_around() {
     let mut editor = from_text(SMALL);
     let mut walk = |command| {
         editor.apply(command);
-        editor.selection()
+        editor.selection
     };
     assert_eq!([(); 4].map(|()| walk(Command::SelectNext)), [Some(0), Some(1), Some(2), Some(0)]);
     assert_eq!([(); 3].map(|()| walk(Command::SelectPrevious)), [Some(2), Some(1), Some(0)]);
@@ -17,10 +17,10 @@ fn selection_walks_around() {
     assert_eq!(walk(Command::SelectPrevious), Some(2));
     let empty = "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n";
     let mut editor = from_text(empty);
-    for command in [Command::SelectNext, Command::Home, Command::Pick([3.0, 3.0]), step(Step::Left), Command::Undo] {
+    for command in [Command::SelectNext, Command::Home, Command::Pick([3.0, 3.0]), Command::Undo] {
         editor.apply(command);
     }
-    assert_eq!(editor.selection(), None);
+    assert_eq!(editor.selection, None);
 }
 
 /// First hit of a ray with all triangles of a scene, in f64 (Moeller and Trumbore).
@@ -126,7 +126,7 @@ fn a_dragged_entity_follows_the_pointer_in_the_ground_plane() {
     let at = picture_place(&editor, centre);
     assert!(!editor.grabs(at), "not selected yet: a drag turns the camera");
     editor.apply(Command::Pick(at));
-    assert_eq!(editor.selection(), Some(amber));
+    assert_eq!(editor.selection, Some(amber));
     assert!(editor.grabs(at) && !editor.grabs([at[0] + 200.0, at[1] + 100.0]));
     let (before, data) = (editor.placements()[amber], editor.scene().data.clone());
     let (_, grabbed) = editor.hit(at).unwrap();

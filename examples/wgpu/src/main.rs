@@ -1,5 +1,5 @@
-//! A wgpu program shares its device with the library, which lights the vertices; wgpu draws them from the buffer where the light lies.
-//! `cargo run -- wgpu.png` in this folder draws a frame and compares it with the library's own picture.
+//! A wgpu program shares its device with the library, which lights the vertices; wgpu draws them from the buffer where
+//! the light lies. `cargo run -- wgpu.png` in this folder draws a frame and compares it with the library's own picture.
 
 mod draw;
 
@@ -27,8 +27,8 @@ fn open() -> Outcome<(wgpu::Device, wgpu::Queue, Gpu)> {
     // The library needs these two features, which wgpu does not ask for.
     let mut rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
     let mut synchronization = vk::PhysicalDeviceSynchronization2Features::default().synchronization2(true);
-    // SAFETY: the features are of Vulkan 1.3, and `from_vulkan` refuses a device without them; the handles are those of a device
-    // that wgpu keeps as long as `main` keeps it, which is longer than anything of the library's.
+    // SAFETY: the features are of Vulkan 1.3, and `from_vulkan` refuses a device without them; the handles are those of
+    // a device that wgpu keeps as long as `main` keeps it, which is longer than anything of the library's.
     unsafe {
         let hal = adapter.as_hal::<Vulkan>().ok_or("no Vulkan")?;
         let more: Box<wgpu::hal::vulkan::CreateDeviceCallback<'_>> = Box::new(|arguments| {
@@ -78,10 +78,10 @@ fn main() -> Outcome<()> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "wgpu.png".into());
     let (device, queue, gpu) = open()?;
     let options = RenderOptions {
-        quality: Quality::Draft,
+        bake: Quality::Draft.into(),
         size: Some(SIZE),
         shading: Some(Shading::Vertex),
-        antialias: Antialias::None,
+        antialias: Some(Antialias::None),
         ..Default::default()
     };
     let scene = scene()?;

@@ -1,23 +1,20 @@
 //! `shadow-fields bench time-error` splits the error of pictures into its causes and compares methods at equal error.
 
-use super::common::start;
+use super::common::{start, table};
 use crate::app::source::GltfArguments;
-use crate::app::{Global, output};
+use crate::app::{Global, output, outputs};
 use crate::bench::cases::Case;
-use crate::bench::time_error::{self, Selection, TimeErrorOutcome};
+use crate::bench::time_error::{self, Selection};
 use crate::error::Result;
-use crate::text::three;
+use crate::scene;
 use clap::Args;
 use std::path::PathBuf;
 
 /// Arguments of `bench time-error`.
 #[derive(Args)]
 #[command(
-    after_help = "Examples:\n  shadow-fields bench time-error --quick --out out/errors\n  shadow-fields bench time-error my_scene.toml \
-    --axis lookup --out out/my_scene\n  shadow-fields bench time-error --case \"torus, near light\" --axis lookup --out out/torus\n\n\
-    Cases that run only when --case names them: teapot, torus and animal (a body on thin legs), each over a floor under a \"near\" \
-    light (5 bounding radii away)\nor a \"distant\" one (1 000) of half angles of 1, 3, 8, 15 and 30 degrees, and \"32 small lights, 24 moving \
-    objects\"."
+    after_help = "Examples:\n  shadow-fields bench time-error --quick --output out/errors\n  shadow-fields bench time-error my_scene.toml \
+    --axis lattice --output out/my_scene\n  shadow-fields bench time-error --case torus --axis lattice --output out/torus"
 )]
 pub struct Arguments {
     /// Scene file or glTF file to measure and sweep instead of the built-in cases, at the time_s of its [output]
@@ -29,98 +26,83 @@ pub struct Arguments {
     /// Measure and sweep only cases that have TEXT in their names; may be given again; a text that none has lists them
     #[arg(long, value_name = "TEXT")]
     case: Vec<String>,
-    /// Sweep only this axis, with all its settings (each may need bakes of its own); may be given again; an unknown name lists them
+    /// Sweep only this axis, with all its settings (each may need bakes of its own); may be given again; an unknown
+    /// name lists them
     #[arg(long, value_name = "NAME")]
     axis: Vec<String>,
-    /// Folder for budget.csv, sweep.csv, rival.csv, time-error.json, time-error.txt (which setting is the default and why), a plot of
-    /// time against error for every case, error pictures, and the picture of the merge beside that of ray casting
-    #[arg(long, value_name = "DIR")]
+    /// Folder for budget.csv, sweep.csv, rival.csv, time-error.json, a plot of time against error for every case, error
+    /// pictures, and the picture of the merge beside that of ray casting
+    #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     gltf: GltfArguments,
 }
 
-/// Measures and prints the budget and the comparison.
+/// Measures and prints the budget, the comparison and the sweep.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let own =
         arguments.scene.as_deref().map(|path| Case::of_file(path, arguments.gltf.scene(global, path)?)).transpose()?;
+    let inputs: Vec<PathBuf> = arguments.scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
+    outputs::check_folder("--output", &arguments.out, &inputs)?;
     let selection =
         Selection { scene: arguments.scene.clone(), cases: arguments.case.clone(), axes: arguments.axis.clone() };
-    let (context, outcome) =
-        start(global, arguments.quick, |bench| time_error::run(bench, &arguments.out, &selection, own))?;
+    let (context, outcome) = start(global, arguments.quick, &arguments.out, |bench| {
+        time_error::run(bench, &arguments.out, &selection, own)
+    })?;
     if global.json {
         output::say(serde_json::to_value(&outcome).expect("results are plain data").to_string());
         return context.finish();
     }
-    say_budgets(&outcome);
-    say_comparisons(&outcome);
-    let folder = output::shown(&arguments.out);
-    output::say(format!("\n{folder}: {} settings measured, {}", outcome.points.len(), outcome.took()));
-    output::say(format!("{folder}/time-error.txt says which setting is the default and why"));
+    output::say("Relative RMS error over vertices, by cause (p99 and max of the total)");
+    let columns = [
+        ("scene", "/case"),
+        ("centre rule", "/centre_rule/rms_relative"),
+        ("bands", "/bands/rms_relative"),
+        ("sampling", "/sampling/rms_relative"),
+        ("storage", "/arithmetic_and_storage/rms_relative"),
+        ("total in SH", "/total/rms_relative"),
+        ("sharp lights", "/sharp_total/rms_relative"),
+        ("p99", "/total/p99_relative"),
+        ("max", "/total/max_relative"),
+        ("T0 error", "/t0_error_relative"),
+    ];
+    table(&outcome.budgets, &columns);
+    output::say("\nPictures: mean FLIP where both are lit by vertex; at pixels mean FLIP and relative RMS error");
+    let columns = [
+        ("scene", "/case"),
+        ("FLIP", "/mean_flip_ratio"),
+        ("pixel FLIP", "/pixels/mean_flip_ratio"),
+        ("pixel RMS", "/pixels/rms_relative"),
+    ];
+    table(&outcome.pictures, &columns);
+    output::say(
+        "\nA frame, everything merged, against ray casting with as many threads at equal error, and the quickest shadow map that errs no \
+         more\n(at vertices without drawing, at pixels with it)",
+    );
+    let columns = [
+        ("scene", "/title"),
+        ("frame ms", "/frame_wall_ms/median"),
+        ("error", "/merge_error/rms_relative"),
+        ("rays", "/rays_at_equal_rms_count"),
+        ("rays ms", "/rival_ms_at_equal_rms"),
+        ("times faster", "/speed_up_at_equal_rms_ratio"),
+        ("merge alone", "/merge_speed_up_at_equal_rms_ratio"),
+        ("map ms", "/map_ms_at_equal_rms"),
+    ];
+    table(&outcome.comparisons, &columns);
+    if !outcome.points.is_empty() {
+        output::say("\nSettings, one at a time round the default");
+        let columns = [
+            ("scene", "/case"),
+            ("axis", "/axis"),
+            ("setting", "/name"),
+            ("merge ms", "/merge_ms/median"),
+            ("over default", "/time_per_default_ratio"),
+            ("error", "/total/rms_relative"),
+            ("field bytes", "/field_bytes"),
+        ];
+        table(&outcome.points, &columns);
+    }
+    output::say(format!("\n{}: this run took {}", output::shown(&arguments.out), outcome.took()));
     context.finish()
-}
-
-fn say_budgets(outcome: &TimeErrorOutcome) {
-    output::say(
-        "Relative RMS error over vertices, by cause (p99 and max of the total); mean FLIP of the picture lit by vertex; error and mean FLIP at pixels",
-    );
-    let rows: Vec<Vec<String>> = outcome
-        .budgets
-        .iter()
-        .zip(&outcome.pictures)
-        .map(|(b, p)| {
-            let mut row = vec![b.case.clone()];
-            row.extend(
-                [b.centre_rule.rms, b.bands.rms, b.sampling.rms, b.arithmetic_and_storage.rms, b.total.rms].map(three),
-            );
-            row.push(b.sharp_total.map_or("-".into(), |d| three(d.rms)));
-            row.extend(
-                [b.total.p99, b.total.max, b.t0_error, p.mean_flip, p.pixels.rms, p.pixels.mean_flip].map(three),
-            );
-            row
-        })
-        .collect();
-    output::table(
-        &[
-            "scene",
-            "centre rule",
-            "bands",
-            "sampling",
-            "storage",
-            "total in SH",
-            "sharp lights",
-            "p99",
-            "max",
-            "T0 error",
-            "mean FLIP",
-            "pixel RMS",
-            "pixel FLIP",
-        ],
-        &rows,
-    );
-}
-
-fn say_comparisons(outcome: &TimeErrorOutcome) {
-    output::say(
-        "\nFrame against ray casting with as many threads, and against shadow maps: the quickest that errs no more, and what the best errs (without \
-         drawing at vertices, with it at pixels)",
-    );
-    let rows: Vec<Vec<String>> = outcome
-        .comparisons
-        .iter()
-        .map(|c| {
-            let or_none = |x: Option<f64>| x.map_or("-".into(), three);
-            let mut row = vec![c.title()];
-            row.extend([c.frame_wall_ms.median, c.merge_error.rms].map(three));
-            row.extend([c.rays_at_equal_rms, c.rival_ms_at_equal_rms].map(or_none));
-            row.extend([c.speed_up_at_equal_rms, c.merge_speed_up_at_equal_rms].map(or_none));
-            let best = c.maps.iter().map(|p| p.error.rms).min_by(f64::total_cmp);
-            row.extend([c.map_ms_at_equal_rms, best].map(or_none));
-            row
-        })
-        .collect();
-    output::table(
-        &["scene", "frame ms", "error", "rays", "rays ms", "times faster", "merge alone", "map ms", "best map error"],
-        &rows,
-    );
 }

@@ -7,8 +7,7 @@ mod submit;
 
 use super::{Global, output};
 use crate::error::{Error, Result};
-use crate::farm::Plan;
-use crate::farm::status::Status;
+use crate::farm::{Plan, counted, results};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::PathBuf;
@@ -22,23 +21,19 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Commands {
-    /// Cut works into slices of about two minutes and write them, with everything that decides their bytes
+    /// Cut bakes and pictures into slices and write them, with everything that decides their bytes
     Plan(plan::Arguments),
     /// Compute one slice; return at once if its result exists and is intact
     Run(run::Arguments),
     /// Check all results and make cache files and pictures of them, or say which slices have to run again
     Collect(collect::Arguments),
-    /// Count what is done and estimate what is left
-    Status(StatusArguments),
+    /// Count the slices whose result is there
+    Status {
+        /// Plan that `farm plan` has written
+        plan: PathBuf,
+    },
     /// Hand the slices that have no result to an engine
     Submit(submit::Arguments),
-}
-
-/// Arguments of `farm status`.
-#[derive(Args)]
-pub struct StatusArguments {
-    /// Plan that `farm plan` has written
-    plan: PathBuf,
 }
 
 /// Runs one of the commands.
@@ -51,13 +46,17 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         Commands::Plan(arguments) => plan::run(global, arguments),
         Commands::Run(arguments) => run::run(global, arguments),
         Commands::Collect(arguments) => collect::run(global, arguments),
-        Commands::Status(arguments) => status(global, arguments),
+        Commands::Status { plan } => {
+            let plan = Plan::read(plan)?;
+            let all = plan.slices.len();
+            let done = all - results::missing(&plan).len();
+            output::say(if global.json {
+                json!({ "slices": all, "done": done }).to_string()
+            } else {
+                format!("{done} of {} done", counted(all, "slice"))
+            });
+            Ok(())
+        }
         Commands::Submit(arguments) => submit::run(global, arguments),
     }
-}
-
-fn status(global: &Global, arguments: &StatusArguments) -> Result<()> {
-    let status = Status::of(&Plan::read(&arguments.plan)?);
-    output::say(if global.json { json!(status).to_string() } else { status.line(32) });
-    Ok(())
 }

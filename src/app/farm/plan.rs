@@ -1,12 +1,14 @@
-//! `shadow-fields farm plan` cuts works into slices.
+//! `shadow-fields farm plan` cuts bakes and pictures into slices.
 
 use super::super::context::Context;
-use super::super::render::Numbered;
+use super::super::outputs::{Numbered, Output, Outputs, check_ending};
+use super::super::render::PictureArguments;
 use super::super::{Global, output};
-use super::run::{mesh_options, render_words, scene_hash};
-use crate::bake::kinds::Kind;
+use super::run::scene_hash;
+use crate::bake::hash_text;
 use crate::error::{Error, Result};
-use crate::farm::plan::{DeviceClass, Input, Plan, Task, TaskCost, TaskKind, Work};
+use crate::farm::plan::{device_class, plain};
+use crate::farm::{Film, Input, Plan, counted};
 use crate::merge::calibrate;
 use crate::scene::{self, Scene};
 use clap::Args;
@@ -14,181 +16,157 @@ use rayon::prelude::*;
 use serde_json::json;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
-
-/// Seconds and MB that a picture is taken to need for each pixel, and for the scene: corrected by what ran.
-const PIXEL_SECONDS: f64 = 1e-7;
-const PICTURE_SECONDS: f64 = 0.05;
-const PIXEL_MB: f64 = 1e-4;
-/// Bytes of a picture's file for each pixel.
-const PIXEL_BYTES: f64 = 1.5;
-/// MB that a process holds for each triangle of a mesh, beside what it holds anyway.
-const TRIANGLE_MB: f64 = 2e-3;
 
 /// Arguments of `farm plan`.
 #[derive(Args)]
-#[command(after_help = "Examples:\n  shadow-fields farm plan meshes/ -o plan.json -- --quality high\n  \
-    shadow-fields farm plan film.toml --frames 240 --pictures out/f_####.png -o film.json -- --size 1280x720")]
+#[command(after_help = "Examples:\n  shadow-fields farm plan meshes/ -o plan.json --quality high\n  \
+    shadow-fields farm plan film.toml --frames 240 --pictures out/f_####.png -o film.json --size 1280x720")]
 pub struct Arguments {
-    /// What is done: meshes to bake (.obj, .glb and .gltf files, or folders that hold some), or scenes (.toml) to render
+    /// Meshes to bake (.obj, .glb and .gltf files, or folders that hold some), or scenes (.toml) to render
     #[arg(required = true, value_name = "WORK")]
     works: Vec<PathBuf>,
     /// Plan to write
     #[arg(short, long, value_name = "PLAN.json")]
     output: PathBuf,
+    /// Replace the plan's file even if it is not a plan
+    #[arg(long)]
+    force: bool,
     /// Shared folder of results, relative to the plan's
     #[arg(long, default_value = "results", value_name = "DIR")]
     results: String,
+    /// Meshes or pictures of a slice, which should take some minutes
+    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=200))]
+    per_slice: u32,
     /// Number of pictures of each scene
-    #[arg(long, value_name = "N", requires = "pictures", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(long, value_name = "N", requires = "pictures", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: Option<u32>,
-    /// Where `farm collect` puts the pictures of a scene: a name with a run of # for the number, relative to the plan's folder. With
-    /// several scenes, $ stands for the scene's name
+    /// Where `farm collect` puts the pictures of a scene: a name with a run of # for the number, relative to the plan's
+    /// folder. With several scenes, $ stands for the scene's name
     #[arg(long, value_name = "F_####.png")]
     pictures: Option<String>,
-    /// Options of `bake` or `render` after --, which decide the bytes: --quality, --size and others
-    #[arg(last = true, value_name = "OPTIONS")]
-    words: Vec<String>,
-}
-
-/// A file to plan, read.
-struct Read {
-    input: Input,
-    /// Kinds with what they cost, of a mesh; empty for a scene.
-    kinds: Vec<(Kind, TaskCost)>,
-    pixels: f64,
+    #[command(flatten)]
+    picture: PictureArguments,
 }
 
 /// Plans slices.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let started = Instant::now();
-    output::check_folder(&arguments.output)?;
-    let full = std::path::absolute(&arguments.output).map_err(|e| Error::input(&arguments.output, e))?;
-    let folder = full.parent().unwrap_or(Path::new("/")).to_owned();
+    let full = std::path::absolute(&arguments.output).map_err(|error| Error::input(&arguments.output, error))?;
+    plain(&full)?;
+    plain(Path::new(&arguments.results))?;
+    if let Some(folder) = &global.cache_dir {
+        plain(folder)?;
+    }
+    check_ending("--output", &arguments.output, "json")?;
+    let (meshes, scenes) = find(global, &arguments.works)?;
+    let folder = full.parent().unwrap_or(Path::new("/"));
+    let patterns = patterns(arguments, &scenes)?;
+    let of_meshes = meshes.iter().flat_map(|mesh| scene::files::of_mesh(mesh));
+    let of_scenes = scenes.iter().flat_map(|scene| scene::files::of_scene(scene));
+    check_outputs(arguments, &of_meshes.chain(of_scenes).collect::<Vec<_>>(), folder, &patterns)?;
     let context = Context::new(global)?;
-    let (class, variant) = (DeviceClass::of(&context.device), calibrate::best_known(&context.device).name);
+    let mut picture = arguments.picture.clone();
+    // Without a variant of its own each machine would take what is fastest there.
+    picture.options.variant.get_or_insert_with(|| calibrate::best_known(&context.device));
+    let device = device_class(&context.device);
     // The device is only asked for its names: what it holds is free before work is listed.
     context.finish()?;
-    let mut plan = Plan::new(class, arguments.results.clone());
-    let (meshes, scenes) = find(&arguments.works)?;
-    if !meshes.is_empty() {
-        add_bakes(&mut plan, &arguments.words, &meshes, &folder)?;
-    }
-    if let Some(Pictures { frames, patterns }) = pictures(arguments, &scenes)? {
-        // Without a variant of its own each machine would take what is fastest there.
-        let mut words = arguments.words.clone();
-        if !words.iter().any(|word| word.starts_with("--variant")) {
-            words.extend(["--variant".into(), variant.into()]);
-        }
-        render_words(&scenes[0], &words)?;
-        for (path, pattern) in scenes.iter().zip(patterns) {
-            add_pictures(&mut plan, read_scene(path, &folder, &words)?, (words.clone(), pattern), frames);
-        }
+
+    let mut plan = Plan::new(device, arguments.results.clone(), picture.options.bake.resolve()?);
+    let read = meshes.par_iter().map(|path| {
+        let (mesh, _) = scene::load_mesh(path)?;
+        Ok(Input { path: written(path, folder)?, hash: hash_text(&mesh) })
+    });
+    let mut inputs: Vec<Input> = read.collect::<Result<_>>()?;
+    // Meshes of equal content share what is baked.
+    let mut known = HashSet::new();
+    inputs.retain(|input| known.insert(input.hash.clone()));
+    plan.add_meshes(inputs, arguments.per_slice);
+    for (path, pictures) in scenes.iter().zip(patterns) {
+        let scene = Scene::load(path)?;
+        let options = picture.options.frame(&scene)?;
+        let first_s = picture.first_s(&scene);
+        let input = Input { path: written(path, folder)?, hash: scene_hash(&scene) };
+        let film = Film { scene: input, pictures, options, first_s, fps: picture.fps };
+        plan.add_film(film, arguments.frames.unwrap_or(1), arguments.per_slice);
     }
     plan.write(&arguments.output)?;
-    let seconds: f64 = plan.slices.iter().map(|slice| f64::from(slice.seconds)).sum();
-    if global.json {
-        output::say(json!({ "slices": plan.slices.len(), "tasks": plan.tasks.len(), "seconds": seconds }).to_string());
+    let slices = plan.slices.len();
+    output::say(if global.json {
+        json!({ "slices": slices }).to_string()
     } else {
-        output::say(format!(
-            "{}: {} slices of {} tasks, about {:.0} s of work, planned in {:.2} s",
-            output::shown(&arguments.output),
-            plan.slices.len(),
-            plan.tasks.len(),
-            seconds,
-            started.elapsed().as_secs_f64()
-        ));
+        format!("{}: {}", output::shown(&arguments.output), counted(slices, "slice"))
+    });
+    Ok(())
+}
+
+/// Fails where the plan or a picture would replace an input, or the plan a file that is none.
+fn check_outputs(arguments: &Arguments, inputs: &[PathBuf], folder: &Path, patterns: &[String]) -> Result<()> {
+    let path = &arguments.output;
+    let mut outputs = vec![Output::new("--output", path, "json")];
+    for pattern in patterns {
+        let pattern = folder.join(pattern);
+        let pictures = match Numbered::new(&pattern)? {
+            Some(numbered) => (0..arguments.frames.unwrap_or(1)).map(|number| numbered.path(number)).collect(),
+            None => vec![pattern],
+        };
+        // `collect` makes their folder: only one that is there can be an input.
+        let mut pictures = pictures.into_iter().filter(|path| path.exists());
+        if let Some(first) = pictures.next() {
+            outputs.push(Output::new("--pictures", first, "png").with(pictures));
+        }
+    }
+    Outputs::check(inputs, &outputs)?;
+    if path.is_file() && !arguments.force && !Plan::is_at(path) {
+        return Err(Error::Usage(format!("{} is no plan; --force replaces it", path.display())));
     }
     Ok(())
 }
 
-/// Adds the bakes of meshes. Those of equal content share what is baked.
-fn add_bakes(plan: &mut Plan, words: &[String], meshes: &[PathBuf], folder: &Path) -> Result<()> {
-    let options = mesh_options(words)?;
-    let work = plan.works.len() as u32;
-    plan.works.push(Work { words: words.to_vec(), pictures: None });
-    let read: Vec<Read> = meshes.par_iter().map(|path| read_mesh(path, folder, &options)).collect::<Result<_>>()?;
-    let mut known = HashSet::new();
-    for Read { input, kinds, .. } in read {
-        if !known.insert(input.hash.clone()) {
-            continue;
-        }
-        let index = plan.inputs.len() as u32;
-        plan.inputs.push(input);
-        for (kind, cost) in kinds {
-            let parts = if kind.is_cut() { Plan::parts(cost.seconds) } else { 1 };
-            let share = f64::from(parts);
-            let cost = TaskCost { seconds: cost.seconds / share, bytes: cost.bytes / share, ..cost };
-            let task = |first| Task { work, input: index, kind: TaskKind::Bake(kind), first, count: parts };
-            (0..parts).for_each(|part| plan.add(task(part), cost));
-        }
-    }
-    Ok(())
-}
-
-/// Adds the pictures of a scene, `words` being those of `render`, in runs that fit into a slice.
-fn add_pictures(plan: &mut Plan, read: Read, (words, pattern): (Vec<String>, String), frames: u32) {
-    let (work, index) = (plan.works.len() as u32, plan.inputs.len() as u32);
-    plan.works.push(Work { words, pictures: Some(pattern) });
-    plan.inputs.push(read.input);
-    let each = TaskCost {
-        seconds: PICTURE_SECONDS + read.pixels * PIXEL_SECONDS,
-        memory_mb: read.pixels * PIXEL_MB,
-        bytes: read.pixels * PIXEL_BYTES,
-    };
-    let run = Plan::fitting(each);
-    for first in (0..frames).step_by(run as usize) {
-        let count = run.min(frames - first);
-        let share = f64::from(count);
-        let cost = TaskCost { seconds: share * each.seconds, bytes: share * each.bytes, ..each };
-        plan.add(Task { work, input: index, kind: TaskKind::Frames, first, count }, cost);
-    }
-}
-
-/// How many pictures there are of each scene, and the pattern of their names for each.
-struct Pictures {
-    frames: u32,
-    patterns: Vec<String>,
-}
-
-/// What is said of pictures; `None` where there are no scenes.
-///
-/// # Errors
-/// `Usage` where something is missing, or pictures would overwrite one another.
-fn pictures(arguments: &Arguments, scenes: &[PathBuf]) -> Result<Option<Pictures>> {
+/// Where the pictures of each scene go.
+fn patterns(arguments: &Arguments, scenes: &[PathBuf]) -> Result<Vec<String>> {
     let wrong = |what: String| Err(Error::Usage(what));
     let (frames, pictures) = match (scenes.first(), arguments.frames, &arguments.pictures) {
         (Some(_), Some(frames), Some(pictures)) => (frames, pictures),
         (Some(scene), ..) => return wrong(format!("{}: a scene needs --frames and --pictures", scene.display())),
-        (None, None, None) => return Ok(None),
-        (None, ..) => return wrong("--frames and --pictures are for scenes, and there is none".into()),
+        (None, None, None) if arguments.picture.options.size.is_none() && arguments.picture.time.is_none() => {
+            return Ok(Vec::new());
+        }
+        (None, ..) => return wrong("--frames, --pictures, --size and --time are for scenes, and there is none".into()),
     };
-    if frames > 1 && Numbered::new(Path::new(pictures), "png")?.is_none() {
+    plain(Path::new(pictures))?;
+    check_ending("--pictures", Path::new(pictures), "png")?;
+    if frames > 1 && Numbered::new(Path::new(pictures))?.is_none() {
         return wrong(format!("--pictures {pictures}: the name needs a run of # for the number"));
     }
     let name = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let patterns: Vec<String> = scenes.iter().map(|path| pictures.replace('$', &name(path))).collect();
     let distinct: HashSet<&String> = patterns.iter().collect();
     if distinct.len() < patterns.len() {
-        return wrong(format!(
-            "--pictures {pictures}: the names of all scenes have to differ; $ stands for the scene's name"
-        ));
+        let what = "the names of all scenes have to differ; $ stands for the scene's name";
+        return wrong(format!("--pictures {pictures}: {what}"));
     }
-    Ok(Some(Pictures { frames, patterns }))
+    Ok(patterns)
 }
 
 /// Meshes and scenes of the works, in order of their names within a folder.
-fn find(works: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
-    let is_mesh = |path: &Path| {
-        path.extension().is_some_and(|e| ["obj", "glb", "gltf"].iter().any(|m| e.eq_ignore_ascii_case(m)))
+fn find(global: &Global, works: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+    let has_ending = |path: &Path, endings: &[&str]| {
+        path.extension().is_some_and(|ending| endings.iter().any(|known| ending.eq_ignore_ascii_case(known)))
     };
-    let (mut meshes, mut scenes) = (Vec::new(), Vec::new());
+    let is_mesh = |path: &Path| has_ending(path, &["obj", "glb", "gltf"]);
+    let mut meshes = Vec::new();
+    let mut scenes = Vec::new();
     for path in works {
         let cannot = |error| Error::input(path, format!("cannot be read: {error}"));
         if std::fs::metadata(path).map_err(cannot)?.is_dir() {
             let entries = std::fs::read_dir(path).map_err(cannot)?.map(|entry| entry.map(|e| e.path()));
-            let mut found: Vec<PathBuf> = entries.collect::<std::io::Result<_>>().map_err(cannot)?;
-            found.retain(|path| is_mesh(path));
+            let entries: Vec<PathBuf> = entries.collect::<std::io::Result<_>>().map_err(cannot)?;
+            let folders = entries.iter().filter(|path| path.is_dir()).count();
+            if folders > 0 {
+                let left_out = counted(folders, "folder");
+                output::note(global, format!("note: {}: {left_out} in it left out; name them too", path.display()));
+            }
+            let mut found: Vec<PathBuf> = entries.into_iter().filter(|path| is_mesh(path)).collect();
             if found.is_empty() {
                 return Err(Error::input(path, "a folder without meshes (.obj, .glb, .gltf)"));
             }
@@ -196,7 +174,7 @@ fn find(works: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
             meshes.extend(found);
         } else if is_mesh(path) {
             meshes.push(path.clone());
-        } else if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+        } else if has_ending(path, &["toml"]) {
             scenes.push(path.clone());
         } else {
             return Err(Error::input(path, "expected a folder, a mesh (.obj, .glb, .gltf) or a scene (.toml)"));
@@ -208,26 +186,5 @@ fn find(works: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
 /// A path as plans have it.
 fn written(path: &Path, folder: &Path) -> Result<String> {
     let full = std::path::absolute(path).map_err(|error| Error::input(path, error))?;
-    let short = full.strip_prefix(folder).unwrap_or(&full);
-    short.to_str().map(str::to_owned).ok_or_else(|| Error::input(path, "a plan needs names in UTF-8"))
-}
-
-fn read_mesh(path: &Path, folder: &Path, options: &crate::bake::Options) -> Result<Read> {
-    let (mesh, _) = scene::load_mesh(path)?;
-    let memory_mb = mesh.triangles.len() as f64 * TRIANGLE_MB;
-    let cost = |kind: Kind| TaskCost {
-        seconds: kind.seconds(&mesh, options),
-        memory_mb,
-        bytes: kind.bytes(&mesh, options) as f64,
-    };
-    let kinds = Kind::of(&mesh).into_iter().map(|kind| (kind, cost(kind))).collect();
-    let input = Input { path: written(path, folder)?, hash: crate::bake::hash_text(&mesh) };
-    Ok(Read { input, kinds, pixels: 0.0 })
-}
-
-fn read_scene(path: &Path, folder: &Path, words: &[String]) -> Result<Read> {
-    let scene = Scene::load(path)?;
-    let size = render_words(path, words)?.unwrap_or([scene.data.output.width, scene.data.output.height]);
-    let input = Input { path: written(path, folder)?, hash: scene_hash(&scene) };
-    Ok(Read { input, kinds: Vec::new(), pixels: f64::from(size[0]) * f64::from(size[1]) })
+    plain(full.strip_prefix(folder).unwrap_or(&full)).map(str::to_owned)
 }

@@ -1,18 +1,16 @@
 //! `shadow-fields farm run` computes one slice.
 
 use super::super::context::Context;
-use super::super::{Cli, Global, Subcommands, output, parse, render};
-use crate::asset::Mesh;
-use crate::bake::cache::Cache;
-use crate::bake::parts::{BakePart, bake, bake_part};
-use crate::bake::{self, hash_text};
+use super::super::{Global, output};
+use crate::asset::picture;
+use crate::bake::{self, Wanted, bakes_transfer, cache::Cache, hash_text};
 use crate::error::{Error, Result};
-use crate::farm::plan::{DeviceClass, Plan, Task, TaskKind};
-use crate::farm::results::{self, Content, SliceResult};
+use crate::farm::results::{self, SliceResult};
+use crate::farm::{Film, Input, Plan, Slice};
+use crate::field::FieldKind;
 use crate::scene::{self, Scene};
 use clap::Args;
-use std::ffi::OsString;
-use std::io;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -24,195 +22,119 @@ pub struct Arguments {
     /// Number of the slice, from 0
     #[arg(long, value_name = "K")]
     slice: usize,
+    /// End when stdin does, which an engine holds open that waits for the slice
+    #[arg(long, hide = true)]
+    until_stdin_ends: bool,
 }
 
 /// Does one slice.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let plan = Plan::read(&arguments.plan)?;
-    let slice = arguments.slice;
-    if slice >= plan.slices.len() {
-        return Err(Error::Usage(format!("--slice {slice}: the plan has slices 0 to {}", plan.slices.len() - 1)));
-    }
-    let line = |what: &str| output::say(format!("slice {slice} of {}: {what}", output::shown(&arguments.plan)));
-    match results::find(&plan, slice) {
-        SliceResult::Whole(..) => {
-            line("its result is there and intact");
+    let number = arguments.slice;
+    let Some(slice) = plan.slices.get(number) else {
+        return Err(Error::Usage(format!("--slice {number}: the plan has slices 0 to {}", plan.slices.len() - 1)));
+    };
+    let say = |what: &str| output::say(format!("slice {number} of {}: {what}", output::shown(&arguments.plan)));
+    match results::find(&plan, number) {
+        SliceResult::Whole(_) => {
+            say("its result is there and intact");
             return Ok(());
         }
         SliceResult::Damaged(error) => log::warn!("{error}; doing the slice anew"),
         SliceResult::Missing => {}
     }
     let started = Instant::now();
-    let context = Context::new(global)?;
-    plan.check_device(&DeviceClass::of(&context.device))?;
-    let mut running = Running { plan: &plan, global, context: Some(context), mesh: None };
-    let mut content = Content::default();
-    for (index, task) in plan.tasks_of(slice).iter().enumerate() {
-        running.task(task, &mut |name, bytes| {
-            content.add(index as u32, name, bytes);
-            Ok(())
-        })?;
+    // It is removed at the end, and by the system's sweep after a kill.
+    let scratch =
+        tempfile::tempdir().map_err(|error| Error::Failed(format!("a temporary folder cannot be written: {error}")))?;
+    if arguments.until_stdin_ends {
+        end_with_stdin(scratch.path().to_owned());
     }
+    let context = Context::new(global)?;
+    plan.check_device(&context.device)?;
+    // The folder in which a cache keeps what is baked.
+    let made = scratch.path().join("fields");
+    let count = match *slice {
+        Slice::Meshes { first, count } => {
+            let mut files = 0;
+            for mesh in plan.meshes(first, count) {
+                files += bake_mesh(&context, &plan, mesh, scratch.path())?;
+            }
+            files
+        }
+        Slice::Pictures { film, first, count } => {
+            render(&context, &plan, &plan.films[film as usize], first..first + count, &made)?;
+            count as usize
+        }
+    };
     // A result that the validation layer objected to is not written.
-    running.context.map_or(Ok(()), Context::finish)?;
-    let seconds = started.elapsed().as_secs_f64();
-    content.write(&plan, slice, seconds)?;
-    line(&format!("done in {seconds:.1} s"));
+    context.finish()?;
+    results::write(&plan, number, &made, count)?;
+    say(&format!("done in {:.1} s", started.elapsed().as_secs_f64()));
     Ok(())
 }
 
-/// Takes the name and the content of a file that a task has made.
-pub(super) type Take<'t> = &'t mut dyn FnMut(&str, &[u8]) -> Result<()>;
-
-struct Running<'r> {
-    plan: &'r Plan,
-    global: &'r Global,
-    /// `None` while a picture is rendered, which opens its own.
-    context: Option<Context>,
-    /// The mesh that was read last, and the index of its input.
-    mesh: Option<(usize, Mesh)>,
+/// Ends this process when the one that started it has ended, which held the other end of stdin.
+fn end_with_stdin(scratch: PathBuf) {
+    std::thread::spawn(move || {
+        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        let _ = std::fs::remove_dir_all(scratch);
+        std::process::exit(1);
+    });
 }
 
-impl Running<'_> {
-    fn task(&mut self, task: &Task, take: Take<'_>) -> Result<()> {
-        let Task { work, input, kind, first, count } = *task;
-        let input = input as usize;
-        let words = &self.plan.works[work as usize].words;
-        match kind {
-            TaskKind::Frames => self.frames(input, words, first, count, take),
-            TaskKind::Bake(kind) => {
-                let options = mesh_options(words)?;
-                if self.context.is_none() {
-                    self.context = Some(Context::new(self.global)?);
-                }
-                if self.mesh.as_ref().is_none_or(|(last, _)| *last != input) {
-                    self.mesh = Some((input, mesh(self.plan, input)?));
-                }
-                let (Some(context), Some((_, mesh))) = (&self.context, &self.mesh) else {
-                    unreachable!("both were made above")
-                };
-                let what = format!("{} {}", mesh.name, kind.name());
-                let progress = |done, all| context.progress.show(&what, done, all);
-                let part = BakePart { index: first, count };
-                if part != BakePart::WHOLE {
-                    return take("part", &bake_part(&context.baker, (mesh, &options), kind, part, &progress)?);
-                }
-                // A cache of its own: what it holds then is what was baked.
-                let folder = scratch()?;
-                let cache = Cache::new(Some(folder.path()));
-                bake(&context.baker, &cache, (mesh, &options), kind, &progress)?;
-                files(&folder.path().join("fields"), take)
-            }
-        }
-    }
-
-    fn frames(&mut self, input: usize, words: &[String], first: u32, count: u32, take: Take<'_>) -> Result<()> {
-        let input = &self.plan.inputs[input];
-        let path = self.plan.path(&input.path);
-        unchanged(&path, &scene_hash(&Scene::load(&path)?), &input.hash)?;
-        // One device at a time: two inside one process crashed a driver.
-        self.context.take().map_or(Ok(()), Context::finish)?;
-        let folder = scratch()?;
-        let output = folder.path().join("##########.png");
-        let mut line: Vec<String> =
-            ["--first", &first.to_string(), "--frames", &count.to_string()].map(str::to_owned).into();
-        line.extend_from_slice(words);
-        let arguments = render_line(&path, &output, &line)?;
-        render::run(self.global, &arguments)?;
-        files(folder.path(), take)
-    }
-}
-
-/// A folder for what a slice makes on its way. It is removed at the end, and by the system's sweep after a kill.
-pub(super) fn scratch() -> Result<tempfile::TempDir> {
-    tempfile::tempdir().map_err(|error| Error::Failed(format!("no temporary folder can be made: {error}")))
-}
-
-/// Hands on the files in a folder, in the order of their names.
-///
-/// # Errors
-/// What `take` returns; `Failed` where there are none: what could not be written was kept in memory.
-pub(super) fn files(folder: &Path, take: Take<'_>) -> Result<()> {
-    let cannot = |error| Error::Failed(format!("{}: cannot be read: {error}", folder.display()));
-    let mut names = match std::fs::read_dir(folder) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
-        entries => {
-            entries.and_then(|all| all.map(|e| Ok(e?.file_name())).collect::<io::Result<_>>()).map_err(cannot)?
-        }
-    };
-    if names.is_empty() {
-        return Err(Error::Failed(format!("{}: nothing was written, the disk may be full", folder.display())));
-    }
-    names.sort();
-    names.iter().try_for_each(|name| take(&name.to_string_lossy(), &std::fs::read(folder.join(name)).map_err(cannot)?))
-}
-
-/// The mesh of an input, which has to be that of the plan.
-pub(super) fn mesh(plan: &Plan, input: usize) -> Result<Mesh> {
-    let input = &plan.inputs[input];
+/// Bakes everything that a scene may need of a mesh into a cache of its own, and answers with the number of its files.
+fn bake_mesh(context: &Context, plan: &Plan, input: &Input, folder: &Path) -> Result<usize> {
     let path = plan.path(&input.path);
     let (mesh, _) = scene::load_mesh(&path)?;
-    unchanged(&path, &hash_text(&mesh), &input.hash)?;
-    Ok(mesh)
+    check_unchanged(&path, &hash_text(&mesh), &input.hash)?;
+    let baker = &context.baker;
+    let options = &plan.bake;
+    let cache = Cache::new(Some(folder));
+    let progress = |done, all| context.progress.show(&mesh.name, done, all);
+    let mut files = 0;
+    let radiance = mesh.colors.is_some().then_some(FieldKind::Radiance);
+    for kind in [Some(FieldKind::Occlusion), radiance].into_iter().flatten() {
+        cache.field(baker, &mesh, &bake::header(&mesh, kind, options), &progress)?;
+        files += 1;
+    }
+    cache.silhouette(baker, &mesh, options, &progress)?;
+    files += 1;
+    if bakes_transfer(&mesh) {
+        cache.vertices(baker, &mesh, options, Wanted::BOTH, &progress)?;
+        files += 2;
+    }
+    Ok(files)
 }
 
-fn unchanged(path: &Path, found: &str, planned: &str) -> Result<()> {
+/// Renders pictures of a film into a folder, where their numbers are their names.
+fn render(context: &Context, plan: &Plan, film: &Film, numbers: Range<u32>, folder: &Path) -> Result<()> {
+    let path = plan.path(&film.scene.path);
+    let scene = Scene::load(&path)?;
+    check_unchanged(&path, &scene_hash(&scene), &film.scene.hash)?;
+    let shape = &scene.data.output;
+    let mut frame = context.frame(&scene, film.options).map_err(|error| match error {
+        Error::Input(_) => error.context(path.display()),
+        other => other,
+    })?;
+    let [width, height] = film.options.size;
+    crate::text::make_folder(folder)?;
+    let count = numbers.end - numbers.start;
+    for (done, number) in (1..).zip(numbers) {
+        let time_s = film.first_s + f64::from(number) / f64::from(film.fps);
+        frame.render(&scene.at(time_s), Some(shape.white()))?;
+        let path = folder.join(format!("{number}.png"));
+        picture::write_png(&path, width, height, &frame.picture(), shape.exposure_ev)?;
+        context.progress.pictures(done, count);
+    }
+    Ok(())
+}
+
+fn check_unchanged(path: &Path, found: &str, planned: &str) -> Result<()> {
     if found == planned {
-        Ok(())
-    } else {
-        Err(Error::input(path, "it has changed since the plan was made; plan again"))
+        return Ok(());
     }
-}
-
-/// The options of a bake that words say.
-///
-/// # Errors
-/// `Usage` where they are not understood.
-pub(super) fn mesh_options(words: &[String]) -> Result<bake::Options> {
-    match understood(["shadow-fields", "bake", "m.obj", "-o", "m.sf"].map(OsString::from).into(), words)? {
-        Subcommands::Bake(arguments) => arguments.of_any_kind(),
-        _ => Err(Error::Usage("the options after -- are not those of bake".into())),
-    }
-}
-
-/// The subcommand of a line with words behind `--`.
-///
-/// # Errors
-/// `Usage` where they are not understood, or are options of every command, which would decide nothing.
-fn understood(mut line: Vec<OsString>, words: &[String]) -> Result<Subcommands> {
-    let said = |error: Error| {
-        let text = error.to_string();
-        let reason = text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
-        Error::Usage(format!("the options after --: {reason}"))
-    };
-    let without = parse(&line).map_err(said)?.global;
-    line.extend(words.iter().map(OsString::from));
-    let Cli { global, command } = parse(&line).map_err(said)?;
-    if format!("{global:?}") == format!("{without:?}") {
-        Ok(command)
-    } else {
-        Err(Error::Usage(
-            "the options after -- are those of bake or render alone; options of every command go before".into(),
-        ))
-    }
-}
-
-fn render_line(scene: &Path, output: &Path, words: &[String]) -> Result<render::Arguments> {
-    let line = ["shadow-fields".into(), "render".into(), scene.into(), "-o".into(), output.as_os_str().to_owned()];
-    match understood(line.into(), words)? {
-        Subcommands::Render(arguments) => Ok(arguments),
-        _ => Err(Error::Usage("the options after -- are not those of render".into())),
-    }
-}
-
-/// The size of pictures that words of `render` say, if they say one.
-///
-/// # Errors
-/// `Usage` where they are not understood, or write anything besides pictures.
-pub(super) fn render_words(scene: &Path, words: &[String]) -> Result<Option<[u32; 2]>> {
-    let arguments = render_line(scene, Path::new("#.png"), words)?;
-    arguments.pictures_only()?;
-    Ok(arguments.size)
+    Err(Error::input(path, "it has changed since the plan was made; plan again"))
 }
 
 /// The hash of a scene as it was read: with its meshes and its distant light, not with the way they were written.

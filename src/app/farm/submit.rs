@@ -3,12 +3,12 @@
 use super::super::output::Progress;
 use super::super::{Global, output};
 use crate::error::{Error, Result};
-use crate::farm::Plan;
 use crate::farm::engines::{self, Call};
-use crate::farm::local::{Runner, cannot_start};
-use crate::farm::status::missing;
+use crate::farm::plan::plain;
+use crate::farm::{Plan, counted, local, results};
 use crate::gpu::{self, Validation};
 use clap::{Args, ValueEnum};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -35,8 +35,8 @@ pub struct Arguments {
     /// What runs the slices
     #[arg(long, value_enum, value_name = "ENGINE")]
     engine: Engine,
-    /// Number of slices at a time: processes of local, or of a Dask cluster on this machine (default: one per core), or tasks of all Slurm
-    /// arrays together, but at least one of each (default: no limit)
+    /// Number of slices at a time: processes of local, or of a Dask cluster on this machine (default: one per core), or
+    /// tasks of a Slurm array (default: no limit)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     workers: Option<u32>,
     /// Address of a Dask scheduler; default: a cluster on this machine
@@ -50,45 +50,47 @@ pub struct Arguments {
 /// Hands slices to an engine.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let plan = Plan::read(&arguments.plan)?;
-    let slices = missing(&plan);
-    let full = |path: &Path| std::path::absolute(path).map_err(|error| Error::input(path, error));
-    let program =
-        std::env::current_exe().map_err(|e| Error::Failed(format!("the program's own file is not known: {e}")))?;
-    let call = Call { program, plan: full(&arguments.plan)?, words: passed_on(global) };
-    if slices.is_empty() && arguments.engine != Engine::Openjd {
-        output::note(global, "all results are there");
-        return Ok(());
+    let path = std::path::absolute(&arguments.plan).map_err(|error| Error::input(&arguments.plan, error))?;
+    let program = std::env::current_exe()
+        .map_err(|error| Error::Failed(format!("the program's own file is not known: {error}")))?;
+    let mut options = passed_on(global)?;
+    if matches!(arguments.engine, Engine::Local | Engine::Dask) {
+        options.push("--until-stdin-ends".into());
+    }
+    let call = Call::new(&program, &path, options)?;
+    let mut slices = results::missing(&plan);
+    if slices.is_empty() {
+        if arguments.engine != Engine::Openjd {
+            output::note(global, "all results are there");
+            return Ok(());
+        }
+        slices = (0..plan.slices.len()).collect();
     }
     match arguments.engine {
-        Engine::Local => {
-            let workers = arguments.workers.map_or_else(gpu::cores, |workers| workers as usize);
-            local(global, &Runner { call, workers }, &slices)
-        }
-        Engine::Slurm => slurm(arguments, &plan, &call, &slices),
-        Engine::Dask => dask(arguments, &call, &slices),
+        Engine::Local => local(global, arguments, &call, &slices),
+        Engine::Slurm => slurm(arguments, &call, &path, &slices),
+        Engine::Dask => dask(arguments, &call, &path, &slices),
         Engine::Print => {
-            slices.iter().for_each(|slice| output::say(call.line(&slice.to_string())));
+            slices.iter().for_each(|slice| output::say(call.line(*slice)));
             Ok(())
         }
         Engine::Openjd => {
-            let all: Vec<usize> = (0..plan.slices.len()).collect();
-            let template = engines::openjd(&plan, &call, if slices.is_empty() { &all } else { &slices });
-            output::say(format!("{template:#}"));
+            output::say(engines::openjd(&call, &slices)?.trim_end());
             Ok(())
         }
     }
 }
 
-/// Options of this command that slices get too. Each slice is one process.
-fn passed_on(global: &Global) -> Vec<String> {
-    let mut words: Vec<String> = ["--jobs", "1", "--no-progress", "--quiet"].map(str::to_owned).into();
+/// Options of this command that slices get too.
+fn passed_on(global: &Global) -> Result<Vec<String>> {
+    let mut words: Vec<String> = ["--no-progress", "--quiet"].map(str::to_owned).into();
     let mut add = |name: &str, value: String| words.extend([name.to_owned(), value]);
     if let Some(device) = &global.device {
         add("--device", device.clone());
     }
     if let Some(folder) = &global.cache_dir {
-        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.clone());
-        add("--cache-dir", folder.to_string_lossy().into_owned());
+        let full = std::path::absolute(folder).map_err(|error| Error::input(folder, error))?;
+        add("--cache-dir", plain(&full)?.to_owned());
     }
     if global.validation != Validation::Off {
         add("--validation", format!("{:?}", global.validation).to_lowercase());
@@ -96,79 +98,69 @@ fn passed_on(global: &Global) -> Vec<String> {
     if global.no_cache {
         words.push("--no-cache".into());
     }
-    words
+    Ok(words)
 }
 
-fn local(global: &Global, runner: &Runner, slices: &[usize]) -> Result<()> {
+fn local(global: &Global, arguments: &Arguments, call: &Call, slices: &[usize]) -> Result<()> {
+    let workers = arguments.workers.map_or_else(gpu::cores, |workers| workers as usize);
     let progress = Progress::new(global);
-    let failures = runner.run(slices, &|done| progress.slices(done as u32, slices.len() as u32))?;
+    let failures = local::run(call, workers, slices, &|done| progress.slices(done as u32, slices.len() as u32));
     for (slice, said) in &failures {
         log::error!("slice {slice}: {said}");
     }
-    match failures.first() {
-        None => {
-            output::say(format!("{} slices done", slices.len()));
-            Ok(())
-        }
-        Some((slice, said)) => {
-            Err(Error::Failed(format!("{} of {} slices failed; slice {slice}: {said}", failures.len(), slices.len())))
-        }
-    }
+    let all = counted(slices.len(), "slice");
+    let Some((slice, said)) = failures.first() else {
+        output::say(format!("{all} done"));
+        return Ok(());
+    };
+    Err(Error::Failed(format!("{} of {all} failed; slice {slice}: {said}", failures.len())))
 }
 
-/// Writes a file beside the plan, with another ending.
-fn beside(plan: &Path, ending: &str, text: &str) -> Result<PathBuf> {
-    let path = plan.with_extension(ending);
-    crate::text::write(&path, text)?;
-    Ok(path)
+fn cannot_start(program: &str, error: &std::io::Error) -> Error {
+    Error::Failed(format!("{program}: cannot be started: {error}"))
 }
 
-/// A command as a line of a shell script.
+/// A command as a line of a shell.
 fn shown(command: &Command) -> String {
-    let words = std::iter::once(command.get_program()).chain(command.get_args());
-    words.map(|word| engines::quoted(&word.to_string_lossy())).collect::<Vec<_>>().join(" ")
+    let words = [command.get_program()].into_iter().chain(command.get_args());
+    engines::shell(&json!(words.map(|word| word.to_string_lossy()).collect::<Vec<_>>()))
 }
 
-fn slurm(arguments: &Arguments, plan: &Plan, call: &Call, slices: &[usize]) -> Result<()> {
-    let logs = call.plan.with_extension("logs");
+fn slurm(arguments: &Arguments, call: &Call, path: &Path, slices: &[usize]) -> Result<()> {
+    let logs = path.with_extension("logs");
+    let output = format!("--output={}", engines::slurm_logs(&logs)?);
     crate::text::make_folder(&logs)?;
-    let script = beside(&call.plan, "sbatch", &engines::slurm(plan, call, &logs))?;
-    for (first, tasks) in engines::arrays(slices, arguments.workers.map(|workers| workers as usize)) {
-        let mut command = Command::new("sbatch");
-        command.args([&format!("--array={tasks}"), &format!("--export=ALL,FIRST={first}")]).arg(&script);
-        if arguments.dry_run {
-            output::say(shown(&command));
-            continue;
-        }
-        let done = command.output().map_err(|error| cannot_start(Path::new("sbatch"), &error))?;
-        let said = if done.status.success() { &done.stdout } else { &done.stderr };
-        let said = String::from_utf8_lossy(said).trim().to_owned();
-        if !done.status.success() {
-            return Err(Error::Failed(format!("sbatch: {said}")));
-        }
-        output::say(said);
-    }
-    Ok(())
-}
-
-fn dask(arguments: &Arguments, call: &Call, slices: &[usize]) -> Result<()> {
-    let script = beside(&call.plan, "dask.py", engines::DASK)?;
-    let mut command = Command::new("python3");
-    command.arg(&script);
-    if let Some(address) = &arguments.scheduler {
-        command.args(["--scheduler", address]);
-    }
-    if let Some(workers) = arguments.workers {
-        command.args(["--workers", &workers.to_string()]);
-    }
-    let numbers: String = slices.iter().map(|slice| format!("{slice}\n")).collect();
-    command.arg(beside(&call.plan, "slices", &numbers)?);
-    // The number of the slice comes last.
-    command.arg(&call.program).args(["farm", "run"]).arg(&call.plan).args(&call.words).arg("--slice");
+    let script = path.with_extension("sbatch");
+    crate::text::write(&script, engines::slurm(call))?;
+    let limit = arguments.workers.map_or_else(String::new, |workers| format!("%{workers}"));
+    let mut command = Command::new("sbatch");
+    command.arg(format!("--array={}{limit}", engines::ranges(slices))).arg(output).arg(&script);
     if arguments.dry_run {
         output::say(shown(&command));
         return Ok(());
     }
-    let status = command.status().map_err(|error| cannot_start(Path::new("python3"), &error))?;
-    if status.success() { Ok(()) } else { Err(Error::Failed(format!("dask: not all slices are done ({status})"))) }
+    let done = command.output().map_err(|error| cannot_start("sbatch", &error))?;
+    if !done.status.success() {
+        let said = local::last_line(&done).unwrap_or_else(|| done.status.to_string());
+        return Err(Error::Failed(format!("{said} (an array may be too long: plan with more --per-slice)")));
+    }
+    output::say(String::from_utf8_lossy(&done.stdout).trim_end());
+    Ok(())
+}
+
+fn dask(arguments: &Arguments, call: &Call, path: &Path, slices: &[usize]) -> Result<()> {
+    let script = path.with_extension("dask.py");
+    crate::text::write(&script, engines::dask(call, slices, arguments.scheduler.as_deref(), arguments.workers))?;
+    let mut command = Command::new("python3");
+    command.arg(&script);
+    if arguments.dry_run {
+        output::say(shown(&command));
+        return Ok(());
+    }
+    let done = local::output_with_stdin(&mut command).map_err(|error| cannot_start("python3", &error))?;
+    if done.status.success() {
+        return Ok(());
+    }
+    let said = local::last_line(&done).unwrap_or_else(|| done.status.to_string());
+    Err(Error::Failed(format!("dask: {said}")))
 }

@@ -18,11 +18,8 @@ struct Elements {
     bytes: Vec<u8>,
 }
 
-/// Numbers of an accessor with `widths` numbers an element, one element after the other. Quantised numbers that are normalised lie
-/// within -1 to 1.
-///
-/// # Errors
-/// `Input` that names the accessor: elements of another width, beyond their buffer, too many, or a number that is not finite.
+/// Numbers of an accessor with `widths` numbers an element, one element after the other. Quantised numbers that are
+/// normalised lie within -1 to 1.
 pub fn numbers(document: &Document, index: usize, widths: &[usize]) -> Result<Vec<f32>> {
     let elements = elements(document, index)?;
     if !widths.contains(&elements.width) {
@@ -50,17 +47,17 @@ pub fn numbers(document: &Document, index: usize, widths: &[usize]) -> Result<Ve
 }
 
 /// Elements of three numbers.
-///
-/// # Errors
-/// As [`numbers`].
 pub fn triples(document: &Document, index: usize) -> Result<Vec<glam::Vec3>> {
     Ok(numbers(document, index, &[3])?.chunks_exact(3).map(glam::Vec3::from_slice).collect())
 }
 
+/// Whether the file gives an accessor no numbers, so that all of them are zeros.
+pub fn is_unfilled(document: &Document, index: usize) -> bool {
+    let accessor = &document.root.accessors[index];
+    accessor.buffer_view.is_none() && accessor.sparse.is_none()
+}
+
 /// Indices: whole numbers, one an element.
-///
-/// # Errors
-/// As [`numbers`], and where the accessor's numbers are not unsigned.
 pub fn indices(document: &Document, index: usize) -> Result<Vec<u32>> {
     let elements = elements(document, index)?;
     whole(elements.component, &elements.bytes)
@@ -80,10 +77,11 @@ fn whole(component: ComponentType, bytes: &[u8]) -> Option<Vec<u32>> {
 fn elements(document: &Document, index: usize) -> Result<Elements> {
     let place = format!("accessors[{index}]");
     let accessor: &Accessor = &document.root.accessors[index];
-    let (Checked::Valid(component), Checked::Valid(kind)) = (&accessor.component_type, &accessor.type_) else {
-        return Err(document.fail(place, "its componentType or type is not a valid one"));
-    };
-    let (component, normalized) = (component.0, accessor.normalized);
+    let bad = |field: &str| document.fail(format!("{place}.{field}"), "the value is not a valid one");
+    let Checked::Valid(component) = &accessor.component_type else { return Err(bad("componentType")) };
+    let Checked::Valid(kind) = &accessor.type_ else { return Err(bad("type")) };
+    let component = component.0;
+    let normalized = accessor.normalized;
     if matches!(kind, Type::Mat2 | Type::Mat3 | Type::Mat4) {
         return Err(document.fail(place, "matrices are not read"));
     }
@@ -112,13 +110,15 @@ fn elements(document: &Document, index: usize) -> Result<Elements> {
             return Err(document.fail(place, "its componentType is not a valid one"));
         };
         let amount = amount as usize;
-        let (view, offset) = (sparse.indices.buffer_view.value(), sparse.indices.byte_offset.0);
+        let view = sparse.indices.buffer_view.value();
+        let offset = sparse.indices.byte_offset.0;
         let at = slices(document, &place, view, offset, of_index.0.size(), amount)?.concat();
         let at = whole(of_index.0, &at).unwrap_or_default();
         if at.windows(2).any(|pair| pair[1] <= pair[0]) || at.last().is_none_or(|last| u64::from(*last) >= count) {
             return Err(document.fail(place, format!("its indices do not increase, or go beyond {count} elements")));
         }
-        let (view, offset) = (sparse.values.buffer_view.value(), sparse.values.byte_offset.0);
+        let view = sparse.values.buffer_view.value();
+        let offset = sparse.values.byte_offset.0;
         let values = slices(document, &place, view, offset, size, amount)?;
         for (index, value) in at.into_iter().zip(values) {
             bytes[size * index as usize..][..size].copy_from_slice(value);
@@ -136,7 +136,7 @@ fn slices<'a>(
     size: usize,
     count: usize,
 ) -> Result<Vec<&'a [u8]>> {
-    let (bytes, stride) = document.view(view);
+    let (bytes, stride) = document.view(view)?;
     let stride = stride.unwrap_or(size);
     let end = offset.checked_add((stride as u64) * (count as u64 - 1) + size as u64);
     if end.is_none_or(|end| end > bytes.len() as u64) || stride < size {

@@ -35,17 +35,22 @@ struct Channel {
 }
 
 /// Keys of every node that moves.
-///
-/// # Errors
-/// `Input` that names the channel or the accessor.
 pub fn tracks(document: &Document, notes: &mut Notes) -> Result<Vec<Option<Tracks>>> {
     let mut out: Vec<Option<Tracks>> = vec![None; document.root.nodes.len()];
+    notes.leave_out_many("channels of animations that move no node", document.nodeless_channels);
     for (index, animation) in document.root.animations.iter().enumerate() {
         let mut channels = Vec::new();
         for (at, channel) in animation.channels.iter().enumerate() {
             let Checked::Valid(property) = channel.target.path else { continue };
             if property == Property::MorphTargetWeights {
                 notes.leave_out("animations of morph targets");
+                continue;
+            }
+            let sampler = &animation.samplers[channel.sampler.value()];
+            let times = sampler.input.value();
+            let timeless = accessor::is_unfilled(document, times) && document.root.accessors[times].count.0 > 1;
+            if timeless || property == Property::Rotation && accessor::is_unfilled(document, sampler.output.value()) {
+                notes.leave_out("animations whose times or rotations are all zeros, which are no times or rotations");
                 continue;
             }
             let read = read(document, index, at)?;

@@ -18,9 +18,6 @@ const FOV_DEG: f32 = 40.0;
 const HEIGHT_PX: f32 = 640.0;
 
 /// The camera, and the size of pictures, for a scene with that bounding sphere (metres).
-///
-/// # Errors
-/// `Input` for numbers of a camera that are out of range.
 pub fn camera(
     document: &Document,
     stands: &[Stand],
@@ -54,7 +51,8 @@ pub fn camera(
     // The placement of an entity that stands there at time 0; cameras look along -z.
     let at = EntityData { motion: stand.motion.clone(), ..EntityData::of_mesh("") }.at(0.0);
     let to_world = |p: DVec3| at.point(stand.fixed.transform_point3(p));
-    let (eye, ahead) = (to_world(DVec3::ZERO), to_world(DVec3::NEG_Z));
+    let eye = to_world(DVec3::ZERO);
+    let ahead = to_world(DVec3::NEG_Z);
     let ahead = (ahead - eye).try_normalize().ok_or_else(|| document.fail(&place, "its node squeezes space flat"))?;
     let distance_m = (centre - eye).dot(ahead).max(0.1 * radius_m).max(1e-3);
     let camera = Camera { eye: eye.as_vec3(), target: (eye + ahead * distance_m).as_vec3(), fov_deg };
@@ -78,7 +76,8 @@ pub fn camera(
 
 /// A sphere around entities at time 0: centre and radius in metres. Each is its mesh's bounding sphere and its data.
 pub fn bounds<'a>(entities: impl Iterator<Item = ((Vec3, f32), &'a EntityData)>) -> (DVec3, f64) {
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let mut low = DVec3::INFINITY;
+    let mut high = DVec3::NEG_INFINITY;
     for (sphere, entity) in entities {
         let (centre, radius_m) = entity.at(0.0).sphere(sphere);
         (low, high) = (low.min(centre - radius_m), high.max(centre + radius_m));

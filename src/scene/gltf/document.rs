@@ -1,14 +1,14 @@
 //! The file: its container, its JSON and its buffers, all within limits before anything of their size is made.
 //!
-//! The crate `gltf` reads and validates JSON. It panics where an accessor leaves its buffer and where an index that its validation
-//! does not visit is out of range, so these are checked here, and accessors are read in [`super::accessor`].
+//! The crate `gltf` reads and validates JSON. It panics where an accessor leaves its buffer and where an index that its
+//! validation does not visit is out of range, so these are checked here, and accessors are read in [`super::accessor`].
 
 use std::cell::Cell;
 use std::fmt::Display;
 use std::path::{Component, Path, PathBuf};
 
 use ::gltf::json::validation::{self, Checked, Validate as _};
-use ::gltf::json::{self, Root};
+use ::gltf::json::{self, Root, Value};
 use base64::Engine as _;
 use base64::engine::DecodePaddingMode;
 use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
@@ -22,6 +22,8 @@ pub const FILE_LIMIT_BYTES: u64 = 256 << 20;
 const BUFFERS_LIMIT_BYTES: u64 = 1 << 30;
 /// Largest number of objects in the JSON; each takes some hundred bytes once it is read.
 const OBJECT_LIMIT: usize = 1_000_000;
+/// Largest JSON that [`rewritten`] takes apart, in bytes: each number of it takes up to 16 times its length.
+const REWRITTEN_LIMIT_BYTES: usize = 32 << 20;
 /// Largest number of numbers that are read from accessors in all, however often one is used: 512 MiB.
 const NUMBER_BUDGET: u64 = 1 << 27;
 
@@ -39,36 +41,39 @@ const EXTENSIONS: [&str; 6] = [
 pub struct Document {
     /// The JSON.
     pub root: Root,
+    /// Channels of animations that move no node, which are not among those of the JSON.
+    pub nodeless_channels: usize,
     path: PathBuf,
-    buffers: Vec<Vec<u8>>,
+    buffers: Vec<Option<Vec<u8>>>,
     numbers_left: Cell<u64>,
 }
 
 impl Document {
     /// Reads a `.glb` or `.gltf` file and its buffers.
-    ///
-    /// # Errors
-    /// [`Error::Input`], one line that starts with the file and the place in its JSON.
     pub fn load(path: &Path) -> Result<Self> {
         let bytes = read_file(path, FILE_LIMIT_BYTES)?;
         let (text, mut rest) = split(&bytes).map_err(|what| Error::input(path, what))?;
         if text.iter().filter(|byte| **byte == b'{').count() > OBJECT_LIMIT {
             return Err(Error::input(path, format!("over the limit of {OBJECT_LIMIT} objects in its JSON")));
         }
-        let root = Root::from_slice(text).map_err(|error| Error::input(path, format!("its JSON: {error}")))?;
+        let (root, nodeless_channels) =
+            parse(text).map_err(|error| Error::input(path, format!("its JSON: {error}")))?;
         check(&root).map_err(|(place, what)| Error::input(path, format!("{place}: {what}")))?;
+        let numbers_left = Cell::new(NUMBER_BUDGET);
         let mut document =
-            Document { root, path: path.to_owned(), buffers: Vec::new(), numbers_left: Cell::new(NUMBER_BUDGET) };
+            Document { root, nodeless_channels, path: path.to_owned(), buffers: Vec::new(), numbers_left };
         let mut left = BUFFERS_LIMIT_BYTES;
         for index in 0..document.root.buffers.len() {
             let buffer = document.buffer(index, &mut rest)?;
-            left = left.checked_sub(buffer.len() as u64).ok_or_else(|| {
+            let size = buffer.as_ref().map_or(0, Vec::len) as u64;
+            left = left.checked_sub(size).ok_or_else(|| {
                 document.fail(format!("buffers[{index}]"), "the buffers are over the limit of 1024 MiB in all")
             })?;
             document.buffers.push(buffer);
         }
         for (index, view) in document.root.buffer_views.iter().enumerate() {
-            let size = document.buffers.get(view.buffer.value()).map_or(0, Vec::len) as u64;
+            let Some(buffer) = &document.buffers[view.buffer.value()] else { continue };
+            let size = buffer.len() as u64;
             let start = view.byte_offset.unwrap_or_default().0;
             if start.checked_add(view.byte_length.0).is_none_or(|end| end > size) {
                 let what = format!("{} bytes from {start} leave a buffer of {size}", view.byte_length.0);
@@ -84,17 +89,20 @@ impl Document {
     }
 
     /// The bytes of a buffer view and the stride that it states.
-    pub fn view(&self, index: usize) -> (&[u8], Option<usize>) {
+    pub fn view(&self, index: usize) -> Result<(&[u8], Option<usize>)> {
         let view = &self.root.buffer_views[index];
         let start = view.byte_offset.unwrap_or_default().0 as usize;
-        let bytes = &self.buffers[view.buffer.value()][start..start + view.byte_length.0 as usize];
-        (bytes, view.byte_stride.map(|stride| stride.0))
+        let buffer = self.buffers[view.buffer.value()].as_ref().ok_or_else(|| {
+            let what = match view.buffer.value() {
+                0 => "there is neither a uri nor a binary part of a GLB file",
+                _ => "only the first buffer may have no uri",
+            };
+            self.fail(format!("buffers[{}]", view.buffer.value()), what)
+        })?;
+        Ok((&buffer[start..start + view.byte_length.0 as usize], view.byte_stride.map(|stride| stride.0)))
     }
 
     /// Takes numbers off what may be read from accessors.
-    ///
-    /// # Errors
-    /// [`Error::Input`] where nothing is left.
     pub fn spend(&self, count: u64, place: &str) -> Result<()> {
         let left = self.numbers_left.get().checked_sub(count);
         let what = || format!("over the limit of {NUMBER_BUDGET} numbers that are read in all");
@@ -102,29 +110,22 @@ impl Document {
         Ok(())
     }
 
-    fn buffer(&self, index: usize, rest: &mut Option<&[u8]>) -> Result<Vec<u8>> {
+    /// The bytes of a buffer; `None` where the file has none, which matters only if they are read.
+    fn buffer(&self, index: usize, rest: &mut Option<&[u8]>) -> Result<Option<Vec<u8>>> {
         let buffer = &self.root.buffers[index];
         let place = format!("buffers[{index}]");
-        let mut bytes = match &buffer.uri {
-            Some(uri) => self.linked(uri, &format!("{place}.uri"))?,
-            None if index == 0 => rest
-                .take()
-                .map(<[u8]>::to_vec)
-                .ok_or_else(|| self.fail(&place, "there is neither a uri nor a binary part of a GLB file"))?,
-            None => return Err(self.fail(&place, "only the first buffer may have no uri")),
-        };
+        let binary = || rest.take().filter(|_| index == 0).map(<[u8]>::to_vec);
+        let linked = buffer.uri.as_ref().map(|uri| self.linked(uri, &format!("{place}.uri")));
+        let Some(mut bytes) = linked.transpose()?.or_else(binary) else { return Ok(None) };
         if (bytes.len() as u64) < buffer.byte_length.0 {
             let what = format!("byteLength is {}, but there are {} bytes", buffer.byte_length.0, bytes.len());
             return Err(self.fail(&place, what));
         }
         bytes.truncate(buffer.byte_length.0 as usize);
-        Ok(bytes)
+        Ok(Some(bytes))
     }
 
     /// What a uri stands for: base64 within itself, or a file in the folder of this file or below.
-    ///
-    /// # Errors
-    /// [`Error::Input`] for other schemes, for files outside the folder, and for those that cannot be read.
     pub fn linked(&self, uri: &str, place: &str) -> Result<Vec<u8>> {
         let fail = |what: String| self.fail(place, what);
         if let Some(data) = uri.strip_prefix("data:") {
@@ -164,7 +165,8 @@ fn split(bytes: &[u8]) -> std::result::Result<(&[u8], Option<&[u8]>), String> {
         return Ok((bytes, None));
     }
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
-    let (version, length) = (word(4), word(8));
+    let version = word(4);
+    let length = word(8);
     if version != Some(2) {
         return Err(format!("expected version 2 of GLB, got {}", version.map_or("none".into(), |v| v.to_string())));
     }
@@ -175,7 +177,8 @@ fn split(bytes: &[u8]) -> std::result::Result<(&[u8], Option<&[u8]>), String> {
     let mut at = 12;
     while at < length {
         let cut = || "a part of the GLB file is cut off".to_owned();
-        let (size, kind) = (word(at).ok_or_else(cut)?, bytes.get(at + 4..at + 8).ok_or_else(cut)?);
+        let size = word(at).ok_or_else(cut)?;
+        let kind = bytes.get(at + 4..at + 8).ok_or_else(cut)?;
         let part = bytes[..length].get(at + 8..(at + 8).saturating_add(size)).ok_or_else(cut)?;
         // Other kinds of parts are to be passed over.
         match (kind, &mut parts) {
@@ -187,6 +190,54 @@ fn split(bytes: &[u8]) -> std::result::Result<(&[u8], Option<&[u8]>), String> {
     }
     let [json, binary] = parts;
     Ok((json.ok_or("a GLB file without JSON")?, binary))
+}
+
+/// Reads JSON, and counts the channels of animations that are left out because they move no node.
+fn parse(text: &[u8]) -> std::result::Result<(Root, usize), json::Error> {
+    let refused = match Root::from_slice(text) {
+        Ok(root) => return Ok((root, 0)),
+        Err(error) => error,
+    };
+    let (text, nodeless_channels) = rewritten(text).ok_or(refused)?;
+    Ok((Root::from_slice(&text)?, nodeless_channels))
+}
+
+/// JSON that the specification allows and the crate does not, as the crate takes it: scenes without nodes, whole
+/// numbers with a point or an exponent, and without the channels of animations that have no node. `None` where it has
+/// nothing of these.
+fn rewritten(text: &[u8]) -> Option<(Vec<u8>, usize)> {
+    let mut root: Value = serde_json::from_slice(text).ok().filter(|_| text.len() <= REWRITTEN_LIMIT_BYTES)?;
+    let mut changed = whole_numbers(&mut root);
+    for scene in root.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Some(scene) = scene.as_object_mut().filter(|scene| !scene.contains_key("nodes")) {
+            scene.insert("nodes".into(), Value::Array(Vec::new()));
+            changed = true;
+        }
+    }
+    let mut nodeless = 0;
+    for animation in root.get_mut("animations").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) {
+            let count = channels.len();
+            channels.retain(|channel| channel.get("target").is_none_or(|target| target.get("node").is_some()));
+            nodeless += count - channels.len();
+        }
+    }
+    (changed || nodeless > 0).then(|| (root.to_string().into_bytes(), nodeless))
+}
+
+/// Writes `4.0` and `4e0` as `4` everywhere; returns whether there are any.
+fn whole_numbers(value: &mut Value) -> bool {
+    match value {
+        Value::Number(number) => {
+            let is_whole = |x: &f64| x.fract() == 0.0 && x.is_sign_positive() && *x < 9e15;
+            let Some(whole) = number.as_f64().filter(|x| number.is_f64() && is_whole(x)) else { return false };
+            *number = (whole as u64).into();
+            true
+        }
+        Value::Array(values) => values.iter_mut().fold(false, |any, value| whole_numbers(value) || any),
+        Value::Object(map) => map.values_mut().fold(false, |any, value| whole_numbers(value) || any),
+        _ => false,
+    }
 }
 
 type Misplaced = (String, String);
@@ -228,9 +279,14 @@ fn check(root: &Root) -> std::result::Result<(), Misplaced> {
     let mut first = None;
     root.validate(root, json::Path::new, &mut |path, error| {
         let place = path().to_string();
-        // Bounds of positions are not read. Extensions are judged above, and a texture may have only pictures of an extension.
+        // Bounds of positions are not read, and accessors are judged where they are read: numbers without a bufferView
+        // are zeros. Extensions are judged above, lights where they are made, and a texture may have only pictures of
+        // an extension.
         let bounds = place.ends_with(".min") || place.ends_with(".max");
-        let excused = bounds || place.starts_with("extensionsRequired") || place.ends_with(".source");
+        let kinds = (place.ends_with(".type") || place.ends_with(".componentType"))
+            && (place.starts_with("accessors") || place.contains(".lights"));
+        let zeros = place.ends_with(".bufferView") && matches!(error, validation::Error::Missing);
+        let excused = bounds || kinds || zeros || place.starts_with("extensionsRequired") || place.ends_with(".source");
         if first.is_none() && !excused {
             let what = match error {
                 validation::Error::IndexOutOfBounds => "the index is out of range",
@@ -239,6 +295,7 @@ fn check(root: &Root) -> std::result::Result<(), Misplaced> {
                 validation::Error::Oversize => "the size is too large",
                 validation::Error::Unsupported => "it is not supported",
             };
+            let place = place.replace("khrLightsPunctual", "KHR_lights_punctual");
             first = Some((place.replace("[\"", ".").replace("\"]", ""), what.to_owned()));
         }
     });

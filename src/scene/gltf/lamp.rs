@@ -1,7 +1,8 @@
-//! Punctual lights as glowing balls, spots as balls in a housing with a round hole, and a directional light as a distant disc.
+//! Punctual lights as glowing balls, of which spots shine within a cone, and a directional light as a distant disc.
 //!
-//! A point has no size, so a lamp gets one, which is said: a hundredth of the scene's radius. Candela are taken as W sr^-1, and the
-//! ball's radiance is the intensity over its mean outline, so that what is lit from afar does not depend on the radius.
+//! A point has no size, so a lamp gets one, which is said: a hundredth of the scene's radius. Candela are taken as W
+//! sr^-1, and the ball's radiance is the intensity over its mean outline, so that what is lit from afar does not depend
+//! on the radius.
 
 use ::gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
 use ::gltf::json::validation::Checked;
@@ -9,20 +10,18 @@ use glam::{DMat3, DQuat, DVec3, Vec3};
 
 use super::document::Document;
 use super::notes::Notes;
-use super::spot::{Housing, PLATE, WIDEST_DEG};
 use super::tree::Stand;
+use crate::asset::Generator;
 use crate::asset::Mesh;
 use crate::asset::disc::{SUN_DEG, Sun};
 use crate::asset::environment::RADIANCE_LIMIT;
-use crate::asset::{Generator, generate::sphere};
 use crate::error::Result;
 use crate::scene::data::{EntityData, MeshData};
+use crate::scene::light::Spot;
 use crate::scene::motion::{Motion, RotationData};
 
 /// Radius of a lamp, as a share of the scene's.
 const RADIUS_SHARE: f64 = 0.01;
-/// Half the width of the widest housing of a spot, in radii of a lamp that has none.
-const HOUSING_RADII: f64 = 6.0;
 /// Cuts of the icosahedron that stands for a ball: 320 triangles.
 const SUBDIVISIONS: u32 = 2;
 /// Name of the lamps' mesh.
@@ -33,7 +32,7 @@ pub const BALL: &str = "lamp";
 pub struct Fittings {
     /// Meshes with their data.
     pub meshes: Vec<(MeshData, Mesh)>,
-    /// Lamps and plates.
+    /// Lamps.
     pub entities: Vec<EntityData>,
 }
 
@@ -48,13 +47,11 @@ pub struct Lamps<'a> {
 
 impl<'a> Lamps<'a> {
     /// The lights that nodes hold, for a scene of that radius in metres.
-    ///
-    /// # Errors
-    /// `Input` for an intensity or colour that is negative or too large.
     pub fn new(document: &'a Document, stands: &'a [Stand], scene_radius_m: f64, notes: &mut Notes) -> Result<Self> {
         let all = document.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
         let all = all.map_or(&[][..], |e| &e.lights);
-        let (mut lights, mut sun) = (Vec::new(), None);
+        let mut lights = Vec::new();
+        let mut sun = None;
         for stand in stands {
             let of = document.root.nodes[stand.node].extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
             let Some(index) = of.map(|e| e.light.value()) else { continue };
@@ -73,6 +70,7 @@ impl<'a> Lamps<'a> {
                     sun = Some(distant(document, light, stand, notes)?)
                 }
                 Checked::Valid(Type::Directional) => notes.leave_out("further directional lights"),
+                Checked::Invalid => notes.leave_out("lights of unknown types"),
                 _ => lights.push((light, stand)),
             }
         }
@@ -80,70 +78,34 @@ impl<'a> Lamps<'a> {
     }
 
     /// Their meshes and entities.
-    ///
-    /// # Errors
-    /// `Input` where a lamp becomes too bright.
     pub fn entities(&self, document: &Document, notes: &mut Notes) -> Result<Fittings> {
         let mut out = Fittings::default();
         if self.lights.is_empty() {
             return Ok(out);
         }
-        out.add(BALL, Generator::Sphere { radius_m: 1.0, subdivisions: SUBDIVISIONS })?;
-        let mut housings: Vec<(Housing, String)> = Vec::new();
-        let mut least_m = self.radius_m;
+        let generator = Generator::Sphere { radius_m: 1.0, subdivisions: SUBDIVISIONS };
+        out.meshes
+            .push((MeshData { name: BALL.into(), file: None, generator: Some(generator.clone()) }, generator.build()?));
+        // A convex body's mean outline is its area over four.
+        let outline_m2 = out.meshes[0].1.area_m2() / 4.0 * self.radius_m.powi(2);
         for (light, stand) in &self.lights {
-            let housing = light.spot.as_ref().filter(|_| is_spot(light)).map(|spot| {
-                let [inner, outer] = [spot.inner_cone_angle, spot.outer_cone_angle].map(f64::from);
-                if outer > WIDEST_DEG.to_radians() {
-                    notes.leave_out("spots that are wider than 80 degrees off their axis (they end there)");
-                }
-                Housing::new(inner, outer)
-            });
-            let widest_m = self.radius_m * HOUSING_RADII;
-            let radius_m = housing.map_or(self.radius_m, |housing| self.radius_m.min(widest_m / housing.half_width));
-            least_m = least_m.min(radius_m);
-            // A convex body's mean outline is its area over four.
-            let outline_m2 = sphere(1.0, SUBDIVISIONS).area_m2() / 4.0 * radius_m.powi(2);
             let emission = intensity(light) / outline_m2 as f32;
             if emission.max_element() > RADIANCE_LIMIT {
                 return Err(document.fail(format!("nodes[{}]", stand.node), "its light is too bright for its size"));
             }
             let name = document.root.nodes[stand.node].name.clone().or_else(|| light.name.clone());
-            let lamp = EntityData { emission, name, ..ball(stand, radius_m) };
-            if let Some(housing) = housing {
-                if housings.is_empty() {
-                    out.add(PLATE, Generator::Plane { size_m: 1.0, cells: 1 })?;
-                }
-                let known = housings.iter().position(|(other, _)| *other == housing);
-                let index = known.map_or_else(
-                    || {
-                        let name = format!("{PLATE} with hole {}", housings.len() + 1);
-                        let front = housing.front(&name)?;
-                        out.meshes.push((MeshData { name: name.clone(), file: None, generator: None }, front));
-                        housings.push((housing, name));
-                        Ok(housings.len() - 1)
-                    },
-                    Ok,
-                )?;
-                out.entities.extend(housing.entities(&lamp, &housings[index].1));
-            }
-            out.entities.push(lamp);
+            let spot = light.spot.as_ref().filter(|_| is_spot(light)).map(|spot| {
+                let outer_deg = spot.outer_cone_angle.to_degrees().clamp(0.01, 90.0);
+                Spot { inner_deg: spot.inner_cone_angle.to_degrees().clamp(0.0, outer_deg), outer_deg }
+            });
+            out.entities.push(EntityData { emission, name, spot, ..ball(stand, self.radius_m, spot.is_some()) });
         }
-        let radii = if least_m < self.radius_m {
-            format!("{least_m:.3} to {:.3}", self.radius_m)
-        } else {
-            format!("{least_m:.3}")
-        };
-        notes.say(format!("point and spot lights ({}) are balls of radius {radii} m", self.lights.len()));
-        let spots = self.lights.iter().filter(|(light, _)| is_spot(light)).count();
-        if spots > 0 {
-            notes.say(format!("spot lights ({spots}) stand in housings of six plates, which cast shadows"));
-        }
+        notes.say(format!("point and spot lights ({}) are balls of radius {:.3} m", self.lights.len(), self.radius_m));
         Ok(out)
     }
 
-    /// The exposure in stops at which a white surface in the middle of the scene, lit by all lights, shows half of white: their
-    /// photometric units say nothing of how bright a picture should be. `None` without lights.
+    /// The exposure in stops at which a white surface in the middle of the scene, lit by all lights, shows half of
+    /// white: their photometric units say nothing of how bright a picture should be. `None` without lights.
     pub fn exposure_ev(&self, centre: DVec3, scene_radius_m: f64) -> Option<f32> {
         let irradiance = |(light, stand): &(&Light, &Stand)| {
             let distance_m = centre.distance(stand.rest.translation).max(0.3 * scene_radius_m);
@@ -152,14 +114,6 @@ impl<'a> Lamps<'a> {
         let sun = self.sun.as_ref().map_or(0.0, |sun| f64::from(sun.radiance.max_element()) * disc_sr(sun.angle_deg));
         let radiance = (self.lights.iter().map(irradiance).sum::<f64>() + sun) / std::f64::consts::PI;
         (radiance > 0.0).then(|| (((0.5 / radiance).log2() * 2.0).round() / 2.0).clamp(-32.0, 32.0) as f32)
-    }
-}
-
-impl Fittings {
-    fn add(&mut self, name: &str, generator: Generator) -> Result<()> {
-        let built = generator.build()?;
-        self.meshes.push((MeshData { name: name.into(), file: None, generator: Some(generator) }, built));
-        Ok(())
     }
 }
 
@@ -189,13 +143,14 @@ fn is_spot(light: &Light) -> bool {
     matches!(light.type_, Checked::Valid(Type::Spot))
 }
 
-/// A ball of that radius in metres where a light stands.
-fn ball(stand: &Stand, radius_m: f64) -> EntityData {
+/// A ball of that radius in metres where a light stands. A spot's own +y is the light's axis.
+fn ball(stand: &Stand, radius_m: f64, is_spot: bool) -> EntityData {
     // Lights look along -z, whatever mirrors them.
     let linear = stand.fixed.matrix3;
     let z = linear.z_axis.try_normalize().unwrap_or(DVec3::Z);
     let y = (linear.y_axis - z * z.dot(linear.y_axis)).try_normalize().unwrap_or_else(|| z.any_orthonormal_vector());
-    let rotation = DQuat::from_mat3(&DMat3::from_cols(y.cross(z), y, z)).normalize();
+    let axes = if is_spot { DMat3::from_cols(y.cross(z), -z, y) } else { DMat3::from_cols(y.cross(z), y, z) };
+    let rotation = DQuat::from_mat3(&axes).normalize();
     // Nor do they grow with the nodes that carry them.
     let size = |motion: &Motion| if let Motion::Node(node) = motion { f64::from(node.scale) } else { 1.0 };
     let carried: f64 = stand.motion.iter().map(size).product();

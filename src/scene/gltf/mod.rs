@@ -1,8 +1,8 @@
 //! glTF 2.0 and GLB as scenes.
 //!
-//! Every primitive of a mesh that a node holds is an entity. Lengths are in metres, +y is up and light is linear Rec.709, as in this
-//! program, so numbers are taken as they are; candela per square metre become W m^-2 sr^-1. What the program has no form for is left
-//! out and listed with counts ([`Notes`]).
+//! Every primitive of a mesh that a node holds is an entity. Lengths are in metres, +y is up and light is linear
+//! Rec.709, as in this program, so numbers are taken as they are; candela per square metre become W m^-2 sr^-1. What
+//! the program has no form for is left out and listed with counts ([`Notes`]).
 //!
 //! | glTF | here |
 //! |---|---|
@@ -11,7 +11,7 @@
 //! | animations of nodes | motion `node`, one for every moving node that carries the entity |
 //! | base colour factor, texture, colours of vertices | albedo, a mean over the surface |
 //! | emissive factor and strength; texture | emission; colours of the mesh's vertices |
-//! | point and spot lights | glowing balls; those of spots in housings with a round hole |
+//! | point and spot lights | glowing balls; those of spots shine within a cone |
 //! | the first directional light | the sun of the distant light |
 //! | the first perspective camera | the camera |
 
@@ -22,7 +22,6 @@ mod document;
 mod lamp;
 mod notes;
 mod shape;
-mod spot;
 mod surface;
 mod texture;
 mod tree;
@@ -42,6 +41,8 @@ use crate::scene::motion::RotationData;
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
 use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, check_counts};
 use document::Document;
+#[cfg(feature = "cli")]
+pub(crate) use document::FILE_LIMIT_BYTES;
 use lamp::Lamps;
 pub use notes::Notes;
 use shape::Shape;
@@ -70,28 +71,25 @@ pub fn is_gltf(path: &Path) -> bool {
 }
 
 /// Reads a scene from a `.glb` or `.gltf` file and the buffers and textures beside it.
-///
-/// # Errors
-/// [`Error::Input`], one line that starts with the file and the place in its JSON.
 pub fn load(path: &Path) -> Result<Import> {
     let document = Document::load(path)?;
     let mut import = Builder::new(&document)?.build()?;
-    let (meshes, entities) = (import.data.meshes.len(), import.data.entities.len());
+    let meshes = import.data.meshes.len();
+    let entities = import.data.entities.len();
     check_counts(meshes, entities).map_err(|what| Error::input(path, what))?;
     import.meshes.shrink_to_fit();
     Ok(import)
 }
 
 /// All triangles of a file's scene as one mesh, as it stands at rest.
-///
-/// # Errors
-/// As [`load`], and where there are no triangles or too many.
 pub fn load_mesh(path: &Path) -> Result<(Mesh, Notes)> {
     let document = Document::load(path)?;
     let mut notes = Notes::default();
     notes.leave_out_many("animations (the mesh is as it stands at rest)", document.root.animations.len());
     let none = vec![None; document.root.nodes.len()];
-    let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    let mut positions = Vec::new();
+    let mut normals = Vec::new();
+    let mut triangles = Vec::new();
     for stand in tree::stands(&document, &none, &mut notes)? {
         if document.root.nodes[stand.node].skin.is_some() {
             notes.leave_out(SKINS);
@@ -188,7 +186,8 @@ impl<'a> Builder<'a> {
             return Ok(None);
         };
         let place = format!("nodes[{}]", stand.node);
-        let (albedo, emission) = (primitive.surface.albedo, primitive.surface.emission);
+        let albedo = primitive.surface.albedo;
+        let emission = primitive.surface.emission;
         let scale = parts.uniform_scale().map(|scale| scale as f32);
         if scale.is_some_and(|scale| !(1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(&scale)) {
             return Err(self.document.fail(place, "its scale is not within 1e-7 to 1e7"));

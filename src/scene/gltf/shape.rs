@@ -13,8 +13,8 @@ use crate::asset::Mesh;
 use crate::asset::mesh::TRIANGLE_LIMIT;
 use crate::error::Result;
 
-/// The triangles of a primitive. Where it has no normals, every triangle has vertices of its own with its own normal, as the
-/// specification demands.
+/// The triangles of a primitive. Where it has no normals, every triangle has vertices of its own with its own normal,
+/// as the specification demands.
 pub struct Shape {
     /// Place in the JSON.
     pub place: String,
@@ -27,10 +27,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Reads a primitive; `None` where it is of points or lines, which is noted.
-    ///
-    /// # Errors
-    /// `Input` that names the place.
+    /// Reads a primitive; `None` where it is of points or lines or has no area, which is noted.
     pub fn read(document: &Document, mesh: usize, at: usize, notes: &mut Notes) -> Result<Option<Self>> {
         let place = format!("meshes[{mesh}].primitives[{at}]");
         let primitive = &document.root.meshes[mesh].primitives[at];
@@ -71,13 +68,14 @@ impl Shape {
             return Err(document.fail(&shape.place, what));
         }
         shape.triangles.shrink_to_fit();
+        if shape.weights().iter().all(|area| *area == 0.0) {
+            notes.leave_out("shapes without an area (all their triangles are points or lines)");
+            return Ok(None);
+        }
         Ok(Some(shape))
     }
 
     /// The mesh, transformed by `bend`, with a colour a vertex if there are any.
-    ///
-    /// # Errors
-    /// As [`Mesh::new`], with the place in front.
     pub fn mesh(&self, document: &Document, name: &str, bend: DMat3, colors: Option<Vec<Vec3>>) -> Result<Mesh> {
         let shape = self.bent(bend, DVec3::ZERO);
         Mesh::new(name, shape.0, shape.1, colors, shape.2).map_err(|error| document.fail(&self.place, error))
@@ -96,10 +94,8 @@ impl Shape {
         (positions, normals, self.triangles.iter().map(turned).collect())
     }
 
-    /// Numbers of an attribute for every vertex, `width` of each element; `None` where the primitive has no such attribute.
-    ///
-    /// # Errors
-    /// As [`accessor::numbers`].
+    /// Numbers of an attribute for every vertex, `width` of each element; `None` where the primitive has no such
+    /// attribute.
     pub fn attribute(
         &self,
         document: &Document,

@@ -28,9 +28,6 @@ pub struct Surface {
 
 impl Surface {
     /// The surface that a material gives a shape.
-    ///
-    /// # Errors
-    /// `Input` that names the place: a factor out of range, or a texture that cannot be read.
     pub fn new(
         document: &Document,
         material: Option<usize>,

@@ -39,11 +39,8 @@ impl<'a> Textures<'a> {
         Textures { document, images: HashMap::new(), pixels: 0 }
     }
 
-    /// Colours of a texture at the vertices of a shape; one for all where the shape has no coordinates for it, the texture's mean.
-    /// `None` where the picture has a format that is not read, which is noted.
-    ///
-    /// # Errors
-    /// `Input` that names the place, where the picture is damaged, too large or missing.
+    /// Colours of a texture at the vertices of a shape; one for all where the shape has no coordinates for it, the
+    /// texture's mean. `None` where the picture has a format that is not read, which is noted.
     pub fn at_vertices(&mut self, info: &Info, shape: &Shape, notes: &mut Notes) -> Result<Option<Vec<Vec3>>> {
         let texture = &self.document.root.textures[info.index.value()];
         let Some(texels) = self.image(texture.source.value(), notes)? else { return Ok(None) };
@@ -88,7 +85,7 @@ impl<'a> Textures<'a> {
         let place = format!("images[{index}]");
         let bytes = match (&image.uri, image.buffer_view) {
             (Some(uri), _) => self.document.linked(uri, &format!("{place}.uri"))?,
-            (None, Some(view)) => self.document.view(view.value()).0.to_vec(),
+            (None, Some(view)) => self.document.view(view.value())?.0.to_vec(),
             (None, None) => return Err(self.document.fail(place, "there is neither a uri nor a bufferView")),
         };
         if ![&b"\x89PNG"[..], b"\xff\xd8\xff"].iter().any(|magic| bytes.starts_with(magic)) {
@@ -107,11 +104,14 @@ impl Texels {
     /// The picture, averaged over squares where it is larger than [`KEPT_PX`].
     fn new(picture: &Picture) -> Self {
         let square = picture.width.max(picture.height).div_ceil(KEPT_PX);
-        let (width, height) = (picture.width.div_ceil(square), picture.height.div_ceil(square));
+        let width = picture.width.div_ceil(square);
+        let height = picture.height.div_ceil(square);
         let linear = picture.linear(0.0);
         let color = |i: usize| {
-            let (left, top) = (i % width * square, i / width * square);
-            let (right, bottom) = ((left + square).min(picture.width), (top + square).min(picture.height));
+            let left = i % width * square;
+            let top = i / width * square;
+            let right = (left + square).min(picture.width);
+            let bottom = (top + square).min(picture.height);
             let rows = (top..bottom).flat_map(|y| (left..right).map(move |x| y * picture.width + x));
             let sum: Vec3 = rows.map(|pixel| Vec3::from_slice(&linear[3 * pixel..])).sum();
             sum / ((right - left) * (bottom - top)) as f32

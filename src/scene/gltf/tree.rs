@@ -1,7 +1,8 @@
 //! Nodes: where each stands, at rest and over time.
 //!
-//! What stands still between a moving node and the next is folded into one transformation. Placements have one positive scale, so a
-//! transformation splits into a placement and a *bend*: an upper triangular matrix, which is baked into a copy of the mesh.
+//! What stands still between a moving node and the next is folded into one transformation. Placements have one positive
+//! scale, so a transformation splits into a placement and a *bend*: an upper triangular matrix, which is baked into a
+//! copy of the mesh.
 
 use ::gltf::json::scene::Node as NodeJson;
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
@@ -19,6 +20,8 @@ const DEPTH_LIMIT: usize = 256;
 const KEY_LIMIT: usize = 1_000_000;
 /// What differs by less than this share of the largest is the same: f32 transformations are rounded.
 const SAME: f64 = 1e-5;
+/// A rotation whose length differs from 1 by more than this is noted.
+const UNIT: f64 = 0.005;
 
 /// Where a node stands.
 #[derive(Clone, Debug)]
@@ -71,9 +74,6 @@ impl SplitTransform {
 }
 
 /// All nodes of the file's scene, those that carry before those that are carried.
-///
-/// # Errors
-/// `Input` for nodes that stand in themselves or in two others, too many in one another, and numbers out of range.
 pub fn stands(document: &Document, tracks: &[Option<Tracks>], notes: &mut Notes) -> Result<Vec<Stand>> {
     let root = &document.root;
     let mut seen = vec![false; root.nodes.len()];
@@ -89,7 +89,8 @@ pub fn stands(document: &Document, tracks: &[Option<Tracks>], notes: &mut Notes)
     notes.leave_out_many("further scenes", root.scenes.len().saturating_sub(1));
     let world = Stand { node: 0, fixed: DAffine3::IDENTITY, motion: Vec::new(), rest: DAffine3::IDENTITY };
     let mut open: Vec<(usize, usize, Stand)> = roots.into_iter().rev().map(|node| (node, 1, world.clone())).collect();
-    let (mut out, mut keys) = (Vec::new(), 0);
+    let mut out = Vec::new();
+    let mut keys = 0;
     while let Some((index, depth, outer)) = open.pop() {
         let place = format!("nodes[{index}]");
         if std::mem::replace(&mut seen[index], true) {
@@ -136,6 +137,14 @@ fn placed(
         Some(matrix) => DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from))),
         None => DAffine3::from_scale_rotation_translation(scale, rotation, position),
     };
+    let parts_too = node.translation.is_some() || node.rotation.is_some() || node.scale.is_some();
+    if node.matrix.is_some() && parts_too {
+        notes.leave_out("translations, rotations and scales of nodes that have a matrix (the matrix counts)");
+    }
+    let turn = node.rotation.unwrap_or_default().0;
+    if (DQuat::from_array(turn.map(f64::from)).length() - 1.0).abs() > UNIT {
+        notes.leave_out("lengths of rotations that are not 1 (they are brought to 1)");
+    }
     let rest = outer.rest * own;
     if rest.translation.to_array().iter().any(|x| x.is_nan() || x.abs() > f64::from(POSITION_LIMIT_M)) {
         return Err(fail("it stands beyond the limit of 1e7 m"));
@@ -189,7 +198,8 @@ fn within(scale: f64) -> f32 {
 /// Translation, unit rotation and scale; `None` if a number is out of range.
 fn properties(node: &NodeJson) -> Option<(DVec3, DQuat, DVec3)> {
     let within = |numbers: &[f32]| numbers.iter().all(|x| x.abs() <= POSITION_LIMIT_M);
-    let (position, scale) = (node.translation.unwrap_or_default(), node.scale.unwrap_or([1.0; 3]));
+    let position = node.translation.unwrap_or_default();
+    let scale = node.scale.unwrap_or([1.0; 3]);
     let rotation = node.rotation.unwrap_or_default().0;
     let length = DQuat::from_array(rotation.map(f64::from)).length();
     let usable = within(&position) && within(&scale) && within(&rotation) && length > 1e-6;

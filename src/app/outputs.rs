@@ -1,0 +1,148 @@
+//! The files that a command writes, compared with those that it reads before anything runs.
+
+use crate::error::{Error, Result};
+use crate::files::{self, Identity};
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// What one option writes.
+pub struct Output {
+    option: &'static str,
+    ending: &'static str,
+    files: Vec<PathBuf>,
+}
+
+impl Output {
+    /// A file whose name has to end as its kind does.
+    pub fn new(option: &'static str, file: impl Into<PathBuf>, ending: &'static str) -> Self {
+        Output { option, ending, files: vec![file.into()] }
+    }
+
+    /// Adds files that the option writes beside the first, or in a folder that it makes there.
+    pub fn with<P: Into<PathBuf>>(mut self, files: impl IntoIterator<Item = P>) -> Self {
+        self.files.extend(files.into_iter().map(Into::into));
+        self
+    }
+
+    /// Pictures of these numbers where the name has a run of `#`, else one picture.
+    pub fn pictures(option: &'static str, file: &Path, ending: &'static str, numbers: Range<u32>) -> Result<Self> {
+        let numbered = Numbered::new(file)?;
+        let files = numbered.map_or_else(|| vec![file.into()], |name| numbers.map(|n| name.path(n)).collect());
+        Ok(Output { option, ending, files })
+    }
+}
+
+/// The files that a command is about to write.
+pub struct Outputs {
+    /// What stood under each name before.
+    before: Vec<(PathBuf, Option<Identity>)>,
+}
+
+impl Outputs {
+    /// Fails where a name has another ending than its kind, where a file would replace one that is read or that another
+    /// option writes, also through links, and where one cannot be written.
+    pub fn check(inputs: &[PathBuf], outputs: &[Output]) -> Result<Self> {
+        let read: HashMap<Identity, &PathBuf> =
+            inputs.iter().filter_map(|path| Some((files::identity(path)?, path))).collect();
+        let mut taken: HashMap<Identity, (&str, &Path)> = HashMap::new();
+        let mut before = Vec::new();
+        for Output { option, ending, files } in outputs {
+            check_ending(option, &files[0], ending)?;
+            for file in files {
+                let identity = files::identity(file);
+                before.push((file.clone(), identity.clone()));
+                let Some(identity) = identity else { continue };
+                let shown = file.display();
+                if let Some(input) = read.get(&identity) {
+                    let what = format!("{option} {shown} would replace the input {}", input.display());
+                    return Err(Error::Usage(what));
+                }
+                if let Some((other, first)) = taken.insert(identity, (option, file)) {
+                    let what = format!("{option} {shown} would replace what {other} {} writes", first.display());
+                    return Err(Error::Usage(what));
+                }
+            }
+        }
+        for Output { files, .. } in outputs {
+            // The others of a run stand in the same folder.
+            for (_, file) in files.iter().enumerate().filter(|(index, file)| *index == 0 || file.exists()) {
+                let cannot = |error| Error::Failed(format!("{}: cannot be written: {error}", file.display()));
+                files::check_writable(file).map_err(cannot)?;
+            }
+        }
+        Ok(Outputs { before })
+    }
+
+    /// Adds to an error which of the files are written already.
+    pub fn after(&self, error: Error) -> Error {
+        let is_new = |(file, before): &&(PathBuf, Option<Identity>)| files::identity(file) != *before;
+        let written: Vec<String> =
+            self.before.iter().filter(is_new).map(|(file, _)| file.display().to_string()).collect();
+        match &written[..] {
+            [] => error,
+            [first, _, _, .., last] => {
+                error.followed_by(format!("{} files from {first} to {last} are written", written.len()))
+            }
+            few => error.followed_by(format!("already written: {}", few.join(", "))),
+        }
+    }
+}
+
+/// Makes the folder that results of several names go to. Fails where it holds an input, which one of them might
+/// replace, and where nothing can be written into it.
+pub fn check_folder(option: &str, folder: &Path, inputs: &[PathBuf]) -> Result<()> {
+    let cannot = |error| Error::Failed(format!("{}: cannot be written: {error}", folder.display()));
+    let is_there = |folder: &&Path| folder.as_os_str().is_empty() || folder.exists();
+    let base = folder.ancestors().find(is_there).unwrap_or(Path::new("."));
+    if base != folder {
+        return files::check_writable(&base.join("results")).map_err(cannot);
+    }
+    let entries = std::fs::read_dir(folder).map_err(cannot)?.flatten();
+    let there: HashSet<Identity> = entries.filter_map(|entry| files::identity(&entry.path())).collect();
+    if let Some(input) = inputs.iter().find(|input| files::identity(input).is_some_and(|it| there.contains(&it))) {
+        let folder = folder.display();
+        let input = input.display();
+        return Err(Error::Usage(format!(
+            "{option} {folder}: results might replace the input {input}, which is there"
+        )));
+    }
+    files::check_writable(&folder.join("results")).map_err(cannot)
+}
+
+/// Fails where a file's name does not end as its kind does; a device or pipe may have any name.
+pub fn check_ending(option: &str, path: &Path, ending: &str) -> Result<()> {
+    let device = std::fs::metadata(path).is_ok_and(|m| !m.is_file());
+    if device || path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!("{option} {}: the name must end in .{ending}", path.display())))
+}
+
+/// An output name with a run of `#` that stands for the frame's number.
+pub struct Numbered {
+    before: String,
+    digits: usize,
+    after: String,
+}
+
+impl Numbered {
+    /// The parts of a name; `None` where it has no run of `#`.
+    pub fn new(path: &Path) -> Result<Option<Self>> {
+        if !path.as_os_str().as_encoded_bytes().contains(&b'#') {
+            return Ok(None);
+        }
+        let Some(text) = path.to_str() else {
+            return Err(Error::Usage(format!("{}: a name with # has to be UTF-8", path.display())));
+        };
+        Ok(text.find('#').map(|at| {
+            let digits = text[at..].bytes().take_while(|b| *b == b'#').count();
+            Numbered { before: text[..at].into(), digits, after: text[at + digits..].into() }
+        }))
+    }
+
+    /// The name of one picture.
+    pub fn path(&self, index: u32) -> PathBuf {
+        format!("{}{index:0width$}{}", self.before, self.after, width = self.digits).into()
+    }
+}

@@ -1,0 +1,196 @@
+//! What a frame computes before it is recorded: the clusters that are dirty and their lists, the chains of sharp lights
+//! that pixels walk, and the viewports with their outlines. [`Frame::prepare`] is all of it; it writes what the passes
+//! read, in buffers of that flight's own.
+
+use super::Frame;
+use super::permutation::{CompiledMerge, PixelShading};
+use super::pixel::PixelChains;
+use super::viewport::{RadiositySource, Viewport};
+use crate::asset::edges::Edges;
+use crate::draw::smooth::Strips;
+use crate::error::Result;
+use crate::gpu::{Device, TexelView, Upload};
+use crate::layout::{self, CLUSTER_FORMAT, ENTRY_FORMAT};
+use crate::lists::incremental::{ClusterLists, Dirty, Merged};
+use crate::lists::sight::Sight;
+use crate::merge::variant::{MergePermutation, Reads};
+use crate::scene::Placement;
+use crate::scene_buffers::limits;
+use crate::sharp::{Sharp, SharpPermutation};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Which light a frame brings up to date.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Relight {
+    Nothing,
+    /// That of dirty clusters which may be seen in viewports that show merged light. Where there are none, or nothing
+    /// has changed since the last call, that of every dirty cluster.
+    Seen,
+    /// That of every dirty cluster.
+    Everything,
+}
+
+/// What is kept from frame to frame to tell which clusters have changed, and what a merge reads of them.
+pub(super) struct ClusterWork {
+    pub lists: ClusterLists,
+    pub entities: Upload,
+    pub clusters: Upload,
+    /// The lists of these clusters.
+    pub entries: Upload,
+    /// What the last frame did about its clusters.
+    pub merged: Merged,
+    /// Whether the merge that was prepared last was recorded too.
+    recorded: AtomicBool,
+}
+
+impl ClusterWork {
+    /// For the clusters of a scene. `entity_room` is the number of entities that the merge shader may address.
+    pub fn new(device: &Arc<Device>, lists: ClusterLists, entity_room: usize) -> Result<Self> {
+        let upload = |name: &str, bytes: usize| Upload::new(device, name, bytes as u64);
+        Ok(ClusterWork {
+            entities: upload("entities", entity_room * size_of::<layout::DeviceEntity>())?,
+            clusters: upload("clusters", lists.clusters.len() * size_of::<layout::Cluster>())?,
+            entries: upload("entries", 4 * lists.clusters.len())?,
+            merged: Merged::default(),
+            recorded: AtomicBool::new(true),
+            lists,
+        })
+    }
+
+    /// Notes that the merge that was prepared last is being recorded. Returns how many clusters it lights.
+    pub fn start(&self) -> u32 {
+        self.recorded.store(true, Ordering::Relaxed);
+        self.merged.merged_clusters as u32
+    }
+
+    /// Whether a device's texel views hold the clusters and their lists.
+    pub fn fits_views(&self, device: &Device) -> bool {
+        TexelView::fits(device, ENTRY_FORMAT, self.entries.size_bytes)
+            && TexelView::fits(device, CLUSTER_FORMAT, self.clusters.size_bytes)
+    }
+
+    pub fn size_bytes(&self) -> u64 {
+        let uploads = [&self.entities, &self.clusters, &self.entries];
+        uploads.iter().map(|upload| upload.all_bytes()).sum()
+    }
+}
+
+impl Frame {
+    /// Prepares a frame that lights `relight` and draws `viewports`, if there are any. Where it lights, the merge has
+    /// to be recorded next, or every cluster is merged again.
+    pub fn prepare(&mut self, placements: &[Placement], viewports: &[Viewport], relight: Relight) -> Result<()> {
+        if relight != Relight::Nothing {
+            self.fit_edges()?;
+            self.radiosity.replaced = false;
+            self.prepare_merge(placements, if relight == Relight::Seen { viewports } else { &[] })?;
+            self.fit_lists()?;
+        }
+        if !viewports.is_empty() {
+            self.prepare_chains()?;
+            self.prepare_lines(placements, viewports)?;
+        }
+        Ok(())
+    }
+
+    /// The dirty clusters and their lists.
+    fn prepare_merge(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
+        let state = self.state(placements);
+        let sights = self.sights(placements, viewports);
+        let work = &mut self.work;
+        if !std::mem::replace(work.recorded.get_mut(), false) {
+            work.lists.forget();
+        }
+        let dirty = work.lists.update(state, sights.as_deref());
+        let (clusters, entries) = work.lists.gather(&dirty);
+        work.merged = Merged {
+            clusters: work.lists.clusters.len(),
+            merged_clusters: dirty.iter().map(Dirty::cluster_count).sum(),
+            merged_entries: entries.len(),
+            stale_clusters: work.lists.stale_count(),
+        };
+        if dirty.is_empty() {
+            return Ok(());
+        }
+        if self.device.info.is_software() {
+            limits::check_entries(clusters.iter().map(|cluster| cluster.entry_count).max().unwrap_or(0))?;
+        }
+        work.entities.write(&work.lists.now().entities)?;
+        work.entries.write(&entries)?;
+        work.clusters.write(&clusters)
+    }
+
+    /// The chains of the time that was merged last, for pictures whose pixels evaluate sharp lights.
+    fn prepare_chains(&mut self) -> Result<()> {
+        if self.pixels == PixelShading::Vertices || !self.work.lists.is_updated() {
+            return Ok(());
+        }
+        let chains = match &mut self.chains {
+            Some(chains) => chains,
+            none => none.insert(PixelChains::new(&self.device, &self.scene, &self.buffers)?),
+        };
+        chains.prepare(&self.work.lists)
+    }
+
+    /// The viewports of the next picture, and the outlines and creases of each where they are smoothed.
+    fn prepare_lines(&mut self, placements: &[Placement], viewports: &[Viewport]) -> Result<()> {
+        let smooths = self.picture.draw.smooth.is_some();
+        if smooths && self.picture.edges.is_empty() {
+            self.picture.edges = self.scene.meshes.iter().map(|mesh| Edges::new(mesh)).collect();
+        }
+        let mut strips = Strips::default();
+        let mut prepared = Vec::with_capacity(viewports.len());
+        for viewport in viewports {
+            let first = strips.count() as u32;
+            let [_, _, width, height] = viewport.area;
+            if smooths {
+                for (line, tag) in self.outlines(placements, f64::from(width) / f64::from(height.max(1))) {
+                    strips.add(&line, [width, height], tag);
+                }
+            }
+            prepared.push((*viewport, first..strips.count() as u32));
+        }
+        self.picture.prepared = prepared;
+        self.picture.lines.write(&strips)
+    }
+
+    /// How each entity is seen in each of the viewports that show merged light; `None` where none does, and light is
+    /// for others to read.
+    pub(super) fn sights(&self, placements: &[Placement], viewports: &[Viewport]) -> Option<Vec<Vec<Sight>>> {
+        let shown = viewports.iter().filter(|viewport| viewport.radiosity == RadiositySource::Merged);
+        let cameras: Vec<_> = shown.map(|viewport| self.camera([viewport.area[2], viewport.area[3]])).collect();
+        let of = |(index, placement)| cameras.iter().map(|camera| self.sight(camera, index, placement)).collect();
+        (!cameras.is_empty()).then(|| placements.iter().enumerate().map(of).collect())
+    }
+
+    /// Goes over to storage blocks where texel views cannot hold the clusters and lists that the next merge reads.
+    fn fit_lists(&mut self) -> Result<()> {
+        if self.work.fits_views(&self.device) {
+            return Ok(());
+        }
+        if let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.reads == Reads::Texels) {
+            let permutation = SharpPermutation { reads: Reads::Storage, ..sharp.permutation };
+            *sharp = Sharp::new(&self.device, &self.library, permutation)?;
+        }
+        let permutation = self.merge.permutation;
+        if permutation.variant.reads == Reads::Texels {
+            let variant = permutation.variant.restricted(false, false);
+            log::info!("the lists are too long for texel views; using \"{}\"", variant.name);
+            let permutation = MergePermutation { variant, ..permutation };
+            self.merge = CompiledMerge::new(&self.device, &self.library, permutation)?;
+        }
+        Ok(())
+    }
+
+    /// Has the pass of sharp lights mark the edges of shadows where pixels by now read the marks, and leave them out
+    /// where none does. Where they are new, every cluster is merged again.
+    fn fit_edges(&mut self) -> Result<()> {
+        let edges = self.pixels.pixels().is_some();
+        let Some(sharp) = self.sharp.as_mut().filter(|sharp| sharp.permutation.edges != edges) else { return Ok(()) };
+        *sharp = Sharp::new(&self.device, &self.library, SharpPermutation { edges, ..sharp.permutation })?;
+        if edges {
+            self.forget();
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,319 @@
+//! Field files: what was written comes back, and nothing else is ever taken for a field.
+
+use crate::generate;
+use fastrand::Rng;
+use serde::Serialize;
+use shadow_fields::Error;
+use shadow_fields::bake;
+use shadow_fields::field::file::{self, FIELD_MAGIC, TRANSFER_MAGIC};
+use shadow_fields::field::{FieldHeader, FieldKind, Lattice, ShadowField, Storage};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Offsets of the prologue, as the module's table states them.
+const VERSION_AT: usize = 8;
+const HEADER_LENGTH_AT: usize = 12;
+const PAYLOAD_LENGTH_AT: usize = 16;
+
+fn header(kind: FieldKind, storage: Storage, lattice: &str) -> FieldHeader {
+    let options =
+        bake::Options { storage, lattice: lattice.parse().unwrap(), bands: 2, face_px: 16, ..Default::default() };
+    bake::header(&generate::sphere(0.7, 1), kind, &options)
+}
+
+fn field(kind: FieldKind, storage: Storage, lattice: &str, seed: u64) -> ShadowField {
+    let header = header(kind, storage, lattice);
+    let mut rng = Rng::with_seed(seed);
+    let payload = (0..header.payload_bytes()).map(|_| rng.u8(..)).collect();
+    ShadowField { header, payload }
+}
+
+fn small() -> ShadowField {
+    field(FieldKind::Occlusion, Storage::F16, "latlon:2x2x2", 1)
+}
+
+/// The refusal of a file: bad input, one line, that names the file.
+fn refusal(path: &Path) -> String {
+    let error = ShadowField::read(path).expect_err("a bad file was read");
+    assert!(matches!(error, Error::Input(_)) && error.exit_code() == 4, "{error:?}");
+    let message = error.to_string();
+    assert!(message.contains(path.file_name().unwrap().to_str().unwrap()), "{message}");
+    assert!(!message.contains('\n'), "{message}");
+    message
+}
+
+fn entries(folder: &Path) -> Vec<String> {
+    std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect()
+}
+
+#[test]
+fn round_trip() {
+    let folder = tempfile::tempdir().unwrap();
+    for (i, (kind, storage, lattice)) in [
+        (FieldKind::Occlusion, Storage::F16, "cube:3x2,inner=1.02"),
+        (FieldKind::Occlusion, Storage::F32, "cube:3x2,linear,raw,inner=0.3,outer=5.5"),
+        (FieldKind::Radiance, Storage::F16, "latlon:3x4x5,linear,raw"),
+        (FieldKind::Radiance, Storage::F32, "cube:1x1"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let path = folder.path().join(format!("below/that/{i}.sf"));
+        let mut written = field(kind, storage, lattice, i as u64);
+        written.header.radiance_scale = 0.1 + i as f32;
+        written.header.centre_m = [0.1, -1e-7, 3e6];
+        written.header.mesh = "na\"me \u{e9}\n".into();
+        written.write(&path).unwrap();
+        assert_eq!(ShadowField::read(&path).unwrap(), written);
+    }
+}
+
+#[test]
+fn stored_numbers_have_their_format() {
+    for storage in [Storage::F16, Storage::F32] {
+        let header = header(FieldKind::Radiance, storage, "latlon:2x2x2");
+        let count = header.payload_bytes() as usize / storage.bytes();
+        let payload = (0..count)
+            .flat_map(|i| match storage {
+                Storage::F16 => half::f16::from_f32(i as f32 / 8.0).to_le_bytes().to_vec(),
+                Storage::F32 => (i as f32 / 8.0).to_le_bytes().to_vec(),
+            })
+            .collect();
+        let field = ShadowField { header, payload };
+        // Two bands: four coefficients a channel, three channels a sample; all values are exact in f16.
+        assert_eq!(field.stored(0, 0, 3), 3.0 / 8.0);
+        assert_eq!(field.stored(1, 2, 1), (12.0 + 8.0 + 1.0) / 8.0);
+    }
+}
+
+#[test]
+fn every_cut_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cut.sf");
+    small().write(&path).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    for length in 0..whole.len() {
+        std::fs::write(&path, &whole[..length]).unwrap();
+        refusal(&path);
+    }
+    std::fs::write(&path, &whole).unwrap();
+    assert_eq!(ShadowField::read(&path).unwrap(), small(), "the whole file is good");
+}
+
+#[test]
+fn every_flipped_bit_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flipped.sf");
+    small().write(&path).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    for at in 0..whole.len() {
+        for bit in 0..8 {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 1 << bit;
+            std::fs::write(&path, &damaged).unwrap();
+            refusal(&path);
+        }
+    }
+}
+
+#[test]
+fn other_kinds_versions_and_lengths_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("other.sf");
+    small().write(&path).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    let with = |edit: &dyn Fn(&mut Vec<u8>)| {
+        let mut bytes = whole.clone();
+        edit(&mut bytes);
+        std::fs::write(&path, bytes).unwrap();
+        refusal(&path)
+    };
+    assert!(with(&|b| b[..8].copy_from_slice(&TRANSFER_MAGIC)).contains("magic"));
+    assert!(with(&|b| b[..8].copy_from_slice(b"\x89PNG\r\n\x1a\n")).contains("magic"));
+    for other in [file::VERSION - 1, file::VERSION + 1] {
+        let said = with(&|b| b[VERSION_AT..VERSION_AT + 4].copy_from_slice(&other.to_le_bytes()));
+        assert!(said.contains(&format!("version {other}")), "{said}");
+    }
+    assert!(with(&|b| b.push(0)).contains("claims"));
+    assert!(with(&|b| b.extend([7; 4096])).contains("claims"));
+    // Lengths that would overflow or exhaust memory if they were believed.
+    for length in [u64::MAX, u64::MAX - 55, 1 << 62, 4 << 30] {
+        with(&|b| b[PAYLOAD_LENGTH_AT..PAYLOAD_LENGTH_AT + 8].copy_from_slice(&length.to_le_bytes()));
+    }
+    for length in [u32::MAX, 1 << 30, 0, 3] {
+        with(&|b| b[HEADER_LENGTH_AT..HEADER_LENGTH_AT + 4].copy_from_slice(&length.to_le_bytes()));
+    }
+}
+
+/// A file whose hash is right, whatever it holds: only the check of its header can refuse it.
+fn sealed(path: &Path, header: &impl Serialize, payload: &[u8]) -> String {
+    file::write(path, FIELD_MAGIC, header, payload).unwrap();
+    refusal(path)
+}
+
+#[test]
+fn headers_are_not_believed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sealed.sf");
+    let good = small();
+    let json = |edit: &dyn Fn(&mut serde_json::Value)| {
+        let mut value = serde_json::to_value(&good.header).unwrap();
+        edit(&mut value);
+        value
+    };
+    // The way itself is sound: an unchanged header is accepted.
+    file::write(&path, FIELD_MAGIC, &json(&|_| ()), &good.payload).unwrap();
+    assert_eq!(ShadowField::read(&path).unwrap(), good);
+
+    let lattice = |edit: &dyn Fn(&mut serde_json::Value)| json(&|header| edit(&mut header["lattice"]));
+    let huge = lattice(&|l| l["directions"] = serde_json::json!({"latlon": {"latitudes": 5000, "longitudes": 10_000}}));
+    let message = sealed(&path, &huge, &good.payload);
+    assert!(message.contains("100000000 samples"), "{message}");
+    let cells = |n: u32| lattice(&|l| l["directions"] = serde_json::json!({ "cube": { "cells": n } }));
+    for n in [u32::MAX, 1 << 31, 3_037_000_500, 0] {
+        sealed(&path, &cells(n), &good.payload);
+    }
+    // Within every limit, but not what the payload holds.
+    assert!(sealed(&path, &cells(500), &good.payload).contains("claims"));
+    assert!(sealed(&path, &json(&|_| ()), &good.payload[1..]).contains("claims"));
+    assert!(sealed(&path, &json(&|_| ()), &[]).contains("claims"));
+
+    let set = |name: &'static str, value: serde_json::Value| json(&move |h| h[name] = value.clone());
+    for header in [
+        set("bands", 1.into()),
+        set("bands", 8.into()),
+        set("bands", u64::MAX.into()),
+        set("bands", (-1).into()),
+        set("face_px", 0.into()),
+        set("face_px", 2000.into()),
+        set("radius_m", 0.into()),
+        set("radius_m", (-1.0).into()),
+        set("radius_m", 1e300.into()),
+        set("radiance_scale", (-1.0).into()),
+        set("radius_m", serde_json::Value::Null),
+        set("kind", "elsewhere".into()),
+        set("storage", 16.into()),
+        set("centre_m", serde_json::json!([0.0, 0.0])),
+        lattice(&|l| l["shells"] = 0.into()),
+        lattice(&|l| l["inner"] = (-1.0).into()),
+        lattice(&|l| l["outer"] = 0.0.into()),
+        lattice(&|l| l["outer"] = 1e9.into()),
+        serde_json::json!({}),
+        serde_json::json!(17),
+    ] {
+        sealed(&path, &header, &good.payload);
+    }
+}
+
+/// Files of spacings that a lattice had once are refused by name, and the headers of the others are what they were:
+/// names in the cache are hashes of them.
+#[test]
+fn spacings_that_went_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("old.sf");
+    let good = small();
+    let pair = |spacing: &str, scaled: bool| {
+        let mut header = serde_json::to_value(&good.header).unwrap();
+        (header["lattice"]["spacing"], header["lattice"]["scaled"]) = (spacing.into(), scaled.into());
+        sealed(&path, &header, &good.payload)
+    };
+    assert!(pair("log", true).contains("`log`, expected `chord` or `linear`"));
+    for (spacing, scaled) in [("chord", false), ("linear", true)] {
+        let said = pair(spacing, scaled);
+        assert!(said.contains("\"chord\" goes with \"scaled\"") && said.contains("baked anew"), "{said}");
+    }
+    let text = r#"{"shells":18,"inner":0.0,"outer":8.0,"spacing":"chord","directions":{"cube":{"cells":7}},"scaled":true,"fit":null,"edges":null}"#;
+    assert_eq!(serde_json::to_string(&Lattice::default()).unwrap(), text);
+}
+
+#[test]
+fn missing_files_and_folders_are_bad_input() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(refusal(&folder.path().join("absent.sf")).contains("cannot be read"));
+    let a_folder = folder.path().join("folder.sf");
+    std::fs::create_dir(&a_folder).unwrap();
+    refusal(&a_folder);
+}
+
+#[test]
+fn nothing_is_left_half_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let bad = |path: &Path| {
+        let error = small().write(path).expect_err("the target cannot be written");
+        assert!(error.exit_code() == 4 && error.to_string().contains("cannot be written"), "{error}");
+        assert!(error.to_string().contains(path.file_name().unwrap().to_str().unwrap()), "{error}");
+    };
+    // A file stands where a folder is needed.
+    std::fs::write(folder.path().join("file"), b"mine").unwrap();
+    bad(&folder.path().join("file/field.sf"));
+    assert_eq!(std::fs::read(folder.path().join("file")).unwrap(), b"mine");
+    // A folder stands where the file is to go: the temporary file was written, and has to go again.
+    std::fs::create_dir_all(folder.path().join("taken.sf/full")).unwrap();
+    bad(&folder.path().join("taken.sf"));
+    let mut left = entries(folder.path());
+    left.sort();
+    assert_eq!(left, ["file", "taken.sf"]);
+    // The folder vanished since: it is made again.
+    let below = folder.path().join("gone");
+    std::fs::create_dir(&below).unwrap();
+    std::fs::remove_dir(&below).unwrap();
+    small().write(&below.join("field.sf")).unwrap();
+    assert_eq!(entries(&below), ["field.sf"]);
+}
+
+/// A folder in which no one may create files, the superuser included.
+#[cfg(target_os = "linux")]
+#[test]
+fn folders_without_permission_are_bad_input() {
+    let path = Path::new("/proc/field.sf");
+    let error = small().write(path).expect_err("nothing can be created there");
+    assert!(error.exit_code() == 4 && error.to_string().contains("/proc/field.sf"), "{error}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_read_only_folder_keeps_the_old_file() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("field.sf");
+    small().write(&path).unwrap();
+    let permit = |mode| std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(mode)).unwrap();
+    permit(0o555);
+    let other = field(FieldKind::Occlusion, Storage::F32, "latlon:2x2x2", 9);
+    let outcome = other.write(&path);
+    permit(0o755);
+    // The superuser may write all the same; either way the file is whole and alone.
+    let expected = if outcome.is_ok() { other } else { small() };
+    assert_eq!(ShadowField::read(&path).unwrap(), expected);
+    assert_eq!(entries(folder.path()), ["field.sf"]);
+}
+
+#[test]
+fn two_writers_and_a_reader_never_meet() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shared.sf");
+    let fields = [1, 2].map(|seed| field(FieldKind::Radiance, Storage::F32, "cube:4x4,inner=1.02", seed));
+    fields[0].write(&path).unwrap();
+    let done = AtomicBool::new(false);
+    let reads = std::thread::scope(|scope| {
+        let reader = scope.spawn(|| {
+            let mut seen = [0, 0];
+            while !done.load(Ordering::Relaxed) || seen[0] + seen[1] == 0 {
+                let found = ShadowField::read(&path).unwrap();
+                let which = fields.iter().position(|f| *f == found).expect("one of the two, whole");
+                seen[which] += 1;
+            }
+            seen
+        });
+        let writers = [&fields[0], &fields[1]].map(|field| {
+            let path = &path;
+            scope.spawn(move || (0..200).for_each(|_| field.write(path).unwrap()))
+        });
+        writers.into_iter().for_each(|w| w.join().unwrap());
+        done.store(true, Ordering::Relaxed);
+        reader.join().unwrap()
+    });
+    assert!(reads[0] + reads[1] > 0);
+    assert!(fields.contains(&ShadowField::read(&path).unwrap()));
+    assert_eq!(entries(folder.path()), ["shared.sf"], "no temporary file is left");
+}

@@ -1,0 +1,386 @@
+//! Meshes: generators against closed forms, derived properties, the enclosing sphere, and OBJ files there and back.
+
+use crate::generate;
+use std::collections::HashMap;
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+use generate::{cuboid, library, plane, sphere, torus, torus_two_colour};
+use glam::{DVec3, Quat, Vec3};
+use shadow_fields::asset::Generator;
+use shadow_fields::asset::{Mesh, enclose, obj};
+
+/// f32 positions: a few roundings of 6e-8 each, summed over many triangles of either sign.
+const F32: f64 = 1e-6;
+
+fn pot() -> Mesh {
+    generate::teapot(10)
+}
+
+fn close(value: f64, expected: f64, relative: f64) {
+    assert!((value - expected).abs() <= relative * expected.abs(), "{value} is not {expected} within {relative}");
+}
+
+#[test]
+fn shape_table() {
+    // mesh, closed, convex, flat, Euler characteristic (2 - 2 handles for closed ones, 1 for a disc)
+    let table = [
+        (plane(6.0, 7), false, false, true, 1),
+        (sphere(0.7, 0), true, true, false, 2),
+        (sphere(0.7, 5), true, true, false, 2),
+        (torus(0.5, 0.2, 48, 24), true, false, false, 0),
+        (torus_two_colour(0.5, 0.15, 48, 20), true, false, false, 0),
+        (cuboid(Vec3::new(0.3, 1.0, 2.5), 1), true, true, false, 2),
+        (cuboid(Vec3::new(0.3, 1.0, 2.5), 6), true, true, false, 2),
+    ];
+    for (mesh, closed, convex, flat, euler) in table {
+        assert_eq!(
+            (mesh.is_closed(), mesh.is_convex(), mesh.is_flat(), mesh.euler_characteristic()),
+            (closed, convex, flat, euler),
+            "{}",
+            mesh.name
+        );
+    }
+    assert!(!pot().is_closed() && !pot().is_convex() && !pot().is_flat());
+}
+
+#[test]
+fn counts() {
+    assert_eq!((plane(1.0, 64).positions.len(), plane(1.0, 64).triangles.len()), (65 * 65, 2 * 64 * 64));
+    assert_eq!((sphere(1.0, 3).positions.len(), sphere(1.0, 3).triangles.len()), (642, 1280));
+    assert_eq!(
+        (torus(1.0, 0.3, 48, 24).positions.len(), torus(1.0, 0.3, 48, 24).triangles.len()),
+        (48 * 24, 2 * 48 * 24)
+    );
+    assert_eq!((cuboid(Vec3::ONE, 4).positions.len(), cuboid(Vec3::ONE, 4).triangles.len()), (6 * 25, 12 * 16));
+    let triangles = pot().triangles.len();
+    assert_eq!(triangles, 64 * 100 - 8 * 10, "eight patches have one collapsed edge of ten squares");
+}
+
+#[test]
+fn volumes_and_areas() {
+    close(plane(3.0, 9).area_m2(), 9.0, F32);
+    let size = Vec3::new(0.3, 1.0, 2.5);
+    close(cuboid(size, 5).volume_m3(), 0.75, F32);
+    close(cuboid(size, 5).area_m2(), 2.0 * (0.3 + 0.75 + 2.5), F32);
+    // A polyhedron inscribed in a sphere: its volume and area fall short by O(h^2); four times less a subdivision.
+    let short = |s| 1.0 - sphere(1.0, s).volume_m3() / (4.0 / 3.0 * PI);
+    assert!(short(5) > 0.0 && short(5) < 2e-3, "{}", short(5));
+    assert!((short(4) / short(5) - 4.0).abs() < 0.05);
+    close(sphere(1.0, 6).area_m2(), 4.0 * PI, 1e-3);
+    // An inscribed n-gon has sin(2 pi / n) / (2 pi / n) of the area of its circle.
+    let inscribed = |n: f64| (TAU / n).sin() / (TAU / n);
+    let (major, minor, segments, sides) = (0.5, 0.2, 96.0, 48.0);
+    // Pappus for the cross-section; around the axis every wedge is cut by a chord in the same ratio.
+    let volume = 2.0 * PI * PI * major * minor * minor * inscribed(segments) * inscribed(sides);
+    close(torus(0.5, 0.2, 96, 48).volume_m3(), volume, 2e-4);
+    close(torus(0.5, 0.2, 192, 96).area_m2(), 4.0 * PI * PI * major * minor, 2e-3);
+}
+
+#[test]
+fn normals_are_unit_and_face_outwards() {
+    for mesh in library() {
+        assert_eq!(mesh.normals.len(), mesh.positions.len());
+        assert!(mesh.normals.iter().all(|n| (n.as_dvec3().length() - 1.0).abs() < 1e-6), "{}", mesh.name);
+        let (mut agree, mut corners) = (0, 0);
+        for t in &mesh.triangles {
+            let p = t.map(|i| mesh.positions[i as usize].as_dvec3());
+            let face = (p[1] - p[0]).cross(p[2] - p[0]);
+            for &i in t {
+                corners += 1;
+                agree += usize::from(face.dot(mesh.normals[i as usize].as_dvec3()) > 0.0);
+            }
+        }
+        assert!(agree as f64 > 0.999 * f64::from(corners), "{}: {agree} of {corners}", mesh.name);
+    }
+}
+
+#[test]
+fn sphere_normals_are_radial() {
+    let mesh = sphere(0.25, 4);
+    for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
+        assert!((*p * 4.0 - *n).length() < 1e-6);
+    }
+}
+
+#[test]
+fn two_colours_meet_in_a_narrow_blend() {
+    let mesh = torus_two_colour(0.5, 0.15, 48, 20);
+    let colors = mesh.colors.as_ref().unwrap();
+    for (p, c) in mesh.positions.iter().zip(colors) {
+        if p.x.abs() > 0.08 {
+            assert_eq!(c.x > c.z, p.x > 0.0, "{p}");
+        }
+    }
+    assert!(colors.contains(&generate::WARM) && colors.contains(&generate::COOL));
+}
+
+#[test]
+fn teapot_stands_upright_and_is_symmetric() {
+    let mesh = pot();
+    let (low, high) =
+        mesh.positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+    assert_eq!(low.y, 0.0, "the base lies on the ground");
+    close(f64::from(high.y), 3.15 / 1.3, F32);
+    // Spout to +x (3.525 is the control polygon's reach), handle to -x, the widest belly 2 to either side.
+    assert!(high.x > 3.3 && high.x < 3.525 && low.x >= -3.0 && low.x < -2.8, "{low} {high}");
+    assert!(high.z > 1.9 && high.z < 2.01 && (high.z + low.z).abs() < 1e-6, "{low} {high}");
+    // Every vertex has its mirror image, position and normal.
+    let key = |p: Vec3| (p * 4096.0).round().as_ivec3();
+    let mut cells: HashMap<glam::IVec3, Vec<usize>> = HashMap::new();
+    mesh.positions.iter().enumerate().for_each(|(i, p)| cells.entry(key(*p)).or_default().push(i));
+    let mirror = Vec3::new(1.0, 1.0, -1.0);
+    for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
+        let image = *p * mirror;
+        let found =
+            (-1..=1).flat_map(|x| (-1..=1).flat_map(move |y| (-1..=1).map(move |z| glam::IVec3::new(x, y, z)))).any(
+                |d| {
+                    cells.get(&(key(image) + d)).into_iter().flatten().any(|&i| {
+                        mesh.positions[i].distance(image) < 1e-5 && mesh.normals[i].distance(*n * mirror) < 1e-3
+                    })
+                },
+            );
+        assert!(found, "{p} {n} has no mirror image");
+    }
+}
+
+#[test]
+fn teapot_poles_have_vertical_normals() {
+    let mesh = pot();
+    for (height, up) in [(3.15 / 1.3, 1.0), (0.0, -1.0)] {
+        let at = |p: &Vec3| p.x.hypot(p.z) < 1e-6 && (f64::from(p.y) - height).abs() < 1e-6;
+        let poles: Vec<Vec3> =
+            mesh.positions.iter().zip(&mesh.normals).filter(|(p, _)| at(p)).map(|(_, n)| *n).collect();
+        assert_eq!(poles.len(), 1, "four patches share the pole");
+        assert!((poles[0].y - up).abs() < 1e-6, "{}", poles[0]);
+    }
+}
+
+/// Slow twin: the smallest ball through every two, three or four points that holds all.
+fn brute_ball(points: &[DVec3]) -> f64 {
+    let holds = |c: DVec3, r: f64| points.iter().all(|p| p.distance(c) <= r * (1.0 + 1e-9));
+    let mut best = f64::INFINITY;
+    let n = points.len();
+    let mut consider = |c: DVec3, r: f64| {
+        if r < best && holds(c, r) {
+            best = r;
+        }
+    };
+    for a in 0..n {
+        for b in a + 1..n {
+            let (p, q) = (points[a], points[b]);
+            consider((p + q) * 0.5, p.distance(q) * 0.5);
+            for &r in &points[b + 1..] {
+                // Circumcentre of a triangle by the cross product form.
+                let (u, v) = (q - p, r - p);
+                let w = u.cross(v);
+                let c = p
+                    + (w.cross(u) * v.length_squared() + v.cross(w) * u.length_squared()) / (2.0 * w.length_squared());
+                consider(c, c.distance(p));
+                for &s in points {
+                    // Circumcentre of a tetrahedron: along the triangle's axis until s is as far as p.
+                    let axis = w / w.length();
+                    let height = (s - p).dot(axis);
+                    if height.abs() > 1e-6 {
+                        let t = ((s - c).length_squared() - (p - c).length_squared()) / (2.0 * height);
+                        consider(c + axis * t, (c + axis * t).distance(p));
+                    }
+                }
+            }
+        }
+    }
+    best
+}
+
+#[test]
+fn bounding_sphere_is_smallest() {
+    let mut random = fastrand::Rng::with_seed(11);
+    for _ in 0..60 {
+        let count = random.usize(2..14);
+        let points: Vec<Vec3> = (0..count)
+            .map(|_| Vec3::from_array(std::array::from_fn(|k| (random.f32() - 0.3) * [1.0, 4.0, 0.2][k])))
+            .collect();
+        let (centre, radius) = enclose::bounding_sphere(&points);
+        assert!(points.iter().all(|p| p.distance(centre) <= radius));
+        let exact = brute_ball(&points.iter().map(|p| p.as_dvec3()).collect::<Vec<_>>());
+        // The centre is rounded to f32: 6e-8 of coordinates up to 3, radii from about 0.1 on.
+        assert!((f64::from(radius) - exact).abs() < 2e-6 * exact.max(0.1), "{radius} against {exact}");
+    }
+}
+
+#[test]
+fn bounding_spheres_of_generators() {
+    for (mesh, radius) in [
+        (sphere(0.37, 4), 0.37),
+        (torus(0.5, 0.2, 48, 24), 0.7),
+        (cuboid(Vec3::new(1.0, 2.0, 2.0), 3), 1.5),
+        (plane(2.0, 5), 2f64.sqrt()),
+    ] {
+        let (centre, r) = mesh.bounding_sphere();
+        assert_eq!(centre, Vec3::ZERO, "{}", mesh.name);
+        close(f64::from(r), radius, 3e-7);
+        assert!(
+            mesh.positions
+                .iter()
+                .all(|p| p.distance(centre) <= r && p.as_dvec3().distance(centre.as_dvec3()) <= f64::from(r))
+        );
+    }
+    // Moved far away, rounded, still all inside.
+    let moved: Vec<Vec3> = sphere(0.37, 4).positions.iter().map(|p| *p + Vec3::new(1000.0, -20.0, 3.0)).collect();
+    let (centre, r) = enclose::bounding_sphere(&moved);
+    assert!(centre.distance(Vec3::new(1000.0, -20.0, 3.0)) < 1e-4 && (r - 0.37).abs() < 1e-4);
+    assert!(moved.iter().all(|p| p.distance(centre) <= r));
+    assert_eq!(enclose::bounding_sphere(&[Vec3::ONE]), (Vec3::ONE, 0.0));
+}
+
+#[test]
+fn shape_survives_rotation_and_refuses_defects() {
+    let turn = Quat::from_axis_angle(Vec3::new(0.3, 0.8, -0.5).normalize(), 1.1);
+    let turned = |mesh: &Mesh| {
+        let all = |v: &[Vec3]| v.iter().map(|p| turn * *p).collect::<Vec<_>>();
+        Mesh::new("turned", all(&mesh.positions), all(&mesh.normals), None, mesh.triangles.clone()).unwrap()
+    };
+    // Split normals give every corner of a box three vertices; rotation rounds equal positions alike.
+    assert!(turned(&cuboid(Vec3::new(1.0, 0.2, 3.0), 9)).is_convex());
+    assert!(turned(&sphere(1.0, 5)).is_convex());
+    assert!(turned(&plane(1.0, 50)).is_flat());
+    let rebuild =
+        |mesh: &Mesh, triangles| Mesh::new("x", mesh.positions.clone(), mesh.normals.clone(), None, triangles).unwrap();
+    let ball = sphere(1.0, 2);
+    assert!(!rebuild(&ball, ball.triangles[1..].to_vec()).is_closed(), "a hole");
+    assert!(!rebuild(&ball, ball.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect()).is_closed(), "inside out");
+    let mut one_turned = ball.triangles.clone();
+    one_turned[5].swap(0, 1);
+    assert!(!rebuild(&ball, one_turned).is_closed(), "one triangle turned over");
+    let mut twice = ball.triangles.clone();
+    twice.push(twice[0]);
+    assert!(!rebuild(&ball, twice).is_closed(), "one triangle twice");
+    let mut dented = ball.clone();
+    dented.positions[7] *= 0.9;
+    let dented = rebuild(&dented, ball.triangles.clone());
+    assert!(dented.is_closed() && !dented.is_convex(), "a dent");
+    let mut bent = plane(1.0, 4);
+    bent.positions[3].y = 1e-3;
+    assert!(!rebuild(&bent, bent.triangles.clone()).is_flat());
+}
+
+/// Two meshes in one, the second moved.
+fn union(a: &Mesh, b: &Mesh, by: Vec3) -> Mesh {
+    let positions = a.positions.iter().copied().chain(b.positions.iter().map(|p| *p + by)).collect();
+    let normals = a.normals.iter().chain(&b.normals).copied().collect();
+    let first = a.positions.len() as u32;
+    let triangles = a.triangles.iter().copied().chain(b.triangles.iter().map(|t| t.map(|i| i + first))).collect();
+    Mesh::new("union", positions, normals, None, triangles).unwrap()
+}
+
+#[test]
+fn pieces_and_contacts() {
+    let cube = cuboid(Vec3::ONE, 1);
+    let apart = union(&cube, &cube, Vec3::new(3.0, 0.0, 0.0));
+    assert!(apart.is_closed() && !apart.is_convex() && apart.euler_characteristic() == 4);
+    assert!(apart.is_solid() && sphere(1.0, 2).is_solid() && torus(1.0, 0.3, 12, 8).is_solid() && !pot().is_solid());
+    let turned = cube.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect();
+    let wall = Mesh::new("wall", cube.positions.clone(), cube.normals.clone(), None, turned).unwrap();
+    let hollow = union(&cuboid(Vec3::splat(3.0), 1), &wall, Vec3::ZERO);
+    assert!(hollow.is_closed() && !hollow.is_solid(), "a hollow in a box");
+    assert!(!union(&cube, &cube, Vec3::ONE).is_closed(), "two boxes that share one corner are no manifold");
+    assert!(!union(&cube, &cube, Vec3::new(1.0, 1.0, 0.0)).is_closed(), "nor are two that share an edge");
+}
+
+#[test]
+fn missing_normals_are_computed() {
+    let ball = sphere(1.0, 4);
+    let bare = Mesh::new("bare", ball.positions.clone(), vec![], None, ball.triangles.clone()).unwrap();
+    for (given, computed) in ball.normals.iter().zip(&bare.normals) {
+        // Angle weights on a nearly regular mesh: the error is that of the triangulation, O(h^2) with h = 0.07.
+        assert!(given.distance(*computed) < 5e-3, "{given} {computed}");
+    }
+    // Where one given normal has no length, that one is computed.
+    let mut normals = ball.normals.clone();
+    normals[9] = Vec3::ZERO;
+    let mended = Mesh::new("mended", ball.positions.clone(), normals, None, ball.triangles.clone()).unwrap();
+    assert!(mended.normals[9].distance(ball.normals[9]) < 5e-3 && mended.normals[8] == ball.normals[8]);
+}
+
+#[test]
+fn needles_and_duplicates_are_tolerated() {
+    let text = "v 0 0 0\nv 1 0 0\nv 1 0 0\nv 0 1 0\nv .5 0 0\nf 1 2 4\nf 1 2 3\nf 1 1 4\nf 1 5 2\n";
+    let mesh = Mesh::parse(text.as_bytes(), Path::new("x.obj")).unwrap();
+    assert_eq!(mesh.triangles.len(), 2, "the triangle and the needle with three different corners");
+    assert!(mesh.normals.iter().all(|n| n.is_finite() && (n.length() - 1.0).abs() < 1e-6));
+}
+
+#[test]
+fn obj_text_reads_back_bit_for_bit() {
+    for mesh in library() {
+        let back =
+            Mesh::parse(obj::write_obj(&mesh).as_bytes(), Path::new(&format!("somewhere/{}.obj", mesh.name))).unwrap();
+        assert_eq!(back, mesh, "{}", mesh.name);
+        assert_eq!(back.content_hash(), mesh.content_hash());
+    }
+}
+
+#[test]
+fn committed_meshes_are_what_the_generators_write() {
+    for mesh in library() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("assets/meshes/{}.obj", mesh.name));
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text == obj::write_obj(&mesh), "{} is stale: run scripts/meshes", path.display());
+    }
+}
+
+#[test]
+fn obj_dialects() {
+    let parse = |text: &str| Mesh::parse(text.as_bytes(), Path::new("x.obj")).unwrap();
+    let plain = parse("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
+    assert_eq!(plain.triangles.len(), 2);
+    assert!(plain.normals.iter().all(|n| n.distance(Vec3::Z) < 1e-6));
+    let same = [
+        "mtllib none.mtl\no a\nv 0 0 0 1\nv 1 0 0\ng b\nv 1 1 0 # far\nv 0 1 0\nusemtl m\nvt 0 0\nf -4/1 -3/1 -2/1 -1/1\n",
+        "f 1 2 3 4\r\nv 0 0 0\r\nv 1 0 0\r\nv 1 1 0\r\nv 0 1 0\r\n",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1/2/1 2//1 3//1 4\nl 1 2\np 3\n",
+    ];
+    for text in same {
+        assert_eq!(parse(text).content_hash(), plain.content_hash(), "{text}");
+    }
+    let split = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 2\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 4//2 2//2\n");
+    assert_eq!((split.positions.len(), split.normals[0]), (6, Vec3::Z), "two normals at two of the positions");
+    let colored = parse("v 0 0 0 1 0 0\nv 1 0 0 0 2 0\nv 0 1 0 0 0 .5\nf 1 2 3\n");
+    assert_eq!(colored.colors.unwrap(), [Vec3::X, Vec3::Y * 2.0, Vec3::Z * 0.5]);
+}
+
+#[test]
+fn content_hash_tells_meshes_apart() {
+    let hashes: Vec<_> = library().iter().map(Mesh::content_hash).collect();
+    for (i, a) in hashes.iter().enumerate() {
+        assert!(hashes[i + 1..].iter().all(|b| a != b));
+    }
+    assert_ne!(torus(0.5, 0.15, 48, 20).content_hash(), torus_two_colour(0.5, 0.15, 48, 20).content_hash());
+}
+
+#[test]
+fn generators_refuse_bad_numbers() {
+    let bad = [
+        Generator::Plane { size_m: 0.0, cells: 4 },
+        Generator::Plane { size_m: f32::NAN, cells: 4 },
+        Generator::Plane { size_m: 1.0, cells: 0 },
+        Generator::Plane { size_m: 1.0, cells: u32::MAX },
+        Generator::Sphere { radius_m: -1.0, subdivisions: 2 },
+        Generator::Sphere { radius_m: 1.0, subdivisions: 9 },
+        Generator::Torus { major_m: 0.2, minor_m: 0.3, segments: 8, sides: 8 },
+        Generator::Torus { major_m: 0.2, minor_m: 0.1, segments: 2, sides: 8 },
+        Generator::Torus { major_m: 0.2, minor_m: 0.1, segments: 8, sides: 2 },
+        Generator::Torus { major_m: 0.2, minor_m: 0.1, segments: u32::MAX, sides: 8 },
+        Generator::TorusTwoColour { major_m: 0.2, minor_m: 0.0, segments: 8, sides: 8 },
+        Generator::Disc { radius_m: 0.0 },
+        Generator::Rectangle { size_m: [1.0, f32::INFINITY] },
+        Generator::Cuboid { size_m: Vec3::new(1.0, 0.0, 1.0), cells: 2 },
+        Generator::Teapot { subdivisions: 0 },
+        Generator::Teapot { subdivisions: 100_000 },
+    ];
+    for generator in bad {
+        let error = generator.build().expect_err(&format!("{generator:?}"));
+        assert_eq!(error.exit_code(), 4);
+        assert!(!error.to_string().contains('\n'));
+    }
+}

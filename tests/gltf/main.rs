@@ -1,0 +1,13 @@
+//! glTF files: scenes, motion, surfaces, what is refused, and the commands that take them.
+
+#[path = "../common/cli.rs"]
+mod cli;
+mod cli_of_gltf;
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../common/model.rs"]
+mod model;
+mod motion;
+mod refused;
+mod scenes;
+mod surface;

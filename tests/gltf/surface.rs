@@ -1,0 +1,171 @@
+//! Materials of glTF files: textures, emission, colours of vertices, and what is left out.
+
+use crate::model;
+use glam::Vec3;
+use model::{Model, U8, load};
+use serde_json::json;
+use shadow_fields::asset::picture::{linear_from_srgb, write_png};
+
+/// A square of 2 x 2 m with coordinates of textures, of a material that is no metal unless it says so.
+fn square(model: &mut Model, mut material: serde_json::Value, with_uv: bool) -> usize {
+    let metallic = &mut material["pbrMetallicRoughness"]["metallicFactor"];
+    *metallic = if metallic.is_null() { 0.into() } else { metallic.clone() };
+    let material = model.push("materials", material);
+    let positions = model.positions(&[-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0.]);
+    let mut attributes = json!({ "POSITION": positions });
+    if with_uv {
+        // The lower half of the picture.
+        attributes["TEXCOORD_0"] = json!(model.floats(2, &[0.1, 0.9, 0.9, 0.9, 0.9, 0.6, 0.1, 0.6]));
+    }
+    let indices = model.indices(&[0, 1, 2, 0, 2, 3]);
+    let mesh = model.mesh(attributes, Some(indices), Some(material));
+    model.node(json!({ "mesh": mesh }))
+}
+
+/// A texture of 2 x 2 texels in linear colours: red, green; blue, white.
+fn texture(model: &mut Model) -> usize {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.png");
+    write_png(&path, 2, 2, &[1., 0., 0., 0., 1., 0., 0., 0., 1., 1., 1., 1.], 0.0).unwrap();
+    let view = model.view(&std::fs::read(path).unwrap());
+    let image = model.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
+    model.push("textures", json!({ "source": image }))
+}
+
+#[test]
+fn textures_become_means_over_vertices() {
+    let mut model = Model::default();
+    let texture = texture(&mut model);
+    let material = |factor: [f32; 4], more: serde_json::Value| {
+        let mut info = json!({ "index": texture });
+        info.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        json!({ "pbrMetallicRoughness": { "baseColorFactor": factor, "baseColorTexture": info } })
+    };
+    square(&mut model, material([1.0, 0.5, 1.0, 1.0], json!({})), true);
+    square(&mut model, material([1.0; 4], json!({})), false);
+    let up = json!({ "extensions": { "KHR_texture_transform": { "offset": [0, -0.5] } } });
+    square(&mut model, material([1.0; 4], up), true);
+    // A quarter turn: what stands below stands at the right, green and white.
+    let turn = json!({ "extensions": { "KHR_texture_transform": { "rotation": std::f32::consts::FRAC_PI_2 } } });
+    square(&mut model, material([1.0; 4], turn), true);
+    let import = load(&model);
+    let albedo = |i: usize| import.data.entities[i].albedo;
+    let close = |a: Vec3, b: [f32; 3]| (a - Vec3::from(b)).length() < 1e-3;
+    assert!(close(albedo(0), [0.5, 0.25, 1.0]), "blue and white: {}", albedo(0));
+    assert!(close(albedo(1), [0.5, 0.5, 0.5]), "the whole picture: {}", albedo(1));
+    assert!(close(albedo(2), [0.5, 0.5, 0.0]), "red and green: {}", albedo(2));
+    assert!(close(albedo(3), [0.5, 1.0, 0.5]), "green and white: {}", albedo(3));
+    let left_out = import.notes.left_out();
+    assert_eq!(left_out, ["left out (4): base colour textures (their mean over the vertices is the albedo)"]);
+}
+
+#[test]
+fn a_jpeg_texture_becomes_its_mean() {
+    let mut model = Model::default();
+    // Two halves of one colour each: blocks of JPEG lie within them.
+    let halves = [[200, 80, 40], [40, 120, 220]];
+    let picture = image::RgbImage::from_fn(64, 32, |x, _| image::Rgb(halves[(x / 32) as usize]));
+    let mut bytes = Vec::new();
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 95).encode_image(&picture).unwrap();
+    let view = model.view(&bytes);
+    let image = model.push("images", json!({ "bufferView": view, "mimeType": "image/jpeg" }));
+    let texture = model.push("textures", json!({ "source": image }));
+    square(&mut model, json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": texture } } }), false);
+    let linear = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
+    let [left, right] = halves.map(|half| Vec3::from(half.map(linear)));
+    let (found, expected) = (load(&model).data.entities[0].albedo, (left + right) / 2.0);
+    // A step of 8 bits is at most 0.009 in linear light at these colours, and JPEG at this quality is wrong by about
+    // one.
+    assert!((found - expected).abs().max_element() < 0.01, "{found} for {expected}");
+}
+
+#[test]
+fn metal_and_gloss_are_said_to_be_diffuse() {
+    let mut model = Model::default();
+    for (metallic, roughness) in [(0.0, 1.0), (1.0, 1.0), (0.3, 1.0), (0.0, 0.5)] {
+        let pbr = json!({ "metallicFactor": metallic, "roughnessFactor": roughness });
+        square(&mut model, json!({ "pbrMetallicRoughness": pbr }), false);
+    }
+    // Of a material that is used twice, once; of one that shows its colour as it is, not; of one that says nothing, as
+    // metal is the default.
+    let mesh = model.json["nodes"][1]["mesh"].clone();
+    model.node(json!({ "mesh": mesh }));
+    let index = square(&mut model, json!({ "extensions": { "KHR_materials_unlit": {} } }), false);
+    model.json["materials"][index - 1]["pbrMetallicRoughness"]["metallicFactor"] = json!(1);
+    let index = square(&mut model, json!({}), false);
+    model.json["materials"][index - 1] = json!({});
+    assert_eq!(load(&model).notes.left_out(), ["left out (4): metallic or glossy materials (they are diffuse)"]);
+}
+
+#[test]
+fn emission_has_its_strength_and_pattern() {
+    let mut model = Model::default();
+    let texture = texture(&mut model);
+    let glow = |more: serde_json::Value| {
+        let mut json = json!({ "emissiveFactor": [1, 0.5, 0.25] });
+        json.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        json
+    };
+    let strong = json!({ "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 40 } } });
+    square(&mut model, glow(json!({})), true);
+    square(&mut model, glow(strong), true);
+    square(&mut model, glow(json!({ "emissiveTexture": { "index": texture } })), true);
+    square(&mut model, json!({ "emissiveTexture": { "index": texture } }), true);
+    let import = load(&model);
+    let entities = &import.data.entities;
+    assert_eq!(entities[0].emission, Vec3::new(1.0, 0.5, 0.25));
+    assert_eq!(entities[1].emission, Vec3::new(40.0, 20.0, 10.0));
+    assert_eq!((entities[2].emission, entities[3].emission), (Vec3::new(1.0, 0.5, 0.25), Vec3::ZERO));
+    // Seen from below: blue at the left, white at the right.
+    let mesh = &import.meshes[2];
+    for (position, color) in mesh.positions.iter().zip(mesh.colors.as_ref().unwrap()) {
+        assert_eq!(*color, if position.x < 0.0 { Vec3::Z } else { Vec3::ONE });
+    }
+    assert!(import.meshes[0].colors.is_none());
+    assert!(import.data.environment.is_empty(), "something shines, so no daylight is added");
+    assert_eq!(import.data.output.exposure_ev, 0.0);
+    let left_out = import.notes.left_out();
+    assert_eq!(left_out, ["left out (1): emissive textures (vertices have their colours)"]);
+}
+
+#[test]
+fn colours_of_vertices_are_a_mean_by_area() {
+    let mut model = Model::default();
+    // A triangle of 3 m^2 in black and one of 1 m^2 in white.
+    let positions = model.positions(&[0., 0., 0., 6., 0., 0., 0., 1., 0., 0., 0., 1., 2., 0., 1., 0., 1., 1.]);
+    let colors =
+        model.accessor(U8, 4, 6, &[[0, 0, 0, 255]; 3].into_iter().chain([[255; 4]; 3]).flatten().collect::<Vec<u8>>());
+    model.json["accessors"][colors]["normalized"] = json!(true);
+    let mesh = model.mesh(json!({ "POSITION": positions, "COLOR_0": colors }), None, None);
+    model.node(json!({ "mesh": mesh }));
+    let import = load(&model);
+    assert!((import.data.entities[0].albedo - Vec3::splat(0.25)).length() < 1e-6);
+}
+
+#[test]
+fn what_is_left_out_is_counted() {
+    let mut model = Model::default();
+    for alpha in ["BLEND", "MASK", "OPAQUE"] {
+        square(&mut model, json!({ "alphaMode": alpha }), false);
+    }
+    let glass = json!({ "extensions": { "KHR_materials_transmission": { "transmissionFactor": 1 } } });
+    square(&mut model, glass, false);
+    let texture = texture(&mut model);
+    square(&mut model, json!({ "normalTexture": { "index": texture } }), false);
+    let nodes = model.json["nodes"].as_array().unwrap().len();
+    let skin = model.push("skins", json!({ "joints": [0] }));
+    model.json["nodes"][nodes - 1]["skin"] = json!(skin);
+    let positions = model.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"].clone();
+    model.json["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": positions }]);
+    model.push("scenes", json!({ "nodes": [0] }));
+    assert_eq!(
+        load(&model).notes.left_out(),
+        [
+            "left out (1): further scenes",
+            "left out (1): nodes with a skin (their meshes stand still as they are stored)",
+            "left out (1): primitives with morph targets (they keep the shape that is stored first)",
+            "left out (1): textures of normals, roughness, metal or occlusion",
+            "left out (3): transparent materials (they are opaque)",
+        ]
+    );
+}

@@ -1,0 +1,324 @@
+//! glTF files that few programs write and the specification allows: they are read, and what is left out of them is
+//! said.
+
+#[path = "common/model.rs"]
+mod model;
+
+use model::{F32, I16, Model, U8, U16, U32, load, robot, room};
+use serde_json::{Value, json};
+use shadow_fields::scene::gltf;
+
+/// Reads JSON with a model's buffer by way of a GLB file.
+fn read(text: &str, bytes: &[u8]) -> shadow_fields::Result<gltf::Import> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.glb");
+    std::fs::write(&path, model::glb(text.as_bytes(), bytes)).unwrap();
+    gltf::load(&path)
+}
+
+/// The JSON of a model as it is written.
+fn text(model: &Model) -> String {
+    let mut json = model.json.clone();
+    json["buffers"] = json!([{ "byteLength": model.bytes.len() }]);
+    json.to_string()
+}
+
+/// Models with every kind of accessor: positions, normals, colours and coordinates of several types, indices of every
+/// type, and times with translations, rotations and scales of every interpolation.
+fn models() -> Vec<Model> {
+    let mut painted = Model::default();
+    let texture = json!({ "uri": "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg==" });
+    let image = painted.push("images", texture);
+    let texture = painted.push("textures", json!({ "source": image }));
+    let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": texture } } });
+    let material = painted.push("materials", material);
+    let triangle = [0., 0., 0., 1., 0., 0., 0., 1., 0.];
+    let shorts: Vec<u8> = [0_i16, 0, 0, 0, 9, 0, 0, 0, 0, 9, 0, 0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    for (indices, color) in [(U8, U8), (U16, U16), (U32, F32)] {
+        let positions = painted.positions(&triangle);
+        let normals = painted.floats(3, &[0., 0., 1., 0., 0., 1., 0., 0., 1.]);
+        let places = painted.floats(2, &[0.; 6]);
+        let colors = painted.accessor(color, 4, 3, &[60; 48]);
+        if color != F32 {
+            painted.json["accessors"][colors]["normalized"] = json!(true);
+        }
+        let size = [(U8, 1), (U16, 2), (U32, 4)].into_iter().find(|(kind, _)| *kind == indices).unwrap().1;
+        let bytes: Vec<u8> = (0..3_u32).flat_map(|i| i.to_le_bytes()[..size].to_vec()).collect();
+        let indices = painted.accessor(indices, 1, 3, &bytes);
+        let attributes = json!({ "POSITION": positions, "NORMAL": normals, "TEXCOORD_0": places, "COLOR_0": colors });
+        let mesh = painted.mesh(attributes, Some(indices), Some(material));
+        painted.node(json!({ "mesh": mesh }));
+    }
+    let view = painted.view(&shorts);
+    painted.json["bufferViews"][view]["byteStride"] = json!(8);
+    let quantised = json!({ "bufferView": view, "componentType": I16, "count": 3, "type": "VEC3" });
+    let quantised = painted.push("accessors", quantised);
+    let mesh = painted.mesh(json!({ "POSITION": quantised }), None, None);
+    painted.node(json!({ "mesh": mesh }));
+
+    let mut moving = Model::default();
+    let mesh = moving.cuboid([-0.5; 3], [0.5; 3], None);
+    for how in ["LINEAR", "STEP", "CUBICSPLINE"] {
+        for (path, value) in
+            [("translation", vec![1., 2., 3.]), ("rotation", vec![0., 0., 0., 1.]), ("scale", vec![1.; 3])]
+        {
+            for keys in [1, 3] {
+                let node = moving.node(json!({ "mesh": mesh }));
+                let times: Vec<f32> = (0..keys).map(|i| i as f32).collect();
+                moving.animate(
+                    0,
+                    node,
+                    path,
+                    how,
+                    &times,
+                    &value.repeat(keys * if how == "CUBICSPLINE" { 3 } else { 1 }),
+                );
+            }
+        }
+    }
+    vec![room(), robot(), painted, moving]
+}
+
+/// Any accessor may lack a bufferView: its numbers are zeros.
+#[test]
+fn accessors_without_a_view_are_zeros() {
+    let mut copies = 0;
+    for model in models() {
+        let whole = load(&model).data;
+        let count = model.json["accessors"].as_array().unwrap().len();
+        for index in 0..count {
+            let mut changed = model.json["accessors"].clone();
+            let accessor = changed[index].as_object_mut().unwrap();
+            accessor.remove("bufferView");
+            let changed = Model {
+                json: {
+                    let mut json = model.json.clone();
+                    json["accessors"] = changed;
+                    json
+                },
+                bytes: model.bytes.clone(),
+            };
+            let found =
+                read(&text(&changed), &changed.bytes).unwrap_or_else(|error| panic!("accessor {index}: {error}"));
+            assert!(found.data.entities.len() <= whole.entities.len(), "accessor {index}");
+            copies += 1;
+        }
+        let mut changed = model;
+        for accessor in changed.json["accessors"].as_array_mut().unwrap() {
+            accessor.as_object_mut().unwrap().remove("bufferView");
+        }
+        let found = read(&text(&changed), &[]).unwrap();
+        assert!(found.data.entities.iter().all(|entity| entity.mesh == "lamp"), "nothing has an area");
+        let notes = found.notes.left_out().join("\n");
+        assert!(notes.contains("shapes without an area"), "{notes}");
+        copies += 1;
+    }
+    println!("accessors without a bufferView: {copies} copies");
+    assert!(copies > 80);
+}
+
+/// Sparse values over zeros: two corners of a triangle, and the colours of all.
+#[test]
+fn sparse_values_stand_over_zeros() {
+    for (component, size) in [(U8, 1), (U16, 2), (U32, 4)] {
+        let mut model = Model::default();
+        let bytes: Vec<u8> = [1_u32, 2].iter().flat_map(|i| i.to_le_bytes()[..size].to_vec()).collect();
+        let indices = model.view(&bytes);
+        let values: Vec<u8> = [1_f32, 0., 0., 0., 1., 0.].iter().flat_map(|x| x.to_le_bytes()).collect();
+        let values = model.view(&values);
+        let sparse = json!({ "count": 2, "indices": { "bufferView": indices, "componentType": component },
+            "values": { "bufferView": values } });
+        let accessor = json!({ "componentType": F32, "count": 3, "type": "VEC3", "sparse": sparse });
+        let positions = model.push("accessors", accessor);
+        let mesh = model.mesh(json!({ "POSITION": positions }), None, None);
+        model.node(json!({ "mesh": mesh }));
+        let import = load(&model);
+        let found = import.meshes[0].positions.iter().map(|p| p.to_array()).collect::<Vec<_>>();
+        assert_eq!(found, [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]], "{component}");
+    }
+}
+
+/// A channel without a node moves nothing: each is left out, and the others stay.
+#[test]
+fn channels_without_a_node_are_left_out() {
+    let mut copies = 0;
+    for model in models() {
+        let count = model.json["animations"][0]["channels"].as_array().map_or(0, Vec::len);
+        for left in (0..count).map(|i| i..i + 1).chain([0..count]).filter(|left| !left.is_empty()) {
+            let mut json = model.json.clone();
+            let dropped = left.len();
+            left.for_each(|i| {
+                drop(json["animations"][0]["channels"][i]["target"].as_object_mut().unwrap().remove("node"))
+            });
+            let changed = Model { json, bytes: model.bytes.clone() };
+            let found = read(&text(&changed), &changed.bytes).unwrap();
+            let note = format!("left out ({dropped}): channels of animations that move no node");
+            assert!(found.notes.left_out().contains(&note), "{:?}", found.notes.left_out());
+            copies += 1;
+        }
+    }
+    println!("channels without a node: {copies} copies");
+    assert!(copies > 20);
+}
+
+#[test]
+fn scenes_may_have_no_nodes() {
+    let mut model = room();
+    let bytes = model.bytes.clone();
+    model.json["scenes"] = json!([{ "name": "empty" }, model.json["scenes"][0].clone()]);
+    assert_eq!(read(&text(&model), &bytes).unwrap().data.entities.len(), 0);
+    model.json["scene"] = json!(1);
+    assert_eq!(read(&text(&model), &bytes).unwrap().data.entities.len(), load(&room()).data.entities.len());
+    model.json["scene"] = json!(2);
+    assert!(read(&text(&model), &bytes).is_err());
+    model.json["scenes"] = json!([{}, {}, {}]);
+    assert_eq!(read(&text(&model), &bytes).unwrap().data.entities.len(), 0);
+}
+
+/// Calls `each` with the place of every whole number below a value.
+fn whole_numbers(value: &Value, place: &str, each: &mut dyn FnMut(String)) {
+    match value {
+        Value::Number(number) if number.is_u64() => each(place.to_owned()),
+        Value::Array(values) => {
+            values.iter().enumerate().for_each(|(i, value)| whole_numbers(value, &format!("{place}/{i}"), each));
+        }
+        Value::Object(map) => map.iter().for_each(|(key, value)| whole_numbers(value, &format!("{place}/{key}"), each)),
+        _ => {}
+    }
+}
+
+/// JSON with a number at a place written in other ways, of which JSON knows one number: 4, 4.0, 4e0, 40e-1.
+fn written(json: &Value, places: &[String], way: &dyn Fn(u64) -> String) -> String {
+    let mut json = json.clone();
+    for place in places {
+        let value = json.pointer_mut(place).unwrap();
+        *value = json!(format!("<{}>", way(value.as_u64().unwrap())));
+    }
+    json.to_string().replace("\"<", "").replace(">\"", "")
+}
+
+#[test]
+fn whole_numbers_may_have_a_point_or_an_exponent() {
+    let ways: [&dyn Fn(u64) -> String; 4] = [
+        &|x| format!("{x}.0"),
+        &|x| format!("{x}e0"),
+        &|x| if x == 0 { "0E-1".into() } else { format!("{x}0E-1") },
+        &|x| format!("{x}.000e+0"),
+    ];
+    let mut copies = 0;
+    for model in models() {
+        let json: Value = serde_json::from_str(&text(&model)).unwrap();
+        let mut places = Vec::new();
+        whole_numbers(&json, "", &mut |place| places.push(place));
+        let whole = load(&model);
+        for way in ways {
+            for place in places.iter().map(std::slice::from_ref).chain([&places[..]]) {
+                let text = written(&json, place, way);
+                let found = read(&text, &model.bytes).unwrap_or_else(|error| panic!("{place:?}: {error}"));
+                assert!(found.data == whole.data && found.notes == whole.notes, "{place:?} in {}", way(4));
+                copies += 1;
+            }
+        }
+    }
+    println!("whole numbers with a point or an exponent: {copies} copies");
+    assert!(copies > 1000);
+    // Broken numbers and negative ones are no indices.
+    let json: Value = serde_json::from_str(&text(&room())).unwrap();
+    for bad in ["0.5", "-1.0", "1e99", "-0.0"] {
+        let text = written(&json, &["/nodes/0/mesh".into()], &|_| bad.to_owned());
+        assert!(read(&text, &room().bytes).is_err(), "{bad}");
+    }
+}
+
+/// Buffers that nothing reads need no bytes, whether a bufferView names them or not; those that are read do.
+#[test]
+fn buffers_that_nothing_reads_need_no_bytes() {
+    let model = room();
+    let length = model.bytes.len();
+    let with = |buffers: Value, more: &dyn Fn(&mut Value)| {
+        let mut json = model.json.clone();
+        json["buffers"] = buffers;
+        more(&mut json);
+        read(&json.to_string(), &model.bytes)
+    };
+    let view = |json: &mut Value| {
+        let views = json["bufferViews"].as_array_mut().unwrap();
+        views.push(json!({ "buffer": 1, "byteOffset": 8, "byteLength": 8 }));
+    };
+    let unread = |json: &mut Value| {
+        view(json);
+        let last = json["bufferViews"].as_array().unwrap().len() - 1;
+        let accessor = json!({ "bufferView": last, "componentType": F32, "count": 2, "type": "SCALAR" });
+        json["accessors"].as_array_mut().unwrap().push(accessor);
+    };
+    let drawn = |json: &mut Value| {
+        unread(json);
+        let last = json["accessors"].as_array().unwrap().len() - 1;
+        json["meshes"][0]["primitives"][0]["indices"] = json!(last);
+    };
+    for two in [
+        json!([{ "byteLength": length }, { "byteLength": 16 }]),
+        json!([{ "byteLength": length }, { "byteLength": 16, "name": "none" }]),
+    ] {
+        let changes: [&dyn Fn(&mut Value); 3] = [&|_| (), &view, &unread];
+        for more in changes {
+            assert_eq!(with(two.clone(), more).unwrap().data, load(&model).data);
+        }
+        let error = with(two, &drawn).err().unwrap().line();
+        assert!(error.contains("buffers[1]: only the first buffer may have no uri"), "{error}");
+    }
+    let bare = json!({ "asset": { "version": "2.0" }, "buffers": [{ "byteLength": 4 }] }).to_string();
+    assert!(read(&bare, b"").is_ok(), "there is no binary part");
+}
+
+/// Lights of another type, and accessors of another type that nothing draws, are left out.
+#[test]
+fn unknown_types_are_left_out() {
+    let whole = load(&room()).data.entities.len();
+    for kind in ["area", "Point", "", "ambient", "spot "] {
+        let mut model = room();
+        model.json["extensions"]["KHR_lights_punctual"]["lights"][0]["type"] = json!(kind);
+        let import = load(&model);
+        assert_eq!(import.data.entities.len(), whole - 1, "{kind}");
+        assert!(import.notes.left_out().contains(&"left out (1): lights of unknown types".to_owned()), "{kind}");
+    }
+    for (component, kind) in [(F32, "VEC5"), (5124, "SCALAR"), (5130, "VEC2"), (0, ""), (F32, "vec3")] {
+        let mut model = room();
+        let unknown = json!({ "bufferView": 0, "componentType": component, "count": 1, "type": kind });
+        model.push("accessors", unknown.clone());
+        assert_eq!(load(&model).data.entities.len(), whole, "{kind}");
+        model.json["accessors"][0] = unknown;
+        let error = read(&text(&model), &model.bytes).err().unwrap().line();
+        assert!(error.contains("accessors[0].") && error.contains("ype: the value is not a valid one"), "{error}");
+    }
+}
+
+/// A matrix beside a translation, rotation or scale counts alone, and rotations are brought to unit length: both are
+/// said.
+#[test]
+fn odd_transformations_are_noted() {
+    let unit = json!([0, 0, 0, 1]);
+    let matrix = json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 2, 0, 0, 1]);
+    let one = |rotation: Value| json!({ "mesh": 0, "rotation": rotation });
+    for (node, note) in [
+        (json!({ "mesh": 0, "matrix": matrix, "translation": [9, 0, 0] }), "nodes that have a matrix"),
+        (json!({ "mesh": 0, "matrix": matrix, "rotation": unit }), "nodes that have a matrix"),
+        (json!({ "mesh": 0, "matrix": matrix, "scale": [2, 2, 2] }), "nodes that have a matrix"),
+        (json!({ "mesh": 0, "matrix": matrix }), ""),
+        (one(json!([0, 0, 0, 2])), "rotations that are not 1"),
+        (one(json!([0, 0.5, 0, 0.5])), "rotations that are not 1"),
+        (one(json!([0, 0, 0, 0.99])), "rotations that are not 1"),
+        (one(json!([0, 0.7071, 0, 0.7071])), ""),
+        (one(unit.clone()), ""),
+    ] {
+        let mut model = Model::default();
+        model.cuboid([-0.5; 3], [0.5; 3], None);
+        model.node(node.clone());
+        let import = load(&model);
+        let notes = import.notes.left_out().join("\n");
+        assert!(if note.is_empty() { !notes.contains("rotations") } else { notes.contains(note) }, "{node}: {notes}");
+        let entity = &import.data.entities[0];
+        let expected = if node.get("matrix").is_some() { 2.0 } else { 0.0 };
+        assert!(entity.position.x == expected && entity.scale == 1.0, "{node}: {entity:?}");
+    }
+}

@@ -1,0 +1,118 @@
+//! Levels of detail in captures: what a field of a large mesh is off by where fewer triangles are drawn, and how many
+//! are.
+
+use crate::common;
+use common::generate;
+use common::{Gpu, gpu, report};
+use glam::Vec3;
+use shadow_fields::asset::Mesh;
+use shadow_fields::bake::silhouette::{SilhouetteOptions, bake_silhouette};
+use shadow_fields::bake::{self, BakeReport, Wanted};
+use shadow_fields::field::{FieldKind, Storage};
+
+/// Most that levels may move coefficients, relative root mean square: as much as faces of 64 texels round a binary
+/// cap's by.
+const OFF: f64 = 0.003;
+
+/// A closed surface with bumps of many sizes, down to those of its vertices, as of a scanned model.
+fn scanned(subdivisions: u32) -> Mesh {
+    let ball = generate::sphere(1.0, subdivisions);
+    let bump = |p: &Vec3| {
+        let waves = |f: f32| (f * p.x + f).sin() * (f * p.y + 0.7 * f).sin() * (f * p.z + 2.1 * f).sin();
+        let sum: f32 = [(3.0, 0.25), (7.0, 0.08), (17.0, 0.02), (41.0, 0.004), (97.0, 0.0008)]
+            .map(|(f, a)| a * waves(f))
+            .iter()
+            .sum();
+        *p * Vec3::new(1.0, 1.4, 0.8) * (1.0 + sum)
+    };
+    let positions = ball.positions.iter().map(bump).collect();
+    Mesh::new("scanned", positions, Vec::new(), None, ball.triangles.clone()).unwrap()
+}
+
+fn options(levels: bool) -> bake::Options {
+    bake::Options { lattice: "cube:9x2".parse().unwrap(), storage: Storage::F32, levels, ..Default::default() }
+}
+
+fn off(found: &[f32], wanted: &[f32]) -> f64 {
+    let sum = |terms: &mut dyn Iterator<Item = f64>| terms.sum::<f64>();
+    let apart = sum(&mut found.iter().zip(wanted).map(|(a, b)| f64::from(a - b).powi(2)));
+    (apart / sum(&mut wanted.iter().map(|b| f64::from(*b).powi(2)))).sqrt()
+}
+
+fn field(gpu: &Gpu, mesh: &Mesh, levels: bool) -> (Vec<f32>, BakeReport, f64) {
+    let header = bake::header(mesh, FieldKind::Occlusion, &options(levels));
+    let (field, report) = gpu.baker().field(mesh, header, &|_, _| ()).unwrap();
+    (bytemuck::pod_collect_to_vec(&field.payload), report, field.header.level_texels)
+}
+
+#[test]
+fn fields_are_those_of_the_whole_mesh() {
+    let Some(gpu) = gpu() else { return };
+    for (mesh, least) in [(scanned(5), 1.8), (generate::torus(1.0, 0.4, 160, 80), 2.5)] {
+        let ((found, with, texels), (wanted, without, none)) = (field(&gpu, &mesh, true), field(&gpu, &mesh, false));
+        let (off, times) = (off(&found, &wanted), without.triangles as f64 / with.triangles as f64);
+        report(&format!("{}: {times:.1} times fewer triangles, off by {off:.5}", mesh.name));
+        assert!(texels > 0.0 && none == 0.0);
+        assert!(times > least, "{}: only {times:.2} times fewer triangles", mesh.name);
+        assert!(off < OFF, "{}: {off}", mesh.name);
+    }
+}
+
+#[test]
+fn small_meshes_have_no_levels() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::torus(1.0, 0.4, 48, 24);
+    let ((found, with, texels), (wanted, without, _)) = (field(&gpu, &mesh, true), field(&gpu, &mesh, false));
+    assert!(found == wanted && with.triangles == without.triangles && texels == 0.0);
+}
+
+/// Near triangles are drawn as they are, whatever stands for far ones.
+#[test]
+fn vertices_see_what_they_see_of_the_whole_mesh() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = scanned(4);
+    let bake = |levels| {
+        let options = bake::Options { face_px: 32, ..options(levels) };
+        gpu.baker().vertices(&mesh, &options, Wanted::BOTH, &|_, _| ()).unwrap()
+    };
+    let ((found, with), (wanted, without)) = (bake(true), bake(false));
+    let (off, times) = (off(&found.transfer, &wanted.transfer), without.triangles as f64 / with.triangles as f64);
+    let steps = |i: usize| {
+        (i32::from(found.self_visibility[i].cast_signed()) - i32::from(wanted.self_visibility[i].cast_signed())).abs()
+    };
+    let count = found.self_visibility.len();
+    let differing = (0..count).filter(|&i| steps(i) > 8).count() as f64 / count as f64;
+    report(&format!("{times:.1} times fewer triangles; transfer off by {off:.5}, {differing:.5} of the maps' bytes"));
+    assert!(times > 1.2 && off < OFF && differing < 0.01, "{times}, {off}, {differing}");
+}
+
+#[test]
+fn outlines_are_those_of_the_whole_mesh() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = scanned(4);
+    let bake = |levels| {
+        let options = SilhouetteOptions { cells: 2, levels, ..Default::default() };
+        bake_silhouette(&gpu.baker(), &mesh, options, &|_, _| ()).unwrap().0
+    };
+    let (found, wanted) = (bake(true), bake(false));
+    assert!(found.header.level_pixels > 0.0 && wanted.header.level_pixels == 0.0);
+    let steps = |(a, b): (&u8, &u8)| (i32::from(a.cast_signed()) - i32::from(b.cast_signed())).abs();
+    let all = found.payload().len();
+    let differing = found.payload().iter().zip(wanted.payload()).filter(|pair| steps(*pair) > 4).count();
+    report(&format!("{differing} of {all} bytes differ by more than four steps"));
+    assert!(100 * differing < all, "{differing} of {all}");
+}
+
+/// Both come of one capture, and are the same bytes as when each is baked by itself.
+#[test]
+fn transfer_and_self_visibility_share_their_captures() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::torus(1.0, 0.4, 24, 12);
+    let options = bake::Options { face_px: 32, ..Default::default() };
+    let bake = |wanted| gpu.baker().vertices(&mesh, &options, wanted, &|_, _| ()).unwrap();
+    let [(both, of_both), (transfer, _), (maps, of_maps)] =
+        [Wanted::BOTH, Wanted::TRANSFER, Wanted::SELF_VISIBILITY].map(bake);
+    assert!(both.transfer == transfer.transfer && both.self_visibility == maps.self_visibility);
+    assert!(transfer.self_visibility.is_empty() && maps.transfer.is_empty());
+    assert_eq!(of_both.faces, of_maps.faces, "one capture for both");
+}

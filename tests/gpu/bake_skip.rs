@@ -1,0 +1,99 @@
+//! What a bake leaves out: faces and backs, samples inside solids, and equal meshes.
+
+use crate::common;
+use common::generate;
+use common::{gpu, report};
+use glam::DVec3;
+use shadow_fields::asset::Mesh;
+use shadow_fields::bake::cache::Cache;
+use shadow_fields::bake::triangles::unit_positions;
+use shadow_fields::bake::{self, Baker, SceneNeeds, capture};
+use shadow_fields::field::{FieldHeader, FieldKind, Storage};
+use shadow_fields::scene::Scene;
+use shadow_fields::scene_buffers::SceneBuffers;
+use shadow_fields::sh::basis::Y00;
+use shadow_fields::sh::cube;
+
+fn header(mesh: &Mesh, lattice: &str) -> FieldHeader {
+    let lattice = lattice.parse().unwrap();
+    let options = bake::Options { lattice, storage: Storage::F32, face_px: 32, ..Default::default() };
+    bake::header(mesh, FieldKind::Occlusion, &options)
+}
+
+#[test]
+fn the_same_mesh_under_two_names_is_baked_once() {
+    let Some(gpu) = gpu() else { return };
+    let meshes = |names: [&str; 2], sides: [u32; 2]| {
+        let mesh = |(name, sides): (&str, u32)| {
+            let size = format!("major_m = 1.0, minor_m = 0.3, segments = 12, sides = {sides}");
+            let entity = format!("[[entity]]\nmesh = \"{name}\"\n");
+            format!("[[mesh]]\nname = \"{name}\"\ntorus = {{ {size} }}\n{entity}")
+        };
+        let text: String = names.into_iter().zip(sides).map(mesh).collect();
+        let rest = "[environment]\nuniform = [1, 1, 1]\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n";
+        Scene::parse(&format!("{text}{rest}"), "test.toml".as_ref(), &shadow_fields::asset::embedded::read).unwrap()
+    };
+    let baker = Baker::new(&gpu.device, &gpu.library);
+    let options = bake::Options { lattice: "cube:3x3".parse().unwrap(), face_px: 16, ..Default::default() };
+    let buffers = |scene: &Scene| {
+        let needs = SceneNeeds::of(scene, &options, shadow_fields::scene::Lights::Sh);
+        let baked = bake::ensure(&baker, &Cache::new(None), scene, &needs, &|_, _, _| ()).unwrap();
+        assert_eq!(baked.meshes.len(), 2);
+        SceneBuffers::new(&gpu.device, scene, &options, baked).unwrap()
+    };
+    let same = buffers(&meshes(["a", "b"], [8, 8]));
+    let other = buffers(&meshes(["a", "b"], [8, 10]));
+    let names = |buffers: &SceneBuffers| buffers.baked.iter().map(|b| b.what.clone()).collect::<Vec<_>>();
+    report(&format!("{:?} and {:?}", names(&same), names(&other)));
+    assert_eq!(names(&same), ["a shadow", "a transfer"]);
+    assert_eq!(names(&other), ["a shadow", "a transfer", "b shadow", "b transfer"]);
+    assert!(same.fields.size_bytes < other.fields.size_bytes);
+    let [a, b] = [0, 1].map(|i| same.meshes[i].blocked.as_ref().unwrap());
+    assert!(a.bytes == b.bytes && a.header.growth == b.header.growth && b.header.growth >= 1.0);
+    assert_eq!(same.meshes[0].transfer_first, same.meshes[1].transfer_first);
+}
+
+/// Samples on an edge between faces of the lattice's cube have several numbers, and are captured once.
+#[test]
+fn what_faces_of_the_lattice_share_is_captured_once() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::sphere(1.0, 2);
+    let header = header(&mesh, "cube:2x4,edges");
+    let nodes = (header.lattice.direction_count() / 6).isqrt();
+    let (field, report) = gpu.baker().field(&mesh, header, &|_, _| ()).unwrap();
+    let places = 6 * (nodes - 2).pow(2) + 12 * (nodes - 2) + 8;
+    assert_eq!((field.header.captured_samples, report.samples), (2 * places, 2 * 6 * nodes.pow(2)));
+}
+
+/// Just off a solid's surface a lookup lies between samples outside and inside. Those inside are captured off the
+/// nearest surface, which leaves the lookup near what is seen there; where they stand they would see all dark, and
+/// darken it.
+#[test]
+fn samples_inside_a_solid_are_captured_off_its_surface() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::torus(1.0, 0.3, 48, 24);
+    let positions = unit_positions(&mesh);
+    let (field, found) = gpu.baker().field(&mesh, header(&mesh, "cube:12x8"), &|_, _| ()).unwrap();
+    assert!(found.filled > 100, "{} samples inside", found.filled);
+    let weights = cube::solid_angle(16);
+    let mut sum = 0.0;
+    for turn in 0..12 {
+        // Off the tube by a tenth of its radius, all round it.
+        let around = 0.5 * f64::from(turn);
+        let along = 2.1 * f64::from(turn);
+        let radius = 1.0 + 0.33 * around.cos();
+        let p = DVec3::new(radius * along.cos(), 0.33 * around.sin(), radius * along.sin()) / 1.3;
+        let mut seen = 0.0;
+        for face in 0..6 {
+            let covered = capture::twin(&positions, &mesh.triangles, p, face, 16);
+            let texels = covered.iter().enumerate().filter(|(_, covered)| **covered);
+            seen += texels.map(|(i, _)| weights[i]).sum::<f64>() * Y00;
+        }
+        let mut blocked = [0.0; 16];
+        field.lookup(p, 0, &mut blocked);
+        sum += (blocked[0] - seen).powi(2);
+    }
+    let off = (sum / 12.0).sqrt();
+    report(&format!("{} samples inside; off by {off:.3}", found.filled));
+    assert!(off < 0.1, "{off}");
+}

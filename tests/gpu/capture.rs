@@ -1,0 +1,253 @@
+//! Capture on the device against rays cast on the host: coverage, culling, faces left out, and colours on the right
+//! faces.
+
+use crate::common;
+use common::generate;
+use common::{Gpu, gpu, pot, report};
+use glam::{DVec3, Quat, Vec3};
+use shadow_fields::asset::Mesh;
+use shadow_fields::bake::capture::{Capture, CaptureKind, Model, NO_SLOT, Way};
+use shadow_fields::check::capture::{
+    self as check, capture_of, differing_limit, eyes_outside, faces, only_batch, texel_index,
+};
+use shadow_fields::sh::cube::{direction, texel_st};
+
+const FACE_PX: u32 = 32;
+const WAYS: [Way; 2] = [Way::Drawn, Way::Computed];
+
+/// Coverage of every eye's faces, true where the object is; faces without a slot are `None`.
+fn coverage(gpu: &Gpu, mesh: &Mesh, eyes: &[Vec3], cull: bool, way: Way) -> Vec<[Option<Vec<bool>>; 6]> {
+    let is_object = |texel: &u8| match texel {
+        0 => true,
+        255 => false,
+        other => panic!("a texel of {other}: neither object nor background"),
+    };
+    let found = faces::<u8>(&gpu.baker(), mesh, eyes, (FACE_PX, CaptureKind::Cover, cull), way).unwrap();
+    found
+        .iter()
+        .map(|faces| faces.each_ref().map(|face| face.as_ref().map(|t| t.iter().map(is_object).collect())))
+        .collect()
+}
+
+fn tilted_plane() -> Mesh {
+    let plane = generate::plane(2.0, 5);
+    let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
+    let positions = plane.positions.iter().map(|p| turn * *p + Vec3::new(0.3, -4.0, 1.0)).collect();
+    Mesh::new("tilted plane", positions, Vec::new(), None, plane.triangles.clone()).unwrap()
+}
+
+/// (mesh, eyes besides those outside).
+fn scenes() -> Vec<(Mesh, Vec<Vec3>)> {
+    let hole = vec![Vec3::ZERO, Vec3::new(0.2, 0.05, -0.1), Vec3::new(0.0, 0.3, 0.25)];
+    vec![
+        (generate::sphere(0.5, 3), vec![Vec3::new(0.58, -0.58, 0.58) * 1.01]),
+        (generate::torus(1.0, 0.3, 48, 24), hole),
+        (pot(4), vec![Vec3::new(0.0, 0.9, 0.0), Vec3::new(0.1, 0.0, 0.05)]),
+        (generate::cuboid(Vec3::new(0.4, 1.0, 0.7), 2), vec![Vec3::new(0.33, 0.0, 0.1), Vec3::new(0.0, 0.82, 0.0)]),
+        (tilted_plane(), vec![Vec3::new(0.01, 0.02, 0.01), Vec3::new(-0.1, 0.6, 0.1)]),
+    ]
+}
+
+#[test]
+fn coverage_is_what_rays_meet() {
+    let Some(gpu) = gpu() else { return };
+    for (mesh, more) in scenes() {
+        let eyes = [eyes_outside(), more].concat();
+        for way in WAYS {
+            let found = check::coverage(&gpu.baker(), &mesh, &eyes, FACE_PX, way).unwrap();
+            report(&format!("{}, {way:?}: {found:?}", mesh.name));
+            assert_eq!(found.off_edge, 0, "{}, {way:?}: texels differ where there is no edge", mesh.name);
+            assert_eq!(found.left_out_wrongly, 0, "{}: a face was left out that shows the object", mesh.name);
+            assert!(found.left_out > 0, "{}: no face was left out", mesh.name);
+            assert!(found.error() < differing_limit(&gpu.device), "{}, {way:?}: {found:?}", mesh.name);
+        }
+    }
+}
+
+/// Faces that are computed in several bands of rows, of which the last has fewer.
+#[test]
+fn large_faces_are_computed_in_bands() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::torus(1.0, 0.3, 16, 8);
+    let eyes = [Vec3::new(0.7, 0.8, -0.4), Vec3::new(0.2, 0.05, -0.1)];
+    let found = check::coverage(&gpu.baker(), &mesh, &eyes, 200, Way::Computed).unwrap();
+    assert!(found.error() < 1e-3, "{found:?}");
+    let off = check::distances(&gpu.baker(), &mesh, &eyes, 80, Way::Computed).unwrap();
+    assert!(off < 2e-3, "{off} of the texels differ");
+}
+
+#[test]
+fn culling_changes_nothing_on_closed_meshes() {
+    let Some(gpu) = gpu() else { return };
+    let mut compared = 0;
+    for (mesh, more) in scenes().into_iter().filter(|(mesh, _)| mesh.is_closed()) {
+        let eyes = [eyes_outside(), more].concat();
+        for way in WAYS {
+            let [with, without] = [true, false].map(|cull| coverage(&gpu, &mesh, &eyes, cull, way));
+            assert_eq!(with, without, "{}, {way:?}", mesh.name);
+        }
+        compared += 1;
+    }
+    assert_eq!(compared, 3, "sphere, torus and cuboid are closed");
+}
+
+/// From inside a solid only back faces are seen: culled, they vanish. This is why samples inside are not captured, and
+/// shows that culling takes place at all.
+#[test]
+fn culled_from_inside_a_solid_nothing_is_left() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::cuboid(Vec3::ONE, 1);
+    let eyes = [Vec3::new(0.1, 0.2, -0.1)];
+    for way in WAYS {
+        let covered = |cull| {
+            let faces = &coverage(&gpu, &mesh, &eyes, cull, way)[0];
+            faces.iter().flatten().flatten().filter(|c| **c).count()
+        };
+        assert_eq!(covered(true), 0, "{way:?}");
+        assert_eq!(covered(false), 6 * (FACE_PX * FACE_PX) as usize, "{way:?}");
+    }
+}
+
+/// One colour a direction, all components different.
+fn wall_color(direction: Vec3) -> Vec3 {
+    (direction + Vec3::splat(2.0)) * Vec3::new(1.0, 0.5, 4.0)
+}
+
+/// Walls of a box around the origin; `inner` is a small box of one colour in front of one wall, in either order.
+fn painted_box(inner_first: bool) -> Mesh {
+    let walls = generate::cuboid(Vec3::splat(2.0), 3);
+    let small = generate::cuboid(Vec3::splat(0.1), 1);
+    let painted = |mesh: &Mesh, offset: Vec3, color: &dyn Fn(Vec3) -> Vec3| {
+        let positions: Vec<Vec3> = mesh.positions.iter().map(|p| *p + offset).collect();
+        let colors: Vec<Vec3> = mesh.normals.iter().map(|n| color(*n)).collect();
+        (positions, colors, mesh.triangles.clone())
+    };
+    let mut parts = [
+        painted(&walls, Vec3::ZERO, &wall_color),
+        painted(&small, Vec3::new(0.0, 0.0, 0.6), &|_| Vec3::new(9.0, 0.0, 0.25)),
+    ];
+    if inner_first {
+        parts.reverse();
+    }
+    let (mut positions, mut colors, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    for (p, c, t) in parts {
+        let first = positions.len() as u32;
+        positions.extend(p);
+        colors.extend(c);
+        triangles.extend(t.iter().map(|t| t.map(|i| i + first)));
+    }
+    Mesh::new("painted box", positions, Vec::new(), Some(colors), triangles).unwrap()
+}
+
+/// Colours of the nearest surface, as rays find them: on a mesh that hides parts of itself.
+#[test]
+fn colours_are_what_rays_meet() {
+    let Some(gpu) = gpu() else { return };
+    for mesh in [painted_box(true), generate::torus_two_colour(0.5, 0.15, 48, 20)] {
+        let off = check::colors(&gpu.baker(), &mesh, &eyes_outside(), FACE_PX).unwrap();
+        report(&format!("{}: {off:.1e} of the texels differ", mesh.name));
+        assert!(off < 2.0 * differing_limit(&gpu.device), "{}: {off} of the texels differ", mesh.name);
+    }
+}
+
+#[test]
+fn colours_land_on_their_faces() {
+    let Some(gpu) = gpu() else { return };
+    let forward = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z].map(|d| d.as_vec3());
+    for inner_first in [false, true] {
+        let mesh = painted_box(inner_first);
+        let px = 9_u32;
+        let capture = capture_of(&gpu.baker(), &mesh, (px, CaptureKind::Radiance, false), Way::Drawn).unwrap();
+        let eyes = [Vec3::ZERO, Vec3::new(0.01, -0.02, 0.01)];
+        let batch = only_batch(&capture, &eyes);
+        let atlas: Vec<[f32; 4]> = gpu.atlas(&capture, &eyes, &batch);
+        for slots in &batch {
+            for (face, &slot) in slots.iter().enumerate() {
+                assert_ne!(slot, NO_SLOT, "a wall in every direction");
+                let at = |x: usize, y: usize| {
+                    let [r, g, b, a] = atlas[texel_index(&capture, slot, x, y)];
+                    assert_eq!(a, 1.0);
+                    Vec3::new(r, g, b)
+                };
+                // The small box hides the middle of the wall at +z, whichever is drawn first; the corner is the wall's.
+                let (middle, corner) = (at(px as usize / 2, px as usize / 2), at(0, 0));
+                let wall = wall_color(forward[face]);
+                let wanted = if face == 4 { Vec3::new(9.0, 0.0, 0.25) } else { wall };
+                // Constant over the wall, but interpolated: a few f32 roundings.
+                assert!((middle - wanted).length() < 1e-5 * wanted.length(), "face {face}: {middle}, not {wanted}");
+                assert!((corner - wall).length() < 1e-5 * wall.length(), "face {face}: corner {corner}, not {wall}");
+            }
+        }
+    }
+}
+
+/// What is culled must be the back: a radiance capture from outside shows the near side of a closed mesh, culled or
+/// not.
+#[test]
+fn culling_keeps_the_near_side() {
+    let Some(gpu) = gpu() else { return };
+    let sphere = generate::sphere(1.0, 3);
+    let colors = sphere.normals.iter().map(|n| wall_color(*n)).collect();
+    let painted =
+        Mesh::new("painted sphere", sphere.positions, sphere.normals, Some(colors), sphere.triangles).unwrap();
+    let ring = generate::torus_two_colour(0.5, 0.15, 48, 20);
+    for mesh in [&painted, &ring] {
+        assert!(mesh.is_closed());
+        let eyes = eyes_outside();
+        let [culled, whole] = [true, false].map(|cull| {
+            let capture = capture_of(&gpu.baker(), mesh, (FACE_PX, CaptureKind::Radiance, cull), Way::Drawn).unwrap();
+            gpu.atlas::<[f32; 4]>(&capture, &eyes, &only_batch(&capture, &eyes))
+        });
+        let lit = whole.iter().filter(|t| t[..3] != [0.0; 3]).count();
+        assert!(lit > 1000, "{lit} texels show the object");
+        // Where the silhouette grazes a texel centre the two sides are as near; none of these eyes has such a texel.
+        let differing = culled.iter().zip(&whole).filter(|(a, b)| a != b).count();
+        assert_eq!(differing, 0, "{}: {differing} of {lit} texels differ", mesh.name);
+    }
+}
+
+/// A colour that runs along an axis runs the same way on each face: s to the right, t down.
+#[test]
+fn faces_are_not_mirrored() {
+    let Some(gpu) = gpu() else { return };
+    let walls = generate::cuboid(Vec3::splat(2.0), 1);
+    let colors = walls.positions.iter().map(|p| *p + Vec3::splat(3.0)).collect();
+    let mesh =
+        Mesh::new("graded box", walls.positions.clone(), Vec::new(), Some(colors), walls.triangles.clone()).unwrap();
+    let px = 8;
+    let capture = capture_of(&gpu.baker(), &mesh, (px, CaptureKind::Radiance, false), Way::Drawn).unwrap();
+    let eyes = [Vec3::ZERO];
+    let batch = only_batch(&capture, &eyes);
+    let atlas: Vec<[f32; 4]> = gpu.atlas(&capture, &eyes, &batch);
+    for (face, &slot) in batch[0].iter().enumerate() {
+        for (x, y) in [(0, 0), (7, 0), (1, 6), (4, 3)] {
+            let along = direction(face, texel_st(x, px as usize), texel_st(y, px as usize));
+            let hit = along / along.abs().max_element();
+            let [r, g, b, _] = atlas[texel_index(&capture, slot, x, y)];
+            let found = DVec3::new(r.into(), g.into(), b.into()) - DVec3::splat(3.0);
+            assert!((found - hit).length() < 1e-5, "face {face} texel {x} {y}: {found}, not {hit}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_fit_waits_for_the_next_batch() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = generate::sphere(1.0, 1);
+    let capture = capture_of(&gpu.baker(), &mesh, (512, CaptureKind::Cover, true), Way::Drawn).unwrap();
+    let eyes = vec![Vec3::new(1.5, 0.0, 0.0); 100];
+    let batches = capture.plan(&eyes);
+    assert!(batches.len() > 1 && batches.iter().map(Vec::len).sum::<usize>() == eyes.len(), "{}", batches.len());
+    for batch in batches {
+        let mut slots: Vec<u32> = batch.iter().flatten().copied().filter(|s| *s != NO_SLOT).collect();
+        assert!(slots.iter().all(|slot| *slot < capture.capacity()));
+        let count = slots.len();
+        slots.sort_unstable();
+        slots.dedup();
+        assert_eq!(slots.len(), count, "no two faces share a place");
+    }
+    let model = Model::new(&gpu.device, &mesh).unwrap();
+    let face_px = gpu.device.limits.max_image_dimension2_d;
+    let too_large = Capture::new(&gpu.device, &gpu.library, model, face_px, CaptureKind::Cover, Way::Drawn);
+    assert_eq!(too_large.err().map(|error| error.exit_code()), Some(4));
+}

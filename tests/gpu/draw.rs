@@ -1,0 +1,348 @@
+//! Pictures: what stands where, what hides what, and in which colour.
+
+use crate::{common, stage};
+use common::report;
+use glam::{Quat, Vec3};
+use shadow_fields::asset::Mesh;
+use shadow_fields::asset::picture::srgb_from_linear;
+use shadow_fields::bake::Baker;
+use shadow_fields::draw::{Antialias, Finish};
+use shadow_fields::frame::{self, PictureMemory};
+use shadow_fields::scene::data::{Camera, EntityData};
+use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::shaders::Library;
+use stage::{at, scene, small, stage};
+
+const WIDTH: usize = 96;
+const HEIGHT: usize = 64;
+
+fn options(antialias: Antialias) -> frame::Options {
+    frame::Options { size: [WIDTH as u32, HEIGHT as u32], antialias, ..small() }
+}
+
+/// Balls of radius .4 m that shine and are not lit, seen from z = 5 m along -z.
+fn balls(environment: &str, emissions: &[[f32; 3]]) -> Scene {
+    let mut text =
+        format!("{environment}\n[[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.4, subdivisions = 3 }}\n");
+    for emission in emissions {
+        text += &format!("[[entity]]\nmesh = \"ball\"\nreceives = false\nemission = {emission:?}\n");
+    }
+    scene(&text)
+}
+
+type Picture = Vec<[f32; 3]>;
+
+fn draw(stage: &stage::Stage, scene: &Scene, places: &[[f32; 3]], antialias: Antialias, white: f32) -> Picture {
+    let placements: Vec<_> = places.iter().map(|&[x, y, z]| at(x, y, z)).collect();
+    let mut frame = stage.frame(scene, options(antialias));
+    frame.render(&placements, Some(white)).unwrap();
+    let picture = frame.picture();
+    assert_eq!(picture.len(), 3 * WIDTH * HEIGHT);
+    picture.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
+}
+
+/// Middle of what has a channel, in pixels from the left and the top, and its area in pixels.
+fn middle(picture: &Picture, channel: usize) -> [f32; 3] {
+    let mut sum = [0.0; 3];
+    for (i, pixel) in picture.iter().enumerate() {
+        let weight = pixel[channel];
+        let place = [(i % WIDTH) as f32 + 0.5, (i / WIDTH) as f32 + 0.5, 1.0];
+        (0..3).for_each(|k| sum[k] += weight * place[k]);
+    }
+    [sum[0] / sum[2], sum[1] / sum[2], sum[2]]
+}
+
+const RED: [f32; 3] = [1.0, 0.0, 0.0];
+const BLUE: [f32; 3] = [0.0, 0.0, 1.0];
+
+#[test]
+fn things_stand_where_they_should() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("", &[RED]);
+    // 40 degrees over 64 pixels at 5 m: 17.58 pixels a metre.
+    let px_per_m = HEIGHT as f32 / (2.0 * 5.0 * 20_f32.to_radians().tan());
+    let see = |place| middle(&draw(&stage, &scene, &[place], Antialias::Samples, 1.0), 0);
+    for (place, x, y) in [
+        ([0.0, 0.0, 0.0], 0.0, 0.0),
+        ([1.0, 0.0, 0.0], 1.0, 0.0),
+        ([0.0, 1.0, 0.0], 0.0, -1.0),
+        ([-1.5, -0.8, 0.0], -1.5, 0.8),
+    ] {
+        let [found_x, found_y, area] = see(place);
+        let expected = [WIDTH as f32 / 2.0 + px_per_m * x, HEIGHT as f32 / 2.0 + px_per_m * y];
+        report(&format!("{place:?}: at {found_x:.2}, {found_y:.2} for {expected:?}, {area:.1} pixels"));
+        // A sphere off the axis is seen as an ellipse whose middle lies a little further out.
+        let tolerance = 0.1 + 0.25 * (x * x + y * y);
+        assert!((found_x - expected[0]).abs() < tolerance && (found_y - expected[1]).abs() < tolerance);
+        let disc = std::f32::consts::PI * (0.4 * px_per_m).powi(2);
+        assert!((area / disc - 1.0).abs() < 0.08, "{area} of {disc} pixels");
+    }
+    let larger = see([0.0, 0.0, 2.5])[2] / see([0.0, 0.0, 0.0])[2];
+    assert!((3.6..4.4).contains(&larger), "half as far, four times the area: {larger}");
+}
+
+#[test]
+fn nearer_hides_farther() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("", &[RED, BLUE]);
+    let centre = WIDTH / 2 + HEIGHT / 2 * WIDTH;
+    for (places, front) in [([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], RED), ([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], BLUE)] {
+        let picture = draw(&stage, &scene, &places, Antialias::Samples, 1.0);
+        assert_eq!(picture[centre], front, "places {places:?}");
+        let back = if front == RED { 2 } else { 0 };
+        assert_eq!(middle(&picture, back)[2].max(0.0), 0.0, "the nearer ball covers the farther one");
+    }
+    // Large balls 300 m away, 1 cm one behind the other: reversed depth in f32 tells them apart.
+    let mut frame = stage.frame(&scene, options(Antialias::Samples));
+    let far = |z| Placement { scale: 40.0, ..at(0.0, 0.0, z) };
+    for (placements, front) in [([far(-300.0), far(-300.01)], RED), ([far(-300.01), far(-300.0)], BLUE)] {
+        frame.render(&placements, Some(1.0)).unwrap();
+        let found = frame.picture()[3 * centre..][..3].iter().map(|c| c.round()).collect::<Vec<_>>();
+        assert_eq!(found, front);
+    }
+    let behind = draw(&stage, &scene, &[[0.0, 0.0, 7.0], [0.0, 0.0, 6.0]], Antialias::Samples, 1.0);
+    assert!(behind.iter().flatten().all(|c| *c == 0.0), "what is behind the camera is not seen");
+}
+
+/// Nothing in view is a picture of the background alone, whatever smooths the edges, and what comes back into view is
+/// drawn again.
+#[test]
+fn nothing_in_view_is_a_picture_too() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("environment = { uniform = [0.25, 0.5, 0.75] }", &[RED, BLUE]);
+    let (seen, unseen) = ([at(-0.5, 0.0, 0.0), at(0.5, 0.2, 0.0)], [at(0.0, 0.0, 9.0), at(0.0, 1.0, 9.0)]);
+    for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
+        for finish in [Finish::Linear, Finish::Display] {
+            let mut frame = stage.frame(&scene, options(antialias));
+            frame.set_finish(finish, antialias).unwrap();
+            // 8 bits of a display's picture tell values apart by 0.003 here.
+            let is_background = |picture: &[f32]| {
+                picture.chunks_exact(3).all(|p| (0..3).all(|c| (p[c] - [0.25, 0.5, 0.75][c]).abs() < 4e-3))
+            };
+            frame.render(&unseen, Some(1.0)).unwrap();
+            assert!(is_background(&frame.picture()), "{antialias:?}, {finish:?}: nothing in the first picture");
+            frame.render(&seen, Some(1.0)).unwrap();
+            let first = frame.picture();
+            assert!(!is_background(&first), "{antialias:?}, {finish:?}: something is seen");
+            frame.render(&unseen, Some(1.0)).unwrap();
+            assert!(is_background(&frame.picture()), "{antialias:?}, {finish:?}: nothing is seen any more");
+            frame.show(&unseen, 1.0).unwrap();
+            frame.render(&seen, Some(1.0)).unwrap();
+            assert!(frame.picture() == first, "{antialias:?}, {finish:?}: what comes back is as it was");
+        }
+    }
+}
+
+/// A picture that several render passes make is the one of a single pass, with samples and without.
+#[test]
+fn batches_change_nothing() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("", &[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
+    let placements = [at(-0.3, 0.0, 0.0), at(0.3, 0.2, 0.5)];
+    for antialias in [Antialias::None, Antialias::Samples, Antialias::Outlines] {
+        let mut frame = stage.frame(&scene, options(antialias));
+        frame.render(&placements, Some(1.0)).unwrap();
+        let whole = frame.picture();
+        assert!(whole.iter().any(|c| *c > 0.5));
+        for triangles in [1000, 37] {
+            frame.set_batch(triangles);
+            frame.render(&placements, Some(1.0)).unwrap();
+            assert!(frame.picture() == whole, "batches of {triangles}, {antialias:?}");
+        }
+    }
+}
+
+#[test]
+fn background_is_the_mean_of_the_sky() {
+    let Some(stage) = stage() else { return };
+    // The gradient's mean: base .2 + rise .8 / 4.
+    let sky = "environment = { uniform = [0.1, 0.2, 0.3], gradient = { radiance = [1, 0.5, 0] } }";
+    let picture = draw(&stage, &balls(sky, &[RED]), &[[0.0, 0.0, 0.0]], Antialias::Samples, 1.0);
+    for corner in [0, WIDTH - 1, WIDTH * (HEIGHT - 1), WIDTH * HEIGHT - 1] {
+        for (found, expected) in picture[corner].iter().zip([0.5, 0.4, 0.3]) {
+            // Half floats: 11 bits.
+            assert!((found - expected).abs() < 1e-3, "{:?}", picture[corner]);
+        }
+    }
+}
+
+#[test]
+fn edges_are_smooth_with_samples_only() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("", &[[1.0, 1.0, 1.0]]);
+    let between = |antialias| {
+        let picture = draw(&stage, &scene, &[[0.0, 0.0, 0.0]], antialias, 1.0);
+        // Rounded: interpolated vertex attributes and half floats are off by 5e-4.
+        let mut levels: Vec<i32> = picture.iter().map(|p| (400.0 * p[0]).round() as i32).collect();
+        levels.sort_unstable();
+        levels.dedup();
+        levels
+    };
+    assert_eq!(between(Antialias::None), [0, 400]);
+    assert_eq!(between(Antialias::Samples), [0, 100, 200, 300, 400], "quarters, from four samples a pixel");
+}
+
+/// A ball before another, a box with creases and a floor that ends in sight, judged by 64 samples a pixel.
+#[test]
+fn outlines_are_smoother_than_four_samples() {
+    let Some(stage) = stage() else { return };
+    let ball = |color: &str| format!("[[entity]]\nmesh = \"ball\"\nreceives = false\nemission = {color}\n");
+    let text = "environment = { key = { radiance = [3, 3, 3], toward = [1, 2, 3], sharpness = 2 } }\n\
+        [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.4, subdivisions = 3 }\n\
+        [[mesh]]\nname = \"box\"\ncuboid = { size_m = [0.8, 0.8, 0.8], cells = 1 }\n\
+        [[mesh]]\nname = \"floor\"\nplane = { size_m = 3, cells = 4 }\n\
+        [[entity]]\nmesh = \"box\"\n[[entity]]\nmesh = \"floor\"\nalbedo = [0.3, 0.6, 0.3]\n";
+    let scene = scene(&(text.to_owned() + &ball("[0.9, 0.5, 0.3]") + &ball("[0.2, 0.6, 0.9]")));
+    let turned = glam::Quat::from_euler(glam::EulerRot::YXZ, 0.5, 0.6, 0.2);
+    let tilted = glam::Quat::from_rotation_x(0.4);
+    let placements = [
+        Placement { rotation: turned, ..at(0.6, 0.3, 0.3) },
+        Placement { rotation: tilted, ..at(0.1, -0.4, 0.0) },
+        at(-0.8, 0.2, 0.0),
+        at(-0.5, 0.4, -0.6),
+    ];
+    let grid: Vec<glam::DVec2> =
+        (0..64).map(|i| (glam::DVec2::new(f64::from(i % 8), f64::from(i / 8)) + 0.5) / 8.0).collect();
+    let mut wanted = Vec::new();
+    let [none, samples, outlines] = [Antialias::None, Antialias::Samples, Antialias::Outlines].map(|antialias| {
+        let mut frame = stage.frame(&scene, options(antialias));
+        frame.render(&placements, Some(1.0)).unwrap();
+        if wanted.is_empty() {
+            wanted = frame.twin_texels(&placements, 1.0, &grid).unwrap();
+        }
+        frame.picture()
+    });
+    let error = |picture: &[f32]| {
+        let squares = picture.chunks_exact(3).zip(&wanted).map(|(found, wanted)| {
+            let found = glam::DVec3::new(found[0].into(), found[1].into(), found[2].into());
+            found.distance_squared(wanted.color)
+        });
+        (squares.sum::<f64>() / wanted.len() as f64).sqrt()
+    };
+    let [none, samples, outlines] = [none, samples, outlines].map(|picture| error(&picture));
+    report(&format!("error of a pixel: none {none:.4}, samples {samples:.4}, outlines {outlines:.4}"));
+    assert!(outlines < 0.4 * none && outlines < samples, "none {none}, samples {samples}, outlines {outlines}");
+}
+
+/// Slivers at every angle, 0.02 to 1 pixel wide: with four samples a pixel none is brighter than its brightest vertex,
+/// as it is where the values of vertices are extrapolated to a pixel's centre outside.
+#[test]
+fn slivers_are_no_brighter_than_their_vertices() {
+    let Some(stage) = stage() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in shadow_fields::shaders::FILES.iter().filter(|(name, _)| name.ends_with(".frag")) {
+        std::fs::write(folder.path().join(name), text.replace("centroid ", "")).unwrap();
+    }
+    let library = Library { shader_dir: Some(folder.path().to_path_buf()), ..stage.gpu.library.clone() };
+    let extrapolating = Baker::new(&stage.gpu.device, &library);
+    let most = 0.5;
+    let mut positions = Vec::new();
+    let mut colors = Vec::new();
+    for i in 0..720 {
+        let turn = Quat::from_rotation_z(std::f32::consts::TAU / 720.0 * i as f32);
+        let place = Vec3::new((i % 36) as f32 * 0.14 - 2.5, (i / 36) as f32 * 0.16 - 1.5, 0.0);
+        let width_m = 0.001 * 1.2_f32.powi(i % 23);
+        for (x, y, color) in [(-0.1, 0.0, 0.02), (0.1, 0.0, 0.02), (0.03, width_m, most)] {
+            positions.push(place + turn * Vec3::new(x, y, 0.0));
+            colors.push(Vec3::splat(color));
+        }
+    }
+    let triangles = (0..720).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let mesh = Mesh::new("slivers", positions, Vec::new(), Some(colors), triangles).unwrap();
+    let slivers = EntityData {
+        emission: Vec3::ONE,
+        emits: Some(false),
+        receives: Some(false),
+        occludes: Some(false),
+        ..EntityData::of_mesh("slivers")
+    };
+    let scene = Scene::builder().camera(Camera::new([0.0, 0.0, 5.0], [0.0; 3])).mesh("slivers", mesh).entity(slivers);
+    let scene = scene.build().unwrap();
+    let options = options(Antialias::Samples);
+    let frames = [stage.frame(&scene, options), stage.frame_on(&extrapolating, &scene, options)];
+    let [within, beyond] = frames.map(|mut frame| {
+        frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
+        frame.picture().into_iter().fold(0.0, f32::max)
+    });
+    report(&format!("slivers of at most {most}: {within} within them, {beyond} extrapolated"));
+    assert!((0.2..most + 1e-3).contains(&within), "{within}");
+    assert!(beyond > 2.0 * most, "the slivers are no test: {beyond}");
+}
+
+/// Lines of what is hidden leave no trace, also where the same entity hides itself.
+#[test]
+fn hidden_outlines_leave_no_trace() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("environment = { uniform = [0.1, 0.1, 0.1] }", &[RED, BLUE]);
+    let picture = |place| draw(&stage, &scene, &[[0.0, 0.0, 1.0], place], Antialias::Outlines, 1.0);
+    assert!(picture([0.0, 0.0, -1.0]) == picture([0.0, 0.0, 9.0]), "behind the first and behind the camera");
+    assert!(picture([0.5, 0.0, -1.0]) != picture([0.0, 0.0, 9.0]), "beside it, it is seen");
+}
+
+#[test]
+fn white_keeps_hue() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("", &[[8.0, 4.0, 2.0], [0.25, 0.5, 0.125]]);
+    let places = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
+    let centre = |picture: &Picture, x: f32| picture[(48.0 + 17.58 * x) as usize + HEIGHT / 2 * WIDTH];
+    for (white, bright) in [(1.0, [1.0, 0.5, 0.25]), (4.0, [4.0, 2.0, 1.0]), (f32::INFINITY, [8.0, 4.0, 2.0])] {
+        let picture = draw(&stage, &scene, &places, Antialias::Samples, white);
+        for (x, expected) in [(-1.0, bright), (1.0, [0.25, 0.5, 0.125])] {
+            let found = centre(&picture, x);
+            // Two half-float steps.
+            let near = found.iter().zip(expected).all(|(f, e)| (f - e).abs() <= 2e-3 * e);
+            assert!(near, "white {white}: {found:?} for {expected:?}");
+        }
+    }
+}
+
+/// Drawn radiance is emission plus radiosity: a floor under a white sky is as bright as its albedo.
+#[test]
+fn lit_surfaces_have_their_radiosity() {
+    let Some(stage) = stage() else { return };
+    let text = "environment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"wall\"\nplane = { size_m = 9, cells = 3 }\n\
+        [[entity]]\nmesh = \"wall\"\nalbedo = [0.25, 0.5, 0.75]\nemission = [0.5, 0, 0]\nemits = false\n\
+        rotation = { axis = [1, 0, 0], angle_deg = 90 }\n";
+    let scene = scene(text);
+    let mut frame = stage.frame(&scene, options(Antialias::Samples));
+    frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
+    let picture = frame.picture();
+    for (found, expected) in picture.chunks_exact(3).flatten().zip([0.75_f32, 0.5, 0.75].iter().cycle()) {
+        assert!((found - expected).abs() < 1e-3, "{found} for {expected}");
+    }
+}
+
+/// A picture for a screen is the linear one over white, in 8 bits of sRGB.
+#[test]
+fn screens_are_shown_the_same() {
+    let Some(stage) = stage() else { return };
+    let scene = balls("environment = { uniform = [0.2, 0.5, 0.05] }", &[[4.0, 1.0, 0.3], [0.1, 0.2, 0.001]]);
+    let placements = [at(-0.5, 0.0, 0.0), at(0.6, 0.2, 0.0)];
+    let mut frame = stage.frame(&scene, options(Antialias::None));
+    let white = 2.0;
+    frame.render(&placements, Some(white)).unwrap();
+    let linear = frame.picture();
+    frame.set_finish(Finish::Display, Antialias::None).unwrap();
+    frame.render(&placements, Some(white)).unwrap();
+    for (shown, linear) in frame.picture().iter().zip(&linear) {
+        let levels = 255.0 * (srgb_from_linear(*shown) - srgb_from_linear(linear / white));
+        // Half a level of rounding, and as much for the device's own powers.
+        assert!(levels.abs() < 1.0, "{shown} against {linear}");
+    }
+    let brightest = linear.iter().fold(0.0_f32, |m, c| m.max(*c));
+    assert!((brightest - white).abs() < 1e-3 * white, "the ball is brighter than white: {brightest}");
+    // A frame that is only shown stays on the device; here nothing receives, so nothing is merged either.
+    let passes: Vec<_> = frame.show(&placements, white).unwrap().into_iter().map(|t| t.pass).collect();
+    assert_eq!(passes, ["draw"]);
+}
+
+#[test]
+fn what_is_said_of_memory_is_what_is_taken() {
+    let Some(stage) = stage() else { return };
+    for antialias in [Antialias::None, Antialias::Outlines, Antialias::Samples] {
+        let options = options(antialias);
+        let said = PictureMemory::new(&stage.gpu.device, &options);
+        let frame = stage.frame(&balls("", &[[1.0; 3]]), options);
+        assert_eq!(said.device, frame.memory().pictures, "{antialias:?}");
+    }
+}

@@ -1,0 +1,22 @@
+//! Passes on the device against their twins, and what frames leave out.
+
+mod bake_levels;
+mod bake_skip;
+mod capture;
+#[path = "../common/mod.rs"]
+mod common;
+mod draw;
+mod flight;
+mod hidden;
+mod layouts;
+mod light;
+mod merge;
+mod order;
+mod project;
+mod self_visibility;
+mod shadow_map;
+mod sharp_motion;
+mod skip;
+mod stability;
+#[path = "../common/stage.rs"]
+mod stage;

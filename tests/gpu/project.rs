@@ -1,0 +1,191 @@
+//! Projection and assembly on the device against their twins in f64.
+
+use crate::common;
+use common::generate;
+use common::{gpu, pot, report};
+use glam::Vec3;
+use shadow_fields::asset::Mesh;
+use shadow_fields::bake::assemble::{Source, Sources, twin};
+use shadow_fields::bake::capture::CaptureKind;
+use shadow_fields::bake::capture::NO_SLOT;
+use shadow_fields::bake::project::{Project, Projection};
+use shadow_fields::check::assemble;
+use shadow_fields::check::project::{self, Content, EYES, F32};
+use shadow_fields::field::{Lattice, Storage};
+use std::f64::consts::PI;
+
+fn painted_pot() -> Mesh {
+    let pot = pot(3);
+    let colors = pot.normals.iter().map(|n| (*n + Vec3::ONE) * Vec3::new(0.5, 1.0, 3.0)).collect();
+    Mesh::new("painted pot", pot.positions, pot.normals, Some(colors), pot.triangles).unwrap()
+}
+
+fn projections(bands: usize) {
+    let Some(gpu) = gpu() else { return };
+    let (pot, painted) = (pot(3), painted_pot());
+    let closed = generate::cuboid(Vec3::ONE, 1);
+    let baker = gpu.baker();
+    let mut worst = 0.0_f64;
+    let mut compare = |content: &Content<'_>, projection, empty: bool| {
+        let (error, largest) = project::compare(content, bands, projection).unwrap();
+        let place = format!("{bands} bands, {projection:?}, {} px", content.capture.face_px);
+        assert!(error <= F32, "{place}: {error:e}");
+        assert!(empty || largest > 0.01, "{place}: nothing to compare");
+        worst = worst.max(error);
+    };
+    for face_px in [8, 32, 64] {
+        let black = Content::new(&baker, &pot, &EYES, (face_px, CaptureKind::Cover, true)).unwrap();
+        // From inside a solid, unculled, every texel is black; from far away all but a few are white.
+        let constant =
+            Content::new(&baker, &closed, &[Vec3::new(0.1, 0.05, -0.2)], (face_px, CaptureKind::Cover, false)).unwrap();
+        for projection in [Projection::Blocked, Projection::Transfer] {
+            compare(&black, projection, false);
+            // What all of the object hides has no transfer left, at scale 1.
+            compare(&constant, projection, projection == Projection::Transfer);
+        }
+        let bright = Content::new(&baker, &painted, &EYES, (face_px, CaptureKind::Radiance, true)).unwrap();
+        compare(&bright, Projection::Radiance, false);
+    }
+    report(&format!("{bands} bands: largest error {worst:.2e}"));
+}
+
+#[test]
+fn projections_to_2_bands() {
+    projections(2);
+}
+
+#[test]
+fn projections_to_3_bands() {
+    projections(3);
+}
+
+#[test]
+fn projections_to_4_bands() {
+    projections(4);
+}
+
+#[test]
+fn projections_to_5_bands() {
+    projections(5);
+}
+
+#[test]
+fn projections_to_6_bands() {
+    projections(6);
+}
+
+#[test]
+fn projections_to_7_bands() {
+    projections(7);
+}
+
+/// Closed form: all blocked is sqrt(4 pi) in the constant band and nothing else; nothing blocked is nothing.
+#[test]
+fn constant_content_has_its_closed_form() {
+    let Some(gpu) = gpu() else { return };
+    let closed = generate::cuboid(Vec3::ONE, 1);
+    let baker = gpu.baker();
+    let content = Content::new(&baker, &closed, &[Vec3::ZERO], (32, CaptureKind::Cover, false)).unwrap();
+    let project = content.pass(4, Projection::Blocked).unwrap();
+    let mut samples = content.samples();
+    samples[0].scale = 1.0;
+    let blocked = content.run(&project, &samples).unwrap();
+    assert!((f64::from(blocked[0]) - (4.0 * PI).sqrt()).abs() < 1e-5, "{}", blocked[0]);
+    // Bands 1 and 3 vanish by symmetry, band 2 up to the midpoint rule's error on 32 texels.
+    assert!(blocked[1..].iter().all(|b| b.abs() < 1e-3), "{blocked:?}");
+    samples[0].slots = [NO_SLOT; 6];
+    assert!(content.run(&project, &samples).unwrap().iter().all(|b| *b == 0.0));
+}
+
+#[test]
+fn oversized_faces_are_refused() {
+    let Some(gpu) = gpu() else { return };
+    // More texels than maxTexelBufferElements, where the device's limit is low enough to try.
+    let limit = gpu.device.limits.max_texel_buffer_elements;
+    let face_px = f64::from(limit).sqrt() as u32 + 1;
+    if face_px > 4096 {
+        return report("the device's views hold more texels than are worth a test");
+    }
+    let refused = Project::new(&gpu.device, &gpu.library, 2, Projection::Blocked, face_px, 3);
+    assert_eq!(refused.err().map(|error| error.exit_code()), Some(4));
+}
+
+#[test]
+fn assembly_against_its_twin() {
+    let Some(gpu) = gpu() else { return };
+    for (text, bands, channels) in assemble::CASES {
+        let lattice: Lattice = text.parse().unwrap();
+        for (storage, tolerance) in [(Storage::F32, F32), (Storage::F16, assemble::F16)] {
+            for seed in 3..6 {
+                let error = assemble::compare(&gpu.baker(), (&lattice, bands, channels), storage, seed).unwrap();
+                assert!(error <= tolerance, "{text} {storage:?}, seed {seed}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_lies_inside_is_filled_from_around() {
+    let lattice: Lattice = "cube:4x3,inner=0.3".parse().unwrap();
+    let count = lattice.sample_count() as usize;
+    let directions = lattice.direction_count();
+    // One sample inside: its replacement is the mean of its six neighbours, or five on the first shell.
+    for (sample, neighbours) in [(directions + 4, 6), (4, 5), (3 * directions + 13, 5)] {
+        let mut inside = vec![false; count];
+        inside[sample as usize] = true;
+        let sources = Sources::new(&lattice, &inside, &inside).unwrap();
+        assert!(sources.list.iter().all(|s| s.sample != sample), "the raw capture is used");
+        let own = lattice.sources().iter().position(|s| *s == [sample % directions]).unwrap() as u32;
+        let stored = (sample / directions * lattice.stored_direction_count() + own) as usize;
+        let list = &sources.list[sources.offsets[stored] as usize..sources.offsets[stored + 1] as usize];
+        assert_eq!(list.len(), neighbours, "sample {sample}");
+        for Source { sample: other, weight } in list {
+            assert!((weight * neighbours as f32 - 1.0).abs() < 1e-6);
+            let step = lattice.position(*other).distance(lattice.position(sample));
+            assert!(step < lattice.position(sample).length().max(6.0), "{other} is no neighbour of {sample}");
+        }
+    }
+    assert_eq!(Sources::new(&lattice, &vec![true; count], &vec![true; count]).unwrap_err().exit_code(), 4);
+    // All but one inside: everything is that one.
+    let mut inside = vec![true; count];
+    inside[100] = false;
+    assert!(Sources::new(&lattice, &inside, &inside).unwrap().list.iter().all(|s| s.sample == 100));
+}
+
+/// What is stored is fitted to being interpolated: constants and straight lines stay, a parabola over the shells sinks
+/// by a twelfth of its second difference, and so does the field as a whole.
+#[test]
+fn samples_are_lowered_by_the_sag_between_them() {
+    let lattice: Lattice = "cube:6x5,inner=0.3".parse().unwrap();
+    let count = lattice.sample_count();
+    let none = vec![false; count as usize];
+    let sources = Sources::new(&lattice, &none, &none).unwrap();
+    let shell = |sample: u32| f64::from(sample / lattice.direction_count());
+    let stored = |of: &dyn Fn(u32) -> f64| {
+        let captured: Vec<f32> = (0..count).map(|s| of(s) as f32).collect();
+        twin(&captured, &sources, 1, 1.0)
+    };
+    let per_shell = lattice.stored_direction_count() as usize;
+    for (power, sag) in [(0, 0.0), (1, 0.0), (2, 2.0 / 12.0)] {
+        for (at, found) in stored(&|s| shell(s).powi(power)).iter().enumerate() {
+            let shell = at / per_shell;
+            let sag = if (1..5).contains(&shell) { sag } else { 0.0 };
+            let wanted = (shell as f64).powi(power) - sag;
+            assert!((found - wanted).abs() < 1e-5, "power {power}, stored sample {at}: {found}, not {wanted}");
+        }
+    }
+    // Across directions, cells of 18 degrees: x^2 is a squared cosine, whose second derivative is -2 along both at its
+    // peak, which rises by 2 x 2 (pi / 10)^2 / 12 = .033, and 2 across its trough, which sinks by half that.
+    let squares = stored(&|s| lattice.direction(s % lattice.direction_count()).x.powi(2));
+    assert!(squares.iter().all(|x| (-0.018..1.035).contains(x)), "{squares:?}");
+    // Nothing is taken across a sample that stands for another place.
+    let mut inside = none.clone();
+    inside[100] = true;
+    let careful = Sources::new(&lattice, &inside, &none).unwrap();
+    let uses = |s: &Sources| s.list.iter().filter(|source| source.sample == 100).count();
+    assert!(uses(&careful) < uses(&sources) && uses(&careful) >= 1);
+    // Grids of latitudes and longitudes hold what was captured.
+    let grid: Lattice = "latlon:8x4x4,inner=0.3".parse().unwrap();
+    let none = vec![false; grid.sample_count() as usize];
+    assert!(Sources::new(&grid, &none, &none).unwrap().list.iter().all(|s| s.weight == 1.0));
+}

@@ -1,0 +1,279 @@
+//! Self-visibility: closed forms, the pass against its twin, the shader's lookup against Rust's, direct light against
+//! rays, the cache.
+
+use crate::common;
+use common::generate;
+use common::{Gpu, gpu, pot, report};
+use glam::{DVec3, Vec3};
+use shadow_fields::asset::{Mesh, embedded};
+use shadow_fields::bake::cache::Cache;
+use shadow_fields::bake::{self, TRANSFER_OFFSET, Wanted};
+use shadow_fields::check::self_visibility as check;
+use shadow_fields::field::quantity::channel_stride;
+use shadow_fields::field::self_visibility::{
+    BYTES, CELLS, LIMIT_RAD, NODES, cells, decode_angle, encode_angle, frame, node_direction, visible,
+};
+use shadow_fields::field::sub_light::{LightPart, SeenLight};
+use shadow_fields::gpu::{Bind, Buffer, Commands, ComputePipeline};
+use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::sh::lobe;
+use shadow_fields::sh::quadrature::random_direction;
+use shadow_fields::shaders::{Library, ShaderPermutation};
+use shadow_fields::truth::{RayMeshes, Vertex, World};
+use std::f64::consts::TAU;
+use std::path::Path;
+
+fn options(face_px: u32) -> bake::Options {
+    bake::Options { face_px, ..bake::Options::default() }
+}
+
+fn bake(gpu: &Gpu, mesh: &Mesh, face_px: u32) -> Vec<u8> {
+    gpu.baker().vertices(mesh, &options(face_px), Wanted::SELF_VISIBILITY, &|_, _| ()).unwrap().0.self_visibility
+}
+
+#[test]
+fn maps_are_those_of_the_twin() {
+    let Some(gpu) = gpu() else { return };
+    let ring = generate::torus(1.0, 0.3, 24, 12);
+    // Faces of 180 px are gone through in two parts.
+    for (mesh, face_px) in [(ring.clone(), 32), (pot(3), 64), (pot(2), 20), (ring, 180)] {
+        let check::Compared { worst_steps: worst, between, other_distances } =
+            check::compare(&gpu.baker(), &mesh, face_px).unwrap();
+        report(&format!("{} at {face_px} px: {worst} steps at most, {between} nodes between the limits", mesh.name));
+        report(&format!("{:.4} of the nodes have another distance", other_distances));
+        assert!(worst <= check::STEPS && between > 100, "{} at {face_px} px: {worst} steps", mesh.name);
+        assert!(other_distances <= check::OTHER_DISTANCES, "{other_distances}");
+    }
+}
+
+/// A floor that is one small triangle at the origin, and a wall that looms over it at x = -1: 1 m high, 80 m long.
+fn floor_beside_a_wall() -> Mesh {
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.1],
+        [0.1, 0.0, 0.0],
+        [-1.0, -0.5, -40.0],
+        [-1.0, 1.0, -40.0],
+        [-1.0, 1.0, 40.0],
+        [-1.0, -0.5, 40.0],
+    ];
+    let triangles = vec![[0, 1, 2], [3, 4, 5], [3, 5, 6]];
+    Mesh::new("wall", corners.map(Vec3::from_array).to_vec(), Vec::new(), None, triangles).unwrap()
+}
+
+#[test]
+fn the_edge_of_a_wall_is_a_great_circle() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = floor_beside_a_wall();
+    let vertex = mesh.positions.iter().position(|p| *p == Vec3::ZERO).unwrap();
+    assert_eq!(mesh.normals[vertex], Vec3::Y);
+    let maps = bake(&gpu, &mesh, 128);
+    let height = 1.0 - f64::from(TRANSFER_OFFSET * mesh.bounding_sphere().1);
+    let across = DVec3::new(height, 1.0, 0.0).normalize();
+    let mut worst = 0.0_f64;
+    for node in 0..NODES {
+        let toward = frame(DVec3::Y) * node_direction(node);
+        let sine = toward.dot(across);
+        // Past the wall's ends the circle goes on below the horizon.
+        let along = (toward - sine * across).y >= 0.0;
+        let wanted = if along { sine.asin() } else { toward.z.abs().acos() };
+        let found = decode_angle(maps[vertex * BYTES + node]);
+        worst = worst.max((found - wanted.clamp(-LIMIT_RAD, LIMIT_RAD)).abs());
+    }
+    report(&format!("beside a wall: {:.2} degrees off at most", worst.to_degrees()));
+    // A texel of 0.9 degrees, and half a step of 0.35.
+    assert!(worst.to_degrees() < 1.08, "{} degrees", worst.to_degrees());
+    // A light whose centre the edge passes through.
+    let edge = DVec3::new(-1.0, height, 0.3).normalize();
+    let half = visible(&maps[vertex * BYTES..][..BYTES], DVec3::Y, edge, 0.1, f64::INFINITY);
+    assert!((half - 0.5).abs() < 0.1, "{half}");
+}
+
+#[test]
+fn a_ball_leaves_all_free_outside_and_nothing_inside() {
+    let Some(gpu) = gpu() else { return };
+    let ball = generate::sphere(0.5, 2);
+    let all = |maps: Vec<u8>, angle| {
+        maps.chunks_exact(BYTES).all(|map| map[..NODES].iter().all(|byte| *byte == encode_angle(angle)))
+    };
+    assert!(all(bake(&gpu, &ball, 32), LIMIT_RAD));
+    let inwards = ball.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect();
+    let room = Mesh::new("room", ball.positions.clone(), Vec::new(), None, inwards).unwrap();
+    assert!(all(bake(&gpu, &room, 32), -LIMIT_RAD));
+}
+
+const LOOKUP: &str = r#"#version 460
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) readonly buffer Cells { uvec2 cells[]; };
+layout(std430, binding = 1) readonly buffer Rays { vec4 rays[]; }; // normal, and the light's distance; direction, and its radius
+layout(std430, binding = 2) writeonly buffer Found { vec2 found[]; };
+layout(push_constant) uniform Push { uint count; uint cell_count; } push;
+uvec2 self_cell(uint i) { return cells[i]; }
+#include "blocked_share.glsl"
+#include "bytes.glsl"
+#include "self_frame.glsl"
+#include "self_visibility.glsl"
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= push.count) {
+        return;
+    }
+    vec3 normal = rays[2 * i].xyz;
+    float distance = rays[2 * i].w;
+    vec4 light = rays[2 * i + 1];
+    uint first = i % 16 * push.cell_count;
+    found[i] = vec2(self_visible(first, normal, light.xyz, light.w, distance),
+        self_visible(first, self_frame(normal), 2.5 * light.xyz, light.w, distance));
+}
+"#;
+
+#[test]
+fn a_shader_finds_what_rust_finds() {
+    let Some(gpu) = gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("lookup.comp"), LOOKUP).unwrap();
+    let library = Library { shader_dir: Some(folder.path().to_path_buf()), ..gpu.library.clone() };
+    let shader = library.shader(&ShaderPermutation::new("lookup.comp", 4).self_visibility()).unwrap();
+    let pass = ComputePipeline::new(&gpu.device, "lookup", &shader, &[]).unwrap();
+    let mut rng = fastrand::Rng::with_seed(8);
+    let maps: Vec<[u8; BYTES]> = (0..16).map(|_| std::array::from_fn(|_| rng.u8(..))).collect();
+    let mut rays: Vec<[Vec3; 2]> = (0..4000).map(|_| [0; 2].map(|_| random_direction(&mut rng).as_vec3())).collect();
+    let poles = [Vec3::Z, Vec3::NEG_Z, Vec3::new(1e-4, -2e-4, -1.0).normalize(), Vec3::X, Vec3::Y];
+    rays.extend(poles.iter().flat_map(|normal| [[*normal, *normal], [*normal, Vec3::X], [*normal, Vec3::NEG_Y]]));
+    let radius = |i: usize| [0.02_f32, 0.1, 0.4][i % 3];
+    let distance = |i: usize| [0.5_f32, 1.0, 1e9][i / 3 % 3];
+    let quads: Vec<[f32; 4]> = rays
+        .iter()
+        .enumerate()
+        .flat_map(|(i, [normal, light])| {
+            [normal.extend(distance(i)), light.extend(radius(i))].map(|quad| quad.to_array())
+        })
+        .collect();
+    let words: Vec<[u32; 2]> = maps.iter().flat_map(|map| cells(map)).collect();
+    let device = &gpu.device;
+    let [words, quads] =
+        [Buffer::with_data(device, "cells", &words).unwrap(), Buffer::with_data(device, "rays", &quads).unwrap()];
+    let found = Buffer::with_data(device, "found", &vec![[f32::NAN; 2]; rays.len()]).unwrap();
+    let mut commands = Commands::new(device, "lookup").unwrap();
+    let resources = [&words, &quads, &found].map(Bind::Buffer);
+    let push = [rays.len() as u32, CELLS as u32];
+    commands.pass("lookup", |c| c.dispatch(&pass, &resources, &push, [push[0], 1, 1])).unwrap();
+    commands.submit().unwrap();
+    let mut worst = 0.0_f64;
+    for (i, found) in found.download::<[f32; 2]>(rays.len()).unwrap().iter().enumerate() {
+        let [normal, light] = rays[i].map(Vec3::as_dvec3);
+        let wanted = visible(&maps[i % 16], normal, light, radius(i).into(), distance(i).into());
+        let errors = found.map(|found| (f64::from(found) - wanted).abs());
+        assert!(errors.iter().all(|error| *error < 2e-3), "{normal} {light}: {found:?}, {wanted}");
+        worst = worst.max(errors[0]).max(errors[1]);
+    }
+    report(&format!("the shader's share is off by {worst:.1e} at most"));
+}
+
+/// Directions over a round light, equal shares of its solid angle.
+fn light_rays(direction: DVec3, angle: f64, count: usize, turned: f64) -> impl Iterator<Item = DVec3> {
+    let (a, b) = direction.any_orthonormal_pair();
+    (0..count).map(move |i| {
+        let cosine = 1.0 - (1.0 - angle.cos()) * (i as f64 + 0.5) / count as f64;
+        let turn = turned + 2.399963229728653 * i as f64;
+        let sine = (1.0 - cosine * cosine).sqrt();
+        sine * turn.cos() * a + sine * turn.sin() * b + cosine * direction
+    })
+}
+
+/// Direct light of a round light of unit radiance over its solid angle, by a map and sub-lights.
+fn by_map(map: &[u8], normal: DVec3, toward: DVec3, angle: f64) -> f64 {
+    let blocks = SeenLight::new(1e6 * toward, 1e6 * angle.sin()).blocks();
+    let parts = blocks.iter().flat_map(|(_, parts)| parts);
+    let sees = |part: &LightPart| visible(map, normal, part.toward, part.sine, f64::INFINITY);
+    parts.map(|part| part.share(normal) * sees(part)).sum::<f64>() / (TAU * (1.0 - angle.cos()))
+}
+
+/// Its figures stand in `src/field/self_visibility.rs`.
+#[test]
+fn direct_light_is_that_of_rays() {
+    const VERTICES: usize = 150;
+    const LIGHTS: usize = 12;
+    let Some(gpu) = gpu() else { return };
+    let text = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"pot\"\nfile = \"assets/meshes/teapot.obj\"\n\
+                [[entity]]\nmesh = \"pot\"\n";
+    let scene = Scene::parse(text, Path::new("test.toml"), &embedded::read).unwrap();
+    let mesh = &scene.meshes[0];
+    let shapes = RayMeshes::new(&scene);
+    let placement = Placement { position: Vec3::ZERO, rotation: glam::Quat::IDENTITY, scale: 1.0 };
+    let world = World::new(&scene, &shapes, &[placement]);
+    let bake = |wanted| gpu.baker().vertices(mesh, &options(64), wanted, &|_, _| ()).unwrap();
+    let (transfer, of_transfer) = bake(Wanted::TRANSFER);
+    let (maps, of_maps) = bake(Wanted::SELF_VISIBILITY);
+    let (transfer, maps) = (transfer.transfer, maps.self_visibility);
+    report(&format!("transfer: {of_transfer:?}"));
+    report(&format!("self-visibility: {of_maps:?}"));
+    let stride = channel_stride(4);
+    let mut rng = fastrand::Rng::with_seed(4);
+    let degrees = [1.0_f64, 3.0, 8.0, 15.0, 30.0];
+    let mut sums = [[0.0; 3]; 5];
+    for _ in 0..VERTICES {
+        let index = rng.usize(..mesh.positions.len());
+        let (map, transfer) = (&maps[index * BYTES..][..BYTES], &transfer[index * stride..][..16]);
+        let view = world.view(Vertex { entity: 0, index });
+        let normal = mesh.normals[index].as_dvec3();
+        for _ in 0..LIGHTS {
+            let toward = random_direction(&mut rng);
+            let toward = if toward.dot(normal) < 0.0 { -toward } else { toward };
+            for (degrees, sums) in degrees.iter().zip(&mut sums) {
+                let angle = degrees.to_radians();
+                let (mut exact, mut whole) = (0.0, 0.0);
+                for ray in light_rays(toward, angle, 96, TAU * rng.f64()).filter(|ray| ray.dot(normal) > 0.0) {
+                    whole += ray.dot(normal) / 96.0;
+                    exact += if world.blocks_itself(&view, ray, f64::INFINITY) { 0.0 } else { ray.dot(normal) / 96.0 };
+                }
+                let cap = lobe::cap(4, toward, angle);
+                let sh = transfer.iter().zip(&cap).map(|(t, c)| f64::from(*t) * c).sum::<f64>();
+                let sh = (sh / (TAU * (1.0 - angle.cos()))).max(0.0);
+                sums[0] += (by_map(map, normal, toward, angle) - exact).powi(2);
+                sums[1] += (sh - exact).powi(2);
+                sums[2] += whole * whole;
+            }
+        }
+    }
+    for ((degrees, [map, sh, whole]), limit) in degrees.iter().zip(sums).zip([0.075, 0.06, 0.04, 0.03, 0.03]) {
+        let (map, sh) = ((map / whole).sqrt(), (sh / whole).sqrt());
+        report(&format!("light of {degrees} degrees: {map:.4} by maps, {sh:.4} by SH transfer"));
+        assert!(map < limit && map < 0.7 * sh, "{degrees} degrees: {map} by maps, {sh} by SH");
+    }
+}
+
+#[test]
+fn the_cache_keeps_maps_and_bakes_damaged_ones_anew() {
+    let Some(gpu) = gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(Some(folder.path()));
+    let (mesh, options) = (generate::torus(1.0, 0.3, 12, 6), options(16));
+    let ensure = |cache: &Cache| {
+        let baker = gpu.baker();
+        let found = cache.vertices(&baker, &mesh, &options, Wanted::SELF_VISIBILITY, &|_, _| ()).unwrap();
+        (found.self_visibility.unwrap(), found.baked)
+    };
+    assert!(!cache.has_self_visibility(&mesh, &options));
+    let (maps, baked) = ensure(&cache);
+    assert_eq!(maps.len(), BYTES * mesh.positions.len());
+    assert!(baked.is_some() && cache.has_self_visibility(&mesh, &options));
+    assert!(!cache.has_transfer(&mesh, &options));
+    let files: Vec<_> = std::fs::read_dir(folder.path().join("fields")).unwrap().map(|f| f.unwrap().path()).collect();
+    assert!(files.len() == 1 && files[0].extension().unwrap() == "selfvis", "{files:?}");
+    let fresh = || Cache::new(Some(folder.path()));
+    assert!(ensure(&fresh()).1.is_none(), "it is found");
+    let bytes = std::fs::read(&files[0]).unwrap();
+    let altered = |at: usize| bytes.iter().enumerate().map(|(i, b)| if i == at { b ^ 1 } else { *b }).collect();
+    let damaged: [Vec<u8>; 5] =
+        [bytes[..bytes.len() - 5].to_vec(), altered(bytes.len() / 2), altered(2), altered(60), Vec::new()];
+    for content in damaged {
+        std::fs::write(&files[0], &content).unwrap();
+        let (again, baked) = ensure(&fresh());
+        assert!(baked.is_some(), "{} bytes are baked anew", content.len());
+        assert_eq!(again, maps);
+        assert_eq!(std::fs::read(&files[0]).unwrap(), bytes, "and kept");
+    }
+    let memory = Cache::new(None);
+    assert!(ensure(&memory).1.is_some() && ensure(&memory).1.is_none(), "without a folder it is kept in memory");
+}

@@ -1,0 +1,206 @@
+//! Sharp lights that move and grow: light on vertices changes as the exact light of balls changes, without steps and
+//! without flicker.
+
+use crate::common;
+use common::{gpu, report};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use shadow_fields::asset::embedded;
+use shadow_fields::bake::cache::Cache;
+use shadow_fields::check::sharp as check;
+use shadow_fields::draw::{Antialias, Shading};
+use shadow_fields::frame::{self, Frame};
+use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::truth::pixels::lit_points;
+use shadow_fields::truth::{RayMeshes, World};
+use std::f64::consts::PI;
+
+/// Rows of vertices of the fine floor, and vertices in a row.
+const SIDE: usize = 100;
+/// Size of pictures in pixels: 100 rows show the floor.
+const PICTURE: [u32; 2] = [100, 180];
+const BALL_RADIUS_M: f64 = 0.5;
+
+/// A floor of that many cells along a side, a ball above it and a ball that shines.
+fn scene(cells: usize) -> Scene {
+    let text = format!(
+        "[camera]\neye = [0, 2, 5]\ntarget = [0, 0.5, 0]\n\
+        [[mesh]]\nname = \"floor\"\nplane = {{ size_m = 6, cells = {cells} }}\n\
+        [[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = {BALL_RADIUS_M}, subdivisions = 5 }}\n\
+        [[entity]]\nmesh = \"floor\"\nalbedo = [1, 1, 1]\n\
+        [[entity]]\nmesh = \"ball\"\nposition = [0, 0.8, 0]\n\
+        [[entity]]\nmesh = \"ball\"\nposition = [0, 3.5, 0]\nemission = [1, 1, 1]\n"
+    );
+    Scene::parse(&text, "test.toml".as_ref(), &embedded::read).unwrap()
+}
+
+fn frame(gpu: &common::Gpu, scene: &Scene) -> Frame {
+    let base = check::sharp_options();
+    let bake = shadow_fields::bake::Options { silhouette: Default::default(), ..base.bake };
+    let options =
+        frame::Options { bake, shading: Some(Shading::Pixel), size: PICTURE, antialias: Antialias::None, ..base };
+    Frame::new(&gpu.baker(), &Cache::new(None), scene, options, &|_, _, _| ()).unwrap()
+}
+
+fn ball(placement: &Placement) -> (DVec3, f64) {
+    (placement.position.as_dvec3(), BALL_RADIUS_M * f64::from(placement.scale))
+}
+
+/// Radiosity of a white floor at `point` under a shining ball past another one, by `count` directions that have the
+/// light's disc evenly.
+fn exact(point: DVec3, occluder: (DVec3, f64), light: (DVec3, f64), count: usize) -> f64 {
+    let to = light.0 - point;
+    let sine = light.1 / to.length();
+    let toward = to.normalize();
+    let (across, down) = toward.any_orthonormal_pair();
+    let blocks = |direction: DVec3| {
+        let centre = occluder.0 - point;
+        let along = centre.dot(direction);
+        along > 0.0 && centre.length_squared() - along * along < occluder.1 * occluder.1
+    };
+    let share = |k: usize| {
+        let place =
+            DVec2::from_angle(k as f64 * PI * (3.0 - 5.0_f64.sqrt())) * ((k as f64 + 0.5) / count as f64).sqrt();
+        let tilt = (1.0 - sine * sine * place.length_squared()).sqrt();
+        let direction = tilt * toward + sine * (place.x * across + place.y * down);
+        if blocks(direction) { 0.0 } else { direction.y.max(0.0) / tilt }
+    };
+    sine * sine * (0..count).map(share).sum::<f64>() / count as f64
+}
+
+/// Radiosity of the floor's vertices whose numbers are multiples of `every`, found and exact, at placements.
+fn lit(frame: &mut Frame, scene: &Scene, placements: &[Placement], every: usize, count: usize) -> [Vec<f64>; 2] {
+    frame.render(placements, None).unwrap();
+    let found = frame.radiosity(0).unwrap();
+    let numbers: Vec<usize> = (0..found.len()).step_by(every).collect();
+    let positions = &scene.meshes[0].positions;
+    let truth = |&v: &usize| exact(positions[v].as_dvec3(), ball(&placements[1]), ball(&placements[2]), count);
+    [numbers.iter().map(|&v| f64::from(found[v][0])).collect(), numbers.par_iter().map(truth).collect()]
+}
+
+/// A light that grows from 0.1 to 60 degrees across: what a vertex sees of it follows the exact share, and changes by
+/// no more from size to size.
+#[test]
+fn a_light_grows_without_a_step() {
+    let Some(gpu) = gpu() else { return };
+    const STEPS: usize = 160;
+    let scene = scene(SIDE - 1);
+    let mut frame = frame(&gpu, &scene);
+    let mut placements = scene.at(0.0);
+    let (mut before, mut worst, mut sum, mut count) = ([Vec::new(), Vec::new()], [0.0_f64; 2], 0.0, 0);
+    for step in 0..=STEPS {
+        let angle_deg = 0.1 * 600_f64.powf(step as f64 / STEPS as f64);
+        // The angle as it is seen from the floor below.
+        let radius_m = 3.5 * (angle_deg / 2.0).to_radians().sin();
+        placements[2].scale = (radius_m / BALL_RADIUS_M) as f32;
+        let whole = |v: f64| v / (radius_m / 3.5).powi(2);
+        let now = lit(&mut frame, &scene, &placements, 97, 4000)
+            .map(|values| values.into_iter().map(whole).collect::<Vec<f64>>());
+        for (found, truth) in now[0].iter().zip(&now[1]) {
+            sum += (found - truth).powi(2);
+            count += 1;
+        }
+        if step > 0 {
+            for ((worst, before), now) in worst.iter_mut().zip(&before).zip(&now) {
+                let change = |(a, b): (&f64, &f64)| (a - b).abs();
+                *worst = before.iter().zip(now).map(change).fold(*worst, f64::max);
+            }
+        }
+        before = now;
+    }
+    let error = (sum / f64::from(count)).sqrt();
+    let [found, truth] = worst;
+    report(&format!(
+        "from size to size a vertex changes by {found:.4} at most, exactly by {truth:.4}; error {error:.4}"
+    ));
+    assert!(found < 1.3 * truth && error < 0.02, "{found} against {truth}, error {error}");
+}
+
+/// Places of ball and light in 240 frames of slow motion.
+fn in_motion(scene: &Scene) -> impl Iterator<Item = Vec<Placement>> + '_ {
+    (0..240).map(|number| {
+        let mut placements = scene.at(0.0);
+        let turn = f64::from(number) / 240.0 * PI;
+        placements[1].position =
+            DVec3::new(0.6 * turn.cos(), 0.8 + 0.1 * (2.0 * turn).sin(), 0.4 * turn.sin()).as_vec3();
+        placements[2].position = DVec3::new(1.2 * turn.sin(), 3.2, 1.2 * turn.cos()).as_vec3();
+        placements[2].scale = 0.25;
+        placements
+    })
+}
+
+/// Sums of changes from frame to frame by rows: found, and exact.
+type RowChanges = Vec<[f64; 2]>;
+
+/// Rows change by at most 1.3 times as much as they should.
+fn assert_calm(what: &str, changes: &RowChanges) {
+    let moved: Vec<_> = changes.iter().filter(|[_, truth]| *truth > 0.0).collect();
+    let ratios: Vec<f64> = moved.iter().map(|[found, truth]| found / truth).collect();
+    let worst = ratios.iter().copied().fold(0.0, f64::max);
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    report(&format!(
+        "{} rows of {what} change {mean:.3} times as much as they should, the worst {worst:.3} times",
+        ratios.len()
+    ));
+    assert!(worst < 1.3, "{what}: {worst}");
+}
+
+#[test]
+fn vertices_do_not_flicker_in_slow_motion() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene(SIDE - 1);
+    let mut frame = frame(&gpu, &scene);
+    let (mut before, mut changes) = (None::<[Vec<f64>; 2]>, vec![[0.0_f64; 2]; SIDE]);
+    for placements in in_motion(&scene) {
+        let now = lit(&mut frame, &scene, &placements, 7, 1500);
+        if let Some(before) = before {
+            for (i, (before, now)) in before.iter().zip(&now).enumerate() {
+                for (k, (a, b)) in before.iter().zip(now).enumerate() {
+                    changes[7 * k / SIDE][i] += (a - b).abs();
+                }
+            }
+        }
+        before = Some(now);
+    }
+    assert!(changes.iter().all(|[_, truth]| *truth > 0.0));
+    assert_calm("vertices", &changes);
+}
+
+/// On a floor of few cells some pixels evaluate the light and others have it from vertices, and which do changes as
+/// things move.
+#[test]
+fn pixels_do_not_flicker_in_slow_motion() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene(24);
+    let mut frame = frame(&gpu, &scene);
+    let shapes = RayMeshes::new(&scene);
+    let [width, height] = PICTURE.map(|edge| edge as usize);
+    let mut before: Vec<Option<[f64; 2]>> = vec![None; width * height];
+    let mut changes = vec![[0.0_f64; 2]; height];
+    let mut evaluated = 0;
+    for placements in in_motion(&scene) {
+        let timings = frame.render(&placements, Some(f32::INFINITY)).unwrap();
+        evaluated += frame.pixels_evaluated(&timings).unwrap_or(1);
+        let picture = frame.picture();
+        let points = lit_points(&World::new(&scene, &shapes, &placements), PICTURE);
+        let floor = points.into_par_iter().filter(|(key, _)| key.entity == 0 && key.index % 3 == 0);
+        let now: Vec<(usize, [f64; 2])> = floor
+            .map(|(key, view)| {
+                let truth = exact(view.position, ball(&placements[1]), ball(&placements[2]), 1000);
+                (key.index, [f64::from(picture[3 * key.index]), truth])
+            })
+            .collect();
+        let mut seen = vec![None; before.len()];
+        for (pixel, values) in now {
+            if let Some([found, truth]) = before[pixel] {
+                let [a, b]: [f64; 2] = values;
+                let row = &mut changes[pixel / width];
+                *row = [row[0] + f64::abs(a - found), row[1] + f64::abs(b - truth)];
+            }
+            seen[pixel] = Some(values);
+        }
+        before = seen;
+    }
+    assert!(evaluated > 240, "no pixel evaluated the light");
+    assert_calm("pixels", &changes);
+}

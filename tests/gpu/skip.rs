@@ -1,0 +1,355 @@
+//! What is not done: an unmoved scene merges nothing, and one in which something moves comes to the bits of a full
+//! merge; what is dropped as small stays within its bound.
+
+use crate::{common, stage};
+use common::report;
+use glam::{Quat, Vec3};
+use shadow_fields::check::merge::{ARITHMETIC, against_twin};
+use shadow_fields::frame;
+use shadow_fields::lists::skip::{Skip, SkipKind, TABLE};
+use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::truth::raycast::RayCast;
+use shadow_fields::truth::{RayMeshes, Vertex, World};
+use stage::{at, scene, small, stage};
+use std::fmt::Write;
+
+/// Balls and rings on a floor, some of them lights, on a grid with `step_m` between them.
+fn town(edge: usize, step_m: f32, lights: usize) -> Scene {
+    let size_m = edge as f32 * step_m;
+    let mut text = format!(
+        "environment = {{ uniform = [0.4, 0.5, 0.6] }}\n\
+         [[mesh]]\nname = \"floor\"\nplane = {{ size_m = {size_m}, cells = 63 }}\n\
+         [[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.3, subdivisions = 1 }}\n\
+         [[mesh]]\nname = \"ring\"\ntorus = {{ major_m = 0.3, minor_m = 0.1, segments = 12, sides = 6 }}\n\
+         [[entity]]\nmesh = \"floor\"\n"
+    );
+    for i in 0..edge * edge {
+        let (x, z) = ((i % edge) as f32 + 0.37, (i / edge) as f32 + 0.61);
+        let (x, z) = (x * step_m - size_m / 2.0, z * step_m - size_m / 2.0);
+        let light = i % (edge * edge / lights.max(1)) == 3 && lights > 0;
+        let _ = writeln!(
+            text,
+            "[[entity]]\nmesh = \"{}\"\nposition = [{x}, {}, {z}]\n{}",
+            if i % 3 == 0 { "ring" } else { "ball" },
+            if light { 1.3 } else { 0.41 },
+            if light { "emission = [4, 5, 6]\nscale = 0.3" } else { "" }
+        );
+    }
+    scene(&text)
+}
+
+fn jostled(place: &Placement, rng: &mut fastrand::Rng, reach_m: f32) -> Placement {
+    let mut step = || (rng.f32() - 0.5) * 2.0 * reach_m;
+    let position = place.position + Vec3::new(step(), 0.1 * step(), step());
+    let rotation = (Quat::from_rotation_y(step()) * place.rotation).normalize();
+    Placement { position, rotation, scale: place.scale }
+}
+
+#[test]
+fn what_moves_is_merged_again_to_the_same_bits() {
+    let Some(stage) = stage() else { return };
+    let scene = town(8, 4.0, 4);
+    for eps in [1e-3, 0.0] {
+        let options = frame::Options { eps, ..small() };
+        let mut kept = stage.frame(&scene, options);
+        let mut anew = stage.frame(&scene, frame::Options { skip: Skip::without("unmoved"), ..options });
+        let mut placements = scene.at(0.0);
+        let mut rng = fastrand::Rng::with_seed(3);
+        let (mut merged, mut all) = (0, 0);
+        for round in 0..12 {
+            // Mostly one of 64 moves, a little or across the town; at times it is a light, the floor, three at once, or
+            // none.
+            let movers: Vec<usize> = match round {
+                0 | 5 => vec![],
+                3 => vec![4],
+                7 => vec![0],
+                9 => vec![1, 33, 60],
+                _ => vec![1 + rng.usize(0..64)],
+            };
+            for &j in &movers {
+                placements[j] = jostled(&placements[j], &mut rng, if round % 2 == 0 { 0.2 } else { 8.0 });
+            }
+            let found = stage.light(&mut kept, &placements);
+            let expected = stage.light(&mut anew, &placements);
+            assert_eq!(anew.merged().merged_clusters, anew.merged().clusters);
+            let same = |a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]| {
+                let bits = |v: &[Vec<[f32; 3]>]| v.iter().flatten().flatten().map(|c| c.to_bits()).collect::<Vec<_>>();
+                bits(a) == bits(b)
+            };
+            assert!(same(&found, &expected), "round {round}, eps {eps}");
+            let now = kept.merged();
+            report(&format!("eps {eps}, {movers:?} moved: {} of {} clusters", now.merged_clusters, now.clusters));
+            if round > 0 && movers.is_empty() {
+                assert_eq!(now.merged_clusters, 0, "nothing has moved");
+            }
+            if movers.len() == 1 && movers != [0] {
+                merged += now.merged_clusters;
+                all += now.clusters;
+                assert!(now.merged_clusters > 0, "what moved is itself lit anew");
+            }
+        }
+        if eps > 0.0 {
+            assert!(3 * merged < all, "{merged} of {all} clusters when one of 64 moves");
+        }
+    }
+}
+
+/// A merge that did not run leaves nothing behind that a later one would take for done.
+#[test]
+fn a_refused_frame_is_done_again() {
+    let Some(stage) = stage() else { return };
+    let scene = town(3, 2.0, 1);
+    let mut frame = stage.frame(&scene, small());
+    let placements = scene.at(0.0);
+    stage.gpu.device.omit_barrier(Some(0));
+    assert!(frame.render(&placements, Some(1.0)).is_err());
+    stage.gpu.device.omit_barrier(None);
+    stage.gpu.device.take_validation_messages();
+    let passes = frame.render(&placements, Some(1.0)).unwrap();
+    assert!(passes.iter().any(|t| t.pass == "merge"), "{passes:?}");
+    let passes = frame.render(&placements, Some(1.0)).unwrap();
+    assert!(passes.iter().all(|t| t.pass != "merge"), "nothing has moved: {passes:?}");
+    frame.set_radiosity(0, &vec![[0.0; 3]; frame.radiosity(0).unwrap().len()]).unwrap();
+    let passes = frame.render(&placements, Some(1.0)).unwrap();
+    assert!(passes.iter().any(|t| t.pass == "merge"), "the light was replaced: {passes:?}");
+}
+
+/// Switches that say they change no number.
+#[test]
+fn exact_skips_change_nothing() {
+    let Some(stage) = stage() else { return };
+    let scene = town(6, 1.1, 5);
+    let placements = scene.at(0.0);
+    let mut all = stage.frame(&scene, small());
+    let expected = stage.light(&mut all, &placements);
+    let entries = all.merged().merged_entries;
+    let exact = TABLE.iter().filter(|row| matches!(row.kind, SkipKind::Exact | SkipKind::Incremental));
+    for name in exact.map(|row| row.name) {
+        let mut frame = stage.frame(&scene, frame::Options { skip: Skip::without(name), ..small() });
+        assert_eq!(stage.light(&mut frame, &placements), expected, "without {name}");
+        let counts = all.counts(&placements);
+        report(&format!("without {name}: {} entries, with it {entries}; {counts:?}", frame.merged().merged_entries));
+        assert!(name != "behind" || frame.merged().merged_entries > entries);
+    }
+}
+
+/// A box of which only the top shines: below it its field is zero and it is left off, with the same light.
+#[test]
+fn a_light_that_faces_away_is_left_off() {
+    let Some(stage) = stage() else { return };
+    let mut scene = scene(
+        "[[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 31 }\n\
+         [[mesh]]\nname = \"lamp\"\ncuboid = { size_m = [1, 0.2, 1], cells = 2 }\n\
+         [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"floor\"\nposition = [0, 4, 0]\nrotation = { axis = [1, 0, 0], angle_deg = 180 }\n\
+         [[entity]]\nmesh = \"lamp\"\nposition = [0, 2, 0]\nemission = [3, 2, 1]\n",
+    );
+    let lamp = &scene.meshes[1];
+    let colors = lamp.normals.iter().map(|n| if n.y > 0.5 { Vec3::ONE } else { Vec3::ZERO }).collect();
+    let (positions, normals, triangles) = (lamp.positions.clone(), lamp.normals.clone(), lamp.triangles.clone());
+    let lamp = shadow_fields::asset::Mesh::new("lamp", positions, normals, Some(colors), triangles).unwrap();
+    scene.meshes[1] = lamp.into();
+    let placements = scene.at(0.0);
+    // Fine directions: a cell more to either side counts as lit.
+    let bake = shadow_fields::bake::Options { lattice: "cube:6x12".parse().unwrap(), ..small().bake };
+    let options = frame::Options { bake, ..small() };
+    let mut with = stage.frame(&scene, options);
+    // With a threshold of 0 the twin looks at everything, left off or not.
+    let worst = against_twin(&mut with, &placements).unwrap().worst;
+    assert!(worst < ARITHMETIC, "{worst}");
+    let a = stage.light(&mut with, &placements);
+    assert!(a[0].iter().flatten().all(|c| *c == 0.0), "no light goes down");
+    assert!(a[1].iter().any(|c| c[0] > 0.05), "the ceiling is lit");
+    let counts = with.counts(&placements);
+    report(&format!("{counts:?}"));
+    assert!(counts.facing_away > 0);
+    // Black altogether, it is no light.
+    let black = vec![Vec3::ZERO; scene.meshes[1].positions.len()];
+    let lamp = &scene.meshes[1];
+    let (positions, normals, triangles) = (lamp.positions.clone(), lamp.normals.clone(), lamp.triangles.clone());
+    scene.meshes[1] =
+        shadow_fields::asset::Mesh::new("lamp", positions, normals, Some(black), triangles).unwrap().into();
+    let mut with = stage.frame(&scene, options);
+    let light = stage.light(&mut with, &placements);
+    assert!(light.iter().flatten().flatten().all(|c| *c == 0.0) && with.merged().merged_entries == 0);
+    assert_eq!(with.counts(&placements).empty, 1);
+}
+
+/// The one ball that is lit shadows nothing but itself: its field is not baked, and its light is the same as beside a
+/// second receiver, for which it is.
+#[test]
+fn what_no_receiver_sees_is_not_baked() {
+    let Some(stage) = stage() else { return };
+    let ball_and_ring = "environment = { uniform = [0.4, 0.5, 0.6] }\n\
+         [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.3, subdivisions = 2 }\n\
+         [[mesh]]\nname = \"ring\"\ntorus = { major_m = 0.3, minor_m = 0.1, segments = 12, sides = 6 }\n\
+         [[entity]]\nmesh = \"ball\"\n[[entity]]\nmesh = \"ring\"\nposition = [0, 0.5, 0]\nreceives = false\n";
+    let (scene, pair) = (scene(ball_and_ring), scene(&format!("{ball_and_ring}{FAR_PATCH}")));
+    let mut with = stage.frame(&scene, small());
+    let mut seen = stage.frame(&pair, small());
+    let (alone, beside) = (stage.light(&mut with, &scene.at(0.0)), stage.light(&mut seen, &pair.at(0.0)));
+    assert_eq!(alone[0], beside[0]);
+    let counts = [with.counts(&scene.at(0.0)).unseen, seen.counts(&pair.at(0.0)).unseen];
+    assert_eq!(counts, [1, 0]);
+    assert_eq!(2 * with.memory().fields, seen.memory().fields, "one field of two alike is baked");
+}
+
+/// A patch that is lit and casts no shadow.
+const FAR_PATCH: &str = "[[mesh]]\nname = \"patch\"\nplane = { size_m = 1, cells = 2 }\n\
+     [[entity]]\nmesh = \"patch\"\nposition = [0, -50, 0]\noccludes = false\n";
+
+/// One cluster in a wide town: what rays say that the dropped occluders and lights took and brought is within the
+/// bound, and so is what the merge itself changes.
+#[test]
+fn what_is_dropped_stays_within_its_bound() {
+    let Some(stage) = stage() else { return };
+    let mut town = town(14, 1.5, 7);
+    let mut patch = town.data.clone();
+    // A small patch of floor: one cluster, so that one list holds for all its vertices.
+    patch.meshes.retain(|mesh| mesh.name != "floor");
+    let plane = scene("[[mesh]]\nname = \"floor\"\nplane = { size_m = 0.4, cells = 6 }\n").data.meshes.remove(0);
+    patch.meshes.insert(0, plane);
+    for entity in &mut patch.entities[1..] {
+        entity.receives = Some(false);
+    }
+    let text = patch.to_toml().unwrap();
+    town = Scene::parse(&text, std::path::Path::new("patch.toml"), &shadow_fields::asset::embedded::read).unwrap();
+    let placements = town.at(0.0);
+    let mut full = stage.frame(&town, small());
+    let exact = stage.light(&mut full, &placements);
+    let shapes = RayMeshes::new(&town);
+    let world = World::new(&town, &shapes, &placements);
+    let vertices: Vec<Vertex> = (0..exact[0].len()).map(|index| Vertex { entity: 0, index }).collect();
+    let cast = RayCast { rays: 1 << 13, ..Default::default() };
+    let truth = cast.run(&world, &vertices);
+    for eps in [1e-3, 5e-3, 2e-2] {
+        let mut frame = stage.frame(&town, frame::Options { eps, ..small() });
+        let light = stage.light(&mut frame, &placements);
+        let counts = frame.counts(&placements);
+        let (worst, brightest) = stage::difference(&light[0], &exact[0]);
+        // The same town without what the list leaves out, by rays.
+        let listed = frame.listed(&placements, 0);
+        let mut bare = town.clone();
+        for (j, entity) in bare.entities.iter_mut().enumerate().skip(1) {
+            entity.occludes &= listed.contains(&j);
+            entity.emits &= listed.contains(&j);
+        }
+        let without = cast.run(&World::new(&bare, &shapes, &placements), &vertices);
+        let pairs = truth.iter().zip(&without);
+        let by_rays = pairs
+            .flat_map(|(a, b)| (0..3).map(move |c| (a.radiosity[c] - b.radiosity[c]).abs()))
+            .fold(0.0_f64, f64::max);
+        report(&format!(
+            "eps {eps}: {} of {} dropped, bound {:.4}, by rays {by_rays:.4}, merge {worst:.4} of {brightest:.3}",
+            counts.below_eps, counts.considered, counts.dropped_bound
+        ));
+        assert!(
+            counts.below_eps > 0 && f64::from(worst) <= counts.dropped_bound,
+            "{worst} of {}",
+            counts.dropped_bound
+        );
+        // Rays have noise: a hundredth of what they measure.
+        assert!(by_rays <= counts.dropped_bound + 0.01 * f64::from(brightest));
+    }
+}
+
+/// A ball, a ring and a box that go away from a floor, turning, through the sizes at which their fields are left for
+/// caps: the light of every vertex goes on as smoothly as with fields alone, and stays near to it.
+#[test]
+fn nothing_pops_as_fields_become_caps() {
+    let Some(stage) = stage() else { return };
+    for shape in [
+        "sphere = { radius_m = 0.5, subdivisions = 2 }",
+        "torus = { major_m = 0.35, minor_m = 0.15, segments = 16, sides = 8 }",
+        "cuboid = { size_m = [0.7, 0.5, 0.4], cells = 1 }",
+    ] {
+        let scene = scene(&format!(
+            "environment = {{ gradient = {{ radiance = [1, 1, 1] }} }}\n[[mesh]]\nname = \"floor\"\nplane = {{ size_m = 1, cells = 7 }}\n\
+             [[mesh]]\nname = \"thing\"\n{shape}\n[[mesh]]\nname = \"bulb\"\nsphere = {{ radius_m = 0.5, subdivisions = 2 }}\n\
+             [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"thing\"\n[[entity]]\nmesh = \"bulb\"\nemission = [9, 9, 9]\n",
+        ));
+        // Fine enough that what a lookup is off by does not hide what caps change.
+        let bake = shadow_fields::bake::Options { face_px: 32, lattice: "cube:12x8".parse().unwrap(), ..small().bake };
+        let options = frame::Options { bake, ..small() };
+        let mut caps = stage.frame(&scene, options);
+        let mut fields = stage.frame(&scene, frame::Options { skip: Skip::without("caps"), ..options });
+        let (mut walk, mut apart, mut brightest) = (Vec::new(), 0.0_f32, 0.0);
+        let mut kinds = std::collections::BTreeSet::new();
+        for i in 0..100 {
+            let d = 1.0 + 0.03 * i as f32;
+            let turn = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 0.02 * i as f32);
+            let thing = Placement { rotation: turn, ..at(0.8 * d, 0.6 * d, 0.2) };
+            let placements = [at(0.0, 0.0, 0.0), thing, at(5.0, 4.0, 0.5)];
+            let by_caps = stage.light(&mut caps, &placements).swap_remove(0);
+            let by_fields = stage.light(&mut fields, &placements).swap_remove(0);
+            let (far, bright) = stage::difference(&by_caps, &by_fields);
+            (apart, brightest) = (apart.max(far), bright);
+            kinds.insert([caps.merged().merged_entries, caps.counts(&placements).caps as usize]);
+            walk.push([by_caps, by_fields]);
+        }
+        // What a step changes in how far the two are apart, less what the one before it did, of any vertex: a pop is as
+        // large as they are apart, what is smooth over the range of sizes a small part of it.
+        let apart_at = |step: &[Vec<[f32; 3]>; 2], v: usize| step[0][v][0] - step[1][v][0];
+        let kink = walk
+            .windows(3)
+            .flat_map(|w| (0..64).map(move |v| apart_at(&w[0], v) - 2.0 * apart_at(&w[1], v) + apart_at(&w[2], v)))
+            .fold(0.0_f32, |most, kink| most.max(kink.abs()));
+        report(&format!(
+            "{shape}: {:.4} of what is brightest apart, kink {:.5}, {kinds:?}",
+            apart / brightest,
+            kink / brightest
+        ));
+        assert!(kinds.len() > 2, "the walk goes from field to cap: {kinds:?}");
+        assert!(apart > 1e-5 && apart < 0.01 * brightest, "{shape}: {apart} of {brightest}");
+        assert!(kink < 0.3 * apart, "{shape}: {kink} of {apart}");
+    }
+}
+
+/// As an occluder passes eps nothing changes by more than it.
+#[test]
+fn nothing_pops_by_more_than_eps() {
+    let Some(stage) = stage() else { return };
+    let scene = scene(
+        "environment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"floor\"\nplane = { size_m = 1, cells = 7 }\n\
+         [[mesh]]\nname = \"ball\"\nsphere = { radius_m = 0.5, subdivisions = 2 }\n[[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"ball\"\n",
+    );
+    let eps = 4e-3;
+    let mut frame = stage.frame(&scene, frame::Options { eps, ..small() });
+    let (mut before, mut largest, mut dropped): (Option<Vec<[f32; 3]>>, f32, bool) = (None, 0.0, false);
+    for i in 0..120 {
+        let placements = [at(0.0, 0.0, 0.0), at(4.0 + 0.02 * i as f32, 1.0, 0.3)];
+        let light = stage.light(&mut frame, &placements).swap_remove(0);
+        let steps = frame.counts(&placements);
+        dropped |= steps.below_eps > 0;
+        if let Some(before) = before.replace(light.clone()) {
+            largest = largest.max(stage::difference(&light, &before).0);
+        }
+    }
+    report(&format!("largest step {largest:.5}"));
+    assert!(dropped && largest <= eps, "{largest}");
+    assert!(largest > eps / 5.0, "the step is seen at all: {largest}");
+}
+
+/// `bench skip` has something of everything that lists leave off.
+#[test]
+fn the_house_has_something_for_every_skip() {
+    let Some(stage) = stage() else { return };
+    let house = shadow_fields::bench::house::scene().unwrap();
+    // Fine directions, as for the lamp above.
+    let bake = shadow_fields::bake::Options { lattice: "cube:6x12".parse().unwrap(), ..small().bake };
+    let options = frame::Options { bake, eps: 1e-3, ..small() };
+    let placements = house.at(0.0);
+    let mut frame = stage.frame(&house, options);
+    let light = stage.light(&mut frame, &placements);
+    let counts = frame.counts(&placements);
+    report(&format!("{counts:?}"));
+    assert_eq!(counts.empty, 6, "lamps that are out");
+    let each = [counts.below_horizon, counts.behind_light, counts.apart, counts.facing_away, counts.below_eps];
+    assert!(each.iter().all(|count| *count > 0), "{counts:?}");
+    assert!(light[0].iter().any(|c| c[0] > 0.05), "the floor is lit");
+    // With a threshold what shines with nothing is below it in any case.
+    let exact = frame::Options { eps: 0.0, ..options };
+    let mut frame = stage.frame(&house, exact);
+    let worst = against_twin(&mut frame, &placements).unwrap().worst;
+    assert!(worst < ARITHMETIC, "{worst}");
+    assert_eq!(frame.counts(&placements).empty, 6);
+}

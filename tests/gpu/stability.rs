@@ -1,0 +1,139 @@
+//! Odd places, sizes, numbers and meshes: everything finite, bounded, the same on a second run, and near its f64 twin;
+//! what no picture can be made of is refused.
+
+use crate::{common, stage};
+use common::report;
+use glam::{DQuat, DVec3, Quat, Vec3};
+use shadow_fields::asset::{Mesh, embedded};
+use shadow_fields::bake;
+use shadow_fields::bench::trials::{cases, run};
+use shadow_fields::check;
+use shadow_fields::field::Storage;
+use shadow_fields::frame;
+use shadow_fields::lists::skip::Skip;
+use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::sh::Rotation;
+use stage::{scene, small, stage};
+use std::path::Path;
+
+#[test]
+fn odd_scenes_stay_bounded() {
+    let Some(stage) = stage() else { return };
+    for case in cases(64).unwrap() {
+        for (storage, base) in [(Storage::F16, check::sharp::sharp_options()), (Storage::F32, small())] {
+            let bake = bake::Options { storage, ..base.bake };
+            let options = frame::Options { bake, skip: Skip::without("unmoved"), ..base };
+            let trial = run(&case, stage.frame(&case.scene, options), storage).unwrap();
+            report(&format!("{trial:?}"));
+            assert!(trial.passed, "{trial:?}");
+        }
+    }
+}
+
+/// A floor under `count` balls at one place, or spread over the sky.
+fn balls(count: usize, distinct: bool) -> Scene {
+    let mut text = String::from(
+        "environment = { uniform = [1, 1, 1] }\n[[mesh]]\nname = \"floor\"\nplane = { size_m = 2, cells = 6 }\n[[mesh]]\nname = \"ball\"\n\
+         sphere = { radius_m = 0.5, subdivisions = 2 }\n[[entity]]\nmesh = \"floor\"\n",
+    );
+    let mut rng = fastrand::Rng::with_seed(12);
+    for _ in 0..count {
+        let (turn, up) = (std::f64::consts::TAU * rng.f64(), 0.3 + 0.7 * rng.f64());
+        let across = 2.0 * (1.0 - up * up).sqrt();
+        let at = if distinct { [across * turn.cos(), 2.0 * up, across * turn.sin()] } else { [0.4, 0.9, 0.1] };
+        text += &format!("[[entity]]\nmesh = \"ball\"\nreceives = false\nposition = {at:?}\n");
+    }
+    scene(&text)
+}
+
+/// Through the merge: nothing is lit more than without occluders, however many there are.
+#[test]
+fn merges_of_many_occluders_stay_bounded() {
+    let Some(stage) = stage() else { return };
+    let light = |scene: &Scene, options| {
+        let mut frame = stage.frame(scene, options);
+        stage.light(&mut frame, &scene.at(0.0)).swap_remove(0)
+    };
+    let options = small();
+    let open = light(&balls(0, false), options);
+    for distinct in [false, true] {
+        for count in [1, 64, 1000] {
+            let scene = balls(count, distinct);
+            let found = light(&scene, options);
+            let worst = found.iter().zip(&open).map(|(f, o)| f[0] / o[0]).fold(0.0, f32::max);
+            let least = found.iter().map(|f| f[0]).fold(f32::INFINITY, f32::min);
+            report(&format!(
+                "{count} balls, distinct {distinct}: at most {worst:.4} of the open floor, at least {least:.4}"
+            ));
+            assert!(worst <= 1.0 + 1e-6 && least >= 0.0, "{count} balls, distinct {distinct}: {least} to {worst}");
+        }
+    }
+}
+
+/// Properties of an entity of which no picture can be made.
+const ENTITIES: &[(&str, &str)] = &[
+    ("scale 0", "scale = 0"),
+    ("negative scale", "scale = -1"),
+    ("scale 10^8", "scale = 1e8"),
+    ("infinite scale", "scale = inf"),
+    ("a scale an axis", "scale = [1, 2, 1]"),
+    ("position not a number", "position = [0, nan, 0]"),
+    ("position of 10^8 m", "position = [1e8, 0, 0]"),
+    ("rotation about no axis", "rotation = { axis = [0, 0, 0], angle_deg = 10 }"),
+    ("quaternion of length 0", "rotation = { quaternion = [0, 0, 0, 0] }"),
+    ("negative radiance", "emission = [-1, 0, 0]"),
+    ("infinite radiance", "emission = [inf, 0, 0]"),
+    ("radiance of 10^16", "emission = [1e16, 0, 0]"),
+];
+
+#[test]
+fn what_no_picture_can_be_made_of_is_refused_in_one_line() {
+    let refused = |name: &str, outcome: shadow_fields::Result<()>| {
+        let error = outcome.expect_err(name);
+        let message = error.to_string();
+        assert!(error.exit_code() == 4 && message.lines().count() == 1 && message.len() <= 240, "{name}: {message}");
+    };
+    for (name, keys) in ENTITIES {
+        let text = format!(
+            "environment = {{ uniform = [1, 1, 1] }}\n[camera]\neye = [0, 3, 6]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"ball\"\n\
+             sphere = {{ radius_m = 0.5, subdivisions = 2 }}\n[[entity]]\nmesh = \"ball\"\n{keys}\n"
+        );
+        refused(name, Scene::parse(&text, Path::new("odd.toml"), &embedded::read).map(|_| ()));
+    }
+    let triangle = |corners: [Vec3; 3], indices| {
+        Mesh::new("odd", corners.to_vec(), vec![Vec3::Y; 3], None, vec![indices]).map(|_| ())
+    };
+    refused("a mesh of points", triangle([Vec3::ZERO; 3], [0, 1, 2]));
+    refused("a mesh of one needle", triangle([Vec3::ZERO, Vec3::X, 2.0 * Vec3::X], [0, 1, 2]));
+    refused("a face of one corner", triangle([Vec3::ZERO, Vec3::X, Vec3::Z], [1, 1, 1]));
+    refused("a corner that is not there", triangle([Vec3::ZERO, Vec3::X, Vec3::Z], [0, 1, 7]));
+    refused("a vertex that is not a number", triangle([Vec3::NAN, Vec3::X, Vec3::Z], [0, 1, 2]));
+    refused("a mesh of 10^-12 m", triangle([Vec3::ZERO, 1e-12 * Vec3::X, 1e-12 * Vec3::Z], [0, 1, 2]));
+    refused("a mesh of 10^30 m", triangle([Vec3::ZERO, 1e30 * Vec3::X, 1e30 * Vec3::Z], [0, 1, 2]));
+}
+
+/// A million turns of a hundredth of a degree in f32: the frame's rotation of what comes out keeps lengths, normalised
+/// or not.
+#[test]
+fn a_million_small_turns_keep_lengths() {
+    let axis = DVec3::new(0.48, 0.6, 0.64);
+    let step = DQuat::from_axis_angle(axis, 0.01_f64.to_radians()).as_quat();
+    for normalise in [true, false] {
+        let mut turned = Quat::IDENTITY;
+        for _ in 0..1_000_000 {
+            turned = step * turned;
+            if normalise {
+                turned = turned.normalize();
+            }
+        }
+        let rotation = Rotation::new(4, Placement { position: Vec3::ZERO, rotation: turned, scale: 1.0 }.turn());
+        for k in 0..16 {
+            let mut unit = [0.0; 16];
+            let mut out = [0.0; 16];
+            unit[k] = 1.0;
+            rotation.apply(&unit, &mut out);
+            let length = out.iter().map(|c| c * c).sum::<f64>();
+            assert!((length - 1.0).abs() < 1e-9, "normalised {normalise}: {length}");
+        }
+    }
+}

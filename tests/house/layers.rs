@@ -1,0 +1,221 @@
+//! The shape of the source tree: which module may use which, and that every shader is embedded.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// A module may use only modules that stand before it.
+///
+/// `field` stands before `shaders` because a shader's STRIDE is the stride of stored channels, and before `asset` and
+/// `bake` because it is plain data; `scene_buffers` stands behind the passes because it keeps what each of them reads
+/// in its form.
+const ORDER: &[&str] = &[
+    "error",
+    "files",
+    "text",
+    "sh",
+    "layout",
+    "gpu",
+    "field",
+    "shaders",
+    "asset",
+    "scene",
+    "bake",
+    "lists",
+    "merge",
+    "sharp",
+    "draw",
+    "scene_buffers",
+    "frame",
+    "renderer",
+    "truth",
+    "check",
+    "bench",
+    "farm",
+    "view",
+    "app",
+    "prelude",
+    "main",
+];
+
+/// The only modules that `gpu` may use: it knows nothing of what it is for.
+const GPU_USES: &[&str] = &["error", "files"];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn files(folder: &str, endings: &[&str]) -> Vec<PathBuf> {
+    let mut out = Vec::new();
+    let mut folders = vec![root().join(folder)];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| endings.iter().any(|ending| e == *ending)) {
+                out.push(path.strip_prefix(root()).unwrap().to_path_buf());
+            }
+        }
+    }
+    out.sort();
+    assert!(!out.is_empty(), "nothing found in {folder}");
+    out
+}
+
+fn text(path: &Path) -> String {
+    std::fs::read_to_string(root().join(path)).unwrap()
+}
+
+/// The text without what stands behind `//` outside a string.
+fn code(text: &str) -> String {
+    let strip = |line: &str| {
+        let cut = line.match_indices("//").find(|(at, _)| line[..*at].matches('"').count().is_multiple_of(2));
+        cut.map_or(line, |(at, _)| &line[..at]).to_owned()
+    };
+    text.lines().map(strip).collect::<Vec<_>>().join("\n")
+}
+
+fn is_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+/// Names right behind `prefix`: one, or the first of each part of a braced list.
+fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    for (at, _) in code.match_indices(prefix) {
+        if code[..at].chars().next_back().is_some_and(|c| is_word(c) || c == ':') {
+            continue;
+        }
+        let rest = &code[at + prefix.len()..];
+        let first = |part: &str| part.trim().chars().take_while(|c| is_word(*c)).collect::<String>();
+        if let Some(list) = rest.strip_prefix('{') {
+            let (mut depth, mut part) = (0, String::new());
+            for c in list.chars() {
+                match c {
+                    '{' => depth += 1,
+                    '}' if depth == 0 => break,
+                    '}' => depth -= 1,
+                    ',' if depth == 0 => {
+                        names.insert(first(&std::mem::take(&mut part)));
+                        continue;
+                    }
+                    _ => {}
+                }
+                part.push(c);
+            }
+            names.insert(first(&part));
+        } else {
+            names.insert(first(rest));
+        }
+    }
+    names.remove("");
+    names
+}
+
+/// The module below `src/` that a file belongs to, and how many `super` lead from it to the crate.
+fn module(path: &Path) -> (String, usize) {
+    let parts: Vec<_> = path.iter().skip(1).map(|p| p.to_string_lossy().into_owned()).collect();
+    let depth = parts.len() - usize::from(parts.last().is_some_and(|file| file == "mod.rs"));
+    (parts[0].trim_end_matches(".rs").to_owned(), depth)
+}
+
+#[test]
+fn modules_use_only_what_stands_above_them() {
+    let mut seen = BTreeSet::new();
+    for path in files("src", &["rs"]) {
+        let (own, depth) = module(&path);
+        // Binaries besides the program stand on top of the library; lib.rs lists the modules.
+        if own == "bin" || own == "lib" {
+            continue;
+        }
+        let place = ORDER.iter().position(|m| *m == own).unwrap_or_else(|| panic!("{}: no layer", path.display()));
+        seen.insert(own.clone());
+        let code = code(&text(&path));
+        let mut used = names_after(&code, "crate::");
+        let up = names_after(&code, &"super::".repeat(depth));
+        used.extend(up.into_iter().filter(|name| ORDER.contains(&name.as_str())));
+        if own == "main" {
+            continue;
+        }
+        for name in used.iter().filter(|name| **name != own && ORDER.contains(&name.as_str())) {
+            let other = ORDER.iter().position(|m| m == name).unwrap();
+            assert!(other < place, "{} uses crate::{name}, which stands below {own}", path.display());
+            assert!(
+                own != "gpu" || GPU_USES.contains(&name.as_str()),
+                "{} uses crate::{name}: gpu knows nothing of it",
+                path.display()
+            );
+        }
+    }
+    for needed in ["sh", "gpu", "field", "bake", "shaders"] {
+        assert!(seen.contains(needed), "no file of {needed} was read");
+    }
+}
+
+/// Files of one folder that use each other in a circle, with the reason. The test below keeps the list complete and
+/// short.
+const CIRCLES: &[(&[&str], &str)] = &[(
+    &["src/field/directions.rs", "src/field/lattice.rs"],
+    "a lattice is its directions on shells, in two files of methods",
+)];
+
+/// Files beside `path` whose module it uses, not counting its tests.
+fn siblings(path: &Path) -> BTreeSet<PathBuf> {
+    let text = text(path);
+    let body = text.split("\n#[cfg(test)]\nmod ").next().unwrap_or_default();
+    let folder: Vec<_> =
+        path.parent().into_iter().flat_map(|p| p.iter().skip(1)).map(|p| p.to_string_lossy()).collect();
+    let mut names = names_after(&code(body), "super::");
+    names.extend(names_after(&code(body), &format!("crate::{}::", folder.join("::"))));
+    let files = names.into_iter().map(|name| path.with_file_name(format!("{name}.rs")));
+    files.filter(|file| file != path && root().join(file).exists()).collect()
+}
+
+/// All files beside `path` that it uses, itself or through others.
+fn reached(path: &Path) -> BTreeSet<PathBuf> {
+    let mut found = BTreeSet::new();
+    let mut open = vec![path.to_path_buf()];
+    while let Some(next) = open.pop() {
+        open.extend(siblings(&next).into_iter().filter(|file| found.insert(file.clone())));
+    }
+    found
+}
+
+#[test]
+fn files_of_one_folder_do_not_use_each_other_in_circles() {
+    let mut circles = BTreeSet::new();
+    // `super` of a mod.rs is the folder above; its children may use it through its parent only.
+    for path in files("src", &["rs"]).iter().filter(|path| !path.ends_with("mod.rs")) {
+        let mut circle = reached(path);
+        circle.retain(|other| other == path || reached(other).contains(path));
+        if !circle.is_empty() {
+            circles.insert(circle);
+        }
+    }
+    let known: BTreeSet<BTreeSet<PathBuf>> =
+        CIRCLES.iter().map(|(circle, _)| circle.iter().map(PathBuf::from).collect()).collect();
+    assert_eq!(circles, known, "circles that stand (left) and circles that are known (right)");
+}
+
+#[test]
+fn the_reader_of_paths_finds_what_is_there() {
+    let source = "use crate::gpu::{Buffer, Device};\nuse crate::{field::{Lattice, Lookup}, scene};\n\
+                  let x = crate::sh::basis; // crate::app\nmycrate::truth; \"http://frame\" // crate::frame";
+    let found = names_after(&code(source), "crate::");
+    assert_eq!(found.into_iter().collect::<Vec<_>>(), ["field", "gpu", "scene", "sh"]);
+    assert_eq!(module(Path::new("src/gpu/mod.rs")), ("gpu".into(), 1));
+    assert_eq!(module(Path::new("src/gpu/access.rs")), ("gpu".into(), 2));
+    assert_eq!(module(Path::new("src/layout.rs")), ("layout".into(), 1));
+}
+
+#[test]
+fn every_shader_file_is_embedded() {
+    let on_disk: BTreeSet<String> = files("glsl", &["glsl", "comp", "vert", "frag"])
+        .iter()
+        .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
+        .collect();
+    let embedded: BTreeSet<String> = shadow_fields::shaders::FILES.iter().map(|(name, _)| (*name).to_owned()).collect();
+    assert_eq!(on_disk, embedded);
+    let all = std::fs::read_dir(root().join("glsl")).unwrap().count();
+    assert_eq!(all, on_disk.len(), "glsl/ holds files of an unknown kind");
+}

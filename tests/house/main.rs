@@ -1,0 +1,6 @@
+//! The source tree, its pages and scripts.
+
+mod expect;
+mod features;
+mod layers;
+mod pages;

@@ -1,0 +1,271 @@
+//! No output replaces an input or another output, what cannot be written is found at the start, and pipes are not
+//! waited for.
+#![cfg(unix)]
+
+#[path = "common/cli.rs"]
+mod cli;
+mod common;
+
+use cli::{Ran, SMALL, command, finish, good, has_device, names};
+use shadow_fields::asset::picture::write_png;
+use std::collections::BTreeMap;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+const SCENE: &str = "[camera]\neye = [0, 1, 5]\ntarget = [0, 0, 0]\n[environment]\nimage = { file = \"sky_0003.png\" }\n\
+    [[mesh]]\nname = \"a\"\nfile = \"tri.obj\"\n[[mesh]]\nname = \"b\"\nfile = \"model.gltf\"\n\
+    [[entity]]\nmesh = \"a\"\n[[entity]]\nmesh = \"b\"\n";
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+const MODEL: &str = r#"{
+    "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+    "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
+    "materials": [{ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }],
+    "textures": [{ "source": 0 }], "images": [{ "uri": "paint.png" }],
+    "buffers": [{ "uri": "the%20buffer.bin", "byteLength": 36 }], "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+    "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }]
+}"#;
+
+/// A scene with all kinds of files that a scene may name.
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let corners: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    std::fs::write(at("s.toml"), SCENE).unwrap();
+    std::fs::write(at("tri.obj"), TRIANGLE).unwrap();
+    std::fs::write(at("model.gltf"), MODEL).unwrap();
+    std::fs::write(at("the buffer.bin"), corners.map(f32::to_le_bytes).concat()).unwrap();
+    for picture in ["sky_0003.png", "paint.png", "a.png", "b.png", "mask.png"] {
+        write_png(&at(picture), 4, 2, &[0.9; 24], 0.0).unwrap();
+    }
+    folder
+}
+
+/// Names and contents of a folder's files.
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    names(folder).into_iter().map(|name| (name.clone(), std::fs::read(folder.join(name)).unwrap_or_default())).collect()
+}
+
+fn run(folder: &TempDir, line: &str) -> Ran {
+    finish(&mut command(folder.path(), &line.split(' ').collect::<Vec<_>>()))
+}
+
+/// The command ends with `code` and a single line that has all `parts`, before it looks for a device; no file changes.
+fn refused(folder: &TempDir, line: &str, code: i32, parts: &[&str]) {
+    let before = contents(folder.path());
+    let mut command = command(folder.path(), &line.split(' ').collect::<Vec<_>>());
+    for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+        command.env(variable, "/nowhere/no.json");
+    }
+    let ran = finish(command.env_remove("VK_ADD_DRIVER_FILES"));
+    assert_eq!((ran.code, ran.stderr.lines().count()), (code, 1), "{line}: {}", ran.stderr);
+    for part in parts {
+        assert!(ran.stderr.contains(part), "{line}: no {part:?} in {}", ran.stderr);
+    }
+    assert!(contents(folder.path()) == before, "{line}: a file came, went or changed");
+}
+
+#[test]
+fn outputs_do_not_replace_inputs() {
+    let folder = folder();
+    for (link, file) in [
+        ("scene.png", "s.toml"),
+        ("scene.csv", "s.toml"),
+        ("mesh.csv", "tri.obj"),
+        ("model.json", "model.gltf"),
+        ("buffer.exr", "the buffer.bin"),
+        ("buffer.sf", "the buffer.bin"),
+        ("scene_meshes.toml", "model.gltf"),
+    ] {
+        symlink(file, folder.path().join(link)).unwrap();
+    }
+    std::fs::hard_link(folder.path().join("s.toml"), folder.path().join("hard.json")).unwrap();
+    std::fs::create_dir(folder.path().join("in")).unwrap();
+    for (line, output, input) in [
+        ("render s.toml -o o.png --error scene.png", "--error scene.png", "s.toml"),
+        ("render s.toml -o o.png --vertices scene.csv", "--vertices scene.csv", "s.toml"),
+        ("render s.toml -o o.png --stats hard.json", "--stats hard.json", "s.toml"),
+        ("render s.toml -o sky_0003.png", "--output sky_0003.png", "sky_0003.png"),
+        ("render s.toml -o in/../sky_0003.png", "--output in/../sky_0003.png", "sky_0003.png"),
+        ("render s.toml -o sky_####.png --frames 9", "--output sky_0003.png", "sky_0003.png"),
+        ("render s.toml -o o.png --vertices mesh.csv", "--vertices mesh.csv", "tri.obj"),
+        ("render s.toml -o o.png --stats model.json", "--stats model.json", "model.gltf"),
+        ("render s.toml -o o.png --exr buffer.exr", "--exr buffer.exr", "the buffer.bin"),
+        ("render model.gltf -o paint.png", "--output paint.png", "paint.png"),
+        ("bake model.gltf -o buffer.sf", "--output buffer.sf", "the buffer.bin"),
+        ("import model.gltf -o scene_meshes.toml --force", "--output scene_meshes.toml", "model.gltf"),
+        ("compare a.png b.png -o a.png", "--output a.png", "a.png"),
+        ("compare a.png b.png -o b.png", "--output b.png", "b.png"),
+        ("compare a.png b.png --mask mask.png -o mask.png", "--output mask.png", "mask.png"),
+        ("inspect buffer.sf --faces scene.png --mesh s.toml", "--faces scene.png", "s.toml"),
+    ] {
+        refused(&folder, line, 2, &[output, &format!("input {input}")]);
+    }
+    // Folders take files of names that the command chooses.
+    refused(&folder, "profile s.toml --output .", 2, &[".", "input s.toml"]);
+    // The pictures before and after those of the scene are free.
+    let free = run(&folder, "render s.toml -o sky_####.png --first 4 --device none");
+    assert_eq!(free.code, 3, "{}", free.stderr);
+}
+
+#[test]
+fn outputs_do_not_replace_one_another() {
+    let folder = folder();
+    symlink("o.png", folder.path().join("link.png")).unwrap();
+    for (line, first, second) in [
+        ("render s.toml -o o.png --error o.png", "--output o.png", "--error o.png"),
+        ("render s.toml -o o.png --error link.png", "--output o.png", "--error link.png"),
+        ("render s.toml -o o_##.png --frames 5 --error o_04.png", "--output o_04.png", "--error o_04.png"),
+    ] {
+        refused(&folder, line, 2, &[first, second]);
+    }
+    let device = run(&folder, "render s.toml -o /dev/null --exr /dev/null --device none");
+    assert_eq!(device.code, 3, "a device takes everything: {}", device.stderr);
+}
+
+#[test]
+fn every_output_asks_for_its_ending() {
+    let folder = folder();
+    for (line, file, ending) in [
+        ("render s.toml -o o.toml", "o.toml", ".png"),
+        ("render s.toml -o o.png --exr s.toml", "s.toml", ".exr"),
+        ("render s.toml -o o.png --vertices s.toml", "s.toml", ".csv"),
+        ("render s.toml -o o.png --stats s.toml", "s.toml", ".json"),
+        ("render s.toml -o o.png --error s.toml", "s.toml", ".png"),
+        ("bake tri.obj -o tri.obj", "tri.obj", ".sf"),
+        ("import model.gltf -o model.gltf", "model.gltf", ".toml"),
+        ("compare a.png b.png -o a", "a", ".png"),
+        ("inspect f.sf --faces f.sf", "f.sf", ".png"),
+        ("farm plan s.toml -o s.toml", "s.toml", ".json"),
+    ] {
+        refused(&folder, line, 2, &[file, ending]);
+    }
+}
+
+/// `import` replaces what it wrote itself, and other files where it is told to.
+#[test]
+fn import_replaces_only_its_own_files() {
+    let folder = folder();
+    refused(&folder, "import model.gltf -o s.toml", 2, &["s.toml", "--force"]);
+    let import = ["import", "model.gltf", "-o", "m.toml"];
+    good(folder.path(), &import);
+    good(folder.path(), &import);
+    let mesh = folder.path().join("m_meshes").join("mesh_0.obj");
+    std::fs::write(&mesh, TRIANGLE).unwrap();
+    refused(&folder, "import model.gltf -o m.toml --quiet", 2, &["m_meshes/mesh_0.obj", "--force"]);
+    assert_eq!(std::fs::read_to_string(&mesh).unwrap(), TRIANGLE);
+    good(folder.path(), &[&import[..], &["--force"]].concat());
+    assert_ne!(std::fs::read_to_string(&mesh).unwrap(), TRIANGLE);
+}
+
+#[test]
+fn what_cannot_be_written_is_found_at_the_start() {
+    let folder = folder();
+    let read_only = folder.path().join("kept.csv");
+    std::fs::write(&read_only, "kept").unwrap();
+    std::fs::set_permissions(&read_only, PermissionsExt::from_mode(0o444)).unwrap();
+    std::fs::create_dir(folder.path().join("folder.exr")).unwrap();
+    for (line, parts) in [
+        ("render s.toml -o o.png --vertices kept.csv", ["kept.csv: cannot be written", "read-only"]),
+        ("render s.toml -o o.png --exr folder.exr", ["folder.exr: cannot be written", "a folder"]),
+        ("render s.toml -o o.png --stats gone/s.json", ["gone/s.json: cannot be written", "no folder gone"]),
+        ("render s.toml -o o.png --error s.toml/e.png", ["s.toml/e.png: cannot be written", "no folder s.toml"]),
+        #[cfg(target_os = "linux")]
+        ("render s.toml -o o.png --vertices /proc/v.csv", ["/proc/v.csv: cannot be written", ""]),
+        ("bake tri.obj -o gone/f.sf", ["gone/f.sf: cannot be written", "no folder gone"]),
+        ("import model.gltf -o gone/m.toml", ["gone/m.toml: cannot be written", "no folder gone"]),
+        ("compare a.png b.png -o gone/d.png", ["gone/d.png: cannot be written", "no folder gone"]),
+    ] {
+        refused(&folder, line, 1, &parts);
+    }
+}
+
+/// A disk may become full later: the message says what is there already.
+#[test]
+fn a_late_failure_tells_what_is_written() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let render = "render sphere_over_plane -o o.png --vertices v.csv --no-cache --quiet";
+    let program = command(folder.path(), &render.split(' ').chain(SMALL).collect::<Vec<_>>());
+    let mut limited = Command::new("sh");
+    limited.current_dir(folder.path()).args(["-c", "ulimit -f 64; exec \"$@\"", "sh"]);
+    let ran = finish(limited.arg(program.get_program()).args(program.get_args()));
+    assert_eq!((ran.code, ran.stderr.lines().count()), (1, 1), "{}", ran.stderr);
+    assert!(ran.stderr.contains("v.csv: cannot be written: File too large"), "{}", ran.stderr);
+    assert!(ran.stderr.trim_end().ends_with("already written: o.png"), "{}", ran.stderr);
+}
+
+/// Runs a command that must end within a minute.
+fn ended(command: &mut Command, what: &str) -> Ran {
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let start = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if start.elapsed() > Duration::from_secs(60) {
+            child.kill().unwrap();
+            panic!("{what} waits without end");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let output = child.wait_with_output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    Ran { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+#[test]
+fn inputs_that_are_no_files_are_refused_and_not_waited_for() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    for pipe in ["pipe.toml", "pipe.obj", "pipe.png", "pipe.glb", "pipe.sf", "pipe.json", "project.comp"] {
+        let made = Command::new("mkfifo").arg(at(pipe)).status();
+        assert!(made.is_ok_and(|status| status.success()), "mkfifo");
+    }
+    std::fs::write(at("mesh.toml"), SCENE.replace("tri.obj", "pipe.obj")).unwrap();
+    std::fs::write(at("sky.toml"), SCENE.replace("sky_0003.png", "pipe.png")).unwrap();
+    std::fs::write(at("buffer.gltf"), MODEL.replace("the%20buffer.bin", "pipe.obj")).unwrap();
+    std::fs::write(at("texture.gltf"), MODEL.replace("paint.png", "pipe.png")).unwrap();
+    let socket = std::os::unix::net::UnixListener::bind(at("socket.toml")).unwrap();
+    for (line, file) in [
+        ("render pipe.toml -o o.png", "pipe.toml"),
+        ("render mesh.toml -o o.png", "pipe.obj"),
+        ("render sky.toml -o o.png", "pipe.png"),
+        ("render buffer.gltf -o o.png", "pipe.obj"),
+        ("render texture.gltf -o o.png", "pipe.png"),
+        ("bake pipe.obj -o f.sf", "pipe.obj"),
+        ("bake pipe.glb -o f.sf", "pipe.glb"),
+        ("import pipe.glb -o m.toml", "pipe.glb"),
+        ("inspect pipe.sf", "pipe.sf"),
+        ("compare a.png pipe.png", "pipe.png"),
+        ("farm status pipe.json", "pipe.json"),
+        ("render socket.toml -o o.png", "socket.toml"),
+        ("render . -o o.png", "."),
+        ("compare a.png .", "."),
+        ("bake /dev/zero -o f.sf", "/dev/zero"),
+        ("inspect /dev/zero", "/dev/zero"),
+    ] {
+        let ran = ended(&mut command(folder.path(), &line.split(' ').collect::<Vec<_>>()), line);
+        assert_eq!((ran.code, ran.stderr.lines().count()), (4, 1), "{line}: {}", ran.stderr);
+        assert!(ran.stderr.contains(&format!("{file}: ")), "{line}: {}", ran.stderr);
+    }
+    drop(socket);
+    if has_device() {
+        let line = "bake tri.obj -o f.sf --face-px 4 --lattice cube:1x1 --shader-dir .";
+        let ran = ended(&mut command(folder.path(), &line.split(' ').collect::<Vec<_>>()), line);
+        assert!(ran.code == 4 && ran.stderr.contains("project.comp: cannot be read"), "{} {}", ran.code, ran.stderr);
+    }
+}
+
+/// A pipe that the shell hands over on purpose has a writer, and an end.
+#[test]
+fn pipes_of_a_shell_are_read() {
+    let folder = folder();
+    for script in ["\"$0\" compare <(sleep 0.2; cat a.png) b.png", "cat a.png | \"$0\" compare /dev/stdin b.png"] {
+        let mut bash = Command::new("bash");
+        bash.current_dir(folder.path()).args(["-c", script, env!("CARGO_BIN_EXE_shadow-fields")]);
+        let ran = ended(&mut bash, script);
+        assert_eq!(ran.code, 0, "{script}: {}", ran.stderr);
+    }
+}

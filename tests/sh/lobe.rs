@@ -1,0 +1,84 @@
+//! Closed forms against quadrature and against figures of the literature.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use shadow_fields::sh::basis::{MAX_BANDS, coefficient_count, evaluate};
+use shadow_fields::sh::lobe::{cap, cap_zonal, clamped_cosine, sphere, zonal};
+use shadow_fields::sh::quadrature::sphere_rule;
+
+const AXES: [DVec3; 4] = [
+    DVec3::new(0.36, -0.48, 0.8),
+    DVec3::new(-0.8, -0.36, -0.48),
+    DVec3::new(0.0, 0.0, -1.0),
+    DVec3::new(-0.48, 0.8, 0.36),
+];
+
+fn assert_close(value: &[f64], expected: &[f64], tolerance: f64, what: &str) {
+    assert_eq!(value.len(), expected.len());
+    for (k, (x, y)) in value.iter().zip(expected).enumerate() {
+        assert!((x - y).abs() < tolerance, "{what}, coefficient {k}: {x} {y}");
+    }
+}
+
+/// Coefficients of `f(w . axis)`, which is a polynomial on [`low`, 1] and 0 below: Gauss-Legendre in the height along
+/// the axis and equal angles around it, both exact, so that the edge costs no accuracy.
+fn by_quadrature(axis: DVec3, low: f64, f: impl Fn(f64) -> f64) -> Vec<f64> {
+    let (u, v) = axis.any_orthonormal_pair();
+    let mut sums = vec![0.0; coefficient_count(MAX_BANDS)];
+    let mut y = sums.clone();
+    // The z of a sphere rule are Gauss-Legendre nodes: stretch [-1, 1] to [low, 1].
+    for (point, weight) in sphere_rule(24) {
+        let height = low + (1.0 - low) * (point.z + 1.0) / 2.0;
+        let (radius, azimuth) = ((1.0 - height * height).sqrt(), point.y.atan2(point.x));
+        let direction = height * axis + radius * (azimuth.cos() * u + azimuth.sin() * v);
+        evaluate(MAX_BANDS, direction.normalize(), &mut y);
+        let scale = weight * (1.0 - low) / 2.0 * f(height);
+        sums.iter_mut().zip(&y).for_each(|(sum, y)| *sum += scale * y);
+    }
+    sums
+}
+
+#[test]
+fn cap_has_the_known_figures() {
+    let expected = [0.237464, 0.383748, 0.429043, 0.403002];
+    assert_close(&cap_zonal(4, (PI / 6.0).cos()), &expected, 5e-7, "zonal cap of 30 degrees");
+    let whole = cap(4, AXES[0], PI);
+    assert_close(&whole[..1], &[2.0 * PI.sqrt()], 1e-14, "whole sphere");
+    assert_close(&whole[1..], &[0.0; 15], 1e-14, "whole sphere");
+    assert_close(&cap(4, AXES[0], 0.0), &[0.0; 16], 1e-14, "empty cap");
+}
+
+#[test]
+fn cap_equals_quadrature() {
+    for axis in AXES {
+        for half_angle_rad in [0.1, PI / 6.0, 1.0, PI / 2.0, 2.5] {
+            for bands in 1..=MAX_BANDS {
+                let expected = &by_quadrature(axis, half_angle_rad.cos(), |_| 1.0)[..coefficient_count(bands)];
+                assert_close(&cap(bands, axis, half_angle_rad), expected, 1e-13, "cap");
+            }
+        }
+    }
+}
+
+#[test]
+fn sphere_is_the_cap_that_it_covers() {
+    for axis in AXES {
+        // asin(1/2): a sphere of radius 1.5 at distance 3 covers a cap of 30 degrees.
+        assert_close(&sphere(4, 3.0 * axis, 1.5), &cap(4, axis, PI / 6.0), 1e-14, "sphere");
+        assert_close(&sphere(4, 0.9 * axis, 1.0), &cap(4, axis, PI), 1e-14, "inside");
+        assert_close(&sphere(4, 1e9 * axis, 1.0), &[0.0; 16], 1e-15, "far");
+    }
+    assert_close(&sphere(4, DVec3::ZERO, 1.0), &cap(4, DVec3::X, PI), 1e-14, "centre");
+}
+
+#[test]
+fn clamped_cosine_has_the_known_zonal_form() {
+    let root = PI.sqrt();
+    let z = [root / 2.0, (PI / 3.0).sqrt(), (5.0 * PI).sqrt() / 8.0, 0.0, -root / 16.0];
+    for axis in AXES {
+        assert_close(&clamped_cosine(5, axis), &zonal(5, &z, axis), 1e-15, "cosine");
+        assert!(clamped_cosine(4, axis)[9..].iter().all(|&c| c == 0.0), "band 3 is exactly 0");
+        assert_close(&clamped_cosine(MAX_BANDS, axis), &by_quadrature(axis, 0.0, |z| z), 1e-13, "cosine");
+    }
+}

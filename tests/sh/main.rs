@@ -1,0 +1,8 @@
+//! The mathematics of spherical harmonics and cube faces, in f64.
+
+mod basis;
+mod cube;
+mod glsl;
+mod lobe;
+mod product;
+mod rotation;

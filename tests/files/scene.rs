@@ -289,9 +289,7 @@ fn the_scenes_of_the_documentation_load() {
         text.lines().filter_map(|line| Some(line.strip_prefix(prefix)?.to_owned() + "\n")).collect()
     };
     let file = |name: &str| std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
-    let readme = file("README.md");
-    let section = readme.split("## Scene files").nth(1).unwrap().split("\n## ").next().unwrap();
-    let scene = documented(&lines(section, "    "));
+    let scene = documented(&lines(&file("docs/scene.md"), "    "));
     assert!(scene.entities[0].emits && scene.data.entities[0].motion.len() == 4);
     assert!(scene.data.environment.sky.is_some());
     // The reference shows every part of the environment and every motion.

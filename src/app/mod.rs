@@ -22,6 +22,8 @@ mod source;
 mod view;
 
 use crate::error::{Error, Result, one_line};
+#[cfg(all(unix, feature = "view"))]
+use crate::gpu::display;
 use crate::gpu::signals;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use context::Global;
@@ -100,6 +102,11 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             output::complain(&error);
+            // The device of a window whose display is lost still works: exit handlers would unload what it runs.
+            #[cfg(all(unix, feature = "view"))]
+            if display::is_lost() {
+                signals::end_at_once(error.exit_code());
+            }
             ExitCode::from(error.exit_code())
         }
     }

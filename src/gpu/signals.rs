@@ -10,8 +10,9 @@ pub fn fail_writes_beyond_limit() {
     }
 }
 
-/// Ends the process at once: no destructor runs, and no other thread is waited for.
-pub fn end_at_once() -> ! {
+/// Ends the process at once, with a code: no destructor and no exit handler runs, and no other thread is waited for.
+#[cfg(all(unix, feature = "view"))]
+pub fn end_at_once(code: u8) -> ! {
     // SAFETY: it does not return, so nothing is used after it.
-    unsafe { libc::_exit(0) }
+    unsafe { libc::_exit(code.into()) }
 }

@@ -111,7 +111,7 @@ impl<'d> View<'d> {
         let start = Instant::now();
         let code = loop {
             if let Some(status) = self.child.0.try_wait().unwrap() {
-                break status.code().expect("it ended by itself");
+                break status.code().unwrap_or_else(|| panic!("it did not end by itself: {status}"));
             }
             assert!(start.elapsed() < PATIENCE, "the window does not close: {:#?}", self.heard);
             std::thread::sleep(Duration::from_millis(20));

@@ -1,10 +1,11 @@
 // What a mesh leaves of a light on its own vertices. The twin is src/field/self_visibility.rs. The shader that includes
 // this, after self_frame.glsl, blocked_share.glsl and bytes.glsl, defines
 //   uvec2 self_cell(uint i): cell i of all, as `cells` in that file makes them,
-// and the macros SELF_SIDE, SELF_RIM, SELF_LIMIT, SELF_STEPS and SELF_RAMP (`ShaderPermutation::self_visibility`).
+// and the macros SELF_SIDE, SELF_RIM, SELF_LIMIT, SELF_STEPS, SELF_FIRST and SELF_RAMP
+// (`ShaderPermutation::self_visibility`).
 
 // At a direction (any length, in the frame's own frame): signed angle in radians to the edge of what the vertex sees,
-// and how far away the mesh is, in r.
+// and the base-2 logarithm of how far away that is which hides, in r.
 vec2 self_lookup(uint first_cell, mat3 frame, vec3 direction) {
     vec2 place = self_place(direction * frame);
     vec2 cell = min(floor(place), float(SELF_SIDE - 2));
@@ -12,14 +13,14 @@ vec2 self_lookup(uint first_cell, mat3 frame, vec3 direction) {
     uvec2 words = self_cell(first_cell + uint(cell.y) * uint(SELF_SIDE - 1) + uint(cell.x));
     vec4 angles = signed_bytes(words.x), distances = unsigned_bytes(words.y);
     vec4 row = mix(vec4(angles.xz, distances.xz), vec4(angles.yw, distances.yw), within.x);
-    return mix(row.xz, row.yw, within.y) * vec2(SELF_LIMIT / 127.0, 1.0 / SELF_STEPS);
+    return mix(row.xz, row.yw, within.y) * vec2(SELF_LIMIT / 127.0, 1.0 / SELF_STEPS) + vec2(0.0, SELF_FIRST);
 }
 
 // Share of a round light of angular radius `radius` (radians), `distance` away (in r), that the mesh leaves free;
 // `first_cell` is the vertex's first.
 float self_visible(uint first_cell, mat3 frame, vec3 direction, float radius, float distance) {
     vec2 found = self_lookup(first_cell, frame, direction);
-    float blocks = clamp((distance - found.y) * (0.5 / SELF_RAMP) + 0.5, 0.0, 1.0);
+    float blocks = clamp((log2(distance) - found.y) * (0.5 / SELF_RAMP) + 0.5, 0.0, 1.0);
     return 1.0 - blocked_share(-found.x / max(radius, 1e-6)) * blocks;
 }
 

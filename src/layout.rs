@@ -199,6 +199,10 @@ pub const NONE: u32 = u32::MAX;
 /// of every device.
 pub const CLUSTER_VERTICES: u32 = 64;
 
+/// Clusters that are gathered for together: enough to share a search, few enough that what is found matters to each. In
+/// a town of 4 095 things 32 find 700 of them, 16 find 420; 170 matter to one.
+pub const GROUP_CLUSTERS: usize = 16;
+
 /// Texels through which some variants of a pass read entries: one each.
 pub const ENTRY_FORMAT: vk::Format = vk::Format::R32_UINT;
 /// Texels through which they read [`Cluster`]: two of its numbers each.

@@ -172,8 +172,8 @@ impl Renderer {
         }
     }
 
-    /// Transfer vectors of an entity's vertices, in its own frame: baked ones, or the cosine lobes of the normals of a
-    /// mesh that cannot shadow itself.
+    /// Transfer vectors of an entity's vertices, in its own frame, past all that never moves against it: baked ones, or
+    /// the cosine lobes of the normals where nothing blocks.
     ///
     /// # Errors
     /// `Input` where there is no such entity, or where none were baked, as no light of the scene goes through spherical
@@ -183,16 +183,16 @@ impl Renderer {
         let bands = self.frame.buffers.bands;
         let known = scene.entities.get(entity);
         let mesh = known.ok_or_else(|| Error::Input(format!("there is no entity {entity}")))?.mesh;
-        if let Some((floats, stride)) = self.frame.buffers.transfer(&self.frame.buffers.meshes[mesh])? {
+        if let Some((floats, stride)) = self.frame.buffers.transfer(self.frame.buffers.surface(entity))? {
             debug_assert_eq!(stride, channel_stride(bands));
             let vectors = floats.chunks_exact(stride).flat_map(|vector| &vector[..bands * bands]);
             return Ok(Transfer { bands, coefficients: vectors.copied().collect() });
         }
-        if crate::bake::bakes_transfer(&scene.meshes[mesh]) {
+        if crate::bake::bakes_transfer(&scene.meshes[mesh]) && !self.frame.has_harmonics() {
             let what = "no transfer was baked, as no light of the scene goes through spherical harmonics";
             return Err(Error::Input(format!("{:?}: {what}", scene.entities[entity].name)));
         }
-        let lobes = scene.meshes[mesh].normals.iter().flat_map(|n| lobe::clamped_cosine(bands, n.as_dvec3()));
+        let lobes = scene.surface(entity).normals.iter().flat_map(|n| lobe::clamped_cosine(bands, n.as_dvec3()));
         Ok(Transfer { bands, coefficients: lobes.map(|c| c as f32).collect() })
     }
 

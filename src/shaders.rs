@@ -113,6 +113,7 @@ impl ShaderPermutation {
             .number("SELF_RIM", self_visibility::RIM)
             .number("SELF_LIMIT", self_visibility::LIMIT_RAD)
             .number("SELF_STEPS", self_visibility::DISTANCE_STEPS)
+            .number("SELF_FIRST", self_visibility::DISTANCE_FIRST)
             .number("SELF_RAMP", self_visibility::RAMP)
     }
 

@@ -337,7 +337,7 @@ fn light_by_rays(frame: &mut Frame, placements: &[Placement], rays: u32, seed: u
 fn vertex_table(frame: &Frame, placements: &[Placement]) -> Result<String> {
     let mut text = String::from("entity,x,y,z,nx,ny,nz,r,g,b\n");
     for (index, entity) in frame.scene().entities.iter().enumerate().filter(|(_, e)| e.receives) {
-        let mesh = &frame.scene().meshes[entity.mesh];
+        let mesh = frame.scene().surface(index);
         let placement = &placements[index];
         let name = if entity.name.contains([',', '"', '\n']) {
             format!("\"{}\"", entity.name.replace('"', "\"\""))

@@ -155,6 +155,18 @@ impl Mesh {
         self.panel
     }
 
+    /// The same shape by more vertices, each on a triangle of this mesh.
+    pub(crate) fn refined(
+        &self,
+        positions: Vec<Vec3>,
+        normals: Vec<Vec3>,
+        colors: Option<Vec<Vec3>>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Mesh {
+        let content_hash = hash(&positions, &normals, colors.as_deref(), &triangles);
+        Mesh { name: self.name.clone(), positions, normals, colors, triangles, content_hash, ..self.clone() }
+    }
+
     pub(super) fn with_panel(self, panel: LampFace) -> Self {
         Mesh { panel: Some(panel), ..self }
     }

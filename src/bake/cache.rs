@@ -1,17 +1,16 @@
-//! The cache of what is baked: fields, silhouette fields, transfer vectors and self-visibility. Names are hashes of the
+//! The cache of what is baked: fields, silhouette fields, and surfaces with their own visibility. Names are hashes of the
 //! mesh's content and of everything else that decides the numbers. A `Shelf` says where one kind is kept.
 
 pub use super::names::field_name;
-use super::names::{SelfVisibilityHeader, TransferHeader, identity, key, silhouette_identity, silhouette_name};
+use super::names::{identity, silhouette_identity, silhouette_name};
 use super::silhouette::{bake_silhouette, silhouette_header};
-use super::{BakeReport, Baker, Options, Progress, Wanted};
+use super::surfaces::{BakedSurface, GroupPlan, StoredGroup};
+use super::{BakeReport, Baker, Options, Progress};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
-use crate::field::file::{self, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC};
-use crate::field::quantity::channel_stride;
+use crate::field::file::{self, SURFACES_MAGIC};
 use crate::field::silhouette::{SilhouetteField, SilhouetteHeader};
-use crate::field::{FieldHeader, ShadowField, self_visibility};
-use serde::de::DeserializeOwned;
+use crate::field::{FieldHeader, ShadowField};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -29,8 +28,7 @@ pub struct Cache {
 struct InMemory {
     fields: HashMap<String, Arc<ShadowField>>,
     silhouettes: HashMap<String, Arc<SilhouetteField>>,
-    transfers: HashMap<String, Arc<Vec<f32>>>,
-    self_visibility: HashMap<String, Arc<Vec<u8>>>,
+    surfaces: HashMap<String, Arc<Vec<BakedSurface>>>,
 }
 
 /// Where one kind of content is kept.
@@ -43,21 +41,9 @@ struct Shelf<T> {
 
 const FIELDS: Shelf<ShadowField> = Shelf { ending: "sf", memory: |all| &mut all.fields };
 const SILHOUETTES: Shelf<SilhouetteField> = Shelf { ending: "outlines", memory: |all| &mut all.silhouettes };
-const TRANSFERS: Shelf<Vec<f32>> = Shelf { ending: "transfer", memory: |all| &mut all.transfers };
-const SELF_VISIBILITY: Shelf<Vec<u8>> = Shelf { ending: "selfvis", memory: |all| &mut all.self_visibility };
+const SURFACES: Shelf<Vec<BakedSurface>> = Shelf { ending: "view", memory: |all| &mut all.surfaces };
 /// What the cache held or a bake has made, and the report of the bake, if there was one.
 pub type CacheAnswer<T> = (Arc<T>, Option<BakeReport>);
-
-/// What is baked of the vertices of a mesh, as far as it was wanted.
-#[derive(Clone, Debug, Default)]
-pub struct FoundVertices {
-    /// Transfer vectors.
-    pub transfer: Option<Arc<Vec<f32>>>,
-    /// Self-visibility.
-    pub self_visibility: Option<Arc<Vec<u8>>>,
-    /// What was baked, and the report of that, if the cache did not hold all of it.
-    pub baked: Option<(Wanted, BakeReport)>,
-}
 
 impl Cache {
     /// A cache below `folder`, or in memory if there is none.
@@ -112,14 +98,9 @@ impl Cache {
         self.has(&SILHOUETTES, &silhouette_name(mesh, options))
     }
 
-    /// Whether the transfer vectors of a mesh are there.
-    pub fn has_transfer(&self, mesh: &Mesh, options: &Options) -> bool {
-        self.has(&TRANSFERS, &key(&TransferHeader::new(mesh, options)))
-    }
-
-    /// Whether the self-visibility of a mesh is there.
-    pub fn has_self_visibility(&self, mesh: &Mesh, options: &Options) -> bool {
-        self.has(&SELF_VISIBILITY, &key(&SelfVisibilityHeader::new(mesh, options)))
+    /// Whether the surfaces of a group are there.
+    pub fn has_surfaces(&self, group: &GroupPlan) -> bool {
+        group.key.as_ref().is_none_or(|key| self.has(&SURFACES, key))
     }
 
     /// The field that `header` describes, and the report of its bake, which is `None` if the cache held the field.
@@ -156,50 +137,23 @@ impl Cache {
         Ok((self.keep(&SILHOUETTES, name, made, |path, field| field.write(path)), Some(report)))
     }
 
-    /// What is wanted of the vertices of a mesh (see [`Baker::vertices`]). What the cache does not hold is baked
-    /// together.
-    pub fn vertices(
-        &self,
-        baker: &Baker,
-        mesh: &Mesh,
-        options: &Options,
-        wanted: Wanted,
-        progress: Progress<'_>,
-    ) -> Result<FoundVertices> {
-        let of_transfer = TransferHeader::new(mesh, options);
-        let of_maps = SelfVisibilityHeader::new(mesh, options);
-        let transfer_key = key(&of_transfer);
-        let maps_key = key(&of_maps);
-        let transfer = wanted.transfer.then(|| {
-            let bytes = 4 * of_transfer.vertex_count * channel_stride(of_transfer.bands);
-            let floats = |payload: Vec<u8>| bytemuck::pod_collect_to_vec(&payload);
-            self.look(&TRANSFERS, &transfer_key, |path| {
-                read_payload(path, TRANSFER_MAGIC, &of_transfer, bytes).map(floats)
-            })
-        });
-        let self_visibility = wanted.self_visibility.then(|| {
-            let bytes = of_maps.vertex_count * self_visibility::BYTES;
-            self.look(&SELF_VISIBILITY, &maps_key, |path| read_payload(path, SELF_VISIBILITY_MAGIC, &of_maps, bytes))
-        });
-        let missing =
-            Wanted { transfer: matches!(transfer, Some(None)), self_visibility: matches!(self_visibility, Some(None)) };
-        let mut out =
-            FoundVertices { transfer: transfer.flatten(), self_visibility: self_visibility.flatten(), baked: None };
-        if !missing.transfer && !missing.self_visibility {
-            return Ok(out);
+    /// The surfaces of a group, one a member, and the report of their bake, which is `None` if the cache held them.
+    pub fn surfaces(&self, group: &GroupPlan, progress: Progress<'_>) -> CacheAnswer<Vec<BakedSurface>> {
+        let Some(key) = &group.key else { return (Arc::new(group.plain()), None) };
+        let read = |path: &Path| {
+            let fits = |found: &Option<Vec<BakedSurface>>| found.is_some();
+            let restore = |(header, payload): (StoredGroup, Vec<u8>)| group.restore(&header, &payload);
+            fitting(path, |path| file::read(path, SURFACES_MAGIC).map(restore), fits).flatten()
+        };
+        if let Some(found) = self.look(&SURFACES, key, read) {
+            return (found, None);
         }
-        let (made, report) = baker.vertices(mesh, options, missing, progress)?;
-        if missing.transfer {
-            out.transfer = Some(self.keep(&TRANSFERS, transfer_key, made.transfer, |path, floats| {
-                file::write(path, TRANSFER_MAGIC, &of_transfer, bytemuck::cast_slice(floats))
-            }));
-        }
-        if missing.self_visibility {
-            let write = |path: &Path, maps: &Vec<u8>| file::write(path, SELF_VISIBILITY_MAGIC, &of_maps, maps);
-            out.self_visibility = Some(self.keep(&SELF_VISIBILITY, maps_key, made.self_visibility, write));
-        }
-        out.baked = Some((missing, report));
-        Ok(out)
+        let (made, report) = group.bake(progress);
+        let write = |path: &Path, surfaces: &Vec<BakedSurface>| {
+            let (header, payload) = group.store(surfaces);
+            file::write(path, SURFACES_MAGIC, &header, &payload)
+        };
+        (self.keep(&SURFACES, key.clone(), made, write), Some(report))
     }
 }
 
@@ -239,15 +193,4 @@ fn read_silhouette(path: &Path, header: &SilhouetteHeader) -> Option<SilhouetteF
     let mut found = fitting(path, SilhouetteField::read, fits)?;
     found.header.mesh.clone_from(&header.mesh);
     Some(found)
-}
-
-/// The payload of a file with this header, of so many bytes.
-fn read_payload<H: PartialEq + DeserializeOwned>(
-    path: &Path,
-    magic: [u8; 8],
-    header: &H,
-    bytes: usize,
-) -> Option<Vec<u8>> {
-    let read = |path: &Path| file::read::<H>(path, magic);
-    fitting(path, read, |(found, payload)| found == header && payload.len() == bytes).map(|(_, payload)| payload)
 }

@@ -1,15 +1,17 @@
 //! Bakes or finds in the cache every field and transfer vector that a scene needs. Everything that shows a scene calls
 //! [`ensure()`].
 
-use super::cache::{Cache, CacheAnswer, FoundVertices, field_name};
+use super::cache::{Cache, CacheAnswer, field_name};
+use super::surfaces::{BakedSurface, SurfacePlan};
 use super::{BakeReport, Baker, Options, Progress, Wanted, header};
 use crate::asset::Mesh;
 use crate::error::Result;
 use crate::field::silhouette::SilhouetteField;
 use crate::field::silhouette_nodes::NodeGrid;
 use crate::field::{FieldHeader, FieldKind, ShadowField};
+use crate::scene::Scene;
+use crate::scene::groups::Groups;
 use crate::scene::light::{self, LightMethod, Lights};
-use crate::scene::{Entity, Scene};
 use std::collections::{HashMap, HashSet};
 use std::hash::Hash;
 use std::sync::Arc;
@@ -32,16 +34,16 @@ pub struct BakedMesh {
     pub blocked: Option<Arc<ShadowField>>,
     pub radiance: Option<Arc<ShadowField>>,
     pub silhouette: Option<Arc<SilhouetteField>>,
-    /// Self-visibility of every vertex for sharp lights, [`crate::field::self_visibility::BYTES`] each in the mesh's
-    /// order of vertices.
-    pub self_visibility: Option<Arc<Vec<u8>>>,
-    /// Transfer vectors in the mesh's order of vertices, or `None` where the cosine lobe of the normal is exact.
-    pub transfer: Option<Arc<Vec<f32>>>,
 }
 
 /// Everything that is baked of a scene.
 pub struct BakedScene {
     pub meshes: Vec<BakedMesh>,
+    pub surfaces: Vec<BakedSurface>,
+    /// The surface of each entity.
+    pub surface_of: Vec<usize>,
+    /// For each entity and each of its clusters the entities whose shadows of sharp lights its maps have.
+    pub near: Vec<Vec<Vec<u32>>>,
     /// Bakes that were not found in the cache.
     pub baked: Vec<Baked>,
 }
@@ -49,18 +51,31 @@ pub struct BakedScene {
 pub struct SceneNeeds {
     /// For every mesh of the scene: what it needs, and the headers of its occlusion and radiance fields.
     meshes: Vec<(Needed, [Option<FieldHeader>; 2])>,
+    pub surfaces: SurfacePlan,
+    pub groups: Groups,
     pub options: Options,
+}
+
+/// The rigid groups of a scene, and what is baked of its surfaces.
+pub fn surfaces(scene: &Scene, options: &Options, lights: Lights) -> (Groups, SurfacePlan) {
+    let groups = if options.groups { Groups::new(scene, lights) } else { Groups::alone(scene.entities.len()) };
+    let wanted =
+        Wanted { transfer: light::has_harmonics(scene, lights), self_visibility: light::has_sharp(scene, lights) };
+    let surfaces = SurfacePlan::new(scene, &groups, options, wanted);
+    (groups, surfaces)
 }
 
 impl SceneNeeds {
     /// The needs of a scene whose fields and transfers are baked with `options`. A field that nothing sees is not
     /// needed.
     pub fn of(scene: &Scene, options: &Options, lights: Lights) -> Self {
+        let (groups, surfaces) = surfaces(scene, options, lights);
         let of_mesh = |(index, mesh): (usize, &Arc<Mesh>)| {
-            let needed = needs(scene, index, lights);
+            let needed = needs(scene, index, lights, &groups);
             (needed, needed.fields.map(|kind| kind.map(|kind| header(mesh, kind, options))))
         };
-        SceneNeeds { meshes: scene.meshes.iter().enumerate().map(of_mesh).collect(), options: *options }
+        let meshes = scene.meshes.iter().enumerate().map(of_mesh).collect();
+        SceneNeeds { meshes, surfaces, groups, options: *options }
     }
 
     /// Bytes of the fields, each rounded up to a multiple of `alignment`. Equal fields count once.
@@ -76,9 +91,7 @@ impl SceneNeeds {
         scene.meshes.iter().zip(&self.meshes).all(|(mesh, (needed, headers))| {
             headers.iter().flatten().all(|header| cache.has_field(header))
                 && (!needed.silhouette || cache.has_silhouette(mesh, &self.options))
-                && (!needed.self_visibility || cache.has_self_visibility(mesh, &self.options))
-                && (!needed.transfer || cache.has_transfer(mesh, &self.options))
-        })
+        }) && self.surfaces.groups.iter().all(|group| cache.has_surfaces(group))
     }
 }
 
@@ -97,13 +110,9 @@ impl SceneNeeds {
                     NodeGrid::map_count(self.options.silhouette.cells) as u32,
                 ));
             }
-            let wanted = Wanted {
-                transfer: needed.transfer && !cache.has_transfer(mesh, &self.options),
-                self_visibility: needed.self_visibility && !cache.has_self_visibility(mesh, &self.options),
-            };
-            if wanted.transfer || wanted.self_visibility {
-                missing.push((format!("{} {}", mesh.name, wanted.name()), mesh.positions.len() as u32));
-            }
+        }
+        for group in self.surfaces.groups.iter().filter(|group| !cache.has_surfaces(group)) {
+            missing.push((group.title(), group.vertex_count() as u32));
         }
         missing
     }
@@ -121,36 +130,29 @@ pub struct Needed {
     /// Occlusion and radiance field.
     pub fields: [Option<FieldKind>; 2],
     pub silhouette: bool,
-    /// Self-visibility for sharp lights.
-    pub self_visibility: bool,
-    pub transfer: bool,
 }
 
 /// What the entities of a mesh need. An entity that only receives, or that nothing else can see, needs no field.
 /// Without light no shadows are needed, without light in spherical harmonics no occlusion field, without sharp lights
-/// no silhouettes. A light of one colour needs no radiance field.
-pub fn needs(scene: &Scene, mesh: usize, lights: Lights) -> Needed {
+/// no silhouettes. A light of one colour needs no radiance field. What only members of its own group see of an occluder
+/// is in their own visibility, less the shadows of sharp lights.
+pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Needed {
     let entities = || (0..scene.entities.len()).filter(|&i| scene.entities[i].mesh == mesh);
-    let seen = || entities().map(|i| (i, &scene.entities[i])).filter(|(_, e)| is_seen(scene, e));
+    let receives = |of: &dyn Fn(usize) -> bool| (0..scene.entities.len()).any(|i| scene.entities[i].receives && of(i));
+    let seen = || entities().filter(|&e| receives(&|i| i != e));
+    let seen_by_others = || entities().filter(|&e| receives(&|i| !groups.share(i, e)));
     let method = |entity| LightMethod::of(scene, entity, lights);
     let coloured = scene.meshes[mesh].colors.is_some();
     let harmonics = light::has_harmonics(scene, lights);
     let sharp = light::has_sharp(scene, lights);
-    let shines = |wanted: LightMethod| seen().any(|(i, e)| e.emits && method(i) == wanted);
-    let blocked = seen().any(|(_, e)| e.occludes && harmonics) || (shines(LightMethod::Harmonics) && !coloured);
+    let shines = |wanted: LightMethod| seen().any(|e| scene.entities[e].emits && method(e) == wanted);
+    let blocked = seen_by_others().any(|e| scene.entities[e].occludes && harmonics)
+        || (shines(LightMethod::Harmonics) && !coloured);
     let radiance = coloured && shines(LightMethod::Harmonics);
-    let shades_itself = bakes_transfer(&scene.meshes[mesh]) && entities().any(|i| scene.entities[i].receives);
     Needed {
         fields: [blocked.then_some(FieldKind::Occlusion), radiance.then_some(FieldKind::Radiance)],
-        silhouette: seen().any(|(_, e)| e.occludes && sharp) || shines(LightMethod::Outline),
-        self_visibility: sharp && shades_itself,
-        transfer: harmonics && shades_itself,
+        silhouette: seen().any(|e| scene.entities[e].occludes && sharp) || shines(LightMethod::Outline),
     }
-}
-
-/// Whether the shadow or light of an entity can fall on another entity, because one other at least is lit.
-pub fn is_seen(scene: &Scene, entity: &Entity) -> bool {
-    scene.entities.iter().filter(|e| e.receives).count() > usize::from(entity.receives)
 }
 
 /// Whether a mesh can shadow itself. If it cannot, its transfer is the cosine lobe of the normal.
@@ -164,7 +166,6 @@ struct Making<'m> {
     baked: Vec<Baked>,
     fields: HashMap<String, Arc<ShadowField>>,
     silhouettes: HashMap<[u8; 32], Arc<SilhouetteField>>,
-    vertices: HashMap<[u8; 32], FoundVertices>,
 }
 
 impl Making<'_> {
@@ -184,32 +185,6 @@ impl Making<'_> {
         known(self).insert(key, found.clone());
         Ok(found)
     }
-
-    /// What is wanted of the vertices of a mesh. The entities of one mesh may need what those of an equal mesh do not.
-    fn vertices(
-        &mut self,
-        mesh: &Mesh,
-        wanted: Wanted,
-        find: impl FnOnce(Wanted, Progress<'_>) -> Result<FoundVertices>,
-    ) -> Result<FoundVertices> {
-        let found = self.vertices.entry(mesh.content_hash()).or_default();
-        let missing = Wanted {
-            transfer: wanted.transfer && found.transfer.is_none(),
-            self_visibility: wanted.self_visibility && found.self_visibility.is_none(),
-        };
-        if missing.transfer || missing.self_visibility {
-            let what = |wanted: Wanted| format!("{} {}", mesh.name, wanted.name());
-            let new = find(missing, &|now, all| (self.progress)(&what(missing), now, all))?;
-            self.baked.extend(new.baked.map(|(baked, report)| Baked { what: what(baked), report }));
-            found.transfer = new.transfer.or(found.transfer.take());
-            found.self_visibility = new.self_visibility.or(found.self_visibility.take());
-        }
-        Ok(FoundVertices {
-            transfer: found.transfer.clone().filter(|_| wanted.transfer),
-            self_visibility: found.self_visibility.clone().filter(|_| wanted.self_visibility),
-            baked: None,
-        })
-    }
 }
 
 /// Bakes or finds in the cache every field and transfer of `needs`, which are those of `scene`, mesh by mesh. What is
@@ -221,13 +196,7 @@ pub fn ensure(
     needs: &SceneNeeds,
     progress: SceneProgress<'_>,
 ) -> Result<BakedScene> {
-    let mut making = Making {
-        progress,
-        baked: Vec::new(),
-        fields: HashMap::new(),
-        silhouettes: HashMap::new(),
-        vertices: HashMap::new(),
-    };
+    let mut making = Making { progress, baked: Vec::new(), fields: HashMap::new(), silhouettes: HashMap::new() };
     let options = &needs.options;
     let mut meshes = Vec::with_capacity(scene.meshes.len());
     for (mesh, (needed, headers)) in scene.meshes.iter().zip(&needs.meshes) {
@@ -243,14 +212,25 @@ pub fn ensure(
             let find = |told: Progress<'_>| cache.silhouette(baker, mesh, options, told);
             to.silhouette = Some(making.once(|all| &mut all.silhouettes, mesh.content_hash(), what, find)?);
         }
-        let wanted = Wanted { transfer: needed.transfer, self_visibility: needed.self_visibility };
-        let find = |missing, told: Progress<'_>| cache.vertices(baker, mesh, options, missing, told);
-        let found = making.vertices(mesh, wanted, find)?;
-        to.transfer = found.transfer;
-        to.self_visibility = found.self_visibility;
         meshes.push(to);
+    }
+    let count = scene.entities.len();
+    let mut scene_surfaces = Vec::new();
+    let mut surface_of = vec![0; count];
+    let mut near = vec![Vec::new(); count];
+    for group in &needs.surfaces.groups {
+        let what = group.title();
+        let (found, report) = cache.surfaces(group, &|now, all| progress(&what, now, all));
+        making.baked.extend(report.map(|report| Baked { what, report }));
+        for (place, &entity) in group.entities.iter().enumerate() {
+            // Entities alone share the only surface of their group.
+            let member = place.min(found.len() - 1);
+            surface_of[entity] = scene_surfaces.len() + member;
+            near[entity] = found[member].near.iter().map(|members| group.entities_of(members)).collect();
+        }
+        scene_surfaces.extend(found.iter().cloned());
     }
     // What is held for further bakes is free for pictures.
     baker.rest();
-    Ok(BakedScene { meshes, baked: making.baked })
+    Ok(BakedScene { meshes, surfaces: scene_surfaces, surface_of, near, baked: making.baked })
 }

@@ -20,19 +20,23 @@ mod batch;
 pub mod cache;
 pub mod capture;
 pub mod chunk;
+pub(crate) mod cluster_order;
 pub mod ensure;
 pub mod levels;
 pub mod model;
 mod names;
 mod options;
+pub mod own_visibility;
 pub mod project;
 mod quality;
 pub mod raster;
+mod refine;
 mod samples;
 pub mod self_visibility;
 pub mod silhouette;
 pub mod snapshot;
 pub mod surface;
+pub mod surfaces;
 pub mod triangles;
 
 use crate::asset::mesh::Mesh;
@@ -43,7 +47,7 @@ use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
 use batch::{Batches, Reduction};
-pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, is_seen, needs};
+pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, needs};
 use levels::Leveled;
 use model::Model;
 pub use options::{Options, Quality, first_shell, hash_text, header};
@@ -53,6 +57,7 @@ use samples::FieldSamples;
 use serde::Serialize;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+pub use surfaces::BakedSurface;
 
 /// Distance of a transfer capture's eye from the surface along the normal, in r. It is large enough that the surface's
 /// own facets stay below the horizon, and small enough that contact shadows do not move visibly.
@@ -110,25 +115,6 @@ impl Wanted {
     /// Transfer vectors alone.
     pub const TRANSFER: Wanted = Wanted { transfer: true, self_visibility: false };
     pub const SELF_VISIBILITY: Wanted = Wanted { transfer: false, self_visibility: true };
-
-    /// Words for it, for people.
-    fn name(self) -> &'static str {
-        match (self.transfer, self.self_visibility) {
-            (true, true) => "transfer and self-visibility",
-            (true, false) => "transfer",
-            _ => "self-visibility",
-        }
-    }
-}
-
-/// What was baked of vertices, in the mesh's order; empty where it was not wanted.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Vertices {
-    /// Transfer vectors, `channel_stride(bands)` floats each, in the object's frame.
-    pub transfer: Vec<f32>,
-    /// Self-visibility, [`BYTES`](crate::field::self_visibility::BYTES) each, as [`crate::field::self_visibility`]
-    /// reads it.
-    pub self_visibility: Vec<u8>,
 }
 
 /// Bakes on one device. A baker has no options of its own: everything that decides a stored number stands in
@@ -206,30 +192,6 @@ impl Baker {
         report.samples = field.header.lattice.sample_count() - inside_count;
         report.total = started.elapsed();
         Ok((field, report))
-    }
-    /// Bakes what is wanted of every vertex. A flat or convex mesh needs none of it, since the cosine lobe of the
-    /// normal is exact there and nothing hides a light. Both come from one capture, and neither depends on whether the
-    /// other is wanted.
-    pub fn vertices(
-        &self,
-        mesh: &Mesh,
-        options: &Options,
-        wanted: Wanted,
-        progress: Progress<'_>,
-    ) -> Result<(Vertices, BakeReport)> {
-        let started = Instant::now();
-        triangles::tell_repeated(mesh);
-        let samples = samples::of_vertices(mesh);
-        let model = self.model(mesh, options.level_texels(mesh))?;
-        let reduction = Reduction {
-            projection: wanted.transfer.then_some((options.bands, Projection::Transfer)),
-            self_visibility: wanted.self_visibility,
-        };
-        let mut report = BakeReport { samples: samples.len() as u32, ..Default::default() };
-        let batches = Batches::new(&self.device, &self.library, model, options.face_px, reduction)?;
-        let reduced = batches.run(&samples, &mut report, progress)?;
-        report.total = started.elapsed();
-        Ok((Vertices { transfer: reduced.coefficients, self_visibility: reduced.maps }, report))
     }
 
     /// The payload of a field from its captured samples, which are put into the stored order and number format.

@@ -1,68 +1,12 @@
 //! Names of what the cache keeps: hashes of the mesh's content and of everything else that decides the numbers.
 
+use super::Options;
 use super::silhouette::silhouette_header;
-use super::{Options, TRANSFER_OFFSET};
 use crate::asset::mesh::Mesh;
+use crate::field::FieldHeader;
 use crate::field::file::VERSION;
 use crate::field::silhouette::SilhouetteHeader;
-use crate::field::{FieldHeader, self_visibility};
-use serde::{Deserialize, Serialize};
-
-/// The header of a cached transfer file: everything that decides transfer vectors.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct TransferHeader {
-    mesh_hash: String,
-    pub bands: usize,
-    face_px: u32,
-    #[serde(default, skip_serializing_if = "crate::field::is_zero")]
-    level_texels: f64,
-    offset: f32,
-    pub vertex_count: usize,
-}
-
-impl TransferHeader {
-    pub fn new(mesh: &Mesh, options: &Options) -> Self {
-        TransferHeader {
-            mesh_hash: super::hash_text(mesh),
-            bands: options.bands,
-            face_px: options.face_px,
-            level_texels: options.level_texels(mesh),
-            offset: TRANSFER_OFFSET,
-            vertex_count: mesh.positions.len(),
-        }
-    }
-}
-
-/// The header of a cached file of self-visibility: everything that decides it.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct SelfVisibilityHeader {
-    mesh_hash: String,
-    face_px: u32,
-    #[serde(default, skip_serializing_if = "crate::field::is_zero")]
-    level_texels: f64,
-    offset: f32,
-    side: usize,
-    rim: f64,
-    limit_rad: f64,
-    distance_steps: f64,
-    pub vertex_count: usize,
-}
-
-impl SelfVisibilityHeader {
-    pub fn new(mesh: &Mesh, options: &Options) -> Self {
-        SelfVisibilityHeader {
-            mesh_hash: super::hash_text(mesh),
-            face_px: options.face_px,
-            level_texels: options.level_texels(mesh),
-            offset: TRANSFER_OFFSET,
-            side: self_visibility::SIDE,
-            rim: self_visibility::RIM,
-            limit_rad: self_visibility::LIMIT_RAD,
-            distance_steps: self_visibility::DISTANCE_STEPS,
-            vertex_count: mesh.positions.len(),
-        }
-    }
-}
+use serde::Serialize;
 
 pub(super) fn key(header: &impl Serialize) -> String {
     let text = serde_json::to_vec(header).expect("headers are plain data");
@@ -93,17 +37,18 @@ pub(super) fn silhouette_name(mesh: &Mesh, options: &Options) -> String {
 mod tests {
     use super::*;
     use crate::asset::generate;
+    use crate::bake::Wanted;
     use crate::bake::silhouette::SilhouetteOptions;
+    use crate::bake::surfaces::GroupPlan;
     use crate::field::{FieldKind, Storage};
     use std::collections::BTreeSet;
+    use std::sync::Arc;
 
-    /// Names of occlusion field, radiance field, transfer vectors, self-visibility and silhouette field.
-    fn names(mesh: &Mesh, options: &Options) -> [String; 5] {
+    /// Names of occlusion field, radiance field, own visibility and silhouette field.
+    fn names(mesh: &Mesh, options: &Options) -> [String; 4] {
         let field = |kind| field_name(&crate::bake::header(mesh, kind, options));
-        let own = [key(&TransferHeader::new(mesh, options)), key(&SelfVisibilityHeader::new(mesh, options))];
-        let [transfer, self_visibility] = own;
-        let outlines = silhouette_name(mesh, options);
-        [field(FieldKind::Occlusion), field(FieldKind::Radiance), transfer, self_visibility, outlines]
+        let own = GroupPlan::alone(&Arc::new(mesh.clone()), options, Wanted::BOTH).key.unwrap();
+        [field(FieldKind::Occlusion), field(FieldKind::Radiance), own, silhouette_name(mesh, options)]
     }
 
     /// Each option that is flipped changes the names of what it decides, and no other names.
@@ -113,21 +58,22 @@ mod tests {
         let mesh = generate::torus_two_colour(1.0, 0.3, 64, 32);
         let base = Options::default();
         // A new option does not compile here until it has a row below.
-        let Options { bands, field_bands, storage, lattice, face_px, silhouette, levels } = base;
+        let Options { bands, field_bands, storage, lattice, face_px, silhouette, levels, vertices: _, groups: _ } =
+            base;
         assert!(field_bands.is_none() && storage == Storage::F16);
-        let all = [true, true, true, true, false];
+        let fields = [true, true, false, false];
         let silhouettes = |silhouette| Options { silhouette, ..base };
         let SilhouetteOptions { cells, map_px, view_px, levels: _ } = silhouette;
-        let outlines = [false, false, false, false, true];
-        let flipped: Vec<(&str, Options, [bool; 5])> = vec![
-            ("bands", Options { bands: bands + 1, ..base }, [true, true, true, false, false]),
-            ("field_bands", Options { field_bands: Some(bands + 2), ..base }, [true, false, false, false, false]),
-            ("storage", Options { storage: Storage::F32, ..base }, [true, true, false, false, false]),
-            ("lattice", Options { lattice: "cube:4x3".parse().unwrap(), ..base }, [true, true, false, false, false]),
-            ("face_px", Options { face_px: face_px / 2, ..base }, all),
+        let outlines = [false, false, false, true];
+        let flipped: Vec<(&str, Options, [bool; 4])> = vec![
+            ("bands", Options { bands: bands + 1, ..base }, [true, true, true, false]),
+            ("field_bands", Options { field_bands: Some(bands + 2), ..base }, [true, false, false, false]),
+            ("storage", Options { storage: Storage::F32, ..base }, fields),
+            ("lattice", Options { lattice: "cube:4x3".parse().unwrap(), ..base }, fields),
+            ("face_px", Options { face_px: face_px / 2, ..base }, fields),
             ("cells", silhouettes(SilhouetteOptions { cells: 2 * cells, ..silhouette }), outlines),
             ("map_px", silhouettes(SilhouetteOptions { map_px: 2 * map_px, ..silhouette }), outlines),
-            ("levels", Options { levels: !levels, ..base }, [true, false, true, true, false]),
+            ("levels", Options { levels: !levels, ..base }, [true, false, false, false]),
             ("levels of outlines", silhouettes(SilhouetteOptions { levels: false, ..silhouette }), outlines),
             ("view_px", silhouettes(SilhouetteOptions { view_px: 2 * view_px, ..silhouette }), outlines),
         ];

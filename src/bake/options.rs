@@ -39,6 +39,10 @@ pub struct Options {
     pub face_px: u32,
     /// Silhouette fields.
     pub silhouette: SilhouetteOptions,
+    /// Vertices to which the surfaces of a scene may be refined where light varies; 0 leaves meshes as they are.
+    pub vertices: u32,
+    /// Whether entities that never move against each other are a group.
+    pub groups: bool,
     /// Whether fewer and larger triangles stand for those of a large mesh that are far from the eye (see
     /// [`super::levels`]).
     pub levels: bool,
@@ -55,6 +59,8 @@ impl Default for Options {
             lattice: Lattice::default(),
             face_px: 64,
             silhouette: SilhouetteOptions::default(),
+            vertices: 40_000,
+            groups: true,
             levels: true,
         }
     }
@@ -154,15 +160,21 @@ impl Quality {
         let normal = Options::default();
         let lattice = |text: &str| text.parse().expect("a lattice of the table");
         match self {
-            Quality::Draft => {
-                Options { lattice: lattice("cube:8x4"), face_px: 32, bands: 3, silhouette: silhouettes(4), ..normal }
-            }
+            Quality::Draft => Options {
+                lattice: lattice("cube:8x4"),
+                face_px: 32,
+                bands: 3,
+                silhouette: silhouettes(4),
+                vertices: 10_000,
+                ..normal
+            },
             Quality::Normal => normal,
             Quality::High => Options {
                 lattice: lattice("cube:24x10"),
                 face_px: 128,
                 bands: 5,
                 silhouette: silhouettes(16),
+                vertices: 200_000,
                 ..normal
             },
         }

@@ -5,6 +5,7 @@ use super::ceilings::Ceilings;
 use super::figures::quantiles;
 use crate::asset::Mesh;
 use crate::bake;
+use crate::bake::surfaces::GroupPlan;
 use crate::draw::{Antialias, Finish};
 use crate::error::Result;
 use crate::field::FieldKind;
@@ -16,6 +17,7 @@ use crate::merge::workload::Workload;
 use crate::scene::{Lights, Scene};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Median, and the values below and above which a tenth of all lies.
@@ -241,6 +243,7 @@ pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(ProfileRow
     let field = |kind: FieldKind, options: &bake::Options| -> Result<bake::BakeReport> {
         Ok(bench.baker.field(mesh, bake::header(mesh, kind, options), &|_, _| ())?.1)
     };
+    let alone = GroupPlan::alone(&Arc::new(mesh.clone()), &options, bake::Wanted::TRANSFER);
     for kind in [FieldKind::Occlusion, FieldKind::Radiance] {
         field(kind, &small)?;
     }
@@ -248,7 +251,7 @@ pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(ProfileRow
         let reports = [
             ("occlusion", field(FieldKind::Occlusion, &options)?),
             ("radiance", field(FieldKind::Radiance, &options)?),
-            ("transfer", bench.baker.vertices(mesh, &options, bake::Wanted::TRANSFER, &|_, _| ())?.1),
+            ("transfer", alone.bake(&|_, _| ()).1),
         ];
         for (what, report) in reports {
             let mut add = |pass, ms: f64| times.entry((what, pass)).or_default().push(ms);

@@ -20,10 +20,8 @@ use std::path::Path;
 
 /// First bytes of a field file.
 pub const FIELD_MAGIC: [u8; 8] = *b"SHFIELD\n";
-/// First bytes of a cached transfer file.
-pub const TRANSFER_MAGIC: [u8; 8] = *b"SHTRANS\n";
-/// First bytes of a cached file of self-visibility.
-pub const SELF_VISIBILITY_MAGIC: [u8; 8] = *b"SHSELFV\n";
+/// First bytes of a cached file of surfaces.
+pub const SURFACES_MAGIC: [u8; 8] = *b"SHSURFA\n";
 /// Version that this program writes and reads. It increases whenever the meaning of header or payload changes.
 pub const VERSION: u32 = 9;
 /// Longest header that is read.

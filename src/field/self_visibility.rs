@@ -1,4 +1,4 @@
-//! Self-visibility: what a mesh blocks of its own vertices' view, for lights too small for four SH bands.
+//! Self-visibility: what a vertex sees past its own mesh, or its own group, for lights too small for four SH bands.
 //!
 //! Every vertex has a map of [`SIDE`] x [`SIDE`] nodes over the hemisphere about its normal, two bytes each. One is the
 //! angle from the node's direction to the nearest edge of what the vertex sees past its own mesh, positive where that
@@ -23,11 +23,15 @@ pub const SIDE: usize = 8;
 pub const NODES: usize = SIDE * SIDE;
 /// Bytes of a map: the angles of all nodes, row by row, and then the distances.
 pub const BYTES: usize = 2 * NODES;
-/// Steps of a distance's byte to r: 250 of them reach across the mesh.
-pub const DISTANCE_STEPS: f64 = 125.0;
-/// How much nearer than a light, in r, the mesh has to be to block it whole; where it is as much farther it leaves the
-/// light free. Several steps of a distance's byte, and less than what a mesh leaves between a lamp and itself.
-pub const RAMP: f64 = 0.05;
+/// Steps of a distance's byte an octave: 4.4 % each.
+pub const DISTANCE_STEPS: f64 = 16.0;
+/// The octave, of r, at which distances begin: from 1/32 r to beyond 2 000 r, since what hides a light may be any member
+/// of the vertex's group.
+pub const DISTANCE_FIRST: f64 = -5.0;
+/// How much nearer than a light, in octaves, the mesh has to be to block it whole; where it is as much farther it leaves
+/// the light free. More than a step of a distance's byte, and less than what is left between a lamp and what is behind
+/// it.
+pub const RAMP: f64 = 0.07;
 /// Cells of a map: the squares between four nodes.
 pub const CELLS: usize = (SIDE - 1) * (SIDE - 1);
 /// Largest angle from an edge that a map holds, 45 degrees: steps of 0.35 degrees.
@@ -76,14 +80,24 @@ pub fn decode_angle(byte: u8) -> f64 {
     decode(byte, LIMIT_RAD)
 }
 
+/// The byte of a distance in r.
+pub fn encode_distance(distance: f64) -> u8 {
+    ((distance.log2() - DISTANCE_FIRST) * DISTANCE_STEPS).round().clamp(0.0, 255.0) as u8
+}
+
+/// Base-2 logarithm of a byte's distance in r.
+pub fn decode_distance(byte: u8) -> f64 {
+    f64::from(byte) / DISTANCE_STEPS + DISTANCE_FIRST
+}
+
 /// What a map of [`BYTES`] holds at a direction (z along the normal): the signed angle in radians to the edge of what
-/// the vertex sees, and how far away the mesh is, in r.
+/// the vertex sees, and the base-2 logarithm of how far away that is which hides, in r.
 pub fn lookup(map: &[u8], local: DVec3) -> [f64; 2] {
     let place = place(local);
     let cell = place.floor().min(DVec2::splat((SIDE - 2) as f64));
     let within = place - cell;
     let node = |i, j| (cell.y as usize + j) * SIDE + cell.x as usize + i;
-    let corner = |i, j| DVec2::new(decode_angle(map[node(i, j)]), f64::from(map[NODES + node(i, j)]) / DISTANCE_STEPS);
+    let corner = |i, j| DVec2::new(decode_angle(map[node(i, j)]), decode_distance(map[NODES + node(i, j)]));
     let row = |j| corner(0, j) * (1.0 - within.x) + corner(1, j) * within.x;
     (row(0) * (1.0 - within.y) + row(1) * within.y).to_array()
 }
@@ -94,7 +108,7 @@ pub fn lookup(map: &[u8], local: DVec3) -> [f64; 2] {
 /// the horizon leaves of it is the cosine's affair.
 pub fn visible(map: &[u8], normal: DVec3, direction: DVec3, radius_rad: f64, distance: f64) -> f64 {
     let [angle, away] = lookup(map, frame(normal).transpose() * direction);
-    let blocks = ((distance - away) / (2.0 * RAMP) + 0.5).clamp(0.0, 1.0);
+    let blocks = ((distance.log2() - away) / (2.0 * RAMP) + 0.5).clamp(0.0, 1.0);
     1.0 - (1.0 - blocked_share(angle / radius_rad.max(RADIUS_MINIMUM_RAD))) * blocks
 }
 
@@ -157,8 +171,7 @@ mod tests {
             let blend = |[a, b, c, d]: [f64; 4]| {
                 (a + (b - a) * within.x) * (1.0 - within.y) + (c + (d - c) * within.x) * within.y
             };
-            let wanted =
-                [blend(angles.map(decode_angle)), blend(distances.map(|byte| f64::from(byte) / DISTANCE_STEPS))];
+            let wanted = [blend(angles.map(decode_angle)), blend(distances.map(decode_distance))];
             assert!(lookup(&map, local).iter().zip(wanted).all(|(found, wanted)| (found - wanted).abs() < 1e-12));
         }
     }
@@ -175,15 +188,24 @@ mod tests {
     }
 
     fn map(angle_rad: f64, distance: f64) -> [u8; BYTES] {
-        let bytes = [encode_angle(angle_rad), (distance * DISTANCE_STEPS).round() as u8];
+        let bytes = [encode_angle(angle_rad), encode_distance(distance)];
         std::array::from_fn(|i| bytes[i / NODES])
     }
 
     #[test]
+    fn distances_are_kept_to_half_a_step() {
+        for distance in [0.04, 0.3, 1.0, 17.0, 1500.0_f64] {
+            let found = decode_distance(encode_distance(distance)) - distance.log2();
+            assert!(found.abs() <= 0.5 / DISTANCE_STEPS + 1e-9, "{distance}: {found} octaves");
+        }
+        assert_eq!([encode_distance(0.0), encode_distance(f64::INFINITY)], [0, 255]);
+    }
+
+    #[test]
     fn what_lies_beyond_a_light_leaves_it_free() {
-        let map = map(-0.3, 0.8);
+        let map = map(-0.3, 8.0);
         let sees = |distance| visible(&map, DVec3::Y, DVec3::Y, 0.1, distance);
-        assert_eq!([0.5, 0.79 - RAMP, 0.81 + RAMP, 1.0, f64::INFINITY].map(sees), [1.0, 1.0, 0.0, 0.0, 0.0]);
-        assert!((sees(0.8) - 0.5).abs() < 1e-9);
+        assert_eq!([5.0, 7.6, 8.4, 10.0, f64::INFINITY].map(sees), [1.0, 1.0, 0.0, 0.0, 0.0]);
+        assert!((sees(8.0) - 0.5).abs() < 1e-9);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::permutation::{CompiledMerge, harmonic_lights, usable};
 use super::{Frame, methods, permutation};
+use crate::bake;
 use crate::error::Result;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant};
@@ -18,7 +19,11 @@ impl Frame {
             let compiled = self.sharp.as_ref().map(|sharp| sharp.permutation);
             compiled.is_some_and(|has| (has.outlines || !wanted.outlines) && (has.panels || !wanted.panels))
         };
-        self.buffers.covers(scene, self.options.lights) && wanted.is_none_or(has)
+        let (groups, surfaces) = bake::ensure::surfaces(scene, &self.options.baked(), self.options.lights);
+        self.groups == groups
+            && self.surfaces.keys() == surfaces.keys()
+            && self.buffers.cover_fields(scene, self.options.lights, &groups)
+            && wanted.is_none_or(has)
     }
 
     /// Takes over lights, switches, sky and camera of a scene that has the meshes and receivers that this frame was
@@ -30,7 +35,9 @@ impl Frame {
         let receivers = |scene: &Scene| scene.entities.iter().map(|e| (e.mesh, e.receives)).collect::<Vec<_>>();
         assert_eq!(receivers(scene), receivers(&self.scene), "another scene needs another frame");
         let sky = scene.data.environment != self.scene.data.environment;
+        let surfaces = (0..scene.entities.len()).map(|entity| self.scene.surface(entity).clone()).collect();
         self.scene = scene.clone();
+        self.scene.set_surfaces(surfaces);
         self.methods = methods(scene, self.options.lights);
         // A shader that knows of lights serves a scene without them as well.
         if harmonic_lights(scene, &self.methods) && !self.merge.permutation.lights {

@@ -109,10 +109,10 @@ impl Frame {
         let mut out = Vec::new();
         for (index, placement) in placements.iter().enumerate() {
             let entity = &self.scene.entities[index];
-            let mesh = &self.scene.meshes[entity.mesh];
+            let mesh = self.scene.surface(index);
             let radiosity = self.radiosity(index)?;
             let rotation = placement.turn();
-            let grid = self.buffers.meshes[entity.mesh].drawn.grid().map(|_| index);
+            let grid = self.buffers.surface(index).drawn.grid().map(|_| index);
             let corner = |&i: &u32| {
                 let v = i as usize;
                 let world = placement.position.as_dvec3()

@@ -49,7 +49,7 @@ impl Frame {
             transfers: self.buffers.transfers.size_bytes,
             vertices: self.buffers.vertices.size_bytes,
             radiosity: self.radiosity.size_bytes(),
-            drawables: self.buffers.meshes.iter().map(|device_mesh| device_mesh.drawn.size_bytes()).sum(),
+            drawables: self.buffers.surfaces.iter().map(|surface| surface.drawn.size_bytes()).sum(),
             lists: self.work.size_bytes()
                 + self.sky.coefficients.all_bytes()
                 + self.picture.lines.size_bytes()

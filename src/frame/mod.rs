@@ -24,6 +24,7 @@ mod viewport;
 
 use crate::bake::cache::Cache;
 use crate::bake::ensure::SceneProgress;
+use crate::bake::surfaces::SurfacePlan;
 use crate::bake::{self, Baker, SceneNeeds};
 use crate::draw::Shading;
 use crate::error::Result;
@@ -33,7 +34,8 @@ use crate::lists::incremental::{ClusterLists, Merged};
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
 use crate::merge::{MergeInputs, Readable};
-use crate::scene::{LightMethod, Lights, Placement, Scene};
+use crate::scene::groups::Groups;
+use crate::scene::{LightMethod, Lights, Placement, Scene, light};
 use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
@@ -65,6 +67,10 @@ pub struct Frame {
     device: Arc<Device>,
     library: Library,
     scene: Scene,
+    /// Which entities never move against each other.
+    groups: Groups,
+    /// What the own visibility of the vertices was baked for.
+    surfaces: SurfacePlan,
     /// How the light of each entity is computed.
     methods: Vec<LightMethod>,
     options: Options,
@@ -94,22 +100,28 @@ impl Frame {
     ) -> Result<Self> {
         let device = baker.device();
         let library = baker.library();
-        let needs = SceneNeeds::of(scene, &options.bake, options.lights);
+        let needs = SceneNeeds::of(scene, &options.baked(), options.lights);
         limits::check(device, scene, &needs)?;
         PictureMemory::new(device, &options).check(device)?;
-        let baked = bake::ensure(baker, cache, scene, &needs, progress)?;
-        let buffers = SceneBuffers::new(device, scene, &options.bake, baked)?;
+        let mut baked = bake::ensure(baker, cache, scene, &needs, progress)?;
+        let mut near = std::mem::take(&mut baked.near);
+        let mut scene = scene.clone();
+        scene.set_surfaces(baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.clone()).collect());
+        let buffers = SceneBuffers::new(device, &scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
-        let methods = methods(scene, options.lights);
-        let wanted = permutation(&options, wanted, harmonic_lights(scene, &methods), uniform_entities(device));
+        let methods = methods(&scene, options.lights);
+        let wanted = permutation(&options, wanted, harmonic_lights(&scene, &methods), uniform_entities(device));
         let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted))?;
-        let sharp = permutation::sharp(&options, &merge.permutation, &methods, scene, &buffers);
-        let radiosity = RadiosityBuffers::new(device, scene, &buffers, sharp.is_some())?;
+        let sharp = permutation::sharp(&options, &merge.permutation, &methods, &scene, &buffers);
+        let radiosity = RadiosityBuffers::new(device, &scene, &buffers, sharp.is_some())?;
         let mut lists = ClusterLists::default();
-        for (index, entity) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
-            let device_mesh = &buffers.meshes[entity.mesh];
-            lists.add(index, pose::clusters(index, device_mesh, radiosity.offsets[index] / 16, options.bake.bands));
+        for (index, _) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
+            lists.add(
+                index,
+                pose::clusters(index, buffers.surface(index), radiosity.offsets[index] / 16, options.bake.bands),
+            );
+            lists.set_near(std::mem::take(&mut near[index]));
         }
         let sharp = sharp.map(|wanted| wanted.fitting(device, buffers.sharp(), radiosity.soft()));
         let pixels = PixelShading::new(device, &options, &buffers, radiosity.soft(), sharp);
@@ -123,11 +135,13 @@ impl Frame {
             sharp.map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting })).transpose()?;
         let entity_room = entity_count.max(merge.permutation.entity_limit as usize);
         let mut sky = SkyLight::new(device, options.bake.bands)?;
-        sky.write(scene, options.bake.bands)?;
+        sky.write(&scene, options.bake.bands)?;
         Ok(Frame {
             device: device.clone(),
             library: library.clone(),
-            scene: scene.clone(),
+            scene,
+            groups: needs.groups,
+            surfaces: needs.surfaces,
             methods,
             sharp,
             options,
@@ -250,14 +264,14 @@ impl Frame {
 
     /// Order in which an entity's vertices are stored.
     fn order(&self, entity: usize) -> &[u32] {
-        &self.buffers.meshes[self.scene.entities[entity].mesh].order
+        &self.buffers.surface(entity).order
     }
 
     /// Replaces the radiosity of an entity's vertices, in the mesh's order, until the next merge: for pictures of what
     /// was computed elsewhere.
     pub fn set_radiosity(&mut self, entity: usize, radiosity: &[[f32; 3]]) -> Result<()> {
         self.forget();
-        let order = &self.buffers.meshes[self.scene.entities[entity].mesh].order;
+        let order = &self.buffers.surface(entity).order;
         self.radiosity.write(entity, order, radiosity)
     }
 
@@ -278,7 +292,7 @@ impl Frame {
     /// Radiosity of every entity's vertices from elsewhere, by entity in the mesh's order, for
     /// [`RadiositySource::Comparison`] of that place: 0 or 1. Entities that are not named are `rest`.
     pub fn set_comparison(&mut self, place: usize, radiosity: &[(usize, Vec<[f32; 3]>)], rest: [f32; 3]) -> Result<()> {
-        let order = |entity: usize| &self.buffers.meshes[self.scene.entities[entity].mesh].order[..];
+        let order = |entity: usize| &self.buffers.surface(entity).order[..];
         let entities = radiosity.iter().map(|(entity, values)| (*entity, order(*entity), &values[..]));
         self.radiosity.compare(place, entities, rest)
     }
@@ -315,6 +329,11 @@ impl Frame {
     /// Clusters whose light is of an earlier time, as no picture since then showed them.
     pub fn stale_count(&self) -> usize {
         self.work.lists.stale_count()
+    }
+
+    /// Whether any light goes through spherical harmonics, so that transfer vectors are baked.
+    pub fn has_harmonics(&self) -> bool {
+        light::has_harmonics(&self.scene, self.options.lights)
     }
 
     /// Merges every cluster in the next frame, moved or not.

@@ -31,6 +31,13 @@ pub struct Options {
     pub antialias: Antialias,
 }
 
+impl Options {
+    /// What is baked: without the skip `static` every entity is a group by itself.
+    pub(crate) fn baked(&self) -> bake::Options {
+        bake::Options { groups: self.bake.groups && self.skip.grouped, ..self.bake }
+    }
+}
+
 impl Default for Options {
     /// What `shadow-fields render` does without options, in 960 x 640 pixels.
     fn default() -> Self {

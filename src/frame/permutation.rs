@@ -80,7 +80,7 @@ pub(super) fn sharp(
         panels: lights.iter().any(|method| matches!(method, LightMethod::LampFace(_))),
         halves: any_field(SilhouetteField::has_halves),
         boxes: any_field(SilhouetteField::has_box),
-        self_shadows: buffers.meshes.iter().any(|device_mesh| device_mesh.self_first != NONE),
+        self_shadows: buffers.surfaces.iter().any(|surface| surface.self_first != NONE),
         cones: lights.len() > 1,
         edges: false,
         rolled: false,

@@ -31,20 +31,20 @@ impl PixelChains {
     pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers) -> Result<Self> {
         let mut clusters = 0;
         let mut receivers = Vec::with_capacity(scene.entities.len());
-        for entity in &scene.entities {
-            let device_mesh = &buffers.meshes[entity.mesh];
-            let fits = match &device_mesh.drawn {
+        for (index, entity) in scene.entities.iter().enumerate() {
+            let surface = buffers.surface(index);
+            let fits = match &surface.drawn {
                 DrawnMesh::Grid(..) => true,
                 DrawnMesh::Triangles(triangles) => triangles.fits_views(device, &buffers.vertices, &buffers.self_cells),
             };
             let by_pixel = ByPixel {
                 cluster_first: clusters,
-                vertex_first: device_mesh.vertices.start,
-                self_first: device_mesh.self_first,
+                vertex_first: surface.vertices.start,
+                self_first: surface.self_first,
             };
             let lit = entity.receives && fits;
-            receivers.push(lit.then_some((by_pixel, device_mesh.reach_m)));
-            clusters += if lit { (device_mesh.vertices.len() as u32).div_ceil(CLUSTER_VERTICES) } else { 0 };
+            receivers.push(lit.then_some((by_pixel, surface.reach_m)));
+            clusters += if lit { (surface.vertices.len() as u32).div_ceil(CLUSTER_VERTICES) } else { 0 };
         }
         let upload = |name: &str, bytes: usize| Upload::new(device, name, bytes as u64);
         Ok(PixelChains {

@@ -30,6 +30,7 @@ impl Frame {
             entities: placements.iter().enumerate().map(|(index, p)| self.entity(index, p)).collect(),
             scene_bounds: SceneBounds {
                 outlines: self.outlines_at(placements),
+                groups: Some(self.groups.clone()),
                 ..SceneBounds::new(bounds, sky, self.options.skip, eps)
             },
             placements: placements.to_vec(),
@@ -158,7 +159,7 @@ impl Frame {
 /// Clusters of one receiver, without entries; `radiosity_first` is its first vertex in the radiosity buffer.
 pub(super) fn clusters(
     receiver: usize,
-    device_mesh: &scene_buffers::DeviceMesh,
+    surface: &scene_buffers::DeviceSurface,
     radiosity_first: u64,
     bands: usize,
 ) -> Vec<Member> {
@@ -167,14 +168,14 @@ pub(super) fn clusters(
         let first = i as u32 * CLUSTER_VERTICES;
         let cluster = layout::Cluster {
             receiver: receiver as u32,
-            vertex_first: device_mesh.vertices.start + first,
-            vertex_count: (device_mesh.vertices.len() as u32 - first).min(CLUSTER_VERTICES),
-            transfer_first: match device_mesh.transfer_first {
+            vertex_first: surface.vertices.start + first,
+            vertex_count: (surface.vertices.len() as u32 - first).min(CLUSTER_VERTICES),
+            transfer_first: match surface.transfer_first {
                 NONE => NONE,
                 quad => quad + first * transfer_quads,
             },
             radiosity_first: radiosity_first as u32 + first,
-            self_first: match device_mesh.self_first {
+            self_first: match surface.self_first {
                 NONE => NONE,
                 word => word + first * self_visibility::CELLS as u32,
             },
@@ -182,7 +183,7 @@ pub(super) fn clusters(
         };
         Member { cluster, bounds: *bounds, faces: *faces }
     };
-    device_mesh.clusters.iter().zip(&device_mesh.faces).enumerate().map(cluster).collect()
+    surface.clusters.iter().zip(&surface.faces).enumerate().map(cluster).collect()
 }
 
 /// Largest value of a projected sky, of any colour, on a grid of directions that is fine against its bands; at least 0.

@@ -25,9 +25,9 @@ impl RadiosityBuffers {
     pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers, sharp: bool) -> Result<Self> {
         let mut offsets = Vec::new();
         let mut size_bytes = 0;
-        for entity in &scene.entities {
+        for entity in 0..scene.entities.len() {
             offsets.push(size_bytes);
-            size_bytes += 16 * buffers.meshes[entity.mesh].vertices.len() as u64;
+            size_bytes += 16 * buffers.surface(entity).vertices.len() as u64;
         }
         let mut merged = Buffer::new(device, "radiosity", BufferKind::Device, size_bytes.max(16))?;
         merged.fill(0, &vec![0.0_f32; merged.size_bytes as usize / 4])?;

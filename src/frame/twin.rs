@@ -5,12 +5,12 @@ use crate::error::Result;
 use crate::field::{Area, ShadowField};
 use crate::layout::{CLUSTER_VERTICES, ENTRY_ENTITIES, ListEntry};
 use crate::lists::gather::{self, Candidates, Counts};
-use crate::lists::incremental::State;
+use crate::lists::incremental::{ClusterLists, State};
 use crate::lists::scope::Scope;
 use crate::merge::twin::{MergeObject, MergeTwin};
 use crate::scene::{Entity, LightMethod, Placement, Scene};
 use crate::scene_buffers;
-use crate::scene_buffers::DeviceMesh;
+use crate::scene_buffers::DeviceSurface;
 use crate::sharp::twin::{SharpLight, SharpObject, SharpTwin, SurfacePoint};
 use glam::DVec3;
 use std::collections::{BTreeSet, HashSet};
@@ -24,7 +24,7 @@ impl Frame {
         let empty = |entity: &&Entity| self.buffers.meshes[entity.mesh].is_empty(entity.emits);
         Counts {
             empty: entities().filter(empty).count() as u64,
-            unseen: entities().filter(|e| !crate::bake::is_seen(&self.scene, e)).count() as u64,
+            unseen: entities().filter(|e| !is_seen(&self.scene, e)).count() as u64,
             hidden: if self.options.skip.hidden { self.hidden_count(placements) as u64 } else { 0 },
             undrawn: self.undrawn_count(placements) as u64,
             ..self.work.lists.counts(&self.state(placements))
@@ -61,17 +61,17 @@ impl Frame {
         let state = self.state(placements);
         let mut receivers = Vec::new();
         for index in indices(&self.scene, |e| e.receives) {
-            let mesh_index = self.scene.entities[index].mesh;
-            let mesh = &self.scene.meshes[mesh_index];
-            let device_mesh = &self.buffers.meshes[mesh_index];
+            let mesh = self.scene.surface(index);
+            let surface = self.buffers.surface(index);
+            let centre_m = self.buffers.meshes[self.scene.entities[index].mesh].centre_m;
             receivers.push(Receiver {
                 index,
                 occluders: self.occluders(&state.scene_bounds, index),
-                positions: mesh.positions.iter().map(|p| p.as_dvec3() - device_mesh.centre_m).collect(),
+                positions: mesh.positions.iter().map(|p| p.as_dvec3() - centre_m).collect(),
                 normals: mesh.normals.iter().map(|n| n.as_dvec3()).collect(),
-                transfer: self.buffers.transfer(device_mesh)?,
+                transfer: self.buffers.transfer(surface)?,
                 // Without a threshold the twin looks at everything, which is what the lists are held against.
-                listed: (self.options.eps > 0.0).then(|| listed(&state, index, device_mesh)),
+                listed: (self.options.eps > 0.0).then(|| listed(&state, &self.work.lists, index, surface)),
             });
         }
         Ok(FrameTwin {
@@ -186,8 +186,7 @@ impl FrameTwin<'_> {
         let lights: Vec<SharpLight> = self.sharp_lights.iter().filter(|l| **l != receiver.index).map(light).collect();
         let occluders: Vec<usize> =
             receiver.occluders.iter().copied().filter(|j| outlines[*j].silhouette.is_some()).collect();
-        let mesh = self.frame.scene.entities[receiver.index].mesh;
-        let self_maps = &self.frame.buffers.meshes[mesh].self_maps;
+        let self_maps = &self.frame.buffers.surface(receiver.index).self_maps;
         let twin = SharpTwin {
             objects: outlines,
             occluders: &occluders,
@@ -214,21 +213,26 @@ impl FrameTwin<'_> {
 /// number.
 type Listed = (Vec<usize>, Vec<HashSet<(u32, u32)>>);
 
-fn listed(state: &State, receiver: usize, device_mesh: &DeviceMesh) -> Listed {
+fn listed(state: &State, lists: &ClusterLists, receiver: usize, surface: &DeviceSurface) -> Listed {
     let scene_bounds = &state.scene_bounds;
     let entity = &state.entities[receiver];
-    let mut cluster_of = vec![0; device_mesh.order.len()];
-    for (place, &v) in device_mesh.order.iter().enumerate() {
+    let mut cluster_of = vec![0; surface.order.len()];
+    for (place, &v) in surface.order.iter().enumerate() {
         cluster_of[v as usize] = place / CLUSTER_VERTICES as usize;
     }
     let candidates = Candidates::all(scene_bounds, receiver as u32);
-    let of_cluster = |bounds| {
+    let of_cluster = |(bounds, near): (_, &[u32])| {
         let mut entries = Vec::new();
-        let scope = Scope::new(scene_bounds, entity, bounds);
+        let scope = Scope::new(scene_bounds, receiver, entity, bounds, near);
         gather::gather(&scope, &candidates, &mut entries);
         entries.into_iter().map(|entry| ListEntry::entities(entry).into()).collect()
     };
-    (cluster_of, device_mesh.clusters.iter().map(of_cluster).collect())
+    (cluster_of, surface.clusters.iter().zip(lists.near_of(receiver)).map(of_cluster).collect())
+}
+
+/// Whether the shadow or light of an entity can fall on another entity, because one other at least is lit.
+fn is_seen(scene: &Scene, entity: &Entity) -> bool {
+    scene.entities.iter().filter(|e| e.receives).count() > usize::from(entity.receives)
 }
 
 /// Entities that satisfy a condition.

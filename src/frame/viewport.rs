@@ -85,11 +85,12 @@ impl Frame {
         let drawn = placements.iter().enumerate().map(|(index, placement)| {
             let entity = &self.scene.entities[index];
             let device_mesh = &self.buffers.meshes[entity.mesh];
+            let surface = self.buffers.surface(index);
             let world_from_object = camera::world_from_centred(placement, device_mesh.centre_m);
             let sight = self.sight(&camera, index, placement);
             let drawn = DrawnEntity {
-                mesh: &device_mesh.drawn,
-                indices: device_mesh.drawn.seen(self.options.skip.hidden.then_some(&sight)),
+                mesh: &surface.drawn,
+                indices: surface.drawn.seen(self.options.skip.hidden.then_some(&sight)),
                 clip_from_object: (camera.clip_from_world * world_from_object).as_mat4(),
                 culls: sight.culls(),
                 emission: entity.emission,

@@ -10,15 +10,12 @@
 //! grows with what may matter to any of them and not with what exists. What a group leaves out, each cluster would
 //! leave off by itself.
 
+pub use crate::layout::GROUP_CLUSTERS;
 use crate::layout::{self, ListEntry};
 pub use crate::lists::scene_bounds::{
     ClusterBounds, Counts, EntityBounds, ListLight, OutlineView, SceneBounds, distance_key,
 };
 use crate::lists::scope::{CullResult, Scope, SphereView};
-
-/// Clusters that are gathered for together: enough to share a search, few enough that what is found matters to each. In
-/// a town of 4 095 things 32 find 700 of them, 16 find 420; 170 matter to one.
-pub const GROUP_CLUSTERS: usize = 16;
 
 /// Whether clusters are as near one another as neighbours on a surface are, so that they make a group: a space-filling
 /// curve leaps at times. It does not help against a single cluster that spans a leap.
@@ -38,7 +35,7 @@ pub struct Candidates {
 impl Candidates {
     /// What may matter to any cluster of a group with these bounds.
     pub fn of_group(scene: &SceneBounds, receiver: u32, entity: &layout::DeviceEntity, bounds: &ClusterBounds) -> Self {
-        let scope = Scope::new(scene, entity, bounds);
+        let scope = Scope::new(scene, receiver as usize, entity, bounds, &[]);
         let mut occluders = Vec::new();
         scene.tree.find(|crowd| scope.leaves_out(crowd), |j| occluders.push(j));
         Self::new(scene, receiver, occluders, |light| scope.may_list(light.entity as usize))
@@ -76,6 +73,7 @@ pub fn counts(scope: &Scope<'_>, receiver: u32) -> Counts {
         match result {
             CullResult::Listed => {}
             CullResult::Cap => counts.caps += lookups,
+            CullResult::Own => counts.own += lookups,
             CullResult::BelowHorizon => counts.below_horizon += lookups,
             CullResult::BehindLight => counts.behind_light += lookups,
             CullResult::Apart => counts.apart += lookups,
@@ -108,6 +106,9 @@ fn walk(
         let (light, light_view) = light.unzip();
         results.clear();
         results.extend(candidates.occluders.iter().zip(&views).map(|(&occluder, view)| {
+            if scope.is_own(occluder as usize, sharp) {
+                return CullResult::Own;
+            }
             let result = scope.occluder_result(view, light_view, sharp, radiance);
             match light.filter(|light| sharp && result == CullResult::Listed && *light != occluder) {
                 Some(light) => scope.outline_result(occluder as usize, spheres[light as usize]),

@@ -70,6 +70,8 @@ pub(crate) struct ClusterLists {
     pub clusters: Vec<layout::Cluster>,
     bounds: Vec<ClusterBounds>,
     faces: Vec<TriangleRun>,
+    /// Entities whose shadows of sharp lights are in a cluster's own maps.
+    near: Vec<Vec<u32>>,
     groups: Vec<WatchedGroup>,
     now: Option<State>,
     /// Every cluster has changed since the last update by something that no [`State`] holds.
@@ -112,6 +114,22 @@ impl ClusterLists {
             self.faces.push(faces);
             self.stale.push(false);
         }
+    }
+
+    /// Says of each cluster of the receiver that was added last which entities' shadows its maps have.
+    pub fn set_near(&mut self, near: Vec<Vec<u32>>) {
+        self.near.resize(self.clusters.len() - near.len(), Vec::new());
+        self.near.extend(near);
+    }
+
+    /// The same for all clusters of a receiver, in order.
+    pub fn near_of(&self, receiver: usize) -> impl Iterator<Item = &[u32]> {
+        let of_receiver = move |cluster: &usize| self.clusters[*cluster].receiver as usize == receiver;
+        (0..self.clusters.len()).filter(of_receiver).map(|cluster| self.near(cluster))
+    }
+
+    fn near(&self, cluster: usize) -> &[u32] {
+        self.near.get(cluster).map_or(&[], |near| near)
     }
 
     /// Forgets what was merged: the next update takes every cluster.
@@ -223,7 +241,8 @@ impl ClusterLists {
             let mut ends = Vec::with_capacity(dirty.clusters.len());
             let mut entries = Vec::new();
             for &cluster in &dirty.clusters {
-                let scope = Scope::new(&now.scene_bounds, entity, &self.bounds[cluster]);
+                let scope =
+                    Scope::new(&now.scene_bounds, group.receiver, entity, &self.bounds[cluster], self.near(cluster));
                 let sharp = gather::gather(&scope, &candidates, &mut entries);
                 ends.push((entries.len(), sharp as u32));
             }
@@ -258,7 +277,7 @@ impl ClusterLists {
             let chains = |cluster: usize| {
                 let mut entries = Vec::new();
                 let bounds = around(&self.bounds[cluster]);
-                let scope = Scope::new(&now.scene_bounds, entity, &bounds);
+                let scope = Scope::new(&now.scene_bounds, receiver, entity, &bounds, self.near(cluster));
                 let sharp = gather::gather(&scope, &candidates, &mut entries);
                 entries.truncate(sharp);
                 let has_edge = |&entry: &u32| {
@@ -284,9 +303,9 @@ impl ClusterLists {
     pub fn counts(&self, state: &State) -> Counts {
         let of_group = |group: &WatchedGroup| {
             let entity = &state.entities[group.receiver];
-            let clusters = self.bounds[group.clusters.clone()].iter();
-            clusters.fold(Counts::default(), |mut counts, bounds| {
-                let scope = Scope::new(&state.scene_bounds, entity, bounds);
+            group.clusters.clone().fold(Counts::default(), |mut counts, cluster| {
+                let bounds = &self.bounds[cluster];
+                let scope = Scope::new(&state.scene_bounds, group.receiver, entity, bounds, self.near(cluster));
                 counts += gather::counts(&scope, group.receiver as u32);
                 counts
             })
@@ -303,8 +322,9 @@ impl ClusterLists {
         let entity = &state.entities[receiver];
         for group in self.groups.iter().filter(|group| group.receiver == receiver) {
             let candidates = Candidates::of_group(&state.scene_bounds, receiver as u32, entity, &group.bounds);
-            for bounds in &self.bounds[group.clusters.clone()] {
-                let scope = Scope::new(&state.scene_bounds, entity, bounds);
+            for cluster in group.clusters.clone() {
+                let bounds = &self.bounds[cluster];
+                let scope = Scope::new(&state.scene_bounds, receiver, entity, bounds, self.near(cluster));
                 gather::gather(&scope, &candidates, &mut entries);
             }
         }
@@ -343,7 +363,7 @@ impl<'b> Moved<'b> {
     /// moved.
     fn near(&self, now: &State, receiver: usize, bounds: &ClusterBounds) -> Vec<usize> {
         let both = [&self.before.scene_bounds, &now.scene_bounds];
-        let scopes = both.map(|scene| Scope::new(scene, &now.entities[receiver], bounds));
+        let scopes = both.map(|scene| Scope::new(scene, receiver, &now.entities[receiver], bounds, &[]));
         let near = |j: usize| j != receiver && scopes.iter().any(|scope| scope.may_list(j));
         self.list.iter().copied().filter(|&j| near(j)).collect()
     }
@@ -351,7 +371,8 @@ impl<'b> Moved<'b> {
     /// Whether any of `list` stands on the list of a cluster, before or now.
     fn any_on_list(&self, now: &State, receiver: usize, bounds: &ClusterBounds, list: &[usize]) -> bool {
         let on = |scene: &SceneBounds| {
-            let scope = Scope::new(scene, &now.entities[receiver], bounds);
+            // Which members are near does not matter here: those of one group move together or not at all.
+            let scope = Scope::new(scene, receiver, &now.entities[receiver], bounds, &[]);
             list.iter().any(|&j| scope.lists(j, receiver as u32))
         };
         on(&self.before.scene_bounds) || on(&now.scene_bounds)

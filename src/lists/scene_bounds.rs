@@ -4,6 +4,7 @@
 use crate::field::silhouette::SilhouetteField;
 use crate::lists::skip::Skip;
 use crate::lists::tree::Tree;
+use crate::scene::groups::Groups;
 use bytemuck::{Pod, Zeroable};
 use glam::{DQuat, DVec3, Vec3};
 use serde::Serialize;
@@ -131,6 +132,8 @@ pub struct SceneBounds {
     pub brightest: f32,
     /// What is left off.
     pub skip: Skip,
+    /// Which entities never move against each other; `None` where each is alone.
+    pub groups: Option<Groups>,
     /// Radiance below which a contribution is left off; 0 leaves nothing off.
     pub eps: f32,
 }
@@ -157,7 +160,20 @@ impl SceneBounds {
         let brightest = lights.iter().map(|light| light.radiance).fold(sky.unwrap_or(0.0), f32::max);
         let tree = Tree::new(occluders.iter().map(|&j| (j, spheres[j as usize])));
         let outlines = Vec::new();
-        SceneBounds { outlines, tree, occluders, lights, sky, brightest, skip, eps: eps as f32, spheres, entities }
+        let groups = None;
+        SceneBounds {
+            groups,
+            outlines,
+            tree,
+            occluders,
+            lights,
+            sky,
+            brightest,
+            skip,
+            eps: eps as f32,
+            spheres,
+            entities,
+        }
     }
 
     /// Whether lists of the other time hold here too where no entity has changed.
@@ -202,6 +218,8 @@ pub struct Counts {
     pub passed_by: u64,
     /// Sharp lights of which one occluder covers all from the cluster, and occluders before them.
     pub covered: u64,
+    /// Occluders of the receiver's own group, whose shadows its own visibility has.
+    pub own: u64,
     /// Occluders that stand on the list as a cap alone.
     pub caps: u64,
     /// Entities that cast shadows or shine by a field of nothing but zeros, and are left off everywhere.
@@ -220,7 +238,7 @@ impl Counts {
     /// Lookups that are left off.
     pub fn skipped(&self) -> u64 {
         let lights = self.behind_light + self.facing_away + self.passed_by + self.covered;
-        lights + self.below_horizon + self.apart + self.below_eps
+        lights + self.below_horizon + self.apart + self.own + self.below_eps
     }
 }
 
@@ -234,6 +252,7 @@ impl std::ops::AddAssign for Counts {
         self.below_eps += other.below_eps;
         self.passed_by += other.passed_by;
         self.covered += other.covered;
+        self.own += other.own;
         self.caps += other.caps;
         self.empty += other.empty;
         self.unseen += other.unseen;

@@ -23,6 +23,8 @@ pub enum CullResult {
     Cap,
     /// No vertex sees it above its horizon.
     BelowHorizon,
+    /// It is of the receiver's group, whose shadows the receiver's own visibility has.
+    Own,
     /// It is farther than the light from every vertex.
     BehindLight,
     /// Its cone meets the light's from no vertex.
@@ -111,6 +113,9 @@ fn weight(half: Angle, cosine: f64) -> f64 {
 /// A cluster of a receiver, or a group of clusters, at one time.
 pub struct Scope<'m> {
     scene: &'m SceneBounds,
+    receiver: usize,
+    /// Entities whose shadows of sharp lights are in the cluster's maps.
+    near: &'m [u32],
     /// Albedo of the receiver, of its brightest colour.
     reflectance: f64,
     /// World, metres.
@@ -122,12 +127,20 @@ pub struct Scope<'m> {
 
 impl<'m> Scope<'m> {
     /// Places bounds of a receiver's mesh in the world.
-    pub fn new(scene: &'m SceneBounds, receiver: &layout::DeviceEntity, bounds: &ClusterBounds) -> Self {
+    pub fn new(
+        scene: &'m SceneBounds,
+        index: usize,
+        receiver: &layout::DeviceEntity,
+        bounds: &ClusterBounds,
+        near: &'m [u32],
+    ) -> Self {
         let scale = f64::from(receiver.scale);
         let [x, y, z, _] = receiver.centre;
         let vector = |[x, y, z]: [f32; 3]| DVec3::new(x.into(), y.into(), z.into());
         Scope {
             scene,
+            receiver: index,
+            near,
             reflectance: receiver.reflectance.into(),
             centre: vector([x, y, z]) + to_world(receiver, vector(bounds.centre) * scale),
             radius_m: f64::from(bounds.radius_m) * scale,
@@ -139,6 +152,12 @@ impl<'m> Scope<'m> {
     /// What the rule looks at.
     pub fn scene(&self) -> &'m SceneBounds {
         self.scene
+    }
+
+    /// Whether the own visibility of the cluster has the shadows of an occluder, those of sharp lights or all others.
+    pub fn is_own(&self, occluder: usize, sharp: bool) -> bool {
+        self.scene.groups.as_ref().is_some_and(|groups| groups.share(self.receiver, occluder))
+            && (!sharp || self.near.binary_search(&(occluder as u32)).is_ok())
     }
 
     /// A sphere of the scene: centre in the world, radius.
@@ -280,7 +299,10 @@ impl<'m> Scope<'m> {
         let scene = self.scene;
         let view = scene.entities[index].occludes.then(|| self.view(scene.spheres[index]));
         let blocks = |light: Option<&SphereView>, sharp, radiance: f32| {
-            view.as_ref().is_some_and(|view| self.occluder_result(view, light, sharp, radiance) == CullResult::Listed)
+            !self.is_own(index, sharp)
+                && view
+                    .as_ref()
+                    .is_some_and(|view| self.occluder_result(view, light, sharp, radiance) == CullResult::Listed)
         };
         let mut lights = scene.lights.iter().filter(|light| light.entity != receiver);
         scene.sky.is_some_and(|sky| blocks(None, false, sky))

@@ -19,7 +19,7 @@ pub enum SkipKind {
 
 #[derive(Clone, Copy, Debug)]
 pub struct SkipRow {
-    /// Name on the command line, and the field of [`Skip`].
+    /// Name on the command line.
     pub name: &'static str,
     /// What it does to the numbers.
     pub kind: SkipKind,
@@ -28,7 +28,7 @@ pub struct SkipRow {
 }
 
 macro_rules! skips {
-    ($($(#[$doc:meta])* $name:ident: $kind:ident, $glsl:expr;)*) => {
+    ($($(#[$doc:meta])* $name:ident $text:literal: $kind:ident, $glsl:expr;)*) => {
         /// The skips that a user can switch, each on or off.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
         pub struct Skip { $($(#[$doc])* pub $name: bool,)* }
@@ -40,7 +40,7 @@ macro_rules! skips {
 
             pub fn switch(&mut self, name: &str) -> Option<&mut bool> {
                 match name {
-                    $(stringify!($name) => Some(&mut self.$name),)*
+                    $($text => Some(&mut self.$name),)*
                     _ => None,
                 }
             }
@@ -52,30 +52,32 @@ macro_rules! skips {
         }
 
         pub const TABLE: &[SkipRow] = &[
-            $(SkipRow { name: stringify!($name), kind: SkipKind::$kind, glsl: $glsl },)*
+            $(SkipRow { name: $text, kind: SkipKind::$kind, glsl: $glsl },)*
         ];
     };
 }
 
 skips! {
     /// Lights and occluders whose bounding spheres lie below the horizon of the receiving surface.
-    horizon: Approximate, Some("SKIP_HORIZON");
+    horizon "horizon": Approximate, Some("SKIP_HORIZON");
     /// Occluders whose bounding spheres do not reach into a light's, as seen from the vertex.
-    cones: Approximate, Some("SKIP_CONES");
+    cones "cones": Approximate, Some("SKIP_CONES");
     /// Occluders that are farther than the light from a whole cluster of vertices.
-    behind: Exact, None;
+    behind "behind": Exact, None;
     /// The fields of occluders that are small as seen from a vertex: what they block is taken at one direction
     /// ([`CAP_SINES`]), with the solid angle that a fit of the field's outermost shell has for it
     /// ([`crate::field::Area`]).
-    caps: Approximate, Some("SKIP_CAPS");
+    caps "caps": Approximate, Some("SKIP_CAPS");
     /// Occluders that every ray from a cluster to a sharp light passes by.
-    passed: Exact, None;
+    passed "passed": Exact, None;
     /// Sharp lights of which one occluder covers all from a whole cluster.
-    covered: Exact, None;
+    covered "covered": Exact, None;
+    /// Occluders that never move against the receiver: its own visibility has their shadows, exactly where they touch.
+    grouped "static": Approximate, None;
     /// Clusters of vertices for which nothing has changed since they were last merged.
-    unmoved: Incremental, None;
+    unmoved "unmoved": Incremental, None;
     /// Clusters that the camera cannot see, in pictures of a moving scene, and triangles that it cannot see.
-    hidden: Incremental, None;
+    hidden "hidden": Incremental, None;
 }
 
 impl Skip {

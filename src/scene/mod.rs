@@ -8,6 +8,7 @@ pub mod export;
 #[cfg(feature = "cli")]
 pub(crate) mod files;
 pub mod gltf;
+pub mod groups;
 pub mod keys;
 pub mod light;
 pub mod motion;
@@ -15,6 +16,7 @@ pub mod single;
 mod sun;
 pub mod values;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -46,6 +48,10 @@ pub struct Scene {
     pub meshes: Vec<Arc<Mesh>>,
     /// Entities in the file's order, with their switches resolved, and then suns. [`Scene::at`] gives their placements.
     pub entities: Vec<Entity>,
+    /// The surface of each entity ([`Scene::surface`]); empty where all are the meshes themselves.
+    surfaces: Vec<Arc<Mesh>>,
+    /// Entities at rest that were taken out of their group.
+    loose: BTreeSet<usize>,
     /// Where the suns stand, which are the last of the entities and do not stand in the file.
     suns: Vec<Placement>,
     /// Distant light.
@@ -153,9 +159,37 @@ impl Scene {
     }
 
     fn assemble(data: Data, meshes: Vec<Arc<Mesh>>, entities: Vec<Entity>, environment: Environment) -> Self {
-        let mut scene = Self { data, meshes, entities, suns: Vec::new(), environment };
+        let mut scene = Self {
+            data,
+            meshes,
+            entities,
+            surfaces: Vec::new(),
+            loose: BTreeSet::new(),
+            suns: Vec::new(),
+            environment,
+        };
         scene.place_suns();
         scene
+    }
+
+    /// The mesh of an entity as it is lit and drawn: its own, or a finer one of the same shape.
+    pub fn surface(&self, entity: usize) -> &Arc<Mesh> {
+        self.surfaces.get(entity).unwrap_or_else(|| &self.meshes[self.entities[entity].mesh])
+    }
+
+    /// Gives every entity its surface.
+    pub(crate) fn set_surfaces(&mut self, surfaces: Vec<Arc<Mesh>>) {
+        self.surfaces = surfaces;
+    }
+
+    /// Whether an entity has no motion and belongs to the group of all that rest.
+    pub(crate) fn is_at_rest(&self, entity: usize) -> bool {
+        self.data.entities.get(entity).is_some_and(|data| data.motion.is_empty()) && !self.loose.contains(&entity)
+    }
+
+    /// Takes an entity out of its group, so that it can be moved.
+    pub(crate) fn loosen(&mut self, entity: usize) {
+        self.loose.insert(entity);
     }
 
     /// Placements of all entities at `time_s` seconds, in order. They depend on the time alone, not on earlier frames.

@@ -6,9 +6,9 @@ mod field_atlas;
 pub mod limits;
 pub mod silhouettes;
 
-use crate::asset::Mesh;
+use crate::bake::cluster_order::cluster_order;
 use crate::bake::ensure::Baked;
-use crate::bake::{self, BakedMesh, BakedScene};
+use crate::bake::{self, BakedScene, BakedSurface};
 use crate::draw::DrawnMesh;
 use crate::error::Result;
 use crate::field::ShadowField;
@@ -19,11 +19,11 @@ use crate::gpu::{Buffer, Device};
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::ClusterBounds;
 use crate::lists::sight::TriangleRun;
+use crate::scene::groups::Groups;
 use crate::scene::{Lights, Scene};
 pub use field_atlas::FieldSlot;
 use glam::DVec3;
 pub use silhouettes::{SilhouetteSlot, Silhouettes};
-use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -31,8 +31,22 @@ use std::sync::Arc;
 /// for.
 pub const ALIGNMENT: u64 = 256;
 
-/// One mesh of the scene: where its vertices, transfer vectors and fields lie, and how it is drawn.
+/// A mesh of the scene as it shades and shines: its fields.
 pub struct DeviceMesh {
+    /// Occlusion field, if an entity needs one.
+    pub blocked: Option<FieldSlot>,
+    /// Radiance field, if an entity needs one.
+    pub radiance: Option<FieldSlot>,
+    /// Silhouette field, if an entity needs one.
+    pub silhouette: Option<SilhouetteSlot>,
+    /// Centre of the bounding sphere, metres.
+    pub centre_m: DVec3,
+    pub radius_m: f64,
+}
+
+/// A mesh as it is lit and drawn: where its vertices and their own visibility lie. Entities share it where both are
+/// equal.
+pub struct DeviceSurface {
     /// The range of its vertices in the vertex buffer.
     pub vertices: Range<u32>,
     /// Which vertex of the mesh stands at each place of that range. Neighbours stand together.
@@ -43,22 +57,13 @@ pub struct DeviceMesh {
     pub faces: Vec<TriangleRun>,
     /// First quad of its transfer vectors, or [`NONE`] where the cosine lobe of the normal is exact.
     pub transfer_first: u32,
-    /// Occlusion field, if an entity needs one.
-    pub blocked: Option<FieldSlot>,
-    /// Radiance field, if an entity needs one.
-    pub radiance: Option<FieldSlot>,
     /// First cell of its self-visibility, or [`NONE`] where it needs none.
     pub self_first: u32,
     /// Self-visibility in the mesh's order of vertices, if it needs any.
     pub self_maps: Option<Arc<Vec<u8>>>,
-    /// Silhouette field, if an entity needs one.
-    pub silhouette: Option<SilhouetteSlot>,
     pub drawn: DrawnMesh,
     /// How far a point of a triangle may lie from a vertex of it, metres.
     pub reach_m: f32,
-    /// Centre of the bounding sphere, metres.
-    pub centre_m: DVec3,
-    pub radius_m: f64,
 }
 
 impl DeviceMesh {
@@ -81,6 +86,9 @@ pub struct SceneBuffers {
     /// Positions and normals of all meshes, one quad for each.
     pub vertices: Buffer,
     pub meshes: Vec<DeviceMesh>,
+    pub surfaces: Vec<DeviceSurface>,
+    /// The surface of each entity.
+    surface_of: Vec<usize>,
     /// The bakes that were not found in the cache.
     pub baked: Vec<Baked>,
     /// Number format of the fields.
@@ -91,17 +99,13 @@ pub struct SceneBuffers {
     pub field_bands: usize,
 }
 
-/// Vertices and transfer vectors of a scene on their way into its buffers.
+/// Vertices and their own visibility on their way into the buffers of a scene.
 struct Packing {
     /// Two quads a vertex: its position about the centre of the mesh's bounding sphere and how far its farthest
     /// neighbour is, metres; and its normal.
     vertices: Vec<[f32; 4]>,
     transfers: Vec<f32>,
-    /// First quad of the transfer vectors of each distinct mesh, by the hash of its content. Equal meshes share theirs.
-    transfer_of: HashMap<[u8; 32], u32>,
     self_cells: Vec<[u32; 2]>,
-    /// First cell of the self-visibility of each distinct mesh.
-    self_of: HashMap<[u8; 32], u32>,
     /// Floats of one transfer vector.
     stride: usize,
     /// Number of vertices of all entities.
@@ -109,34 +113,13 @@ struct Packing {
 }
 
 impl Packing {
-    fn new(scene: &Scene, stride: usize) -> Self {
-        // The vertices are reserved at once. Growing by halves would hold up to three times as much.
-        let quads = 2 * scene.meshes.iter().map(|mesh| mesh.positions.len()).sum::<usize>();
-        let drawn = scene.entities.iter().map(|entity| scene.meshes[entity.mesh].positions.len()).sum();
-        Packing {
-            vertices: Vec::with_capacity(quads),
-            transfers: Vec::new(),
-            transfer_of: HashMap::new(),
-            self_cells: Vec::new(),
-            self_of: HashMap::new(),
-            stride,
-            drawn,
-        }
-    }
-
-    /// Adds one mesh in the order of its clusters.
-    fn add(
-        &mut self,
-        device: &Arc<Device>,
-        mesh: &Mesh,
-        [blocked, radiance]: [Option<FieldSlot>; 2],
-        silhouette: Option<SilhouetteSlot>,
-        baked: &BakedMesh,
-    ) -> Result<DeviceMesh> {
-        let Packing { vertices, transfers, transfer_of, self_cells, self_of, stride, drawn } = self;
-        let (centre, radius_m) = mesh.bounding_sphere();
+    /// Adds one surface in the order of its clusters.
+    fn add(&mut self, device: &Arc<Device>, baked: &BakedSurface) -> Result<DeviceSurface> {
+        let Packing { vertices, transfers, self_cells, stride, drawn } = self;
+        let mesh = &baked.mesh;
+        let (centre, _) = mesh.bounding_sphere();
         let vertex_first = vertices.len() as u32;
-        let order = clusters::order(mesh);
+        let order = cluster_order(mesh);
         let drawn = DrawnMesh::new(device, mesh, &order, *drawn)?;
         let steps = drawn.grid().map_or_else(|| mesh.steps(), |grid| vec![grid.step_m; order.len()]);
         let longest = || steps.iter().copied().fold(0.0, f32::max);
@@ -146,35 +129,26 @@ impl Packing {
             vertices.push(mesh.normals[v as usize].extend(0.0).to_array());
         }
         let transfer_first = baked.transfer.as_ref().map_or(NONE, |floats| {
-            *transfer_of.entry(mesh.content_hash()).or_insert_with(|| {
-                let first = (transfers.len() / 4) as u32;
-                transfers.extend(order.iter().flat_map(|&v| &floats[v as usize * *stride..][..*stride]));
-                first
-            })
+            let first = (transfers.len() / 4) as u32;
+            transfers.extend(order.iter().flat_map(|&v| &floats[v as usize * *stride..][..*stride]));
+            first
         });
         let self_first = baked.self_visibility.as_ref().map_or(NONE, |maps| {
-            *self_of.entry(mesh.content_hash()).or_insert_with(|| {
-                let first = self_cells.len() as u32;
-                let map = |&v: &u32| self_visibility::cells(&maps[v as usize * BYTES..][..BYTES]);
-                self_cells.extend(order.iter().flat_map(map));
-                first
-            })
+            let first = self_cells.len() as u32;
+            let map = |&v: &u32| self_visibility::cells(&maps[v as usize * BYTES..][..BYTES]);
+            self_cells.extend(order.iter().flat_map(map));
+            first
         });
-        Ok(DeviceMesh {
+        Ok(DeviceSurface {
             self_first,
             self_maps: baked.self_visibility.clone(),
             vertices: vertex_first / 2..vertices.len() as u32 / 2,
             clusters: clusters::bounds(mesh, &order),
             faces: TriangleRun::around(mesh, &order, CLUSTER_VERTICES as usize),
             transfer_first,
-            blocked,
-            radiance,
-            silhouette,
             drawn,
             reach_m,
             order,
-            centre_m: centre.as_dvec3(),
-            radius_m: f64::from(radius_m),
         })
     }
 }
@@ -183,12 +157,22 @@ impl SceneBuffers {
     /// Uploads what was baked of a scene with `options`, and its meshes.
     pub fn new(device: &Arc<Device>, scene: &Scene, options: &bake::Options, baked: BakedScene) -> Result<Self> {
         let (fields, slots) = field_atlas::field_atlas(device, scene, &baked.meshes, options)?;
-        let mut packing = Packing::new(scene, channel_stride(options.bands));
-        let mut meshes = Vec::new();
         let (silhouettes, outlines) = Silhouettes::new(device, &baked.meshes)?;
-        for (((mesh, slots), silhouette), baked) in scene.meshes.iter().zip(slots).zip(outlines).zip(baked.meshes) {
-            meshes.push(packing.add(device, mesh, slots, silhouette, &baked)?);
-        }
+        let meshes = scene.meshes.iter().zip(slots).zip(outlines).map(|((mesh, [blocked, radiance]), silhouette)| {
+            let (centre, radius_m) = mesh.bounding_sphere();
+            DeviceMesh { blocked, radiance, silhouette, centre_m: centre.as_dvec3(), radius_m: f64::from(radius_m) }
+        });
+        let meshes = meshes.collect();
+        // The vertices are reserved at once. Growing by halves would hold up to three times as much.
+        let quads = 2 * baked.surfaces.iter().map(|surface| surface.mesh.positions.len()).sum::<usize>();
+        let mut packing = Packing {
+            vertices: Vec::with_capacity(quads),
+            transfers: Vec::new(),
+            self_cells: Vec::new(),
+            stride: channel_stride(options.bands),
+            drawn: baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.positions.len()).sum(),
+        };
+        let surfaces = baked.surfaces.iter().map(|surface| packing.add(device, surface)).collect::<Result<_>>()?;
         let Packing { vertices, mut transfers, mut self_cells, .. } = packing;
         self_cells.resize(self_cells.len().max(2), [0; 2]);
         // A buffer may not be empty.
@@ -202,11 +186,18 @@ impl SceneBuffers {
             transfers: Buffer::with_data(device, "transfers", &transfers)?,
             vertices: Buffer::with_data(device, "vertices", &vertices)?,
             meshes,
+            surfaces,
+            surface_of: baked.surface_of,
             baked: baked.baked,
             storage: options.storage,
             bands: options.bands,
             field_bands: options.occlusion_bands(),
         })
+    }
+
+    /// The surface of an entity.
+    pub fn surface(&self, entity: usize) -> &DeviceSurface {
+        &self.surfaces[self.surface_of[entity]]
     }
 
     /// What the pass of sharp lights reads: nodes and cells of silhouettes, and cells of self-visibility.
@@ -215,15 +206,13 @@ impl SceneBuffers {
     }
 
     /// Whether every field that `scene` needs is here. The scene must have the meshes that these buffers were made for.
-    pub fn covers(&self, scene: &Scene, lights: Lights) -> bool {
+    pub fn cover_fields(&self, scene: &Scene, lights: Lights, groups: &Groups) -> bool {
         self.meshes.iter().enumerate().all(|(mesh, device_mesh)| {
-            let needed = bake::needs(scene, mesh, lights);
+            let needed = bake::needs(scene, mesh, lights, groups);
             let [blocked, radiance] = needed.fields.map(|kind| kind.is_some());
             (device_mesh.blocked.is_some() || !blocked)
                 && (device_mesh.radiance.is_some() || !radiance)
                 && (device_mesh.silhouette.is_some() || !needed.silhouette)
-                && (device_mesh.self_first != NONE || !needed.self_visibility)
-                && (device_mesh.transfer_first != NONE || !needed.transfer)
         })
     }
 
@@ -232,17 +221,17 @@ impl SceneBuffers {
         field_atlas::download(&self.fields, slot)
     }
 
-    /// A copy of a mesh's transfer vectors, in the mesh's order of vertices, and the floats of each.
-    pub fn transfer(&self, device_mesh: &DeviceMesh) -> Result<Option<(Vec<f32>, usize)>> {
-        if device_mesh.transfer_first == NONE {
+    /// A copy of a surface's transfer vectors, in the mesh's order of vertices, and the floats of each.
+    pub fn transfer(&self, surface: &DeviceSurface) -> Result<Option<(Vec<f32>, usize)>> {
+        if surface.transfer_first == NONE {
             return Ok(None);
         }
         let stride = channel_stride(self.bands);
-        let first = u64::from(device_mesh.transfer_first) * 16;
-        let size = device_mesh.vertices.len() as u64 * stride as u64 * 4;
+        let first = u64::from(surface.transfer_first) * 16;
+        let size = surface.vertices.len() as u64 * stride as u64 * 4;
         let stored: Vec<f32> = self.transfers.download_range(first..first + size)?;
         let mut floats = vec![0.0; stored.len()];
-        for (place, &v) in device_mesh.order.iter().enumerate() {
+        for (place, &v) in surface.order.iter().enumerate() {
             floats[v as usize * stride..][..stride].copy_from_slice(&stored[place * stride..][..stride]);
         }
         Ok(Some((floats, stride)))

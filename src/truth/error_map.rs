@@ -84,7 +84,7 @@ impl ErrorMap {
     /// radiosity is replaced until the next merge.
     pub fn draw(&self, frame: &mut Frame, placements: &[Placement], scale: &ColorScale) -> Result<()> {
         for entity in 0..frame.scene().entities.len() {
-            let count = frame.scene().meshes[frame.scene().entities[entity].mesh].positions.len();
+            let count = frame.scene().surface(entity).positions.len();
             frame.set_radiosity(entity, &vec![NEUTRAL; count])?;
         }
         for (entity, colors) in self.colors(scale) {

@@ -50,7 +50,7 @@ pub struct Vertex {
 /// All vertices of all receivers, by entity.
 pub fn receiver_vertices(scene: &Scene) -> Vec<Vertex> {
     let of = |(entity, e): (usize, &crate::scene::Entity)| {
-        let count = if e.receives { scene.meshes[e.mesh].positions.len() } else { 0 };
+        let count = if e.receives { scene.surface(entity).positions.len() } else { 0 };
         (0..count).map(move |index| Vertex { entity, index })
     };
     scene.entities.iter().enumerate().flat_map(of).collect()

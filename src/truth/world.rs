@@ -87,7 +87,7 @@ impl<'s> World<'s> {
     }
 
     pub fn view(&self, vertex: Vertex) -> VertexView {
-        let mesh = &self.scene.meshes[self.scene.entities[vertex.entity].mesh];
+        let mesh = self.scene.surface(vertex.entity);
         let (centre, radius_m) = mesh.bounding_sphere();
         let local = (mesh.positions[vertex.index].as_dvec3() - centre.as_dvec3()) / f64::from(radius_m);
         self.surface(vertex.entity, local, mesh.normals[vertex.index].as_dvec3())

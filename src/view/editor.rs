@@ -9,6 +9,7 @@ use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
 use crate::bake;
 use crate::field::quantity;
+use crate::scene::groups::Groups;
 use crate::scene::{Camera, Data, Entity, Placement, Scene};
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
@@ -135,7 +136,8 @@ impl Editor {
 
     /// Fields that a mesh needs for its entities' switches: occlusion, radiance.
     pub fn needs(&self, mesh: usize) -> [Option<quantity::FieldKind>; 2] {
-        bake::needs(&self.scene, mesh, crate::scene::Lights::Sh).fields
+        let alone = Groups::alone(self.scene.entities.len());
+        bake::needs(&self.scene, mesh, crate::scene::Lights::Sh, &alone).fields
     }
 
     /// Advances the time by `dt_s` seconds if the motion runs. Placements depend only on the sum of all `dt_s`.

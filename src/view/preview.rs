@@ -35,7 +35,7 @@ pub(super) fn preview(baker: &Baker, cache: &Cache, editor: &Editor, options: Op
                 if entity.emits { entity.emission } else { entity.albedo * (0.3 + 0.6 * cosine) * editor.white() };
             shown.to_array()
         };
-        colors.push((index, scene.meshes[entity.mesh].normals.iter().map(color).collect()));
+        colors.push((index, frame.scene().surface(index).normals.iter().map(color).collect()));
     }
     frame.set_comparison(0, &colors, [0.0; 3])?;
     Ok(frame)

@@ -3,7 +3,8 @@
 use super::super::context::Context;
 use super::super::{Global, output};
 use crate::asset::picture;
-use crate::bake::{self, Wanted, bakes_transfer, cache::Cache, hash_text};
+use crate::bake::surfaces::GroupPlan;
+use crate::bake::{self, Wanted, cache::Cache, hash_text};
 use crate::error::{Error, Result};
 use crate::farm::results::{self, SliceResult};
 use crate::farm::{Film, Input, Plan, Slice};
@@ -12,6 +13,7 @@ use crate::scene::{self, Scene};
 use clap::Args;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Arguments of `farm run`.
@@ -100,9 +102,10 @@ fn bake_mesh(context: &Context, plan: &Plan, input: &Input, folder: &Path) -> Re
     }
     cache.silhouette(baker, &mesh, options, &progress)?;
     files += 1;
-    if bakes_transfer(&mesh) {
-        cache.vertices(baker, &mesh, options, Wanted::BOTH, &progress)?;
-        files += 2;
+    let alone = GroupPlan::alone(&Arc::new(mesh.clone()), options, Wanted::BOTH);
+    if alone.key.is_some() {
+        cache.surfaces(&alone, &progress);
+        files += 1;
     }
     Ok(files)
 }

@@ -1,0 +1,255 @@
+//! Refines surfaces where their own visibility varies, under a budget of vertices.
+//!
+//! An edge is split where the transfer vector at its middle differs from the mean of its ends'. Edges come in the order
+//! of that difference times their squared length, which is what the difference adds to a picture. A triangle is
+//! bisected at its longest edge first, so that angles stay bounded (Rivara, *Mesh Refinement Processes Based on the
+//! Generalized Bisection of Simplices*, 1984). Both sides of an edge are split together: there are no T-junctions.
+
+use super::own_visibility::{Rays, Seen};
+use super::surfaces::GroupSpace;
+use crate::asset::Mesh;
+use glam::Vec3;
+use rayon::prelude::*;
+use std::collections::{HashMap, HashSet};
+
+/// Least difference of transfer vectors, relative to the clamped cosine's, for which an edge is split.
+const LEAST_DIFFERENCE: f32 = 0.03;
+/// Length of the clamped cosine as a vector of four bands.
+const COSINE_LENGTH: f32 = 1.445;
+/// Share of the vertices by which a round may grow a group, so that the worst edges are split first.
+const GROWTH: f64 = 0.35;
+
+/// A surface in the making. Vertices are only ever added.
+pub(super) struct Refined {
+    pub positions: Vec<Vec3>,
+    pub normals: Vec<Vec3>,
+    pub colors: Option<Vec<Vec3>>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Equal positions have equal numbers.
+    places: Vec<u32>,
+    place_of: HashMap<[u32; 3], u32>,
+    /// Transfer vectors of the vertices; empty before they are asked for.
+    transfers: Vec<Vec<f32>>,
+    /// Transfer vectors at the middles of edges between two vertices, and their difference to the ends' mean.
+    middles: HashMap<(u32, u32), (Vec<f32>, f32)>,
+}
+
+type Edge = (u32, u32);
+
+fn edge(a: u32, b: u32) -> Edge {
+    (a.min(b), a.max(b))
+}
+
+impl Refined {
+    pub fn new(mesh: &Mesh) -> Self {
+        let mut refined = Refined {
+            positions: Vec::new(),
+            normals: mesh.normals.clone(),
+            colors: mesh.colors.clone(),
+            triangles: mesh.triangles.clone(),
+            places: Vec::new(),
+            place_of: HashMap::new(),
+            transfers: Vec::new(),
+            middles: HashMap::new(),
+        };
+        mesh.positions.iter().for_each(|&position| refined.add_position(position));
+        refined
+    }
+
+    fn add_position(&mut self, position: Vec3) {
+        let next = self.place_of.len() as u32;
+        let key = (position + Vec3::ZERO).to_array().map(f32::to_bits);
+        self.places.push(*self.place_of.entry(key).or_insert(next));
+        self.positions.push(position);
+    }
+
+    /// The finished mesh, of the shape and name of `mesh`.
+    pub fn into_mesh(self, mesh: &Mesh) -> Mesh {
+        mesh.refined(self.positions, self.normals, self.colors, self.triangles)
+    }
+
+    fn length(&self, (a, b): Edge) -> f32 {
+        self.positions[a as usize].distance(self.positions[b as usize])
+    }
+
+    /// The edge in terms of places, which both of its sides share.
+    fn shared(&self, (a, b): Edge) -> Edge {
+        edge(self.places[a as usize], self.places[b as usize])
+    }
+
+    fn edges(&self) -> HashSet<Edge> {
+        self.triangles.iter().flat_map(|[a, b, c]| [edge(*a, *b), edge(*b, *c), edge(*c, *a)]).collect()
+    }
+
+    /// Casts rays from the vertices that have no transfer vector yet, and from the middles of edges longer than
+    /// `least_m`.
+    fn look(&mut self, space: &GroupSpace<'_>, least_m: f32) {
+        let new = self.transfers.len()..self.positions.len();
+        let nudges = space.nudges(&self.positions, &self.normals, &self.triangles);
+        let vertex = |v: usize| space.see(self.positions[v], self.normals[v], nudges[v], Rays::Few).transfer;
+        let transfers: Vec<Vec<f32>> = new.into_par_iter().map(vertex).collect();
+        self.transfers.extend(transfers);
+        let mut edges: Vec<Edge> = self.edges().into_iter().collect();
+        edges.retain(|edge| !self.middles.contains_key(edge) && self.length(*edge) > least_m);
+        edges.sort_unstable();
+        let middle = |&(a, b): &Edge| {
+            let [a_index, b_index] = [a as usize, b as usize];
+            let position = 0.5 * (self.positions[a_index] + self.positions[b_index]);
+            let normal = (self.normals[a_index] + self.normals[b_index]).normalize_or(self.normals[a_index]);
+            let nudge = 0.5 * (nudges[a_index] + nudges[b_index]);
+            let Seen { transfer, buried, .. } = space.see(position, normal, nudge, Rays::Few);
+            let ends = self.transfers[a_index].iter().zip(&self.transfers[b_index]);
+            let squares = transfer.iter().zip(ends).map(|(middle, (a, b))| (middle - 0.5 * (a + b)).powi(2));
+            let difference = if buried { 0.0 } else { squares.sum::<f32>().sqrt() / COSINE_LENGTH };
+            ((a, b), (transfer, difference))
+        };
+        let found: Vec<_> = edges.par_iter().map(middle).collect();
+        self.middles.extend(found);
+    }
+
+    /// Edges whose middle differs: the difference, the edge's length in the group and its places.
+    fn candidates(&self, scale: f32) -> Vec<(f32, f32, Edge)> {
+        let mut worst: HashMap<Edge, (f32, f32)> = HashMap::new();
+        for edge in self.edges() {
+            let Some((_, difference)) = self.middles.get(&edge) else { continue };
+            let length = scale * self.length(edge);
+            let found = worst.entry(self.shared(edge)).or_insert((0.0, length));
+            found.0 = found.0.max(*difference);
+        }
+        worst.into_iter().map(|(edge, (difference, length))| (difference, length, edge)).collect()
+    }
+
+    /// Splits edges, given by their places, and those longest edges of triangles that have to be split before them.
+    fn split(&mut self, mut marked: HashSet<Edge>) {
+        loop {
+            let before = marked.len();
+            for &[a, b, c] in &self.triangles {
+                let sides = [edge(a, b), edge(b, c), edge(c, a)];
+                if sides.iter().any(|side| marked.contains(&self.shared(*side))) {
+                    marked.insert(self.shared(self.longest(&sides)));
+                }
+            }
+            if marked.len() == before {
+                break;
+            }
+        }
+        let mut middle_of: HashMap<Edge, u32> = HashMap::new();
+        let mut done = Vec::with_capacity(self.triangles.len());
+        let mut open: Vec<[u32; 3]> = std::mem::take(&mut self.triangles);
+        open.reverse();
+        while let Some([a, b, c]) = open.pop() {
+            let sides: Vec<Edge> = [edge(a, b), edge(b, c), edge(c, a)]
+                .into_iter()
+                .filter(|side| marked.contains(&self.shared(*side)))
+                .collect();
+            if sides.is_empty() {
+                done.push([a, b, c]);
+                continue;
+            }
+            let side = self.longest(&sides);
+            let middle = *middle_of.entry(side).or_insert_with(|| self.add_middle(side));
+            let [a, b, c] = match side {
+                side if side == edge(a, b) => [a, b, c],
+                side if side == edge(b, c) => [b, c, a],
+                _ => [c, a, b],
+            };
+            open.push([middle, b, c]);
+            open.push([a, middle, c]);
+        }
+        self.triangles = done;
+    }
+
+    /// The longest side; of equal ones that of the lower places, the same for both triangles at an edge.
+    fn longest(&self, sides: &[Edge]) -> Edge {
+        let key = |side: &Edge| (self.length(*side), std::cmp::Reverse(self.shared(*side)));
+        let longer = |a: &Edge, b: &Edge| key(a).0.total_cmp(&key(b).0).then_with(|| key(a).1.cmp(&key(b).1));
+        sides.iter().copied().max_by(longer).expect("a triangle has sides")
+    }
+
+    fn add_middle(&mut self, (a, b): Edge) -> u32 {
+        let [low, high] = [a as usize, b as usize];
+        self.add_position(0.5 * (self.positions[low] + self.positions[high]));
+        self.normals.push((self.normals[low] + self.normals[high]).normalize_or(self.normals[low]));
+        if let Some(colors) = &mut self.colors {
+            colors.push(0.5 * (colors[low] + colors[high]));
+        }
+        if let Some((transfer, _)) = self.middles.remove(&(a, b))
+            && self.transfers.len() + 1 == self.positions.len()
+        {
+            self.transfers.push(transfer);
+        }
+        self.positions.len() as u32 - 1
+    }
+
+    /// Cuts every edge that is longer than `most_m`.
+    fn cut_longest(&mut self, most_m: f32, budget: usize) {
+        while self.positions.len() < budget {
+            let long: HashSet<Edge> =
+                self.edges().into_iter().filter(|e| self.length(*e) > most_m).map(|e| self.shared(e)).collect();
+            if long.is_empty() {
+                break;
+            }
+            self.split(long);
+        }
+    }
+}
+
+/// How finely a group is refined.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Limits {
+    /// Vertices of all surfaces together.
+    pub vertices: usize,
+    /// Longest edge of flat surfaces, in the group's space.
+    pub flat_edge: f32,
+    /// Longest edge of all others.
+    pub edge: f32,
+    /// Edges up to this length are never split.
+    pub least_edge: f32,
+}
+
+/// Refines the surfaces of a group together; each comes with the space that its points are seen in. `told` hears how
+/// many vertices there are.
+pub(super) fn refine(surfaces: &mut [(Refined, GroupSpace<'_>, bool)], limits: &Limits, told: &dyn Fn(usize)) {
+    let count =
+        |surfaces: &[(Refined, GroupSpace<'_>, bool)]| surfaces.iter().map(|s| s.0.positions.len()).sum::<usize>();
+    let start = count(surfaces);
+    if start >= limits.vertices {
+        return;
+    }
+    let share = (limits.vertices - start) / 2;
+    for (refined, space, flat) in surfaces.iter_mut() {
+        let most = if *flat { limits.flat_edge } else { limits.edge };
+        let budget = refined.positions.len() + share;
+        refined.cut_longest(most / space.scale(), budget);
+    }
+    loop {
+        let before = count(surfaces);
+        told(before);
+        if before >= limits.vertices {
+            break;
+        }
+        let mut candidates = Vec::new();
+        for (index, (refined, space, _)) in surfaces.iter_mut().enumerate() {
+            refined.look(space, limits.least_edge / space.scale());
+            let found = refined.candidates(space.scale()).into_iter();
+            candidates.extend(found.filter(|(difference, ..)| *difference > LEAST_DIFFERENCE).map(|c| (index, c)));
+        }
+        let weight = |(_, (difference, length, _)): &(usize, (f32, f32, Edge))| difference * length * length;
+        candidates.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then_with(|| (a.0, a.1.2).cmp(&(b.0, b.1.2))));
+        let room = (limits.vertices - before).min((GROWTH * before as f64) as usize + 64);
+        // An edge of two triangles adds one vertex or two, and as many again where longer edges go first.
+        candidates.truncate((room / 2).max(1));
+        if candidates.is_empty() {
+            break;
+        }
+        for (index, (refined, ..)) in surfaces.iter_mut().enumerate() {
+            let marked: HashSet<Edge> = candidates.iter().filter(|c| c.0 == index).map(|c| c.1.2).collect();
+            if !marked.is_empty() {
+                refined.split(marked);
+            }
+        }
+        if count(surfaces) == before {
+            break;
+        }
+    }
+}

@@ -1,0 +1,543 @@
+//! Surfaces: the meshes of a rigid group as they are lit and drawn, with the own visibility of every vertex past the
+//! whole group.
+
+use super::cluster_order::cluster_order;
+use super::own_visibility::{Blockers, Counts, Eye, PATTERN, Rays, Seen, Standing, see};
+use super::refine::{Limits, Refined, refine};
+use super::triangles::distinct;
+use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted};
+use crate::asset::Mesh;
+use crate::asset::enclose::around_spheres;
+use crate::field::quantity::channel_stride;
+use crate::field::self_visibility::{self, BYTES};
+use crate::layout::CLUSTER_VERTICES;
+use crate::scene::groups::Groups;
+use crate::scene::{Placement, Scene};
+use glam::{DMat3, DVec3, Quat, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Counts in every name of the cache: another number where a bake of surfaces computes something else.
+const VERSION: u32 = 1;
+/// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
+/// that just inside each face.
+const NUDGE: f32 = 0.02;
+/// A member casts its own sharp shadow on a cluster from this distance on, in its bounding radii; nearer ones are part of
+/// the cluster's maps.
+const FAR: f64 = 1.1;
+/// Share of the blocked cosine-weighted hemisphere that shows backs of triangles, from a place inside a solid or below a
+/// sheet.
+const BURIED_BACKS: f64 = 0.5;
+/// Share of it that is blocked there at least.
+const BURIED_BLOCKED: f64 = 0.35;
+/// Places on the way from a buried vertex to the middle of a triangle where one that is not may be.
+const WAYS_OUT: [f32; 5] = [0.06, 0.15, 0.3, 0.5, 0.8];
+
+/// One entity of a group.
+#[derive(Clone)]
+pub struct Member {
+    pub mesh: Arc<Mesh>,
+    pub placement: Placement,
+    pub occludes: bool,
+    /// Members that shine block the view of the sky alone: before sharp lights they stand on lists.
+    pub emits: bool,
+    pub receives: bool,
+}
+
+/// What is baked of one group.
+#[derive(Clone)]
+pub struct GroupPlan {
+    /// The members' entities, of one group of several; every entity with this mesh of a group of one.
+    pub entities: Vec<usize>,
+    members: Vec<Member>,
+    wanted: Wanted,
+    bands: usize,
+    /// Vertices to which all surfaces of the scene may grow, and whether anything moves in it.
+    refinement: Option<(u32, bool)>,
+    /// Name in the cache; `None` where nothing has to be baked.
+    pub key: Option<String>,
+}
+
+/// A surface with its own visibility.
+#[derive(Clone)]
+pub struct BakedSurface {
+    pub mesh: Arc<Mesh>,
+    /// Transfer vectors in the mesh's order of vertices, or `None` where the cosine lobe of the normal is exact.
+    pub transfer: Option<Arc<Vec<f32>>>,
+    /// Self-visibility of every vertex, [`BYTES`] each, or `None` where no sharp light is blocked.
+    pub self_visibility: Option<Arc<Vec<u8>>>,
+    /// For each cluster the members whose shadows of sharp lights its maps have.
+    pub near: Vec<Vec<u32>>,
+}
+
+impl BakedSurface {
+    /// A mesh as it is, which sees nothing of itself.
+    pub fn plain(mesh: &Arc<Mesh>) -> Self {
+        BakedSurface { mesh: mesh.clone(), transfer: None, self_visibility: None, near: Vec::new() }
+    }
+}
+
+/// The groups of a scene as they are baked.
+#[derive(Clone)]
+pub struct SurfacePlan {
+    pub groups: Vec<GroupPlan>,
+}
+
+impl SurfacePlan {
+    pub fn new(scene: &Scene, groups: &Groups, options: &Options, wanted: Wanted) -> Self {
+        let rest = scene.at(0.0);
+        let moves = (0..scene.data.entities.len()).any(|entity| !scene.is_at_rest(entity));
+        let refinement = (options.vertices > 0).then_some((options.vertices, moves));
+        let member = |entity: usize, placement: Placement| {
+            let of = &scene.entities[entity];
+            let mesh = scene.meshes[of.mesh].clone();
+            Member { mesh, placement, occludes: of.occludes, emits: of.emits, receives: of.receives }
+        };
+        let mut plans: Vec<GroupPlan> = Vec::new();
+        for entities in groups.members() {
+            let members: Vec<Member> = match entities[..] {
+                // What an entity blocks of its own view does not depend on its place.
+                [only] => vec![Member { occludes: true, emits: false, ..member(only, AT_ORIGIN) }],
+                _ => entities.iter().map(|&entity| member(entity, rest[entity])).collect(),
+            };
+            let mut plan = GroupPlan { entities, members, wanted, bands: options.bands, refinement, key: None };
+            plan.key = plan.needs_bake().then(|| plan.name());
+            // Entities alone with equal meshes share what is baked.
+            let is_alike = |other: &&mut GroupPlan| {
+                plan.members.len() == 1
+                    && other.members.len() == 1
+                    && other.members[0].receives == plan.members[0].receives
+                    && other.members[0].mesh.content_hash() == plan.members[0].mesh.content_hash()
+            };
+            match plans.iter_mut().find(is_alike) {
+                Some(known) => known.entities.extend(&plan.entities),
+                None => plans.push(plan),
+            }
+        }
+        SurfacePlan { groups: plans }
+    }
+
+    /// Names of all that is baked: another scene with these names needs the same surfaces.
+    pub fn keys(&self) -> Vec<(&[usize], Option<&str>)> {
+        self.groups.iter().map(|group| (&group.entities[..], group.key.as_deref())).collect()
+    }
+}
+
+const AT_ORIGIN: Placement = Placement { position: Vec3::ZERO, rotation: Quat::IDENTITY, scale: 1.0 };
+
+impl GroupPlan {
+    /// A mesh that nothing surrounds.
+    pub fn alone(mesh: &Arc<Mesh>, options: &Options, wanted: Wanted) -> Self {
+        let members =
+            vec![Member { mesh: mesh.clone(), placement: AT_ORIGIN, occludes: true, emits: false, receives: true }];
+        let bands = options.bands;
+        let mut plan = GroupPlan { entities: Vec::new(), members, wanted, bands, refinement: None, key: None };
+        plan.key = plan.needs_bake().then(|| plan.name());
+        plan
+    }
+
+    fn needs_bake(&self) -> bool {
+        let shades_itself = |mesh: &Mesh| !mesh.is_flat() && !mesh.is_convex();
+        let lit = self.wanted.transfer || self.wanted.self_visibility;
+        match &self.members[..] {
+            [only] => lit && only.receives && (shades_itself(&only.mesh) || self.refinement.is_some()),
+            members => lit && members.iter().any(|member| member.receives),
+        }
+    }
+
+    /// A hash of everything that decides the surfaces.
+    fn name(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        let numbers = format!(
+            "{VERSION} {} {:?} {:?} {PATTERN} {TRANSFER_OFFSET} {:?}",
+            self.bands,
+            self.wanted,
+            self.refinement,
+            [self_visibility::RIM, self_visibility::LIMIT_RAD, self_visibility::DISTANCE_STEPS]
+        );
+        hasher.update(numbers.as_bytes());
+        for member in &self.members {
+            hasher.update(&member.mesh.content_hash());
+            hasher
+                .update(format!("{:?}", (member.placement, member.occludes, member.emits, member.receives)).as_bytes());
+        }
+        hasher.finalize().to_hex()[..32].to_owned()
+    }
+
+    /// What people read.
+    pub fn title(&self) -> String {
+        match &self.members[..] {
+            [only] => format!("{} view", only.mesh.name),
+            members => format!("view of {} things at rest", members.len()),
+        }
+    }
+
+    /// Vertices before they are refined.
+    pub fn vertex_count(&self) -> usize {
+        self.members.iter().map(|member| member.mesh.positions.len()).sum()
+    }
+
+    /// The surfaces of the members as they are, with nothing baked.
+    pub fn plain(&self) -> Vec<BakedSurface> {
+        self.members.iter().map(|member| BakedSurface::plain(&member.mesh)).collect()
+    }
+
+    /// Refines the members and casts their rays. A surface for each member.
+    pub fn bake(&self, progress: Progress<'_>) -> (Vec<BakedSurface>, BakeReport) {
+        let started = Instant::now();
+        let group = Group::new(self);
+        let receivers: Vec<usize> = (0..self.members.len()).filter(|&i| self.members[i].receives).collect();
+        let mut refined: Vec<(Refined, GroupSpace<'_>, bool)> = receivers
+            .iter()
+            .map(|&i| (Refined::new(&self.members[i].mesh), group.space(i), self.members[i].mesh.is_flat()))
+            .collect();
+        if let Some(limits) = self.limits(&group) {
+            let most = limits.vertices.max(1) as u32;
+            refine(&mut refined, &limits, &|count| progress((count as u32).min(most) / 2, most));
+        }
+        let mut surfaces = self.plain();
+        let total: usize = refined.iter().map(|(refined, ..)| refined.positions.len()).sum();
+        let mut done = 0;
+        for (&member, (refined, space, _)) in receivers.iter().zip(refined) {
+            let own = &self.members[member].mesh;
+            let is_new = refined.positions.len() != own.positions.len();
+            let mesh = if is_new { Arc::new(refined.into_mesh(own)) } else { own.clone() };
+            let tell = |vertices: usize| {
+                progress((total + done + vertices) as u32 / 2, total.max(1) as u32);
+            };
+            surfaces[member] = space.surface(mesh, self.wanted, &tell);
+            done += surfaces[member].mesh.positions.len();
+        }
+        let report = BakeReport { samples: total as u32, total: started.elapsed(), ..Default::default() };
+        (surfaces, report)
+    }
+
+    fn limits(&self, group: &Group<'_>) -> Option<Limits> {
+        let (vertices, moves) = self.refinement?;
+        // What stands on a ground decides what is fine, not the ground.
+        let solid: Vec<(DVec3, f64)> =
+            group.spheres.iter().zip(&self.members).filter(|(_, m)| !m.mesh.is_flat()).map(|(s, _)| *s).collect();
+        let extent = around_spheres(&solid).map_or(2.0, |(_, radius)| 2.0 * radius) as f32;
+        let flat_area: f64 = group
+            .standings
+            .iter()
+            .zip(&self.members)
+            .filter(|(_, member)| member.mesh.is_flat() && member.receives)
+            .map(|(s, member)| member.mesh.area_m2() * (s.radius / f64::from(member.mesh.bounding_sphere().1)).powi(2))
+            .sum();
+        let flat_edge = (0.02 * extent).max((4.0 * flat_area / f64::from(vertices)).sqrt() as f32);
+        Some(Limits {
+            vertices: vertices as usize,
+            flat_edge: if moves { flat_edge } else { 0.1 * extent.max(1.0) },
+            edge: 0.1 * extent,
+            least_edge: 0.004 * extent,
+        })
+    }
+}
+
+/// The triangles of a group in a frame in which its bounding sphere is the unit sphere.
+struct Group<'p> {
+    plan: &'p GroupPlan,
+    blockers: Blockers,
+    centre: DVec3,
+    radius_m: f64,
+    standings: Vec<Standing>,
+    spheres: Vec<(DVec3, f64)>,
+}
+
+impl<'p> Group<'p> {
+    fn new(plan: &'p GroupPlan) -> Self {
+        let world: Vec<(DVec3, f64)> =
+            plan.members.iter().map(|member| member.placement.sphere(member.mesh.bounding_sphere())).collect();
+        let (centre, radius_m) = around_spheres(&world).unwrap_or((DVec3::ZERO, 1.0));
+        let spheres: Vec<(DVec3, f64)> =
+            world.iter().map(|(c, radius)| ((*c - centre) / radius_m, radius / radius_m)).collect();
+        let standings = plan
+            .members
+            .iter()
+            .zip(&spheres)
+            .map(|(member, (_, radius))| Standing {
+                rotation: DMat3::from_quat(member.placement.turn()),
+                radius: *radius,
+            })
+            .collect();
+        let to_group =
+            |member: &Member, p: Vec3| ((member.placement.point(p.as_dvec3()) - centre) / radius_m).as_vec3();
+        let corners = plan.members.iter().enumerate().flat_map(|(index, member)| {
+            let positions: Vec<Vec3> = member.mesh.positions.iter().map(|&p| to_group(member, p)).collect();
+            let triangles: Vec<[Vec3; 3]> =
+                distinct(&member.mesh).iter().map(|t| t.map(|i| positions[i as usize])).collect();
+            triangles.into_iter().map(move |corners| (index as u32, corners))
+        });
+        Group { plan, blockers: Blockers::new(corners), centre, radius_m, standings, spheres }
+    }
+
+    fn space(&self, member: usize) -> GroupSpace<'_> {
+        GroupSpace { group: self, member }
+    }
+}
+
+/// A member among its group: sees points of its own frame.
+pub(super) struct GroupSpace<'g> {
+    group: &'g Group<'g>,
+    member: usize,
+}
+
+impl GroupSpace<'_> {
+    fn own(&self) -> &Member {
+        &self.group.plan.members[self.member]
+    }
+
+    /// Lengths in the group's frame over lengths in the member's.
+    pub fn scale(&self) -> f32 {
+        (f64::from(self.own().placement.scale) / self.group.radius_m) as f32
+    }
+
+    fn blocks(&self, member: u32) -> bool {
+        member as usize == self.member || self.group.plan.members[member as usize].occludes
+    }
+
+    /// From each vertex towards the middle of its triangles, along the surface; and off the surface, by less than the
+    /// shortest edge around it.
+    pub fn nudges(&self, positions: &[Vec3], normals: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+        let mut sums = vec![(Vec3::ZERO, 0.0_f32, f32::INFINITY); positions.len()];
+        for triangle in triangles {
+            let corners = triangle.map(|v| positions[v as usize]);
+            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+            for k in 0..3 {
+                let side = corners[k].distance(corners[(k + 1) % 3]);
+                let (sum, count, shortest) = &mut sums[triangle[k] as usize];
+                *sum += middle - corners[k];
+                *count += 1.0;
+                *shortest = shortest.min(side);
+            }
+        }
+        let (_, radius_m) = self.own().mesh.bounding_sphere();
+        let least = 1e-5 / self.scale();
+        sums.iter()
+            .zip(normals)
+            .map(|((sum, count, shortest), normal)| {
+                let inward = *sum / count.max(1.0);
+                let along = inward - inward.dot(*normal) * *normal;
+                let off = (TRANSFER_OFFSET * radius_m).min(0.05 * shortest).max(least);
+                NUDGE * along + off * *normal
+            })
+            .collect()
+    }
+
+    /// A point of the member's frame as seen from where it is nudged to.
+    pub fn see(&self, position: Vec3, normal: Vec3, nudge: Vec3, rays: Rays) -> Seen {
+        self.see_with(position, normal, nudge, rays, None)
+    }
+
+    fn see_with(
+        &self,
+        position: Vec3,
+        normal: Vec3,
+        nudge: Vec3,
+        rays: Rays,
+        in_map: Option<&(dyn Fn(u32) -> bool + Sync)>,
+    ) -> Seen {
+        let group = self.group;
+        let world = self.own().placement.point((position + nudge).as_dvec3());
+        let eye = Eye { origin: ((world - group.centre) / group.radius_m).as_vec3(), normal };
+        let blocks = |member: u32| self.blocks(member);
+        let standing = &group.standings[self.member];
+        let counts = Counts { blocks: &blocks, in_map };
+        let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
+        seen.buried = seen.blocked > BURIED_BLOCKED && seen.behind > BURIED_BACKS * seen.blocked;
+        seen
+    }
+
+    /// The members that are so near a cluster, given by its vertices, that its maps have their shadows.
+    fn near(&self, positions: impl Iterator<Item = Vec3> + Clone) -> Vec<u32> {
+        let group = self.group;
+        let place = |p: Vec3| (self.own().placement.point(p.as_dvec3()) - group.centre) / group.radius_m;
+        let count = positions.clone().count().max(1) as f64;
+        let centre = positions.clone().map(place).sum::<DVec3>() / count;
+        let radius = positions.map(|p| place(p).distance(centre)).fold(0.0, f64::max);
+        let is_near = |member: &usize| {
+            let (middle, reach) = group.spheres[*member];
+            let of = &group.plan.members[*member];
+            *member == self.member || (of.occludes && !of.emits && middle.distance(centre) - radius < FAR * reach)
+        };
+        (0..group.spheres.len()).filter(is_near).map(|member| member as u32).collect()
+    }
+
+    /// The surface with the own visibility of its vertices. `told` hears of the vertices that are done.
+    fn surface(&self, mesh: Arc<Mesh>, wanted: Wanted, told: &dyn Fn(usize)) -> BakedSurface {
+        let plan = self.group.plan;
+        let order = cluster_order(&mesh);
+        let nudges = self.nudges(&mesh.positions, &mesh.normals, &mesh.triangles);
+        let mut middles: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.positions.len()];
+        for triangle in &mesh.triangles {
+            let middle = triangle.iter().map(|&v| mesh.positions[v as usize]).sum::<Vec3>() / 3.0;
+            triangle.iter().for_each(|&v| middles[v as usize].push(middle));
+        }
+        let stride = channel_stride(plan.bands);
+        let mut transfer = vec![0.0; mesh.positions.len() * stride];
+        let mut maps = vec![0; if wanted.self_visibility { mesh.positions.len() * BYTES } else { 0 }];
+        let mut near = Vec::with_capacity(order.len().div_ceil(CLUSTER_VERTICES as usize));
+        let mut any_blocked = false;
+        let clusters: Vec<&[u32]> = order.chunks(CLUSTER_VERTICES as usize).collect();
+        let mut done = 0;
+        for batch in clusters.chunks(16) {
+            let look = |cluster: &&[u32]| {
+                let near = self.near(cluster.iter().map(|&v| mesh.positions[v as usize]));
+                let in_map = |member: u32| near.binary_search(&member).is_ok();
+                let vertex = |&v: &u32| {
+                    let v = v as usize;
+                    let (position, normal, nudge) = (mesh.positions[v], mesh.normals[v], nudges[v]);
+                    let in_map = wanted.self_visibility.then_some(&in_map as &(dyn Fn(u32) -> bool + Sync));
+                    let see = |position| self.see_with(position, normal, nudge, Rays::Many, in_map);
+                    let here = see(position);
+                    if !here.buried {
+                        return here;
+                    }
+                    let ways = WAYS_OUT.iter().flat_map(|way| middles[v].iter().map(move |m| position.lerp(*m, *way)));
+                    let free = |place: &Vec3| !self.see(*place, normal, nudge, Rays::Few).buried;
+                    ways.into_iter().find(free).map_or(here, see)
+                };
+                let seen: Vec<Seen> = cluster.par_iter().with_max_len(8).map(vertex).collect();
+                (near, seen)
+            };
+            let found: Vec<(Vec<u32>, Vec<Seen>)> = batch.par_iter().map(look).collect();
+            for (cluster, (members, seen)) in batch.iter().zip(found) {
+                for (&v, seen) in cluster.iter().zip(seen) {
+                    any_blocked |= seen.blocked > 0.0;
+                    transfer[v as usize * stride..][..stride].copy_from_slice(&seen.transfer);
+                    if wanted.self_visibility {
+                        maps[v as usize * BYTES..][..BYTES].copy_from_slice(&seen.map);
+                    }
+                }
+                near.push(members);
+                done += cluster.len();
+            }
+            told(done);
+        }
+        BakedSurface {
+            mesh,
+            transfer: (any_blocked && wanted.transfer).then(|| Arc::new(transfer)),
+            self_visibility: (any_blocked && wanted.self_visibility).then(|| Arc::new(maps)),
+            near,
+        }
+    }
+}
+
+/// How a surface is kept in the cache.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct StoredSurface {
+    vertices: usize,
+    triangles: usize,
+    /// Whether its geometry follows, as that of a mesh that was refined.
+    refined: bool,
+    transfer: bool,
+    self_visibility: bool,
+    /// Clusters with near members, whose counts and numbers end the payload.
+    clusters: usize,
+}
+
+/// The header of a cached group.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct StoredGroup {
+    key: String,
+    surfaces: Vec<StoredSurface>,
+}
+
+impl GroupPlan {
+    /// Header and payload of what was baked.
+    pub(super) fn store(&self, surfaces: &[BakedSurface]) -> (StoredGroup, Vec<u8>) {
+        let mut payload = Vec::new();
+        let mut stored = Vec::new();
+        for (member, surface) in self.members.iter().zip(surfaces) {
+            let BakedSurface { mesh, transfer, self_visibility, near } = surface;
+            let refined = !Arc::ptr_eq(mesh, &member.mesh);
+            if refined {
+                payload.extend_from_slice(bytemuck::cast_slice(&mesh.positions));
+                payload.extend_from_slice(bytemuck::cast_slice(&mesh.normals));
+                payload.extend_from_slice(bytemuck::cast_slice(mesh.colors.as_deref().unwrap_or_default()));
+                payload.extend_from_slice(bytemuck::cast_slice(&mesh.triangles));
+            }
+            if let Some(floats) = transfer {
+                payload.extend_from_slice(bytemuck::cast_slice(floats));
+            }
+            if let Some(maps) = self_visibility {
+                payload.extend_from_slice(maps);
+            }
+            stored.push(StoredSurface {
+                vertices: mesh.positions.len(),
+                triangles: mesh.triangles.len(),
+                refined,
+                transfer: transfer.is_some(),
+                self_visibility: self_visibility.is_some(),
+                clusters: near.len(),
+            });
+            for members in near {
+                payload.extend_from_slice(&(members.len() as u32).to_le_bytes());
+                payload.extend_from_slice(bytemuck::cast_slice(members));
+            }
+        }
+        (StoredGroup { key: self.key.clone().unwrap_or_default(), surfaces: stored }, payload)
+    }
+
+    /// What header and payload hold; `None` where they hold something else.
+    pub(super) fn restore(&self, header: &StoredGroup, payload: &[u8]) -> Option<Vec<BakedSurface>> {
+        if self.key.as_ref() != Some(&header.key) || header.surfaces.len() != self.members.len() {
+            return None;
+        }
+        let mut rest = payload;
+        let mut take = |bytes: usize| {
+            let (taken, after) = rest.split_at_checked(bytes)?;
+            rest = after;
+            Some(taken)
+        };
+        let mut surfaces = Vec::new();
+        for (member, stored) in self.members.iter().zip(&header.surfaces) {
+            let mut mesh = member.mesh.clone();
+            if stored.refined {
+                let mut vectors = || Some(bytemuck::pod_collect_to_vec(take(stored.vertices.checked_mul(12)?)?));
+                let positions: Vec<Vec3> = vectors()?;
+                let normals: Vec<Vec3> = vectors()?;
+                let colors = match mesh.colors {
+                    Some(_) => Some(vectors()?),
+                    None => None,
+                };
+                let triangles: Vec<[u32; 3]> = bytemuck::pod_collect_to_vec(take(stored.triangles.checked_mul(12)?)?);
+                let fits = triangles.iter().flatten().all(|&v| (v as usize) < positions.len());
+                let is_finite = positions.iter().chain(&normals).all(|v| v.is_finite());
+                if !fits || !is_finite {
+                    return None;
+                }
+                mesh = Arc::new(mesh.refined(positions, normals, colors, triangles));
+            } else if stored.vertices != mesh.positions.len() {
+                return None;
+            }
+            let floats = stored.vertices.checked_mul(4 * channel_stride(self.bands))?;
+            let transfer = match stored.transfer {
+                true => Some(Arc::new(bytemuck::pod_collect_to_vec(take(floats)?))),
+                false => None,
+            };
+            let self_visibility = match stored.self_visibility {
+                true => Some(Arc::new(take(stored.vertices.checked_mul(BYTES)?)?.to_vec())),
+                false => None,
+            };
+            let mut near = Vec::new();
+            for _ in 0..stored.clusters {
+                let count: u32 = bytemuck::pod_read_unaligned(take(4)?);
+                near.push(bytemuck::pod_collect_to_vec(take(4 * count as usize)?));
+            }
+            surfaces.push(BakedSurface { mesh, transfer, self_visibility, near });
+        }
+        rest.is_empty().then_some(surfaces)
+    }
+
+    /// Entities of a cluster's near members.
+    pub(super) fn entities_of(&self, members: &[u32]) -> Vec<u32> {
+        if self.members.len() == 1 {
+            return Vec::new();
+        }
+        members.iter().filter_map(|&member| self.entities.get(member as usize)).map(|&entity| entity as u32).collect()
+    }
+}

@@ -1,0 +1,83 @@
+//! Rigid groups: entities that never move against each other. A vertex's own visibility is past its whole group, so
+//! members never stand on each other's lists.
+
+use super::light::{self, Lights};
+use super::{LightMethod, Scene};
+
+/// The group of every entity. An entity that moves is a group by itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Groups {
+    of: Vec<u32>,
+}
+
+impl Groups {
+    /// The groups of a scene: all entities at rest are one, less those that were taken out ([`Scene::loosen`]).
+    ///
+    /// Lights in bands meet what lies before them in the chain of a vertex, so in a scene with such lights every entity
+    /// is a group by itself.
+    pub fn new(scene: &Scene, lights: Lights) -> Self {
+        let is_banded = |entity: usize| {
+            scene.entities[entity].emits && LightMethod::of(scene, entity, lights) == LightMethod::Harmonics
+        };
+        let banded = lights == Lights::Sh && light::has_emitters(scene) || (0..scene.entities.len()).any(is_banded);
+        let rests = |entity: &usize| scene.is_at_rest(*entity) && !banded;
+        let first = (0..scene.entities.len()).find(rests).unwrap_or(0) as u32;
+        let group = |entity: usize| if rests(&entity) { first } else { entity as u32 };
+        Groups { of: (0..scene.entities.len()).map(group).collect() }
+    }
+
+    /// Every entity by itself.
+    pub fn alone(count: usize) -> Self {
+        Groups { of: (0..count as u32).collect() }
+    }
+
+    /// Whether two entities never move against each other.
+    pub fn share(&self, a: usize, b: usize) -> bool {
+        self.of[a] == self.of[b]
+    }
+
+    /// The members of every group, in order.
+    pub fn members(&self) -> Vec<Vec<usize>> {
+        let mut members = vec![Vec::new(); self.of.len()];
+        for (entity, &group) in self.of.iter().enumerate() {
+            members[group as usize].push(entity);
+        }
+        members.retain(|members| !members.is_empty());
+        members
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::embedded;
+    use std::path::Path;
+
+    fn scene(emission: &str) -> Scene {
+        let text = format!(
+            "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n\
+             [[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.5, subdivisions = 1 }}\n\
+             [[mesh]]\nname = \"rings\"\ntorus_two_colour = {{ major_m = 0.3, minor_m = 0.1, segments = 12, sides = 6 }}\n\
+             [[entity]]\nmesh = \"ball\"\n[[entity]]\nmesh = \"ball\"\nmotion = [{{ spin = {{ period_s = 4 }} }}]\n\
+             [[entity]]\nmesh = \"ball\"\nposition = [2, 0, 0]\n[[entity]]\nmesh = \"rings\"\n{emission}\n"
+        );
+        Scene::parse(&text, Path::new("test.toml"), &embedded::read).unwrap()
+    }
+
+    #[test]
+    fn entities_at_rest_are_one_group() {
+        let mut scene = scene("");
+        let groups = Groups::new(&scene, Lights::Sharp);
+        assert_eq!(groups.members(), [vec![0, 2, 3], vec![1]]);
+        assert!(groups.share(0, 3) && !groups.share(0, 1));
+        scene.loosen(0);
+        assert_eq!(Groups::new(&scene, Lights::Sharp).members(), [vec![0], vec![1], vec![2, 3]]);
+        assert_eq!(Groups::alone(2).members(), [[0], [1]]);
+    }
+
+    #[test]
+    fn a_light_in_bands_leaves_every_entity_alone() {
+        let scene = scene("emission = [1, 1, 1]");
+        assert_eq!(Groups::new(&scene, Lights::Sharp), Groups::alone(4));
+    }
+}

@@ -30,8 +30,10 @@
 //! - Small occluders: an occluder whose bounding sphere has a half-angle below 12 degrees blocks a point. It takes away
 //!   the chain's value in its direction times the solid angle of a projected area, which is fitted to its outermost
 //!   shell ([`field::Area`]). Up to 16 degrees the point and the field share.
-//! - Entities: an emitter does not occlude, flat ground only receives, and everything else does both. Each can be set
-//!   per entity. Scales are uniform and positive.
+//! - Entities: everything receives, and everything but emitters occludes. Each can be set per entity. Scales are uniform
+//!   and positive.
+//! - Sheets: a flat mesh blocks light from both sides. A point within 0.002 bounding radii of its receiver from the
+//!   sheet's plane counts as that far from it, on the side of its receiver's centre ([`field::sheet`]).
 //! - Light: it is linear Rec.709 radiance. The radiosity is B = albedo/pi * integral of L V max(0, n.w) dw.
 //! - Numbers: tables are made in f64, shaders compute in f32, and fields are stored as f16 or f32.
 //!

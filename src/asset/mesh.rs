@@ -111,7 +111,12 @@ impl Mesh {
 
     /// Whether all vertices lie in one plane, within 1e-5 of the bounding radius.
     pub fn is_flat(&self) -> bool {
-        self.shape.flat
+        self.shape.plane.is_some()
+    }
+
+    /// Unit normal of the plane of a flat mesh.
+    pub(crate) fn plane_normal(&self) -> Option<DVec3> {
+        self.shape.plane
     }
 
     /// Vertices - edges + triangles after welding equal positions: 2 for a sphere, 0 for a torus.

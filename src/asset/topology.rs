@@ -14,8 +14,8 @@ pub struct Topology {
     pub solid: bool,
     /// Closed, in one piece, Euler characteristic 2, no edge bends inwards.
     pub convex: bool,
-    /// All vertices in one plane.
-    pub flat: bool,
+    /// Unit normal of the plane in which all vertices lie, if they do.
+    pub plane: Option<DVec3>,
     /// Vertices - edges + triangles.
     pub euler_characteristic: i64,
 }
@@ -53,7 +53,7 @@ pub fn shape(positions: &[Vec3], triangles: &[[u32; 3]], centre: Vec3, radius_m:
         && euler_characteristic == 2
         && pieces(&edges, triangles.len()).count == 1
         && edges.iter().all(|e| bends_outwards(e, positions, triangles, f64::from(radius_m)));
-    Topology { closed, solid, convex, flat: is_flat(positions, f64::from(radius_m)), euler_characteristic }
+    Topology { closed, solid, convex, plane: plane(positions, f64::from(radius_m)), euler_characteristic }
 }
 
 /// Signed volume in cubic metres: the sum of the tetrahedra from `centre` to every triangle.
@@ -181,7 +181,7 @@ fn bends_outwards(edge: &[HalfEdge], positions: &[Vec3], triangles: &[[u32; 3]],
 
 /// Chooses three vertices that span the set widely, so that the plane is well determined, and tests all others against
 /// it.
-fn is_flat(positions: &[Vec3], radius_m: f64) -> bool {
+fn plane(positions: &[Vec3], radius_m: f64) -> Option<DVec3> {
     let most = |measure: &dyn Fn(DVec3) -> f64| {
         let larger = |a: DVec3, b: DVec3| if measure(b) > measure(a) { b } else { a };
         positions.iter().map(|p| p.as_dvec3()).reduce(larger).unwrap_or_default()
@@ -189,6 +189,6 @@ fn is_flat(positions: &[Vec3], radius_m: f64) -> bool {
     let a = positions[0].as_dvec3();
     let b = most(&|p| p.distance_squared(a));
     let c = most(&|p| (p - a).cross(b - a).length_squared());
-    let Some(normal) = (b - a).cross(c - a).try_normalize() else { return false };
-    positions.iter().all(|p| normal.dot(p.as_dvec3() - a).abs() <= FLAT_TOLERANCE * radius_m)
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    positions.iter().all(|p| normal.dot(p.as_dvec3() - a).abs() <= FLAT_TOLERANCE * radius_m).then_some(normal)
 }

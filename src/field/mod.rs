@@ -9,6 +9,7 @@ pub mod growth;
 pub mod lattice;
 pub mod quantity;
 pub mod self_visibility;
+pub mod sheet;
 pub mod silhouette;
 pub mod silhouette_header;
 pub mod silhouette_nodes;

@@ -261,7 +261,7 @@ pub struct EntityData {
     /// Whether it lights others. By default it does if it has emission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub emits: Option<bool>,
-    /// Whether it casts shadows. By default it does unless it emits or is flat.
+    /// Whether it casts shadows. By default it does unless it emits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub occludes: Option<bool>,
     /// Whether it is lit. By default it is.

@@ -215,7 +215,7 @@ impl Scene {
     /// As [`Scene::set_entity`], of numbers in range.
     pub(crate) fn put_entity(&mut self, index: usize, data: EntityData) {
         let mesh = self.entities[index].mesh;
-        self.entities[index] = resolve(index, &data, mesh, &self.meshes[mesh]);
+        self.entities[index] = resolve(index, &data, mesh);
         self.data.entities[index] = data;
     }
 
@@ -253,7 +253,7 @@ fn resolve_all(data: &Data, meshes: &[Arc<Mesh>], fail: impl Fn(usize, String) -
         let mesh = data.meshes.iter().position(|mesh| mesh.name == entity.mesh);
         let mesh = mesh.ok_or_else(|| fail(i, format!("there is no mesh {:?}", entity.mesh)))?;
         check_spot(entity, &meshes[mesh]).map_err(|what| fail(i, what.to_owned()))?;
-        Ok(resolve(i, entity, mesh, &meshes[mesh]))
+        Ok(resolve(i, entity, mesh))
     };
     data.entities.iter().enumerate().map(entity).collect()
 }
@@ -264,9 +264,8 @@ fn check_spot(data: &EntityData, mesh: &Mesh) -> std::result::Result<(), &'stati
     if data.spot.is_some() && has_colors { Err("a spot takes a mesh without colours of its own") } else { Ok(()) }
 }
 
-/// Resolves the switches. By default, an entity emits if it has emission, occludes unless it emits or is flat, and
-/// receives.
-fn resolve(index: usize, data: &EntityData, mesh: usize, shape: &Mesh) -> Entity {
+/// Resolves the switches. By default, an entity emits if it has emission, occludes unless it emits, and receives.
+fn resolve(index: usize, data: &EntityData, mesh: usize) -> Entity {
     let emits = data.emits.unwrap_or(data.emission != Vec3::ZERO);
     Entity {
         name: data.name.clone().unwrap_or_else(|| format!("entity {index}")),
@@ -275,7 +274,7 @@ fn resolve(index: usize, data: &EntityData, mesh: usize, shape: &Mesh) -> Entity
         emission: data.emission,
         spot: data.spot,
         emits,
-        occludes: data.occludes.unwrap_or(!emits && !shape.is_flat()),
+        occludes: data.occludes.unwrap_or(!emits),
         receives: data.receives.unwrap_or(true),
     }
 }

@@ -6,7 +6,7 @@ use crate::bake::{bakes_transfer, first_shell};
 use crate::field::Fit;
 use crate::field::lattice::ROOMY_INNER;
 use crate::scene::Scene;
-use glam::{Vec3, Vec3A};
+use glam::{DVec3, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
 use obvhs::ray::{Ray, RayHit};
@@ -25,6 +25,8 @@ pub struct RayMesh {
     pub inner_radius: f32,
     /// Whether it can shadow itself.
     pub self_shadowing: bool,
+    /// Unit normal of its plane, of a flat mesh.
+    pub normal: Option<DVec3>,
 }
 
 /// The meshes of a scene, in its order.
@@ -58,6 +60,7 @@ impl RayMesh {
             // `first_shell` answers with a shell off the surface where the mesh nearly fills its sphere.
             inner_radius: if inner > ROOMY_INNER { inner.min(0.93) as f32 } else { 0.0 },
             self_shadowing: bakes_transfer(mesh),
+            normal: mesh.plane_normal(),
         }
     }
 

@@ -5,6 +5,7 @@ use super::ray_mesh::{RayMesh, RayMeshes};
 use super::sequence::Axes;
 use crate::bake::TRANSFER_OFFSET;
 use crate::field::lattice::cap_height;
+use crate::field::sheet;
 use crate::scene::{Placement, Scene};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
@@ -123,7 +124,19 @@ impl<'s> World<'s> {
     /// Every occluder of a vertex but its own entity, in the order of indices.
     pub fn occluders(&self, view: &VertexView) -> Vec<EntityView> {
         let others = self.occluders.iter().filter(|&&j| j != view.entity);
-        others.map(|&j| self.sight(j, view.position)).collect()
+        others.map(|&j| self.sight(j, self.beside(j, view))).collect()
+    }
+
+    /// Where a vertex sees an occluder from: its own place, off the plane of a sheet ([`sheet::height_over`]).
+    fn beside(&self, occluder: usize, view: &VertexView) -> DVec3 {
+        let placed = &self.entities[occluder];
+        let Some(normal) = placed.mesh.normal else { return view.position };
+        let normal = placed.rotation * normal;
+        let receiver = &self.entities[view.entity];
+        let height = normal.dot(view.position - placed.centre);
+        let of_centre = normal.dot(receiver.centre - placed.centre);
+        let contact = sheet::CONTACT * receiver.radius_m;
+        view.position + normal * (sheet::height_over(height, of_centre, normal.dot(view.normal), contact) - height)
     }
 
     /// Every light of a vertex but its own entity.

@@ -294,3 +294,24 @@ fn a_pixel_is_lit_where_its_middle_meets_the_floor() {
     }
     assert!(lit.len() > 300 && near_form > lit.len() * 8 / 10 && near_form < lit.len(), "{near_form} of {}", lit.len());
 }
+
+/// A patch that stands on a floor sees half of the sky, wherever its rim lies within rounding of the floor, and the
+/// rim's vertices as all others.
+#[test]
+fn a_floor_blocks_the_light_from_below() {
+    for sunk in [-1e-6, 0.0, 1e-6] {
+        let patch = format!(
+            "[[mesh]]\nname = \"patch\"\nplane = {{ size_m = 0.02, cells = 2 }}\n[[entity]]\nmesh = \"patch\"\n\
+             albedo = [1, 1, 1]\nposition = [0, {}, 0]\nrotation = {{ axis = [0, 0, 1], angle_deg = -90 }}\n",
+            0.01 - sunk
+        );
+        let scene = scene(&format!("{patch}{SKY}"));
+        let shapes = RayMeshes::new(&scene);
+        let world = World::new(&scene, &shapes, &scene.at(0.0));
+        let vertices: Vec<Vertex> = (0..9).map(|index| Vertex { entity: 1, index }).collect();
+        for (vertex, estimate) in vertices.iter().zip(RayCast::default().run(&world, &vertices)) {
+            // The floor ends 2 m away, 0.6 degrees below the horizon.
+            assert!((estimate.radiosity[0] - 0.5).abs() < 0.01, "{vertex:?}, {sunk} m below: {estimate:?}");
+        }
+    }
+}

@@ -27,6 +27,7 @@ pub mod model;
 mod names;
 mod options;
 pub mod own_visibility;
+mod packet;
 pub mod project;
 mod quality;
 pub mod raster;

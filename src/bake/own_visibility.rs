@@ -8,18 +8,14 @@
 //! - The map of [`crate::field::self_visibility`] holds for every node the angle to the nearest ray of the other state.
 //!   Further rays halve the gap between the two until the edge is known to a fraction of a degree.
 
+use super::packet::{BlockerHit, Blockers};
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{BYTES, LIMIT_RAD, NODES, encode_angle, encode_distance, frame, node_direction};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use glam::{DMat3, DVec3, Mat3A, Vec3, Vec3A};
-use obvhs::BvhBuildParams;
-use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
-use obvhs::ray::{Ray, RayHit};
-use obvhs::triangle::Triangle;
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
-use std::time::Duration;
 
 /// Rays of the pattern along an edge of the square that is mapped to the hemisphere. 1 024 rays leave a transfer vector
 /// wrong by 0.004 next to a ball, relative to the clamped cosine.
@@ -61,10 +57,16 @@ impl Rays {
     }
 }
 
+/// Rays of a square of `side` by `side` places, in tiles of neighbours, which meet the same boxes.
 fn rays(side: usize) -> Vec<PatternRay> {
+    const TILE: usize = 4;
     let middle = |i: usize| (0.5 + i as f64) / side as f64;
     let ray = |i: usize| {
-        let local = hemisphere(middle(i % side), middle(i / side));
+        let tile = i / (TILE * TILE);
+        let within = i % (TILE * TILE);
+        let x = tile % (side / TILE) * TILE + within % TILE;
+        let y = tile / (side / TILE) * TILE + within / TILE;
+        let local = hemisphere(middle(x), middle(y));
         PatternRay { local: local.as_vec3a(), weight: local.z * TAU / (side * side) as f64 }
     };
     (0..side * side).map(ray).collect()
@@ -99,58 +101,6 @@ fn hemisphere(u: f64, v: f64) -> DVec3 {
     };
     let flat = radius * (2.0 - radius * radius).sqrt();
     DVec3::new(flat * angle.cos(), flat * angle.sin(), 1.0 - radius * radius)
-}
-
-/// Triangles that block, each of one member of a group.
-pub struct Blockers {
-    hierarchy: CwBvh,
-    /// In the order of the hierarchy's leaves.
-    triangles: Vec<Triangle>,
-    members: Vec<u32>,
-}
-
-/// The first triangle on a ray.
-#[derive(Clone, Copy)]
-pub struct BlockerHit {
-    pub distance: f32,
-    pub member: u32,
-    /// Whether the ray meets its back.
-    pub from_behind: bool,
-}
-
-impl Blockers {
-    /// Builds the hierarchy; one of no triangles blocks nothing.
-    pub fn new(corners: impl IntoIterator<Item = (u32, [Vec3; 3])>) -> Self {
-        let (members, unsorted): (Vec<u32>, Vec<Triangle>) = corners
-            .into_iter()
-            .map(|(member, [a, b, c])| (member, Triangle { v0: a.into(), v1: b.into(), v2: c.into() }))
-            .unzip();
-        let hierarchy = build_cwbvh_from_tris(&unsorted, BvhBuildParams::medium_build(), &mut Duration::default());
-        let order = || hierarchy.primitive_indices.iter().map(|&i| i as usize);
-        Blockers {
-            triangles: order().map(|i| unsorted[i]).collect(),
-            members: order().map(|i| members[i]).collect(),
-            hierarchy,
-        }
-    }
-
-    /// The first triangle of the members that `counts` keeps.
-    pub fn first(&self, origin: Vec3A, direction: Vec3A, counts: impl Fn(u32) -> bool) -> Option<BlockerHit> {
-        if self.triangles.is_empty() {
-            return None;
-        }
-        let mut hit = RayHit::none();
-        let meets = |ray: &Ray, id: usize| match counts(self.members[id]) {
-            true => self.triangles[id].intersect(ray),
-            false => f32::INFINITY,
-        };
-        self.hierarchy.ray_traverse(Ray::new_inf(origin, direction), &mut hit, meets).then(|| {
-            let id = hit.primitive_id as usize;
-            let Triangle { v0, v1, v2 } = self.triangles[id];
-            let from_behind = (v1 - v0).cross(v2 - v0).dot(direction) > 0.0;
-            BlockerHit { distance: hit.t, member: self.members[id], from_behind }
-        })
-    }
 }
 
 /// A point of a surface from which rays leave.
@@ -194,79 +144,224 @@ pub struct Counts<'c> {
     pub in_map: Option<&'c (dyn Fn(u32) -> bool + Sync)>,
 }
 
+/// Rays that leave one point, in the frame of its hemisphere.
+struct Caster<'c> {
+    blockers: &'c Blockers,
+    origin: Vec3A,
+    to_blockers: Mat3A,
+    counts: Counts<'c>,
+}
+
+impl Caster<'_> {
+    fn cast(&self, locals: impl Iterator<Item = Vec3A>, hits: &mut Vec<Option<BlockerHit>>) {
+        let directions: Vec<Vec3A> = locals.map(|local| self.to_blockers * local).collect();
+        self.blockers.first(self.origin, &directions, self.counts.blocks, hits);
+    }
+
+    /// How far each ray comes past all that the map counts; infinity where it is free.
+    fn map_distances(&self, locals: &[Vec3A], hits: &[Option<BlockerHit>]) -> Vec<f32> {
+        let in_map = self.counts.in_map.expect("asked for maps alone");
+        let mut distances: Vec<f32> = hits.iter().map(|hit| hit.map_or(f32::INFINITY, |hit| hit.distance)).collect();
+        let other = |i: &usize| hits[*i].is_some_and(|hit| !in_map(hit.member));
+        let others: Vec<usize> = (0..hits.len()).filter(other).collect();
+        if !others.is_empty() {
+            let directions: Vec<Vec3A> = others.iter().map(|&i| self.to_blockers * locals[i]).collect();
+            let mut behind = Vec::new();
+            self.blockers.first(self.origin, &directions, in_map, &mut behind);
+            for (&i, hit) in others.iter().zip(&behind) {
+                distances[i] = hit.map_or(f32::INFINITY, |hit| hit.distance);
+            }
+        }
+        distances
+    }
+}
+
 /// Casts the rays of one point.
 pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, rays: Rays, counts: Counts<'_>) -> Seen {
     let normal = eye.normal.as_dvec3();
     let to_object = frame(normal);
-    let to_blockers = Mat3A::from((standing.rotation * to_object).as_mat3());
-    let origin = Vec3A::from(eye.origin);
-    let cast = |local: Vec3A| blockers.first(origin, to_blockers * local, counts.blocks);
-    // The distance at which a direction is blocked for the map; infinity where it is free.
-    let map_distance = |hit: Option<BlockerHit>, local: Vec3A, in_map: &dyn Fn(u32) -> bool| match hit {
-        Some(hit) if in_map(hit.member) => hit.distance,
-        Some(_) => blockers.first(origin, to_blockers * local, in_map).map_or(f32::INFINITY, |hit| hit.distance),
-        None => f32::INFINITY,
+    let caster = Caster {
+        blockers,
+        origin: Vec3A::from(eye.origin),
+        to_blockers: Mat3A::from((standing.rotation * to_object).as_mat3()),
+        counts,
     };
+    let pattern = rays.pattern();
+    let mut hits = Vec::with_capacity(pattern.len());
+    caster.cast(pattern.iter().map(|ray| ray.local), &mut hits);
     let mut seen = Seen::default();
     let mut blocked = [0.0; MAX_COEFFICIENTS];
-    let mut distances = [f32::INFINITY; PATTERN];
     let mut basis = [0.0; MAX_COEFFICIENTS];
-    for (ray, distance) in rays.pattern().iter().zip(&mut distances) {
-        let hit = cast(ray.local);
-        if let Some(found) = hit {
-            evaluate(bands, to_object * ray.local.as_dvec3(), &mut basis);
-            blocked.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += ray.weight * y);
-            seen.blocked += ray.weight / PI;
-            seen.behind += if found.from_behind { ray.weight / PI } else { 0.0 };
-            if let Some(in_map) = counts.in_map {
-                *distance = map_distance(hit, ray.local, in_map);
-            }
-        }
+    for (ray, hit) in pattern.iter().zip(&hits) {
+        let Some(found) = hit else { continue };
+        evaluate(bands, to_object * ray.local.as_dvec3(), &mut basis);
+        blocked.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += ray.weight * y);
+        seen.blocked += ray.weight / PI;
+        seen.behind += if found.from_behind { ray.weight / PI } else { 0.0 };
     }
     seen.transfer = vec![0.0; channel_stride(bands)];
     let lobe = clamped_cosine(bands, normal);
     for k in 0..coefficient_count(bands) {
         seen.transfer[k] = (lobe[k] - blocked[k]) as f32;
     }
-    if let Some(in_map) = counts.in_map {
+    if counts.in_map.is_some() {
         assert_eq!(rays, Rays::Many, "maps take all rays");
-        seen.map = map_of(&MANY_RAYS, &distances, standing, |local| map_distance(cast(local), local, in_map));
+        seen.map = map_of(&caster, standing, &hits);
     }
     seen
 }
 
-/// The map for the rays' distances; `cast` casts one more ray.
-fn map_of(pattern: &Pattern, distances: &[f32; PATTERN], standing: &Standing, cast: impl Fn(Vec3A) -> f32) -> Vec<u8> {
+/// A node of a map on its way: where the ray of the other state lies, and how near to the edge it has come.
+struct NodeSearch {
+    node: usize,
+    free: bool,
+    far: Vec3A,
+    low: f32,
+    high: f32,
+    away: f32,
+}
+
+impl NodeSearch {
+    fn middle(&self, toward: Vec3A) -> Vec3A {
+        toward.lerp(self.far, 0.5 * (self.low + self.high)).normalize()
+    }
+}
+
+/// The map of a point whose pattern of rays had these hits.
+fn map_of(caster: &Caster<'_>, standing: &Standing, pattern_hits: &[Option<BlockerHit>]) -> Vec<u8> {
+    let Pattern { rays, nodes, near_nodes } = &*MANY_RAYS;
+    let locals: Vec<Vec3A> = rays.iter().map(|ray| ray.local).collect();
+    let distances = caster.map_distances(&locals, pattern_hits);
     let mut map = vec![u8::MAX; BYTES];
-    for (node, (&toward, near)) in pattern.nodes.iter().zip(&pattern.near_nodes).enumerate() {
-        let here = cast(toward);
-        let free = here.is_infinite();
-        let other = near.iter().find(|(_, ray)| distances[*ray as usize].is_infinite() != free);
-        let Some(&(angle, ray)) = other else {
-            map[node] = encode_angle(if free { LIMIT_RAD } else { -LIMIT_RAD });
-            if !free {
-                map[NODES + node] = encode_distance(f64::from(here) / standing.radius);
-            }
-            continue;
-        };
-        // The edge lies between the node and that ray, and near the ray.
-        let far = pattern.rays[ray as usize].local;
-        let mut away = if free { distances[ray as usize] } else { here };
-        let mut low = (1.0 - 0.15 / angle.max(0.15)).max(0.0);
-        let mut high = 1.0;
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            let found = cast(toward.lerp(far, middle).normalize());
-            if found.is_infinite() == free {
-                low = middle;
-            } else {
-                high = middle;
-                away = if free { found } else { away };
+    if distances.iter().all(|distance| distance.is_infinite()) {
+        map[..NODES].fill(encode_angle(LIMIT_RAD));
+        return map;
+    }
+    let mut hits = Vec::new();
+    caster.cast(nodes.iter().copied(), &mut hits);
+    let here = caster.map_distances(nodes, &hits);
+    let distance_byte = |distance: f32| encode_distance(f64::from(distance) / standing.radius);
+    let mut searches = Vec::new();
+    for (node, near) in near_nodes.iter().enumerate() {
+        let free = here[node].is_infinite();
+        match near.iter().find(|(_, ray)| distances[*ray as usize].is_infinite() != free) {
+            // The edge lies between the node and that ray, and near the ray.
+            Some(&(angle, ray)) => searches.push(NodeSearch {
+                node,
+                free,
+                far: rays[ray as usize].local,
+                low: (1.0 - 0.15 / angle.max(0.15)).max(0.0),
+                high: 1.0,
+                away: if free { distances[ray as usize] } else { here[node] },
+            }),
+            None => {
+                map[node] = encode_angle(if free { LIMIT_RAD } else { -LIMIT_RAD });
+                map[NODES + node] = if free { u8::MAX } else { distance_byte(here[node]) };
             }
         }
-        let edge = toward.angle_between(toward.lerp(far, 0.5 * (low + high)).normalize());
-        map[node] = encode_angle(if free { f64::from(edge) } else { -f64::from(edge) });
-        map[NODES + node] = encode_distance(f64::from(away) / standing.radius);
+    }
+    for _ in 0..HALVINGS {
+        let middles: Vec<Vec3A> = searches.iter().map(|search| search.middle(nodes[search.node])).collect();
+        caster.cast(middles.iter().copied(), &mut hits);
+        for (search, found) in searches.iter_mut().zip(caster.map_distances(&middles, &hits)) {
+            let middle = 0.5 * (search.low + search.high);
+            if found.is_infinite() == search.free {
+                search.low = middle;
+            } else {
+                search.high = middle;
+                search.away = if search.free { found } else { search.away };
+            }
+        }
+    }
+    for search in searches {
+        let toward = nodes[search.node];
+        let edge = f64::from(toward.angle_between(search.middle(toward)));
+        map[search.node] = encode_angle(if search.free { edge } else { -edge });
+        map[NODES + search.node] = distance_byte(search.away);
     }
     map
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate;
+    use crate::field::self_visibility::decode_angle;
+    use crate::sh::quadrature::random_direction;
+
+    /// A receiver at the origin that looks up at a ball of radius 1 whose centre lies `toward`.
+    fn under_a_ball(toward: DVec3, with_map: bool) -> Seen {
+        let ball = generate::sphere(1.0, 5);
+        let corners = ball.triangles.iter().map(|t| (7, t.map(|i| ball.positions[i as usize] + toward.as_vec3())));
+        let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
+        let counts = Counts { blocks: &|_| true, in_map: with_map.then_some(&|member| member == 7) };
+        let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
+        see(&Blockers::new(corners), &standing, &eye, 4, Rays::Many, counts)
+    }
+
+    /// Against the cosine over the cap that the ball covers, by many random directions.
+    #[test]
+    fn a_ball_takes_its_cap_from_the_cosine() {
+        let mut rng = fastrand::Rng::with_seed(4);
+        for toward in [DVec3::new(0.0, 2.0, 0.0), DVec3::new(1.5, 1.5, 0.3), DVec3::new(3.0, 0.5, -2.0)] {
+            let seen = under_a_ball(toward, false);
+            let mut wanted = [0.0; MAX_COEFFICIENTS];
+            let mut basis = [0.0; MAX_COEFFICIENTS];
+            const COUNT: usize = 400_000;
+            for _ in 0..COUNT {
+                let direction = random_direction(&mut rng);
+                let off = toward.length_squared() - direction.dot(toward).powi(2);
+                let blocked = direction.dot(toward) > 0.0 && off < 1.0;
+                if !blocked && direction.y > 0.0 {
+                    evaluate(4, direction, &mut basis);
+                    let weight = 2.0 * TAU * direction.y / COUNT as f64;
+                    wanted.iter_mut().zip(&basis).for_each(|(sum, y)| *sum += weight * y);
+                }
+            }
+            let square = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
+            let error = square(&mut seen.transfer.iter().zip(&wanted).map(|(a, b)| f64::from(*a) - b));
+            let whole = square(&mut wanted.iter().copied());
+            assert!(error < 0.01 * whole, "{toward}: {error} of {whole}");
+        }
+    }
+
+    #[test]
+    fn maps_know_the_edge_and_the_distance_of_a_ball() {
+        let toward = DVec3::new(0.0, 2.0, 0.0);
+        let map = under_a_ball(toward, true).map;
+        let half_rad = 0.5_f64.asin();
+        let mut worst = 0.0_f64;
+        for node in 0..NODES {
+            let direction = frame(DVec3::Y) * node_direction(node);
+            let wanted = (direction.angle_between(toward) - half_rad).clamp(-LIMIT_RAD, LIMIT_RAD);
+            worst = worst.max((decode_angle(map[node]) - wanted).abs());
+        }
+        assert!(worst < 1.5_f64.to_radians(), "{} degrees", worst.to_degrees());
+        let nearest = (0..NODES).min_by(|a, b| node_direction(*b).z.total_cmp(&node_direction(*a).z)).unwrap();
+        let distance = crate::field::self_visibility::decode_distance(map[NODES + nearest]).exp2();
+        assert!((0.95..1.15).contains(&distance), "{distance}");
+    }
+
+    #[test]
+    fn what_the_map_leaves_out_still_blocks_the_sky() {
+        let square = |height: f32| {
+            let corners = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]].map(|[x, z]| Vec3::new(x, height, z));
+            [[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]]
+        };
+        let near = square(1.0).map(|t| (0, t));
+        let far = square(0.5).map(|t| (1, t));
+        let eye = Eye { origin: Vec3::ZERO, normal: Vec3::Y };
+        let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
+        let see_with = |in_map: &(dyn Fn(u32) -> bool + Sync), corners: &[(u32, [Vec3; 3])]| {
+            let counts = Counts { blocks: &|_| true, in_map: Some(in_map) };
+            see(&Blockers::new(corners.iter().copied()), &standing, &eye, 4, Rays::Many, counts)
+        };
+        // The member that the map leaves out stands in front of the one that it has.
+        let both = see_with(&|member| member == 0, &[&near[..], &far[..]].concat());
+        assert!(both.blocked > 0.98, "{}", both.blocked);
+        assert_eq!(both.map, see_with(&|_| true, &near).map);
+        let free = see_with(&|_| false, &near);
+        assert!(free.map[..NODES].iter().all(|angle| decode_angle(*angle) > 0.7) && free.blocked > 0.98);
+        assert!(free.behind < 0.01 || free.behind > 0.9);
+    }
 }

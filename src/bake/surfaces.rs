@@ -2,7 +2,8 @@
 //! whole group.
 
 use super::cluster_order::cluster_order;
-use super::own_visibility::{Blockers, Counts, Eye, PATTERN, Rays, Seen, Standing, see};
+use super::own_visibility::{Counts, Eye, PATTERN, Rays, Seen, Standing, see};
+use super::packet::Blockers;
 use super::refine::{Limits, Refined, refine};
 use super::triangles::distinct;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted};

@@ -1,0 +1,231 @@
+//! Rays from one point against a hierarchy of triangles, sixteen at a time: what a box or a triangle costs is shared by
+//! all, and the compiler turns loops over them into vector instructions, of eight lanes where the processor has AVX2.
+
+use glam::{Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::bvh2::{Bvh2, builder::build_bvh2_from_tris};
+use obvhs::triangle::Triangle;
+use pulp::Arch;
+use std::time::Duration;
+
+/// Rays of a packet.
+const LANES: usize = 16;
+
+/// Triangles that block, each of one member of a group.
+pub struct Blockers {
+    hierarchy: Bvh2,
+    /// In the order of the hierarchy's leaves.
+    triangles: Vec<Corners>,
+    members: Vec<u32>,
+}
+
+/// A corner and the two edges from it.
+#[derive(Clone, Copy)]
+struct Corners {
+    corner: Vec3A,
+    edges: [Vec3A; 2],
+    normal: Vec3A,
+}
+
+/// The first triangle on a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlockerHit {
+    pub distance: f32,
+    pub member: u32,
+    /// Whether the ray meets its back.
+    pub from_behind: bool,
+}
+
+struct Packet {
+    direction: [[f32; LANES]; 3],
+    inverse: [[f32; LANES]; 3],
+    distance: [f32; LANES],
+    triangle: [u32; LANES],
+    middle: Vec3A,
+}
+
+impl Packet {
+    fn new(directions: &[Vec3A]) -> Self {
+        // Lanes without a ray repeat the last one.
+        let lane = |i: usize| directions[i.min(directions.len() - 1)];
+        let axis = |k: usize| -> [f32; LANES] { std::array::from_fn(|i| lane(i)[k]) };
+        let direction = [axis(0), axis(1), axis(2)];
+        Packet {
+            inverse: direction.map(|axis| axis.map(|d| 1.0 / d)),
+            direction,
+            distance: [f32::INFINITY; LANES],
+            triangle: [u32::MAX; LANES],
+            middle: directions.iter().sum(),
+        }
+    }
+
+    /// Whether any ray enters a box, given from the rays' origin, nearer than what it has met.
+    #[inline(always)]
+    fn enters(&self, low: Vec3A, high: Vec3A) -> bool {
+        let mut from = [0.0_f32; LANES];
+        let mut to = self.distance;
+        for k in 0..3 {
+            for i in 0..LANES {
+                let a = low[k] * self.inverse[k][i];
+                let b = high[k] * self.inverse[k][i];
+                let (near, far) = if a < b { (a, b) } else { (b, a) };
+                from[i] = if near > from[i] { near } else { from[i] };
+                to[i] = if far < to[i] { far } else { to[i] };
+            }
+        }
+        (0..LANES).fold(false, |any, i| any | (from[i] <= to[i]))
+    }
+
+    /// Möller, Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, 1997, with the products that all rays from
+    /// one origin share.
+    #[inline(always)]
+    fn meet(&mut self, origin: Vec3A, corners: &Corners, index: u32) {
+        let to_corner = corners.corner - origin;
+        let second = corners.edges[1].cross(to_corner);
+        let first = to_corner.cross(corners.edges[0]);
+        let along = corners.normal.dot(to_corner);
+        let [x, y, z] = &self.direction;
+        for i in 0..LANES {
+            let facing = x[i] * corners.normal.x + y[i] * corners.normal.y + z[i] * corners.normal.z;
+            let inverse = 1.0 / facing;
+            let u = (x[i] * second.x + y[i] * second.y + z[i] * second.z) * inverse;
+            let v = (x[i] * first.x + y[i] * first.y + z[i] * first.z) * inverse;
+            let distance = along * inverse;
+            let meets = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance > 0.0) & (distance < self.distance[i]);
+            self.distance[i] = if meets { distance } else { self.distance[i] };
+            self.triangle[i] = if meets { index } else { self.triangle[i] };
+        }
+    }
+}
+
+/// A traversal as it is dispatched to what the processor has.
+struct Traverse<'t, F> {
+    blockers: &'t Blockers,
+    origin: Vec3A,
+    packet: &'t mut Packet,
+    counts: &'t F,
+}
+
+impl<F: Fn(u32) -> bool> pulp::NullaryFnOnce for Traverse<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.blockers.traverse(self.origin, self.packet, self.counts);
+    }
+}
+
+impl Blockers {
+    /// Builds the hierarchy; one of no triangles blocks nothing.
+    pub fn new(corners: impl IntoIterator<Item = (u32, [Vec3; 3])>) -> Self {
+        let (members, unsorted): (Vec<u32>, Vec<Triangle>) = corners
+            .into_iter()
+            .map(|(member, [a, b, c])| (member, Triangle { v0: a.into(), v1: b.into(), v2: c.into() }))
+            .unzip();
+        let hierarchy = build_bvh2_from_tris(&unsorted, BvhBuildParams::slow_build(), &mut Duration::default());
+        let corners = |&i: &u32| {
+            let Triangle { v0, v1, v2 } = unsorted[i as usize];
+            let edges = [v1 - v0, v2 - v0];
+            Corners { corner: v0, edges, normal: edges[0].cross(edges[1]) }
+        };
+        Blockers {
+            triangles: hierarchy.primitive_indices.iter().map(corners).collect(),
+            members: hierarchy.primitive_indices.iter().map(|&i| members[i as usize]).collect(),
+            hierarchy,
+        }
+    }
+
+    /// The first triangle on each ray of those whose members `counts` keeps.
+    pub fn first(
+        &self,
+        origin: Vec3A,
+        directions: &[Vec3A],
+        counts: impl Fn(u32) -> bool,
+        hits: &mut Vec<Option<BlockerHit>>,
+    ) {
+        hits.clear();
+        let arch = Arch::new();
+        for rays in directions.chunks(LANES) {
+            let mut packet = Packet::new(rays);
+            arch.dispatch(Traverse { blockers: self, origin, packet: &mut packet, counts: &counts });
+            hits.extend(rays.iter().enumerate().map(|(lane, direction)| {
+                let triangle = packet.triangle[lane];
+                (triangle != u32::MAX).then(|| BlockerHit {
+                    distance: packet.distance[lane],
+                    member: self.members[triangle as usize],
+                    from_behind: self.triangles[triangle as usize].normal.dot(*direction) > 0.0,
+                })
+            }));
+        }
+    }
+
+    #[inline(always)]
+    fn traverse(&self, origin: Vec3A, packet: &mut Packet, counts: &impl Fn(u32) -> bool) {
+        if self.triangles.is_empty() {
+            return;
+        }
+        let nodes = &self.hierarchy.nodes;
+        let mut open = vec![0_u32];
+        while let Some(index) = open.pop() {
+            let node = &nodes[index as usize];
+            if !packet.enters(node.aabb.min - origin, node.aabb.max - origin) {
+                continue;
+            }
+            if node.prim_count > 0 {
+                for triangle in node.first_index..node.first_index + node.prim_count {
+                    if counts(self.members[triangle as usize]) {
+                        packet.meet(origin, &self.triangles[triangle as usize], triangle);
+                    }
+                }
+                continue;
+            }
+            // The child that lies nearer along the rays comes first.
+            let [a, b] = [node.first_index, node.first_index + 1];
+            let towards = |child: u32| {
+                let aabb = &nodes[child as usize].aabb;
+                (aabb.min + aabb.max).dot(packet.middle)
+            };
+            open.extend(if towards(a) < towards(b) { [b, a] } else { [a, b] });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::generate;
+    use crate::sh::quadrature::random_direction;
+
+    /// Against every triangle by itself.
+    #[test]
+    fn packets_find_the_first_triangle() {
+        let mesh = generate::torus(1.0, 0.3, 24, 12);
+        let corners: Vec<[Vec3; 3]> = mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect();
+        let blockers = Blockers::new(corners.iter().enumerate().map(|(i, t)| ((i % 2) as u32, *t)));
+        let mut rng = fastrand::Rng::with_seed(3);
+        let mut hits = Vec::new();
+        let mut met = 0;
+        for _ in 0..50 {
+            let origin = 1.5 * random_direction(&mut rng).as_vec3a();
+            let directions: Vec<Vec3A> = (0..37).map(|_| random_direction(&mut rng).as_vec3a()).collect();
+            for only_odd in [false, true] {
+                blockers.first(origin, &directions, |member| !only_odd || member == 1, &mut hits);
+                assert_eq!(hits.len(), directions.len());
+                for (direction, hit) in directions.iter().zip(&hits) {
+                    let counted = corners.iter().enumerate().filter(|(i, _)| !only_odd || i % 2 == 1);
+                    let distance = |(_, t): (usize, &[Vec3; 3])| {
+                        let [v0, v1, v2] = t.map(Vec3A::from);
+                        Triangle { v0, v1, v2 }.intersect(&obvhs::ray::Ray::new_inf(origin, *direction))
+                    };
+                    let wanted = counted.map(distance).fold(f32::INFINITY, f32::min);
+                    let found = hit.map_or(f32::INFINITY, |hit| hit.distance);
+                    assert!(found == wanted || (found - wanted).abs() < 1e-4, "{found} {wanted}");
+                    met += usize::from(hit.is_some());
+                }
+            }
+        }
+        assert!((300..3300).contains(&met), "{met}");
+        Blockers::new([]).first(Vec3A::ZERO, &[Vec3A::X], |_| true, &mut hits);
+        assert_eq!(hits, [None]);
+    }
+}

@@ -78,7 +78,8 @@ impl Crowded {
         let everything = Candidates::all(&self.scene_bounds, self.receiver);
         let list = |bounds| {
             let mut entries = Vec::new();
-            gather::gather(&Scope::new(&self.scene_bounds, &self.entity, bounds), &everything, &mut entries);
+            let scope = Scope::new(&self.scene_bounds, self.receiver as usize, &self.entity, bounds, &[]);
+            gather::gather(&scope, &everything, &mut entries);
             entries
         };
         self.clusters.iter().map(list).collect()
@@ -102,7 +103,7 @@ fn the_tree_leaves_every_list_as_it_is() {
         offered += group.occluder_count();
         all += Candidates::all(scene_bounds, *receiver).occluder_count();
         for (bounds, expected) in clusters.iter().zip(crowded.expected()) {
-            let scope = Scope::new(scene_bounds, entity, bounds);
+            let scope = Scope::new(scene_bounds, *receiver as usize, entity, bounds, &[]);
             let mut found = Vec::new();
             gather::gather(&scope, &group, &mut found);
             assert_eq!(found, expected, "round {round}");

@@ -18,6 +18,7 @@
 //! | [`product_program`] | the product as straight-line code, and its GLSL |
 //! | [`rotation`] | block-diagonal rotation, and its GLSL |
 //! | [`lobe`] | closed forms: caps, spheres, the clamped cosine |
+//! | [`polygon`] | the closed form of flat polygons |
 //! | [`program`] | straight-line programs: run by tests, printed for shaders |
 //!
 //! # References
@@ -30,10 +31,13 @@
 //!    clamped cosine.
 //! 5. A. D. McLaren, *Optimal Numerical Integration on a Sphere*, Mathematics of Computation 17, 1963: the 32-point
 //!    rule.
+//! 6. A. van Oosterom, J. Strackee, *The Solid Angle of a Plane Triangle*, IEEE Transactions on Biomedical Engineering
+//!    30 (2), 1983.
 
 pub mod basis;
 pub mod cube;
 pub mod lobe;
+pub mod polygon;
 pub mod product;
 pub mod product_program;
 pub mod program;

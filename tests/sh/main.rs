@@ -4,5 +4,6 @@ mod basis;
 mod cube;
 mod glsl;
 mod lobe;
+mod polygon;
 mod product;
 mod rotation;

@@ -2,8 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{enclose, topology};
+use super::{enclose, outline, topology};
 use crate::error::{Error, Result};
+use crate::field::sheet::Rectangle;
 use crate::field::sub_light::LampFace;
 
 /// Largest number of triangles of a mesh: 48 MB of indices, and edge tables of about 200 MB while it is checked.
@@ -36,6 +37,7 @@ pub struct Mesh {
     shape: topology::Topology,
     content_hash: [u8; 32],
     panel: Option<LampFace>,
+    rectangle: Option<Rectangle>,
 }
 
 impl Mesh {
@@ -73,7 +75,7 @@ impl Mesh {
         }
         let shape = topology::shape(&positions, &triangles, centre, radius_m);
         let content_hash = hash(&positions, &normals, colors.as_deref(), &triangles);
-        Ok(Self {
+        let mut mesh = Self {
             name: name.into(),
             positions,
             normals,
@@ -84,7 +86,10 @@ impl Mesh {
             shape,
             content_hash,
             panel: None,
-        })
+            rectangle: None,
+        };
+        mesh.rectangle = outline::rectangle(&mesh);
+        Ok(mesh)
     }
 
     /// Centre and radius in metres of the smallest enclosing sphere (see [`enclose::bounding_sphere`]).
@@ -170,6 +175,11 @@ impl Mesh {
     ) -> Mesh {
         let content_hash = hash(&positions, &normals, colors.as_deref(), &triangles);
         Mesh { name: self.name.clone(), positions, normals, colors, triangles, content_hash, ..self.clone() }
+    }
+
+    /// The rectangle that the mesh covers, if it is flat and does.
+    pub fn rectangle(&self) -> Option<Rectangle> {
+        self.rectangle
     }
 
     pub(super) fn with_panel(self, panel: LampFace) -> Self {

@@ -25,6 +25,7 @@ pub mod grid;
 pub mod lettering;
 pub mod mesh;
 pub mod obj;
+mod outline;
 pub(crate) mod panel;
 mod peak;
 pub mod picture;

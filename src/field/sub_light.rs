@@ -183,6 +183,11 @@ impl SeenLight {
         blocks(self.fine, &pattern).into_iter().map(of).collect()
     }
 
+    /// Normal of the side that shines, of a light that is no ball.
+    pub fn facing(&self) -> Option<DVec3> {
+        self.panel.map(|panel| panel.normal)
+    }
+
     /// Irradiance of an unoccluded light of radiance 1.
     pub fn irradiance(&self, normal: DVec3) -> f64 {
         self.blocks().iter().flat_map(|(_, parts)| parts).map(|part| part.share(normal)).sum()

@@ -35,6 +35,9 @@ layout(std430, binding = 7) writeonly buffer Radiosity { vec4 radiosity[]; };
 
 #include "merge_cone.glsl"
 #include "merge_cap.glsl"
+#if SHEETS
+#include "merge_sheet.glsl"
+#endif
 
 // Transfer in the world frame: the receiver's own shadow times cosine. `at` is its first quad.
 void transfer(uint at, Entity receiver, out float t[COEFFICIENTS]) {
@@ -49,6 +52,7 @@ struct Vertex {
     vec3 receiver; // centre, world
     vec3 position; // world axes, from there
     vec3 normal;
+    float contact; // how near to a sheet it touches it, metres
 };
 
 // How much occluder e counts in the chain of light l: 1 before the light, 0 behind it, and less where it stands beside
@@ -128,6 +132,41 @@ void cover(Vertex vertex, uint packed, inout float t[CHAIN]) {
 }
 #endif
 
+// Whether an entry reads a field.
+bool is_look(uint packed) {
+    bool look = true;
+#if SKIP_CAPS
+    look = look && !is_cap(packed);
+#endif
+#if SHEETS
+    look = look && !is_sheet(packed);
+#endif
+    return look;
+}
+
+#if SHEETS
+// An entry that takes a sheet.
+void take_sheet(Vertex vertex, uint packed, inout float t[CHAIN]) {
+    Entity entity = ENTITY(packed & SKY_CHAIN);
+    vec3 centre = entity.centre.xyz - vertex.receiver;
+    Sheet sheet = sheet_of(entity, centre, vertex.position, vertex.normal, vertex.contact);
+    float weight = sheet_above_horizon(sheet, vertex.normal);
+#if LIGHTS
+    uint l = packed >> ENTRY_BITS & SKY_CHAIN;
+    vec4 light = ENTITY(l == SKY_CHAIN ? packed & SKY_CHAIN : l).centre;
+    light.xyz -= vertex.receiver;
+    float before = sheet_before(sheet, cone_of(light, vertex.position), light.w);
+    weight *= l == SKY_CHAIN ? 1.0 : before;
+#endif
+    float b[FETCHED];
+    sheet_blocked(sheet, b);
+    [[unroll]] for (uint k = 0; k < SHEET_COEFFICIENTS; k++) {
+        b[k] *= weight;
+    }
+    chain_multiply(t, b);
+}
+#endif
+
 void main() {
     Cluster cluster = cluster_at(gl_WorkGroupID.x);
     uint v = gl_LocalInvocationID.x;
@@ -157,21 +196,22 @@ void main() {
     vec3 sum = vec3(0.0);
     // Nothing may be read without an entry: the scene may have no field at all.
     if (cluster.entry_count > 0) {
-        Vertex vertex = Vertex(receiver.centre.xyz, position, normal);
+        Vertex vertex = Vertex(receiver.centre.xyz, position, normal, CONTACT / receiver.centre.w);
         uint i = 0;
         uint packed = entry_at(cluster.entry_first);
         // Loops are tested at the end: llvmpipe runs a body once more, masked, before a test at the start ends the
         // loop. It jumps nowhere else, so entries of either kind run as loops of their own, each in turn as long as
         // there are such entries.
         do {
-#if SKIP_CAPS
+#if SKIP_CAPS || SHEETS
             do {
-                if (!is_cap(packed)) {
+                if (is_look(packed)) {
                     look(vertex, packed, t_start, t, sum);
                     i++;
                     packed = entry_at(cluster.entry_first + min(i, cluster.entry_count - 1));
                 }
-            } while (i < cluster.entry_count && !is_cap(packed));
+            } while (i < cluster.entry_count && is_look(packed));
+#if SKIP_CAPS
             do {
                 if (i < cluster.entry_count && is_cap(packed)) {
                     cover(vertex, packed, t);
@@ -179,6 +219,16 @@ void main() {
                     packed = entry_at(cluster.entry_first + min(i, cluster.entry_count - 1));
                 }
             } while (i < cluster.entry_count && is_cap(packed));
+#endif
+#if SHEETS
+            do {
+                if (i < cluster.entry_count && is_sheet(packed)) {
+                    take_sheet(vertex, packed, t);
+                    i++;
+                    packed = entry_at(cluster.entry_first + min(i, cluster.entry_count - 1));
+                }
+            } while (i < cluster.entry_count && is_sheet(packed));
+#endif
 #else
             look(vertex, entry_at(cluster.entry_first + i), t_start, t, sum);
             i++;

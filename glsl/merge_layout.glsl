@@ -42,3 +42,8 @@ const uint ENTRY_LIGHT = 1u << 2 * ENTRY_BITS;      // meets the light rather th
 const uint ENTRY_CHANNEL = 2 * ENTRY_BITS + 1;      // two bits: 0 to 2 for a channel of a radiance field, 3 for a light of one colour
 const uint ENTRY_LAST = 1u << 2 * ENTRY_BITS + 3;   // ends the chain: the next entry begins anew from the transfer
 const uint ENTRY_CAP = 1u << ENTRY_CHANNEL;         // without ENTRY_LIGHT: an occluder as a cap
+const uint ENTRY_SHEET = 2u << ENTRY_CHANNEL;       // without ENTRY_LIGHT: an occluder that is a sheet
+
+bool is_sheet(uint packed) {
+    return (packed & (ENTRY_LIGHT | ENTRY_SHEET)) == ENTRY_SHEET;
+}

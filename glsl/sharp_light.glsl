@@ -199,8 +199,21 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
     return share;
 }
 
+#if SHEETS
+#include "sharp_sheet.glsl"
+#endif
+
 uint chain_light(uint packed) {
     return packed >> ENTRY_BITS & SKY_CHAIN;
+}
+
+// Whether an entry is an occluder whose outline is looked up.
+bool has_outline(uint packed) {
+#if SHEETS
+    return (packed & (ENTRY_LIGHT | ENTRY_SHEET)) == 0;
+#else
+    return (packed & ENTRY_LIGHT) == 0;
+#endif
 }
 
 #if CONES
@@ -275,12 +288,22 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
             j = i;
             uint packed = entry_at(first + j);
             do {
-                if ((packed & ENTRY_LIGHT) == 0) {
+                if (has_outline(packed)) {
                     share *= let_through(ENTITY(packed & SKY_CHAIN), surface, light, block, true);
                     j = next_entry(surface, first, count, j + 1, true);
                     packed = entry_at(first + j);
                 }
-            } while ((packed & ENTRY_LIGHT) == 0 && j < count);
+            } while (has_outline(packed) && j < count);
+#if SHEETS
+            // They stand behind all others of a chain.
+            do {
+                if (is_sheet(packed)) {
+                    share *= past_sheet(ENTITY(packed & SKY_CHAIN), surface, light, block);
+                    j = next_entry(surface, first, count, j + 1, true);
+                    packed = entry_at(first + j);
+                }
+            } while (is_sheet(packed) && j < count);
+#endif
         }
         vec4 shines = vec4(shining.light_kind == LIGHT_BALL ? shining.light_share : 1.0);
 #if OUTLINES

@@ -81,7 +81,8 @@ shared_struct! {
         albedo: [f32; 3],
         /// Uniform scale of the entity.
         scale: f32,
-        /// First axis of its projected area ([`crate::field::Area`]), world; w = the area's constant term.
+        /// First axis of its projected area ([`crate::field::Area`]), world; w = the area's constant term. Of a sheet
+        /// these two are the axes of its rectangle.
         area_x: [f32; 4],
         /// Second axis, world; w = factor of u, the square of a direction's cosine to the first.
         area_y: [f32; 4],
@@ -97,8 +98,8 @@ shared_struct! {
         light_ratio: f32,
         /// Of a spot, which shines along its own +y: [`crate::scene::light::Spot::ramp`]. 0 and 1 of any other light.
         light_ramp: [f32; 2],
-        /// Fills the last quad.
-        unused: [f32; 2],
+        /// Of a sheet: half the sides of its rectangle, metres.
+        half_sides: [f32; 2],
     }
 }
 
@@ -230,6 +231,13 @@ pub enum ListEntry {
         /// Whose chain it is.
         light: Option<u32>,
     },
+    /// As [`ListEntry::Occlude`], of a sheet.
+    Sheet {
+        /// The occluder.
+        entity: u32,
+        /// Whose chain it is.
+        light: Option<u32>,
+    },
     /// Meet a light; `channel` is `None` for a light of one colour, which shares the occlusion field.
     Shine {
         /// The light.
@@ -257,6 +265,9 @@ impl ListEntry {
         match self {
             ListEntry::Occlude { entity, light } => entity | light.unwrap_or(ENTRY_ENTITIES) << ENTRY_BITS,
             ListEntry::Cap { entity, light } => ListEntry::Occlude { entity, light }.pack() | 1 << (2 * ENTRY_BITS + 1),
+            ListEntry::Sheet { entity, light } => {
+                ListEntry::Occlude { entity, light }.pack() | 2 << (2 * ENTRY_BITS + 1)
+            }
             ListEntry::Shine { entity, channel, last } => {
                 let flags = 1 | channel.unwrap_or(3) << 1 | u32::from(last) << 3;
                 entity | entity << ENTRY_BITS | flags << (2 * ENTRY_BITS)

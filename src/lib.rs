@@ -22,7 +22,7 @@
 //! - Between shells: b / (1 - cos a) is interpolated over sin(a/2), where a is the half-angle of the bounding sphere.
 //!   Samples are lowered by a twelfth of their second differences. Beyond 8 r the value falls as (8r/d)^2.
 //! - Order: an occluder precedes a light if its bounding sphere's centre is nearer to the vertex than the light's.
-//!   Entity indices decide ties.
+//!   Entity indices decide ties. A sheet precedes what lies beyond its plane.
 //! - Sharp lights: an entity that glows in one colour, or from one flat side, is a sharp light. It is cut into 4 or 16
 //!   parts ([`field::sub_light`]); in each, the visibilities past all occluders' outlines ([`field::silhouette`]) and
 //!   past the receiver's own mesh ([`field::self_visibility`]) are multiplied. What lies beyond the light's surface
@@ -32,7 +32,8 @@
 //!   shell ([`field::Area`]). Up to 16 degrees the point and the field share.
 //! - Entities: everything receives, and everything but emitters occludes. Each can be set per entity. Scales are uniform
 //!   and positive.
-//! - Sheets: a flat mesh blocks light from both sides. A point within 0.002 bounding radii of its receiver from the
+//! - Sheets: a flat mesh blocks light from both sides. What a rectangle blocks has a closed form, for SH and for sharp
+//!   lights, so nothing is baked of it; other flat meshes have fields as all others do. A point within 0.002 bounding radii of its receiver from the
 //!   sheet's plane counts as that far from it, on the side of its receiver's centre ([`field::sheet`]).
 //! - Light: it is linear Rec.709 radiance. The radiosity is B = albedo/pi * integral of L V max(0, n.w) dw.
 //! - Numbers: tables are made in f64, shaders compute in f32, and fields are stored as f16 or f32.

@@ -53,6 +53,7 @@ fn sharp() -> Vec<ShaderPermutation> {
             panels: on(3),
             halves: on(2) != on(3),
             boxes: on(2) != on(4),
+            sheets: on(1),
             self_shadows: on(4),
             cones: on(5),
             edges: on(0) == on(2),
@@ -74,6 +75,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         panels: outlines,
         halves: outlines,
         boxes: outlines,
+        sheets: outlines,
         self_shadows: true,
         cones: outlines,
         edges: true,
@@ -114,6 +116,7 @@ fn usual_permutation() -> MergePermutation {
         lattice: Lattice::default().starting_at(1.02),
         skip: Skip::ALL,
         lights: true,
+        sheets: true,
         entity_limit: 48,
     }
 }
@@ -146,6 +149,7 @@ fn merging() -> Vec<ShaderPermutation> {
     ];
     permutations.extend(lattices.map(|text| MergePermutation { lattice: lattice(text), ..usual }));
     permutations.push(MergePermutation { lights: false, ..usual });
+    permutations.push(MergePermutation { sheets: false, ..usual });
     permutations.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| MergePermutation {
         bands,
         field_bands,

@@ -132,7 +132,8 @@ pub struct Needed {
     pub silhouette: bool,
 }
 
-/// What the entities of a mesh need. An entity that only receives, or that nothing else can see, needs no field.
+/// What the entities of a mesh need. An entity that only receives, or that nothing else can see, needs no field, and an
+/// occluder that is a rectangle none either.
 /// Without light no shadows are needed, without light in spherical harmonics no occlusion field, without sharp lights
 /// no silhouettes. A light of one colour needs no radiance field. What only members of its own group see of an occluder
 /// is in their own visibility, less the shadows of sharp lights.
@@ -146,12 +147,13 @@ pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Nee
     let harmonics = light::has_harmonics(scene, lights);
     let sharp = light::has_sharp(scene, lights);
     let shines = |wanted: LightMethod| seen().any(|e| scene.entities[e].emits && method(e) == wanted);
-    let blocked = seen_by_others().any(|e| scene.entities[e].occludes && harmonics)
+    let casts = scene.meshes[mesh].rectangle().is_none();
+    let blocked = (casts && harmonics && seen_by_others().any(|e| scene.entities[e].occludes))
         || (shines(LightMethod::Harmonics) && !coloured);
     let radiance = coloured && shines(LightMethod::Harmonics);
     Needed {
         fields: [blocked.then_some(FieldKind::Occlusion), radiance.then_some(FieldKind::Radiance)],
-        silhouette: seen().any(|e| scene.entities[e].occludes && sharp) || shines(LightMethod::Outline),
+        silhouette: (casts && sharp && seen().any(|e| scene.entities[e].occludes)) || shines(LightMethod::Outline),
     }
 }
 

@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face.
 const NUDGE: f32 = 0.02;
@@ -362,7 +362,9 @@ impl GroupSpace<'_> {
         let is_near = |member: &usize| {
             let (middle, reach) = group.spheres[*member];
             let of = &group.plan.members[*member];
-            *member == self.member || (of.occludes && !of.emits && middle.distance(centre) - radius < FAR * reach)
+            // A rectangle's outline is exact at every distance.
+            let casts_none = of.emits || of.mesh.rectangle().is_some();
+            *member == self.member || (of.occludes && !casts_none && middle.distance(centre) - radius < FAR * reach)
         };
         (0..group.spheres.len()).filter(is_near).map(|member| member as u32).collect()
     }

@@ -22,8 +22,8 @@ pub const ARITHMETIC: f64 = 1e-5;
 /// Vulkan lets a device be off by 4096 units in the last place in atan and acos: 2.4e-4 of an angle.
 pub const ANGLES: f64 = 3e-4;
 
-/// A floor, a ball that is lit and shades itself with a ring, two lights of which one has colours of its own, and a
-/// sky. Positions are odd, so that no vertex lies on a border between samples.
+/// A floor, a wall that stands on it, a ball that is lit and shades itself with a ring, two lights of which one has
+/// colours of its own, and a sky. Positions are odd, so that no vertex lies on a border between samples.
 pub const MIXED: &str = r#"
 environment = { uniform = [0.1, 0.12, 0.2], key = { radiance = [2, 1.5, 1], toward = [1, 2, 0.5], sharpness = 3 } }
 [[mesh]]
@@ -58,6 +58,13 @@ mesh = "ball"
 position = [1.513, 2.177, 0.691]
 scale = 0.4
 emission = [20, 15, 10]
+[[mesh]]
+name = "wall"
+plane = { size_m = 1.4, cells = 5 }
+[[entity]]
+mesh = "wall"
+position = [-1.431, 0.7, 0.231]
+rotation = { axis = [0, 0, 1], angle_deg = 90 }
 "#;
 
 /// A scene from the text of its meshes, entities and sky; a camera is added.

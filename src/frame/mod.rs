@@ -40,7 +40,7 @@ use crate::scene_buffers::{SceneBuffers, limits};
 use crate::shaders::Library;
 use crate::sharp::{self, Sharp, SharpPermutation};
 use ash::vk;
-use permutation::{CompiledMerge, PixelShading, harmonic_lights, permutation, usable};
+use permutation::{CompiledMerge, PixelShading, permutation, usable};
 use picture::FramePicture;
 use pixel::PixelChains;
 use prepare::ClusterWork;
@@ -111,7 +111,7 @@ impl Frame {
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
         let methods = methods(&scene, options.lights);
-        let wanted = permutation(&options, wanted, harmonic_lights(&scene, &methods), uniform_entities(device));
+        let wanted = permutation(&options, wanted, &scene, &methods, uniform_entities(device));
         let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted))?;
         let sharp = permutation::sharp(&options, &merge.permutation, &methods, &scene, &buffers);
         let radiosity = RadiosityBuffers::new(device, &scene, &buffers, sharp.is_some())?;

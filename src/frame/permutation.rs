@@ -80,6 +80,7 @@ pub(super) fn sharp(
         panels: lights.iter().any(|method| matches!(method, LightMethod::LampFace(_))),
         halves: any_field(SilhouetteField::has_halves),
         boxes: any_field(SilhouetteField::has_box),
+        sheets: merge.sheets,
         self_shadows: buffers.surfaces.iter().any(|surface| surface.self_first != NONE),
         cones: lights.len() > 1,
         edges: false,
@@ -125,7 +126,14 @@ pub(super) fn harmonic_lights(scene: &Scene, methods: &[LightMethod]) -> bool {
     scene.entities.iter().zip(methods).any(|(entity, method)| entity.emits && !method.is_sharp())
 }
 
-pub(super) fn permutation(options: &Options, variant: Variant, lights: bool, entity_limit: u32) -> MergePermutation {
+/// What the merge of a scene is to be compiled for.
+pub(super) fn permutation(
+    options: &Options,
+    variant: Variant,
+    scene: &Scene,
+    methods: &[LightMethod],
+    entity_limit: u32,
+) -> MergePermutation {
     MergePermutation {
         variant,
         bands: options.bake.bands,
@@ -133,7 +141,8 @@ pub(super) fn permutation(options: &Options, variant: Variant, lights: bool, ent
         storage: options.bake.storage,
         lattice: options.bake.lattice,
         skip: options.skip,
-        lights,
+        lights: harmonic_lights(scene, methods),
+        sheets: scene.meshes.iter().any(|mesh| mesh.rectangle().is_some()),
         entity_limit,
     }
 }

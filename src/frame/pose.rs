@@ -4,6 +4,7 @@ use super::Frame;
 use crate::field::extent::Extent;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility;
+use crate::field::sheet::{Rectangle, Sheet};
 use crate::field::sub_light::LampFace;
 use crate::field::{Area, Fit};
 use crate::layout::{self, CLUSTER_VERTICES, NONE};
@@ -66,10 +67,12 @@ impl Frame {
         EntityBounds {
             centre: self.centre(index, placement),
             radius_m: device_mesh.radius_m * f64::from(placement.scale),
-            occludes: entity.occludes && (holds(&device_mesh.blocked) || device_mesh.silhouette.is_some()),
+            occludes: entity.occludes
+                && (holds(&device_mesh.blocked) || device_mesh.silhouette.is_some() || device_mesh.rectangle.is_some()),
             emits: entity.emits && (sharp || holds(source)),
             sharp,
             coloured,
+            sheet: self.sheet(index, placement).filter(|_| entity.occludes),
             radiance: f64::from(entity.emission.max_element()) * f64::from(brightest),
             facing,
         }
@@ -94,7 +97,9 @@ impl Frame {
             [slope as f32, offset as f32, lattice.inner as f32, lattice.outer as f32]
         });
         let area = device_mesh.blocked.as_ref().map_or(Area::default(), |slot| slot.area);
-        let [area_x, area_y] = area.axes.map(|axis| (rotation * axis).as_vec3());
+        let sheet = self.sheet(index, placement).map(|sheet| sheet.rectangle);
+        let axes = sheet.map_or(area.axes.map(|axis| rotation * axis), |rectangle| rectangle.axes);
+        let [area_x, area_y] = axes.map(|axis| axis.as_vec3());
         let terms = area.terms.map(|term| term as f32);
         let method = self.light_method(index);
         let light_share = match method {
@@ -124,7 +129,7 @@ impl Frame {
             light_share: light_share as f32,
             light_ratio: light_ratio as f32,
             light_ramp: entity.spot.map_or([0.0, 1.0], |spot| spot.ramp().map(|x| x as f32)),
-            unused: [0.0; 2],
+            half_sides: sheet.map_or([0.0; 2], |rectangle| rectangle.half_m.map(|half| half as f32)),
             blocked_base: device_mesh.blocked.as_ref().map_or(0, FieldSlot::quad),
             radiance_base: device_mesh.radiance.as_ref().map_or(0, FieldSlot::quad),
         }
@@ -144,7 +149,17 @@ impl Frame {
     fn occludes(&self, index: usize) -> bool {
         let entity = &self.scene.entities[index];
         let device_mesh = &self.buffers.meshes[entity.mesh];
-        entity.occludes && (device_mesh.blocked.is_some() || device_mesh.silhouette.is_some())
+        let blocks = device_mesh.rectangle.is_some() || device_mesh.blocked.is_some();
+        entity.occludes && (blocks || device_mesh.silhouette.is_some())
+    }
+
+    /// The rectangle that an entity is in the world, if its mesh is one.
+    pub(super) fn sheet(&self, index: usize, placement: &Placement) -> Option<Sheet> {
+        let Rectangle { axes, half_m } = self.buffers.meshes[self.scene.entities[index].mesh].rectangle?;
+        let rotation = placement.turn();
+        let scale = f64::from(placement.scale);
+        let rectangle = Rectangle { axes: axes.map(|axis| rotation * axis), half_m: half_m.map(|half| half * scale) };
+        Some(Sheet { centre: self.centre(index, placement), rectangle })
     }
 
     /// Occluders of a receiver in their order, [`SceneBounds::order`]; itself left out.

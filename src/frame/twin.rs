@@ -63,6 +63,7 @@ impl Frame {
         for index in indices(&self.scene, |e| e.receives) {
             let mesh = self.scene.surface(index);
             let surface = self.buffers.surface(index);
+            let listed = (self.options.eps > 0.0).then(|| listed(&state, &self.work.lists, index, surface));
             let centre_m = self.buffers.meshes[self.scene.entities[index].mesh].centre_m;
             receivers.push(Receiver {
                 index,
@@ -71,7 +72,8 @@ impl Frame {
                 normals: mesh.normals.iter().map(|n| n.as_dvec3()).collect(),
                 transfer: self.buffers.transfer(surface)?,
                 // Without a threshold the twin looks at everything, which is what the lists are held against.
-                listed: (self.options.eps > 0.0).then(|| listed(&state, &self.work.lists, index, surface)),
+                clusters: (cluster_of(surface), listed),
+                near: self.work.lists.near_of(index).map(<[u32]>::to_vec).collect(),
             });
         }
         Ok(FrameTwin {
@@ -105,7 +107,10 @@ struct Receiver {
     positions: Vec<DVec3>,
     normals: Vec<DVec3>,
     transfer: Option<(Vec<f32>, usize)>,
-    listed: Option<Listed>,
+    /// The cluster of every vertex, and what stands on each cluster's list where some may be left out.
+    clusters: (Vec<usize>, Option<Listed>),
+    /// For each cluster the entities whose shadows of sharp lights its maps have.
+    near: Vec<Vec<u32>>,
 }
 
 impl FrameTwin<'_> {
@@ -125,16 +130,26 @@ impl FrameTwin<'_> {
                 blocked: blocked.as_ref(),
                 area: buffers.meshes[entity.mesh].blocked.as_ref().map_or(Area::default(), |slot| slot.area),
                 radiance: radiance.as_ref().filter(|_| entity.emits),
+                sheet: self.frame.sheet(index, placement),
             }
         };
         let objects: Vec<MergeObject<'_>> = self.placements.iter().enumerate().map(object).collect();
         let outlines: Vec<SharpObject<'_>> = objects.iter().enumerate().map(|o| self.outline(o)).collect();
         let lit = |receiver: &Receiver| {
             let leaves = |v: usize, j: usize, light: Option<usize>| {
-                let Some((cluster_of, listed)) = &receiver.listed else { return false };
+                let (cluster_of, listed) = &receiver.clusters;
+                let is_own = self.frame.groups.share(j, receiver.index)
+                    && light.is_none_or(|l| {
+                        let is_sharp = self.frame.light_method(l).is_sharp() && l != j;
+                        is_sharp && receiver.near[cluster_of[v]].binary_search(&(j as u32)).is_ok()
+                    });
+                if is_own {
+                    return true;
+                }
+                let Some(listed) = listed else { return false };
                 !listed[cluster_of[v]].contains(&(j as u32, light.map_or(ENTRY_ENTITIES, |l| l as u32)))
             };
-            let with_field = |j: &usize| objects[*j].blocked.is_some();
+            let with_field = |j: &usize| objects[*j].blocked.is_some() || objects[*j].sheet.is_some();
             let occluders: Vec<usize> = receiver.occluders.iter().copied().filter(with_field).collect();
             let twin = MergeTwin {
                 objects: &objects,
@@ -166,6 +181,7 @@ impl FrameTwin<'_> {
             rotation: object.rotation,
             radius_m: object.radius_m,
             silhouette: device_mesh.silhouette.as_ref().map(|slot| &*slot.field),
+            sheet: object.sheet,
         }
     }
 
@@ -184,14 +200,13 @@ impl FrameTwin<'_> {
             spot: self.frame.scene.entities[entity].spot,
         };
         let lights: Vec<SharpLight> = self.sharp_lights.iter().filter(|l| **l != receiver.index).map(light).collect();
-        let occluders: Vec<usize> =
-            receiver.occluders.iter().copied().filter(|j| outlines[*j].silhouette.is_some()).collect();
+        let has_edge = |j: &usize| outlines[*j].silhouette.is_some() || outlines[*j].sheet.is_some();
+        let occluders: Vec<usize> = receiver.occluders.iter().copied().filter(has_edge).collect();
         let self_maps = &self.frame.buffers.surface(receiver.index).self_maps;
         let twin = SharpTwin {
             objects: outlines,
             occluders: &occluders,
-            rotation: object.rotation,
-            radius_m: object.radius_m,
+            receiver: receiver.index,
             self_maps: self_maps.as_deref().map(|maps| &maps[..]),
             lights: &lights,
             leaves: &|v, j, light| leaves(v, j, Some(light)),
@@ -209,17 +224,21 @@ impl FrameTwin<'_> {
     }
 }
 
-/// The cluster of every vertex of a mesh, and what stands on each cluster's list: entity and light, or the sky's
-/// number.
-type Listed = (Vec<usize>, Vec<HashSet<(u32, u32)>>);
+/// What stands on each cluster's list: entity and light, or the sky's number.
+type Listed = Vec<HashSet<(u32, u32)>>;
 
-fn listed(state: &State, lists: &ClusterLists, receiver: usize, surface: &DeviceSurface) -> Listed {
-    let scene_bounds = &state.scene_bounds;
-    let entity = &state.entities[receiver];
+/// The cluster of every vertex of a surface.
+fn cluster_of(surface: &DeviceSurface) -> Vec<usize> {
     let mut cluster_of = vec![0; surface.order.len()];
     for (place, &v) in surface.order.iter().enumerate() {
         cluster_of[v as usize] = place / CLUSTER_VERTICES as usize;
     }
+    cluster_of
+}
+
+fn listed(state: &State, lists: &ClusterLists, receiver: usize, surface: &DeviceSurface) -> Listed {
+    let scene_bounds = &state.scene_bounds;
+    let entity = &state.entities[receiver];
     let candidates = Candidates::all(scene_bounds, receiver as u32);
     let of_cluster = |(bounds, near): (_, &[u32])| {
         let mut entries = Vec::new();
@@ -227,7 +246,7 @@ fn listed(state: &State, lists: &ClusterLists, receiver: usize, surface: &Device
         gather::gather(&scope, &candidates, &mut entries);
         entries.into_iter().map(|entry| ListEntry::entities(entry).into()).collect()
     };
-    (cluster_of, surface.clusters.iter().zip(lists.near_of(receiver)).map(of_cluster).collect())
+    surface.clusters.iter().zip(lists.near_of(receiver)).map(of_cluster).collect()
 }
 
 /// Whether the shadow or light of an entity can fall on another entity, because one other at least is lit.

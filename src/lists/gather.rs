@@ -100,7 +100,7 @@ fn walk(
     let first = out.len();
     let mut sharp_count = 0;
     let spheres = &scope.scene().spheres;
-    let views: Vec<SphereView> = candidates.occluders.iter().map(|&j| scope.view(spheres[j as usize])).collect();
+    let views: Vec<SphereView> = candidates.occluders.iter().map(|&j| scope.view_of(j as usize)).collect();
     // What becomes of each occluder in a light's chain.
     let chain = |light: Option<(u32, &SphereView)>, sharp, radiance: f32, results: &mut Vec<CullResult>| {
         let (light, light_view) = light.unzip();
@@ -121,10 +121,12 @@ fn walk(
             let occluders = candidates.occluders.iter().zip(views.iter().zip(results));
             for (&entity, (view, &result)) in occluders.filter(|(j, _)| light != Some(**j)) {
                 let listed = result == CullResult::Listed;
-                let whole = view.whole || sharp;
-                let cap = view.cap && !sharp;
-                tell(if listed && !whole { CullResult::Cap } else { result }, 1);
+                let sheet = view.is_sheet();
+                let whole = (view.whole || sharp) && !sheet;
+                let cap = view.cap && !sharp && !sheet;
+                tell(if listed && !whole && !sheet { CullResult::Cap } else { result }, 1);
                 out.extend((listed && whole).then(|| ListEntry::Occlude { entity, light }.pack()));
+                out.extend((listed && sheet).then(|| ListEntry::Sheet { entity, light }.pack()));
                 out.extend((listed && cap).then(|| ListEntry::Cap { entity, light }.pack()));
             }
         };

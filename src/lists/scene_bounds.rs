@@ -1,6 +1,7 @@
 //! Bounds of clusters, entities and lights at one time, from which cluster lists are made, and counts of what lists
 //! leave off.
 
+use crate::field::sheet::Sheet;
 use crate::field::silhouette::SilhouetteField;
 use crate::lists::skip::Skip;
 use crate::lists::tree::Tree;
@@ -88,6 +89,8 @@ pub struct EntityBounds {
     pub radiance: f64,
     /// Axis (world) and half-angle of a cone of directions outside of which its radiance field is zero.
     pub facing: Option<(DVec3, f64)>,
+    /// The rectangle by which it casts shadows.
+    pub sheet: Option<Sheet>,
 }
 
 /// The outline of an occluder at one time.
@@ -184,10 +187,11 @@ impl SceneBounds {
 
     /// The key by which the occluders of a receiver are ordered, near to far from the centre of its bounding sphere:
     /// products truncated in another order differ (by up to 0.006 over twelve occluders), which would show as seams, so
-    /// there is one order for a whole receiver. Equal distances go by index.
-    pub fn order(&self, receiver: u32, occluder: u32) -> (u32, u32) {
+    /// there is one order for a whole receiver. Equal distances go by index. Sheets come last, for loops of their own.
+    pub fn order(&self, receiver: u32, occluder: u32) -> (bool, u32, u32) {
         let [[x, y, z, _], [cx, cy, cz, _]] = [occluder, receiver].map(|i| self.spheres[i as usize]);
-        (distance_key([x, y, z], [cx, cy, cz]), occluder)
+        let is_sheet = self.entities[occluder as usize].sheet.is_some();
+        (is_sheet, distance_key([x, y, z], [cx, cy, cz]), occluder)
     }
 }
 

@@ -4,6 +4,7 @@
 //! It lists what may change a vertex of the cluster and leaves off what cannot: the weights of cone, horizon and cap in
 //! the merge have faded to exactly zero where the rule ends, and what is bounded below eps may be missing.
 
+use crate::field::sheet::{CONTACT, Sheet};
 use crate::field::silhouette::{INSIDE, REACH, Side};
 use crate::layout;
 use crate::layout::{COSINE_LOBE, EVERYTHING};
@@ -91,6 +92,24 @@ pub struct SphereView {
     pub whole: bool,
     /// Whether a vertex may see it small enough for one.
     pub cap: bool,
+    sheet: Option<SheetSides>,
+}
+
+/// The plane of a sheet, and which side of it all vertices of a cluster are on.
+struct SheetSides {
+    /// Unit normal; away from the vertices, if that is known.
+    normal: DVec3,
+    /// Height of the cluster's centre along it, metres.
+    height: f64,
+    /// Whether all vertices lie on one side.
+    known: bool,
+}
+
+impl SphereView {
+    /// Whether it is that of a sheet.
+    pub fn is_sheet(&self) -> bool {
+        self.sheet.is_some()
+    }
 }
 
 /// Share of the irradiance under a uniform sky that a small cap takes whose nearest point to the normal stands at this
@@ -113,7 +132,7 @@ fn weight(half: Angle, cosine: f64) -> f64 {
 /// A cluster of a receiver, or a group of clusters, at one time.
 pub struct Scope<'m> {
     scene: &'m SceneBounds,
-    receiver: usize,
+    index: usize,
     /// Entities whose shadows of sharp lights are in the cluster's maps.
     near: &'m [u32],
     /// Albedo of the receiver, of its brightest colour.
@@ -123,6 +142,8 @@ pub struct Scope<'m> {
     radius_m: f64,
     axis: DVec3,
     spread: Angle,
+    /// Centre of the receiver's bounding sphere in the world, and how near to a sheet it touches it, metres.
+    receiver: (DVec3, f64),
 }
 
 impl<'m> Scope<'m> {
@@ -135,17 +156,18 @@ impl<'m> Scope<'m> {
         near: &'m [u32],
     ) -> Self {
         let scale = f64::from(receiver.scale);
-        let [x, y, z, _] = receiver.centre;
+        let [x, y, z, inverse_radius] = receiver.centre;
         let vector = |[x, y, z]: [f32; 3]| DVec3::new(x.into(), y.into(), z.into());
         Scope {
             scene,
-            receiver: index,
+            index,
             near,
             reflectance: receiver.reflectance.into(),
             centre: vector([x, y, z]) + to_world(receiver, vector(bounds.centre) * scale),
             radius_m: f64::from(bounds.radius_m) * scale,
             axis: to_world(receiver, vector(bounds.axis)),
             spread: Angle::of_cosine(bounds.cosine.into()),
+            receiver: (vector([x, y, z]), CONTACT / f64::from(inverse_radius)),
         }
     }
 
@@ -156,7 +178,7 @@ impl<'m> Scope<'m> {
 
     /// Whether the own visibility of the cluster has the shadows of an occluder, those of sharp lights or all others.
     pub fn is_own(&self, occluder: usize, sharp: bool) -> bool {
-        self.scene.groups.as_ref().is_some_and(|groups| groups.share(self.receiver, occluder))
+        self.scene.groups.as_ref().is_some_and(|groups| groups.share(self.index, occluder))
             && (!sharp || self.near.binary_search(&(occluder as u32)).is_ok())
     }
 
@@ -182,7 +204,52 @@ impl<'m> Scope<'m> {
             .map_or(EVERYTHING, |(half, spread)| weight(half, from_axis.cosine_less(self.spread.plus(spread))));
         let whole = !skip.caps || sphere_radius > CAP_SINES[0] * nearest;
         let cap = skip.caps && sphere_radius < CAP_SINES[1] * farthest;
-        SphereView { toward, nearest, farthest, radius: sphere_radius, spread, turn, below, weight, whole, cap }
+        SphereView {
+            toward,
+            nearest,
+            farthest,
+            radius: sphere_radius,
+            spread,
+            turn,
+            below,
+            weight,
+            whole,
+            cap,
+            sheet: None,
+        }
+    }
+
+    /// The sphere of an occluder, and what more is known where it is a sheet.
+    pub fn view_of(&self, occluder: usize) -> SphereView {
+        let view = self.view(self.scene.spheres[occluder]);
+        let Some(sheet) = &self.scene.entities[occluder].sheet else { return view };
+        SphereView { below: self.scene.skip.horizon && self.is_below(sheet), sheet: Some(self.sides(sheet)), ..view }
+    }
+
+    /// Whether no vertex sees any corner of a sheet above its horizon.
+    fn is_below(&self, sheet: &Sheet) -> bool {
+        sheet.corners().into_iter().all(|corner| {
+            let to = corner - self.centre;
+            let distance = to.length().max(1e-15);
+            let from_axis = Angle::of_cosine(to.dot(self.axis) / distance);
+            // A vertex in contact counts as up to twice as far off.
+            distance * from_axis.cosine_less(self.spread) + self.radius_m + 2.0 * self.receiver.1 < 0.0
+        })
+    }
+
+    fn sides(&self, sheet: &Sheet) -> SheetSides {
+        let up = sheet.up();
+        let height = up.dot(self.centre - sheet.centre);
+        let (centre, contact) = self.receiver;
+        let of_centre = up.dot(centre - sheet.centre);
+        // As in `height_over`: who is in contact counts as on the side of the receiver's centre, if that is off it.
+        let above = |height: f64, of_centre: f64| {
+            let lowest = height - self.radius_m;
+            lowest > 1.01 * contact || (of_centre > 2.1 * contact && lowest > -0.99 * contact)
+        };
+        let known = [above(height, of_centre), above(-height, -of_centre)];
+        let normal = if known[1] { up } else { -up };
+        SheetSides { normal, height: normal.dot(self.centre - sheet.centre), known: known[0] || known[1] }
     }
 
     pub fn light_result(&self, light: &ListLight, view: &SphereView) -> CullResult {
@@ -221,12 +288,37 @@ impl<'m> Scope<'m> {
             return CullResult::BelowHorizon;
         }
         let Some(light) = light else { return self.of_weight(radiance * view.weight) };
+        if let Some(sides) = &view.sheet {
+            return self.sheet_result(sides, view, light, sharp, radiance);
+        }
         let reach = if sharp { view.radius } else { 0.0 };
         if self.scene.skip.behind && view.nearest - reach > light.farthest {
             return CullResult::BehindLight;
         }
         let fade = if sharp { 0.0 } else { SKIP_FADE_RAD };
         if self.scene.skip.cones && apart(view, light, fade) {
+            return CullResult::Apart;
+        }
+        self.of_weight(radiance * view.weight.min(light.weight))
+    }
+
+    /// As [`Scope::occluder_result`], of a sheet that rises above the horizon. A sheet blocks what lies beyond its
+    /// plane: in bands a light whose centre does, and of a sharp light the parts that do.
+    fn sheet_result(
+        &self,
+        sides: &SheetSides,
+        view: &SphereView,
+        light: &SphereView,
+        sharp: bool,
+        radiance: f64,
+    ) -> CullResult {
+        let light_height = sides.height + sides.normal.dot(light.toward) * (light.nearest + self.radius_m);
+        let reaches = if sharp { light.radius } else { 0.0 };
+        if self.scene.skip.behind && sides.known && light_height + reaches < 0.0 {
+            return CullResult::BehindLight;
+        }
+        // The shares of the four sides of a sheet that is seen at a grazing angle end less than that far from it.
+        if sharp && self.scene.skip.cones && apart(view, light, SKIP_FADE_RAD) {
             return CullResult::Apart;
         }
         self.of_weight(radiance * view.weight.min(light.weight))
@@ -297,7 +389,7 @@ impl<'m> Scope<'m> {
     /// Whether an entity stands on the list of the cluster.
     pub fn lists(&self, index: usize, receiver: u32) -> bool {
         let scene = self.scene;
-        let view = scene.entities[index].occludes.then(|| self.view(scene.spheres[index]));
+        let view = scene.entities[index].occludes.then(|| self.view_of(index));
         let blocks = |light: Option<&SphereView>, sharp, radiance: f32| {
             !self.is_own(index, sharp)
                 && view

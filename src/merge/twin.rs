@@ -1,10 +1,12 @@
 //! The CPU twin of "merge", in f64 and vertex by vertex, from the same stored numbers.
 
+use crate::field::sheet::{Sheet, SheetEye, SheetView};
 use crate::field::{Area, ShadowField};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
 use crate::merge::chain::{ChainState, Multiplier};
 use crate::sh::basis::{MAX_BANDS, MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
+use crate::sh::polygon::POLYGON_BANDS;
 use crate::sh::rotation::Rotation;
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
@@ -27,6 +29,8 @@ pub struct MergeObject<'f> {
     pub area: Area,
     /// Radiance field, if its light varies over the surface.
     pub radiance: Option<&'f ShadowField>,
+    /// The rectangle that blocks in place of a field.
+    pub sheet: Option<Sheet>,
 }
 
 /// One receiver under all lights.
@@ -79,10 +83,15 @@ impl MergeTwin<'_> {
 
         let normal = receiver.rotation * self.normals[v];
         let cones: Vec<Cone> = self.objects.iter().map(|o| Cone::new(o.centre, o.radius_m, position)).collect();
+        let eye = SheetEye { position, normal, receiver: (receiver.centre, receiver.radius_m) };
+        let sheet = |j: usize| self.objects[j].sheet.map(|sheet| sheet.seen(&eye));
         let factors: Vec<(usize, f64, Coefficients, Option<Cap>)> = self
             .occluders
             .iter()
             .map(|&j| {
+                if let Some(sheet) = sheet(j) {
+                    return (j, sheet_above_horizon(&sheet, normal, self.skip), self.sheet_blocked(&sheet), None);
+                }
                 let share = cones[j].field_share(self.skip);
                 let blocked = self.field(j, position, None, rotations).map(|b| b * share);
                 let object = &self.objects[j];
@@ -110,9 +119,16 @@ impl MergeTwin<'_> {
             sum.iter_mut().zip(sky).for_each(|(sum, sky)| *sum += multiplier.meet(&t, sky));
         }
         for &light in self.lights.iter().filter(|&&l| l != self.receiver && !(self.leaves)(v, l, Some(l))) {
-            let before =
-                |j: usize| !(self.leaves)(v, j, Some(light)) && (cones[j].distance, j) < (cones[light].distance, light);
-            let t = chain(&|j| if before(j) { cones[j].overlap(&cones[light], self.skip) } else { 0.0 });
+            let before = |j: usize| (cones[j].distance, j) < (cones[light].distance, light);
+            let t = chain(&|j| match sheet(j) {
+                _ if (self.leaves)(v, j, Some(light)) => 0.0,
+                Some(sheet) => {
+                    let Cone { toward, distance, .. } = cones[light];
+                    sheet_before(&sheet, distance * toward, self.objects[light].radius_m, self.skip)
+                }
+                None if before(j) => cones[j].overlap(&cones[light], self.skip),
+                None => 0.0,
+            });
             let reach = cones[light].above_horizon(normal, self.skip);
             for (channel, sum) in sum.iter_mut().enumerate() {
                 let s = self.field(light, position, Some(channel), rotations);
@@ -140,6 +156,14 @@ impl MergeTwin<'_> {
         out
     }
 
+    /// What a sheet blocks, in as many bands as are both known and asked for.
+    fn sheet_blocked(&self, sheet: &SheetView) -> Coefficients {
+        let mut out = [0.0; MAX_COEFFICIENTS];
+        let count = coefficient_count(self.bands.min(POLYGON_BANDS));
+        out[..count].copy_from_slice(&sheet.blocked()[..count]);
+        out
+    }
+
     /// The field of object `j` at a world position, in the world frame: radiance of a channel, or the blocked part.
     fn field(&self, j: usize, position: DVec3, channel: Option<usize>, rotations: &[Rotation]) -> Coefficients {
         let object = &self.objects[j];
@@ -156,10 +180,35 @@ impl MergeTwin<'_> {
     }
 }
 
+/// How far a light's centre lies beyond a sheet, in its bounding radii, where the sheet counts in full. A lamp that lies
+/// on a ceiling is to shine.
+pub const BEHIND_SHEET: f64 = 0.2;
+
+/// Share with which a sheet counts above a horizon: 0 where none of it rises above, and all where it may rise by
+/// [`SKIP_FADE_RAD`]. The twin of `glsl/merge_sheet.glsl`, as all about sheets here.
+pub fn sheet_above_horizon(sheet: &SheetView, normal: DVec3, skip: Skip) -> f64 {
+    let highest = sheet.corners().into_iter().map(|corner| corner.dot(normal)).fold(f64::NEG_INFINITY, f64::max);
+    if skip.horizon { smoothstep(0.0, SKIP_FADE_RAD.sin(), highest / sheet.nearest_m()) } else { 1.0 }
+}
+
+/// Share with which a sheet counts before a light whose centre lies at `to` from the point, metres. It goes from 0 to 1
+/// as that centre goes from the sheet's plane to [`BEHIND_SHEET`] beyond it. It is less where the two stand side by
+/// side: 1 where the light reaches [`CONES_MEET_RAD`] into the sheet or its middle does, fading to 0 where they are
+/// [`SKIP_FADE_RAD`] apart.
+pub fn sheet_before(sheet: &SheetView, to: DVec3, radius_m: f64, skip: Skip) -> f64 {
+    let beyond = smoothstep(0.0, BEHIND_SHEET, sheet.beyond_m(to) / radius_m);
+    let sine = (radius_m / to.length()).min(1.0);
+    let apart = -sine - SKIP_FADE_RAD.sin();
+    let met = (CONES_MEET_RAD.sin() - sine).min(0.0);
+    let inside = sheet.inside(to.normalize_or_zero()).min_element();
+    if skip.cones { beyond * smoothstep(apart, met, inside) } else { beyond }
+}
+
 /// What a bounding sphere covers of a vertex's view: the twin of `glsl/merge_cone.glsl`, in angles.
 #[derive(Clone, Copy, Debug)]
 pub struct Cone {
-    toward: DVec3,
+    /// Unit direction of the sphere's centre.
+    pub toward: DVec3,
     /// Distance of the sphere's centre, metres.
     pub distance: f64,
     half_angle_rad: Option<f64>,

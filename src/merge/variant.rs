@@ -3,10 +3,13 @@
 use crate::error::{Error, Result};
 use crate::field::lattice::{CELL_WARP, Directions, Lattice, Spacing};
 use crate::field::quantity::{Storage, channel_stride};
+use crate::field::sheet::CONTACT;
 use crate::gpu::Device;
 use crate::layout::{CLUSTER_VERTICES, DeviceEntity, ENTRY_BITS};
 use crate::lists::skip::{CAP_SINES, CAP_SPREAD, CONES_MEET_RAD, SKIP_FADE_RAD, Skip};
-use crate::sh::basis::Y00;
+use crate::merge::twin::BEHIND_SHEET;
+use crate::sh::basis::{Y00, coefficient_count};
+use crate::sh::polygon::POLYGON_BANDS;
 use crate::shaders::ShaderPermutation;
 use ash::vk;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -103,6 +106,8 @@ pub struct MergePermutation {
     pub skip: Skip,
     /// Whether any light meets a chain. Without, there is the sky's chain alone.
     pub lights: bool,
+    /// Whether any mesh is a sheet.
+    pub sheets: bool,
     /// Entities that uniform blocks hold on the device, [`uniform_entities`].
     pub entity_limit: u32,
 }
@@ -140,6 +145,10 @@ impl MergePermutation {
             .define("PACKED", self.packed())
             .define("SHIFTED", self.packed() && self.variant.shifted)
             .define("LIGHTS", self.lights)
+            .define("SHEETS", self.sheets)
+            .define("SHEET_COEFFICIENTS", coefficient_count(self.bands.min(POLYGON_BANDS)) as u32)
+            .number("CONTACT", CONTACT)
+            .number("BEHIND_SHEET", BEHIND_SHEET)
             .define("UNIFORM", self.variant.reads == Reads::StorageUniform)
             .define("ENTITY_LIMIT", self.entity_limit)
             .define("HALF", self.storage == Storage::F16)

@@ -138,6 +138,7 @@ impl Workload {
             lattice: self.lattice,
             skip: Skip::NONE,
             lights: false,
+            sheets: false,
             entity_limit: self.entity_limit,
         }
     }

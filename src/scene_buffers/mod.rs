@@ -15,6 +15,7 @@ use crate::field::ShadowField;
 use crate::field::extent::Extent;
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::self_visibility::{self, BYTES};
+use crate::field::sheet::Rectangle;
 use crate::gpu::{Buffer, Device};
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::ClusterBounds;
@@ -39,6 +40,8 @@ pub struct DeviceMesh {
     pub radiance: Option<FieldSlot>,
     /// Silhouette field, if an entity needs one.
     pub silhouette: Option<SilhouetteSlot>,
+    /// The rectangle that blocks in place of fields, if the mesh is one.
+    pub rectangle: Option<Rectangle>,
     /// Centre of the bounding sphere, metres.
     pub centre_m: DVec3,
     pub radius_m: f64,
@@ -160,7 +163,9 @@ impl SceneBuffers {
         let (silhouettes, outlines) = Silhouettes::new(device, &baked.meshes)?;
         let meshes = scene.meshes.iter().zip(slots).zip(outlines).map(|((mesh, [blocked, radiance]), silhouette)| {
             let (centre, radius_m) = mesh.bounding_sphere();
-            DeviceMesh { blocked, radiance, silhouette, centre_m: centre.as_dvec3(), radius_m: f64::from(radius_m) }
+            let rectangle = mesh.rectangle();
+            let radius_m = f64::from(radius_m);
+            DeviceMesh { blocked, radiance, silhouette, rectangle, centre_m: centre.as_dvec3(), radius_m }
         });
         let meshes = meshes.collect();
         // The vertices are reserved at once. Growing by halves would hold up to three times as much.

@@ -11,6 +11,7 @@ pub mod twin;
 use crate::bake::silhouette::SilhouetteOptions;
 use crate::error::Result;
 use crate::field::lattice::CELL_WARP;
+use crate::field::sheet::{BEYOND as BEYOND_SHEET, CONTACT};
 use crate::field::silhouette::{DEEP, INSIDE, LEAST_PENUMBRA, LEAST_STEP, NEAREST, NO_BOX, REACH, TOUCHING};
 use crate::field::silhouette_nodes::{BEYOND, EASED, LEAST_AHEAD};
 use crate::field::sub_light::{BLEND, CORNER, LIMIT_SINE, MOST_SINE, STRIP, TURNED_BY};
@@ -56,6 +57,8 @@ pub struct SharpPermutation {
     pub halves: bool,
     /// Whether any silhouette field has a box that tells more than its outlines: of a convex mesh that is no ball.
     pub boxes: bool,
+    /// Whether any mesh is a sheet.
+    pub sheets: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
     /// Whether every point leaves out the occluders of its lists that stand outside a light's cone. It saves a quarter
@@ -91,6 +94,7 @@ impl SharpPermutation {
             .define("PANELS", self.panels)
             .define("HALVES", self.halves)
             .define("BOXES", self.boxes)
+            .define("SHEETS", self.sheets)
             .define("SELF", self.self_shadows)
             .define("CONES", self.cones)
             .define("EDGES", self.edges)
@@ -108,6 +112,8 @@ impl SharpPermutation {
             ("INSIDE_TO", INSIDE[1]),
             ("DEEP_FROM", DEEP[0]),
             ("DEEP_TO", DEEP[1]),
+            ("CONTACT", CONTACT),
+            ("BEYOND_SHEET", BEYOND_SHEET),
             ("CONE_WIDER", CONE_WIDER),
             ("BALL_WIDER", BALL_WIDER),
             ("EDGE_REACH", EDGE_REACH),

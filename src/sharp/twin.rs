@@ -1,6 +1,7 @@
 //! The CPU twin of "sharp", in f64 and vertex by vertex, from the same stored numbers.
 
 use crate::field::self_visibility::{self, BYTES};
+use crate::field::sheet::{BEYOND, Sheet, SheetEye};
 use crate::field::silhouette::{Near, SilhouetteField};
 use crate::field::sub_light::{BLOCK, LightPart, SeenLight};
 use crate::scene::LightMethod;
@@ -17,6 +18,8 @@ pub struct SharpObject<'f> {
     /// Bounding radius after scaling, metres.
     pub radius_m: f64,
     pub silhouette: Option<&'f SilhouetteField>,
+    /// The rectangle that blocks in place of an outline.
+    pub sheet: Option<Sheet>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -33,12 +36,10 @@ pub struct SharpLight {
 /// One receiver under all sharp lights.
 pub struct SharpTwin<'t> {
     pub objects: &'t [SharpObject<'t>],
+    /// The object that is lit.
+    pub receiver: usize,
     /// Objects that occlude the receiver.
     pub occluders: &'t [usize],
-    /// Rotation of the receiver to the world.
-    pub rotation: DQuat,
-    /// Bounding radius of the receiver after scaling, metres.
-    pub radius_m: f64,
     /// Self-visibility of its points, [`BYTES`] each, if it can shadow itself.
     pub self_maps: Option<&'t [u8]>,
     pub lights: &'t [SharpLight],
@@ -83,8 +84,12 @@ impl SharpTwin<'_> {
             LightMethod::Harmonics => return 0.0,
         };
         let between = |j: &&usize| **j != light.entity && !(self.leaves)(v, **j, light.entity);
-        let occluders: Vec<&SharpObject<'_>> =
-            self.occluders.iter().filter(between).map(|&j| &self.objects[j]).collect();
+        let between = self.occluders.iter().filter(between).map(|&j| &self.objects[j]);
+        let (sheets, occluders): (Vec<&SharpObject<'_>>, Vec<_>) = between.partition(|object| object.sheet.is_some());
+        let receiver = &self.objects[self.receiver];
+        let eye =
+            SheetEye { position: point.position, normal: point.normal, receiver: (receiver.centre, receiver.radius_m) };
+        let sheets: Vec<_> = sheets.iter().flat_map(|object| object.sheet).map(|sheet| sheet.seen(&eye)).collect();
         let near = |object: &SharpObject<'_>, toward: DVec3| {
             let field = object.silhouette.expect("what blocks or shines by its outline has a silhouette field");
             let local = |v: DVec3| object.rotation.inverse() * v;
@@ -102,14 +107,33 @@ impl SharpTwin<'_> {
                 let pairs = occluders.iter().zip(&between);
                 let through: f64 =
                     pairs.map(|(object, near)| 1.0 - blocked(object, near, part, part.distance)).product();
+                let past_sheets: f64 = sheets
+                    .iter()
+                    .map(|sheet| {
+                        let slope = sheet.slope(seen.facing().unwrap_or(part.toward));
+                        1.0 - sheet.blocked_of(
+                            part.toward,
+                            part.distance,
+                            part.sine,
+                            slope,
+                            BEYOND * seen.sine * seen.distance,
+                        )
+                    })
+                    .product();
                 let covers =
                     share.unwrap_or(0.0) + own.as_ref().map_or(0.0, |near| blocked(shining, near, part, f64::INFINITY));
                 let sees = self.self_maps.map_or(1.0, |maps| {
-                    let toward = self.rotation.inverse() * part.toward;
+                    let toward = receiver.rotation.inverse() * part.toward;
                     let map = &maps[v * BYTES..][..BYTES];
-                    self_visibility::visible(map, point.own_normal, toward, part.sine, part.distance / self.radius_m)
+                    self_visibility::visible(
+                        map,
+                        point.own_normal,
+                        toward,
+                        part.sine,
+                        part.distance / receiver.radius_m,
+                    )
                 });
-                part.share(point.normal) * sees * covers * through
+                part.share(point.normal) * sees * covers * through * past_sheets
             };
             parts.iter().map(part).sum()
         };

@@ -7,9 +7,10 @@ use super::world::{EntityView, VertexView, World};
 use crate::lists::gather::distance_key;
 use crate::lists::skip::Skip;
 use crate::merge::chain::Multiplier;
-use crate::merge::twin::{Cap, Cone};
+use crate::merge::twin::{Cap, Cone, sheet_above_horizon, sheet_before};
 use crate::sh::basis::{MAX_COEFFICIENTS, Y00, coefficient_count, evaluate};
 use crate::sh::lobe::clamped_cosine;
+use crate::sh::polygon::POLYGON_BANDS;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -59,11 +60,24 @@ impl ExactChain {
             Cone::new(entity.centre, entity.radius_m, view.position)
         };
         let mut occluders = world.occluders(&view);
-        // As in the merge, ties of the f32 distance key are ordered by index.
-        occluders.sort_by_key(|sight| (distance_key(centre(sight.entity), centre(vertex.entity)), sight.entity));
+        // As in the merge, ties of the f32 distance key are ordered by index, and sheets come last.
+        let sheet = |sight: &EntityView| world.sheet(sight.entity, &view);
+        occluders.sort_by_key(|sight| {
+            (sheet(sight).is_some(), distance_key(centre(sight.entity), centre(vertex.entity)), sight.entity)
+        });
         let factors: Vec<(EntityView, f64, Coefficients, Option<Cap>)> = occluders
             .into_iter()
             .map(|occluder| {
+                if let Some(sheet) = sheet(&occluder) {
+                    let blocked = if self.visibility_bands > POLYGON_BANDS {
+                        self.blocked(world, &occluder, points(1 + occluder.entity))
+                    } else {
+                        let known = sheet.blocked();
+                        let count = coefficient_count(self.visibility_bands);
+                        std::array::from_fn(|k| if k < count { known[k] } else { 0.0 })
+                    };
+                    return (occluder, sheet_above_horizon(&sheet, view.normal, self.skip), blocked, None);
+                }
                 let cone = cone(&occluder);
                 let share = cone.field_share(self.skip);
                 let blocked = self.blocked(world, &occluder, points(1 + occluder.entity));
@@ -89,8 +103,13 @@ impl ExactChain {
         let mut sum = DVec3::from_array(sky.each_ref().map(|channel| multiplier.meet(&through, channel)));
         for light in world.lights(&view) {
             let behind = cone(&light);
-            let t = chain(&|occluder| {
-                if occluder.precedes(&light) { cone(occluder).overlap(&behind, self.skip) } else { 0.0 }
+            let t = chain(&|occluder| match sheet(occluder) {
+                Some(sheet) => {
+                    let radius_m = world.entities[light.entity].radius_m;
+                    sheet_before(&sheet, behind.distance * behind.toward, radius_m, self.skip)
+                }
+                None if occluder.precedes(&light) => cone(occluder).overlap(&behind, self.skip),
+                None => 0.0,
             });
             let reach = behind.above_horizon(view.normal, self.skip);
             let radiance = self.radiance(world, &light, points(1 + light.entity));

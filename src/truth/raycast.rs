@@ -27,8 +27,8 @@ pub enum Distant {
 pub enum Order {
     /// What a ray meets before the light's surface.
     Surfaces,
-    /// The merge's rule for SH fields, [`EntityView::precedes`]: an occluder counts as a whole or not at all, by the
-    /// centres of the bounding spheres, and the receiver shadows itself from what lies beyond the light too.
+    /// The merge's rule for SH fields, [`EntityView::precedes`]: an occluder that is no sheet counts as a whole or not
+    /// at all, by the centres of the bounding spheres, and the receiver shadows itself from what lies beyond the light too.
     Centres,
 }
 
@@ -126,7 +126,7 @@ impl RayCast {
             .lights(view)
             .into_iter()
             .filter(|light| light.rises_above(view.normal))
-            .map(|light| Shadowed::new(view, light, &occluders, self.order))
+            .map(|light| Shadowed::new(world, view, light, &occluders, self.order))
             .collect();
 
         let albedo = world.scene.entities[vertex.entity].albedo.as_dvec3();
@@ -208,7 +208,7 @@ impl RayCast {
         let view = world.view(vertex);
         let occluders = world.occluders(&view);
         world.lights(&view).into_iter().filter(|light| light.rises_above(view.normal)).any(|light| {
-            let shadowed = Shadowed::new(&view, light, &occluders, Order::Surfaces);
+            let shadowed = Shadowed::new(world, &view, light, &occluders, Order::Surfaces);
             shadowed.limits_itself || !shadowed.beside.is_empty()
         })
     }
@@ -230,17 +230,18 @@ struct Shadowed {
 }
 
 impl Shadowed {
-    fn new(view: &VertexView, light: EntityView, occluders: &[EntityView], order: Order) -> Self {
+    fn new(world: &World<'_>, view: &VertexView, light: EntityView, occluders: &[EntityView], order: Order) -> Self {
         let [near, far] = light.range_m();
         // The comparison of distances comes first, because that of cones costs an arc cosine.
-        let nearer = |o: &&EntityView| match order {
-            Order::Surfaces => o.entity != light.entity && o.range_m()[0] < far && o.overlaps(&light),
-            Order::Centres => o.precedes(&light) && o.overlaps(&light),
+        let by_surface = |o: &EntityView| order == Order::Surfaces || world.is_sheet(o.entity);
+        let nearer = |o: &&EntityView| match by_surface(o) {
+            true => o.entity != light.entity && o.range_m()[0] < far && o.overlaps(&light),
+            false => o.precedes(&light) && o.overlaps(&light),
         };
         let mut before = Vec::new();
         let mut beside = Vec::new();
         for occluder in occluders.iter().filter(nearer) {
-            let wholly = order == Order::Centres || occluder.range_m()[1] <= near;
+            let wholly = !by_surface(occluder) || occluder.range_m()[1] <= near;
             if wholly { &mut before } else { &mut beside }.push(*occluder);
         }
         let limits_itself = order == Order::Surfaces && view.own().is_some_and(|own| own.range_m()[1] > near);

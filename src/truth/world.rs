@@ -5,7 +5,7 @@ use super::ray_mesh::{RayMesh, RayMeshes};
 use super::sequence::Axes;
 use crate::bake::TRANSFER_OFFSET;
 use crate::field::lattice::cap_height;
-use crate::field::sheet;
+use crate::field::sheet::{self, Rectangle, Sheet, SheetEye, SheetView};
 use crate::scene::{Placement, Scene};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
@@ -125,6 +125,23 @@ impl<'s> World<'s> {
     pub fn occluders(&self, view: &VertexView) -> Vec<EntityView> {
         let others = self.occluders.iter().filter(|&&j| j != view.entity);
         others.map(|&j| self.sight(j, self.beside(j, view))).collect()
+    }
+
+    /// Whether an occluder is a rectangle.
+    pub fn is_sheet(&self, occluder: usize) -> bool {
+        self.scene.meshes[self.scene.entities[occluder].mesh].rectangle().is_some()
+    }
+
+    /// An occluder as a vertex sees it, where it is a rectangle.
+    pub fn sheet(&self, occluder: usize, view: &VertexView) -> Option<SheetView> {
+        let Rectangle { axes, half_m } = self.scene.meshes[self.scene.entities[occluder].mesh].rectangle()?;
+        let PlacedEntity { centre, radius_m, rotation, .. } = self.entities[occluder];
+        let own_radius_m = f64::from(self.scene.meshes[self.scene.entities[occluder].mesh].bounding_sphere().1);
+        let half_m = half_m.map(|half| half * radius_m / own_radius_m);
+        let sheet = Sheet { centre, rectangle: Rectangle { axes: axes.map(|axis| rotation * axis), half_m } };
+        let receiver = &self.entities[view.entity];
+        let receiver = (receiver.centre, receiver.radius_m);
+        Some(sheet.seen(&SheetEye { position: view.position, normal: view.normal, receiver }))
     }
 
     /// Where a vertex sees an occluder from: its own place, off the plane of a sheet ([`sheet::height_over`]).

@@ -39,6 +39,7 @@ fn merge() -> Vec<(Variant, Reflection)> {
         lattice: Lattice::default().starting_at(1.02),
         skip: Skip::ALL,
         lights: true,
+        sheets: true,
         entity_limit: 48,
     };
     let reflection = |row| library().shader(&row).unwrap().reflection;
@@ -90,7 +91,7 @@ fn entities_and_clusters_of_the_merge() {
                 light_share,
                 light_ratio,
                 light_ramp,
-                unused,
+                half_sides,
             }
         );
         assert_eq!(entity.len(), 20);

@@ -16,6 +16,7 @@ mod project;
 mod self_visibility;
 mod shadow_map;
 mod sharp_motion;
+mod sheet;
 mod skip;
 mod stability;
 #[path = "../common/stage.rs"]

@@ -61,6 +61,7 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
             blocked: fields[entity.mesh].as_ref(),
             area: device_mesh.blocked.as_ref().map_or(Default::default(), |slot| slot.area),
             radiance: None,
+            sheet: None,
         }
     };
     let objects: Vec<MergeObject<'_>> = scene.entities.iter().zip(&placements).map(object).collect();
@@ -172,6 +173,7 @@ fn equal_keys_go_by_index() {
         coloured: false,
         radiance: 0.0,
         facing: None,
+        sheet: None,
     };
     let scene_bounds =
         SceneBounds::new(vec![entity(0.0), entity(1.0 + 1e-12), entity(1.0), entity(1.0 - 1e-5)], None, Skip::ALL, 0.0);

@@ -1,0 +1,56 @@
+// The share of the parts of a light that a sheet lets through: SheetView::blocked_of of src/field/sheet.rs.
+#include "sheet.glsl"
+
+// Share of a disc on the inner side of two edges, from the shares inside of each and the cosine of their normals.
+float both(float a, float b, float cosine) {
+    return mix(a * b, cosine < 0.0 ? max(a + b - 1.0, 0.0) : min(a, b), abs(cosine));
+}
+
+vec4 past_sheet(Entity entity, Surface surface, SeenLight light, Block block) {
+    Sheet sheet = sheet_of(entity, entity.centre.xyz - surface.origin, surface.position, surface.facings[0].normal,
+                           CONTACT / surface.inverse_radius);
+    mat3 axes = transpose(mat3(light.toward, light.across, light.down)) * sheet.axes; // by the light's axes
+    float h = sheet.height;
+    vec4 ends = sheet.ends / sheet.to_ends;
+    vec2 tilts = -(vec2(h * h) + sheet.ends.xz * sheet.ends.yw) / (sheet.to_ends.xz * sheet.to_ends.yw);
+    float least = BEYOND_SHEET * light.sine * light.distance;
+    vec4 blocked;
+    EACH for (uint k = 0; k < 4; k++) {
+        vec2 part = part_place(light, block, k);
+        vec3 along = along_axes(light, part);
+        float sine = part_sine(light, block, part, along);
+        float reach = reach_of(light, part, along);
+        vec3 direction = along * axes;
+        vec4 inside = inside_of(sheet, direction);
+        float width = max(sine, LEAST_PENUMBRA);
+        vec4 share = vec4(blocked_share(inside.x / width), blocked_share(inside.y / width),
+                          blocked_share(inside.z / width), blocked_share(inside.w / width));
+        float x = both(share.x, share.y, tilts.x), y = both(share.z, share.w, tilts.y);
+        float cosine = (share.x < share.y ? -ends.x : ends.y) * (share.z < share.w ? -ends.z : ends.w);
+#if PANELS
+        float facing = dot(is_panel(light) ? light.facing : along, axes[2]);
+#else
+        float facing = direction.z;
+#endif
+        float slope = sqrt(max(1.0 - facing * facing, 0.0));
+        float counts = clamp((direction.z * reach - h - least) / max(reach * sine * slope, least), 0.0, 1.0);
+        blocked[k] = counts * both(x, y, cosine);
+#if EDGES
+        // The side that is nearest to the ray or farthest outside of it, and how far away it is there.
+        float nearest = inside.x, end = sheet.ends.x, off = sheet.to_ends.x, across = direction.x;
+        EACH for (uint i = 1; i < 4; i++) {
+            bool nearer = inside[i] < nearest;
+            nearest = nearer ? inside[i] : nearest;
+            end = nearer ? sheet.ends[i] : end;
+            off = nearer ? sheet.to_ends[i] : off;
+            across = nearer ? direction[i >> 1] : across;
+        }
+        float toward = end * across + h * direction.z;
+        float away = toward > 0.0 ? off * off / toward : -EVERYTHING;
+        float scale = entity.centre.w;
+        find_edge(nearest * abs(away) * scale, away * scale, reach * scale, away * scale * max(sine, LEAST_PENUMBRA),
+                  inversesqrt(block.area), surface.step * scale);
+#endif
+    }
+    return 1.0 - blocked;
+}

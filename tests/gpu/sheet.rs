@@ -1,0 +1,134 @@
+//! Sheets against rays: grounds, walls and ceilings that are rectangles, and what moves past them.
+
+use crate::{common, stage};
+use common::report;
+use shadow_fields::bake;
+use shadow_fields::frame;
+use shadow_fields::scene::{Lights, Scene};
+use shadow_fields::truth::{RayCast, RayMeshes, Vertex, World};
+use stage::{Stage, scene, small, stage};
+
+/// The fields that the command line bakes by default, in f32.
+fn defaults(lights: Lights) -> frame::Options {
+    let bake = bake::Options { storage: small().bake.storage, ..Default::default() };
+    frame::Options { bake, lights, ..small() }
+}
+
+/// Vertices of an entity as rays light them.
+fn truth(scene: &Scene, time_s: f64, entity: usize, every: usize, rays: u32) -> (Vec<usize>, Vec<f64>) {
+    let shapes = RayMeshes::new(scene);
+    let world = World::new(scene, &shapes, &scene.at(time_s));
+    let count = scene.meshes[scene.entities[entity].mesh].positions.len();
+    let chosen: Vec<usize> = (0..count).step_by(every).collect();
+    let vertices: Vec<Vertex> = chosen.iter().map(|&index| Vertex { entity, index }).collect();
+    let estimates = RayCast { rays, runs: 1, ..Default::default() }.run(&world, &vertices);
+    (chosen, estimates.iter().map(|estimate| estimate.radiosity[0]).collect())
+}
+
+/// Relative RMS of an entity's light against rays.
+fn error(stage: &Stage, frame: &mut frame::Frame, scene: &Scene, time_s: f64, entity: usize, every: usize) -> f64 {
+    let light = stage.light(frame, &scene.at(time_s)).swap_remove(entity);
+    let (chosen, truth) = truth(scene, time_s, entity, every, 1024);
+    let off: f64 = chosen.iter().zip(&truth).map(|(&v, truth)| (f64::from(light[v][0]) - truth).powi(2)).sum();
+    (off / truth.iter().map(|truth| truth * truth).sum::<f64>()).sqrt()
+}
+
+const WHITE: &str = "albedo = [1, 1, 1]";
+
+#[test]
+fn an_object_on_a_ground_is_lit_as_by_rays() {
+    let Some(stage) = stage() else { return };
+    let text = format!(
+        "environment = {{ uniform = [1, 1, 1] }}\n[[mesh]]\nname = \"floor\"\nplane = {{ size_m = 6, cells = 2 }}\n\
+         [[mesh]]\nname = \"pot\"\nfile = \"assets/meshes/teapot.obj\"\n\
+         [[entity]]\nmesh = \"floor\"\n[[entity]]\nmesh = \"pot\"\nscale = 0.5\n{WHITE}\n"
+    );
+    let scene = scene(&text);
+    let mut frame = stage.frame(&scene, defaults(Lights::Sharp));
+    let found = error(&stage, &mut frame, &scene, 0.0, 1, 3);
+    report(&format!("teapot on a floor of 6 m under a uniform sky: {found:.4}"));
+    assert!(found < 0.006, "{found}");
+}
+
+/// A ball rolls along a wall, then off the edge of its ground, in steps of 2 cm, under a sky that is brighter above.
+#[test]
+fn a_ball_along_a_wall_and_over_an_edge() {
+    let Some(stage) = stage() else { return };
+    let text = format!(
+        "environment = {{ gradient = {{ radiance = [1, 1, 1] }} }}\n\
+         [[mesh]]\nname = \"plane\"\nplane = {{ size_m = 4, cells = 2 }}\n\
+         [[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.3, subdivisions = 3 }}\n\
+         [[entity]]\nmesh = \"plane\"\n\
+         [[entity]]\nmesh = \"plane\"\nposition = [0, 0.5, -0.32]\nscale = 0.5\nrotation = {{ axis = [1, 0, 0], angle_deg = 90 }}\n\
+         [[entity]]\nmesh = \"ball\"\nposition = [0, 0.3, 0]\n{WHITE}\nmotion = [{{ bob = {{ amplitude_m = 2.5, period_s = 4, axis = [1, 0, 0] }} }}]\n"
+    );
+    let scene = scene(&text);
+    let mut frame = stage.frame(&scene, defaults(Lights::Sharp));
+    let (mut worst, mut pop) = (0.0_f64, 0.0_f64);
+    let mut walk: Vec<Vec<[f32; 3]>> = Vec::new();
+    for step in 0..=100 {
+        let time_s = f64::from(step) / 100.0;
+        walk.push(stage.light(&mut frame, &scene.at(time_s)).swap_remove(2));
+        if step % 10 == 0 {
+            let found = error(&stage, &mut frame, &scene, time_s, 2, 3);
+            report(&format!("{:.2} m from the ground's middle: {found:.4}", scene.at(time_s)[2].position.x));
+            worst = worst.max(found);
+        }
+        // A step that neither neighbour's slope explains. Of single vertices near the ground's edge it is large in truth.
+        if let [.., a, b, c] = &walk[..] {
+            let bend = |v: usize| f64::from(c[v][0] - 2.0 * b[v][0] + a[v][0]).powi(2);
+            pop = pop.max(((0..a.len()).map(bend).sum::<f64>() / a.len() as f64).sqrt());
+        }
+    }
+    report(&format!("error at most {worst:.4}, second difference {pop:.4} RMS at most"));
+    assert!(worst < 0.03, "{worst}");
+    assert!(pop < 0.02, "{pop}");
+}
+
+/// Balls of light beyond a wall, one that the wall's rim cuts, one below a ground, and a lamp that lies on a ceiling.
+#[test]
+fn sheets_hide_sharp_lights() {
+    let Some(stage) = stage() else { return };
+    let lit = |rest: &str, lights: Lights| {
+        let text = format!(
+            "[[mesh]]\nname = \"plane\"\nplane = {{ size_m = 2, cells = 1 }}\n\
+             [[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.3, subdivisions = 4 }}\n\
+             [[mesh]]\nname = \"lamp\"\nrectangle = {{ size_m = [0.6, 0.9] }}\n\
+             [[mesh]]\nname = \"field\"\nplane = {{ size_m = 3, cells = 20 }}\n\
+             [[entity]]\nmesh = \"field\"\n{WHITE}\n{rest}"
+        );
+        let scene = scene(&text);
+        let mut frame = stage.frame(&scene, defaults(lights));
+        let brightest = stage.light(&mut frame, &scene.at(0.0))[0].iter().map(|v| v[0]).fold(0.0, f32::max);
+        (error(&stage, &mut frame, &scene, 0.0, 0, 2), brightest)
+    };
+    let glow = "receives = false\nemission = [9, 9, 9]";
+    let wall = "[[entity]]\nmesh = \"plane\"\nposition = [0.13, 0.4, 0]\nscale = 0.4\nreceives = false\n\
+                rotation = { axis = [0, 0, 1], angle_deg = 90 }\n";
+    let ball = |place: &str| format!("[[entity]]\nmesh = \"ball\"\nposition = {place}\n{glow}\n");
+    let low = lit(&format!("{wall}{}", ball("[1.3, 0.7, 0.1]")), Lights::Sharp);
+    let rim = lit(&format!("{wall}{}", ball("[1.1, 1.4, 0.6]")), Lights::Sharp);
+    let tilted =
+        lit(&format!("{}{}", wall.replace("angle_deg = 90", "angle_deg = 50"), ball("[0.4, 1.9, 0.1]")), Lights::Sharp);
+    let ceiling = "[[entity]]\nmesh = \"plane\"\nposition = [0, 1.5, 0]\nreceives = false\n";
+    let lamp = |height: f64| {
+        format!(
+            "[[entity]]\nmesh = \"lamp\"\nposition = [0, {height}, 0]\nrotation = {{ axis = [1, 0, 0], angle_deg = 180 }}\n{glow}\n"
+        )
+    };
+    let under = lit(&format!("{ceiling}{}", lamp(1.499)), Lights::Sharp);
+    for (name, (error, _)) in
+        [("a low light", low), ("a light at the rim", rim), ("a tilted sheet", tilted), ("a ceiling lamp", under)]
+    {
+        report(&format!("{name} and a sheet: {error:.4}"));
+        assert!(error < 0.03, "{name}: {error}");
+    }
+    for lights in [Lights::Sharp, Lights::Sh] {
+        let (_, through) = lit(&format!("{ceiling}{}", lamp(1.7)), lights);
+        let (_, open) = lit(&lamp(1.7), lights);
+        report(&format!("{lights:?}: {through:.4} of {open:.4} come through a ceiling"));
+        assert!(through < if lights == Lights::Sharp { 1e-6 } else { 0.03 } * open, "{through} of {open}");
+        let (_, beneath) = lit(&ball("[0, -0.6, 0]"), lights);
+        assert!(beneath < 1e-6 || lights == Lights::Sh, "{beneath} from below");
+    }
+}

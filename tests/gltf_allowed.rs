@@ -293,6 +293,29 @@ fn unknown_types_are_left_out() {
     }
 }
 
+/// Words that a later version may add to a list do not keep a file from being read, and nor does a primitive that has
+/// no positions yet.
+#[test]
+fn unlisted_words_and_primitives_without_positions_are_left_out() {
+    let whole = load(&room()).data;
+    for (list, item) in [
+        ("materials", json!({ "alphaMode": "DITHER" })),
+        ("samplers", json!({ "wrapS": 1, "wrapT": 2, "magFilter": 3, "minFilter": 4 })),
+        ("bufferViews", json!({ "buffer": 0, "byteLength": 4, "target": 5 })),
+        ("cameras", json!({ "type": "fisheye", "perspective": { "yfov": 1, "znear": 1 } })),
+    ] {
+        let mut model = room();
+        model.push(list, item);
+        assert_eq!(load(&model).data, whole, "{list}");
+    }
+    let mut model = room();
+    model.json["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap().remove("POSITION");
+    let import = load(&model);
+    assert!(import.data.entities.len() < whole.entities.len());
+    let note = "left out (1): primitives without positions".to_owned();
+    assert!(import.notes.left_out().contains(&note), "{:?}", import.notes.left_out());
+}
+
 /// A matrix beside a translation, rotation or scale counts alone, and rotations are brought to unit length: both are
 /// said.
 #[test]

@@ -27,7 +27,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Reads a primitive; `None` where it is of points or lines or has no area, which is noted.
+    /// Reads a primitive; `None` where it is of points or lines, or has no positions or no area, which is noted.
     pub fn read(document: &Document, mesh: usize, at: usize, notes: &mut Notes) -> Result<Option<Self>> {
         let place = format!("meshes[{mesh}].primitives[{at}]");
         let primitive = &document.root.meshes[mesh].primitives[at];
@@ -40,8 +40,11 @@ impl Shape {
         if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
             notes.leave_out("primitives with morph targets (they keep the shape that is stored first)");
         }
-        let positions = attributes.get(&Semantic::Positions).map(|index| accessor::triples(document, *index));
-        let positions = positions.ok_or_else(|| document.fail(&place, "there is no attribute POSITION"))??;
+        let Some(positions) = attributes.get(&Semantic::Positions) else {
+            notes.leave_out("primitives without positions");
+            return Ok(None);
+        };
+        let positions = accessor::triples(document, *positions)?;
         let normals = attributes.get(&Semantic::Normals).map(|index| accessor::triples(document, *index));
         let normals = normals.transpose()?;
         if normals.as_ref().is_some_and(|normals| normals.len() != positions.len()) {

@@ -130,6 +130,7 @@ fn scene_entities() {
         ("albedo = [-0.1, 0.5, 0.5]", "0 to 1"),
         ("emission = [-1, 0, 0]", "radiance"),
         ("emission = [nan, 0, 0]", "radiance"),
+        ("emission = [1e16, 0, 0]", "radiance"),
         ("rotation = { axis = [0, 0, 0], angle_deg = 10 }", "a rotation is"),
         ("rotation = { axis = [0, 1, 0] }", "a rotation is"),
         ("rotation = { quaternion = [0, 0, 0, 0] }", "a rotation is"),

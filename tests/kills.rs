@@ -1,12 +1,14 @@
 //! Killed, crowded and cramped: whenever a command is killed, however many share a cache, and whether or not that can
 //! be written, outputs are whole or absent, the next run is as if nothing had happened, and nothing is left over.
 //!
-//! Some kills run by default. All 60 of every command: `cargo test --test kills -- --ignored --nocapture`.
+//! The variable SHADOW_FIELDS_KILLS says how many rounds there are for each number of processes; without it there are 2.
 #![cfg(unix)]
 
 #[path = "common/cli.rs"]
 mod cli;
 mod common;
+#[path = "common/room.rs"]
+mod room;
 
 use cli::{finish, has_device, names};
 use std::collections::BTreeMap;
@@ -15,30 +17,6 @@ use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-const SCENE: &str = r#"
-[camera]
-eye = [0, 1, 4]
-target = [0, 0, 0]
-[environment]
-gradient = { radiance = [0.3, 0.35, 0.4] }
-[[mesh]]
-name = "floor"
-plane = { size_m = 4, cells = 2 }
-[[mesh]]
-name = "ring"
-torus = { major_m = 0.5, minor_m = 0.2, segments = 8, sides = 6 }
-[[entity]]
-mesh = "floor"
-position = [0, -0.6, 0]
-[[entity]]
-mesh = "ring"
-[[entity]]
-mesh = "ring"
-position = [1.2, 1, 0]
-scale = 0.3
-emission = [30, 24, 12]
-motion = [{ spin = { period_s = 3 } }]
-"#;
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
 /// One triangle.
@@ -48,22 +26,19 @@ const MODEL: &str = r#"{ "asset": { "version": "2.0" }, "scene": 0, "scenes": [{
 "buffers": [{ "byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }] }"#;
 
 /// Every kind of command that writes, and what it writes. Those whose files hold times, `bench` and `profile`, write
-/// them likewise; `demo` has a test of its own, and `farm` in `tests/farm`. What the first one writes is an input of
+/// them likewise; `farm` has tests of its own. What the first one writes is an input of
 /// others.
 const COMMANDS: [(&str, &[&str]); 8] = [
     ("bake m.obj -o f.sf --lattice cube:3x3 --face-px 8", &["f.sf"]),
     ("bake m.obj -o s.sf --silhouette --quality draft", &["s.sf"]),
     (
-        "render s.toml -o p.png --exr p.exr --vertices v.csv --size 24x16 --variant storage --lattice cube:2x2 --face-px 4 \
+        "render scene.toml -o p.png --exr p.exr --vertices v.csv --variant storage --lattice cube:2x2 --face-px 4 \
          --quality draft",
         &["p.png", "p.exr", "v.csv"],
     ),
+    ("render scene.toml -o a.png --frames 4 --variant storage --lattice cube:2x2 --face-px 4 --lights sh", &["a.png"]),
     (
-        "render s.toml -o a.png --frames 4 --size 24x16 --variant storage --lattice cube:2x2 --face-px 4 --lights sh",
-        &["a.png"],
-    ),
-    (
-        "render s.toml -o n##.png --frames 3 --size 16x16 --variant storage --lattice cube:2x2 --face-px 4 --lights sh",
+        "render scene.toml -o n##.png --frames 3 --size 16x16 --variant storage --lattice cube:2x2 --face-px 4 --lights sh",
         &["n00.png", "n01.png", "n02.png"],
     ),
     ("import t.gltf -o i.toml", &["i.toml", "i_meshes/mesh_0.obj"]),
@@ -76,9 +51,8 @@ const NUMBERED: usize = 4;
 /// A folder for a command's outputs, with its inputs.
 fn place(inside: &Path, name: &str) -> PathBuf {
     let folder = inside.join(name);
-    std::fs::create_dir_all(&folder).unwrap();
+    room::write(&folder, [24, 16], "motion = [{ spin = { period_s = 3 } }]");
     std::fs::write(folder.join("m.obj"), MESH).unwrap();
-    std::fs::write(folder.join("s.toml"), SCENE).unwrap();
     std::fs::write(folder.join("t.gltf"), MODEL).unwrap();
     folder
 }
@@ -209,11 +183,13 @@ fn unfinished(folder: &Path) -> Vec<String> {
     all.into_iter().flat_map(inside).filter(|name| name.starts_with(".unfinished-")).collect()
 }
 
-/// Kills so many rounds for each number of processes; in each round another command is killed for sure.
-fn kill(rounds: usize) {
+/// In each round another command is killed for sure.
+#[test]
+fn kills_leave_whole_outputs_and_a_cache_that_works() {
     if !has_device() {
         return;
     }
+    let rounds = std::env::var("SHADOW_FIELDS_KILLS").map_or(2, |text| text.parse().expect("a number of rounds"));
     let (good, mut random) = (Good::get(), fastrand::Rng::with_seed(1));
     for crowd in [1, 2, 4] {
         let (start, mut tally) = (Instant::now(), Tally::default());
@@ -222,71 +198,6 @@ fn kill(rounds: usize) {
         let seconds = start.elapsed().as_secs_f64();
         common::report(&format!("{crowd} processes on one cache, {rounds} rounds: {tally:?}, {seconds:.1} s"));
     }
-}
-
-#[test]
-fn kills_leave_whole_outputs_and_a_cache_that_works() {
-    kill(2);
-}
-
-/// The variable says how many rounds each command has; 60 without it.
-fn rounds() -> usize {
-    std::env::var("SHADOW_FIELDS_KILLS").map_or(60, |text| text.parse().expect("a number of rounds"))
-}
-
-#[test]
-#[ignore = "takes an hour; a few kills run by default"]
-fn sixty_kills_of_every_command_by_one_two_and_four_processes() {
-    kill(rounds() * COMMANDS.len());
-}
-
-/// `demo` goes on where it was killed: what it has baked is in the cache.
-#[test]
-#[ignore = "takes an hour; other commands are killed by default"]
-fn sixty_kills_of_demo() {
-    if !has_device() {
-        return;
-    }
-    let inside = Path::new(env!("CARGO_TARGET_TMPDIR")).join("kills-demo");
-    let _ = std::fs::remove_dir_all(&inside);
-    let command = |output: &str| {
-        program(&place(&inside, "work"), &format!("demo -o {output} --size 32x24 --timed-frames 1 --no-progress"))
-    };
-    let run = |output: &str| {
-        let (start, ran) = (Instant::now(), finish(&mut command(output)));
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
-        start.elapsed()
-    };
-    let pictures = |output: &str| {
-        let folder = inside.join("work").join(output);
-        let all = if folder.is_dir() { names(&folder) } else { Vec::new() };
-        let of = |name: String| (name.clone(), std::fs::read(folder.join(name)).unwrap());
-        all.into_iter().filter(|name| !name.starts_with(".unfinished-")).map(of).collect::<BTreeMap<_, _>>()
-    };
-    let long = run("good");
-    let (short, good, mut random) = (run("good"), pictures("good"), fastrand::Rng::with_seed(1));
-    let (start, mut tally) = (Instant::now(), Tally::default());
-    for round in 0..rounds() {
-        // Every tenth time nothing is baked.
-        let is_new = round % 10 == 0;
-        if is_new {
-            std::fs::remove_dir_all(inside.join("cache/fields")).unwrap();
-        }
-        let _ = std::fs::remove_dir_all(inside.join("work/some"));
-        let mut process = Running::start(&mut command("some"));
-        std::thread::sleep(if is_new { long } else { short }.mul_f64(1.1 * random.f64()));
-        tally.started += 1;
-        tally.cut += usize::from(process.0.try_wait().unwrap().is_none());
-        drop(process);
-        tally.left += unfinished(&inside.join("work")).len() + unfinished(&inside.join("cache")).len();
-        for (name, bytes) in pictures("some") {
-            assert!(good[&name] == bytes, "{name} is not what it should be");
-        }
-    }
-    run("some");
-    assert!(pictures("some") == good, "other pictures than without kills");
-    assert_eq!([unfinished(&inside.join("work")), unfinished(&inside.join("cache"))], [[""; 0]; 2]);
-    common::report(&format!("demo: {tally:?}, {:.1} s", start.elapsed().as_secs_f64()));
 }
 
 /// A cache on a full disk, a read-only one, and a limit on the sizes of files: the work is done all the same.
@@ -323,6 +234,6 @@ fn caches_that_cannot_be_written_lose_nothing() {
         assert_eq!(ran.code, 0, "{how}: {}", ran.stderr);
         good.assert_whole(&folder, Some(NUMBERED));
         written.iter().for_each(|name| std::fs::remove_file(folder.join(name)).unwrap());
-        assert_eq!(names(&folder), ["m.obj", "s.toml", "t.gltf"], "{how}");
+        assert_eq!(names(&folder), ["m.obj", "scene.toml", "t.gltf"], "{how}");
     }
 }

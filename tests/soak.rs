@@ -61,34 +61,6 @@ motion = [{ orbit = { centre = [0, 1.2, 0], period_s = 4 } }]
 "#;
 const PERIOD_S: f64 = 4.0;
 
-/// What was measured.
-#[derive(Clone, Debug)]
-struct Outcome {
-    /// Memory of the process in bytes when the warm-up ended, and the most after it; `None` where the system does not
-    /// say.
-    memory_bytes: Option<[u64; 2]>,
-    /// Pictures that were compared with the first of the same moment and state.
-    compared: u64,
-    /// Compared pictures that were not the same to the bit.
-    differing: u64,
-}
-
-impl Outcome {
-    /// What is wrong, a line each.
-    fn faults(&self) -> Vec<String> {
-        let mut faults = Vec::new();
-        if let Some([before, most]) = self.memory_bytes
-            && most as f64 > before as f64 * (1.0 + MOST_GROWTH)
-        {
-            faults.push(format!("memory grew from {before} to {most} bytes after the warm-up"));
-        }
-        if self.differing > 0 || self.compared == 0 {
-            faults.push(format!("{} of {} pictures of the same moment differ", self.differing, self.compared));
-        }
-        faults
-    }
-}
-
 /// The scene in one of its states: other colours, a lamp that is brighter, goes out or casts shadows instead.
 fn changed(scene: &Scene, state: u64) -> Scene {
     let mut data = scene.data.clone();
@@ -110,36 +82,6 @@ fn changed(scene: &Scene, state: u64) -> Scene {
     changed
 }
 
-fn soak(frame: &mut Frame, states: &[Scene], frames: u64) -> Outcome {
-    let warm_up = ((frames as f64 * WARM_UP) as u64).max(2 * MOMENTS * STATES * STATE_FRAMES);
-    let mut first: Vec<Option<Vec<f32>>> = vec![None; (MOMENTS * STATES) as usize];
-    let mut memory = None;
-    let mut compared = 0;
-    let mut differing = 0;
-    for index in 0..frames {
-        let moment = index % MOMENTS;
-        let state = index / STATE_FRAMES % STATES;
-        if index % STATE_FRAMES == 0 {
-            frame.set_scene(&states[state as usize]).unwrap();
-        }
-        let placements = states[state as usize].at(moment as f64 * PERIOD_S / MOMENTS as f64);
-        frame.render(&placements, Some(1.0)).unwrap();
-        let picture = frame.picture();
-        match &first[(moment * STATES + state) as usize] {
-            None => first[(moment * STATES + state) as usize] = Some(picture),
-            Some(known) => {
-                compared += 1;
-                differing += u64::from(*known != picture);
-            }
-        }
-        if index >= warm_up && index % 256 == 0 {
-            let now = resident_bytes();
-            memory = now.map(|now| memory.map_or([now, now], |[before, most]: [u64; 2]| [before, most.max(now)]));
-        }
-    }
-    Outcome { memory_bytes: memory, compared, differing }
-}
-
 /// Memory of this process that is in use, where the system says it.
 fn resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -147,7 +89,10 @@ fn resident_bytes() -> Option<u64> {
     Some(1024 * line.split_whitespace().next()?.parse::<u64>().ok()?)
 }
 
-fn draw(frames: u64) {
+/// The variable says how many frames; without it there are 2 500.
+#[test]
+fn frames_neither_drift_nor_take_more_memory() {
+    let frames = std::env::var("SHADOW_FIELDS_SOAK").map_or(2500, |text| text.parse().expect("a number of frames"));
     // Not under the validation layer, which keeps what it has seen.
     let options = DeviceOptions { cache_dir: Some(cache_dir()), ..DeviceOptions::default() };
     let device = match Device::new(&options) {
@@ -167,34 +112,35 @@ fn draw(frames: u64) {
     let baker = Baker::new(&device, &library());
     let cache = Cache::new(Some(&folder));
     let mut frame = Frame::new(&baker, &cache, &scene, options, &|_, _, _| ()).unwrap();
-    let outcome = soak(&mut frame, &states, frames);
-    report(&format!("{outcome:?}"));
-    assert!(outcome.compared > 2000, "{outcome:?}");
-    assert_eq!(outcome.faults(), [""; 0]);
-}
 
-#[test]
-fn frames_neither_drift_nor_take_more_memory() {
-    draw(2500);
-}
-
-#[test]
-#[ignore = "an hour"]
-fn a_million_frames_neither_drift_nor_take_more_memory() {
-    draw(1_000_000);
-}
-
-#[test]
-fn growth_and_drift_are_faults() {
-    let good = Outcome { memory_bytes: Some([1000, 1019]), compared: 5, differing: 0 };
-    assert_eq!(good.faults(), [""; 0]);
-    assert_eq!(Outcome { memory_bytes: None, ..good.clone() }.faults(), [""; 0]);
-    for (bad, word) in [
-        (Outcome { memory_bytes: Some([1000, 1021]), ..good.clone() }, "memory"),
-        (Outcome { differing: 1, ..good.clone() }, "1 of 5"),
-        (Outcome { compared: 0, ..good.clone() }, "0 of 0"),
-    ] {
-        let faults = bad.faults();
-        assert!(faults.len() == 1 && faults[0].contains(word), "{faults:?}");
+    let warm_up = ((frames as f64 * WARM_UP) as u64).max(2 * MOMENTS * STATES * STATE_FRAMES);
+    let mut first: Vec<Option<Vec<f32>>> = vec![None; (MOMENTS * STATES) as usize];
+    let mut memory: Option<[u64; 2]> = None;
+    let mut compared = 0;
+    for index in 0..frames {
+        let moment = index % MOMENTS;
+        let state = index / STATE_FRAMES % STATES;
+        if index % STATE_FRAMES == 0 {
+            frame.set_scene(&states[state as usize]).unwrap();
+        }
+        let placements = states[state as usize].at(moment as f64 * PERIOD_S / MOMENTS as f64);
+        frame.render(&placements, Some(1.0)).unwrap();
+        let picture = frame.picture();
+        match &first[(moment * STATES + state) as usize] {
+            None => first[(moment * STATES + state) as usize] = Some(picture),
+            Some(known) => {
+                compared += 1;
+                assert!(*known == picture, "frame {index} is another than one of the same moment and state before");
+            }
+        }
+        if index >= warm_up && index % 256 == 0 {
+            let now = resident_bytes();
+            memory = now.map(|now| memory.map_or([now, now], |[before, most]| [before, most.max(now)]));
+        }
+    }
+    report(&format!("{compared} pictures compared; bytes in use after the warm-up, and the most later: {memory:?}"));
+    assert!(compared > frames / 2);
+    if let Some([before, most]) = memory {
+        assert!(most as f64 <= before as f64 * (1.0 + MOST_GROWTH), "memory grew from {before} to {most} bytes");
     }
 }

@@ -89,12 +89,10 @@ impl Job {
     }
 
     /// Lets calls fail, each in a run of its own, and returns how many did. Runs follow each other in one process, and
-    /// up to its fault each makes the calls of a good one. After every eight this job runs without a fault, and where
-    /// all calls fail, the `smallest` one after every fault; both must make what they did before.
-    pub fn sweep(&self, folder: &Path, share: usize, smallest: &Job) -> usize {
+    /// up to its fault each makes the calls of a good one. After every eight this job runs without a fault, and must
+    /// make what it did before.
+    pub fn sweep(&self, folder: &Path, share: usize) -> usize {
         let start = Instant::now();
-        smallest.good(folder, "the first run");
-        let (least, _) = smallest.good(folder, "the second run");
         self.good(folder, "the first run");
         self.remove(folder, self.outputs);
         self.remove(folder, self.cold);
@@ -104,9 +102,6 @@ impl Job {
             let call = heard.calls[plan.at];
             let what = format!("{}: call {}, {} with {:?}", self.name, plan.at, call.name, call.errors[plan.error]);
             self.one(folder, &what, plan, call, &expected);
-            if share == 1 {
-                smallest.again(folder, &what, &least);
-            }
             if index % 8 == 7 || index + 1 == faults.len() {
                 self.again(folder, &format!("faults up to call {}, {}", plan.at, call.name), &expected);
             }

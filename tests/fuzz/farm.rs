@@ -8,20 +8,9 @@ use shadow_fields::farm::{Film, Input, Plan};
 use shadow_fields::{Result, bake, frame};
 use std::path::{Path, PathBuf};
 
-pub const TOKENS: &[&str] = &[
-    "\"films\":[",
-    "\"meshes\":[",
-    "\"slices\":[",
-    "\"pictures\":\"#.png\"",
-    "{\"meshes\":{\"first\":0,\"count\":1}}",
-    "4294967295",
-    "4294967290",
-    "-1",
-    "null",
-    "[",
-    "]",
-    ",",
-];
+pub const TOKENS: &str = "\
+    \"films\":[|\"meshes\":[|\"slices\":[|\"pictures\":\"#.png\"|{\"meshes\":{\"first\":0,\"count\":1}}|\
+    4294967295|4294967290|-1|null|[|]|,";
 
 fn example() -> Plan {
     let mut plan = Plan::new("none (none)".into(), "results".into(), bake::Options::default());

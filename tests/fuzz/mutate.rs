@@ -6,38 +6,16 @@ use fastrand::Rng;
 const LONGEST: usize = 1 << 16;
 
 /// Numbers at which parsers go wrong.
-const NUMBERS: [&str; 24] = [
-    "0",
-    "-0",
-    "1",
-    "-1",
-    "2",
-    "0.5",
-    "1e-7",
-    "1e7",
-    "1e9",
-    "1e15",
-    "1e38",
-    "1e39",
-    "1e300",
-    "1e-300",
-    "1e400",
-    "nan",
-    "inf",
-    "-inf",
-    "255",
-    "65536",
-    "2147483647",
-    "4294967296",
-    "9223372036854775807",
-    "99999999999999999999",
-];
+const NUMBERS: &str = "\
+    0 -0 1 -1 2 0.5 1e-7 1e7 1e9 1e15 1e38 1e39 1e300 1e-300 1e400 nan inf -inf 255 65536 2147483647 4294967296 \
+    9223372036854775807 99999999999999999999";
 
 /// The same as little-endian words.
 const WORDS: [u32; 10] = [0, 1, 7, 0x7f, 0xff, 0xffff, 0x7fff_ffff, 0x8000_0000, 0x7fc0_0000, 0xffff_ffff];
 
-/// An input changed in one to four ways; `other` is another input, `tokens` are words of the format.
-pub fn mutated(random: &mut Rng, input: &[u8], other: &[u8], tokens: &[&str]) -> Vec<u8> {
+/// An input changed in one to four ways; `other` is another input, `tokens` are words of the format between
+/// bars.
+pub fn mutated(random: &mut Rng, input: &[u8], other: &[u8], tokens: &str) -> Vec<u8> {
     let mut out = input.to_vec();
     for _ in 0..1 << random.u32(0..3) {
         once(random, &mut out, other, tokens);
@@ -51,7 +29,7 @@ fn range(random: &mut Rng, length: usize, most: usize) -> std::ops::Range<usize>
     from..(from + random.usize(0..=most)).min(length)
 }
 
-fn once(random: &mut Rng, out: &mut Vec<u8>, other: &[u8], tokens: &[&str]) {
+fn once(random: &mut Rng, out: &mut Vec<u8>, other: &[u8], tokens: &str) {
     let length = out.len();
     match random.u32(0..12) {
         0 | 1 if length > 0 => out[random.usize(0..length)] ^= 1 << random.u32(0..8),
@@ -82,13 +60,16 @@ fn once(random: &mut Rng, out: &mut Vec<u8>, other: &[u8], tokens: &[&str]) {
         }
         9 | 10 => number(random, out),
         _ => {
-            if let Some(token) = random.choice(tokens) {
-                let place = range(random, length, 8);
-                let place = if random.bool() { place.start..place.start } else { place };
-                out.splice(place, token.bytes());
-            }
+            let place = range(random, length, 8);
+            let place = if random.bool() { place.start..place.start } else { place };
+            out.splice(place, word(random, tokens, '|').bytes());
         }
     }
+}
+
+fn word<'t>(random: &mut Rng, words: &'t str, between: char) -> &'t str {
+    let words: Vec<&str> = words.split(between).collect();
+    words[random.usize(..words.len())]
 }
 
 /// Replaces a number in a text.
@@ -98,5 +79,5 @@ fn number(random: &mut Rng, out: &mut Vec<u8>) {
         (0..out.len()).filter(|&i| is_part(&out[i]) && (i == 0 || !is_part(&out[i - 1]))).take(4096).collect();
     let Some(&from) = random.choice(&begins) else { return };
     let to = out[from..].iter().position(|byte| !is_part(byte)).map_or(out.len(), |length| from + length);
-    out.splice(from..to, random.choice(NUMBERS).unwrap().bytes());
+    out.splice(from..to, word(random, NUMBERS, ' ').bytes());
 }

@@ -17,7 +17,8 @@ use std::path::Path;
 pub struct Target {
     pub name: &'static str,
     pub seeds: fn() -> Vec<Vec<u8>>,
-    pub tokens: &'static [&'static str],
+    /// Separated by bars.
+    pub tokens: &'static str,
     /// Parses; what was read is used as the program would use it.
     pub parse: fn(&[u8]) -> Result<()>,
     /// Whether it reads a file: then an error is one line that names it.
@@ -31,7 +32,7 @@ pub const TARGETS: &[Target] = &[
     Target {
         name: "obj",
         seeds: meshes,
-        tokens: &["v ", "vn ", "vt ", "f ", "//", "/", "\n", "\\\n", "g x\n", "usemtl m\n", "1/1/1"],
+        tokens: "v |vn |vt |f |//|/|\n|\\\n|g x\n|usemtl m\n|1/1/1",
         parse: mesh,
         reads_file: true,
     },
@@ -42,50 +43,27 @@ pub const TARGETS: &[Target] = &[
     Target {
         name: "picture",
         seeds: pictures,
-        tokens: &[
-            "#?RADIANCE\n",
-            "FORMAT=32-bit_rle_rgbe\n",
-            "-Y 2 +X 4\n",
-            "IHDR",
-            "IDAT",
-            "acTL",
-            "channels",
-            "chlist",
-            "dataWindow",
-            "compression",
-        ],
+        tokens: "\
+            #?RADIANCE\n|FORMAT=32-bit_rle_rgbe\n|-Y 2 +X 4\n|IHDR|IDAT|acTL|channels|chlist|dataWindow|\
+            compression",
         parse: decode,
         reads_file: false,
     },
     Target {
         name: "lattice",
         seeds: lattices,
-        tokens: &[
-            "cube:",
-            "latlon:",
-            "x",
-            ",chord",
-            ",linear",
-            ",scaled",
-            ",raw",
-            ",inner=",
-            ",outer=",
-            ",edges",
-            ",edges=auto",
-            ",round",
-            ",centre=",
-            ",stretch=",
-            ":",
-        ],
+        tokens: "\
+            cube:|latlon:|x|,chord|,linear|,scaled|,raw|,inner=|,outer=|,edges|,edges=auto|,round|,centre=|\
+            ,stretch=|:",
         parse: lattice,
         reads_file: false,
     },
-    Target { name: "spirv", seeds: words, tokens: &[], parse: spirv, reads_file: false },
-    Target { name: "pipelines", seeds: caches, tokens: &[], parse: pipelines, reads_file: false },
+    Target { name: "spirv", seeds: words, tokens: "", parse: spirv, reads_file: false },
+    Target { name: "pipelines", seeds: caches, tokens: "", parse: pipelines, reads_file: false },
     Target {
         name: "calibration",
         seeds: calibrations,
-        tokens: &["\"driver\":", "null", "1e999", "[", "]", "{", "}"],
+        tokens: "\"driver\":|null|1e999|[|]|{|}",
         parse: calibration,
         reads_file: false,
     },
@@ -94,91 +72,19 @@ pub const TARGETS: &[Target] = &[
     Target { name: "options", seeds: options, tokens: OPTIONS, parse: option, reads_file: false },
 ];
 
-const TOML: &[&str] = &[
-    "[camera]\n",
-    "[output]\n",
-    "[environment]\n",
-    "[[mesh]]\n",
-    "[[entity]]\n",
-    "eye = ",
-    "target = ",
-    "fov_deg = ",
-    "width = ",
-    "height = ",
-    "exposure_ev = ",
-    "time_s = ",
-    "strength = ",
-    "turn_deg = ",
-    "uniform = ",
-    "gradient = { radiance = ",
-    "key = { radiance = ",
-    "sky = { turbidity = ",
-    "image = { file = \"sky.hdr\" }\n",
-    "name = \"m\"\n",
-    "file = \"m.obj\"\n",
-    "plane = { size_m = 1, cells = 2 }\n",
-    "sphere = { radius_m = 1, subdivisions = 1 }\n",
-    "teapot = { subdivisions = 1 }\n",
-    "mesh = \"m\"\n",
-    "position = ",
-    "rotation = ",
-    "scale = ",
-    "albedo = ",
-    "emission = ",
-    "emits = true\n",
-    "motion = [",
-    "keyframes = { keys = [",
-    "orbit = ",
-    "spin = ",
-    "bob = ",
-    "[0, 1, 0]",
-    "true",
-    "\n",
-];
-const HEADER: &[&str] = &[
-    "\"bands\":",
-    "\"lattice\":",
-    "\"shells\":",
-    "\"cells\":",
-    "\"map_px\":",
-    "\"view_px\":",
-    "\"radius_m\":",
-    "null",
-    "1e999",
-    "{",
-    "}",
-    "[",
-    "]",
-];
-const OPTIONS: &[&str] = &[
-    "render\n",
-    "bake\n",
-    "inspect\n",
-    "view\n",
-    "check\n",
-    "bench\n",
-    "demo\n",
-    "profile\n",
-    "devices\n",
-    "-o\n",
-    "--lattice\n",
-    "--size\n",
-    "--frames\n",
-    "--time\n",
-    "--skip\n",
-    "--eps\n",
-    "--radiance\n",
-    "--lights\n",
-    "--variant\n",
-    "--face-px\n",
-    "--bands\n",
-    "--seed\n",
-    "--quality\n",
-    "--json\n",
-    "=",
-    ",",
-    "x",
-];
+const TOML: &str = "\
+    [camera]\n|[output]\n|[environment]\n|[[mesh]]\n|[[entity]]\n|eye = |target = |fov_deg = |width = |height = |\
+    exposure_ev = |time_s = |strength = |turn_deg = |uniform = |gradient = { radiance = |key = { radiance = |\
+    sky = { turbidity = |image = { file = \"sky.hdr\" }\n|name = \"m\"\n|file = \"m.obj\"\n|\
+    plane = { size_m = 1, cells = 2 }\n|sphere = { radius_m = 1, subdivisions = 1 }\n|\
+    teapot = { subdivisions = 1 }\n|mesh = \"m\"\n|position = |rotation = |scale = |albedo = |emission = |\
+    emits = true\n|motion = [|keyframes = { keys = [|orbit = |spin = |bob = |[0, 1, 0]|true|\n";
+const HEADER: &str =
+    "\"bands\":|\"lattice\":|\"shells\":|\"cells\":|\"map_px\":|\"view_px\":|\"radius_m\":|null|1e999|{|}|[|]";
+const OPTIONS: &str = "\
+    render\n|bake\n|inspect\n|view\n|check\n|bench\n|demo\n|profile\n|devices\n|-o\n|--lattice\n|--size\n|\
+    --frames\n|--time\n|--skip\n|--eps\n|--radiance\n|--lights\n|--variant\n|--face-px\n|--bands\n|--seed\n|\
+    --quality\n|--json\n|=|,|x";
 
 fn meshes() -> Vec<Vec<u8>> {
     let cut = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nvn 0 0 1\nvt 0 0\nf 1/1/1 2/1/1 3//1\nf -1 -2 -3\n# end\n";

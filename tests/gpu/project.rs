@@ -1,4 +1,4 @@
-//! Projection and assembly on the device against their twins in f64.
+//! Projection on the device against its twin in f64, and what samples stand for.
 
 use crate::common;
 use common::generate;
@@ -9,9 +9,8 @@ use shadow_fields::bake::assemble::{Source, Sources, twin};
 use shadow_fields::bake::capture::CaptureKind;
 use shadow_fields::bake::capture::NO_SLOT;
 use shadow_fields::bake::project::{Project, Projection};
-use shadow_fields::check::assemble;
 use shadow_fields::check::project::{self, Content, EYES, F32};
-use shadow_fields::field::{Lattice, Storage};
+use shadow_fields::field::Lattice;
 use std::f64::consts::PI;
 
 fn painted_pot() -> Mesh {
@@ -20,63 +19,36 @@ fn painted_pot() -> Mesh {
     Mesh::new("painted pot", pot.positions, pot.normals, Some(colors), pot.triangles).unwrap()
 }
 
-fn projections(bands: usize) {
+/// More bands, sizes of faces and constant content than `check` tries.
+#[test]
+fn projections_are_those_of_the_twin() {
     let Some(gpu) = gpu() else { return };
-    let (pot, painted) = (pot(3), painted_pot());
+    let pot = pot(3);
+    let painted = painted_pot();
     let closed = generate::cuboid(Vec3::ONE, 1);
     let baker = gpu.baker();
-    let mut worst = 0.0_f64;
-    let mut compare = |content: &Content<'_>, projection, empty: bool| {
-        let (error, largest) = project::compare(content, bands, projection).unwrap();
-        let place = format!("{bands} bands, {projection:?}, {} px", content.capture.face_px);
-        assert!(error <= F32, "{place}: {error:e}");
-        assert!(empty || largest > 0.01, "{place}: nothing to compare");
-        worst = worst.max(error);
-    };
-    for face_px in [8, 32, 64] {
+    for face_px in [8, 64] {
         let black = Content::new(&baker, &pot, &EYES, (face_px, CaptureKind::Cover, true)).unwrap();
-        // From inside a solid, unculled, every texel is black; from far away all but a few are white.
-        let constant =
-            Content::new(&baker, &closed, &[Vec3::new(0.1, 0.05, -0.2)], (face_px, CaptureKind::Cover, false)).unwrap();
-        for projection in [Projection::Blocked, Projection::Transfer] {
-            compare(&black, projection, false);
-            // What all of the object hides has no transfer left, at scale 1.
-            compare(&constant, projection, projection == Projection::Transfer);
-        }
+        // From inside a solid, unculled, every texel is black.
+        let inside = [Vec3::new(0.1, 0.05, -0.2)];
+        let constant = Content::new(&baker, &closed, &inside, (face_px, CaptureKind::Cover, false)).unwrap();
         let bright = Content::new(&baker, &painted, &EYES, (face_px, CaptureKind::Radiance, true)).unwrap();
-        compare(&bright, Projection::Radiance, false);
+        for bands in 2..=7 {
+            for (content, projection) in [
+                (&black, Projection::Blocked),
+                (&black, Projection::Transfer),
+                (&constant, Projection::Blocked),
+                (&constant, Projection::Transfer),
+                (&bright, Projection::Radiance),
+            ] {
+                let (error, largest) = project::compare(content, bands, projection).unwrap();
+                let place = format!("{bands} bands, {projection:?}, {face_px} px: {error:e}, largest {largest}");
+                // What all of the object hides has no transfer left, at scale 1.
+                let empty = projection == Projection::Transfer && std::ptr::eq(content, &constant);
+                assert!(error <= F32 && (empty || largest > 0.01), "{place}");
+            }
+        }
     }
-    report(&format!("{bands} bands: largest error {worst:.2e}"));
-}
-
-#[test]
-fn projections_to_2_bands() {
-    projections(2);
-}
-
-#[test]
-fn projections_to_3_bands() {
-    projections(3);
-}
-
-#[test]
-fn projections_to_4_bands() {
-    projections(4);
-}
-
-#[test]
-fn projections_to_5_bands() {
-    projections(5);
-}
-
-#[test]
-fn projections_to_6_bands() {
-    projections(6);
-}
-
-#[test]
-fn projections_to_7_bands() {
-    projections(7);
 }
 
 /// Closed form: all blocked is sqrt(4 pi) in the constant band and nothing else; nothing blocked is nothing.
@@ -108,20 +80,6 @@ fn oversized_faces_are_refused() {
     }
     let refused = Project::new(&gpu.device, &gpu.library, 2, Projection::Blocked, face_px, 3);
     assert_eq!(refused.err().map(|error| error.exit_code()), Some(4));
-}
-
-#[test]
-fn assembly_against_its_twin() {
-    let Some(gpu) = gpu() else { return };
-    for (text, bands, channels) in assemble::CASES {
-        let lattice: Lattice = text.parse().unwrap();
-        for (storage, tolerance) in [(Storage::F32, F32), (Storage::F16, assemble::F16)] {
-            for seed in 3..6 {
-                let error = assemble::compare(&gpu.baker(), (&lattice, bands, channels), storage, seed).unwrap();
-                assert!(error <= tolerance, "{text} {storage:?}, seed {seed}: {error:e}");
-            }
-        }
-    }
 }
 
 #[test]

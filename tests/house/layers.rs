@@ -152,51 +152,6 @@ fn modules_use_only_what_stands_above_them() {
     }
 }
 
-/// Files of one folder that use each other in a circle, with the reason. The test below keeps the list complete and
-/// short.
-const CIRCLES: &[(&[&str], &str)] = &[(
-    &["src/field/directions.rs", "src/field/lattice.rs"],
-    "a lattice is its directions on shells, in two files of methods",
-)];
-
-/// Files beside `path` whose module it uses, not counting its tests.
-fn siblings(path: &Path) -> BTreeSet<PathBuf> {
-    let text = text(path);
-    let body = text.split("\n#[cfg(test)]\nmod ").next().unwrap_or_default();
-    let folder: Vec<_> =
-        path.parent().into_iter().flat_map(|p| p.iter().skip(1)).map(|p| p.to_string_lossy()).collect();
-    let mut names = names_after(&code(body), "super::");
-    names.extend(names_after(&code(body), &format!("crate::{}::", folder.join("::"))));
-    let files = names.into_iter().map(|name| path.with_file_name(format!("{name}.rs")));
-    files.filter(|file| file != path && root().join(file).exists()).collect()
-}
-
-/// All files beside `path` that it uses, itself or through others.
-fn reached(path: &Path) -> BTreeSet<PathBuf> {
-    let mut found = BTreeSet::new();
-    let mut open = vec![path.to_path_buf()];
-    while let Some(next) = open.pop() {
-        open.extend(siblings(&next).into_iter().filter(|file| found.insert(file.clone())));
-    }
-    found
-}
-
-#[test]
-fn files_of_one_folder_do_not_use_each_other_in_circles() {
-    let mut circles = BTreeSet::new();
-    // `super` of a mod.rs is the folder above; its children may use it through its parent only.
-    for path in files("src", &["rs"]).iter().filter(|path| !path.ends_with("mod.rs")) {
-        let mut circle = reached(path);
-        circle.retain(|other| other == path || reached(other).contains(path));
-        if !circle.is_empty() {
-            circles.insert(circle);
-        }
-    }
-    let known: BTreeSet<BTreeSet<PathBuf>> =
-        CIRCLES.iter().map(|(circle, _)| circle.iter().map(PathBuf::from).collect()).collect();
-    assert_eq!(circles, known, "circles that stand (left) and circles that are known (right)");
-}
-
 #[test]
 fn the_reader_of_paths_finds_what_is_there() {
     let source = "use crate::gpu::{Buffer, Device};\nuse crate::{field::{Lattice, Lookup}, scene};\n\

@@ -282,7 +282,8 @@ fn check(root: &Root) -> std::result::Result<(), Misplaced> {
         // Bounds of positions are not read, and accessors are judged where they are read: numbers without a bufferView
         // are zeros. Extensions are judged above, lights, cameras and primitives where they are made, and a texture may
         // have only pictures of an extension. The specification lets later versions add words to its lists.
-        let lists = [".type", ".componentType", ".alphaMode", ".target", ".magFilter", ".minFilter", ".wrapS", ".wrapT"];
+        let lists =
+            [".type", ".componentType", ".alphaMode", ".target", ".magFilter", ".minFilter", ".wrapS", ".wrapT"];
         let excused = match error {
             validation::Error::Invalid => lists.iter().any(|key| place.ends_with(key)),
             validation::Error::Missing => place.ends_with(".bufferView") || place.ends_with("[\"POSITION\"]"),

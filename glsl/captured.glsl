@@ -1,4 +1,4 @@
-// What the passes that reduce captured cube faces read: the atlas, and the faces of each sample.
+// Input of the passes that reduce captured cube faces: the atlas, and the faces of each sample.
 
 struct SampleFaces {
     vec4 normal;   // unit surface normal, of vertices

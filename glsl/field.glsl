@@ -89,7 +89,7 @@ FieldPlace field_place(vec3 p, vec4 radial, float edges) {
     uint base = cells.base + uint(shell) * PLANE;
     uint up = SHELLS > 1 ? PLANE : 0;
     vec2 fraction = cells.fraction;
-    // Of a corner's number the lowest bits say which cell it is along x and y, the next which shell.
+    // The lowest bits of a corner's number choose the cell along x and y, the next bit the shell.
     [[unroll]] for (uint k = 0; k < CORNERS; k++) {
         bool right = (k & 1) != 0;
         bool lower = (k & 2) != 0;

@@ -28,7 +28,7 @@ layout(push_constant) uniform Push {
     uint culls; // 1 where backs of triangles are left out
 } push;
 
-// What was found so far, row by row: a bit for each texel that is covered, or the byte of each texel's distance.
+// Result so far, row by row: a bit for each texel that is covered, or the byte of each texel's distance.
 shared uint words[WORDS];
 const uint FREE = 255;
 

@@ -18,7 +18,7 @@ shared uint edges[WORDS]; // a bit for each texel beside an edge
 shared uint busy[WORDS / 32]; // a bit for each word with an edge
 shared uint bytes[2 * NODES]; // of the map
 
-// What was captured at a texel of a face: how far away the mesh is, or FREE.
+// Value of a texel that shows no part of the mesh. All others are distances.
 const uint FREE = 255;
 uint captured_at(uint slot, ivec2 at) {
     return slot == NONE ? FREE : uint(texelFetch(atlas, slot_origin(slot) + at, 0).r * 255.0 + 0.5);
@@ -28,7 +28,7 @@ bool free_at(uint slot, ivec2 at) {
     return captured_at(slot, at) == FREE;
 }
 
-// What was captured at the texel that a direction (any length) meets.
+// Captured texel in a direction of any length.
 uint captured_toward(uint index, vec3 d) {
     vec3 a = abs(d);
     uint face = a.z >= a.x && a.z >= a.y ? (d.z < 0.0 ? 5 : 4) : a.y >= a.x ? (d.y < 0.0 ? 3 : 2) : (d.x < 0.0 ? 1 : 0);

@@ -1,4 +1,4 @@
-// What a mesh leaves of a light on its own vertices. The twin is src/field/self_visibility.rs. The shader that includes
+// Visibility of a light past the receiver's own mesh. The twin is src/field/self_visibility.rs. A shader that includes
 // this, after self_frame.glsl, blocked_share.glsl and bytes.glsl, defines
 //   uvec2 self_cell(uint i): cell i of all, as `cells` in that file makes them,
 // and the macros SELF_SIDE, SELF_RIM, SELF_LIMIT, SELF_STEPS, SELF_FIRST and SELF_RAMP

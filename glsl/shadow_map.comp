@@ -58,7 +58,7 @@ float occluder(vec3 vector, vec3 to_vertex, vec3 normal) {
     float share = met(vector);
     float facing = dot(normal, vector);
     float plane = facing < -1e-3 * length(vector) ? dot(normal, to_vertex) / facing : 1.0;
-    // What is left of a surface's shadow on itself once texels are compared at their centres: its curvature within a
+    // Texels are compared at their centres. This allows for the curvature of a surface within a
     // texel.
     float bias = 1e-3 + push.right.w / float(MAP);
     return share < plane * (1.0 - bias) ? share / plane : EVERYTHING;

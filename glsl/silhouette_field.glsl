@@ -106,7 +106,7 @@ NearMap near_map(NodeCell cell, uint k, uint side, mat3 axes, vec3 foot) {
     return near;
 }
 
-// What one map knows of the outline near the ray in direction `along` with that foot, both by the axes. x: signed
+// The outline in one map near the ray in direction `along` with that foot, both by the axes. x: signed
 // distance of the ray from the outline, positive where it meets the object; y: depth along the ray of the outline's
 // nearest point. Object's frame, in r.
 vec2 outline(NearMap near, uint side, vec3 along, vec3 foot) {

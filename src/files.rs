@@ -42,7 +42,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What two paths have in common that lead to the same file.
+/// Identity of a file, equal for all paths that lead to it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Identity {
     /// Device and inode of a file that exists.
@@ -220,7 +220,7 @@ mod tests {
         assert_eq!(names(folder.path()), ["later", "link", "one", "two"]);
     }
 
-    /// What a full disk or a limit on file sizes says names no file but the one that was asked for.
+    /// The error of a full disk or of a limit on file sizes names only the file that was asked for.
     #[test]
     fn messages_do_not_show_the_unfinished_name() {
         let folder = tempfile::tempdir().unwrap();

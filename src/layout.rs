@@ -1,4 +1,4 @@
-//! What Rust and GLSL both read: structs, of which the GLSL text and its readers are generated from the Rust fields,
+//! Data that Rust and GLSL share: structs, of which the GLSL text and its readers are generated from the Rust fields,
 //! and constants. `tests/gpu/layouts.rs` compares names and offsets with the compiled shaders.
 
 use ash::vk;
@@ -92,11 +92,11 @@ shared_struct! {
         silhouette: u32,
         /// Shape of its sharp light: a [`LightKind`].
         light_kind: u32,
-        /// Of a ball or a disc: the share of its bounding sphere's disc that shines.
+        /// Ball or disc: the share of its bounding sphere's disc that shines.
         light_share: f32,
-        /// Of a rectangle: its edge along z over that along x.
+        /// Rectangle: its edge along z over that along x.
         light_ratio: f32,
-        /// Of a spot, which shines along its own +y: [`crate::scene::light::Spot::ramp`]. 0 and 1 of any other light.
+        /// Spot, which shines along its own +y: [`crate::scene::light::Spot::ramp`]. 0 and 1 for any other light.
         light_ramp: [f32; 2],
         /// Of a sheet: half the sides of its rectangle, metres.
         half_sides: [f32; 2],
@@ -214,7 +214,7 @@ pub const ENTRY_BITS: u32 = 14;
 /// Entities that an entry can name: numbers below this, which stands for the sky.
 pub const ENTRY_ENTITIES: u32 = (1 << ENTRY_BITS) - 1;
 
-/// What one lookup of the merge is for, packed into 32 bits.
+/// Purpose of one lookup of the merge, packed into 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ListEntry {
     /// Multiply the chain of a light (`None`: of the sky) by the visibility past an entity.

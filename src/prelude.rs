@@ -1,4 +1,4 @@
-//! What a program needs to light a scene: `use shadow_fields::prelude::*;`.
+//! Names that a program needs to light a scene: `use shadow_fields::prelude::*;`.
 
 pub use crate::asset::Generator;
 pub use crate::bake::cache::Cache;

@@ -109,7 +109,7 @@ fn picture(found: &PictureDifference, mask: Option<&[bool]>) -> (Vec<f32>, usize
     scale.with_bar(&rgb, found.width, "FLIP: how different the two pictures look")
 }
 
-/// What is above its bound.
+/// Names of the measures that are above their bounds.
 fn beyond(arguments: &Arguments, found: &PictureDifference) -> Vec<String> {
     let measures = [
         ("mean FLIP", found.mean_flip, arguments.max_flip, "--max-flip"),

@@ -7,7 +7,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// What takes less time than this is not shown.
+/// Compilations shorter than this are not shown.
 const MOMENT: Duration = Duration::from_millis(500);
 /// Time between two looks at what is being compiled.
 const PERIOD: Duration = Duration::from_millis(100);

@@ -148,7 +148,7 @@ impl Context {
         gpu::validation::Messages::into_result(self.device.take_validation_messages())
     }
 
-    /// What a result file says of where it comes from.
+    /// The origin of a result file: program, device and command line.
     pub fn origin(&self, global: &Global) -> serde_json::Value {
         serde_json::json!({
             "program": concat!("shadow-fields ", env!("CARGO_PKG_VERSION")),

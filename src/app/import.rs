@@ -47,7 +47,7 @@ impl Arguments {
     }
 }
 
-/// What the comment in the first line of every imported file starts with.
+/// Start of the comment in the first line of every imported file.
 const HEAD: &str = "Written by shadow-fields import";
 
 /// Reads a glTF file and writes it as a scene file.

@@ -58,7 +58,7 @@ fn direction(text: &str) -> std::result::Result<DVec3, String> {
     if toward.length() > 1e-6 { Ok(toward) } else { Err(format!("expected a direction like 0,1,0.5, got \"{text}\"")) }
 }
 
-/// What to show of a silhouette field: a ray needs a place and a direction.
+/// Prints or draws a silhouette field. A ray needs a place and a direction.
 fn silhouette(global: &Global, arguments: &Arguments) -> Result<()> {
     let ray = match (arguments.at, arguments.toward) {
         (Some(_), None) => return Err(Error::Usage("--at needs --toward X,Y,Z for a silhouette field".into())),

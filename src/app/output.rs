@@ -1,4 +1,4 @@
-//! What the program says: results, logs, errors, progress bars, tables.
+//! Output of the program: results, logs, errors, progress bars, tables.
 
 use super::Global;
 use super::compiling::CompilingLine;
@@ -9,7 +9,7 @@ use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// What kept results from being written first.
+/// The first error that kept results from being written.
 static UNWRITTEN: Mutex<Option<std::io::Error>> = Mutex::new(None);
 
 /// Writes lines of results to stdout. A reader that went away is no error; any other is kept for [`written`].

@@ -6,7 +6,7 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// What one option writes.
+/// The files of one option.
 pub struct Output {
     option: &'static str,
     ending: &'static str,
@@ -35,7 +35,7 @@ impl Output {
 
 /// The files that a command is about to write.
 pub struct Outputs {
-    /// What stood under each name before.
+    /// Each file with its identity before the command ran.
     before: Vec<(PathBuf, Option<Identity>)>,
 }
 

@@ -49,7 +49,6 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
-/// What is timed.
 enum Subject {
     Bake(Mesh),
     Scene(String, Scene),

@@ -365,7 +365,7 @@ impl Shown {
                 }
                 self.viewer.event(Event::Move(self.pointer))
             }
-            // What the scene holds is let go wherever the pointer is.
+            // A dragged entity is released wherever the pointer is.
             WindowEvent::MouseInput { state: ElementState::Released, button, .. } => {
                 button_of(*button).map_or(Ok(()), |button| self.viewer.event(Event::Release(button)))
             }

@@ -69,7 +69,7 @@ impl Picture {
         self.rgb.iter().map(of).collect()
     }
 
-    /// What a screen shows: sRGB from 0 to 1; linear values are multiplied by 2^`exposure_ev`, and NaN is black.
+    /// sRGB from 0 to 1 as a screen shows it; linear values are multiplied by 2^`exposure_ev`, and NaN is black.
     pub fn shown(&self, exposure_ev: f32) -> Vec<f32> {
         let gain = exposure_ev.exp2();
         let of = |value: &f32| if self.is_linear { srgb_from_linear(value * gain) } else { *value };

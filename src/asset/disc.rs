@@ -63,7 +63,6 @@ pub(super) fn check_angle(what: &str, angle_deg: f32) -> Result<()> {
 /// A distant disc of one radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
-    /// What people call it.
     pub name: &'static str,
     /// Direction towards its middle, unit.
     pub toward: DVec3,

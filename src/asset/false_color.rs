@@ -6,7 +6,7 @@
 use super::lettering;
 use super::picture::linear_from_srgb;
 
-/// What the colours show.
+/// Quantity that the colours show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Scheme {
@@ -20,7 +20,6 @@ pub enum Scheme {
 /// The mapping from errors to colours.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ColorScale {
-    /// What the colours show.
     pub scheme: Scheme,
     /// The error of the last colour; larger errors have the same colour.
     pub limit: f64,

@@ -56,7 +56,7 @@ pub(super) fn take_out(
     if outer.is_empty() {
         return None;
     }
-    // What the surroundings send, by the median of each colour.
+    // Radiance of the surroundings: the median of each channel.
     let median = |channel: usize| {
         let mut values: Vec<f32> = outer.iter().map(|(i, _, _)| texels[*i][channel]).collect();
         values.sort_by(f32::total_cmp);

@@ -96,7 +96,7 @@ fn check_size(path: &Path, width: u32, height: u32, channel_count: usize) -> Res
     Ok(())
 }
 
-/// What can go wrong while a file is written.
+/// Errors of encoders and of the file system alike.
 type WriteResult = std::result::Result<(), Box<dyn std::error::Error>>;
 
 /// Writes a file in its folder under another name and renames it, so that it is never seen half-written. If the path is

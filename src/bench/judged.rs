@@ -16,7 +16,7 @@ pub const PIXEL_SIZE: [u32; 2] = [360, 240];
 /// Rays of the sky's part, which both the truth and shadow maps have.
 const SKY_RAYS: u32 = 1024;
 
-/// What is lit and compared.
+/// Points that are lit and compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum JudgedAt {
@@ -66,7 +66,7 @@ impl Judged {
         cast.run_at(world, &points).iter().map(|e| e.radiosity).collect()
     }
 
-    /// What the sky alone gives to the compared points.
+    /// Radiosity of the compared points under the sky alone.
     pub fn sky(&self, bench: &Bench<'_>, case: &Case, shapes: &RayMeshes) -> Vec<Radiosity> {
         let mut world = World::new(&case.scene, shapes, &case.scene.at(case.time_s));
         world.lights.clear();

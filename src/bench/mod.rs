@@ -31,7 +31,7 @@ use crate::frame::{self, Frame};
 use crate::scene::Scene;
 use serde_json::Value;
 
-/// What every measurement needs.
+/// Shared input of all measurements.
 #[derive(Clone)]
 pub struct Bench<'b> {
     /// Baker on the measured device.

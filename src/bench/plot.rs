@@ -17,7 +17,7 @@ pub struct Curve {
 }
 
 const SIZE_PX: (u32, u32) = (960, 600);
-/// Of Okabe and Ito, which colour-blind readers can distinguish.
+/// Palette of Okabe and Ito, which colour-blind readers can distinguish.
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
     RGBColor(0, 114, 178),

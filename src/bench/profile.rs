@@ -39,7 +39,7 @@ impl Tenths {
     }
 }
 
-/// What a merge does for a pair of vertex and occluder, counted in the SPIR-V of the loop's body.
+/// Work of a merge for a pair of vertex and occluder, counted in the SPIR-V of the loop's body.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Work {
     /// Float multiplications and additions.

@@ -273,7 +273,7 @@ struct Maps<'c> {
     bench: &'c Bench<'c>,
     case: &'c Case,
     judged: &'c Judged,
-    /// What the sky gives to the compared points.
+    /// Radiosity of the compared points under the sky alone.
     sky: Vec<Radiosity>,
     /// Filter, size, wall times, and what was found last.
     measured: Vec<(Filter, u32, Vec<f64>, Vec<Radiosity>)>,

@@ -48,14 +48,14 @@ pub struct SkipCost {
     pub times_faster: f64,
     /// Largest change of a vertex, relative to the root mean square of T0.
     pub change: VertexDifference,
-    /// What the lists leave off, all skips on.
+    /// Lookups that the lists leave off, all skips on.
     pub counts: Counts,
-    /// What this skip left off: (cluster, chain, entity) triples, a cluster being 64 vertices. `None` where it does not
-    /// work on lists.
+    /// Lookups that this skip left off: (cluster, chain, entity) triples, a cluster being 64 vertices. `None` where it
+    /// does not work on lists.
     pub left_off_count: Option<u64>,
 }
 
-/// What moves while a skip is timed.
+/// Motion of the scene while a skip is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Motion {
     /// Nothing: frames without drawing, everything merged in each.
@@ -207,7 +207,7 @@ fn in_turns(
     Ok((walls, merges))
 }
 
-/// What results are held against.
+/// Truth that results are compared with.
 struct Judge {
     unit: f64,
     vertices: Vec<Vertex>,

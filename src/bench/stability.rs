@@ -63,7 +63,6 @@ pub const NEAR_F32: f64 = 1e-5;
 /// Largest allowed difference for factors stored in f16, each rounded by at most 5e-4 of its largest coefficients.
 pub const NEAR_F16: f64 = 2e-3;
 
-/// What was measured.
 #[derive(Serialize)]
 pub struct StabilityOutcome {
     pub chains: Vec<CapChain>,

@@ -1,4 +1,4 @@
-//! What the choices in bake and merge cost and give, one axis at a time round the default.
+//! Cost and error of the choices in bake and merge, one axis at a time round the default.
 
 use super::budget::{Truth, device_radiosity};
 use super::cases::Case;
@@ -22,7 +22,7 @@ pub struct Variation {
     pub options: frame::Options,
 }
 
-/// What was measured of it.
+/// The measurement of a variation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
     /// Scene and light.
@@ -149,7 +149,7 @@ pub fn interleaved(frames: &mut [Frame], placements: &[Placement], rounds: usize
     Ok(times)
 }
 
-/// What one variation gave.
+/// Raw numbers of one variation.
 struct Measured {
     field_bytes: u64,
     bake_ms: Option<f64>,

@@ -26,7 +26,6 @@ pub struct Selection {
     pub axes: Vec<String>,
 }
 
-/// What was measured.
 #[derive(Serialize)]
 pub struct TimeErrorOutcome {
     /// One row per scene and light.

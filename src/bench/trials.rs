@@ -17,14 +17,12 @@ use std::sync::Arc;
 
 /// A scene that tests the merge.
 pub struct TrialCase {
-    /// What is odd about it.
     pub name: String,
     pub scene: Scene,
 }
 
 #[derive(Clone, Debug, Serialize)]
 pub struct Trial {
-    /// What is odd about it.
     pub name: String,
     /// Number format of the fields.
     pub storage: Storage,

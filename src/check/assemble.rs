@@ -31,7 +31,7 @@ pub fn compare(
     let inside: Vec<bool> = (0..lattice.sample_count()).map(|i| i > 0 && rng.u32(..10) < 3).collect();
     let sources = Sources::new(lattice, &inside, &inside)?;
     let stride = channels * channel_stride(bands);
-    // What lies inside is never to be used: NaN would show.
+    // Samples inside the solid are never used: their NaN would show.
     let number = |inside: bool, rng: &mut Rng| if inside { f32::NAN } else { 8.0 * rng.f32() - 4.0 };
     let captured: Vec<f32> =
         inside.iter().flat_map(|&inside| (0..stride).map(|_| number(inside, &mut rng)).collect::<Vec<_>>()).collect();

@@ -22,7 +22,7 @@ use serde::Serialize;
 pub struct CheckRow {
     /// Pass, by the one word that names it everywhere.
     pub pass: &'static str,
-    /// What it was given.
+    /// The input that was compared.
     pub what: String,
     pub measure: &'static str,
     /// The worst error; infinite where an outcome is no number, differs from run to run or shows nothing to compare.

@@ -16,7 +16,7 @@ use glam::Vec3;
 /// Sums of 25 000 f32 terms in shares of 64, relative to 1 + the sum; measured below 2e-6 on llvmpipe.
 pub const F32: f64 = 1e-5;
 
-/// What samples hold before they are written.
+/// Content of samples before they are written.
 const SENTINEL: f32 = f32::NAN;
 
 /// Captured faces on the device and on the host.
@@ -43,10 +43,10 @@ impl<'b> Content<'b> {
         Ok(Content { baker, capture, batch, drawn, texels })
     }
 
-    /// What was captured at a texel.
+    /// The captured value of a texel.
     pub fn texel(&self, eye: usize, face: usize, x: usize, y: usize, projection: Projection) -> [f32; 3] {
         match self.batch[eye][face] {
-            // What is not in the atlas shows the background.
+            // Faces outside the atlas show the background.
             NO_SLOT if projection == Projection::Radiance => [0.0; 3],
             NO_SLOT => [1.0, 0.0, 0.0],
             slot => self.texels[texel_index(&self.capture, slot, x, y)],

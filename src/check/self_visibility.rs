@@ -22,7 +22,6 @@ pub const OTHER_DISTANCES: f64 = 0.02;
 /// Vertices that are compared, or fewer where their faces are too large for one atlas.
 const VERTICES: usize = 48;
 
-/// What a comparison finds.
 pub struct Compared {
     /// Largest difference of an angle in steps.
     pub worst_steps: f64,

@@ -15,8 +15,8 @@ use crate::scene::Lights;
 /// divided by the half-width of a penumbra, which near an outline is a thousandth of the object's radius.
 pub const PENUMBRA: f64 = 1e-4;
 
-/// What [`MIXED`] has besides: a light with an outline of its own, a small light, a ball that stands beyond it, a ring
-/// around it, a thin board in whose bounding sphere others stand, panels of every form, and a spot.
+/// Further entities beside [`MIXED`]: a light with an outline of its own, a small light, a ball that stands beyond it,
+/// a ring around it, a thin board in whose bounding sphere others stand, panels of every form, and a spot.
 const MORE: &str = r#"
 [[entity]]
 mesh = "ring"

@@ -19,7 +19,7 @@ pub const OFF_SCALE: f64 = 3e-3;
 /// on either side of it.
 pub const OFF_SHARE_HALVES: f64 = 0.02;
 
-/// What differs from the twin.
+/// Differences to the twin.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Apart {
     /// Share of the texels of whole objects that are off by more than two steps in distance, or in depth near the

@@ -1,9 +1,9 @@
-//! What a user chooses of how pictures are drawn.
+//! A user's choices of how pictures are drawn.
 
 use crate::gpu::Device;
 use ash::vk;
 
-/// What a picture is made for.
+/// Purpose of a picture: its format and tone follow from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Finish {
     /// Linear radiance in half floats, for files and further work.
@@ -28,7 +28,7 @@ pub enum Antialias {
 }
 
 impl Antialias {
-    /// What a device draws at interactive rates. On a GPU four samples cost little; a software device stores and
+    /// Default at interactive rates. On a GPU four samples cost little; a software device stores and
     /// averages each.
     pub fn usual(device: &Device) -> Self {
         if device.info.is_software() { Antialias::Outlines } else { Antialias::Samples }
@@ -54,7 +54,7 @@ pub enum Shading {
 }
 
 impl Shading {
-    /// What pictures have that ask for neither: pixels where they have several samples, as on a GPU and in files. A
+    /// Default of the shading: pixels where they have several samples, as on a GPU and in files, else vertices. A
     /// pixel that evaluates lights takes about 1 us of a core on llvmpipe, so frames full of shadow edges take up to 10
     /// times as long as with vertices.
     pub fn usual(antialias: Antialias) -> Self {

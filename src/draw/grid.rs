@@ -169,7 +169,7 @@ impl DrawGrid {
         Ok(())
     }
 
-    /// What both fragment shaders read.
+    /// Bindings of both fragment shaders.
     fn own<'r>(grid: &'r DrawnGrid, viewport: &DrawnViewport<'r>) -> [(&'r Buffer, vk::Format); 2] {
         [(&grid.corners, QUADS), (viewport.radiosity, FLOATS)]
     }

@@ -35,7 +35,7 @@ use std::sync::Arc;
 
 /// Linear half floats. Their 11 bits are more than a PNG shows, and they take half the bandwidth of f32.
 const COLOR: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
-/// What a screen shows: the shader encodes it, and it takes half the bytes of half floats. With a format that encodes
+/// Format for a screen: the shader encodes sRGB, and it takes half the bytes of half floats. With a format that encodes
 /// by itself (_SRGB), llvmpipe takes 1.5 times as long at four samples a pixel.
 const SHOWN: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
@@ -110,10 +110,10 @@ pub struct DrawnEntity<'d> {
     pub emission: Vec3,
     /// Byte offset of its vertices in the radiosity buffer.
     pub radiosity_offset: u64,
-    /// What a picture's alpha holds where the entity is seen.
+    /// Alpha of the picture where the entity is seen.
     pub tag: f32,
     pub index: u32,
-    /// What its pixels need to evaluate sharp lights, where they may.
+    /// Input of its pixels, where they evaluate sharp lights.
     pub by_pixel: Option<ByPixel>,
 }
 
@@ -143,7 +143,7 @@ pub struct DrawnViewport<'d> {
     /// The entities that are drawn, in this order.
     pub entities: Vec<DrawnEntity<'d>>,
     pub radiosity: &'d Buffer,
-    /// What pixels read that evaluate sharp lights; `None` where radiosity of vertices is all that is shown.
+    /// Input of pixels that evaluate sharp lights; `None` where only the radiosity of vertices is shown.
     pub pixel: Option<PixelLight<'d>>,
     /// Which of the lines that pass "smooth" reads belong to this region.
     pub lines: Range<u32>,
@@ -209,7 +209,6 @@ impl Draw {
         colors * color + samples * 4
     }
 
-    /// What its pictures are made for.
     pub fn finish(&self) -> Finish {
         if self.picture.shape.format == SHOWN { Finish::Display } else { Finish::Linear }
     }

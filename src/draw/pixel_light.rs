@@ -1,4 +1,4 @@
-//! What drawing shaders read that include `glsl/pixel_light.glsl`: their pixels evaluate sharp lights.
+//! Bindings of drawing shaders that include `glsl/pixel_light.glsl`: their pixels evaluate sharp lights.
 
 use crate::error::Result;
 use crate::gpu::{Bind, Buffer, TexelView};
@@ -17,7 +17,7 @@ pub struct ByPixel {
     pub self_first: u32,
 }
 
-/// What pixels read that evaluate sharp lights themselves.
+/// Input of pixels that evaluate sharp lights.
 pub struct PixelLight<'d> {
     /// [`crate::layout::DeviceEntity`] of every entity.
     pub entities: &'d Buffer,
@@ -34,7 +34,7 @@ pub struct PixelLight<'d> {
 }
 
 impl<'d> PixelLight<'d> {
-    /// What a shader reads that includes `glsl/pixel_light.glsl`: corners and radiosity before it, `others` after it.
+    /// All bindings of a shader that includes `glsl/pixel_light.glsl`: corners and radiosity first, `others` last.
     pub fn binds(
         &self,
         own: &[(&'d Buffer, vk::Format); 2],

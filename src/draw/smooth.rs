@@ -22,7 +22,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, IVec2};
 use std::sync::Arc;
 
-/// What lies behind a line may seem nearer by this share of its distance.
+/// Surfaces behind a line may seem nearer by this share of its distance.
 const TOLERANCE: f64 = 1e-3;
 
 /// Pixels that a corner may be moved by: two steps of 1/256, which is what devices have to offer at least, and

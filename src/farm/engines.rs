@@ -1,4 +1,4 @@
-//! What engines of farms are given: templates in `assets/farm` with the commands of slices, and plain commands.
+//! Input of farm engines: templates in `assets/farm` with the commands of slices, and plain commands.
 
 use super::plan::plain;
 use crate::error::{Error, Result};

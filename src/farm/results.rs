@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 
 const MAGIC: [u8; 8] = *b"SHSLICE\n";
 
-/// What a result says of itself.
+/// Header of a result's file.
 #[derive(Serialize, Deserialize)]
 struct About {
-    /// What it is the result of, see [`Plan::key`].
+    /// [`Plan::key`] of its slice.
     key: String,
     /// Name and length of each file, in the order in which they follow.
     files: Vec<(String, u64)>,

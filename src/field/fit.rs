@@ -122,7 +122,7 @@ mod tests {
         assert!(fit.apply(middle.as_dvec3()).length() < 2e-3, "to 1/1024 a component");
         let p = DVec3::new(0.3, -0.2, 0.9);
         assert!((fit.invert(fit.apply(p)) - p).length() < 1e-15);
-        // What a shader makes of the packed numbers.
+        // The shader's reading of the packed numbers.
         let [x, y, z, packed] = fit.packed();
         let steps = [packed as u32 & 127, packed as u32 >> 7 & 127, packed as u32 >> 14].map(f64::from);
         let found = p * (1.0 + DVec3::from(steps) / 64.0) + Vec3::new(x, y, z).as_dvec3();

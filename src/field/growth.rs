@@ -144,7 +144,7 @@ mod tests {
         ShadowField { header, payload }
     }
 
-    /// What is told of samples without their eigenvalues is what the eigenvalues say.
+    /// The cheap bound agrees with the eigenvalues.
     #[test]
     fn a_bound_holds_exactly_where_eigenvalues_say_so() {
         let tensor = Tensor::new(4, 4, 4);

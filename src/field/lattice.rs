@@ -146,7 +146,7 @@ impl Lattice {
         }
     }
 
-    /// What is added to squared distances before [`cap_cosine`] is taken: 1 - inner^2, or 0 where the first shell lies
+    /// Added to squared distances before [`cap_cosine`] is taken: 1 - inner^2, or 0 where the first shell lies
     /// outside the sphere. It makes the cosine 0 on the first shell of an object with room in its sphere. The cosine
     /// itself has a kink at d = 1, where the field of such an object has none.
     fn room(&self) -> f64 {

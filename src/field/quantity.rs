@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What a field's coefficients mean.
+/// Meaning of a field's coefficients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FieldKind {

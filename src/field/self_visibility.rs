@@ -90,8 +90,8 @@ pub fn decode_distance(byte: u8) -> f64 {
     f64::from(byte) / DISTANCE_STEPS + DISTANCE_FIRST
 }
 
-/// What a map of [`BYTES`] holds at a direction (z along the normal): the signed angle in radians to the edge of what
-/// the vertex sees, and the base-2 logarithm of how far away that is which hides, in r.
+/// The map of [`BYTES`] in a direction (z along the normal): the signed angle in radians to the edge of the part that
+/// the vertex sees, and the base-2 logarithm of the distance in r to the surface that hides the rest.
 pub fn lookup(map: &[u8], local: DVec3) -> [f64; 2] {
     let place = place(local);
     let cell = place.floor().min(DVec2::splat((SIDE - 2) as f64));

@@ -75,7 +75,7 @@ impl MapFrame {
         let axes = Self::axes_of(direction);
         let places = positions.iter().map(|p| DVec2::new(p.dot(axes[0]), p.dot(axes[1])));
         let (low, high) = places.fold((DVec2::MAX, DVec2::MIN), |(low, high), p| (low.min(p), high.max(p)));
-        // What is stored is f32, and what was captured must be what is looked up.
+        // Captured maps are looked up by the stored f32 values.
         let stored = |v: DVec2| v.as_vec2().as_dvec2();
         MapFrame { direction, axes, centre: stored((low + high) / 2.0), half: stored((high - low) / 2.0 + MARGIN) }
     }
@@ -94,7 +94,7 @@ impl MapFrame {
     }
 }
 
-/// What a lookup finds along a ray.
+/// Result of a lookup along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outline {
     /// Signed distance of the ray from the outline, in r: positive where the ray meets the object.
@@ -103,7 +103,7 @@ pub struct Outline {
     pub depth: f64,
 }
 
-/// What a field knows of rays through one point in directions near one another.
+/// The four maps that serve all rays through one point in directions close to each other.
 #[derive(Clone, Copy, Debug)]
 pub struct Near {
     /// The point, in the object's frame.
@@ -286,7 +286,7 @@ impl SilhouetteField {
         [found.x - way.length(), found.y]
     }
 
-    /// What the field knows of rays through `point` (object's frame, in r) in directions near `toward`.
+    /// The maps for rays through `point` (object's frame, in r) in directions close to `toward`.
     pub fn near(&self, point: DVec3, toward: DVec3) -> Near {
         let cell = self.nodes.cell(toward);
         let along = point.dot(toward);

@@ -1,4 +1,4 @@
-//! What a silhouette field's file says before its maps.
+//! Header of a silhouette field's file.
 
 use super::silhouette_nodes::NodeGrid;
 use crate::error::{Error, Result};
@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     Whole,
-    /// What lies beyond the centre along the direction.
+    /// The half beyond the centre along the direction.
     Far,
-    /// What lies before it.
+    /// The half before the centre.
     Near,
 }
 

@@ -1,4 +1,4 @@
-//! What may change from frame to frame: the scene's lights and camera, the merge's variant, and shader files.
+//! Changes between frames: the scene's lights and camera, the merge's variant, and shader files.
 
 use super::permutation::{CompiledMerge, harmonic_lights, usable};
 use super::{Frame, methods, permutation};

@@ -133,7 +133,7 @@ impl Frame {
     }
 }
 
-/// What the fragment shader makes of radiance.
+/// Twin of the tone mapping in the fragment shader.
 fn shown(radiance: DVec3, white: f64) -> DVec3 {
     let shown = radiance.max(DVec3::ZERO);
     if shown.max_element() > white { shown * (white / shown.max_element()) } else { shown }

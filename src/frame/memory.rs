@@ -16,7 +16,7 @@ pub struct Memory {
     pub vertices: u64,
     /// Light on vertices.
     pub radiosity: u64,
-    /// What is drawn: positions, emission and indices of meshes.
+    /// Positions, emission and indices of drawn meshes.
     pub drawables: u64,
     /// Entities, clusters, entries, sky and outlines.
     pub lists: u64,

@@ -1,4 +1,4 @@
-//! What decides light and pictures besides the scene: as users say it, and as a frame takes it.
+//! Options of light and pictures: as users state them, and resolved for a frame.
 
 use crate::bake::cache::Cache;
 use crate::bake::{self, BakeOptions};
@@ -20,7 +20,7 @@ pub struct Options {
     pub shading: Option<Shading>,
     /// How the merge is done; `None` takes what was measured to be the device's fastest.
     pub variant: Option<Variant>,
-    /// What the merge leaves out.
+    /// Contributions that the merge leaves out.
     pub skip: Skip,
     /// Light that the merge leaves out: contributions to a vertex that are bounded below this share of the radiance
     /// that the scene's exposure shows as white; 0 leaves none out.
@@ -39,7 +39,7 @@ impl Options {
 }
 
 impl Default for Options {
-    /// What `shadow-fields render` does without options, in 960 x 640 pixels.
+    /// The defaults of `shadow-fields render`, in 960 x 640 pixels.
     fn default() -> Self {
         Options {
             bake: bake::Options::default(),
@@ -54,7 +54,7 @@ impl Default for Options {
     }
 }
 
-/// What a user decides besides the scene: one list for programs, the command line and the window.
+/// A user's options besides the scene: one list for programs, the command line and the window.
 #[derive(Clone)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct RenderOptions {
@@ -128,7 +128,7 @@ pub fn picture_size(text: &str) -> std::result::Result<[u32; 2], String> {
 }
 
 impl Default for RenderOptions {
-    /// What `shadow-fields render` does without options.
+    /// The defaults of `shadow-fields render`.
     fn default() -> Self {
         let Options { lights, shading, variant, skip, eps, .. } = Options::default();
         let bake = BakeOptions::default();

@@ -1,4 +1,4 @@
-//! What the passes of a scene are compiled for: what was asked for, less what scene or device do not allow.
+//! Permutations of a scene's passes: the options, restricted to features of the scene and limits of the device.
 
 use super::Options;
 use crate::draw::Shading;
@@ -18,7 +18,6 @@ use std::sync::Arc;
 /// The merge pass of a frame.
 pub(super) struct CompiledMerge {
     pub pass: Merge,
-    /// What its shader was compiled for.
     pub permutation: MergePermutation,
 }
 

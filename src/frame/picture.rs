@@ -74,7 +74,7 @@ fn readback(device: &Arc<Device>, [width, height]: [u32; 2]) -> Result<Buffer> {
 }
 
 impl Frame {
-    /// What [`super::record()`] needs to draw the picture that was prepared last; `white` as in [`Frame::render`].
+    /// Input of [`super::record()`] for the picture that was prepared last; `white` as in [`Frame::render`].
     pub fn picture_work(&self, placements: &[Placement], white: f32) -> PictureWork<'_> {
         let viewport = |(viewport, lines): &(Viewport, Range<u32>)| DrawnViewport {
             area: viewport.area,
@@ -113,7 +113,7 @@ impl Frame {
         Ok(std::mem::replace(&mut self.picture.draw, draw))
     }
 
-    /// What pixels read that evaluate sharp lights in a viewport.
+    /// Input of pixels that evaluate sharp lights in a viewport.
     fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
         self.pixels.pixels()?;
         let chains = self.chains.as_ref().filter(|chains| chains.is_ready())?;

@@ -12,7 +12,7 @@ use crate::scene_buffers::SceneBuffers;
 use ash::vk;
 use std::sync::Arc;
 
-/// What pixels read that evaluate sharp lights.
+/// Lists of sharp lights for pixels that evaluate them.
 pub(super) struct PixelChains {
     /// Entities at the time of the picture.
     pub entities: Upload,

@@ -47,7 +47,7 @@ impl RadiosityBuffers {
         first..first + 16 * vertex_count as u64
     }
 
-    /// What the merge writes.
+    /// Output of the merge.
     pub fn soft(&self) -> &Buffer {
         self.soft.as_ref().unwrap_or(&self.merged)
     }

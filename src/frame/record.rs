@@ -19,7 +19,7 @@ pub struct MergeWork<'f> {
     pub(super) merge: &'f Merge,
     /// The pass of sharp lights with what it reads; `None` where the scene has none.
     pub(super) sharp: Option<(&'f Sharp, sharp::SharpInputs<'f>)>,
-    /// What the merge writes: all light, or what the pass of sharp lights adds to.
+    /// Output of the merge: all light, or the part to which the pass of sharp lights adds.
     pub(super) soft: &'f Buffer,
     pub(super) radiosity: &'f Buffer,
 }
@@ -46,7 +46,7 @@ pub enum PictureTarget<'t, 'f> {
         clear: [f32; 4],
         /// Draws the picture that was made last, and what lies over it.
         show: &'t mut dyn FnMut(&mut Drawing<'_, 'f>) -> Result<()>,
-        /// What the image is used for afterwards.
+        /// The image's next use.
         next: Access,
     },
 }

@@ -17,7 +17,7 @@ use std::collections::{BTreeSet, HashSet};
 use std::f64::consts::PI;
 
 impl Frame {
-    /// What the lists of all clusters leave off at this time, and why, and a bound of the light in it: by looking at
+    /// Counts lookups that the lists of all clusters leave off, by reason, and bounds the light in them. It looks at
     /// every cluster and entity, which no frame does.
     pub fn counts(&self, placements: &[Placement]) -> Counts {
         let entities = || self.scene.entities.iter().filter(|entity| entity.occludes || entity.emits);
@@ -100,7 +100,7 @@ struct FrameTwin<'f> {
     sky: [Vec<f64>; 3],
 }
 
-/// What is lit: an entity with what its twin borrows.
+/// A lit entity with the data that its twin borrows.
 struct Receiver {
     index: usize,
     occluders: Vec<usize>,

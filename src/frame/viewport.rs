@@ -15,7 +15,7 @@ use std::ops::Range;
 pub enum RadiositySource {
     /// The radiosity that the merge has written.
     Merged,
-    /// What [`Frame::set_comparison`] put at that place.
+    /// The comparison that [`Frame::set_comparison`] put at that index.
     Comparison(usize),
 }
 

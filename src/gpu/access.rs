@@ -9,7 +9,7 @@ use ash::vk;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// What a pass does with a resource. A barrier names two of them: what happened before it and what follows.
+/// Use of a resource by a pass. A barrier names two: the use before it and the use after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Access {
     /// The host reads mapped memory after the submission.

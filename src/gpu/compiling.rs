@@ -1,4 +1,4 @@
-//! What is being compiled now. A shader of seven bands takes a minute, so whoever runs in a terminal can say what it
+//! Compilations in progress. A shader of seven bands takes a minute, so a terminal can show what it
 //! waits for.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -30,7 +30,7 @@ impl Drop for Compiling {
     }
 }
 
-/// What has been compiling for the longest time, and its start; `None` if nothing is.
+/// The longest compilation in progress, and its start.
 pub fn longest() -> Option<(String, Instant)> {
     now().iter().min_by_key(|(_, since)| *since).cloned()
 }

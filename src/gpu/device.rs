@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// What the caller decides about a device.
+/// The caller's choices for a device.
 #[derive(Clone, Debug, Default)]
 pub struct DeviceOptions {
     /// Index, UUID or part of a name; `None` takes the best device.
@@ -27,7 +27,7 @@ pub fn required_features() -> vk::PhysicalDeviceVulkan13Features<'static> {
     vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true)
 }
 
-/// What a [`Device`] is put together from.
+/// Parts of a [`Device`].
 pub(super) struct Parts {
     pub physical: vk::PhysicalDevice,
     pub handle: ash::Device,

@@ -1,5 +1,5 @@
-//! What winit does not tell of an X11 display: its loss while a window is open, over which Xlib would end the process,
-//! and with it what is not saved; and drops of files that do not exist.
+//! Events of an X11 display that winit does not report. Over the loss of the display Xlib would end the process, and
+//! unsaved edits with it; drops of files that do not exist bring no event at all.
 
 use crate::error::Error;
 use raw_window_handle::RawDisplayHandle;
@@ -47,7 +47,7 @@ pub fn is_lost() -> bool {
     LOST.load(Ordering::Relaxed) || watched.as_ref().is_some_and(has_error)
 }
 
-/// What to say of it.
+/// The error of a lost display.
 pub fn lost() -> Error {
     Error::Device("the display was lost".into())
 }

@@ -1,4 +1,4 @@
-//! What a recording owns, and its execution: either submitted and waited for, or launched without waiting.
+//! The resources of a recording, and its execution: either submitted and waited for, or launched without waiting.
 //!
 //! A one-shot recording waits. A frame of the window is launched: at most [`FLIGHTS`] frames are in flight, and the
 //! owner of anything that they may use waits for all of them before it destroys it ([`Device::settle`]).

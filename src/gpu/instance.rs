@@ -17,7 +17,7 @@ pub(super) struct Instance {
     pub(super) messages: Arc<Messages>,
 }
 
-/// What goes with an instance that is destroyed here.
+/// An instance that this library destroys, with its debug messenger.
 pub(super) struct OwnInstance {
     pub(super) entry: ash::Entry,
     debug: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,

@@ -1,4 +1,4 @@
-//! What shaders ask of a device, held against its limits before anything is made of them.
+//! Shaders' demands, compared with the device's limits before pipelines are made.
 
 use super::reflect::{Binding, BindingKind, Reflection};
 use super::shader::{Shader, Stage};

@@ -1,4 +1,4 @@
-//! What the Vulkan loader reads to find drivers, for messages where it finds none.
+//! Drivers' manifests that the Vulkan loader reads, for messages where it finds none.
 
 use crate::error::{Error, one_line};
 use std::path::{Path, PathBuf};

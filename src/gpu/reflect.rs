@@ -1,4 +1,4 @@
-//! What a SPIR-V module declares: bindings, push constants, local size, specialisation constants, vertex inputs and the
+//! Reflection of a SPIR-V module: bindings, push constants, local size, specialisation constants, vertex inputs and the
 //! layout of every struct.
 
 use crate::error::{Error, Result};

@@ -125,7 +125,7 @@ pub(super) fn physical_devices(instance: &ash::Instance) -> Result<Vec<(vk::Phys
     Ok(handles.into_iter().enumerate().map(|(index, handle)| (handle, describe(instance, index, handle))).collect())
 }
 
-/// What is to be told of one physical device.
+/// Properties of one physical device.
 pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
     // SAFETY: for the whole block, queries on live handles with structs that outlive the calls; the 1.3 structs are
     // only chained if the device supports 1.3.

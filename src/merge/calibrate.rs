@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What was measured on a device.
+/// Merge times of a device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// Driver in its own words; another driver is measured anew.
@@ -35,7 +35,7 @@ fn path(device: &Device) -> Option<PathBuf> {
     Some(device.cache_dir.as_ref()?.join(format!("calibration-{}.json", device.info.uuid)))
 }
 
-/// What was measured on the device before, with this driver and program, of the variants that there are now.
+/// The variant that was measured fastest on the device, with this driver and program.
 fn known(device: &Device) -> Option<Variant> {
     let calibration: Calibration = serde_json::from_slice(&crate::files::read(&path(device)?).ok()?).ok()?;
     let names = calibration.milliseconds.iter().map(|(name, _)| name.as_str());

@@ -25,7 +25,7 @@ pub struct MergeObject<'f> {
     pub emission: [f64; 3],
     /// Occlusion field, if one was baked.
     pub blocked: Option<&'f ShadowField>,
-    /// What it covers from afar.
+    /// Fit of its solid angle from afar.
     pub area: Area,
     /// Radiance field, if its light varies over the surface.
     pub radiance: Option<&'f ShadowField>,
@@ -51,7 +51,6 @@ pub struct MergeTwin<'t> {
     pub transfer: Option<(&'t [f32], usize)>,
     /// SH bands of transfer and light; an occlusion field has its own.
     pub bands: usize,
-    /// What is left out.
     pub skip: Skip,
     /// Whether a vertex leaves out an entity in the chain of a light (`None`: of the sky), or the light itself where
     /// both are the same, for another reason.
@@ -204,7 +203,7 @@ pub fn sheet_before(sheet: &SheetView, to: DVec3, radius_m: f64, skip: Skip) -> 
     if skip.cones { beyond * smoothstep(apart, met, inside) } else { beyond }
 }
 
-/// What a bounding sphere covers of a vertex's view: the twin of `glsl/merge_cone.glsl`, in angles.
+/// A bounding sphere as a cone in a vertex's view: the twin of `glsl/merge_cone.glsl`, in angles.
 #[derive(Clone, Copy, Debug)]
 pub struct Cone {
     /// Unit direction of the sphere's centre.

@@ -66,7 +66,7 @@ impl Variant {
         })
     }
 
-    /// What a device gets before anything was measured on it: texel reads are more than ten times faster than storage
+    /// Default before anything was measured: texel reads are more than ten times faster than storage
     /// reads on a processor, and no slower than them on the GPUs that are known.
     pub fn sane_default(device: &Device) -> Self {
         let name = if device.info.is_software() { "texel-shifted" } else { "storage-uniform" };
@@ -89,7 +89,7 @@ pub fn uniform_entities(device: &Device) -> u32 {
     (device.limits.max_uniform_buffer_range / size_of::<DeviceEntity>() as u32).min(512)
 }
 
-/// What the merge shader is compiled for: a variant, the shape of the fields, and what is left out.
+/// A permutation of the merge shader: a variant, the shape of the fields, and the skips.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MergePermutation {
     /// How it is done.
@@ -102,7 +102,6 @@ pub struct MergePermutation {
     pub storage: Storage,
     /// Samples of the fields. First and last shell are data, not code.
     pub lattice: Lattice,
-    /// What is left out.
     pub skip: Skip,
     /// Whether any light meets a chain. Without, there is the sky's chain alone.
     pub lights: bool,
@@ -131,7 +130,7 @@ impl MergePermutation {
     pub fn row(&self) -> ShaderPermutation {
         let lattice = self.lattice;
         let (cells, latitudes, longitudes) = match lattice.directions {
-            // What a lattice has none of is 1: the shader's other side must compile too.
+            // Unused sizes are 1: the shader's other side must compile too.
             Directions::Cube { cells } => (cells, 1, 1),
             Directions::LatLon { latitudes, longitudes } => (1, latitudes, longitudes),
         };

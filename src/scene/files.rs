@@ -7,7 +7,7 @@ use serde::Deserialize;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// What a scene file may name.
+/// The file names in a scene file.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct SceneFile {
@@ -27,7 +27,7 @@ struct Named {
     file: Option<PathBuf>,
 }
 
-/// What a glTF file may name.
+/// The file names in a glTF file.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct GltfFile {

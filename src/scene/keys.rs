@@ -27,7 +27,7 @@ impl Between {
 
 /// A property that keys give.
 pub trait KeyValue: Copy + Sized {
-    /// What it is, with its range.
+    /// Name of the quantity, with its range.
     const WHAT: &'static str;
 
     /// Whether it is within its range.
@@ -41,7 +41,7 @@ pub trait KeyValue: Copy + Sized {
         self.raw()
     }
 
-    /// What stands between two values at a share of the way.
+    /// The value at a share of the way between two others.
     fn linear(from: DVec4, to: DVec4, share: f64) -> DVec4 {
         from.lerp(to, share)
     }

@@ -110,7 +110,7 @@ impl LightMethod {
         }
     }
 
-    /// What people read.
+    /// The word for users.
     pub fn name(self) -> &'static str {
         match self {
             LightMethod::Harmonics => "spherical harmonics",

@@ -5,7 +5,7 @@
 
 use std::fmt::Write;
 
-/// What an instruction reads: an input of the program or a variable that an earlier instruction has set.
+/// Operand of an instruction: an input of the program or a variable that an earlier instruction has set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Value {
     /// Position in the list of inputs.

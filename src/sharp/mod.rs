@@ -40,7 +40,7 @@ const CONE_WIDER: f64 = 1.12;
 /// from a light. With 1.1 no pixel changes, with 1.06 by 0.0009 of the brightest.
 const BALL_WIDER: f64 = 1.15;
 
-/// What the shader is compiled for.
+/// A permutation of the shader.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharpPermutation {
     /// How it reads what it is given.
@@ -168,13 +168,12 @@ pub struct SharpInputs<'b> {
     /// Positions and normals.
     pub vertices: &'b Buffer,
     pub self_cells: &'b Buffer,
-    /// What the merge has written.
+    /// Output of the merge.
     pub soft: &'b Buffer,
 }
 
 pub struct Sharp {
     pipeline: ComputePipeline,
-    /// What it was compiled for.
     pub permutation: SharpPermutation,
 }
 

@@ -62,7 +62,7 @@ pub enum Command {
     Quit,
 }
 
-/// What a command changed, so that the viewer knows what to update. Several may be true, as after an undo.
+/// Changes by a command, for the viewer to follow. Several may be true, as after an undo.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Changed {
     /// Another scene: rebuild everything.

@@ -12,7 +12,7 @@ pub fn moved(entity: &EntityData, by: DVec3) -> Option<EntityData> {
         *p = (p.as_dvec3() + by).as_vec3();
         p.abs().max_element() <= POSITION_LIMIT_M
     };
-    // What stands in a node moves with the outermost one, or with a still one around it where keys move that. Keyframes
+    // Parts in a node move with the outermost one, or with a still one around it where keys move that. Keyframes
     // replace what was before them, nodes too.
     let mut fits = true;
     let placed = out.motion.iter().rposition(|motion| matches!(motion, Motion::Node(_) | Motion::Keyframes { .. }));

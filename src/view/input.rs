@@ -108,7 +108,7 @@ pub fn help() -> String {
     })
 }
 
-/// What dragging with a held button does.
+/// Effect of dragging with a held button.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Held {
     Turn,

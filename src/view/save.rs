@@ -106,7 +106,7 @@ impl Editor {
         Ok(paths)
     }
 
-    /// What follows from an error that ends the window: edits are saved first, and the message says where.
+    /// Saves edits before an error ends the window, and adds to its message where.
     pub fn rescued(&mut self, error: Error) -> Error {
         match self.rescue() {
             Ok(paths) if paths.is_empty() => error,

@@ -1,4 +1,4 @@
-//! What the overlay's panels and notes show of the viewer's state, and their common style.
+//! The viewer's state for the overlay's panels and notes, and their common style.
 
 use super::task::TaskProgress;
 use crate::gpu::Timing;

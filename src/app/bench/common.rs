@@ -1,4 +1,4 @@
-//! What the measurements of `bench` have in common.
+//! Shared set-up and tables of the measurements of `bench`.
 
 use crate::app::context::Context;
 use crate::app::{Global, output, outputs};
@@ -30,7 +30,7 @@ pub fn start<T>(
     Ok((context, outcome))
 }
 
-/// What measurements need of an open device.
+/// The measurements' view of an open device.
 pub fn bench<'b>(context: &'b Context, global: &Global, quick: bool, progress: &'b dyn Fn(&str)) -> Bench<'b> {
     let origin = context.origin(global);
     Bench { baker: &context.baker, cache: &context.cache, progress, quick, seed: global.seed, origin }

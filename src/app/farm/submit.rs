@@ -12,7 +12,6 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What runs slices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Engine {
     /// Processes on this machine; ends when all are done
@@ -32,7 +31,7 @@ enum Engine {
 pub struct Arguments {
     /// Plan that `farm plan` has written
     plan: PathBuf,
-    /// What runs the slices
+    /// Engine that runs the slices
     #[arg(long, value_enum, value_name = "ENGINE")]
     engine: Engine,
     /// Number of slices at a time: processes of local, or of a Dask cluster on this machine (default: one per core), or

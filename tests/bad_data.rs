@@ -63,8 +63,14 @@ impl Draw {
     }
 
     fn generator(&mut self) -> Generator {
-        let (size_m, radius_m, major_m, minor_m) = (self.float(), self.float(), self.float(), self.float());
-        let (cells, subdivisions, segments, sides) = (self.count(), self.count(), self.count(), self.count());
+        let size_m = self.float();
+        let radius_m = self.float();
+        let major_m = self.float();
+        let minor_m = self.float();
+        let cells = self.count();
+        let subdivisions = self.count();
+        let segments = self.count();
+        let sides = self.count();
         match self.0.u32(..8) {
             0 => Generator::Plane { size_m, cells },
             1 => Generator::Sphere { radius_m, subdivisions },
@@ -112,7 +118,9 @@ impl Draw {
 
     fn keys(&mut self) -> Option<Written<Vec3>> {
         let list = |draw: &mut Self| (0..draw.0.u32(..4)).map(|_| draw.vector()).collect::<Vec<_>>();
-        let (values, in_slopes, out_slopes) = (list(self), list(self), list(self));
+        let values = list(self);
+        let in_slopes = list(self);
+        let out_slopes = list(self);
         let times_s = (0..self.0.u32(..4)).map(|_| self.double()).collect();
         let period_s = self.maybe(Self::double);
         Some(Written { times_s, values, interpolation: Default::default(), in_slopes, out_slopes, period_s })
@@ -239,7 +247,9 @@ fn a_mesh_refuses_arrays_that_do_not_fit() {
     let mut draw = Draw(fastrand::Rng::with_seed(3));
     for _ in 0..3000 {
         let list = |draw: &mut Draw| (0..draw.0.u32(..6)).map(|_| draw.vector()).collect::<Vec<_>>();
-        let (positions, normals, colors) = (list(&mut draw), list(&mut draw), list(&mut draw));
+        let positions = list(&mut draw);
+        let normals = list(&mut draw);
+        let colors = list(&mut draw);
         let corner = |draw: &mut Draw| if draw.0.u32(..9) == 0 { draw.count() } else { draw.0.u32(..5) };
         let triangles =
             (0..draw.0.u32(..5)).map(|_| [corner(&mut draw), corner(&mut draw), corner(&mut draw)]).collect();

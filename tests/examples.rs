@@ -44,7 +44,8 @@ fn run(program: &Path, arguments: &[&str], folder: &Path) -> String {
     command.env("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation").env("VK_LOADER_DEBUG", "layer");
     command.env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT");
     let output = command.output().unwrap();
-    let (out, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let out = String::from_utf8_lossy(&output.stdout);
+    let log = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{}: {out}{log}", program.display());
     assert!(log.contains("Insert instance layer \"VK_LAYER_KHRONOS_validation\""), "the layer is not there: {log}");
     for said in [&out, &log] {
@@ -104,7 +105,8 @@ fn examples_build_from_an_empty_project_and_run() {
         let bytes = &model.blob.as_ref().unwrap()[first..first + 12 * colors.count()];
         let colors: Vec<f32> = bytes.chunks(4).map(|word| f32::from_le_bytes(word.try_into().unwrap())).collect();
         let green = || colors.chunks(3).map(|c| c[1]);
-        let (dark, bright) = (green().fold(f32::MAX, f32::min), green().fold(0.0, f32::max));
+        let dark = green().fold(f32::MAX, f32::min);
+        let bright = green().fold(0.0, f32::max);
         assert!(dark >= 0.0 && bright.is_finite() && bright > 0.05 && dark < 0.7 * bright, "{dark} to {bright}");
         let transfers = primitive.attributes().filter(|(name, _)| name.to_string().contains("TRANSFER")).count();
         assert_eq!(transfers, 3, "nine coefficients of three bands");

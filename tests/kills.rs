@@ -99,7 +99,8 @@ impl Good {
         let inside = Path::new(env!("CARGO_TARGET_TMPDIR")).join("kills");
         let _ = std::fs::remove_dir_all(&inside);
         let folder = place(&inside, "good");
-        let (mut outputs, mut took) = (BTreeMap::new(), Vec::new());
+        let mut outputs = BTreeMap::new();
+        let mut took = Vec::new();
         for (arguments, written) in COMMANDS {
             assert_eq!(finish(&mut program(&folder, arguments)).code, 0, "{arguments:?}");
             let _ = std::fs::remove_dir_all(inside.join("cache/fields"));
@@ -190,9 +191,11 @@ fn kills_leave_whole_outputs_and_a_cache_that_works() {
         return;
     }
     let rounds = std::env::var("SHADOW_FIELDS_KILLS").map_or(2, |text| text.parse().expect("a number of rounds"));
-    let (good, mut random) = (Good::get(), fastrand::Rng::with_seed(1));
+    let good = Good::get();
+    let mut random = fastrand::Rng::with_seed(1);
     for crowd in [1, 2, 4] {
-        let (start, mut tally) = (Instant::now(), Tally::default());
+        let start = Instant::now();
+        let mut tally = Tally::default();
         let first = random.usize(0..COMMANDS.len());
         (0..rounds).for_each(|round| good.kill(&mut random, crowd, (first + round) % COMMANDS.len(), &mut tally));
         let seconds = start.elapsed().as_secs_f64();

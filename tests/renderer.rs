@@ -116,7 +116,8 @@ fn light_and_picture_are_those_of_a_frame() {
         assert!(picture.rgb == expected, "picture {step}");
     }
     // From elsewhere it is another picture of the same light.
-    let (before, lit) = (renderer.picture().unwrap(), renderer.light().unwrap().to_vec());
+    let before = renderer.picture().unwrap();
+    let lit = renderer.light().unwrap().to_vec();
     renderer.set_camera(&Camera::new([4.0, 1.0, 0.0], [0.0; 3])).unwrap();
     assert!(renderer.picture().unwrap().rgb != before.rgb && renderer.light().unwrap() == lit);
     assert!(matches!(renderer.set_camera(&Camera::new([f32::NAN; 3], [0.0; 3])), Err(Error::Input(_))));

@@ -62,7 +62,8 @@ fn a_ball_blocks_what_two_discs_have_in_common() {
     let field = bake(&gpu, &generate::sphere(0.5, 5), SilhouetteOptions::default());
     let mut rng = fastrand::Rng::with_seed(3);
     for angle_deg in [1.0_f64, 3.0, 8.0, 15.0, 30.0] {
-        let (mut square, mut worst) = (0.0, 0.0_f64);
+        let mut square = 0.0;
+        let mut worst = 0.0_f64;
         for _ in 0..200 {
             let axis = DVec3::from_array([0; 3].map(|_| 2.0 * rng.f64() - 1.0)).normalize();
             let distance = 1.1 + 5.0 * rng.f64();
@@ -89,7 +90,8 @@ fn a_ball_blocks_what_two_discs_have_in_common() {
 
 /// Share of a light that rays find blocked, weighed by the cosine to +y.
 fn blocked_by_rays(shape: &RayMesh, point: DVec3, toward: DVec3, angle: f64) -> f64 {
-    let (mut blocked, mut whole) = (0.0, 0.0);
+    let mut blocked = 0.0;
+    let mut whole = 0.0;
     for ray in light_rays(toward, angle, 256) {
         let cosine = ray.y.max(0.0);
         whole += cosine;
@@ -151,7 +153,9 @@ fn table() -> Mesh {
     for (x, z) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
         parts.push((generate::cuboid(Vec3::new(0.08, 0.64, 0.08), 2), Vec3::new(0.54 * x, 0.32, 0.54 * z)));
     }
-    let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    let mut positions = Vec::new();
+    let mut normals = Vec::new();
+    let mut triangles = Vec::new();
     for (part, by) in parts {
         let first = positions.len() as u32;
         positions.extend(part.positions.iter().map(|p| *p + by));
@@ -185,7 +189,8 @@ fn receivers_and_lights_within_the_bounding_sphere_see_what_lies_between_them() 
         let whole = without_halves(&field);
         let shape = RayMesh::new(&mesh);
         for (inside, limit) in ["receivers", "lights"].into_iter().zip(limits) {
-            let (mut rng, mut sums) = (fastrand::Rng::with_seed(5), [0.0; 2]);
+            let mut rng = fastrand::Rng::with_seed(5);
+            let mut sums = [0.0; 2];
             let angle = 3_f64.to_radians();
             for _ in 0..PAIRS {
                 let within = loop {
@@ -290,7 +295,8 @@ fn odd_meshes_give_finite_fields() {
         let mut rng = fastrand::Rng::with_seed(1);
         for _ in 0..2000 {
             let mut point = || DVec3::from_array([0; 3].map(|_| 6.0 * rng.f64() - 3.0));
-            let (from, light) = (point(), 3.0 * point());
+            let from = point();
+            let light = 3.0 * point();
             let angle = rng.f64() * 1.2;
             let [blocked, whole] =
                 blocked_light(&field, from, DVec3::Y, &SeenLight::new(light, light.length() * angle.sin()));

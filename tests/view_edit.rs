@@ -51,7 +51,9 @@ fn keys() -> impl Strategy<Value = Keys<Vec3>> {
     let between = prop_oneof![Just(Between::Step), Just(Between::Linear), Just(Between::Cubic)];
     (three(), three(), between, prop::option::of(0.5_f64..9.0)).prop_map(|(values, slopes, interpolation, period_s)| {
         let slopes = if interpolation == Between::Cubic { slopes } else { Vec::new() };
-        let (in_slopes, out_slopes, times_s) = (slopes.clone(), slopes, vec![-1.0, 0.5, 3.0]);
+        let in_slopes = slopes.clone();
+        let out_slopes = slopes;
+        let times_s = vec![-1.0, 0.5, 3.0];
         Keys::try_from(Written { times_s, values, interpolation, in_slopes, out_slopes, period_s }).unwrap()
     })
 }

@@ -23,7 +23,8 @@ use window::{SIZE, Stand};
 
 /// What is shown, which is what `render` makes of the same state.
 fn as_rendered(stand: &mut Stand, when: &str) -> Vec<[u8; 4]> {
-    let (shown, scene) = (stand.shown(), stand.viewer.editor().scene().clone());
+    let shown = stand.shown();
+    let scene = stand.viewer.editor().scene().clone();
     assert_eq!(apart(&shown, &stand.rendered(&scene)), 0, "{when}");
     shown
 }
@@ -197,7 +198,8 @@ fn the_overlay_and_the_reference_are_drawn() {
     let split = stand.shown();
     let column = |x: u32| (0..SIZE[1]).map(|y| split[(y * SIZE[0] + x) as usize]).collect::<Vec<_>>();
     // The same place in both halves, lit by the merge and by rays: alike, but not the same.
-    let (left, right) = (column(80), column(240));
+    let left = column(80);
+    let right = column(240);
     let distance: u32 =
         left.iter().zip(&right).map(|(a, b)| (0..3).map(|c| u32::from(a[c].abs_diff(b[c]))).sum::<u32>()).sum();
     assert!(distance > 0 && distance < 40 * SIZE[1], "the halves are {distance} apart");

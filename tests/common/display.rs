@@ -64,7 +64,11 @@ impl Display {
     pub fn look(&self, [width, height]: [usize; 2]) -> Vec<[u8; 3]> {
         let bytes = std::fs::read(&self.pixels).unwrap();
         let word = |i: usize| u32::from_be_bytes(bytes[4 * i..][..4].try_into().unwrap()) as usize;
-        let (header, little, bits, line, colors) = (word(0), word(7) == 0, word(11), word(12), word(19));
+        let header = word(0);
+        let little = word(7) == 0;
+        let bits = word(11);
+        let line = word(12);
+        let colors = word(19);
         assert!(little && bits == 32, "the display's pixels are of another kind");
         let first = header + 12 * colors;
         let pixel = |i: usize| {

@@ -19,8 +19,11 @@ pub fn drop_file(display: &str, target: u32, file: &Path, [x, y]: [u16; 2]) {
     let (connection, screen) = x11rb::connect(Some(display)).unwrap();
     let screen = &connection.setup().roots[screen];
     let atom = |name: &str| connection.intern_atom(false, name.as_bytes()).unwrap().reply().unwrap().atom;
-    let (list, selection, copy) = (atom("text/uri-list"), atom("XdndSelection"), atom("XdndActionCopy"));
-    let (status, finished) = (atom("XdndStatus"), atom("XdndFinished"));
+    let list = atom("text/uri-list");
+    let selection = atom("XdndSelection");
+    let copy = atom("XdndActionCopy");
+    let status = atom("XdndStatus");
+    let finished = atom("XdndFinished");
     let source = connection.generate_id().unwrap();
     let look = CreateWindowAux::new();
     let class = WindowClass::INPUT_OUTPUT;
@@ -42,7 +45,8 @@ pub fn drop_file(display: &str, target: u32, file: &Path, [x, y]: [u16; 2]) {
             // The window asks for what is dragged.
             Some(Event::SelectionRequest(asked)) => {
                 let uri = format!("file://{}\r\n", file.display());
-                let (mode, kind) = (PropMode::REPLACE, list);
+                let mode = PropMode::REPLACE;
+                let kind = list;
                 connection.change_property8(mode, asked.requestor, asked.property, kind, uri.as_bytes()).unwrap();
                 let answer = SelectionNotifyEvent {
                     response_type: SELECTION_NOTIFY_EVENT,

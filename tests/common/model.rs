@@ -116,7 +116,8 @@ impl Model {
     /// An indexed box between two corners, with a normal a face.
     pub fn cuboid(&mut self, low: [f32; 3], high: [f32; 3], material: Option<usize>) -> usize {
         let (positions, normals, indices) = cuboid(low, high);
-        let (positions, normals) = (self.positions(&positions), self.floats(3, &normals));
+        let positions = self.positions(&positions);
+        let normals = self.floats(3, &normals);
         let indices = self.indices(&indices);
         self.mesh(json!({ "POSITION": positions, "NORMAL": normals }), Some(indices), material)
     }
@@ -124,7 +125,8 @@ impl Model {
     /// An animation channel of a node: times and numbers, `width` a value.
     pub fn animate(&mut self, animation: usize, node: usize, path: &str, how: &str, times: &[f32], numbers: &[f32]) {
         let width = if path == "rotation" { 4 } else { 3 };
-        let (input, output) = (self.floats(1, times), self.floats(width, numbers));
+        let input = self.floats(1, times);
+        let output = self.floats(width, numbers);
         while self.json["animations"].as_array().map_or(0, Vec::len) <= animation {
             self.push("animations", json!({ "channels": [], "samplers": [] }));
         }
@@ -198,7 +200,8 @@ pub fn load(model: &Model) -> gltf::Import {
 /// A floor, a stretched box on it that turns, a glowing ball-like box and a lamp.
 pub fn room() -> Model {
     let mut model = Model::default();
-    let (floor, body) = (model.paint([0.6, 0.6, 0.5]), model.paint([0.2, 0.5, 0.8]));
+    let floor = model.paint([0.6, 0.6, 0.5]);
+    let body = model.paint([0.2, 0.5, 0.8]);
     let glow = json!({ "emissiveFactor": [1, 0.4, 0.1], "pbrMetallicRoughness": { "metallicFactor": 0 },
         "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 30 } } });
     let glow = model.push("materials", glow);
@@ -260,7 +263,9 @@ pub fn glb(json: &[u8], binary: &[u8]) -> Vec<u8> {
 
 /// Positions, normals and indices of a box.
 pub fn cuboid(low: [f32; 3], high: [f32; 3]) -> (Vec<f32>, Vec<f32>, Vec<u16>) {
-    let (mut positions, mut normals, mut indices) = (Vec::new(), Vec::new(), Vec::new());
+    let mut positions = Vec::new();
+    let mut normals = Vec::new();
+    let mut indices = Vec::new();
     for axis in 0..3 {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         for (side, sign) in [(low, -1.0), (high, 1.0)] {

@@ -199,7 +199,8 @@ fn slurm_runs_an_array_and_requeues_what_dies() {
     let plan = farm.path("p.json");
     let words = [plan.to_str().unwrap(), "--no-progress", "--quiet", "--cache-dir", cli::cache().to_str().unwrap()];
     let first = format!("{}\0--slice\x000\0", words.join("\0")).into_bytes();
-    let (start, mut killed) = (std::time::Instant::now(), false);
+    let start = std::time::Instant::now();
+    let mut killed = false;
     while farm.results().len() < MESHES {
         assert!(start.elapsed().as_secs() < 200, "{}", farm.good(&["farm", "status", "p.json"]));
         if let Some(id) = processes(&first).first().filter(|_| !killed) {

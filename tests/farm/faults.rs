@@ -151,7 +151,8 @@ fn kills_lose_at_most_the_slice() {
     let farm = Farm::new();
     farm.plan();
     let mut random = fastrand::Rng::with_seed(7);
-    let (mut done, mut killed) = (0, 0);
+    let mut done = 0;
+    let mut killed = 0;
     for kill in 0..kills {
         if kill % 4 == 0 {
             let _ = std::fs::remove_dir_all(farm.path("results"));

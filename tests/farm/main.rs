@@ -221,7 +221,8 @@ fn slices_of_pictures_are_those_of_render() {
         let pictures = format!("plain/{film}_###.png");
         farm.good(&[&["render", &scene, "-o", &pictures, "--frames", "5"][..], &options].concat());
     }
-    let (found, plain) = (files(&farm.path("out")), files(&farm.path("plain")));
+    let found = files(&farm.path("out"));
+    let plain = files(&farm.path("plain"));
     assert_eq!(found.len(), 10);
     assert!(found.contains_key("film_000.png") && found["film_000.png"] != found["film_004.png"]);
     assert!(found == plain);

@@ -35,7 +35,8 @@ impl Own {
         let window = connection.generate_id().unwrap();
         let look = CreateWindowAux::new().background_pixel(root.black_pixel);
         let ([width, height], class) = (SIZE.map(|side| side as u16), WindowClass::INPUT_OUTPUT);
-        let (depth, visual) = (root.root_depth, root.root_visual);
+        let depth = root.root_depth;
+        let visual = root.root_visual;
         connection.create_window(depth, window, root.root, 0, 0, width, height, 0, class, visual, &look).unwrap();
         connection.map_window(window).unwrap();
         connection.flush().unwrap();

@@ -113,7 +113,8 @@ pub fn without_stdout<R>(run: impl FnOnce() -> R) -> R {
 pub fn fault(name: &'static str, errors: &'static [vk::Result]) -> Option<vk::Result> {
     let (error, devices) = {
         let mut state = state();
-        let (index, call) = (state.heard.calls.len(), Call { name, errors });
+        let index = state.heard.calls.len();
+        let call = Call { name, errors };
         state.heard.calls.push(call);
         if state.lost && errors.contains(&vk::Result::ERROR_DEVICE_LOST) {
             return Some(vk::Result::ERROR_DEVICE_LOST);

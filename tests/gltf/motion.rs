@@ -50,8 +50,12 @@ fn translations_step_go_straight_and_follow_splines() {
     let slope = |key: usize, part: usize| Vec3::from(cubic[key][part]).as_dvec3();
     // The specification's formula, in its own letters.
     let spline = |t: f64, dt: f64, k: usize| {
-        let (v, b, w, a) = (slope(k, 1), slope(k, 2), slope(k + 1, 1), slope(k + 1, 0));
-        let (t2, t3) = (t * t, t * t * t);
+        let v = slope(k, 1);
+        let b = slope(k, 2);
+        let w = slope(k + 1, 1);
+        let a = slope(k + 1, 0);
+        let t2 = t * t;
+        let t3 = t * t * t;
         (2.0 * t3 - 3.0 * t2 + 1.0) * v + dt * (t3 - 2.0 * t2 + t) * b + (3.0 * t2 - 2.0 * t3) * w + dt * (t3 - t2) * a
     };
     for (time_s, expected) in [
@@ -125,7 +129,8 @@ fn nodes_carry_what_stands_in_them() {
         let moon = DMat4::from_rotation_translation(DQuat::from_rotation_x(angle(2.0)), DVec3::new(0.0, 0.5, 0.0));
         for point in [DVec3::ZERO, DVec3::new(0.2, -0.1, 0.3)] {
             for (entity, matrix) in [(0, body), (1, body * arm * moon)] {
-                let (found, expected) = (moved(&import, entity, time_s, point), matrix.transform_point3(point));
+                let found = moved(&import, entity, time_s, point);
+                let expected = matrix.transform_point3(point);
                 assert!(near(found, expected), "entity {entity} at {time_s} s: {found}, not {expected}");
             }
         }

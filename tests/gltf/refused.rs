@@ -257,7 +257,8 @@ fn damage_at_random_is_read_or_refused() {
     let whole = room().glb();
     let json_end = 20 + u32::from_le_bytes(whole[12..16].try_into().unwrap()) as usize;
     let mut random = fastrand::Rng::with_seed(5);
-    let (mut read, mut refused) = (0, 0);
+    let mut read = 0;
+    let mut refused = 0;
     for round in 0..3000 {
         let mut bytes = whole.clone();
         for _ in 0..random.usize(1..4) {
@@ -288,7 +289,8 @@ fn bombs() {
     let started = std::time::Instant::now();
     // Elements of a sparse accessor take no bytes in the file.
     let mut model = Model::default();
-    let (indices, values) = (model.view(&[0]), model.view(&[0; 12]));
+    let indices = model.view(&[0]);
+    let values = model.view(&[0; 12]);
     let sparse = json!({ "count": 1, "indices": { "bufferView": indices, "componentType": U8 }, "values": { "bufferView": values } });
     let bounds = json!([0, 0, 0]);
     let json = json!({ "componentType": F32, "count": 4_000_000_000_u64, "type": "VEC3", "sparse": sparse, "min": bounds, "max": bounds });

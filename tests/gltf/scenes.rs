@@ -40,9 +40,11 @@ fn arrows() -> Model {
     for axis in 0..3 {
         let mut color = [0.1; 3];
         color[axis] = 0.8;
-        let (mut low, mut high) = ([-0.1; 3], [0.1; 3]);
+        let mut low = [-0.1; 3];
+        let mut high = [0.1; 3];
         (low[axis], high[axis]) = (0.5, 2.0);
-        let (name, paint) = (["x", "y", "z"][axis], model.paint(color));
+        let name = ["x", "y", "z"][axis];
+        let paint = model.paint(color);
         let mesh = model.cuboid(low, high, Some(paint));
         model.child(body, json!({ "name": name, "mesh": mesh }));
     }
@@ -118,7 +120,8 @@ fn normals_follow_their_surface_through_uneven_and_mirrored_scales() {
         let turned = |of: &[f32]| -> Vec<f32> {
             of.chunks_exact(3).flat_map(|p| (turn * Vec3::from_slice(p).as_dvec3()).as_vec3().to_array()).collect()
         };
-        let (positions, normals) = (model.positions(&turned(&positions)), model.floats(3, &turned(&normals)));
+        let positions = model.positions(&turned(&positions));
+        let normals = model.floats(3, &turned(&normals));
         let indices = model.indices(&indices);
         let mesh = model.mesh(json!({ "POSITION": positions, "NORMAL": normals }), Some(indices), None);
         model.node(json!({ "mesh": mesh, "scale": scale }));
@@ -145,7 +148,8 @@ fn indexed_or_not_with_normals_or_without_it_is_the_same_box() {
     let n = model.floats(3, &apart(&normals));
     let plain = model.mesh(json!({ "POSITION": p, "NORMAL": n }), None, None);
     let bare = model.mesh(json!({ "POSITION": p }), None, None);
-    let (shared, i) = (model.positions(&positions), model.indices(&indices));
+    let shared = model.positions(&positions);
+    let i = model.indices(&indices);
     let bare_indexed = model.mesh(json!({ "POSITION": shared }), Some(i), None);
     let bytes: Vec<u8> = indices.iter().map(|i| *i as u8).collect();
     let small = model.accessor(U8, 1, indices.len(), &bytes);
@@ -201,7 +205,8 @@ fn quantised_accessors_are_numbers() {
         json!({ "bufferView": view, "componentType": I16, "count": 3, "type": "VEC3", "normalized": normalized,
             "min": [0, -32768, 0], "max": [16384, 0, 32767] })
     };
-    let (share, whole) = (model.push("accessors", accessor(true)), model.push("accessors", accessor(false)));
+    let share = model.push("accessors", accessor(true));
+    let whole = model.push("accessors", accessor(false));
     let normals: Vec<u8> = [[0_u8, 0, 127, 0]; 3].concat();
     let view = model.view(&normals);
     model.json["bufferViews"][view]["byteStride"] = json!(4);
@@ -325,7 +330,9 @@ fn spots_shine_within_their_cone() {
     let (lit, _) = shadow_fields::truth::picture(&scene, &scene.at(0.0), &cast);
     let (_, radiosity) = lit.iter().find(|(entity, _)| *entity == 0).unwrap();
     let mesh = &scene.meshes[scene.entities[0].mesh];
-    let (mut full, mut dark, mut between) = (0, 0, 0);
+    let mut full = 0;
+    let mut dark = 0;
+    let mut between = 0;
     for (position, found) in mesh.positions.iter().zip(radiosity) {
         let to_lamp = DVec3::new(0.0, 2.0, 0.0) - position.as_dvec3();
         let cosine = to_lamp.y / to_lamp.length();
@@ -347,7 +354,8 @@ fn the_first_perspective_camera_is_taken() {
     let mut model = arrows();
     let flat = json!({ "type": "orthographic", "orthographic": { "xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1 } });
     let view = json!({ "type": "perspective", "perspective": { "yfov": 0.5, "znear": 0.1, "aspectRatio": 1.5 } });
-    let (flat, view) = (model.push("cameras", flat), model.push("cameras", view));
+    let flat = model.push("cameras", flat);
+    let view = model.push("cameras", view);
     model.node(json!({ "camera": flat }));
     let half = std::f32::consts::FRAC_1_SQRT_2;
     // Turned by a quarter about +y, -z becomes -x.

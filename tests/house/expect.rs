@@ -11,7 +11,8 @@ fn root() -> &'static Path {
 /// Exit code and lines of the script for a list and an output.
 fn expect(list: &str, log: &str) -> (i32, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
-    let (list_file, log_file) = (folder.path().join("list"), folder.path().join("log"));
+    let list_file = folder.path().join("list");
+    let log_file = folder.path().join("log");
     std::fs::write(&list_file, list).unwrap();
     std::fs::write(&log_file, log).unwrap();
     let output = Command::new(root().join("scripts/expect")).arg("list").arg("log").current_dir(folder.path()).output();

@@ -89,7 +89,8 @@ fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
         let rest = &code[at + prefix.len()..];
         let first = |part: &str| part.trim().chars().take_while(|c| is_word(*c)).collect::<String>();
         if let Some(list) = rest.strip_prefix('{') {
-            let (mut depth, mut part) = (0, String::new());
+            let mut depth = 0;
+            let mut part = String::new();
             for c in list.chars() {
                 match c {
                     '{' => depth += 1,

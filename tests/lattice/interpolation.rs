@@ -86,7 +86,8 @@ fn interpolation_is_continuous() {
         paths.push((DVec3::new(1.0, 0.9, 0.8), DVec3::new(0.8, 1.0, 1.1)));
         paths.push((DVec3::new(-1.0, 1.0, -1.0), DVec3::new(1.0, 1.0, 1.0)));
         paths.push((DVec3::new(1.0, -1.0 + 1e-9, -0.9), DVec3::new(1.0, -1.0 - 1e-9, 0.9)));
-        let (mut largest, mut steps) = (0.0_f64, 0);
+        let mut largest = 0.0_f64;
+        let mut steps = 0;
         for (from, to) in paths {
             // The distance swings from inside the first shell to beyond the last.
             let radius = |f: f64| (lattice.outer * 1.5 * (0.5 - 0.5 * (3.0 * TAU * f).cos())).max(0.2 * lattice.inner);
@@ -96,14 +97,17 @@ fn interpolation_is_continuous() {
                 let f = f64::from(i) / f64::from(count);
                 radius(f) * from.lerp(to, f).normalize()
             };
-            let (mut before, mut value) = (point(0), at(point(0)));
+            let mut before = point(0);
+            let mut value = at(point(0));
             for i in 1..=count {
                 let next = point(i);
-                let (d0, d1) = (before.length(), next.length());
+                let d0 = before.length();
+                let d1 = next.length();
                 let angle = before.cross(next).length().atan2(before.dot(next));
                 let cell = 2.0 * f64::from(steps_of_row) / 2.0 * 4.0 / PI * 6.0_f64.sqrt() * angle;
                 let shell = (shell_at(d1) - shell_at(d0)).abs();
-                let (u0, u1) = (lattice.unscale(d0), lattice.unscale(d1));
+                let u0 = lattice.unscale(d0);
+                let u1 = lattice.unscale(d1);
                 let bound = (cell + shell) * u0.max(u1) + (u1 - u0).abs() + 1e-12;
                 let now = at(next);
                 assert!(
@@ -149,7 +153,8 @@ fn longitudes_wrap() {
     // Halfway between the last longitude and the first.
     let ring = lattice.direction_count() + 2 * 7;
     let inner_shell = lattice.shell(1);
-    let (polar, azimuth) = (2.5 * PI / 5.0, 6.5 * TAU / 7.0);
+    let polar = 2.5 * PI / 5.0;
+    let azimuth = 6.5 * TAU / 7.0;
     let p = DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin());
     let mean = (captured[ring as usize + 6] + captured[ring as usize]) / 2.0;
     assert!((interpolate(&lattice, &stored, inner_shell * p) - mean).abs() < ROUNDING);

@@ -126,7 +126,8 @@ fn samples_lie_on_their_shells() {
             assert!(lattice.shell(shell) > lattice.shell(shell - 1), "{lattice}: shells grow");
         }
         for index in 0..lattice.sample_count() {
-            let (shell, direction) = (index / lattice.direction_count(), index % lattice.direction_count());
+            let shell = index / lattice.direction_count();
+            let direction = index % lattice.direction_count();
             let unit = lattice.direction(direction);
             assert!((unit.length() - 1.0).abs() < 1e-14, "{lattice}: direction {direction}");
             let position = lattice.position(index);

@@ -29,7 +29,8 @@ fn legendre(l: i32, m: i32, theta: f64) -> f64 {
 
 /// Y_lm in angles.
 fn slow_twin(l: i32, m: i32, direction: DVec3) -> f64 {
-    let (theta, azimuth) = (direction.z.clamp(-1.0, 1.0).acos(), direction.y.atan2(direction.x));
+    let theta = direction.z.clamp(-1.0, 1.0).acos();
+    let azimuth = direction.y.atan2(direction.x);
     let k = m.abs();
     let factorial = |n: i32| (1..=n).map(f64::from).product::<f64>();
     let scale = ((2 * l + 1) as f64 / (4.0 * PI) * factorial(l - k) / factorial(l + k)).sqrt();
@@ -60,7 +61,8 @@ fn evaluation_equals_the_slow_twin() {
         let values = basis(MAX_BANDS, d);
         for l in 0..MAX_BANDS as i32 {
             for m in -l..=l {
-                let (value, expected) = (values[(l * (l + 1) + m) as usize], slow_twin(l, m, d));
+                let value = values[(l * (l + 1) + m) as usize];
+                let expected = slow_twin(l, m, d);
                 // The twin's sum cancels: its terms reach 2^l, 1e3 times an f64 rounding, times azimuths near poles.
                 assert!((value - expected).abs() < 1e-11, "l {l} m {m} at {d}: {value} {expected}");
             }

@@ -48,7 +48,8 @@ fn texel_to_direction_and_back() {
             assert_eq!(right.cross(down), -forward, "faces are mirror images");
             for y in 0..face_px {
                 for x in 0..face_px {
-                    let (s, t) = (texel_st(x, face_px), texel_st(y, face_px));
+                    let s = texel_st(x, face_px);
+                    let t = texel_st(y, face_px);
                     let d = direction(face, s, t);
                     assert!((d - (forward + s * right + t * down).normalize()).length() < 1e-15);
                     let (back, s, t) = face_st(d);
@@ -93,7 +94,9 @@ fn solid_angles_are_exact() {
     // One texel of 2 x 2: a 24th of the sphere. One of 64 x 64: the integrand (1 + s^2 + t^2)^-3/2 at its centre, whose
     // error is the texel's area times its width squared.
     assert!((solid_angle(2)[3] - 4.0 * PI / 24.0).abs() < 1e-15);
-    let (s, t, area) = (texel_st(50, 64), texel_st(9, 64), (2.0_f64 / 64.0).powi(2));
+    let s = texel_st(50, 64);
+    let t = texel_st(9, 64);
+    let area = (2.0_f64 / 64.0).powi(2);
     let approximate = area * (1.0 + s * s + t * t).powf(-1.5);
     assert!((solid_angle(64)[9 * 64 + 50] / approximate - 1.0).abs() < 1e-3);
 }

@@ -66,7 +66,8 @@ fn interpret(text: &str, name: &str, names: &mut HashMap<String, f64>) {
     for line in text[start..].lines().skip(1).take_while(|line| *line != "}") {
         let statement = line.trim().strip_suffix(';').expect("a line is a statement");
         let words: Vec<&str> = statement.strip_prefix("float ").unwrap_or(statement).split(' ').collect();
-        let (mut sum, mut product) = (0.0, 1.0);
+        let mut sum = 0.0;
+        let mut product = 1.0;
         for word in &words[2..] {
             match *word {
                 "*" => {}

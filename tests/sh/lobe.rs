@@ -30,7 +30,8 @@ fn by_quadrature(axis: DVec3, low: f64, f: impl Fn(f64) -> f64) -> Vec<f64> {
     // The z of a sphere rule are Gauss-Legendre nodes: stretch [-1, 1] to [low, 1].
     for (point, weight) in sphere_rule(24) {
         let height = low + (1.0 - low) * (point.z + 1.0) / 2.0;
-        let (radius, azimuth) = ((1.0 - height * height).sqrt(), point.y.atan2(point.x));
+        let radius = (1.0 - height * height).sqrt();
+        let azimuth = point.y.atan2(point.x);
         let direction = height * axis + radius * (azimuth.cos() * u + azimuth.sin() * v);
         evaluate(MAX_BANDS, direction.normalize(), &mut y);
         let scale = weight * (1.0 - low) / 2.0 * f(height);

@@ -40,7 +40,8 @@ fn rotated_coefficients_are_the_rotated_function() {
     let mut rng = Rng::with_seed(11);
     for bands in 1..=MAX_BANDS {
         for _ in 0..20 {
-            let (coefficients, turn) = (random(&mut rng, bands), random_rotation(&mut rng));
+            let coefficients = random(&mut rng, bands);
+            let turn = random_rotation(&mut rng);
             let rotated = apply(&Rotation::new(bands, turn), &coefficients);
             for _ in 0..50 {
                 let direction = random_direction(&mut rng);
@@ -65,7 +66,8 @@ fn rotations_form_a_group_and_keep_the_norm() {
     let mut rng = Rng::with_seed(12);
     for bands in [2, 4, 6, 8] {
         for _ in 0..20 {
-            let (p, q) = (random_rotation(&mut rng), random_rotation(&mut rng));
+            let p = random_rotation(&mut rng);
+            let q = random_rotation(&mut rng);
             let coefficients = random(&mut rng, bands);
             let [rp, rq, rpq] = [p, q, p * q].map(|turn| Rotation::new(bands, turn));
             assert_close(&apply(&rp, &apply(&rq, &coefficients)), &apply(&rpq, &coefficients), "group law");

@@ -27,7 +27,8 @@ fn error(gpu: &common::Gpu, scene: &Scene, options: frame::Options, rays: u32) -
     let lit: Vec<Vec<[f32; 3]>> = (0..scene.entities.len())
         .map(|entity| if scene.entities[entity].receives { frame.radiosity(entity).unwrap() } else { Vec::new() })
         .collect();
-    let (mut off, mut whole) = (0.0, 0.0);
+    let mut off = 0.0;
+    let mut whole = 0.0;
     for (vertex, truth) in vertices.iter().zip(&truth) {
         for (found, exact) in lit[vertex.entity][vertex.index].iter().zip(truth.radiosity) {
             off += (f64::from(*found) - exact).powi(2);

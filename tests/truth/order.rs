@@ -57,7 +57,8 @@ fn what_lies_behind_a_lights_surface_hides_nothing_though_its_centre_is_nearer()
     assert!(near(centres, seen) && surfaces > seen && surfaces < below(1.0, 3.0), "{surfaces} {centres}");
     // The circle in which the two spheres meet: 1 and 0.2 m around centres 1 m apart, seen from 2 and 3 m below.
     let along = (1.0 - 0.04 + 1.0) / 2.0;
-    let (radius_squared, height) = (1.0 - along * along, 3.0 - along);
+    let radius_squared = 1.0 - along * along;
+    let height = 3.0 - along;
     let cap = 0.6 * 9.0 * radius_squared / (radius_squared + height * height);
     assert!((surfaces - (below(1.0, 3.0) - cap)).abs() < 5e-3 * below(1.0, 3.0), "{surfaces} less {cap}");
 }

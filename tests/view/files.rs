@@ -186,7 +186,8 @@ fn a_saved_scene_reads_back_as_the_state() {
 #[test]
 fn saved_files_are_found_from_other_folders() {
     let folder = tempfile::tempdir().unwrap();
-    let (here, there) = (folder.path().join("here"), folder.path().join("there"));
+    let here = folder.path().join("here");
+    let there = folder.path().join("there");
     std::fs::create_dir_all(here.join("meshes")).unwrap();
     std::fs::create_dir_all(&there).unwrap();
     std::fs::write(here.join("meshes/t.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();

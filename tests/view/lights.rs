@@ -83,7 +83,8 @@ fn sliders_change_the_scene_and_undo_as_one() {
         Command::SetLight(1e9),
         Command::SetSkyTurn(f32::INFINITY),
     ] {
-        let (now, count) = (editor.scene().data.clone(), editor.undo_count());
+        let now = editor.scene().data.clone();
+        let count = editor.undo_count();
         assert!(!editor.apply(bad).changed.any(), "{bad:?}");
         assert_eq!((&editor.scene().data, editor.undo_count()), (&now, count), "{bad:?}");
     }

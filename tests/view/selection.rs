@@ -33,7 +33,8 @@ fn brute_force(editor: &Editor, origin: DVec3, direction: DVec3) -> Option<(usiz
         };
         for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(at);
-            let (e, f) = (b - a, c - a);
+            let e = b - a;
+            let f = c - a;
             let p = direction.cross(f);
             let determinant = e.dot(p);
             let t = origin - a;
@@ -60,17 +61,21 @@ fn picking_finds_what_is_seen() {
         editor.apply(Command::Resize([96, 64]));
         editor.advance(1.7);
         editor.apply(Command::Orbit([5.0, -3.0]));
-        let (mut hits, mut disagree, mut seen) = (0, 0, std::collections::BTreeSet::new());
+        let mut hits = 0;
+        let mut disagree = 0;
+        let mut seen = std::collections::BTreeSet::new();
         // Every pixel of a coarse grid against all triangles, the ray made from the camera by itself.
         let camera = editor.camera().clone();
-        let (eye, ahead) = (camera.eye.as_dvec3(), (camera.target - camera.eye).as_dvec3().normalize());
+        let eye = camera.eye.as_dvec3();
+        let ahead = (camera.target - camera.eye).as_dvec3().normalize();
         let right = ahead.cross(DVec3::Y).normalize();
         let up = right.cross(ahead);
         let half = (f64::from(camera.fov_deg).to_radians() / 2.0).tan();
         for y in (0..64).step_by(9) {
             for x in (0..96).step_by(9) {
                 let at = [x as f32 + 0.5, y as f32 + 0.5];
-                let (h, v) = ((f64::from(at[0]) - 48.0) / 32.0, (32.0 - f64::from(at[1])) / 32.0);
+                let h = (f64::from(at[0]) - 48.0) / 32.0;
+                let v = (32.0 - f64::from(at[1])) / 32.0;
                 let direction = (ahead + half * (h * right + v * up)).normalize();
                 let expected = brute_force(&editor, eye, direction);
                 let found = editor.hit(at);
@@ -128,7 +133,8 @@ fn a_dragged_entity_follows_the_pointer_in_the_ground_plane() {
     editor.apply(Command::Pick(at));
     assert_eq!(editor.selection, Some(amber));
     assert!(editor.grabs(at) && !editor.grabs([at[0] + 200.0, at[1] + 100.0]));
-    let (before, data) = (editor.placements()[amber], editor.scene().data.clone());
+    let before = editor.placements()[amber];
+    let data = editor.scene().data.clone();
     let (_, grabbed) = editor.hit(at).unwrap();
     editor.apply(Command::DragStart(at));
     for i in 1..=30 {

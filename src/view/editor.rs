@@ -211,13 +211,14 @@ impl Editor {
         }
     }
 
-    /// Centre and radius in metres of a sphere around all entities that occlude or emit; around all entities if none
-    /// does.
+    /// Centre and radius in metres of a sphere around all lights and all occluders but flat ones, as floors are; around
+    /// all entities if there are none.
     pub fn bounds(&self) -> (DVec3, f64) {
         let placements = self.placements();
         // Suns stand behind the entities of the file.
         let entities = &self.scene.entities[..self.scene.data.entities.len()];
-        let acts = |entity: &Entity| entity.occludes || entity.emits;
+        let is_flat = |entity: &Entity| self.scene.meshes[entity.mesh].is_flat();
+        let acts = |entity: &Entity| entity.emits || entity.occludes && !is_flat(entity);
         let any = entities.iter().any(acts);
         let shown = (0..entities.len()).filter(|i| !any || acts(&entities[*i]));
         let spheres: Vec<(DVec3, f64)> = shown.map(|i| self.sphere(i, &placements[i])).collect();

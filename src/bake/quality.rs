@@ -81,10 +81,10 @@ mod tests {
 
     #[test]
     fn every_quality_is_a_row_of_options() {
-        assert_eq!(parsed(&[]), Options::default());
+        assert_eq!(parsed(&[]), Quality::Normal.options());
         let all: Vec<Options> = ["draft", "normal", "high"].map(|word| parsed(&["--quality", word])).to_vec();
         assert_eq!(all, Quality::value_variants().iter().map(|quality| quality.options()).collect::<Vec<_>>());
-        assert_eq!(all[1], Options::default(), "normal is what there is without the option");
+        assert_eq!(all[1], parsed(&[]), "normal is what there is without the option");
         assert_eq!("cube:18x7,edges=auto".parse(), Ok(Lattice::default()), "as help texts write it");
         for pair in all.windows(2) {
             let samples = pair.iter().map(|o| o.lattice.starting_at(1.0).stored_count()).collect::<Vec<_>>();

@@ -5,7 +5,7 @@ use fastrand::Rng;
 use serde::Serialize;
 use shadow_fields::Error;
 use shadow_fields::bake;
-use shadow_fields::field::file::{self, FIELD_MAGIC, TRANSFER_MAGIC};
+use shadow_fields::field::file::{self, FIELD_MAGIC, SURFACES_MAGIC};
 use shadow_fields::field::{FieldHeader, FieldKind, Lattice, ShadowField, Storage};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -128,7 +128,7 @@ fn other_kinds_versions_and_lengths_are_named() {
         std::fs::write(&path, bytes).unwrap();
         refusal(&path)
     };
-    assert!(with(&|b| b[..8].copy_from_slice(&TRANSFER_MAGIC)).contains("magic"));
+    assert!(with(&|b| b[..8].copy_from_slice(&SURFACES_MAGIC)).contains("magic"));
     assert!(with(&|b| b[..8].copy_from_slice(b"\x89PNG\r\n\x1a\n")).contains("magic"));
     for other in [file::VERSION - 1, file::VERSION + 1] {
         let said = with(&|b| b[VERSION_AT..VERSION_AT + 4].copy_from_slice(&other.to_le_bytes()));

@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use shadow_fields::Result;
 use shadow_fields::bake;
 use shadow_fields::error::Error;
-use shadow_fields::field::file::{self, FIELD_MAGIC, SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC};
+use shadow_fields::field::file::{self, FIELD_MAGIC, SURFACES_MAGIC};
 use shadow_fields::field::silhouette::{SILHOUETTE_MAGIC, SilhouetteField, SilhouetteHeader};
 use shadow_fields::field::{FieldKind, ShadowField, Storage};
 use std::path::Path;
@@ -82,7 +82,7 @@ pub fn outline(bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-const MAGICS: [[u8; 8]; 4] = [SELF_VISIBILITY_MAGIC, TRANSFER_MAGIC, FIELD_MAGIC, SILHOUETTE_MAGIC];
+const MAGICS: [[u8; 8]; 3] = [SURFACES_MAGIC, FIELD_MAGIC, SILHOUETTE_MAGIC];
 
 pub fn payloads() -> Vec<Vec<u8>> {
     let header = serde_json::json!({ "mesh_hash": "00", "face_px": 16, "offset": 1e-3, "side": 16, "vertex_count": 2 });

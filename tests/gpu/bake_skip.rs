@@ -45,12 +45,12 @@ fn the_same_mesh_under_two_names_is_baked_once() {
     let other = buffers(&meshes(["a", "b"], [8, 10]));
     let names = |buffers: &SceneBuffers| buffers.baked.iter().map(|b| b.what.clone()).collect::<Vec<_>>();
     report(&format!("{:?} and {:?}", names(&same), names(&other)));
-    assert_eq!(names(&same), ["a shadow", "a transfer"]);
-    assert_eq!(names(&other), ["a shadow", "a transfer", "b shadow", "b transfer"]);
+    assert_eq!(names(&same), ["a shadow", "a view"]);
+    assert_eq!(names(&other), ["a shadow", "b shadow", "a view", "b view"]);
     assert!(same.fields.size_bytes < other.fields.size_bytes);
     let [a, b] = [0, 1].map(|i| same.meshes[i].blocked.as_ref().unwrap());
     assert!(a.bytes == b.bytes && a.header.growth == b.header.growth && b.header.growth >= 1.0);
-    assert_eq!(same.meshes[0].transfer_first, same.meshes[1].transfer_first);
+    assert_eq!(same.surface(0).transfer_first, same.surface(1).transfer_first);
 }
 
 /// Samples on an edge between faces of the lattice's cube have several numbers, and are captured once.

@@ -1,14 +1,12 @@
-//! Self-visibility: closed forms, the pass against its twin, the shader's lookup against Rust's, direct light against
-//! rays, the cache.
+//! Self-visibility: closed forms, the shader's lookup against Rust's, direct light against rays.
 
 use crate::common;
 use common::generate;
-use common::{Gpu, gpu, pot, report};
+use common::{gpu, report};
 use glam::{DVec3, Vec3};
 use shadow_fields::asset::{Mesh, embedded};
-use shadow_fields::bake::cache::Cache;
-use shadow_fields::bake::{self, TRANSFER_OFFSET, Wanted};
-use shadow_fields::check::self_visibility as check;
+use shadow_fields::bake::surfaces::{BakedSurface, GroupPlan};
+use shadow_fields::bake::{self, Wanted};
 use shadow_fields::field::quantity::channel_stride;
 use shadow_fields::field::self_visibility::{
     BYTES, CELLS, LIMIT_RAD, NODES, cells, decode_angle, encode_angle, frame, node_direction, visible,
@@ -22,28 +20,16 @@ use shadow_fields::shaders::{Library, ShaderPermutation};
 use shadow_fields::truth::{RayMeshes, Vertex, World};
 use std::f64::consts::TAU;
 use std::path::Path;
+use std::sync::Arc;
 
-fn options(face_px: u32) -> bake::Options {
-    bake::Options { face_px, ..bake::Options::default() }
+/// The surface of a mesh that nothing surrounds.
+fn bake(mesh: &Mesh) -> BakedSurface {
+    let alone = GroupPlan::alone(&Arc::new(mesh.clone()), &bake::Options::default(), Wanted::BOTH);
+    alone.bake(&|_, _| ()).0.remove(0)
 }
 
-fn bake(gpu: &Gpu, mesh: &Mesh, face_px: u32) -> Vec<u8> {
-    gpu.baker().vertices(mesh, &options(face_px), Wanted::SELF_VISIBILITY, &|_, _| ()).unwrap().0.self_visibility
-}
-
-#[test]
-fn maps_are_those_of_the_twin() {
-    let Some(gpu) = gpu() else { return };
-    let ring = generate::torus(1.0, 0.3, 24, 12);
-    // Faces of 180 px are gone through in two parts.
-    for (mesh, face_px) in [(ring.clone(), 32), (pot(3), 64), (pot(2), 20), (ring, 180)] {
-        let check::Compared { worst_steps: worst, between, other_distances } =
-            check::compare(&gpu.baker(), &mesh, face_px).unwrap();
-        report(&format!("{} at {face_px} px: {worst} steps at most, {between} nodes between the limits", mesh.name));
-        report(&format!("{:.4} of the nodes have another distance", other_distances));
-        assert!(worst <= check::STEPS && between > 100, "{} at {face_px} px: {worst} steps", mesh.name);
-        assert!(other_distances <= check::OTHER_DISTANCES, "{other_distances}");
-    }
+fn maps(mesh: &Mesh) -> Vec<u8> {
+    bake(mesh).self_visibility.expect("some ray is blocked").to_vec()
 }
 
 /// A floor that is one small triangle at the origin, and a wall that looms over it at x = -1: 1 m high, 80 m long.
@@ -63,12 +49,12 @@ fn floor_beside_a_wall() -> Mesh {
 
 #[test]
 fn the_edge_of_a_wall_is_a_great_circle() {
-    let Some(gpu) = gpu() else { return };
     let mesh = floor_beside_a_wall();
     let vertex = mesh.positions.iter().position(|p| *p == Vec3::ZERO).unwrap();
     assert_eq!(mesh.normals[vertex], Vec3::Y);
-    let maps = bake(&gpu, &mesh, 128);
-    let height = 1.0 - f64::from(TRANSFER_OFFSET * mesh.bounding_sphere().1);
+    let maps = maps(&mesh);
+    // The vertex is seen from 5 % of its shortest edge above the floor, and 2 % of the way to its triangle's middle.
+    let height = 1.0 - 0.005;
     let across = DVec3::new(height, 1.0, 0.0).normalize();
     let mut worst = 0.0_f64;
     for node in 0..NODES {
@@ -81,7 +67,7 @@ fn the_edge_of_a_wall_is_a_great_circle() {
         worst = worst.max((found - wanted.clamp(-LIMIT_RAD, LIMIT_RAD)).abs());
     }
     report(&format!("beside a wall: {:.2} degrees off at most", worst.to_degrees()));
-    // A texel of 0.9 degrees, and half a step of 0.35.
+    // Rays of 5 degrees, halved four times, and half a step of 0.35.
     assert!(worst.to_degrees() < 1.08, "{} degrees", worst.to_degrees());
     // A light whose centre the edge passes through.
     let edge = DVec3::new(-1.0, height, 0.3).normalize();
@@ -91,15 +77,14 @@ fn the_edge_of_a_wall_is_a_great_circle() {
 
 #[test]
 fn a_ball_leaves_all_free_outside_and_nothing_inside() {
-    let Some(gpu) = gpu() else { return };
     let ball = generate::sphere(0.5, 2);
     let all = |maps: Vec<u8>, angle| {
         maps.chunks_exact(BYTES).all(|map| map[..NODES].iter().all(|byte| *byte == encode_angle(angle)))
     };
-    assert!(all(bake(&gpu, &ball, 32), LIMIT_RAD));
+    assert!(bake(&ball).self_visibility.is_none(), "nothing is blocked, so nothing is kept");
     let inwards = ball.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect();
     let room = Mesh::new("room", ball.positions.clone(), Vec::new(), None, inwards).unwrap();
-    assert!(all(bake(&gpu, &room, 32), -LIMIT_RAD));
+    assert!(all(maps(&room), -LIMIT_RAD));
 }
 
 const LOOKUP: &str = r#"#version 460
@@ -194,7 +179,6 @@ fn by_map(map: &[u8], normal: DVec3, toward: DVec3, angle: f64) -> f64 {
 fn direct_light_is_that_of_rays() {
     const VERTICES: usize = 150;
     const LIGHTS: usize = 12;
-    let Some(gpu) = gpu() else { return };
     let text = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n[[mesh]]\nname = \"pot\"\nfile = \"assets/meshes/teapot.obj\"\n\
                 [[entity]]\nmesh = \"pot\"\n";
     let scene = Scene::parse(text, Path::new("test.toml"), &embedded::read).unwrap();
@@ -202,12 +186,9 @@ fn direct_light_is_that_of_rays() {
     let shapes = RayMeshes::new(&scene);
     let placement = Placement { position: Vec3::ZERO, rotation: glam::Quat::IDENTITY, scale: 1.0 };
     let world = World::new(&scene, &shapes, &[placement]);
-    let bake = |wanted| gpu.baker().vertices(mesh, &options(64), wanted, &|_, _| ()).unwrap();
-    let (transfer, of_transfer) = bake(Wanted::TRANSFER);
-    let (maps, of_maps) = bake(Wanted::SELF_VISIBILITY);
-    let (transfer, maps) = (transfer.transfer, maps.self_visibility);
-    report(&format!("transfer: {of_transfer:?}"));
-    report(&format!("self-visibility: {of_maps:?}"));
+    let surface = bake(mesh);
+    let transfer = surface.transfer.expect("some ray is blocked");
+    let maps = surface.self_visibility.expect("some ray is blocked");
     let stride = channel_stride(4);
     let mut rng = fastrand::Rng::with_seed(4);
     let degrees = [1.0_f64, 3.0, 8.0, 15.0, 30.0];
@@ -241,39 +222,4 @@ fn direct_light_is_that_of_rays() {
         report(&format!("light of {degrees} degrees: {map:.4} by maps, {sh:.4} by SH transfer"));
         assert!(map < limit && map < 0.7 * sh, "{degrees} degrees: {map} by maps, {sh} by SH");
     }
-}
-
-#[test]
-fn the_cache_keeps_maps_and_bakes_damaged_ones_anew() {
-    let Some(gpu) = gpu() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let cache = Cache::new(Some(folder.path()));
-    let (mesh, options) = (generate::torus(1.0, 0.3, 12, 6), options(16));
-    let ensure = |cache: &Cache| {
-        let baker = gpu.baker();
-        let found = cache.vertices(&baker, &mesh, &options, Wanted::SELF_VISIBILITY, &|_, _| ()).unwrap();
-        (found.self_visibility.unwrap(), found.baked)
-    };
-    assert!(!cache.has_self_visibility(&mesh, &options));
-    let (maps, baked) = ensure(&cache);
-    assert_eq!(maps.len(), BYTES * mesh.positions.len());
-    assert!(baked.is_some() && cache.has_self_visibility(&mesh, &options));
-    assert!(!cache.has_transfer(&mesh, &options));
-    let files: Vec<_> = std::fs::read_dir(folder.path().join("fields")).unwrap().map(|f| f.unwrap().path()).collect();
-    assert!(files.len() == 1 && files[0].extension().unwrap() == "selfvis", "{files:?}");
-    let fresh = || Cache::new(Some(folder.path()));
-    assert!(ensure(&fresh()).1.is_none(), "it is found");
-    let bytes = std::fs::read(&files[0]).unwrap();
-    let altered = |at: usize| bytes.iter().enumerate().map(|(i, b)| if i == at { b ^ 1 } else { *b }).collect();
-    let damaged: [Vec<u8>; 5] =
-        [bytes[..bytes.len() - 5].to_vec(), altered(bytes.len() / 2), altered(2), altered(60), Vec::new()];
-    for content in damaged {
-        std::fs::write(&files[0], &content).unwrap();
-        let (again, baked) = ensure(&fresh());
-        assert!(baked.is_some(), "{} bytes are baked anew", content.len());
-        assert_eq!(again, maps);
-        assert_eq!(std::fs::read(&files[0]).unwrap(), bytes, "and kept");
-    }
-    let memory = Cache::new(None);
-    assert!(ensure(&memory).1.is_some() && ensure(&memory).1.is_none(), "without a folder it is kept in memory");
 }

@@ -5,6 +5,7 @@ use super::{quiet, small, torus};
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
+use shadow_fields::bake::surfaces::GroupPlan;
 use shadow_fields::bake::{self, Baker, Wanted};
 use shadow_fields::field::{FieldHeader, FieldKind, ShadowField, Storage};
 use shadow_fields::gpu::Device;
@@ -105,29 +106,33 @@ fn a_file_under_another_name_is_not_believed() {
 }
 
 #[test]
-fn the_cache_keeps_transfers() {
-    let Some(gpu) = gpu() else { return };
+fn the_cache_keeps_surfaces_and_bakes_damaged_ones_anew() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = generate::torus(1.0, 0.3, 12, 8);
     let cache = Cache::new(Some(folder.path()));
-    let baker = Baker::new(&gpu.device, &gpu.library);
-    let options = |bands| bake::Options { bands, face_px: 16, ..Default::default() };
+    let mesh = Arc::new(mesh);
     let run = |bands| {
-        let found = cache.vertices(&baker, &mesh, &options(bands), Wanted::TRANSFER, &quiet).unwrap();
-        (found.transfer.unwrap(), found.baked)
+        let options = bake::Options { bands, ..Default::default() };
+        let (found, baked) = cache.surfaces(&GroupPlan::alone(&mesh, &options, Wanted::BOTH), &quiet);
+        let surface = found[0].clone();
+        ((surface.transfer.unwrap(), surface.self_visibility.unwrap()), baked)
     };
     let (first, baked) = run(3);
     assert!(baked.is_some());
     let (second, found) = run(3);
     assert!(found.is_none() && second == first);
-    let paths = files(folder.path(), "transfer");
+    let paths = files(folder.path(), "view");
     assert_eq!(paths.len(), 1);
-    let mut bytes = std::fs::read(&paths[0]).unwrap();
-    let last = bytes.len() - 1;
-    bytes[last] ^= 1;
-    std::fs::write(&paths[0], bytes).unwrap();
-    let (third, again) = run(3);
-    assert!(again.is_some() && third == first);
+    let bytes = std::fs::read(&paths[0]).unwrap();
+    let altered = |at: usize| bytes.iter().enumerate().map(|(i, b)| if i == at { b ^ 1 } else { *b }).collect();
+    let damaged: [Vec<u8>; 5] =
+        [bytes[..bytes.len() - 5].to_vec(), altered(bytes.len() - 1), altered(2), altered(60), Vec::new()];
+    for content in damaged {
+        std::fs::write(&paths[0], &content).unwrap();
+        let (again, baked) = run(3);
+        assert!(baked.is_some() && again == first, "{} bytes are baked anew", content.len());
+        assert_eq!(std::fs::read(&paths[0]).unwrap(), bytes, "and kept");
+    }
     assert!(run(3).1.is_none(), "replaced");
     assert!(run(4).1.is_some(), "other bands have their own");
 }
@@ -138,16 +143,17 @@ fn without_a_folder_a_bake_is_kept_in_memory() {
     let (mesh, options) = (generate::torus(1.0, 0.3, 12, 8), small("cube:2x1", Storage::F16, 2));
     let baker = Baker::new(&gpu.device, &gpu.library);
     let header = bake::header(&mesh, FieldKind::Occlusion, &options);
+    let alone = GroupPlan::alone(&Arc::new(mesh.clone()), &options, Wanted::TRANSFER);
     for _ in 0..2 {
         let cache = Cache::new(None);
         let run = || {
             let (field, baked) = cache.field(&baker, &mesh, &header, &quiet).unwrap();
-            let found = cache.vertices(&baker, &mesh, &options, Wanted::TRANSFER, &quiet).unwrap();
-            (field, found.transfer, [baked.is_some(), found.baked.is_some()])
+            let (surfaces, seen) = cache.surfaces(&alone, &quiet);
+            (field, surfaces[0].transfer.clone(), [baked.is_some(), seen.is_some()])
         };
-        assert!(!cache.has_field(&header) && !cache.has_transfer(&mesh, &options));
+        assert!(!cache.has_field(&header) && !cache.has_surfaces(&alone));
         let (first, second) = (run(), run());
-        assert!(cache.has_field(&header) && cache.has_transfer(&mesh, &options));
+        assert!(cache.has_field(&header) && cache.has_surfaces(&alone));
         assert_eq!([first.2, second.2], [[true; 2], [false; 2]], "another cache knows nothing of it");
         assert!(first.0 == second.0 && first.1 == second.1);
     }

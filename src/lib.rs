@@ -30,6 +30,10 @@
 //! - Small occluders: an occluder whose bounding sphere has a half-angle below 12 degrees blocks a point. It takes away
 //!   the chain's value in its direction times the solid angle of a projected area, which is fitted to its outermost
 //!   shell ([`field::Area`]). Up to 16 degrees the point and the field share.
+//! - Rigid groups: entities without motion are one group. A vertex's own visibility is cast by rays past its whole
+//!   group, so members leave each other's chains; under sharp lights a member farther than 1.1 of its bounding radii
+//!   keeps its silhouette. In a scene with lights in bands, and without the skip `static`, every entity is alone.
+//! - Surfaces: a mesh is lit and drawn with more vertices where its own visibility varies ([`bake::surfaces`]).
 //! - Entities: everything receives, and everything but emitters occludes. Each can be set per entity. Scales are uniform
 //!   and positive.
 //! - Sheets: a flat mesh blocks light from both sides. What a rectangle blocks has a closed form, for SH and for sharp
@@ -52,7 +56,7 @@
 //! | [`shaders`] | every shader entry point and its permutations |
 //! | [`asset`] | meshes, distant light, pictures |
 //! | [`scene`] | scenes as plain data, motion, glTF |
-//! | [`bake`] | capture, project, assemble: fields and transfer vectors of a mesh, and their cache |
+//! | [`bake`] | capture, project, assemble: fields of a mesh; rays: surfaces and their own visibility; the cache |
 //! | [`lists`] | which entities concern which cluster of vertices, and which clusters have to be merged again |
 //! | [`merge`] | the merge pass, its permutations, its CPU twin and its calibration |
 //! | [`sharp`] | the pass of lights whose shadows have edges, and its CPU twin |

@@ -174,7 +174,8 @@ fn more_than_the_device_can_hold() {
     }
     // What nobody sees, or what stands in no light, is not baked.
     let light = "[environment]\nuniform = [1, 1, 1]\n";
-    let two = "[[entity]]\nmesh = \"ball\"\n[[entity]]\nmesh = \"ball\"\nposition = [3, 0, 0]\n";
+    // Nor are fields of things that rest beside one another.
+    let two = "[[entity]]\nmesh = \"ball\"\n[[entity]]\nmesh = \"ball\"\nmotion = [{ spin = { period_s = 4 } }]\n";
     let scene = format!("{CAMERA}{light}{BALL}{two}");
     let case =
         case(&[("s.toml", &scene), ("m.obj", &format!("{TRIANGLE}v 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"))]);

@@ -1,12 +1,13 @@
 //! The bake makes the field and the transfer vectors of a mesh. Everything that shows a scene calls [`ensure()`].
 //!
 //! ```text
-//! samples -> capture -> project -------------> assemble -> field
-//!                  `--> project, self_visibility ---------> transfer vectors, self-visibility
+//! samples -> capture -> project -> assemble -> field
+//! group -> refine -> rays -> surfaces with transfer vectors and self-visibility
 //! ```
 //!
-//! [`Baker::field`] and [`Baker::vertices`] go along these lines; `batch.rs` records the passes from capture on, with
-//! every barrier. Silhouette fields have a pass of their own ([`silhouette`]).
+//! [`Baker::field`] goes along the first line; `batch.rs` records the passes from capture on, with every barrier.
+//! [`surfaces::GroupPlan::bake`] goes along the second, on the host. Silhouette fields have a pass of their own
+//! ([`silhouette`]).
 //!
 //! - A **sample** is what is captured from one eye, and what that is reduced to: of a point of a lattice, or of a
 //!   vertex.

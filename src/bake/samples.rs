@@ -1,6 +1,5 @@
 //! Decides which samples of a field or of vertices are captured and from where, and what each stored sample is made of.
 
-use super::TRANSFER_OFFSET;
 use super::assemble::Sources;
 use super::surface::{self, Surface};
 use super::triangles::{distinct, unit_positions};
@@ -62,16 +61,4 @@ impl FieldSamples {
 pub(super) fn first_at_place(lattice: &Lattice, sample: u32) -> u32 {
     let count = lattice.direction_count();
     sample / count * count + lattice.first_of(sample % count)
-}
-
-/// A sample for every vertex of a mesh, just off the surface.
-pub(super) fn of_vertices(mesh: &Mesh) -> Vec<Sample> {
-    let vertices = unit_positions(mesh).into_iter().zip(&mesh.normals).enumerate();
-    let sample = |(vertex, (position, &normal)): (usize, (Vec3, &Vec3))| Sample {
-        number: vertex as u32,
-        eye: position + TRANSFER_OFFSET * normal,
-        normal,
-        scale: 1.0,
-    };
-    vertices.map(sample).collect()
 }

@@ -67,13 +67,14 @@ enum Motion {
 }
 
 /// How each skip that has a switch is timed.
-const TIMED: [(&str, Motion); 8] = [
+const TIMED: [(&str, Motion); 9] = [
     ("horizon", Motion::AtRest),
     ("cones", Motion::AtRest),
     ("behind", Motion::AtRest),
     ("caps", Motion::AtRest),
     ("passed", Motion::AtRest),
     ("covered", Motion::AtRest),
+    ("static", Motion::AtRest),
     ("unmoved", Motion::OneMoves),
     ("hidden", Motion::AllMove),
 ];
@@ -87,6 +88,7 @@ fn left_off(name: &str, counts: &Counts) -> Option<u64> {
         "caps" => Some(counts.caps),
         "passed" => Some(counts.passed_by),
         "covered" => Some(counts.covered),
+        "static" => Some(counts.own),
         "hidden" => Some(counts.hidden),
         "eps" => Some(counts.below_eps),
         _ => None,

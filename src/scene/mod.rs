@@ -187,7 +187,7 @@ impl Scene {
         self.data.entities.get(entity).is_some_and(|data| data.motion.is_empty()) && !self.loose.contains(&entity)
     }
 
-    /// Takes an entity out of its group, so that it can be moved.
+    /// Takes an entity out of its group, as one that was moved: it may be moved again.
     pub(crate) fn loosen(&mut self, entity: usize) {
         self.loose.insert(entity);
     }
@@ -214,6 +214,10 @@ impl Scene {
 
     /// As [`Scene::set_entity`], of numbers in range.
     pub(crate) fn put_entity(&mut self, index: usize, data: EntityData) {
+        let before = &self.data.entities[index];
+        if (before.position, before.rotation, before.scale) != (data.position, data.rotation, data.scale) {
+            self.loosen(index);
+        }
         let mesh = self.entities[index].mesh;
         self.entities[index] = resolve(index, &data, mesh);
         self.data.entities[index] = data;

@@ -56,7 +56,7 @@ mod tests {
         let scene = Scene::load(&path).unwrap();
         assert_eq!(scene.entities.len(), 3, "the object, the floor, and the sky's sun");
         assert_eq!(scene.data.entities[1].position.y, 5.0, "the floor lies under it");
-        assert!(scene.entities[0].occludes && !scene.entities[1].occludes);
+        assert!(scene.entities[0].occludes && scene.entities[1].occludes);
         let camera = &scene.data.camera;
         let (centre, radius_m) = scene.meshes[0].bounding_sphere();
         let half_deg = (radius_m / camera.eye.distance(centre)).asin().to_degrees();

@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face.
 const NUDGE: f32 = 0.02;
@@ -45,6 +45,9 @@ pub struct Member {
     /// Members that shine block the view of the sky alone: before sharp lights they stand on lists.
     pub emits: bool,
     pub receives: bool,
+    /// Whether its surface may be refined: a mesh from a file, at rest. A generator's tessellation is a user's choice, and
+    /// what moves is many instances of one mesh.
+    pub refines: bool,
 }
 
 /// What is baked of one group.
@@ -94,7 +97,9 @@ impl SurfacePlan {
         let member = |entity: usize, placement: Placement| {
             let of = &scene.entities[entity];
             let mesh = scene.meshes[of.mesh].clone();
-            Member { mesh, placement, occludes: of.occludes, emits: of.emits, receives: of.receives }
+            let generated = scene.data.meshes.get(of.mesh).is_some_and(|data| data.generator.is_some());
+            let refines = refinement.is_some() && of.receives && scene.is_at_rest(entity) && !generated;
+            Member { mesh, placement, occludes: of.occludes, emits: of.emits, receives: of.receives, refines }
         };
         let mut plans: Vec<GroupPlan> = Vec::new();
         for entities in groups.members() {
@@ -110,6 +115,7 @@ impl SurfacePlan {
                 plan.members.len() == 1
                     && other.members.len() == 1
                     && other.members[0].receives == plan.members[0].receives
+                    && other.members[0].refines == plan.members[0].refines
                     && other.members[0].mesh.content_hash() == plan.members[0].mesh.content_hash()
             };
             match plans.iter_mut().find(is_alike) {
@@ -131,8 +137,14 @@ const AT_ORIGIN: Placement = Placement { position: Vec3::ZERO, rotation: Quat::I
 impl GroupPlan {
     /// A mesh that nothing surrounds.
     pub fn alone(mesh: &Arc<Mesh>, options: &Options, wanted: Wanted) -> Self {
-        let members =
-            vec![Member { mesh: mesh.clone(), placement: AT_ORIGIN, occludes: true, emits: false, receives: true }];
+        let members = vec![Member {
+            mesh: mesh.clone(),
+            placement: AT_ORIGIN,
+            occludes: true,
+            emits: false,
+            receives: true,
+            refines: false,
+        }];
         let bands = options.bands;
         let mut plan = GroupPlan { entities: Vec::new(), members, wanted, bands, refinement: None, key: None };
         plan.key = plan.needs_bake().then(|| plan.name());
@@ -143,7 +155,7 @@ impl GroupPlan {
         let shades_itself = |mesh: &Mesh| !mesh.is_flat() && !mesh.is_convex();
         let lit = self.wanted.transfer || self.wanted.self_visibility;
         match &self.members[..] {
-            [only] => lit && only.receives && (shades_itself(&only.mesh) || self.refinement.is_some()),
+            [only] => lit && only.receives && (shades_itself(&only.mesh) || only.refines),
             members => lit && members.iter().any(|member| member.receives),
         }
     }
@@ -161,8 +173,10 @@ impl GroupPlan {
         hasher.update(numbers.as_bytes());
         for member in &self.members {
             hasher.update(&member.mesh.content_hash());
-            hasher
-                .update(format!("{:?}", (member.placement, member.occludes, member.emits, member.receives)).as_bytes());
+            hasher.update(
+                format!("{:?}", (member.placement, member.occludes, member.emits, member.receives, member.refines))
+                    .as_bytes(),
+            );
         }
         hasher.finalize().to_hex()[..32].to_owned()
     }
@@ -190,25 +204,30 @@ impl GroupPlan {
         let started = Instant::now();
         let group = Group::new(self);
         let receivers: Vec<usize> = (0..self.members.len()).filter(|&i| self.members[i].receives).collect();
-        let mut refined: Vec<(Refined, GroupSpace<'_>, bool)> = receivers
-            .iter()
-            .map(|&i| (Refined::new(&self.members[i].mesh), group.space(i), self.members[i].mesh.is_flat()))
+        let refining = receivers.iter().copied().filter(|&i| self.members[i].refines);
+        let mut refined: Vec<(Refined, GroupSpace<'_>, bool)> = refining
+            .clone()
+            .map(|i| (Refined::new(&self.members[i].mesh), group.space(i), self.members[i].mesh.is_flat()))
             .collect();
-        if let Some(limits) = self.limits(&group) {
+        if let Some(limits) = self.limits(&group).filter(|_| !refined.is_empty()) {
             let most = limits.vertices.max(1) as u32;
             refine(&mut refined, &limits, &|count| progress((count as u32).min(most) / 2, most));
         }
         let mut surfaces = self.plain();
-        let total: usize = refined.iter().map(|(refined, ..)| refined.positions.len()).sum();
-        let mut done = 0;
-        for (&member, (refined, space, _)) in receivers.iter().zip(refined) {
+        for (member, (refined, ..)) in refining.zip(refined) {
             let own = &self.members[member].mesh;
-            let is_new = refined.positions.len() != own.positions.len();
-            let mesh = if is_new { Arc::new(refined.into_mesh(own)) } else { own.clone() };
+            if refined.positions.len() != own.positions.len() {
+                surfaces[member].mesh = Arc::new(refined.into_mesh(own));
+            }
+        }
+        let total: usize = receivers.iter().map(|&member| surfaces[member].mesh.positions.len()).sum();
+        let mut done = 0;
+        for &member in &receivers {
+            let mesh = surfaces[member].mesh.clone();
             let tell = |vertices: usize| {
                 progress((total + done + vertices) as u32 / 2, total.max(1) as u32);
             };
-            surfaces[member] = space.surface(mesh, self.wanted, &tell);
+            surfaces[member] = group.space(member).surface(mesh, self.wanted, &tell);
             done += surfaces[member].mesh.positions.len();
         }
         let report = BakeReport { samples: total as u32, total: started.elapsed(), ..Default::default() };

@@ -5,6 +5,7 @@ mod common;
 use common::gpu;
 use glam::{Quat, Vec3};
 use shadow_fields::asset::environment::EnvironmentData;
+use shadow_fields::bake;
 use shadow_fields::frame::{self, Frame};
 use shadow_fields::gpu::Gpu;
 use shadow_fields::prelude::{Cache, Camera, DeviceOptions, EntityData, Error, Generator, Quality};
@@ -95,7 +96,9 @@ fn light_and_picture_are_those_of_a_frame() {
     let scene = room().build().unwrap();
     let options = RenderOptions { cache: Some(cache.clone()), ..small() };
     let mut renderer = Renderer::new(&door, &scene, &options).unwrap();
-    let wanted = frame::Options { bake: Quality::Draft.options(), size: [96, 64], ..Default::default() };
+    // A renderer's entities may be placed anywhere, so each is a group by itself.
+    let bake = bake::Options { groups: false, vertices: 0, ..Quality::Draft.options() };
+    let wanted = frame::Options { bake, size: [96, 64], ..Default::default() };
     let mut frame = Frame::new(&gpu.baker(), &cache, &scene, wanted, &|_, _, _| ()).unwrap();
     let black = renderer.light_buffer();
     assert_eq!(black.entities.len(), 3);

@@ -97,8 +97,8 @@ fn a_light_in_the_hole_of_a_torus_shines_through_the_hole_alone() {
 #[test]
 fn a_receiver_is_lit_across_its_own_hole_by_a_light_within() {
     let torus = "[[mesh]]\nname = \"torus\"\ntorus = { major_m = 1, minor_m = 0.4, segments = 96, sides = 48 }\n\
-        [[entity]]\nmesh = \"torus\"\nalbedo = [0.6, 0.6, 0.6]\n";
-    let scene = scene(&format!("{torus}{}", bulb(0.1, [0.0; 3])));
+        [[entity]]\nmesh = \"torus\"\nposition = [0, 9, 0]\nalbedo = [0.6, 0.6, 0.6]\n";
+    let scene = scene(&format!("{torus}{}", bulb(0.1, [0.0, 9.0, 0.0])));
     let shapes = RayMeshes::new(&scene);
     let world = World::new(&scene, &shapes, &scene.at(0.0));
     let mesh = &scene.meshes[scene.entities[1].mesh];

@@ -29,12 +29,11 @@ fn an_occluder_becomes_a_light_and_back() {
     let lamp = &editor.scene().entities[2];
     assert!(!lamp.emits && lamp.occludes && lamp.emission == Vec3::ZERO);
     assert_eq!(editor.needs(1), fields);
-    // So has a floor, flat or not.
-    let fields = editor.needs(0);
-    assert!(fields[0].is_some());
+    // A floor that is a rectangle casts its shadow without a field, and shines by one.
+    assert_eq!(editor.needs(0), [None, None]);
     editor.apply(Command::SelectNext);
     editor.apply(Command::ToggleLight);
-    assert_eq!(editor.needs(0), fields);
+    assert!(editor.needs(0)[0].is_some());
     // A torus of two colours needs the other kind.
     let mut editor = built_in("glowing_torus");
     let glowing = editor.scene().entities.iter().position(|e| e.name == "glowing").unwrap();

@@ -21,9 +21,15 @@ use std::sync::LazyLock;
 /// wrong by 0.004 to 0.013 next to a ball, relative to the free one.
 const PATTERN_SIDE: usize = 32;
 pub(super) const PATTERN: usize = PATTERN_SIDE * PATTERN_SIDE;
+/// Rays just above the horizon, for maps alone, and the sine of their height: the lowest places of the pattern lie 3
+/// degrees above it.
+const HORIZON: usize = 64;
+const HORIZON_HEIGHT: f64 = 0.01;
 /// Times that the gap between a node and the nearest ray of the other state is halved. The pattern's rays stand 5
 /// degrees apart.
 const HALVINGS: usize = 4;
+/// Rays of the other state that are tried for each node.
+const CANDIDATES: usize = 4;
 
 /// A ray of the pattern.
 struct PatternRay {
@@ -77,7 +83,12 @@ fn rays(side: usize) -> Vec<PatternRay> {
 static FEW_RAYS: LazyLock<Vec<PatternRay>> = LazyLock::new(|| rays(PATTERN_SIDE / 2));
 
 static MANY_RAYS: LazyLock<Pattern> = LazyLock::new(|| {
-    let rays = rays(PATTERN_SIDE);
+    let mut rays = rays(PATTERN_SIDE);
+    // Edges that reach the horizon: these rays weigh nothing in the cosine.
+    rays.extend((0..HORIZON).map(|i| {
+        let turn = TAU * i as f64 / HORIZON as f64;
+        PatternRay { local: DVec3::new(turn.cos(), turn.sin(), HORIZON_HEIGHT).normalize().as_vec3a(), weight: 0.0 }
+    }));
     let nodes: Vec<Vec3A> = (0..NODES).map(|node| node_direction(node).as_vec3a()).collect();
     let near = |node: &Vec3A| {
         let angles = rays.iter().enumerate().map(|(i, ray)| (node.angle_between(ray.local), i as u16));
@@ -246,21 +257,16 @@ fn map_of(caster: &Caster<'_>, standing: &Standing, pattern_hits: &[Option<Block
     let mut searches = Vec::new();
     for (node, near) in near_nodes.iter().enumerate() {
         let free = here[node].is_infinite();
-        match near.iter().find(|(_, ray)| distances[*ray as usize].is_infinite() != free) {
-            // The edge lies between the node and that ray, and near the ray.
-            Some(&(angle, ray)) => searches.push(NodeSearch {
-                node,
-                free,
-                far: rays[ray as usize].local,
-                low: (1.0 - 0.15 / angle.max(0.15)).max(0.0),
-                high: 1.0,
-                away: if free { distances[ray as usize] } else { here[node] },
-            }),
-            None => {
-                map[node] = encode_angle(if free { LIMIT_RAD } else { -LIMIT_RAD });
-                map[NODES + node] = if free { u8::MAX } else { distance_byte(here[node]) };
-            }
-        }
+        let others = near.iter().filter(|(_, ray)| distances[*ray as usize].is_infinite() != free);
+        // The edge lies between the node and such a ray, and near the ray.
+        searches.extend(others.take(CANDIDATES).map(|&(angle, ray)| NodeSearch {
+            node,
+            free,
+            far: rays[ray as usize].local,
+            low: (1.0 - 0.15 / angle.max(0.15)).max(0.0),
+            high: 1.0,
+            away: if free { distances[ray as usize] } else { here[node] },
+        }));
     }
     for _ in 0..HALVINGS {
         let middles: Vec<Vec3A> = searches.iter().map(|search| search.middle(nodes[search.node])).collect();
@@ -275,11 +281,15 @@ fn map_of(caster: &Caster<'_>, standing: &Standing, pattern_hits: &[Option<Block
             }
         }
     }
-    for search in searches {
-        let toward = nodes[search.node];
-        let edge = f64::from(toward.angle_between(search.middle(toward)));
-        map[search.node] = encode_angle(if search.free { edge } else { -edge });
-        map[NODES + search.node] = distance_byte(search.away);
+    let edges: Vec<(Vec3A, f32)> =
+        searches.iter().map(|search| (search.middle(nodes[search.node]), search.away)).collect();
+    for (node, &toward) in nodes.iter().enumerate() {
+        let nearest = edges.iter().max_by(|a, b| a.0.dot(toward).total_cmp(&b.0.dot(toward)));
+        let angle = nearest.map_or(LIMIT_RAD, |(edge, _)| f64::from(toward.angle_between(*edge)));
+        let free = here[node].is_infinite();
+        map[node] = encode_angle(if free { angle } else { -angle });
+        let away = if free { nearest.map_or(f32::INFINITY, |(_, away)| *away) } else { here[node] };
+        map[NODES + node] = distance_byte(away);
     }
     map
 }

@@ -21,9 +21,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
-/// that just inside each face.
+/// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
 /// A member casts its own sharp shadow on a cluster from this distance on, in its bounding radii; nearer ones are part of
 /// the cluster's maps.
@@ -319,30 +319,30 @@ impl GroupSpace<'_> {
         member as usize == self.member || self.group.plan.members[member as usize].occludes
     }
 
-    /// From each vertex towards the middle of its triangles, along the surface; and off the surface, by less than the
-    /// shortest edge around it.
+    /// From each vertex towards the middle of its triangles, along the surface; and off the surface by
+    /// [`TRANSFER_OFFSET`], as rays of references leave it. A flat mesh does not shade itself, and may be a ground that
+    /// others touch.
     pub fn nudges(&self, positions: &[Vec3], normals: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
-        let mut sums = vec![(Vec3::ZERO, 0.0_f32, f32::INFINITY); positions.len()];
+        let mut sums = vec![(Vec3::ZERO, 0.0_f32); positions.len()];
         for triangle in triangles {
             let corners = triangle.map(|v| positions[v as usize]);
             let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
             for k in 0..3 {
-                let side = corners[k].distance(corners[(k + 1) % 3]);
-                let (sum, count, shortest) = &mut sums[triangle[k] as usize];
+                let (sum, count) = &mut sums[triangle[k] as usize];
                 *sum += middle - corners[k];
                 *count += 1.0;
-                *shortest = shortest.min(side);
             }
         }
         let (_, radius_m) = self.own().mesh.bounding_sphere();
         let least = 1e-5 / self.scale();
+        let inward_share = if self.group.plan.refinement.is_some() { NUDGE } else { 0.0 };
+        let off = if self.own().mesh.is_flat() { least } else { least.max(TRANSFER_OFFSET * radius_m) };
         sums.iter()
             .zip(normals)
-            .map(|((sum, count, shortest), normal)| {
+            .map(|((sum, count), normal)| {
                 let inward = *sum / count.max(1.0);
                 let along = inward - inward.dot(*normal) * *normal;
-                let off = (TRANSFER_OFFSET * radius_m).min(0.05 * shortest).max(least);
-                NUDGE * along + off * *normal
+                inward_share * along + off * *normal
             })
             .collect()
     }
@@ -367,7 +367,9 @@ impl GroupSpace<'_> {
         let standing = &group.standings[self.member];
         let counts = Counts { blocks: &blocks, in_map };
         let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
-        seen.buried = seen.blocked > BURIED_BLOCKED && seen.behind > BURIED_BACKS * seen.blocked;
+        seen.buried = group.plan.refinement.is_some()
+            && seen.blocked > BURIED_BLOCKED
+            && seen.behind > BURIED_BACKS * seen.blocked;
         seen
     }
 

@@ -11,7 +11,7 @@ pub struct Groups {
 }
 
 impl Groups {
-    /// The groups of a scene: all entities at rest are one, less those that were taken out ([`Scene::loosen`]).
+    /// The groups of a scene: all entities at rest are one, less those that were taken out (`Scene::loosen`).
     ///
     /// Lights in bands meet what lies before them in the chain of a vertex, so in a scene with such lights every entity
     /// is a group by itself.

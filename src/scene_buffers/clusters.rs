@@ -1,5 +1,5 @@
 //! Bounds of a mesh's clusters, which are runs of [`CLUSTER_VERTICES`] vertices in the order of
-//! [`crate::bake::cluster_order`].
+//! `bake::cluster_order`.
 
 use crate::asset::mesh::Mesh;
 use crate::layout::CLUSTER_VERTICES;

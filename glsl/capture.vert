@@ -5,8 +5,6 @@ layout(location = 0) in vec4 position; // in r
 #if RADIANCE
 layout(location = 1) in vec3 color;
 layout(location = 0) out vec3 radiance;
-#elif DISTANCE
-layout(location = 0) out vec3 toward; // from the eye, in r
 #endif
 
 layout(push_constant) uniform Push {
@@ -29,9 +27,6 @@ void main() {
     float z = push.eye.w;
     radiance = color;
 #else
-#if DISTANCE
-    toward = q;
-#endif
     // No depth is kept: z = w / 2 passes every clip test in front of the eye, so no near plane cuts the object.
     float z = 0.5 * w;
 #endif

@@ -17,7 +17,6 @@ layout(binding = 10) uniform utextureBuffer self_cells;
 uvec2 self_cell(uint i) {
     return texelFetch(self_cells, int(i)).xy;
 }
-#include "self_frame.glsl"
 #include "self_visibility.glsl"
 #endif
 #include "sharp_light.glsl"

@@ -3,17 +3,41 @@
 // Projects cube faces to SH coefficients, one workgroup per sample. Every invocation sums its share of the texels; then
 // one invocation per coefficient adds the shares in order, so the result does not depend on scheduling.
 #include "generated/basis.glsl"
-#if COSINE
-#include "generated/cosine.glsl"
-#endif
 
 layout(local_size_x = WORKGROUP) in;
 
-#include "captured.glsl"
+struct SampleFaces {
+    uint slots[6]; // place of each face in the atlas; NONE where the object does not reach
+    float scale;   // factor on coefficients
+};
 
+layout(binding = 0) uniform texture2D atlas;
+layout(std430, binding = 1) readonly buffer Samples { SampleFaces samples[]; };
 // For each texel of a face: unit direction as components along (right, down, forward), and solid angle in steradians.
 layout(binding = 2) uniform textureBuffer texels;
 layout(std430, binding = 3) writeonly buffer Coefficients { float coefficients[]; };
+
+layout(push_constant) uniform Push {
+    uint face_px;
+    uint atlas_columns;
+} push;
+
+const uint NONE = 0xffffffffu;
+
+ivec2 slot_origin(uint slot) {
+    return ivec2(slot % push.atlas_columns, slot / push.atlas_columns) * int(push.face_px);
+}
+
+vec3 to_object(uint face, vec3 d) {
+    switch (face) {
+        case 0: return vec3(d.z, -d.y, -d.x);
+        case 1: return vec3(-d.z, -d.y, d.x);
+        case 2: return vec3(d.x, d.z, d.y);
+        case 3: return vec3(d.x, -d.z, -d.y);
+        case 4: return vec3(d.x, -d.y, d.z);
+        default: return vec3(-d.x, -d.y, -d.z);
+    }
+}
 
 shared float shares[COEFFICIENTS * CHANNELS][WORKGROUP];
 
@@ -39,7 +63,7 @@ void main() {
                 continue;
             }
 #else
-            float value = float(captured.r < 1.0); // the object is black, or the darker the nearer it is
+            float value = float(captured.r < 1.0); // the object is black
             if (value == 0.0) {
                 continue;
             }
@@ -47,9 +71,6 @@ void main() {
             vec4 texel = texelFetch(texels, int(i));
             vec3 direction = to_object(face, texel.xyz);
             float weight = texel.w;
-#if COSINE
-            weight *= max(0.0, dot(samples[index].normal.xyz, direction));
-#endif
             float y[COEFFICIENTS];
             sh_basis(direction, y);
             for (uint k = 0; k < COEFFICIENTS; k++) {
@@ -76,12 +97,6 @@ void main() {
                 total += shares[channel * COEFFICIENTS + k][other];
             }
             total *= samples[index].scale;
-#if COSINE
-            // The unoccluded part is the whole cosine lobe minus the part that the object's own geometry blocks.
-            float lobe[COEFFICIENTS];
-            sh_cosine(samples[index].normal.xyz, lobe);
-            total = lobe[k] - total;
-#endif
         }
         coefficients[index * (STRIDE * CHANNELS) + i] = total;
     }

@@ -28,16 +28,11 @@ layout(push_constant) uniform Push {
     uint culls; // 1 where backs of triangles are left out
 } push;
 
-// Result so far, row by row: a bit for each texel that is covered, or the byte of each texel's distance.
+// Result so far, row by row: a bit for each texel that is covered.
 shared uint words[WORDS];
-const uint FREE = 255;
 
 uint words_across() {
-#if DISTANCE
-    return push.face_px;
-#else
     return (push.face_px + 31) / 32;
-#endif
 }
 
 // The planes through the eye and each edge: a ray to (s, t, 1) meets the triangle where no product with them is
@@ -73,20 +68,7 @@ void narrow(float place, bool opens, inout vec2 span) {
 }
 
 // Marks the texels low to high of a row as met by a triangle.
-void meet(int row, int low, int high, Planes planes, float t) {
-#if DISTANCE
-    float texel = 2.0 / float(push.face_px);
-    for (int x = low; x <= high; x++) {
-        vec3 ray = vec3((float(x) + 0.5) * texel - 1.0, t, 1.0);
-        float along = planes.volume / dot(planes.bc + planes.ca + planes.ab, ray);
-        // The object reaches no farther than 2 r; FREE stands for the background.
-        uint found = uint(clamp(along * length(ray), 0.0, 2.0) * DISTANCE_STEPS + 0.5);
-        uint i = uint(row) * push.face_px + uint(x);
-        if (found < words[i]) {
-            atomicMin(words[i], found);
-        }
-    }
-#else
+void meet(int row, int low, int high) {
     uint first = uint(row) * words_across();
     for (int word = low / 32; word <= high / 32; word++) {
         uint from = uint(max(low - 32 * word, 0));
@@ -94,7 +76,6 @@ void meet(int row, int low, int high, Planes planes, float t) {
         uint bits = 0xffffffffu >> (31 - to) & 0xffffffffu << from;
         atomicOr(words[first + uint(word)], bits);
     }
-#endif
 }
 
 // Adds a triangle, whose corners are in the face's frame, where rays are (s, t, 1).
@@ -135,7 +116,7 @@ void add(vec3 a, vec3 b, vec3 c, int row_first, int row_end) {
         narrow(ab.x * t + ab.y, opens.z, span);
         span = vec2(ceil(span.x), floor(span.y));
         if (span.x <= span.y) {
-            meet(y - row_first, int(span.x), int(span.y), planes, t);
+            meet(y - row_first, int(span.x), int(span.y));
         }
     }
 }
@@ -149,12 +130,8 @@ vec3 corner(Face face, uint vertex) {
 uint four(uint row, uint column) {
     uint bytes = 0;
     for (uint k = 0; k < 4; k++) {
-#if DISTANCE
-        uint found = words[row * push.face_px + column + k];
-#else
         uint word = words[row * words_across() + column / 32];
-        uint found = (word >> (column % 32 + k) & 1) == 1 ? 0 : FREE;
-#endif
+        uint found = (word >> (column % 32 + k) & 1) == 1 ? 0 : 255;
         bytes |= found << 8 * k;
     }
     return bytes;
@@ -166,7 +143,7 @@ void main() {
     uint row_first = gl_WorkGroupID.y * push.band_rows;
     uint row_end = min(row_first + push.band_rows, push.face_px);
     for (uint i = lane; i < (row_end - row_first) * words_across(); i += WORKGROUP) {
-        words[i] = DISTANCE == 1 ? FREE : 0;
+        words[i] = 0;
     }
     barrier();
     for (uint k = 0; k < face.range_count; k++) {

@@ -1,8 +1,26 @@
 // Visibility of a light past the receiver's own mesh. The twin is src/field/self_visibility.rs. A shader that includes
-// this, after self_frame.glsl, blocked_share.glsl and bytes.glsl, defines
+// this, after blocked_share.glsl and bytes.glsl, defines
 //   uvec2 self_cell(uint i): cell i of all, as `cells` in that file makes them,
 // and the macros SELF_SIDE, SELF_RIM, SELF_LIMIT, SELF_STEPS, SELF_FIRST and SELF_RAMP
 // (`ShaderPermutation::self_visibility`).
+
+// Axes of a vertex's hemisphere from its unit normal: columns tangent, bitangent, normal. The normal must be the mesh's
+// own, in the object's frame; the axes may then be turned to any other frame in which directions are given.
+mat3 self_frame(vec3 normal) {
+    float s = normal.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + normal.z);
+    float b = normal.x * normal.y * a;
+    vec3 tangent = vec3(1.0 + s * normal.x * normal.x * a, s * b, -s * normal.x);
+    return mat3(tangent, vec3(b, s + normal.y * normal.y * a, -normal.y), normal);
+}
+
+// Place of a direction (z along the normal) on the map, nodes at whole numbers from 0 to SELF_SIDE - 1.
+vec2 self_place(vec3 local) {
+    vec2 flattened = local.xy / max(abs(local.x) + abs(local.y) + max(local.z, 0.0), 1e-20);
+    vec2 square = vec2(flattened.x + flattened.y, flattened.x - flattened.y) * (1.0 / SELF_RIM);
+    const float HALF = 0.5 * float(SELF_SIDE - 1);
+    return clamp(square, -1.0, 1.0) * HALF + HALF;
+}
 
 // At a direction (any length, in the frame's own frame): signed angle in radians to the edge of what the vertex sees,
 // and the base-2 logarithm of how far away that is which hides, in r.

@@ -19,7 +19,6 @@ READ_VEC4(8, Soft, soft, soft_at) // what the merge has written
 layout(std430, binding = 6) writeonly buffer Radiosity { vec4 radiosity[]; };
 #if SELF
 READ_UVEC2(7, SelfCells, self_cells, self_cell)
-#include "self_frame.glsl"
 #include "self_visibility.glsl"
 #endif
 #define FACINGS 1

@@ -27,7 +27,6 @@ embedded!(
     "bytes.glsl",
     "capture.frag",
     "capture.vert",
-    "captured.glsl",
     "ceiling.comp",
     "centroid.glsl",
     "cube.glsl",
@@ -53,8 +52,6 @@ embedded!(
     "project.comp",
     "raster.comp",
     "readable.glsl",
-    "self_frame.glsl",
-    "self_visibility.comp",
     "self_visibility.glsl",
     "shadow_map.comp",
     "shadow_map.frag",
@@ -110,7 +107,7 @@ impl ShaderPermutation {
         self
     }
 
-    /// Adds the macros of `self_frame.glsl` and `self_visibility.glsl`.
+    /// Adds the macros of `self_visibility.glsl`.
     pub fn self_visibility(self) -> Self {
         self.define("SELF_SIDE", self_visibility::SIDE as u32)
             .number("SELF_RIM", self_visibility::RIM)

@@ -58,7 +58,6 @@ fn a_wrong_shader_is_found() {
             "capture",
         ),
         ("project.comp", "total *= samples[index].scale;", "total *= 1.0001 * samples[index].scale;", "project"),
-        ("self_visibility.comp", "inverse * sqrt(inverse)", "1.5 * inverse * sqrt(inverse)", "self_visibility"),
         ("assemble.comp", "sum *= push.factor;", "sum *= 1.01 * push.factor;", "assemble"),
         ("silhouette_field.glsl", "foot + near.depth * along", "foot + 0.9 * near.depth * along", "sharp"),
         ("sub_light.glsl", "block.weight = 1.0 - light.fine", "block.weight = 0.9996 - light.fine", "sharp"),

@@ -7,7 +7,6 @@ use shadow_fields::bake::assemble::Assemble;
 use shadow_fields::bake::capture::{Capture, CaptureKind};
 use shadow_fields::bake::project::{Project, Projection};
 use shadow_fields::bake::raster::Raster;
-use shadow_fields::bake::self_visibility::SelfVisibility;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
 use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
 use shadow_fields::draw::grid::DrawGrid;
@@ -22,22 +21,13 @@ use std::collections::BTreeSet;
 use std::process::Command;
 
 const BANDS: std::ops::RangeInclusive<usize> = 2..=7;
-const PROJECTIONS: [Projection; 3] = [Projection::Blocked, Projection::Radiance, Projection::Transfer];
+const PROJECTIONS: [Projection; 2] = [Projection::Blocked, Projection::Radiance];
 
 fn baking() -> Vec<ShaderPermutation> {
     let project = BANDS.flat_map(|bands| PROJECTIONS.map(|projection| Project::row(bands, projection)));
     let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
-    let capture =
-        [CaptureKind::Cover, CaptureKind::Distance, CaptureKind::Radiance].into_iter().flat_map(Capture::rows);
-    let computed = [false, true].map(Raster::row);
-    let own = [SelfVisibility::row()];
-    project
-        .chain(own)
-        .chain(computed)
-        .chain(assemble)
-        .chain(capture)
-        .chain(Silhouette::permutations(32, 128, 16))
-        .collect()
+    let capture = [CaptureKind::Cover, CaptureKind::Radiance].into_iter().flat_map(Capture::rows);
+    project.chain([Raster::row()]).chain(assemble).chain(capture).chain(Silhouette::permutations(32, 128, 16)).collect()
 }
 
 /// Every way of the pass of sharp lights.

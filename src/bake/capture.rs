@@ -1,11 +1,11 @@
 //! Pass "capture": shows an object from sample points: the six cube faces around each eye, many eyes in one atlas.
 //!
 //! Inputs: the mesh in units of its bounding radius around its centre; eyes in the same frame. Output: an atlas of
-//! square faces. An occlusion capture is R8: the object is black, or holds its distance, on white. A radiance capture
-//! is RGBA32F: the mesh's colours on black. A face that the object's bounding sphere does not reach is left out and
-//! gets no place in the atlas. The other faces show chunks of neighbouring triangles. A chunk is left out if its
-//! bounding sphere does not reach into the face, or if the mesh is closed and the eye sees only backs of the chunk. Of
-//! a large mesh, chunks of fewer triangles stand for what is far off.
+//! square faces. An occlusion capture is R8: the object is black on white. A radiance capture is RGBA32F: the mesh's
+//! colours on black. A face that the object's bounding sphere does not reach is left out and gets no place in the
+//! atlas. The other faces show chunks of neighbouring triangles. A chunk is left out if its bounding sphere does not
+//! reach into the face, or if the mesh is closed and the eye sees only backs of the chunk. Of a large mesh, chunks of
+//! fewer triangles stand for what is far off.
 
 use super::chunk::{faces_reached, joined};
 use super::model::DrawnFace;
@@ -13,7 +13,6 @@ pub use super::model::Model;
 use super::raster::{Raster, RasterFaces, face_axes};
 use crate::error::{Error, Result};
 use crate::field::FieldKind;
-use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::{Access, Buffer, Commands, Device, GraphicsPipeline, GraphicsState, Image, ImageShape, Keeps, Target};
 use crate::sh::cube::{FACE_COUNT, face_basis, texel_st};
 use crate::shaders::{Library, ShaderPermutation};
@@ -44,8 +43,6 @@ struct Push {
 pub enum CaptureKind {
     /// Where the object is: 0 there and 1 elsewhere.
     Cover,
-    /// How far the object is: [`DISTANCE_STEPS`] bytes an r, and 255 where it is not.
-    Distance,
     /// The mesh's colours.
     Radiance,
 }
@@ -128,12 +125,8 @@ pub struct Capture {
 impl Capture {
     /// The rows of the shader table: vertex and fragment.
     pub fn rows(kind: CaptureKind) -> [ShaderPermutation; 2] {
-        ["capture.vert", "capture.frag"].map(|file| {
-            ShaderPermutation::new(file, 4)
-                .define("RADIANCE", kind == CaptureKind::Radiance)
-                .define("DISTANCE", kind == CaptureKind::Distance)
-                .number("DISTANCE_STEPS", DISTANCE_STEPS)
-        })
+        ["capture.vert", "capture.frag"]
+            .map(|file| ShaderPermutation::new(file, 4).define("RADIANCE", kind == CaptureKind::Radiance))
     }
 
     /// Faces in a row of the atlas.
@@ -166,8 +159,7 @@ impl Capture {
         let shape = ImageShape { format, width: edge, height: edge, samples: 1 };
         let computed = way == Way::Computed && !radiance && Raster::serves(face_px) && Raster::holds(device, &model);
         let writer = if computed {
-            let distance = kind == CaptureKind::Distance;
-            Writer::Computed(Raster::new(device, library, distance, face_px, columns)?)
+            Writer::Computed(Raster::new(device, library, face_px, columns)?)
         } else {
             let depth_shape = ImageShape { format: vk::Format::D32_SFLOAT, ..shape };
             let depth = radiance.then(|| Image::new(device, "capture depth", depth_shape)).transpose()?;
@@ -190,7 +182,7 @@ impl Capture {
             samples: 1,
             // A cube face is a mirror image, which turns every triangle over, so FRONT removes the object's back faces.
             cull: if model.closed { vk::CullModeFlags::FRONT } else { vk::CullModeFlags::NONE },
-            keeps: if kind == CaptureKind::Distance { Keeps::Smallest } else { Keeps::Last },
+            keeps: Keeps::Last,
             nearer_steps: 0.0,
         };
         GraphicsPipeline::new(device, "capture", &library.shader(&vertex)?, &library.shader(&fragment)?, state)
@@ -325,18 +317,6 @@ pub fn twin_colors(
         }
     });
     nearest.into_iter().map(|(_, color)| color).collect()
-}
-
-/// The CPU twin of a capture of distances: how far the nearest triangle is that each ray meets, in r, infinite where it
-/// meets none.
-pub fn twin_distances(positions: &[Vec3], triangles: &[[u32; 3]], eye: DVec3, face: usize, face_px: u32) -> Vec<f64> {
-    let px = face_px as usize;
-    let mut nearest = vec![f64::INFINITY; px * px];
-    rays(positions, triangles, eye, face, face_px, |texel, _, (distance, _)| {
-        let ray = DVec3::new(texel_st(texel % px, px), texel_st(texel / px, px), 1.0);
-        nearest[texel] = nearest[texel].min(distance * ray.length());
-    });
-    nearest
 }
 
 /// Calls a function for every ray and triangle that meet: with the distance in units of the ray's (s, t, 1), and with

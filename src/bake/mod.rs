@@ -9,8 +9,7 @@
 //! [`surfaces::GroupPlan::bake`] goes along the second, on the host. Silhouette fields have a pass of their own
 //! ([`silhouette`]).
 //!
-//! - A **sample** is what is captured from one eye, and what that is reduced to: of a point of a lattice, or of a
-//!   vertex.
+//! - A **sample** is what is captured from one eye at a point of a lattice, and what that is projected to.
 //! - A **face** is one of the six cube faces around an eye. Its **slot** is its place in the atlas.
 //! - A **batch** is the samples whose faces fill the atlas once. It is one submission.
 //! - A **chunk** is neighbouring triangles that are drawn or left out together.
@@ -34,7 +33,6 @@ mod quality;
 pub mod raster;
 mod refine;
 mod samples;
-pub mod self_visibility;
 pub mod silhouette;
 pub mod snapshot;
 pub mod surface;
@@ -48,12 +46,11 @@ use crate::field::{FieldHeader, ShadowField, growth};
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device, Timing};
 use crate::shaders::Library;
 use assemble::{Assemble, Sources};
-use batch::{Batches, Reduction};
+use batch::Batches;
 pub use ensure::{BakedMesh, BakedScene, SceneNeeds, bakes_transfer, ensure, needs};
 use levels::Leveled;
 use model::Model;
 pub use options::{Options, Quality, first_shell, hash_text, header};
-use project::Projection;
 pub use quality::BakeOptions;
 use samples::FieldSamples;
 use serde::Serialize;
@@ -85,7 +82,7 @@ pub struct BakeReport {
     pub triangles: u64,
     /// Device time in capture passes, in ms.
     pub capture_ms: f64,
-    /// Device time in the passes that reduce faces, project or self_visibility, in ms.
+    /// Device time in project passes, in ms.
     pub project_ms: f64,
     /// Device time in the assemble pass, in ms.
     pub assemble_ms: f64,
@@ -98,7 +95,7 @@ impl BakeReport {
         for timing in timings {
             match timing.pass.as_str() {
                 "capture" => self.capture_ms += timing.milliseconds,
-                "project" | "self_visibility" => self.project_ms += timing.milliseconds,
+                "project" => self.project_ms += timing.milliseconds,
                 _ => self.assemble_ms += timing.milliseconds,
             }
         }
@@ -168,16 +165,14 @@ impl Baker {
         };
         let (samples, model) = rayon::join(|| FieldSamples::new(mesh, &header.lattice), make_model);
         let FieldSamples { captured, inside_count, sources } = samples?;
-        let projection = if radiance { Projection::Radiance } else { Projection::Blocked };
-        let reduction = Reduction { projection: Some((header.bands, projection)), self_visibility: false };
         let mut report = BakeReport::default();
-        let batches = Batches::new(&self.device, &self.library, model?, header.face_px, reduction)?;
-        let reduced = batches.run(&captured, &mut report, progress)?;
+        let batches = Batches::new(&self.device, &self.library, model?, &header)?;
+        let coefficients = batches.run(&captured, &mut report, progress)?;
 
         let stride = header.sample_stride();
         let mut values = vec![0.0_f32; header.lattice.sample_count() as usize * stride];
-        for (sample, coefficients) in captured.iter().zip(reduced.coefficients.chunks_exact(stride)) {
-            values[sample.number as usize * stride..][..stride].copy_from_slice(coefficients);
+        for (sample, captured) in captured.iter().zip(coefficients.chunks_exact(stride)) {
+            values[sample.number as usize * stride..][..stride].copy_from_slice(captured);
         }
         for sample in 0..header.lattice.sample_count() {
             let first = samples::first_at_place(&header.lattice, sample) as usize * stride;

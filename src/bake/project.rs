@@ -1,22 +1,21 @@
 //! Pass "project": makes SH coefficients of captured cube faces, with one workgroup for each sample.
 //!
 //! Inputs: the atlas of [`super::capture`], [`SampleFaces`] for each sample, and the texel table. Output: for each
-//! sample `channels` x `channel_stride(bands)` floats. They hold the blocked part (1 where a texel is below 1), the
-//! radiance, or for transfer the clamped cosine of the normal less the part that the object itself blocks.
+//! sample `channels` x `channel_stride(bands)` floats. They hold the blocked part (1 where a texel is below 1) or the
+//! radiance.
 
 use super::capture::Slots;
 use super::samples::Sample;
 use crate::error::{Error, Result};
-use crate::field::quantity::channel_stride;
+use crate::field::quantity::{FieldKind, channel_stride};
 use crate::gpu::memory::TexelView;
 use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Image};
 use crate::sh::basis::{MAX_COEFFICIENTS, coefficient_count, evaluate};
 use crate::sh::cube::{FACE_COUNT, direction, solid_angle, texel_st};
-use crate::sh::lobe::clamped_cosine;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::sync::Arc;
 
 /// What a projection makes of the faces.
@@ -26,11 +25,14 @@ pub enum Projection {
     Blocked,
     /// Radiance in three channels.
     Radiance,
-    /// Self-visibility times cosine of an occlusion capture, one channel.
-    Transfer,
 }
 
 impl Projection {
+    /// The projection of the samples of a field.
+    pub fn of_field(kind: FieldKind) -> Self {
+        if kind == FieldKind::Radiance { Projection::Radiance } else { Projection::Blocked }
+    }
+
     pub fn channels(self) -> usize {
         if self == Projection::Radiance { 3 } else { 1 }
     }
@@ -39,19 +41,15 @@ impl Projection {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct SampleFaces {
-    /// Unit surface normal, for transfer and self-visibility.
-    pub normal: [f32; 4],
     /// Place of each face in the atlas.
     pub slots: Slots,
     /// Factor on coefficients.
     pub scale: f32,
-    /// Fills the struct up to a multiple of 16 bytes.
-    pub unused: u32,
 }
 
 impl SampleFaces {
     pub(super) fn new(sample: &Sample, slots: Slots) -> Self {
-        SampleFaces { normal: sample.normal.extend(0.0).to_array(), slots, scale: sample.scale, unused: 0 }
+        SampleFaces { slots, scale: sample.scale }
     }
 }
 
@@ -66,14 +64,13 @@ fn workgroup(bands: usize, projection: Projection) -> u32 {
     [64, 32].into_iter().find(|count| count * sums <= SHARED_BYTES).unwrap_or(16) as u32
 }
 
-/// Constants of the passes that reduce captured faces.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct Push {
+struct Push {
     /// Edge of a face in texels.
-    pub face_px: u32,
+    face_px: u32,
     /// Faces in a row of the atlas.
-    pub atlas_columns: u32,
+    atlas_columns: u32,
 }
 
 /// The pipeline with its texel table.
@@ -91,7 +88,6 @@ impl Project {
     pub fn row(bands: usize, projection: Projection) -> ShaderPermutation {
         ShaderPermutation::new("project.comp", bands)
             .define("CHANNELS", projection.channels() as u32)
-            .define("COSINE", projection == Projection::Transfer)
             .define("WORKGROUP", workgroup(bands, projection))
     }
 
@@ -164,14 +160,12 @@ pub fn twin(
     bands: usize,
     projection: Projection,
     face_px: usize,
-    normal: Vec3,
     scale: f32,
     texel: impl Fn(usize, usize, usize) -> [f32; 3],
 ) -> Vec<f64> {
     let stride = channel_stride(bands);
     let mut out = vec![0.0; projection.channels() * stride];
     let weights = solid_angle(face_px);
-    let normal = normal.as_dvec3();
     for face in 0..FACE_COUNT {
         for (i, weight) in weights.iter().enumerate() {
             let x = i % face_px;
@@ -183,7 +177,6 @@ pub fn twin(
             let values = match projection {
                 Projection::Radiance => captured,
                 Projection::Blocked => [f64::from(captured[0] < 1.0), 0.0, 0.0],
-                Projection::Transfer => [f64::from(captured[0] < 1.0) * normal.dot(w).max(0.0), 0.0, 0.0],
             };
             for (channel, value) in values.iter().enumerate().take(projection.channels()) {
                 for (k, y) in basis.iter().enumerate().take(coefficient_count(bands)) {
@@ -193,9 +186,5 @@ pub fn twin(
         }
     }
     out.iter_mut().for_each(|c| *c *= f64::from(scale));
-    if projection == Projection::Transfer {
-        let lobe = clamped_cosine(bands, normal);
-        out.iter_mut().zip(lobe).for_each(|(blocked, whole)| *blocked = whole - *blocked);
-    }
     out
 }

@@ -7,7 +7,6 @@
 
 use super::model::{DrawnFace, Model};
 use crate::error::Result;
-use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::memory::TexelView;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, Image};
 use crate::sh::cube::face_basis;
@@ -20,10 +19,8 @@ use std::sync::Arc;
 /// Invocations of a workgroup: as many as llvmpipe runs in one step with AVX2. With more, each further step would go
 /// through all ranges again.
 const WORKGROUP: u32 = 8;
-/// Words of shared memory for distances, one for each texel: the 16 KiB that every device has, and a face of 64 px.
-const DISTANCE_WORDS: u32 = 4096;
-/// Words of shared memory for coverage, one bit for each texel: a face of 168 px.
-const COVER_WORDS: u32 = 1024;
+/// Words of shared memory, one bit for each texel: a face of 168 px.
+const WORDS: u32 = 1024;
 const POSITION_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 const INDEX_FORMAT: vk::Format = vk::Format::R32_UINT;
 
@@ -61,7 +58,6 @@ struct Push {
 pub struct Raster {
     pipeline: ComputePipeline,
     texels: Buffer,
-    distance: bool,
     face_px: u32,
     columns: u32,
 }
@@ -106,22 +102,14 @@ impl RasterFaces {
 }
 
 impl Raster {
-    /// The row of the shader table: for what is covered, or for distances.
-    pub fn row(distance: bool) -> ShaderPermutation {
-        ShaderPermutation::new("raster.comp", 4)
-            .define("DISTANCE", distance)
-            .define("WORKGROUP", WORKGROUP)
-            .define("WORDS", Self::words(distance))
-            .number("DISTANCE_STEPS", DISTANCE_STEPS)
-    }
-
-    fn words(distance: bool) -> u32 {
-        if distance { DISTANCE_WORDS } else { COVER_WORDS }
+    /// The row of the shader table.
+    pub fn row() -> ShaderPermutation {
+        ShaderPermutation::new("raster.comp", 4).define("WORKGROUP", WORKGROUP).define("WORDS", WORDS)
     }
 
     /// Whether faces of this edge can be computed: bytes are written in words of four of a row.
     pub(super) fn serves(face_px: u32) -> bool {
-        face_px.is_multiple_of(4) && face_px <= COVER_WORDS
+        face_px.is_multiple_of(4) && face_px <= WORDS
     }
 
     /// Whether the device's texel views hold a model.
@@ -131,17 +119,11 @@ impl Raster {
     }
 
     /// The pipeline for an atlas of `columns` by `columns` faces of `face_px`.
-    pub(super) fn new(
-        device: &Arc<Device>,
-        library: &Library,
-        distance: bool,
-        face_px: u32,
-        columns: u32,
-    ) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, "capture", &library.shader(&Self::row(distance))?, &[])?;
+    pub(super) fn new(device: &Arc<Device>, library: &Library, face_px: u32, columns: u32) -> Result<Self> {
+        let pipeline = ComputePipeline::new(device, "capture", &library.shader(&Self::row())?, &[])?;
         let bytes = u64::from(columns * face_px).pow(2);
         let texels = Buffer::new(device, "capture texels", BufferKind::Device, bytes)?;
-        Ok(Raster { pipeline, texels, distance, face_px, columns })
+        Ok(Raster { pipeline, texels, face_px, columns })
     }
 
     /// Computes faces, with a barrier of its own, and copies them into the atlas, which must be in the layout of
@@ -153,9 +135,8 @@ impl Raster {
         faces: &'r RasterFaces,
         atlas: &'r Image,
     ) -> Result<()> {
-        let across = if self.distance { self.face_px } else { self.face_px.div_ceil(32) };
-        let band_rows = (Self::words(self.distance) / across).min(self.face_px);
         let face_px = self.face_px;
+        let band_rows = (WORDS / face_px.div_ceil(32)).min(face_px);
         let push = Push { face_px, atlas_columns: self.columns, band_rows, culls: u32::from(model.closed) };
         let resources = [
             Bind::Buffer(&faces.faces),

@@ -1,4 +1,4 @@
-//! Decides which samples of a field or of vertices are captured and from where, and what each stored sample is made of.
+//! Decides which samples of a field are captured and from where, and what each stored sample is made of.
 
 use super::assemble::Sources;
 use super::surface::{self, Surface};
@@ -10,12 +10,10 @@ use glam::{DVec3, Vec3};
 
 #[derive(Clone, Copy)]
 pub(super) struct Sample {
-    /// Its number among all samples of the lattice, or among the vertices.
+    /// Its number among all samples of the lattice.
     pub number: u32,
     /// From where it is captured, in r.
     pub eye: Vec3,
-    /// Unit normal of a vertex.
-    pub normal: Vec3,
     /// Factor on its coefficients.
     pub scale: f32,
 }
@@ -49,7 +47,7 @@ impl FieldSamples {
         let captured = seen.map(|sample| {
             let eye = pushed[sample].unwrap_or(positions[sample]);
             let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
-            Sample { number: sample as u32, eye: eye.as_vec3(), normal: Vec3::ZERO, scale }
+            Sample { number: sample as u32, eye: eye.as_vec3(), scale }
         });
         let inside_count = inside.iter().filter(|inside| **inside).count() as u32;
         Ok(FieldSamples { captured: captured.collect(), inside_count, sources })

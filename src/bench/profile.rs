@@ -255,9 +255,10 @@ pub fn bake(bench: &Bench<'_>, mesh: &Mesh, runs: u32) -> Result<Vec<(ProfileRow
         ];
         for (what, report) in reports {
             let mut add = |pass, ms: f64| times.entry((what, pass)).or_default().push(ms);
-            add("capture", report.capture_ms);
-            add("project", report.project_ms);
+            // Transfer vectors are the host's work alone.
             if what != "transfer" {
+                add("capture", report.capture_ms);
+                add("project", report.project_ms);
                 add("assemble", report.assemble_ms);
             }
             add("bake", report.total.as_secs_f64() * 1e3);

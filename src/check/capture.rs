@@ -5,10 +5,8 @@ use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
 pub use crate::bake::capture::Way;
 use crate::bake::capture::{self, Capture, CaptureKind, Model, NO_SLOT, Slots};
-use crate::bake::self_visibility::FREE;
 use crate::bake::triangles::unit_positions;
 use crate::error::Result;
-use crate::field::self_visibility::DISTANCE_STEPS;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::sh::cube::FACE_COUNT;
 use bytemuck::Pod;
@@ -186,28 +184,6 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
     Ok(if lit == 0 { f64::INFINITY } else { f64::from(differing as u32) / texels as f64 })
 }
 
-/// Share of the texels whose captured distance is more than a step from that of the nearest thing that a ray meets.
-/// Infinite where nothing was seen.
-pub fn distances(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32, way: Way) -> Result<f64> {
-    let positions = unit_positions(mesh);
-    let mut texels = 0;
-    let mut differing = 0;
-    let mut seen = 0;
-    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, CaptureKind::Distance, true), way)?) {
-        for (face, found) in faces.iter().enumerate() {
-            let wanted = capture::twin_distances(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
-            for (i, &wanted) in wanted.iter().enumerate() {
-                let found = found.as_ref().map_or(FREE, |texels| texels[i]);
-                let step = if wanted.is_finite() { wanted.min(2.0) * DISTANCE_STEPS } else { f64::from(FREE) };
-                differing += usize::from((f64::from(found) - step).abs() > 1.0);
-                seen += usize::from(wanted < 2.0);
-                texels += 1;
-            }
-        }
-    }
-    Ok(if seen == 0 { f64::INFINITY } else { f64::from(differing as u32) / texels as f64 })
-}
-
 /// Eyes all around: on the axes, at odd angles, near and far.
 pub fn eyes_outside() -> Vec<Vec3> {
     vec![
@@ -228,8 +204,6 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
             let found = coverage(baker, &mesh, &eyes_outside(), 32, way)?;
             add(CheckRow::new("capture", format!("coverage, {}, {word}", mesh.name), measure, found.error(), limit));
         }
-        let found = distances(baker, &rings, &eyes_outside(), 32, way)?;
-        add(CheckRow::new("capture", format!("distance, {}, {word}", rings.name), measure, found, 2.0 * limit));
     }
     let found = colors(baker, &rings, &eyes_outside(), 32)?;
     // Silhouettes and the seams where two colours meet count here too.

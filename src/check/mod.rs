@@ -8,7 +8,6 @@ pub mod capture;
 pub mod draw;
 pub mod merge;
 pub mod project;
-pub mod self_visibility;
 pub mod sharp;
 pub mod show;
 pub mod silhouette;
@@ -55,10 +54,9 @@ impl CheckRow {
 type PassCheck = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
 /// Every pass in the order of execution, by the one word that names it everywhere.
-pub const PASSES: [(&str, PassCheck); 10] = [
+pub const PASSES: [(&str, PassCheck); 9] = [
     ("capture", capture::rows),
     ("project", project::rows),
-    ("self_visibility", self_visibility::rows),
     ("assemble", assemble::rows),
     ("silhouette", silhouette::rows),
     ("merge", merge::rows),

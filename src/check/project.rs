@@ -6,10 +6,8 @@ use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
 use crate::bake::capture::{Capture, CaptureKind, Drawn, NO_SLOT, Slots};
 use crate::bake::project::{self, Project, Projection, SampleFaces};
-use crate::bake::self_visibility::SelfVisibility;
 use crate::error::Result;
 use crate::field::quantity::channel_stride;
-use crate::field::self_visibility::BYTES;
 use crate::gpu::{Access, Buffer, Commands};
 use glam::Vec3;
 
@@ -53,21 +51,11 @@ impl<'b> Content<'b> {
         }
     }
 
-    /// A sample for every eye, with its normal.
-    pub fn vertices(&self, normals: &[Vec3]) -> Vec<SampleFaces> {
-        let sample = |(&slots, normal): (&Slots, &Vec3)| {
-            let normal = normal.extend(0.0).to_array();
-            SampleFaces { normal, slots, scale: 1.0, unused: 0 }
-        };
-        self.batch.iter().zip(normals).map(sample).collect()
-    }
-
-    /// A sample for every eye, at different scales and normals.
+    /// A sample for every eye, at different scales.
     pub fn samples(&self) -> Vec<SampleFaces> {
         let sample = |(i, &slots): (usize, &Slots)| {
-            let normal = [Vec3::new(0.48, -0.6, 0.64), Vec3::new(-0.8, 0.0, 0.6), Vec3::Y][i % 3];
             let scale = [1.0, 0.37, 2.5][i % 3];
-            SampleFaces { normal: normal.extend(0.0).to_array(), slots, scale, unused: 0 }
+            SampleFaces { slots, scale }
         };
         self.batch.iter().enumerate().map(sample).collect()
     }
@@ -87,34 +75,12 @@ impl<'b> Content<'b> {
         let mut uploaded = Project::sample_buffer(device, count)?;
         uploaded.write(0, samples);
         let texels = project.texel_view()?;
-        let mut commands = self.captured()?;
+        let mut commands = Commands::new(device, "check of captured faces")?;
+        self.capture.record(&mut commands, &self.drawn, Access::ComputeSampled)?;
         let atlas = &self.capture.atlas;
         commands.pass("project", |c| project.record(c, atlas, &uploaded, &texels, &coefficients, count))?;
         commands.submit()?;
         coefficients.download(samples.len() * stride)
-    }
-
-    /// As [`Content::run`], for maps of self-visibility.
-    pub fn run_self_visibility(&self, samples: &[SampleFaces]) -> Result<Vec<u8>> {
-        let device = self.baker.device();
-        let library = self.baker.library();
-        let pass = SelfVisibility::new(device, library, self.capture.face_px, self.capture.columns)?;
-        let maps = Buffer::with_data(device, "maps", &vec![0_u8; samples.len() * BYTES])?;
-        let count = samples.len() as u32;
-        let mut uploaded = Project::sample_buffer(device, count)?;
-        uploaded.write(0, samples);
-        let mut commands = self.captured()?;
-        let atlas = &self.capture.atlas;
-        commands.pass("self_visibility", |c| pass.record(c, atlas, &uploaded, &maps, count))?;
-        commands.submit()?;
-        maps.download(samples.len() * BYTES)
-    }
-
-    /// Commands that capture the faces for a compute pass that follows.
-    fn captured(&self) -> Result<Commands<'_>> {
-        let mut commands = Commands::new(self.baker.device(), "check of captured faces")?;
-        self.capture.record(&mut commands, &self.drawn, Access::ComputeSampled)?;
-        Ok(commands)
     }
 }
 
@@ -130,9 +96,8 @@ pub fn compare(content: &Content<'_>, bands: usize, projection: Projection) -> R
     let mut worst = 0.0_f64;
     let mut largest = 0.0_f64;
     for (eye, sample) in samples.iter().enumerate() {
-        let normal = Vec3::from_slice(&sample.normal[..3]);
         let texel = |face, x, y| content.texel(eye, face, x, y, projection);
-        let wanted = project::twin(bands, projection, content.capture.face_px as usize, normal, sample.scale, texel);
+        let wanted = project::twin(bands, projection, content.capture.face_px as usize, sample.scale, texel);
         let first = eye * stride;
         for (found, wanted) in found[first..first + stride].iter().zip(&wanted) {
             let error = (f64::from(*found) - wanted).abs() / (1.0 + wanted.abs());
@@ -152,9 +117,7 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let bright =
         Content::new(baker, &generate::torus_two_colour(0.5, 0.15, 32, 16), &EYES, (32, CaptureKind::Radiance, true))?;
     for bands in [4, 7] {
-        for (content, projection) in
-            [(&black, Projection::Blocked), (&black, Projection::Transfer), (&bright, Projection::Radiance)]
-        {
+        for (content, projection) in [(&black, Projection::Blocked), (&bright, Projection::Radiance)] {
             let (worst, largest) = compare(content, bands, projection)?;
             let worst = if largest > 0.01 { worst } else { f64::INFINITY };
             let what = format!("{}, {bands} bands", format!("{projection:?}").to_lowercase());
@@ -165,8 +128,8 @@ pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
     let eyes: Vec<Vec3> = EYES.iter().flat_map(|eye| [*eye, -*eye, 1.5 * *eye, -1.5 * *eye]).collect();
     let large = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &eyes, (128, CaptureKind::Cover, true))?;
     let rows = large.batch.iter().flatten().any(|slot| *slot != NO_SLOT && *slot >= large.capture.columns);
-    let (worst, _) = compare(&large, 4, Projection::Transfer)?;
+    let (worst, _) = compare(&large, 4, Projection::Blocked)?;
     let worst = if rows { worst } else { f64::INFINITY };
-    add(CheckRow::new("project", "transfer, 4 bands, 128 px", "of 1 + coefficient", worst, F32));
+    add(CheckRow::new("project", "blocked, 4 bands, 128 px", "of 1 + coefficient", worst, F32));
     Ok(())
 }

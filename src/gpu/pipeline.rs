@@ -182,9 +182,7 @@ impl ComputePipeline {
 pub enum Keeps {
     /// The last.
     Last,
-    /// The smallest, also of what the attachment held before.
-    Smallest,
-    /// The largest, likewise.
+    /// The largest, also of what the attachment held before.
     Largest,
     /// The last over what was there before, by its alpha, with which its colour is premultiplied.
     Over,
@@ -311,7 +309,6 @@ fn vertex_layout(
 
 fn color_blend(keeps: Keeps) -> vk::PipelineColorBlendAttachmentState {
     let operation = match keeps {
-        Keeps::Smallest => vk::BlendOp::MIN,
         Keeps::Largest => vk::BlendOp::MAX,
         Keeps::Last | Keeps::Over => vk::BlendOp::ADD,
     };

@@ -72,8 +72,6 @@ fn large_faces_are_computed_in_bands() {
     let eyes = [Vec3::new(0.7, 0.8, -0.4), Vec3::new(0.2, 0.05, -0.1)];
     let found = check::coverage(&gpu.baker(), &mesh, &eyes, 200, Way::Computed).unwrap();
     assert!(found.error() < 1e-3, "{found:?}");
-    let off = check::distances(&gpu.baker(), &mesh, &eyes, 80, Way::Computed).unwrap();
-    assert!(off < 2e-3, "{off} of the texels differ");
 }
 
 #[test]

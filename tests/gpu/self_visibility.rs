@@ -95,7 +95,6 @@ layout(push_constant) uniform Push { uint count; uint cell_count; } push;
 uvec2 self_cell(uint i) { return cells[i]; }
 #include "blocked_share.glsl"
 #include "bytes.glsl"
-#include "self_frame.glsl"
 #include "self_visibility.glsl"
 void main() {
     uint i = gl_GlobalInvocationID.x;

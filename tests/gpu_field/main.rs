@@ -197,7 +197,7 @@ fn samples_in_the_tube_are_filled_from_outside() {
             [if covered { 0.0 } else { 1.0 }, 0.0, 0.0]
         };
         let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
-        let wanted = project::twin(4, Projection::Blocked, px as usize, Vec3::Y, scale, texel);
+        let wanted = project::twin(4, Projection::Blocked, px as usize, scale, texel);
         let stored = (sample / directions) as u32 * lattice.stored_direction_count() + own[sample % directions];
         for (k, wanted) in wanted.iter().enumerate() {
             let found = field.stored(stored, 0, k);

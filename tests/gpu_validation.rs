@@ -7,7 +7,7 @@ use common::generate;
 use common::{Gpu, gpu, library, report};
 use glam::Vec3;
 use shadow_fields::bake::assemble::Assemble;
-use shadow_fields::bake::capture::{Capture, CaptureKind, Model, Way};
+use shadow_fields::bake::capture::{Capture, Model, Way};
 use shadow_fields::bake::{self, Baker};
 use shadow_fields::field::{FieldKind, Storage};
 use shadow_fields::gpu::image::ImageShape;
@@ -191,7 +191,7 @@ fn the_barrier_of_a_bake_batch_is_missed() {
 fn every_barrier_of_a_picture_is_missed() {
     let Some(gpu) = gpu() else { return };
     let model = Model::new(&gpu.device, &generate::sphere(1.0, 1)).unwrap();
-    let capture = Capture::new(&gpu.device, &gpu.library, model, 16, CaptureKind::Cover, Way::Computed).unwrap();
+    let capture = Capture::new(&gpu.device, &gpu.library, model, 16, FieldKind::Occlusion, Way::Computed).unwrap();
     let eyes = [Vec3::new(1.5, 0.3, 0.2)];
     let drawn = capture.choose(&eyes, &capture.plan(&eyes)[0]).unwrap();
     let host = Buffer::new(&gpu.device, "host picture", BufferKind::Readback, 4 << 20).unwrap();

@@ -4,15 +4,15 @@ mod common;
 
 use common::{library, skip};
 use shadow_fields::bake::assemble::Assemble;
-use shadow_fields::bake::capture::{Capture, CaptureKind};
-use shadow_fields::bake::project::{Project, Projection};
+use shadow_fields::bake::capture::Capture;
+use shadow_fields::bake::project::Project;
 use shadow_fields::bake::raster::Raster;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
 use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
 use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::draw::triangles::DrawTriangles;
-use shadow_fields::field::{Lattice, Storage};
+use shadow_fields::field::{FieldKind, Lattice, Storage};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{MergePermutation, Reads, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, ShaderPermutation};
@@ -21,12 +21,12 @@ use std::collections::BTreeSet;
 use std::process::Command;
 
 const BANDS: std::ops::RangeInclusive<usize> = 2..=7;
-const PROJECTIONS: [Projection; 2] = [Projection::Blocked, Projection::Radiance];
+const KINDS: [FieldKind; 2] = [FieldKind::Occlusion, FieldKind::Radiance];
 
 fn baking() -> Vec<ShaderPermutation> {
-    let project = BANDS.flat_map(|bands| PROJECTIONS.map(|projection| Project::row(bands, projection)));
+    let project = BANDS.flat_map(|bands| KINDS.map(|kind| Project::row(bands, kind)));
     let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
-    let capture = [CaptureKind::Cover, CaptureKind::Radiance].into_iter().flat_map(Capture::rows);
+    let capture = KINDS.into_iter().flat_map(Capture::rows);
     project.chain([Raster::row()]).chain(assemble).chain(capture).chain(Silhouette::permutations(32, 128, 16)).collect()
 }
 
@@ -256,5 +256,5 @@ fn a_folder_overrides_embedded_files() {
     assert_eq!(overridden.reflection.local_size, [3, 1, 1]);
     // What is not in the folder stays as embedded.
     library.shader(&Assemble::row(Storage::F32)).unwrap();
-    assert!(library.shader(&Capture::rows(CaptureKind::Cover)[0]).is_ok());
+    assert!(library.shader(&Capture::rows(FieldKind::Occlusion)[0]).is_ok());
 }

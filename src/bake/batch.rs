@@ -2,8 +2,8 @@
 
 use super::BakeReport;
 use super::Progress;
-use super::capture::{Capture, CaptureKind, Drawn, Model, NO_SLOT, Slots, Way};
-use super::project::{Project, Projection, SampleFaces};
+use super::capture::{Capture, Drawn, Model, NO_SLOT, Slots, Way};
+use super::project::{Project, SampleFaces};
 use super::samples::Sample;
 use crate::error::Result;
 use crate::field::FieldHeader;
@@ -27,10 +27,8 @@ pub(super) struct Batches {
 impl Batches {
     /// Batches for the samples of the field that `header` describes.
     pub fn new(device: &Arc<Device>, library: &Library, model: Model, header: &FieldHeader) -> Result<Self> {
-        let kind = CaptureKind::of_field(header.kind);
-        let projection = Projection::of_field(header.kind);
-        let capture = Capture::new(device, library, model, header.face_px, kind, Way::usual(device))?;
-        let project = Project::new(device, library, header.bands, projection, header.face_px, capture.columns)?;
+        let capture = Capture::new(device, library, model, header.face_px, header.kind, Way::usual(device))?;
+        let project = Project::new(device, library, header.bands, header.kind, header.face_px, capture.columns)?;
         let stride = header.sample_stride();
         let bytes = 4 * u64::from(capture.capacity()) * stride as u64;
         Ok(Batches {

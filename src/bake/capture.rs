@@ -39,21 +39,6 @@ struct Push {
     forward: [f32; 4],
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CaptureKind {
-    /// Where the object is: 0 there and 1 elsewhere.
-    Cover,
-    /// The mesh's colours.
-    Radiance,
-}
-
-impl CaptureKind {
-    /// The kind of capture that the samples of a field need.
-    pub fn of_field(kind: FieldKind) -> Self {
-        if kind == FieldKind::Radiance { CaptureKind::Radiance } else { CaptureKind::Cover }
-    }
-}
-
 /// How faces are captured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
@@ -119,21 +104,21 @@ pub struct Capture {
     pub face_px: u32,
     /// Faces in a row of the atlas.
     pub columns: u32,
-    kind: CaptureKind,
+    pub kind: FieldKind,
 }
 
 impl Capture {
     /// The rows of the shader table: vertex and fragment.
-    pub fn rows(kind: CaptureKind) -> [ShaderPermutation; 2] {
+    pub fn rows(kind: FieldKind) -> [ShaderPermutation; 2] {
         ["capture.vert", "capture.frag"]
-            .map(|file| ShaderPermutation::new(file, 4).define("RADIANCE", kind == CaptureKind::Radiance))
+            .map(|file| ShaderPermutation::new(file, 4).define("RADIANCE", kind == FieldKind::Radiance))
     }
 
     /// Faces in a row of the atlas.
-    pub fn columns(device: &Device, face_px: u32, kind: CaptureKind) -> u32 {
+    pub fn columns(device: &Device, face_px: u32, kind: FieldKind) -> u32 {
         let atlas_px = ATLAS_PX.min(device.most_image_px());
         // The texels of a radiance capture are 16 times as large. Six faces always fit.
-        (if kind == CaptureKind::Radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3)
+        (if kind == FieldKind::Radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3)
     }
 
     /// Captures of a model in faces of `face_px`. Those that cannot be computed are drawn. `Input` when a face is
@@ -143,7 +128,7 @@ impl Capture {
         library: &Library,
         model: Model,
         face_px: u32,
-        kind: CaptureKind,
+        kind: FieldKind,
         way: Way,
     ) -> Result<Self> {
         let columns = Self::columns(device, face_px, kind);
@@ -154,7 +139,7 @@ impl Capture {
                 "cube faces of {face_px} px take images of {edge} px, the device's have at most {most} px"
             )));
         }
-        let radiance = kind == CaptureKind::Radiance;
+        let radiance = kind == FieldKind::Radiance;
         let format = if radiance { vk::Format::R32G32B32A32_SFLOAT } else { vk::Format::R8_UNORM };
         let shape = ImageShape { format, width: edge, height: edge, samples: 1 };
         let computed = way == Way::Computed && !radiance && Raster::serves(face_px) && Raster::holds(device, &model);
@@ -173,12 +158,12 @@ impl Capture {
         library: &Library,
         model: &Model,
         color: vk::Format,
-        kind: CaptureKind,
+        kind: FieldKind,
     ) -> Result<GraphicsPipeline> {
         let [vertex, fragment] = Self::rows(kind);
         let state = GraphicsState {
             color,
-            depth: (kind == CaptureKind::Radiance).then_some(vk::Format::D32_SFLOAT),
+            depth: (kind == FieldKind::Radiance).then_some(vk::Format::D32_SFLOAT),
             samples: 1,
             // A cube face is a mirror image, which turns every triangle over, so FRONT removes the object's back faces.
             cull: if model.closed { vk::CullModeFlags::FRONT } else { vk::CullModeFlags::NONE },
@@ -264,7 +249,7 @@ impl Capture {
         depth: Option<&'r Image>,
         drawn: &'r Drawn,
     ) -> Result<()> {
-        let radiance = self.kind == CaptureKind::Radiance;
+        let radiance = self.kind == FieldKind::Radiance;
         let background = if radiance { [0.0, 0.0, 0.0, 1.0] } else { [1.0; 4] };
         let target = Target { color: &self.atlas, clear: Some(background), depth, resolve: None };
         let mut vertices = vec![(&self.model.positions, 0)];

@@ -18,26 +18,6 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// What a projection makes of the faces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Projection {
-    /// Blocked part of an occlusion capture, one channel.
-    Blocked,
-    /// Radiance in three channels.
-    Radiance,
-}
-
-impl Projection {
-    /// The projection of the samples of a field.
-    pub fn of_field(kind: FieldKind) -> Self {
-        if kind == FieldKind::Radiance { Projection::Radiance } else { Projection::Blocked }
-    }
-
-    pub fn channels(self) -> usize {
-        if self == Projection::Radiance { 3 } else { 1 }
-    }
-}
-
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct SampleFaces {
@@ -59,8 +39,8 @@ const SHARED_BYTES: usize = 16_384;
 /// Number of invocations that share a sample's texels. It is one wave of the widest GPUs, or fewer where their sums
 /// (one float for each coefficient and channel) would not fit [`SHARED_BYTES`]: 32 from 5 bands of radiance on, and 16
 /// for 7 bands.
-fn workgroup(bands: usize, projection: Projection) -> u32 {
-    let sums = 4 * coefficient_count(bands) * projection.channels();
+fn workgroup(bands: usize, kind: FieldKind) -> u32 {
+    let sums = 4 * coefficient_count(bands) * kind.channels();
     [64, 32].into_iter().find(|count| count * sums <= SHARED_BYTES).unwrap_or(16) as u32
 }
 
@@ -78,17 +58,17 @@ pub struct Project {
     pipeline: ComputePipeline,
     texels: Buffer,
     pub bands: usize,
-    /// What the projection makes of the faces.
-    pub projection: Projection,
+    /// What its samples are of.
+    pub kind: FieldKind,
     face_px: u32,
     columns: u32,
 }
 
 impl Project {
-    pub fn row(bands: usize, projection: Projection) -> ShaderPermutation {
+    pub fn row(bands: usize, kind: FieldKind) -> ShaderPermutation {
         ShaderPermutation::new("project.comp", bands)
-            .define("CHANNELS", projection.channels() as u32)
-            .define("WORKGROUP", workgroup(bands, projection))
+            .define("CHANNELS", kind.channels() as u32)
+            .define("WORKGROUP", workgroup(bands, kind))
     }
 
     /// A pipeline for faces of `face_px` in an atlas of `columns`.
@@ -96,11 +76,11 @@ impl Project {
         device: &Arc<Device>,
         library: &Library,
         bands: usize,
-        projection: Projection,
+        kind: FieldKind,
         face_px: u32,
         columns: u32,
     ) -> Result<Self> {
-        let shader = library.shader(&Self::row(bands, projection))?;
+        let shader = library.shader(&Self::row(bands, kind))?;
         let pipeline = ComputePipeline::new(device, "project", &shader, &[])?;
         let texels = Buffer::with_data(device, "project texels", &texel_table(face_px as usize))?;
         if !TexelView::fits(device, TEXEL_FORMAT, texels.size_bytes) {
@@ -109,7 +89,7 @@ impl Project {
                 "cube faces of {face_px} px have more texels than the device's views hold ({most})"
             )));
         }
-        Ok(Project { pipeline, texels, bands, projection, face_px, columns })
+        Ok(Project { pipeline, texels, bands, kind, face_px, columns })
     }
 
     /// The view of the texel table that [`Project::record`] wants.
@@ -158,13 +138,13 @@ fn texel_table(face_px: usize) -> Vec<[f32; 4]> {
 /// one channel after another, `channel_stride(bands)` apart.
 pub fn twin(
     bands: usize,
-    projection: Projection,
+    kind: FieldKind,
     face_px: usize,
     scale: f32,
     texel: impl Fn(usize, usize, usize) -> [f32; 3],
 ) -> Vec<f64> {
     let stride = channel_stride(bands);
-    let mut out = vec![0.0; projection.channels() * stride];
+    let mut out = vec![0.0; kind.channels() * stride];
     let weights = solid_angle(face_px);
     for face in 0..FACE_COUNT {
         for (i, weight) in weights.iter().enumerate() {
@@ -174,11 +154,11 @@ pub fn twin(
             let mut basis = [0.0; MAX_COEFFICIENTS];
             evaluate(bands, w, &mut basis);
             let captured = texel(face, x, y).map(f64::from);
-            let values = match projection {
-                Projection::Radiance => captured,
-                Projection::Blocked => [f64::from(captured[0] < 1.0), 0.0, 0.0],
+            let values = match kind {
+                FieldKind::Radiance => captured,
+                FieldKind::Occlusion => [f64::from(captured[0] < 1.0), 0.0, 0.0],
             };
-            for (channel, value) in values.iter().enumerate().take(projection.channels()) {
+            for (channel, value) in values.iter().enumerate().take(kind.channels()) {
                 for (k, y) in basis.iter().enumerate().take(coefficient_count(bands)) {
                     out[channel * stride + k] += weight * value * y;
                 }

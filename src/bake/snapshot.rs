@@ -1,6 +1,6 @@
 //! Captured faces as pictures, for `inspect` and its contact sheets.
 
-use super::capture::{Capture, CaptureKind, Model, NO_SLOT, Way};
+use super::capture::{Capture, Model, NO_SLOT, Way};
 use crate::asset::mesh::Mesh;
 use crate::error::Result;
 use crate::field::FieldKind;
@@ -21,7 +21,7 @@ pub fn snapshot(
 ) -> Result<Vec<Vec<f32>>> {
     let radiance = kind == FieldKind::Radiance;
     let model = if radiance { Model::with_colors(device, mesh)? } else { Model::new(device, mesh)? };
-    let capture = Capture::new(device, library, model, face_px, CaptureKind::of_field(kind), Way::usual(device))?;
+    let capture = Capture::new(device, library, model, face_px, kind, Way::usual(device))?;
     let eyes: Vec<Vec3> = eyes.iter().map(|eye| eye.as_vec3()).collect();
     let texel_bytes = if radiance { 16 } else { 1 };
     let edge = (capture.columns * face_px) as usize;

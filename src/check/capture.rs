@@ -4,9 +4,10 @@ use super::CheckRow;
 use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
 pub use crate::bake::capture::Way;
-use crate::bake::capture::{self, Capture, CaptureKind, Model, NO_SLOT, Slots};
+use crate::bake::capture::{self, Capture, Model, NO_SLOT, Slots};
 use crate::bake::triangles::unit_positions;
 use crate::error::Result;
+use crate::field::FieldKind;
 use crate::gpu::{Access, Buffer, BufferKind, Commands, Device};
 use crate::sh::cube::FACE_COUNT;
 use bytemuck::Pod;
@@ -56,11 +57,11 @@ pub type CapturedFaces<T> = [Option<Vec<T>>; FACE_COUNT];
 pub fn capture_of(
     baker: &Baker,
     mesh: &Mesh,
-    (face_px, kind, cull): (u32, CaptureKind, bool),
+    (face_px, kind, cull): (u32, FieldKind, bool),
     way: Way,
 ) -> Result<Capture> {
     let device = baker.device();
-    let colors = kind == CaptureKind::Radiance;
+    let colors = kind == FieldKind::Radiance;
     let mut model = if colors { Model::with_colors(device, mesh)? } else { Model::new(device, mesh)? };
     model.closed &= cull;
     Capture::new(device, baker.library(), model, face_px, kind, way)
@@ -78,7 +79,7 @@ pub fn faces<T: Pod>(
     baker: &Baker,
     mesh: &Mesh,
     eyes: &[Vec3],
-    settings: (u32, CaptureKind, bool),
+    settings: (u32, FieldKind, bool),
     way: Way,
 ) -> Result<Vec<CapturedFaces<T>>> {
     let capture = capture_of(baker, mesh, settings, way)?;
@@ -133,7 +134,7 @@ fn is_edge(covered: &[bool], px: usize, x: usize, y: usize) -> bool {
 pub fn coverage(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32, way: Way) -> Result<Coverage> {
     let positions = unit_positions(mesh);
     let mut out = Coverage::default();
-    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, CaptureKind::Cover, true), way)?) {
+    for (eye, faces) in eyes.iter().zip(faces::<u8>(baker, mesh, eyes, (face_px, FieldKind::Occlusion, true), way)?) {
         for (face, texels) in faces.iter().enumerate() {
             let wanted = capture::twin(&positions, &mesh.triangles, eye.as_dvec3(), face, face_px);
             let Some(texels) = texels else {
@@ -166,7 +167,7 @@ pub fn colors(baker: &Baker, mesh: &Mesh, eyes: &[Vec3], face_px: u32) -> Result
     let mut differing = 0;
     let mut lit = 0;
     for (eye, faces) in
-        eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, CaptureKind::Radiance, true), Way::Drawn)?)
+        eyes.iter().zip(faces::<[f32; 4]>(baker, mesh, eyes, (face_px, FieldKind::Radiance, true), Way::Drawn)?)
     {
         for (face, found) in faces.iter().enumerate() {
             let wanted = capture::twin_colors(&positions, colors, &mesh.triangles, eye.as_dvec3(), face, face_px);

@@ -4,9 +4,10 @@ use super::CheckRow;
 use super::capture::{Way, atlas, capture_of, only_batch, texel_index};
 use crate::asset::{Mesh, generate};
 use crate::bake::Baker;
-use crate::bake::capture::{Capture, CaptureKind, Drawn, NO_SLOT, Slots};
-use crate::bake::project::{self, Project, Projection, SampleFaces};
+use crate::bake::capture::{Capture, Drawn, NO_SLOT, Slots};
+use crate::bake::project::{self, Project, SampleFaces};
 use crate::error::Result;
+use crate::field::FieldKind;
 use crate::field::quantity::channel_stride;
 use crate::gpu::{Access, Buffer, Commands};
 use glam::Vec3;
@@ -27,10 +28,10 @@ pub struct Content<'b> {
 }
 
 impl<'b> Content<'b> {
-    pub fn new(baker: &'b Baker, mesh: &Mesh, eyes: &[Vec3], settings: (u32, CaptureKind, bool)) -> Result<Self> {
+    pub fn new(baker: &'b Baker, mesh: &Mesh, eyes: &[Vec3], settings: (u32, FieldKind, bool)) -> Result<Self> {
         let capture = capture_of(baker, mesh, settings, Way::usual(baker.device()))?;
         let batch = only_batch(&capture, eyes);
-        let texels = if settings.1 == CaptureKind::Radiance {
+        let texels = if settings.1 == FieldKind::Radiance {
             let atlas: Vec<[f32; 4]> = atlas(baker.device(), &capture, eyes, &batch)?;
             atlas.iter().map(|t| [t[0], t[1], t[2]]).collect()
         } else {
@@ -42,10 +43,10 @@ impl<'b> Content<'b> {
     }
 
     /// The captured value of a texel.
-    pub fn texel(&self, eye: usize, face: usize, x: usize, y: usize, projection: Projection) -> [f32; 3] {
+    pub fn texel(&self, eye: usize, face: usize, x: usize, y: usize) -> [f32; 3] {
         match self.batch[eye][face] {
             // Faces outside the atlas show the background.
-            NO_SLOT if projection == Projection::Radiance => [0.0; 3],
+            NO_SLOT if self.capture.kind == FieldKind::Radiance => [0.0; 3],
             NO_SLOT => [1.0, 0.0, 0.0],
             slot => self.texels[texel_index(&self.capture, slot, x, y)],
         }
@@ -60,16 +61,17 @@ impl<'b> Content<'b> {
         self.batch.iter().enumerate().map(sample).collect()
     }
 
-    pub fn pass(&self, bands: usize, projection: Projection) -> Result<Project> {
+    pub fn pass(&self, bands: usize) -> Result<Project> {
         let device = self.baker.device();
         let library = self.baker.library();
-        Project::new(device, library, bands, projection, self.capture.face_px, self.capture.columns)
+        let Capture { kind, face_px, columns, .. } = self.capture;
+        Project::new(device, library, bands, kind, face_px, columns)
     }
 
     /// One capture and projection; every float of the coefficients, what was not written being no number.
     pub fn run(&self, project: &Project, samples: &[SampleFaces]) -> Result<Vec<f32>> {
         let device = self.baker.device();
-        let stride = project.projection.channels() * channel_stride(project.bands);
+        let stride = project.kind.channels() * channel_stride(project.bands);
         let coefficients = Buffer::with_data(device, "coefficients", &vec![SENTINEL; samples.len() * stride])?;
         let count = samples.len() as u32;
         let mut uploaded = Project::sample_buffer(device, count)?;
@@ -86,18 +88,19 @@ impl<'b> Content<'b> {
 
 /// The largest error relative to 1 + what is wanted, and the largest magnitude of what is wanted. Infinite where a
 /// second run differs.
-pub fn compare(content: &Content<'_>, bands: usize, projection: Projection) -> Result<(f64, f64)> {
-    let project = content.pass(bands, projection)?;
+pub fn compare(content: &Content<'_>, bands: usize) -> Result<(f64, f64)> {
+    let project = content.pass(bands)?;
     let samples = content.samples();
     let found = content.run(&project, &samples)?;
     let again = content.run(&project, &samples)?;
     let bits = |floats: &[f32]| floats.iter().map(|f| f.to_bits()).collect::<Vec<_>>();
-    let stride = projection.channels() * channel_stride(bands);
+    let kind = content.capture.kind;
+    let stride = kind.channels() * channel_stride(bands);
     let mut worst = 0.0_f64;
     let mut largest = 0.0_f64;
     for (eye, sample) in samples.iter().enumerate() {
-        let texel = |face, x, y| content.texel(eye, face, x, y, projection);
-        let wanted = project::twin(bands, projection, content.capture.face_px as usize, sample.scale, texel);
+        let texel = |face, x, y| content.texel(eye, face, x, y);
+        let wanted = project::twin(bands, kind, content.capture.face_px as usize, sample.scale, texel);
         let first = eye * stride;
         for (found, wanted) in found[first..first + stride].iter().zip(&wanted) {
             let error = (f64::from(*found) - wanted).abs() / (1.0 + wanted.abs());
@@ -113,23 +116,23 @@ pub fn compare(content: &Content<'_>, bands: usize, projection: Projection) -> R
 pub const EYES: [Vec3; 3] = [Vec3::new(0.9, 0.6, -0.5), Vec3::new(-0.4, 1.3, 2.0), Vec3::new(0.2, -0.1, -1.6)];
 
 pub fn rows(baker: &Baker, add: &mut dyn FnMut(CheckRow)) -> Result<()> {
-    let black = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &EYES, (32, CaptureKind::Cover, true))?;
+    let black = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &EYES, (32, FieldKind::Occlusion, true))?;
     let bright =
-        Content::new(baker, &generate::torus_two_colour(0.5, 0.15, 32, 16), &EYES, (32, CaptureKind::Radiance, true))?;
+        Content::new(baker, &generate::torus_two_colour(0.5, 0.15, 32, 16), &EYES, (32, FieldKind::Radiance, true))?;
     for bands in [4, 7] {
-        for (content, projection) in [(&black, Projection::Blocked), (&bright, Projection::Radiance)] {
-            let (worst, largest) = compare(content, bands, projection)?;
+        for content in [&black, &bright] {
+            let (worst, largest) = compare(content, bands)?;
             let worst = if largest > 0.01 { worst } else { f64::INFINITY };
-            let what = format!("{}, {bands} bands", format!("{projection:?}").to_lowercase());
+            let what = format!("{}, {bands} bands", format!("{:?}", content.capture.kind).to_lowercase());
             add(CheckRow::new("project", what, "of 1 + coefficient", worst, F32));
         }
     }
     // Faces of this size stand in several rows of the atlas.
     let eyes: Vec<Vec3> = EYES.iter().flat_map(|eye| [*eye, -*eye, 1.5 * *eye, -1.5 * *eye]).collect();
-    let large = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &eyes, (128, CaptureKind::Cover, true))?;
+    let large = Content::new(baker, &generate::torus(1.0, 0.3, 32, 16), &eyes, (128, FieldKind::Occlusion, true))?;
     let rows = large.batch.iter().flatten().any(|slot| *slot != NO_SLOT && *slot >= large.capture.columns);
-    let (worst, _) = compare(&large, 4, Projection::Blocked)?;
+    let (worst, _) = compare(&large, 4)?;
     let worst = if rows { worst } else { f64::INFINITY };
-    add(CheckRow::new("project", "blocked, 4 bands, 128 px", "of 1 + coefficient", worst, F32));
+    add(CheckRow::new("project", "occlusion, 4 bands, 128 px", "of 1 + coefficient", worst, F32));
     Ok(())
 }

@@ -6,10 +6,11 @@ use common::generate;
 use common::{Gpu, gpu, pot, report};
 use glam::{DVec3, Quat, Vec3};
 use shadow_fields::asset::Mesh;
-use shadow_fields::bake::capture::{Capture, CaptureKind, Model, NO_SLOT, Way};
+use shadow_fields::bake::capture::{Capture, Model, NO_SLOT, Way};
 use shadow_fields::check::capture::{
     self as check, capture_of, differing_limit, eyes_outside, faces, only_batch, texel_index,
 };
+use shadow_fields::field::FieldKind;
 use shadow_fields::sh::cube::{direction, texel_st};
 
 const FACE_PX: u32 = 32;
@@ -22,7 +23,7 @@ fn coverage(gpu: &Gpu, mesh: &Mesh, eyes: &[Vec3], cull: bool, way: Way) -> Vec<
         255 => false,
         other => panic!("a texel of {other}: neither object nor background"),
     };
-    let found = faces::<u8>(&gpu.baker(), mesh, eyes, (FACE_PX, CaptureKind::Cover, cull), way).unwrap();
+    let found = faces::<u8>(&gpu.baker(), mesh, eyes, (FACE_PX, FieldKind::Occlusion, cull), way).unwrap();
     found
         .iter()
         .map(|faces| faces.each_ref().map(|face| face.as_ref().map(|t| t.iter().map(is_object).collect())))
@@ -155,7 +156,7 @@ fn colours_land_on_their_faces() {
     for inner_first in [false, true] {
         let mesh = painted_box(inner_first);
         let px = 9_u32;
-        let capture = capture_of(&gpu.baker(), &mesh, (px, CaptureKind::Radiance, false), Way::Drawn).unwrap();
+        let capture = capture_of(&gpu.baker(), &mesh, (px, FieldKind::Radiance, false), Way::Drawn).unwrap();
         let eyes = [Vec3::ZERO, Vec3::new(0.01, -0.02, 0.01)];
         let batch = only_batch(&capture, &eyes);
         let atlas: Vec<[f32; 4]> = gpu.atlas(&capture, &eyes, &batch);
@@ -193,7 +194,7 @@ fn culling_keeps_the_near_side() {
         assert!(mesh.is_closed());
         let eyes = eyes_outside();
         let [culled, whole] = [true, false].map(|cull| {
-            let capture = capture_of(&gpu.baker(), mesh, (FACE_PX, CaptureKind::Radiance, cull), Way::Drawn).unwrap();
+            let capture = capture_of(&gpu.baker(), mesh, (FACE_PX, FieldKind::Radiance, cull), Way::Drawn).unwrap();
             gpu.atlas::<[f32; 4]>(&capture, &eyes, &only_batch(&capture, &eyes))
         });
         let lit = whole.iter().filter(|t| t[..3] != [0.0; 3]).count();
@@ -213,7 +214,7 @@ fn faces_are_not_mirrored() {
     let mesh =
         Mesh::new("graded box", walls.positions.clone(), Vec::new(), Some(colors), walls.triangles.clone()).unwrap();
     let px = 8;
-    let capture = capture_of(&gpu.baker(), &mesh, (px, CaptureKind::Radiance, false), Way::Drawn).unwrap();
+    let capture = capture_of(&gpu.baker(), &mesh, (px, FieldKind::Radiance, false), Way::Drawn).unwrap();
     let eyes = [Vec3::ZERO];
     let batch = only_batch(&capture, &eyes);
     let atlas: Vec<[f32; 4]> = gpu.atlas(&capture, &eyes, &batch);
@@ -232,7 +233,7 @@ fn faces_are_not_mirrored() {
 fn what_does_not_fit_waits_for_the_next_batch() {
     let Some(gpu) = gpu() else { return };
     let mesh = generate::sphere(1.0, 1);
-    let capture = capture_of(&gpu.baker(), &mesh, (512, CaptureKind::Cover, true), Way::Drawn).unwrap();
+    let capture = capture_of(&gpu.baker(), &mesh, (512, FieldKind::Occlusion, true), Way::Drawn).unwrap();
     let eyes = vec![Vec3::new(1.5, 0.0, 0.0); 100];
     let batches = capture.plan(&eyes);
     assert!(batches.len() > 1 && batches.iter().map(Vec::len).sum::<usize>() == eyes.len(), "{}", batches.len());
@@ -246,6 +247,6 @@ fn what_does_not_fit_waits_for_the_next_batch() {
     }
     let model = Model::new(&gpu.device, &mesh).unwrap();
     let face_px = gpu.device.limits.max_image_dimension2_d;
-    let too_large = Capture::new(&gpu.device, &gpu.library, model, face_px, CaptureKind::Cover, Way::Drawn);
+    let too_large = Capture::new(&gpu.device, &gpu.library, model, face_px, FieldKind::Occlusion, Way::Drawn);
     assert_eq!(too_large.err().map(|error| error.exit_code()), Some(4));
 }

@@ -5,9 +5,9 @@ use crate::common;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use common::library;
-use shadow_fields::bake::project::{Project, Projection, SampleFaces};
+use shadow_fields::bake::project::{Project, SampleFaces};
 use shadow_fields::bake::raster::{Face, Raster};
-use shadow_fields::field::{Lattice, Storage};
+use shadow_fields::field::{FieldKind, Lattice, Storage};
 use shadow_fields::gpu::reflect::Reflection;
 use shadow_fields::gpu::{Access, Bind, Buffer, Commands, ComputePipeline, TexelView};
 // In a shader there is no other entity.
@@ -149,8 +149,8 @@ fn entities_and_clusters_read_from_texels() {
 
 #[test]
 fn samples_of_captured_faces() {
-    for projection in [Projection::Blocked, Projection::Radiance] {
-        let reflection = library().shader(&Project::row(4, projection)).unwrap().reflection;
+    for kind in [FieldKind::Occlusion, FieldKind::Radiance] {
+        let reflection = library().shader(&Project::row(4, kind)).unwrap().reflection;
         same_layout!(reflection, SampleFaces { slots, scale });
         assert_eq!(reflection.strides.get("SampleFaces"), Some(&(size_of::<SampleFaces>() as u32)));
     }
@@ -165,7 +165,7 @@ fn faces_that_are_computed() {
 
 #[test]
 fn a_moved_field_is_noticed() {
-    let mut reflection = library().shader(&Project::row(4, Projection::Blocked)).unwrap().reflection;
+    let mut reflection = library().shader(&Project::row(4, FieldKind::Occlusion)).unwrap().reflection;
     reflection.structs.get_mut("SampleFaces").unwrap().swap(0, 1);
     assert!(std::panic::catch_unwind(|| same_layout!(reflection, SampleFaces { slots, scale })).is_err());
 }

@@ -6,11 +6,10 @@ use common::{gpu, pot, report};
 use glam::Vec3;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::assemble::{Source, Sources, twin};
-use shadow_fields::bake::capture::CaptureKind;
 use shadow_fields::bake::capture::NO_SLOT;
-use shadow_fields::bake::project::{Project, Projection};
+use shadow_fields::bake::project::Project;
 use shadow_fields::check::project::{self, Content, EYES, F32};
-use shadow_fields::field::Lattice;
+use shadow_fields::field::{FieldKind, Lattice};
 use std::f64::consts::PI;
 
 fn painted_pot() -> Mesh {
@@ -28,17 +27,16 @@ fn projections_are_those_of_the_twin() {
     let closed = generate::cuboid(Vec3::ONE, 1);
     let baker = gpu.baker();
     for face_px in [8, 64] {
-        let black = Content::new(&baker, &pot, &EYES, (face_px, CaptureKind::Cover, true)).unwrap();
+        let black = Content::new(&baker, &pot, &EYES, (face_px, FieldKind::Occlusion, true)).unwrap();
         // From inside a solid, unculled, every texel is black.
         let inside = [Vec3::new(0.1, 0.05, -0.2)];
-        let constant = Content::new(&baker, &closed, &inside, (face_px, CaptureKind::Cover, false)).unwrap();
-        let bright = Content::new(&baker, &painted, &EYES, (face_px, CaptureKind::Radiance, true)).unwrap();
+        let constant = Content::new(&baker, &closed, &inside, (face_px, FieldKind::Occlusion, false)).unwrap();
+        let bright = Content::new(&baker, &painted, &EYES, (face_px, FieldKind::Radiance, true)).unwrap();
         for bands in 2..=7 {
-            for (content, projection) in
-                [(&black, Projection::Blocked), (&constant, Projection::Blocked), (&bright, Projection::Radiance)]
-            {
-                let (error, largest) = project::compare(content, bands, projection).unwrap();
-                let place = format!("{bands} bands, {projection:?}, {face_px} px: {error:e}, largest {largest}");
+            for content in [&black, &constant, &bright] {
+                let (error, largest) = project::compare(content, bands).unwrap();
+                let place =
+                    format!("{bands} bands, {:?}, {face_px} px: {error:e}, largest {largest}", content.capture.kind);
                 assert!(error <= F32 && largest > 0.01, "{place}");
             }
         }
@@ -51,8 +49,8 @@ fn constant_content_has_its_closed_form() {
     let Some(gpu) = gpu() else { return };
     let closed = generate::cuboid(Vec3::ONE, 1);
     let baker = gpu.baker();
-    let content = Content::new(&baker, &closed, &[Vec3::ZERO], (32, CaptureKind::Cover, false)).unwrap();
-    let project = content.pass(4, Projection::Blocked).unwrap();
+    let content = Content::new(&baker, &closed, &[Vec3::ZERO], (32, FieldKind::Occlusion, false)).unwrap();
+    let project = content.pass(4).unwrap();
     let mut samples = content.samples();
     samples[0].scale = 1.0;
     let blocked = content.run(&project, &samples).unwrap();
@@ -72,7 +70,7 @@ fn oversized_faces_are_refused() {
     if face_px > 4096 {
         return report("the device's views hold more texels than are worth a test");
     }
-    let refused = Project::new(&gpu.device, &gpu.library, 2, Projection::Blocked, face_px, 3);
+    let refused = Project::new(&gpu.device, &gpu.library, 2, FieldKind::Occlusion, face_px, 3);
     assert_eq!(refused.err().map(|error| error.exit_code()), Some(4));
 }
 

@@ -12,7 +12,7 @@ use glam::{DQuat, DVec3, Vec3};
 use half::f16;
 use shadow_fields::asset::Mesh;
 use shadow_fields::bake::cache::Cache;
-use shadow_fields::bake::project::{self, Projection};
+use shadow_fields::bake::project::{self};
 use shadow_fields::bake::surface::Surface;
 use shadow_fields::bake::surface::{inside, pushed_out};
 use shadow_fields::bake::triangles::unit_positions;
@@ -197,7 +197,7 @@ fn samples_in_the_tube_are_filled_from_outside() {
             [if covered { 0.0 } else { 1.0 }, 0.0, 0.0]
         };
         let scale = lattice.scale(lattice.distance(eye).max(lattice.inner)) as f32;
-        let wanted = project::twin(4, Projection::Blocked, px as usize, scale, texel);
+        let wanted = project::twin(4, FieldKind::Occlusion, px as usize, scale, texel);
         let stored = (sample / directions) as u32 * lattice.stored_direction_count() + own[sample % directions];
         for (k, wanted) in wanted.iter().enumerate() {
             let found = field.stored(stored, 0, k);

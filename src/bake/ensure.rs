@@ -58,7 +58,7 @@ pub struct SceneNeeds {
 
 /// The rigid groups of a scene, and what is baked of its surfaces.
 pub fn surfaces(scene: &Scene, options: &Options, lights: Lights) -> (Groups, SurfacePlan) {
-    let groups = if options.groups { Groups::new(scene, lights) } else { Groups::alone(scene.entities.len()) };
+    let groups = if options.groups { Groups::new(scene, lights) } else { Groups::alone(scene) };
     let wanted =
         Wanted { transfer: light::has_harmonics(scene, lights), self_visibility: light::has_sharp(scene, lights) };
     let surfaces = SurfacePlan::new(scene, &groups, options, wanted);
@@ -139,9 +139,8 @@ pub struct Needed {
 /// is in their own visibility, less the shadows of sharp lights.
 pub fn needs(scene: &Scene, mesh: usize, lights: Lights, groups: &Groups) -> Needed {
     let entities = || (0..scene.entities.len()).filter(|&i| scene.entities[i].mesh == mesh);
-    let receives = |of: &dyn Fn(usize) -> bool| (0..scene.entities.len()).any(|i| scene.entities[i].receives && of(i));
-    let seen = || entities().filter(|&e| receives(&|i| i != e));
-    let seen_by_others = || entities().filter(|&e| receives(&|i| !groups.share(i, e)));
+    let seen = || entities().filter(|&e| groups.is_seen(e));
+    let seen_by_others = || entities().filter(|&e| groups.is_seen_by_others(e));
     let method = |entity| LightMethod::of(scene, entity, lights);
     let coloured = scene.meshes[mesh].colors.is_some();
     let harmonics = light::has_harmonics(scene, lights);

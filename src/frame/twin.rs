@@ -20,11 +20,14 @@ impl Frame {
     /// Counts lookups that the lists of all clusters leave off, by reason, and bounds the light in them. It looks at
     /// every cluster and entity, which no frame does.
     pub fn counts(&self, placements: &[Placement]) -> Counts {
-        let entities = || self.scene.entities.iter().filter(|entity| entity.occludes || entity.emits);
-        let empty = |entity: &&Entity| self.buffers.meshes[entity.mesh].is_empty(entity.emits);
+        let entities = || indices(&self.scene, |entity| entity.occludes || entity.emits).into_iter();
+        let empty = |&entity: &usize| {
+            let Entity { mesh, emits, .. } = self.scene.entities[entity];
+            self.buffers.meshes[mesh].is_empty(emits)
+        };
         Counts {
             empty: entities().filter(empty).count() as u64,
-            unseen: entities().filter(|e| !is_seen(&self.scene, e)).count() as u64,
+            unseen: entities().filter(|&entity| !self.groups.is_seen(entity)).count() as u64,
             hidden: if self.options.skip.hidden { self.hidden_count(placements) as u64 } else { 0 },
             undrawn: self.undrawn_count(placements) as u64,
             ..self.work.lists.counts(&self.state(placements))
@@ -247,11 +250,6 @@ fn listed(state: &State, lists: &ClusterLists, receiver: usize, surface: &Device
         entries.into_iter().map(|entry| ListEntry::entities(entry).into()).collect()
     };
     surface.clusters.iter().zip(lists.near_of(receiver)).map(of_cluster).collect()
-}
-
-/// Whether the shadow or light of an entity can fall on another entity, because one other at least is lit.
-fn is_seen(scene: &Scene, entity: &Entity) -> bool {
-    scene.entities.iter().filter(|e| e.receives).count() > usize::from(entity.receives)
 }
 
 /// Entities that satisfy a condition.

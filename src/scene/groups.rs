@@ -8,6 +8,12 @@ use super::{LightMethod, Scene};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Groups {
     of: Vec<u32>,
+    /// Whether each entity is lit.
+    receives: Vec<bool>,
+    /// How many members of each group are lit.
+    receivers: Vec<u32>,
+    /// How many entities are lit.
+    receiver_count: u32,
 }
 
 impl Groups {
@@ -23,12 +29,31 @@ impl Groups {
         let rests = |entity: &usize| scene.is_at_rest(*entity) && !banded;
         let first = (0..scene.entities.len()).find(rests).unwrap_or(0) as u32;
         let group = |entity: usize| if rests(&entity) { first } else { entity as u32 };
-        Groups { of: (0..scene.entities.len()).map(group).collect() }
+        Groups::of(scene, (0..scene.entities.len()).map(group).collect())
     }
 
     /// Every entity by itself.
-    pub fn alone(count: usize) -> Self {
-        Groups { of: (0..count as u32).collect() }
+    pub fn alone(scene: &Scene) -> Self {
+        Groups::of(scene, (0..scene.entities.len() as u32).collect())
+    }
+
+    fn of(scene: &Scene, of: Vec<u32>) -> Self {
+        let receives: Vec<bool> = scene.entities.iter().map(|entity| entity.receives).collect();
+        let mut receivers = vec![0; of.len()];
+        for (&group, &lit) in of.iter().zip(&receives) {
+            receivers[group as usize] += u32::from(lit);
+        }
+        Groups { receiver_count: receivers.iter().sum(), of, receives, receivers }
+    }
+
+    /// Whether the shadow or light of an entity can fall on another entity, because one other at least is lit.
+    pub fn is_seen(&self, entity: usize) -> bool {
+        self.receiver_count > u32::from(self.receives[entity])
+    }
+
+    /// Whether they can fall on an entity of another group.
+    pub fn is_seen_by_others(&self, entity: usize) -> bool {
+        self.receiver_count > self.receivers[self.of[entity] as usize]
     }
 
     /// Whether two entities never move against each other.
@@ -72,12 +97,29 @@ mod tests {
         assert!(groups.share(0, 3) && !groups.share(0, 1));
         scene.loosen(0);
         assert_eq!(Groups::new(&scene, Lights::Sharp).members(), [vec![0], vec![1], vec![2, 3]]);
-        assert_eq!(Groups::alone(2).members(), [[0], [1]]);
+        assert_eq!(Groups::alone(&scene).members(), [[0], [1], [2], [3]]);
+    }
+
+    #[test]
+    fn an_entity_is_seen_where_another_is_lit() {
+        let mut scene = scene("");
+        for entity in &mut scene.entities {
+            entity.receives = false;
+        }
+        let seen = |scene: &Scene| {
+            let groups = Groups::new(scene, Lights::Sharp);
+            (0..4).map(|e| (groups.is_seen(e), groups.is_seen_by_others(e))).collect::<Vec<_>>()
+        };
+        assert_eq!(seen(&scene), [(false, false); 4]);
+        scene.entities[2].receives = true;
+        assert_eq!(seen(&scene), [(true, false), (true, true), (false, false), (true, false)]);
+        scene.entities[1].receives = true;
+        assert_eq!(seen(&scene), [(true, true); 4]);
     }
 
     #[test]
     fn a_light_in_bands_leaves_every_entity_alone() {
         let scene = scene("emission = [1, 1, 1]");
-        assert_eq!(Groups::new(&scene, Lights::Sharp), Groups::alone(4));
+        assert_eq!(Groups::new(&scene, Lights::Sharp), Groups::alone(&scene));
     }
 }

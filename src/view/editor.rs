@@ -136,8 +136,7 @@ impl Editor {
 
     /// Fields that a mesh needs for its entities' switches: occlusion, radiance.
     pub fn needs(&self, mesh: usize) -> [Option<quantity::FieldKind>; 2] {
-        let alone = Groups::alone(self.scene.entities.len());
-        bake::needs(&self.scene, mesh, crate::scene::Lights::Sh, &alone).fields
+        bake::needs(&self.scene, mesh, crate::scene::Lights::Sh, &Groups::alone(&self.scene)).fields
     }
 
     /// Advances the time by `dt_s` seconds if the motion runs. Placements depend only on the sum of all `dt_s`.

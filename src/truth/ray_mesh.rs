@@ -14,10 +14,15 @@ use obvhs::triangle::Triangle;
 use rayon::prelude::*;
 use std::time::Duration;
 
+/// Lengths in a hierarchy over bounding radii. [`CwBvh`] leaves out every box that a ray has left 1e-4 after its start:
+/// of a flat mesh, whose boxes have no depth, all that lies so near. This makes it 1e-7 bounding radii. A power of two
+/// rounds nothing.
+const ENLARGED: f32 = 1024.0;
+
 /// One mesh with its bounding volume hierarchy.
 pub struct RayMesh {
     hierarchy: CwBvh,
-    /// Triangles in the order of the hierarchy's leaves.
+    /// Triangles in the order of the hierarchy's leaves, [`ENLARGED`] as those are.
     triangles: Vec<Triangle>,
     /// Colours of their corners, where the mesh has any.
     colors: Option<Vec<[Vec3; 3]>>,
@@ -43,7 +48,7 @@ impl RayMesh {
     /// Builds the hierarchy of one mesh.
     pub fn new(mesh: &Mesh) -> Self {
         let positions = unit_positions(mesh);
-        let corner = |i: u32| Vec3A::from(positions[i as usize]);
+        let corner = |i: u32| ENLARGED * Vec3A::from(positions[i as usize]);
         let unsorted: Vec<Triangle> =
             mesh.triangles.iter().map(|t| Triangle { v0: corner(t[0]), v1: corner(t[1]), v2: corner(t[2]) }).collect();
         let hierarchy = build_cwbvh_from_tris(&unsorted, BvhBuildParams::slow_build(), &mut Duration::default());
@@ -70,7 +75,7 @@ impl RayMesh {
         if limit <= 0.0 {
             return false;
         }
-        let ray = Ray::new(origin, direction, 0.0, limit);
+        let ray = Ray::new(ENLARGED * origin, direction, 0.0, ENLARGED * limit);
         // The distance that `intersect_embree` returns has a scale that depends on the triangle, but its test of the
         // limit has not.
         let met = |ray: &Ray, id: usize| {
@@ -81,19 +86,19 @@ impl RayMesh {
 
     /// Distance along a ray to its first intersection with the mesh.
     pub fn first_hit(&self, origin: Vec3A, direction: Vec3A) -> Option<f32> {
-        self.nearest(origin, direction).map(|hit| hit.t)
+        self.nearest(origin, direction).map(|hit| hit.t / ENLARGED)
     }
 
     /// A ray's first intersection: its distance, the triangle's number in the mesh, and the weights of the triangle's
     /// corners there.
     pub fn corners_hit(&self, origin: Vec3A, direction: Vec3A) -> Option<(f32, usize, [f32; 3])> {
         let hit = self.nearest(origin, direction)?;
-        let weights = self.weights(hit.primitive_id as usize, origin + hit.t * direction);
-        Some((hit.t, self.hierarchy.primitive_indices[hit.primitive_id as usize] as usize, weights))
+        let weights = self.weights(hit.primitive_id as usize, ENLARGED * origin + hit.t * direction);
+        Some((hit.t / ENLARGED, self.hierarchy.primitive_indices[hit.primitive_id as usize] as usize, weights))
     }
 
-    /// Areas of the three parts that a point cuts a triangle into, as shares; of a triangle without area, its first
-    /// corner.
+    /// Areas of the three parts that a point, [`ENLARGED`], cuts a triangle into, as shares; of a triangle without
+    /// area, its first corner.
     fn weights(&self, triangle: usize, at: Vec3A) -> [f32; 3] {
         let triangle = &self.triangles[triangle];
         let a = triangle.v0 - at;
@@ -104,8 +109,9 @@ impl RayMesh {
         if total > 0.0 { areas.map(|area| area / total) } else { [1.0, 0.0, 0.0] }
     }
 
+    /// A ray's first intersection, whose distance is [`ENLARGED`].
     fn nearest(&self, origin: Vec3A, direction: Vec3A) -> Option<RayHit> {
-        let ray = Ray::new_inf(origin, direction);
+        let ray = Ray::new_inf(ENLARGED * origin, direction);
         let mut hit = RayHit::none();
         // `intersect_embree` is no alternative: its distance has a scale that depends on the triangle.
         self.hierarchy.ray_traverse(ray, &mut hit, |ray, id| self.triangles[id].intersect(ray)).then_some(hit)
@@ -122,7 +128,7 @@ impl RayMesh {
             return self.blocks(origin, direction, f32::INFINITY).then_some(Vec3::ONE);
         };
         let hit = self.nearest(origin, direction)?;
-        let weights = self.weights(hit.primitive_id as usize, origin + hit.t * direction);
+        let weights = self.weights(hit.primitive_id as usize, ENLARGED * origin + hit.t * direction);
         let corners = &colors[hit.primitive_id as usize];
         Some(corners.iter().zip(weights).map(|(color, weight)| *color * weight).sum())
     }

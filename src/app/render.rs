@@ -206,7 +206,8 @@ impl<'a> Rendering<'a> {
     /// Writes all pictures: one file, an animated PNG, or numbered files.
     fn write_pictures(&mut self) -> Result<()> {
         let numbered = Numbered::new(&self.arguments.output)?;
-        let (arguments, [width, height]) = (self.arguments, self.options.size);
+        let arguments = self.arguments;
+        let [width, height] = self.options.size;
         let exposure_ev = self.scene.data.output.exposure_ev;
         if numbered.is_none() && arguments.frames > 1 {
             let frames = (0..arguments.frames).map(|index| Ok(picture::encode_srgb(&self.draw(index)?, exposure_ev)));

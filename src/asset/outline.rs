@@ -14,7 +14,8 @@ const AREA: f64 = 1e-3;
 pub(super) fn rectangle(mesh: &Mesh) -> Option<Rectangle> {
     let normal = mesh.plane_normal()?;
     let (centre, radius) = mesh.bounding_sphere();
-    let (centre, radius) = (centre.as_dvec3(), f64::from(radius));
+    let centre = centre.as_dvec3();
+    let radius = f64::from(radius);
     let place = |v: u32| mesh.positions[v as usize].as_dvec3() - centre;
     let places = || (0..mesh.positions.len() as u32).map(place);
     let most = |measure: &dyn Fn(DVec3) -> f64| places().max_by(|a, b| measure(*a).total_cmp(&measure(*b)));

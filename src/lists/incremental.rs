@@ -249,7 +249,8 @@ impl ClusterLists {
             (ends, entries)
         };
         let found: Vec<(Vec<(usize, u32)>, Vec<u32>)> = dirty.par_iter().map(of_group).collect();
-        let (mut clusters, mut all) = (Vec::new(), Vec::with_capacity(found.iter().map(|(_, s)| s.len()).sum()));
+        let mut clusters = Vec::new();
+        let mut all = Vec::with_capacity(found.iter().map(|(_, s)| s.len()).sum());
         for (dirty, (ends, entries)) in dirty.iter().zip(found) {
             let mut start = 0;
             for (&cluster, (end, sharp_count)) in dirty.clusters.iter().zip(ends) {

@@ -112,7 +112,8 @@ fn the_sun_of_a_picture_is_taken_out_whole() {
         let file = folder.path().join(name);
         let [width, height] = SIZE.map(f64::from);
         let texel = |i: u32| {
-            let (x, y) = (f64::from(i % SIZE[0]) + 0.5, f64::from(i / SIZE[0]) + 0.5);
+            let x = f64::from(i % SIZE[0]) + 0.5;
+            let y = f64::from(i / SIZE[0]) + 0.5;
             let (across, ahead) = (2.0 * PI * (x / width - 0.5)).sin_cos();
             let (level, up) = (PI * y / height).sin_cos();
             radiance(DVec3::new(level * across, up, -level * ahead))

@@ -64,7 +64,8 @@ fn a_ball_along_a_wall_and_over_an_edge() {
     );
     let scene = scene(&text);
     let mut frame = stage.frame(&scene, defaults(Lights::Sharp));
-    let (mut worst, mut pop) = (0.0_f64, 0.0_f64);
+    let mut worst = 0.0_f64;
+    let mut pop = 0.0_f64;
     let mut walk: Vec<Vec<[f32; 3]>> = Vec::new();
     for step in 0..=100 {
         let time_s = f64::from(step) / 100.0;

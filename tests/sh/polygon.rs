@@ -88,8 +88,9 @@ fn parts_add_up() {
                     true => (cut[axis], whole.high[axis]),
                     false => (whole.low[axis], cut[axis]),
                 };
-                let (x, y) = (side(x, 0), side(y, 1));
-                let part = Rectangle { low: [x.0, y.0], high: [x.1, y.1], ..whole };
+                let (left, right) = side(x, 0);
+                let (near, far) = side(y, 1);
+                let part = Rectangle { low: [left, near], high: [right, far], ..whole };
                 sum.iter_mut().zip(part.blocked()).for_each(|(sum, b)| *sum += b);
             }
             let off = worst(&sum, &whole.blocked());

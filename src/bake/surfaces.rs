@@ -6,7 +6,7 @@ use super::own_visibility::{Counts, Eye, PATTERN, Rays, Seen, Standing, see};
 use super::packet::Blockers;
 use super::refine::{Limits, Refined, refine};
 use super::triangles::distinct;
-use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted};
+use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
 use crate::asset::Mesh;
 use crate::asset::enclose::around_spheres;
 use crate::field::quantity::channel_stride;
@@ -17,6 +17,8 @@ use crate::scene::{Placement, Scene};
 use glam::{DMat3, DVec3, Quat, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -102,26 +104,23 @@ impl SurfacePlan {
             Member { mesh, placement, occludes: of.occludes, emits: of.emits, receives: of.receives, refines }
         };
         let mut plans: Vec<GroupPlan> = Vec::new();
+        // The plans of entities alone: those with equal meshes share what is baked.
+        let mut alone: HashMap<([u8; 32], bool, bool), usize> = HashMap::new();
         for entities in groups.members() {
-            let members: Vec<Member> = match entities[..] {
+            let members: Vec<Member> = if let [only] = entities[..] {
                 // What an entity blocks of its own view does not depend on its place.
-                [only] => vec![Member { occludes: true, emits: false, ..member(only, AT_ORIGIN) }],
-                _ => entities.iter().map(|&entity| member(entity, rest[entity])).collect(),
+                let member = Member { occludes: true, emits: false, ..member(only, AT_ORIGIN) };
+                let plan = alone.entry((member.mesh.content_hash(), member.receives, member.refines));
+                if let Entry::Occupied(known) = &plan {
+                    plans[*known.get()].entities.push(only);
+                    continue;
+                }
+                plan.or_insert(plans.len());
+                vec![member]
+            } else {
+                entities.iter().map(|&entity| member(entity, rest[entity])).collect()
             };
-            let mut plan = GroupPlan { entities, members, wanted, bands: options.bands, refinement, key: None };
-            plan.key = plan.needs_bake().then(|| plan.name());
-            // Entities alone with equal meshes share what is baked.
-            let is_alike = |other: &&mut GroupPlan| {
-                plan.members.len() == 1
-                    && other.members.len() == 1
-                    && other.members[0].receives == plan.members[0].receives
-                    && other.members[0].refines == plan.members[0].refines
-                    && other.members[0].mesh.content_hash() == plan.members[0].mesh.content_hash()
-            };
-            match plans.iter_mut().find(is_alike) {
-                Some(known) => known.entities.extend(&plan.entities),
-                None => plans.push(plan),
-            }
+            plans.push(GroupPlan { entities, members, wanted, bands: options.bands, refinement, key: None }.named());
         }
         SurfacePlan { groups: plans }
     }
@@ -146,16 +145,19 @@ impl GroupPlan {
             refines: false,
         }];
         let bands = options.bands;
-        let mut plan = GroupPlan { entities: Vec::new(), members, wanted, bands, refinement: None, key: None };
-        plan.key = plan.needs_bake().then(|| plan.name());
-        plan
+        GroupPlan { entities: Vec::new(), members, wanted, bands, refinement: None, key: None }.named()
+    }
+
+    /// The plan with its name in the cache.
+    fn named(mut self) -> Self {
+        self.key = self.needs_bake().then(|| self.name());
+        self
     }
 
     fn needs_bake(&self) -> bool {
-        let shades_itself = |mesh: &Mesh| !mesh.is_flat() && !mesh.is_convex();
         let lit = self.wanted.transfer || self.wanted.self_visibility;
         match &self.members[..] {
-            [only] => lit && only.receives && (shades_itself(&only.mesh) || only.refines),
+            [only] => lit && only.receives && (bakes_transfer(&only.mesh) || only.refines),
             members => lit && members.iter().any(|member| member.receives),
         }
     }

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
@@ -397,11 +397,8 @@ impl GroupSpace<'_> {
         let plan = self.group.plan;
         let order = cluster_order(&mesh);
         let nudges = self.nudges(&mesh.positions, &mesh.normals, &mesh.triangles);
-        let mut middles: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.positions.len()];
-        for triangle in &mesh.triangles {
-            let middle = triangle.iter().map(|&v| mesh.positions[v as usize]).sum::<Vec3>() / 3.0;
-            triangle.iter().for_each(|&v| middles[v as usize].push(middle));
-        }
+        // Few meshes have buried vertices, which alone ask for their triangles.
+        let around = OnceLock::new();
         let stride = channel_stride(plan.bands);
         let mut transfer = vec![0.0; mesh.positions.len() * stride];
         let mut maps = vec![0; if wanted.self_visibility { mesh.positions.len() * BYTES } else { 0 }];
@@ -415,16 +412,24 @@ impl GroupSpace<'_> {
                 let in_map = |member: u32| near.binary_search(&member).is_ok();
                 let vertex = |&v: &u32| {
                     let v = v as usize;
-                    let (position, normal, nudge) = (mesh.positions[v], mesh.normals[v], nudges[v]);
+                    let normal = mesh.normals[v];
+                    let nudge = nudges[v];
                     let in_map = wanted.self_visibility.then_some(&in_map as &(dyn Fn(u32) -> bool + Sync));
                     let see = |position| self.see_with(position, normal, nudge, Rays::Many, in_map);
+                    let position = mesh.positions[v];
                     let here = see(position);
                     if !here.buried {
                         return here;
                     }
-                    let ways = WAYS_OUT.iter().flat_map(|way| middles[v].iter().map(move |m| position.lerp(*m, *way)));
+                    let middle = |triangle: u32| {
+                        let corners = mesh.triangles[triangle as usize].iter();
+                        corners.map(|&v| mesh.positions[v as usize]).sum::<Vec3>() / 3.0
+                    };
+                    let middles =
+                        || around.get_or_init(|| Around::new(&mesh)).of(v).iter().map(|&triangle| middle(triangle));
+                    let mut ways = WAYS_OUT.iter().flat_map(|way| middles().map(|m| position.lerp(m, *way)));
                     let free = |place: &Vec3| !self.see(*place, normal, nudge, Rays::Few).buried;
-                    ways.into_iter().find(free).map_or(here, see)
+                    ways.find(free).map_or(here, see)
                 };
                 let seen: Vec<Seen> = cluster.par_iter().with_max_len(8).map(vertex).collect();
                 (near, seen)
@@ -449,6 +454,36 @@ impl GroupSpace<'_> {
             self_visibility: (any_blocked && wanted.self_visibility).then(|| Arc::new(maps)),
             near,
         }
+    }
+}
+
+/// The triangles around every vertex of a mesh.
+struct Around {
+    triangles: Vec<u32>,
+    /// Where those of each vertex begin, and where those of the last end.
+    starts: Vec<u32>,
+}
+
+impl Around {
+    fn new(mesh: &Mesh) -> Self {
+        let mut starts = vec![0; mesh.positions.len() + 1];
+        mesh.triangles.iter().flatten().for_each(|&v| starts[v as usize + 1] += 1);
+        for v in 1..starts.len() {
+            starts[v] += starts[v - 1];
+        }
+        let mut next = starts.clone();
+        let mut triangles = vec![0; 3 * mesh.triangles.len()];
+        for (index, triangle) in mesh.triangles.iter().enumerate() {
+            for &v in triangle {
+                triangles[next[v as usize] as usize] = index as u32;
+                next[v as usize] += 1;
+            }
+        }
+        Around { triangles, starts }
+    }
+
+    fn of(&self, v: usize) -> &[u32] {
+        &self.triangles[self.starts[v] as usize..self.starts[v + 1] as usize]
     }
 }
 

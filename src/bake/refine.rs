@@ -28,8 +28,8 @@ pub(super) struct Refined {
     /// Equal positions have equal numbers.
     places: Vec<u32>,
     place_of: HashMap<[u32; 3], u32>,
-    /// Transfer vectors of the vertices; empty before they are asked for.
-    transfers: Vec<Vec<f32>>,
+    /// Transfer vectors of the vertices; `None` where no rays are cast yet.
+    transfers: Vec<Option<Vec<f32>>>,
     /// Transfer vectors at the middles of edges between two vertices, and their difference to the ends' mean.
     middles: HashMap<(u32, u32), (Vec<f32>, f32)>,
 }
@@ -49,7 +49,7 @@ impl Refined {
             triangles: mesh.triangles.clone(),
             places: Vec::new(),
             place_of: HashMap::new(),
-            transfers: Vec::new(),
+            transfers: vec![None; mesh.positions.len()],
             middles: HashMap::new(),
         };
         mesh.positions.iter().for_each(|&position| refined.add_position(position));
@@ -84,21 +84,22 @@ impl Refined {
     /// Casts rays from the vertices that have no transfer vector yet, and from the middles of edges longer than
     /// `least_m`.
     fn look(&mut self, space: &GroupSpace<'_>, least_m: f32) {
-        let new = self.transfers.len()..self.positions.len();
         let nudges = space.nudges(&self.positions, &self.normals, &self.triangles);
-        let vertex = |v: usize| space.see(self.positions[v], self.normals[v], nudges[v], Rays::Few).transfer;
-        let transfers: Vec<Vec<f32>> = new.into_par_iter().map(vertex).collect();
-        self.transfers.extend(transfers);
+        let Refined { transfers, positions, normals, .. } = self;
+        transfers.par_iter_mut().enumerate().for_each(|(v, transfer)| {
+            transfer.get_or_insert_with(|| space.see(positions[v], normals[v], nudges[v], Rays::Few).transfer);
+        });
         let mut edges: Vec<Edge> = self.edges().into_iter().collect();
         edges.retain(|edge| !self.middles.contains_key(edge) && self.length(*edge) > least_m);
         edges.sort_unstable();
+        let transfer_of = |v: usize| self.transfers[v].as_ref().expect("rays are cast from every vertex above");
         let middle = |&(a, b): &Edge| {
             let [a_index, b_index] = [a as usize, b as usize];
             let position = 0.5 * (self.positions[a_index] + self.positions[b_index]);
             let normal = (self.normals[a_index] + self.normals[b_index]).normalize_or(self.normals[a_index]);
             let nudge = 0.5 * (nudges[a_index] + nudges[b_index]);
             let Seen { transfer, buried, .. } = space.see(position, normal, nudge, Rays::Few);
-            let ends = self.transfers[a_index].iter().zip(&self.transfers[b_index]);
+            let ends = transfer_of(a_index).iter().zip(transfer_of(b_index));
             let squares = transfer.iter().zip(ends).map(|(middle, (a, b))| (middle - 0.5 * (a + b)).powi(2));
             let difference = if buried { 0.0 } else { squares.sum::<f32>().sqrt() / COSINE_LENGTH };
             ((a, b), (transfer, difference))
@@ -173,11 +174,7 @@ impl Refined {
         if let Some(colors) = &mut self.colors {
             colors.push(0.5 * (colors[low] + colors[high]));
         }
-        if let Some((transfer, _)) = self.middles.remove(&(a, b))
-            && self.transfers.len() + 1 == self.positions.len()
-        {
-            self.transfers.push(transfer);
-        }
+        self.transfers.push(self.middles.remove(&(a, b)).map(|(transfer, _)| transfer));
         self.positions.len() as u32 - 1
     }
 

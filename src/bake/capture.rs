@@ -115,7 +115,7 @@ impl Capture {
     }
 
     /// Faces in a row of the atlas.
-    pub fn columns(device: &Device, face_px: u32, kind: FieldKind) -> u32 {
+    fn columns(device: &Device, face_px: u32, kind: FieldKind) -> u32 {
         let atlas_px = ATLAS_PX.min(device.most_image_px());
         // The texels of a radiance capture are 16 times as large. Six faces always fit.
         (if kind == FieldKind::Radiance { atlas_px / 2 } else { atlas_px } / face_px).max(3)

@@ -71,7 +71,7 @@ pub type Progress<'p> = &'p dyn Fn(u32, u32);
 /// What a bake did, and where its time went.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct BakeReport {
-    /// Number of samples that stand at their own place, or of maps of a silhouette field.
+    /// Number of samples that stand at their own place, of maps of a silhouette field, or of lit vertices.
     pub samples: u32,
     /// Number of samples inside the solid. They were captured off the nearest surface or, if that sees nothing, filled
     /// from neighbours.
@@ -113,7 +113,6 @@ impl Wanted {
     pub const BOTH: Wanted = Wanted { transfer: true, self_visibility: true };
     /// Transfer vectors alone.
     pub const TRANSFER: Wanted = Wanted { transfer: true, self_visibility: false };
-    pub const SELF_VISIBILITY: Wanted = Wanted { transfer: false, self_visibility: true };
 }
 
 /// Bakes on one device. A baker has no options of its own: everything that decides a stored number stands in

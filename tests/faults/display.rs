@@ -34,7 +34,8 @@ impl Own {
         let root = &connection.setup().roots[screen];
         let window = connection.generate_id().unwrap();
         let look = CreateWindowAux::new().background_pixel(root.black_pixel);
-        let ([width, height], class) = (SIZE.map(|side| side as u16), WindowClass::INPUT_OUTPUT);
+        let [width, height] = SIZE.map(|side| side as u16);
+        let class = WindowClass::INPUT_OUTPUT;
         let depth = root.root_depth;
         let visual = root.root_visual;
         connection.create_window(depth, window, root.root, 0, 0, width, height, 0, class, visual, &look).unwrap();

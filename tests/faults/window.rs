@@ -40,7 +40,8 @@ pub fn viewer(
     options: DeviceOptions,
     (format, encodes_srgb): (ash::vk::Format, bool),
 ) -> Result<Viewer> {
-    let (cache_dir, path) = (folder.join("cache"), folder.join("scene.toml"));
+    let cache_dir = folder.join("cache");
+    let path = folder.join("scene.toml");
     let setup = Setup {
         device,
         options,

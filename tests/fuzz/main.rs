@@ -115,7 +115,8 @@ impl Target {
     }
 
     fn fuzz(&self, time: Duration, most: u64, seed: u64) -> Tally {
-        let (mut tally, mut known) = (Tally::default(), HashSet::new());
+        let mut tally = Tally::default();
+        let mut known = HashSet::new();
         let mut seeds = (self.seeds)();
         for input in &seeds {
             let said = self.run(input, &mut tally);
@@ -127,7 +128,8 @@ impl Target {
             known.insert(self.run(&input, &mut tally));
             seeds.push(input);
         }
-        let (mut random, start) = (Rng::with_seed(seed), Instant::now());
+        let mut random = Rng::with_seed(seed);
+        let start = Instant::now();
         while start.elapsed() < time && tally.executions < most {
             // Half of all inputs come of those that are good.
             let among = if random.bool() { good } else { seeds.len() };

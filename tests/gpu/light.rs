@@ -308,7 +308,8 @@ fn spinning_sphere_shows_the_interpolation_error() {
         let rotation = Quat::from_axis_angle(axis, 0.5 * f32::from(i));
         spins.push(stage.light(&mut frame, &[at(0.0, 0.0, 0.0), turned(rotation)]).swap_remove(0));
     }
-    let (mut worst, mut square) = (0.0_f64, 0.0);
+    let mut worst = 0.0_f64;
+    let mut square = 0.0;
     for v in 0..spins[0].len() {
         let mean = spins.iter().map(|s| f64::from(s[v][0])).sum::<f64>() / spins.len() as f64;
         for spin in &spins {

@@ -273,7 +273,8 @@ fn every_barrier_is_needed() {
     let (rest, mut moved) = (scene.at(0.0), scene.at(0.0));
     moved.iter_mut().for_each(|p| p.position.x += 0.3);
     frame.render(&rest, Some(1.0)).unwrap();
-    let (light, picture) = (frame.radiosity(0).unwrap(), frame.picture());
+    let light = frame.radiosity(0).unwrap();
+    let picture = frame.picture();
     let refused = |frame: &mut Frame, stage: &Stage, index: usize| {
         stage.gpu.device.omit_barrier(Some(index));
         let outcome = frame.render(&moved, Some(1.0));

@@ -67,7 +67,8 @@ fn by_vertex(frame: &Frame, sorted: &Sort<'_>) -> (Vec<[f64; 3]>, BTreeMap<Vec<u
     let objects: Vec<MergeObject<'_>> = scene.entities.iter().zip(&placements).map(object).collect();
     let sky = scene.environment.coefficients(4);
     let mesh = &scene.meshes[0];
-    let (mut out, mut orders) = (Vec::new(), BTreeMap::new());
+    let mut out = Vec::new();
+    let mut orders = BTreeMap::new();
     for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
         let (position, normal) = (position.as_dvec3() - frame.buffers.meshes[0].centre_m, normal.as_dvec3());
         let distance = |j: usize| objects[j].centre.distance(objects[0].centre + position);

@@ -193,7 +193,8 @@ fn direct_light_is_that_of_rays() {
     let mut sums = [[0.0; 3]; 5];
     for _ in 0..VERTICES {
         let index = rng.usize(..mesh.positions.len());
-        let (map, transfer) = (&maps[index * BYTES..][..BYTES], &transfer[index * stride..][..16]);
+        let map = &maps[index * BYTES..][..BYTES];
+        let transfer = &transfer[index * stride..][..16];
         let view = world.view(Vertex { entity: 0, index });
         let normal = mesh.normals[index].as_dvec3();
         for _ in 0..LIGHTS {

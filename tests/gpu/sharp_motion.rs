@@ -87,7 +87,10 @@ fn a_light_grows_without_a_step() {
     let scene = scene(SIDE - 1);
     let mut frame = frame(&gpu, &scene);
     let mut placements = scene.at(0.0);
-    let (mut before, mut worst, mut sum, mut count) = ([Vec::new(), Vec::new()], [0.0_f64; 2], 0.0, 0);
+    let mut before = [Vec::new(), Vec::new()];
+    let mut worst = [0.0_f64; 2];
+    let mut sum = 0.0;
+    let mut count = 0;
     for step in 0..=STEPS {
         let angle_deg = 0.1 * 600_f64.powf(step as f64 / STEPS as f64);
         // The angle as it is seen from the floor below.
@@ -150,7 +153,8 @@ fn vertices_do_not_flicker_in_slow_motion() {
     let Some(gpu) = gpu() else { return };
     let scene = scene(SIDE - 1);
     let mut frame = frame(&gpu, &scene);
-    let (mut before, mut changes) = (None::<[Vec<f64>; 2]>, vec![[0.0_f64; 2]; SIDE]);
+    let mut before = None::<[Vec<f64>; 2]>;
+    let mut changes = vec![[0.0_f64; 2]; SIDE];
     for placements in in_motion(&scene) {
         let now = lit(&mut frame, &scene, &placements, 7, 1500);
         if let Some(before) = before {

@@ -272,7 +272,9 @@ fn nothing_pops_as_fields_become_caps() {
         let options = frame::Options { bake, ..small() };
         let mut caps = stage.frame(&scene, options);
         let mut fields = stage.frame(&scene, frame::Options { skip: Skip::without("caps"), ..options });
-        let (mut walk, mut apart, mut brightest) = (Vec::new(), 0.0_f32, 0.0);
+        let mut walk = Vec::new();
+        let mut apart = 0.0_f32;
+        let mut brightest = 0.0;
         let mut kinds = std::collections::BTreeSet::new();
         for i in 0..100 {
             let d = 1.0 + 0.03 * i as f32;

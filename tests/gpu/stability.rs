@@ -35,7 +35,8 @@ fn balls(count: usize, distinct: bool) -> Scene {
     );
     let mut rng = fastrand::Rng::with_seed(12);
     for _ in 0..count {
-        let (turn, up) = (std::f64::consts::TAU * rng.f64(), 0.3 + 0.7 * rng.f64());
+        let turn = std::f64::consts::TAU * rng.f64();
+        let up = 0.3 + 0.7 * rng.f64();
         let across = 2.0 * (1.0 - up * up).sqrt();
         let at = if distinct { [across * turn.cos(), 2.0 * up, across * turn.sin()] } else { [0.4, 0.9, 0.1] };
         text += &format!("[[entity]]\nmesh = \"ball\"\nreceives = false\nposition = {at:?}\n");

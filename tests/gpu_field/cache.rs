@@ -32,7 +32,8 @@ fn cached(device: &Arc<Device>, folder: &Path, mesh: &Mesh, header: &mut FieldHe
 fn the_cache_finds_what_it_holds_and_replaces_what_is_damaged() {
     let Some(gpu) = gpu() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let (mesh, options) = (torus(), small("cube:10x4", Storage::F16, 4));
+    let mesh = torus();
+    let options = small("cube:10x4", Storage::F16, 4);
     let fresh = || bake::header(&mesh, FieldKind::Occlusion, &options);
     let mut header = fresh();
     let (baked, bytes) = cached(&gpu.device, folder.path(), &mesh, &mut header);
@@ -140,7 +141,8 @@ fn the_cache_keeps_surfaces_and_bakes_damaged_ones_anew() {
 #[test]
 fn without_a_folder_a_bake_is_kept_in_memory() {
     let Some(gpu) = gpu() else { return };
-    let (mesh, options) = (generate::torus(1.0, 0.3, 12, 8), small("cube:2x1", Storage::F16, 2));
+    let mesh = generate::torus(1.0, 0.3, 12, 8);
+    let options = small("cube:2x1", Storage::F16, 2);
     let baker = Baker::new(&gpu.device, &gpu.library);
     let header = bake::header(&mesh, FieldKind::Occlusion, &options);
     let alone = GroupPlan::alone(&Arc::new(mesh.clone()), &options, Wanted::TRANSFER);
@@ -164,7 +166,8 @@ fn without_a_folder_a_bake_is_kept_in_memory() {
 fn two_devices_bake_into_one_cache() {
     let Some(_gpu) = gpu() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let (mesh, options) = (torus(), small("cube:6x3", Storage::F16, 4));
+    let mesh = torus();
+    let options = small("cube:6x3", Storage::F16, 4);
     let outcomes = std::thread::scope(|scope| {
         let threads = [0, 1].map(|_| {
             scope.spawn(|| {

@@ -216,7 +216,8 @@ fn one_colour_shines_where_it_blocks() {
     let color = Vec3::new(0.5, 2.0, 7.0);
     for mesh in [torus(), common::pot(2)] {
         let colors = Some(vec![color; mesh.positions.len()]);
-        let (name, triangles) = (mesh.name.clone(), mesh.triangles.clone());
+        let name = mesh.name.clone();
+        let triangles = mesh.triangles.clone();
         let bright = Mesh::new(name, mesh.positions.clone(), mesh.normals.clone(), colors, triangles).unwrap();
         let options = small("cube:5x3", Storage::F32, 4);
         let blocked = bake_field(&gpu.device, &mesh, FieldKind::Occlusion, &options);
@@ -305,7 +306,8 @@ fn a_field_lands_at_its_place_in_a_scene() {
 #[test]
 fn progress_is_told_up_to_the_end() {
     let Some(gpu) = gpu() else { return };
-    let (mesh, options) = (generate::sphere(1.0, 1), small("cube:3x4", Storage::F16, 4));
+    let mesh = generate::sphere(1.0, 1);
+    let options = small("cube:3x4", Storage::F16, 4);
     let header = bake::header(&mesh, FieldKind::Occlusion, &options);
     let told = std::cell::RefCell::new(Vec::new());
     let progress = |done, all| told.borrow_mut().push((done, all));

@@ -129,7 +129,8 @@ fn the_exact_chain_of_balls_is_that_of_their_closed_forms() {
             t[..bands * bands].copy_from_slice(&lobe::clamped_cosine(bands, DVec3::Y));
             let balls = [(DVec3::new(0.0, 1.0, 0.0), 0.5), (DVec3::new(0.9, 1.4, 0.3), 0.4)];
             for (centre, radius) in balls {
-                let (blocked, mut product) = (lobe::sphere(bands, centre - *position, radius), [0.0; MAX_COEFFICIENTS]);
+                let blocked = lobe::sphere(bands, centre - *position, radius);
+                let mut product = [0.0; MAX_COEFFICIENTS];
                 tensor.multiply(&t, &blocked, &mut product);
                 t.iter_mut().zip(product).for_each(|(t, p)| *t -= p);
             }
@@ -277,7 +278,8 @@ fn a_pixel_is_lit_where_its_middle_meets_the_floor() {
     use shadow_fields::draw::camera::clip_from_world;
     let light = bulb(0.2, [0.3, 1.5, 0.4]);
     let scene = scene(&format!("{light}{}", ball(0.3, [-1.0, 0.3, 0.5])));
-    let (size, cast) = ([48, 32], RayCast { rays: 64, runs: 1, ..Default::default() });
+    let size = [48, 32];
+    let cast = RayCast { rays: 64, runs: 1, ..Default::default() };
     let lit = shadow_fields::truth::pixels::pixels(&scene, &scene.at(0.0), size, &cast);
     let to_world = clip_from_world(&scene.data.camera, 1.5).inverse();
     let eye = scene.data.camera.eye.as_dvec3();

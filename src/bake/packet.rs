@@ -1,11 +1,11 @@
 //! Rays from one point against a hierarchy of triangles, sixteen at a time: what a box or a triangle costs is shared by
-//! all, and the compiler turns loops over them into vector instructions, of eight lanes where the processor has AVX2.
+//! all, and vector instructions take eight of them where the processor has AVX2.
 
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2_from_tris};
 use obvhs::triangle::Triangle;
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 use std::time::Duration;
 
 /// Rays of a packet.
@@ -64,42 +64,67 @@ impl Packet {
 
     /// Whether any ray enters a box, given from the rays' origin, nearer than what it has met.
     #[inline(always)]
-    fn enters(&self, low: Vec3A, high: Vec3A) -> bool {
-        let mut from = [0.0_f32; LANES];
-        let mut to = self.distance;
-        for k in 0..3 {
-            for i in 0..LANES {
-                let a = low[k] * self.inverse[k][i];
-                let b = high[k] * self.inverse[k][i];
-                let (near, far) = if a < b { (a, b) } else { (b, a) };
-                from[i] = if near > from[i] { near } else { from[i] };
-                to[i] = if far < to[i] { far } else { to[i] };
+    fn enters<S: Simd>(&self, simd: S, low: Vec3A, high: Vec3A) -> bool {
+        let distance = vectors::<S>(&self.distance);
+        for i in 0..distance.len() {
+            let mut from = simd.splat_f32s(0.0);
+            let mut to = distance[i];
+            for k in 0..3 {
+                let inverse = vectors::<S>(&self.inverse[k])[i];
+                let a = simd.mul_f32s(simd.splat_f32s(low[k]), inverse);
+                let b = simd.mul_f32s(simd.splat_f32s(high[k]), inverse);
+                from = simd.max_f32s(from, simd.min_f32s(a, b));
+                to = simd.min_f32s(to, simd.max_f32s(a, b));
+            }
+            if simd.first_true_m32s(simd.less_than_or_equal_f32s(from, to)) < S::F32_LANES {
+                return true;
             }
         }
-        (0..LANES).fold(false, |any, i| any | (from[i] <= to[i]))
+        false
     }
 
     /// Möller, Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, 1997, with the products that all rays from
     /// one origin share.
     #[inline(always)]
-    fn meet(&mut self, origin: Vec3A, corners: &Corners, index: u32) {
+    fn meet<S: Simd>(&mut self, simd: S, origin: Vec3A, corners: &Corners, index: u32) {
         let to_corner = corners.corner - origin;
         let second = corners.edges[1].cross(to_corner);
         let first = to_corner.cross(corners.edges[0]);
-        let along = corners.normal.dot(to_corner);
-        let [x, y, z] = &self.direction;
-        for i in 0..LANES {
-            let facing = x[i] * corners.normal.x + y[i] * corners.normal.y + z[i] * corners.normal.z;
-            let inverse = 1.0 / facing;
-            let u = (x[i] * second.x + y[i] * second.y + z[i] * second.z) * inverse;
-            let v = (x[i] * first.x + y[i] * first.y + z[i] * first.z) * inverse;
-            let distance = along * inverse;
-            let within = (u >= -SLACK) & (v >= -SLACK) & (u + v <= 1.0 + SLACK);
-            let meets = within & (distance > 0.0) & (distance < self.distance[i]);
-            self.distance[i] = if meets { distance } else { self.distance[i] };
-            self.triangle[i] = if meets { index } else { self.triangle[i] };
+        let along = simd.splat_f32s(corners.normal.dot(to_corner));
+        let least = simd.splat_f32s(-SLACK);
+        let most = simd.splat_f32s(1.0 + SLACK);
+        let [x, y, z] = [0, 1, 2].map(|k| vectors::<S>(&self.direction[k]));
+        let (distances, _) = S::as_mut_simd_f32s(&mut self.distance);
+        let (triangles, _) = S::as_mut_simd_u32s(&mut self.triangle);
+        for i in 0..x.len() {
+            let dot = |v: Vec3A| {
+                let sum = simd.mul_f32s(x[i], simd.splat_f32s(v.x));
+                let sum = simd.add_f32s(sum, simd.mul_f32s(y[i], simd.splat_f32s(v.y)));
+                simd.add_f32s(sum, simd.mul_f32s(z[i], simd.splat_f32s(v.z)))
+            };
+            let inverse = simd.div_f32s(simd.splat_f32s(1.0), dot(corners.normal));
+            let u = simd.mul_f32s(dot(second), inverse);
+            let v = simd.mul_f32s(dot(first), inverse);
+            let distance = simd.mul_f32s(along, inverse);
+            let within = simd.and_m32s(
+                simd.and_m32s(simd.greater_than_or_equal_f32s(u, least), simd.greater_than_or_equal_f32s(v, least)),
+                simd.less_than_or_equal_f32s(simd.add_f32s(u, v), most),
+            );
+            let nearer = simd.and_m32s(
+                simd.greater_than_f32s(distance, simd.splat_f32s(0.0)),
+                simd.less_than_f32s(distance, distances[i]),
+            );
+            let meets = simd.and_m32s(within, nearer);
+            distances[i] = simd.select_f32s(meets, distance, distances[i]);
+            triangles[i] = simd.select_u32s(meets, simd.splat_u32s(index), triangles[i]);
         }
     }
+}
+
+/// The lanes as vectors of the processor.
+#[inline(always)]
+fn vectors<S: Simd>(lanes: &[f32; LANES]) -> &[S::f32s] {
+    S::as_simd_f32s(lanes).0
 }
 
 /// A traversal as it is dispatched to what the processor has.
@@ -107,15 +132,42 @@ struct Traverse<'t, F> {
     blockers: &'t Blockers,
     origin: Vec3A,
     packet: &'t mut Packet,
+    open: &'t mut Vec<u32>,
     counts: &'t F,
 }
 
-impl<F: Fn(u32) -> bool> pulp::NullaryFnOnce for Traverse<'_, F> {
+impl<F: Fn(u32) -> bool> WithSimd for Traverse<'_, F> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
-        self.blockers.traverse(self.origin, self.packet, self.counts);
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Traverse { blockers, origin, packet, open, counts } = self;
+        if blockers.triangles.is_empty() {
+            return;
+        }
+        let nodes = &blockers.hierarchy.nodes;
+        open.push(0);
+        while let Some(index) = open.pop() {
+            let node = &nodes[index as usize];
+            if !packet.enters(simd, node.aabb.min - origin, node.aabb.max - origin) {
+                continue;
+            }
+            if node.prim_count > 0 {
+                for triangle in node.first_index..node.first_index + node.prim_count {
+                    if counts(blockers.members[triangle as usize]) {
+                        packet.meet(simd, origin, &blockers.triangles[triangle as usize], triangle);
+                    }
+                }
+                continue;
+            }
+            // The child that lies nearer along the rays comes first.
+            let [a, b] = [node.first_index, node.first_index + 1];
+            let towards = |child: u32| {
+                let aabb = &nodes[child as usize].aabb;
+                (aabb.min + aabb.max).dot(packet.middle)
+            };
+            open.extend(if towards(a) < towards(b) { [b, a] } else { [a, b] });
+        }
     }
 }
 
@@ -149,9 +201,10 @@ impl Blockers {
     ) {
         hits.clear();
         let arch = Arch::new();
+        let mut open = Vec::new();
         for rays in directions.chunks(LANES) {
             let mut packet = Packet::new(rays);
-            arch.dispatch(Traverse { blockers: self, origin, packet: &mut packet, counts: &counts });
+            arch.dispatch(Traverse { blockers: self, origin, packet: &mut packet, open: &mut open, counts: &counts });
             hits.extend(rays.iter().enumerate().map(|(lane, direction)| {
                 let triangle = packet.triangle[lane];
                 (triangle != u32::MAX).then(|| BlockerHit {
@@ -160,36 +213,6 @@ impl Blockers {
                     from_behind: self.triangles[triangle as usize].normal.dot(*direction) > 0.0,
                 })
             }));
-        }
-    }
-
-    #[inline(always)]
-    fn traverse(&self, origin: Vec3A, packet: &mut Packet, counts: &impl Fn(u32) -> bool) {
-        if self.triangles.is_empty() {
-            return;
-        }
-        let nodes = &self.hierarchy.nodes;
-        let mut open = vec![0_u32];
-        while let Some(index) = open.pop() {
-            let node = &nodes[index as usize];
-            if !packet.enters(node.aabb.min - origin, node.aabb.max - origin) {
-                continue;
-            }
-            if node.prim_count > 0 {
-                for triangle in node.first_index..node.first_index + node.prim_count {
-                    if counts(self.members[triangle as usize]) {
-                        packet.meet(origin, &self.triangles[triangle as usize], triangle);
-                    }
-                }
-                continue;
-            }
-            // The child that lies nearer along the rays comes first.
-            let [a, b] = [node.first_index, node.first_index + 1];
-            let towards = |child: u32| {
-                let aabb = &nodes[child as usize].aabb;
-                (aabb.min + aabb.max).dot(packet.middle)
-            };
-            open.extend(if towards(a) < towards(b) { [b, a] } else { [a, b] });
         }
     }
 }

@@ -161,6 +161,11 @@ impl Output {
     pub fn white(&self) -> f32 {
         (-self.exposure_ev).exp2()
     }
+
+    /// Width over height.
+    pub fn aspect(&self) -> f64 {
+        f64::from(self.width) / f64::from(self.height)
+    }
 }
 
 impl Default for Output {

@@ -7,6 +7,7 @@ pub mod data;
 pub mod export;
 #[cfg(feature = "cli")]
 pub(crate) mod files;
+pub(crate) mod framing;
 pub mod gltf;
 pub mod groups;
 pub mod keys;
@@ -56,6 +57,8 @@ pub struct Scene {
     suns: Vec<Placement>,
     /// Distant light.
     pub environment: Environment,
+    /// Whether the file has no camera, so that the scene's was added.
+    camera_added: bool,
 }
 
 /// The properties of an entity that do not depend on time.
@@ -109,10 +112,11 @@ impl Scene {
         if !gltf::is_gltf(path) {
             return Ok((Self::load_toml(path)?, gltf::Notes::default()));
         }
-        let gltf::Import { data, meshes, notes } = gltf::load(path)?;
+        let gltf::Import { data, meshes, camera_added, notes } = gltf::load(path)?;
         let entities = resolve_all(&data, &meshes, |_, what| Error::input(path, what))?;
         let environment = Environment::new(&data.environment, &read_named).map_err(|e| e.context(path.display()))?;
-        Ok((Self::assemble(data, meshes, entities, environment), notes))
+        let scene = Self { camera_added, ..Self::assemble(data, meshes, entities, environment) };
+        Ok((scene, notes))
     }
 
     fn load_toml(path: &Path) -> Result<Self> {
@@ -167,6 +171,7 @@ impl Scene {
             loose: BTreeSet::new(),
             suns: Vec::new(),
             environment,
+            camera_added: false,
         };
         scene.place_suns();
         scene
@@ -175,6 +180,17 @@ impl Scene {
     /// The mesh of an entity as it is lit and drawn: its own, or a finer one of the same shape.
     pub fn surface(&self, entity: usize) -> &Arc<Mesh> {
         self.surfaces.get(entity).unwrap_or_else(|| &self.meshes[self.entities[entity].mesh])
+    }
+
+    /// Places the camera anew for pictures of that width over height, where the file has none.
+    pub fn fit_added_camera(&mut self, aspect: f64) {
+        if self.camera_added {
+            // Lamps are no part of what is looked at.
+            let shown = |(at, _): &(usize, &EntityData)| self.entities[*at].receives;
+            let things = self.data.entities.iter().enumerate().filter(shown);
+            let things = things.map(|(at, data)| (&*self.meshes[self.entities[at].mesh], data.at(0.0)));
+            self.data.camera = framing::camera(&framing::points(things), aspect);
+        }
     }
 
     /// Gives every entity its surface.

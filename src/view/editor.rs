@@ -10,7 +10,7 @@ use crate::asset::sky::Sky;
 use crate::bake;
 use crate::field::quantity;
 use crate::scene::groups::Groups;
-use crate::scene::{Camera, Data, Entity, Placement, Scene};
+use crate::scene::{Camera, Data, Entity, Placement, Scene, framing};
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -160,9 +160,15 @@ impl Editor {
             Command::Orbit(drag) => self.see(|orbit, [_, height], _| orbit.turn(drag, height)),
             Command::Pan(drag) => self.see(|orbit, [_, height], _| orbit.pan(drag, height)),
             Command::Zoom(notches) => self.see(|orbit, _, (_, radius_m)| orbit.zoom(notches, radius_m)),
-            Command::Home => self.see(|orbit, [width, height], (centre, radius_m)| {
-                orbit.frame(centre, radius_m, f64::from(width) / f64::from(height));
-            }),
+            Command::Home => {
+                // Suns stand behind the entities of the file.
+                let entities = self.scene.entities[..self.scene.data.entities.len()].iter().zip(self.placements());
+                let things = entities.map(|(entity, place)| (&*self.scene.meshes[entity.mesh], place));
+                let points = framing::points(things);
+                self.see(|orbit, [width, height], (_, radius_m)| {
+                    orbit.frame(&points, radius_m, f64::from(width) / f64::from(height));
+                })
+            }
             Command::SelectNext => self.cycle(1),
             Command::SelectPrevious => self.cycle(-1),
             Command::SelectNone => self.select(None),

@@ -1,6 +1,6 @@
 //! A camera that turns around a point.
 
-use crate::scene::Camera;
+use crate::scene::{Camera, framing};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
@@ -94,14 +94,13 @@ impl OrbitCamera {
         }
     }
 
-    /// Looks at a sphere from the current direction so that it fills the picture. `aspect` is width / height.
-    pub fn frame(&mut self, centre: DVec3, radius_m: f64, aspect: f64) {
-        let half = (f64::from(self.fov_deg).to_radians() / 2.0).tan() * aspect.min(1.0);
-        let distance_m = radius_m / half.atan().sin();
-        if centre.is_finite() && distance_m.is_finite() && distance_m > 0.0 {
-            self.target = centre.clamp(DVec3::splat(-TARGET_LIMIT_M), DVec3::splat(TARGET_LIMIT_M));
-            self.distance_m = limited(distance_m, radius_m);
-            self.pitch_rad = self.pitch_rad.clamp(-PITCH_LIMIT_RAD, PITCH_LIMIT_RAD);
+    /// Looks at points from the current direction so that they fill the picture, in a scene of that radius. `aspect` is
+    /// width / height.
+    pub fn frame(&mut self, points: &[DVec3], scene_radius_m: f64, aspect: f64) {
+        self.pitch_rad = self.pitch_rad.clamp(-PITCH_LIMIT_RAD, PITCH_LIMIT_RAD);
+        if let Some([eye, target]) = framing::fit(points, self.outward(), self.fov_deg, aspect) {
+            self.target = target.clamp(DVec3::splat(-TARGET_LIMIT_M), DVec3::splat(TARGET_LIMIT_M));
+            self.distance_m = limited(eye.distance(target), scene_radius_m);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The viewpoint: the file's first perspective camera, or one that sees the whole scene.
+//! The viewpoint: the file's first perspective camera.
 
 use ::gltf::json::camera::Type;
 use ::gltf::json::validation::Checked;
@@ -10,20 +10,17 @@ use super::tree::Stand;
 use crate::error::Result;
 use crate::scene::data::{Camera, EntityData, Output};
 
-/// Where a camera stands that the file does not have, as seen from the scene's centre.
-const TOWARD: DVec3 = DVec3::new(0.5, 0.5, 1.0);
-/// Its vertical field of view, degrees.
-const FOV_DEG: f32 = 40.0;
 /// Height of pictures in pixels where the camera states an aspect.
 const HEIGHT_PX: f32 = 640.0;
 
-/// The camera, and the size of pictures, for a scene with that bounding sphere (metres).
+/// The file's camera and the size of its pictures, for a scene with that bounding sphere (metres); `None` if it has
+/// none.
 pub fn camera(
     document: &Document,
     stands: &[Stand],
     (centre, radius_m): (DVec3, f64),
     notes: &mut Notes,
-) -> Result<(Camera, Output)> {
+) -> Result<Option<(Camera, Output)>> {
     let mut found = None;
     for stand in stands {
         let Some(index) = document.root.nodes[stand.node].camera.map(|camera| camera.value()) else { continue };
@@ -36,9 +33,7 @@ pub fn camera(
     }
     let Some((index, stand, perspective)) = found else {
         notes.say("there is no camera: one that sees everything is added".into());
-        let distance_m = radius_m / f64::from(FOV_DEG / 2.0).to_radians().sin();
-        let eye = centre + TOWARD.normalize() * distance_m;
-        return Ok((Camera { eye: eye.as_vec3(), target: centre.as_vec3(), fov_deg: FOV_DEG }, Output::default()));
+        return Ok(None);
     };
     let place = format!("cameras[{index}].perspective");
     let fov_deg = perspective.yfov.to_degrees();
@@ -71,7 +66,7 @@ pub fn camera(
         }
         (output.width, output.height) = ((HEIGHT_PX * aspect).round() as u32, HEIGHT_PX as u32);
     }
-    Ok((camera, output))
+    Ok(Some((camera, output)))
 }
 
 /// A sphere around entities at time 0: centre and radius in metres. Each is its mesh's bounding sphere and its data.

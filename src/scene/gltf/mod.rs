@@ -13,7 +13,7 @@
 //! | emissive factor and strength; texture | emission; colours of the mesh's vertices |
 //! | point and spot lights | glowing balls; those of spots shine within a cone |
 //! | the first directional light | the sun of the distant light |
-//! | the first perspective camera | the camera |
+//! | the first perspective camera | the camera; without one, a camera that sees everything |
 
 mod accessor;
 mod animation;
@@ -36,7 +36,8 @@ use crate::asset::Mesh;
 use crate::asset::environment::EnvironmentData;
 use crate::asset::sky::Sky;
 use crate::error::{Error, Result};
-use crate::scene::data::{Data, EntityData, MeshData};
+use crate::scene::data::{Data, EntityData, MeshData, Output};
+use crate::scene::framing;
 use crate::scene::motion::RotationData;
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
 use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, check_counts};
@@ -61,6 +62,8 @@ pub struct Import {
     pub data: Data,
     /// Meshes in the order of the data.
     pub meshes: Vec<Arc<Mesh>>,
+    /// Whether the file has no camera, so that the scene's was added.
+    pub camera_added: bool,
     /// What a reader has to know.
     pub notes: Notes,
 }
@@ -280,7 +283,14 @@ impl<'a> Builder<'a> {
         let bounds = camera::bounds(spheres);
         let lamps = Lamps::new(document, stands, bounds.1, &mut self.notes)?;
         let fittings = lamps.entities(document, &mut self.notes)?;
-        let (camera, mut output) = camera::camera(document, stands, bounds, &mut self.notes)?;
+        let camera = camera::camera(document, stands, bounds, &mut self.notes)?;
+        let camera_added = camera.is_none();
+        let (camera, mut output) = camera.unwrap_or_else(|| {
+            let meshes: HashMap<&str, &Mesh> = self.meshes.iter().map(|(name, mesh)| (&**name, &**mesh)).collect();
+            let things = entities.iter().filter_map(|e| Some((*meshes.get(e.mesh.as_str())?, e.at(0.0))));
+            let output = Output::default();
+            (framing::camera(&framing::points(things), output.aspect()), output)
+        });
         if let Some(exposure_ev) = lamps.exposure_ev(bounds.0, bounds.1) {
             output.exposure_ev = exposure_ev;
             self.notes.say(format!("exposure_ev is {exposure_ev}, from the intensities of the lights"));
@@ -299,6 +309,6 @@ impl<'a> Builder<'a> {
             built.push(Arc::new(mesh));
         }
         let data = Data { camera, output, environment, meshes, entities };
-        Ok(Import { data, meshes: built, notes: self.notes })
+        Ok(Import { data, meshes: built, camera_added, notes: self.notes })
     }
 }

@@ -219,7 +219,7 @@ impl Renderer {
     /// As [`Renderer::picture`]; `Failed` where the path cannot be written.
     pub fn write_png(&mut self, path: &Path) -> Result<()> {
         let shown = self.picture()?;
-        let exposure_ev = self.frame.scene().data.output.exposure_ev;
+        let exposure_ev = self.frame.scene().data.output.exposure_ev();
         picture::write_png(path, shown.width as u32, shown.height as u32, &shown.rgb, exposure_ev)
     }
 

@@ -214,8 +214,12 @@ fn a_builder_refuses_numbers_in_one_line() {
             builder = builder.environment(draw.environment());
         }
         if odd & 8 != 0 {
-            let output =
-                Output { width: draw.count(), height: draw.count(), exposure_ev: draw.float(), time_s: draw.double() };
+            let output = Output {
+                width: draw.count(),
+                height: draw.count(),
+                exposure_ev: Some(draw.float()),
+                time_s: draw.double(),
+            };
             let camera = Camera { fov_deg: 60.0 * draw.float(), ..Camera::new(draw.vector(), draw.vector()) };
             builder = builder.camera(camera).output(output);
         }

@@ -71,7 +71,7 @@ fn render_writes_what_it_is_asked_for() {
     let brightest = exr.pixels().flat_map(|p| p.0).fold(0.0_f32, f32::max);
     assert!((100.0..200.0).contains(&brightest), "the light itself is seen, unclamped: {brightest}");
     let scene = shadow_fields::scene::Scene::load(Path::new(SCENE)).unwrap();
-    let gain = scene.data.output.exposure_ev.exp2();
+    let gain = scene.data.output.exposure_ev().exp2();
     assert_encodes(&png, &exr, gain);
 
     let text = String::from_utf8(read(folder, "v.csv")).unwrap();

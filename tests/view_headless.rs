@@ -271,7 +271,7 @@ fn a_window_that_fails_saves_edits_first() {
         assert_eq!(told.to_string(), format!("{}; the edited scene was saved as {}", lost(), path.display()));
         let saved = Scene::load(&path).unwrap();
         assert_eq!(saved.data.entities, stand.viewer.editor().scene().data.entities, "{name}");
-        assert_eq!(saved.data.output.exposure_ev, ev, "{name}");
+        assert_eq!(saved.data.output.exposure_ev(), ev, "{name}");
         assert_eq!(&saved.data.camera, stand.viewer.editor().camera(), "{name}");
         assert_eq!([saved.data.output.width, saved.data.output.height], SIZE);
         assert_eq!(stand.viewer.rescued(lost()).to_string(), lost().to_string(), "it is saved now");

@@ -196,14 +196,14 @@ struct Times {
 }
 
 fn draw(frame: &mut Frame, scene: &Scene, options: frame::Options, path: &Path) -> Result<()> {
-    let exposure_ev = scene.data.output.exposure_ev;
+    let exposure_ev = scene.data.output.exposure_ev();
     frame.render(&scene.at(0.0), Some(scene.data.output.white()))?;
     picture::write_png(path, options.size[0], options.size[1], &frame.picture(), exposure_ev)
 }
 
 fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene) -> Result<PathBuf> {
     let options = frame::Options { size: ANIMATION_SIZE, ..arguments.options.frame(scene)? };
-    let exposure_ev = scene.data.output.exposure_ev;
+    let exposure_ev = scene.data.output.exposure_ev();
     let mut frame = context.frame(scene, options)?;
     let (count, fps) = ANIMATION;
     let mut pictures = Vec::new();

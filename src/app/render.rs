@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::outputs::{Numbered, Output, Outputs};
-use super::source::GltfArguments;
+use super::source::{GltfArguments, LookArguments};
 use super::{Global, output};
 use crate::asset::false_color::Scheme;
 use crate::asset::picture;
@@ -17,7 +17,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::ops::Bound;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// A picture that takes more memory than this is told in a line.
@@ -68,6 +68,8 @@ pub struct Arguments {
     #[command(flatten)]
     picture: PictureArguments,
     #[command(flatten)]
+    look: LookArguments,
+    #[command(flatten)]
     gltf: GltfArguments,
 }
 
@@ -83,7 +85,9 @@ impl Arguments {
             [("--vertices", &self.vertices, "csv"), ("--stats", &self.stats, "json"), ("--error", &self.error, "png")];
         let given = others.into_iter().filter_map(|(option, path, ending)| Some((option, path.as_ref()?, ending)));
         outputs.extend(given.map(|(option, path, ending)| Output::new(option, path, ending)));
-        Outputs::check(&scene::files::of_scene(&self.scene), &outputs)
+        let mut inputs = scene::files::of_scene(&self.scene);
+        inputs.extend(self.look.picture().map(Path::to_owned));
+        Outputs::check(&inputs, &outputs)
     }
 }
 
@@ -114,7 +118,10 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
 }
 
 fn render(global: &Global, arguments: &Arguments) -> Result<()> {
-    let scene = arguments.gltf.scene(global, &arguments.scene)?;
+    let mut scene = arguments.gltf.scene(global, &arguments.scene)?;
+    let size = arguments.picture.options.frame(&scene)?.size;
+    let first_s = arguments.picture.first_s(&scene);
+    arguments.look.apply(global, &arguments.scene, &mut scene, size, first_s)?;
     let context = Context::new(global)?;
     let mut rendering = Rendering::new(global, arguments, &context, &scene)?;
     rendering.write_pictures()?;
@@ -208,7 +215,7 @@ impl<'a> Rendering<'a> {
         let numbered = Numbered::new(&self.arguments.output)?;
         let arguments = self.arguments;
         let [width, height] = self.options.size;
-        let exposure_ev = self.scene.data.output.exposure_ev;
+        let exposure_ev = self.scene.data.output.exposure_ev();
         if numbered.is_none() && arguments.frames > 1 {
             let frames = (0..arguments.frames).map(|index| Ok(picture::encode_srgb(&self.draw(index)?, exposure_ev)));
             return picture::write_apng(&arguments.output, width, height, frames, arguments.picture.fps);

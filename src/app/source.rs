@@ -3,9 +3,54 @@
 use super::{Global, output};
 use crate::asset::Mesh;
 use crate::error::{Error, Result};
+use crate::scene::Surroundings;
 use crate::scene::{self, Scene, gltf::Notes};
+use crate::text::number;
+use crate::truth::exposure;
 use clap::Args;
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use std::path::Path;
+
+/// Options of how a scene looks that its file does not say.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Look")]
+pub struct LookArguments {
+    /// Distant light in place of the scene's, its suns included: daylight, studio (soft, from above), none, or an
+    /// equirectangular picture (.hdr, .exr or .png). Default: the scene's own; a glTF file without light gets daylight,
+    /// and one with lights a dim sky beside them
+    #[arg(long, value_name = "daylight|studio|none|FILE", value_parser = OsStringValueParser::new().try_map(|name| Surroundings::parse(&name)))]
+    pub environment: Option<Surroundings>,
+    /// Stops by which pictures are brighter, -32 to 32, than the scene's exposure makes them. A scene that states none,
+    /// or whose light --environment replaces, has one from the light of its first picture
+    #[arg(long, default_value_t = 0.0, value_name = "EV", value_parser = number::<f32>(-32.0..=32.0), allow_negative_numbers = true)]
+    pub exposure: f32,
+}
+
+impl LookArguments {
+    /// The picture of distant light, if it is one.
+    pub fn picture(&self) -> Option<&Path> {
+        match &self.environment {
+            Some(Surroundings::Picture(file)) => Some(file),
+            _ => None,
+        }
+    }
+
+    /// Gives a scene its light, its camera where that was added, and its exposure for pictures of that size in pixels,
+    /// the first of which is at `time_s`.
+    pub fn apply(&self, global: &Global, path: &Path, scene: &mut Scene, size: [u32; 2], time_s: f64) -> Result<()> {
+        if let Some(environment) = &self.environment {
+            scene.surround(environment)?;
+        }
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
+        scene.fit_added_camera(aspect);
+        if let Some(said) = exposure::settle(scene, time_s, aspect) {
+            output::note(global, format!("note: {}: {said} (--exposure changes it)", path.display()));
+        }
+        let exposure_ev = (scene.data.output.exposure_ev() + self.exposure).clamp(-32.0, 32.0);
+        scene.data.output.exposure_ev = Some(exposure_ev);
+        Ok(())
+    }
+}
 
 /// Options of commands that read glTF.
 #[derive(Args, Clone, Copy, Debug)]

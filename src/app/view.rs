@@ -1,7 +1,7 @@
 //! `shadow-fields view` opens a window.
 
 use super::context::Context;
-use super::source::GltfArguments;
+use super::source::{GltfArguments, LookArguments};
 use super::{Global, output};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
@@ -9,6 +9,7 @@ use crate::frame::{self, RenderOptions};
 use crate::gpu::{self, Device, PresentMode, Window, display, heap};
 use crate::scene::Scene;
 use crate::view::command::Command;
+use crate::view::editor::add_sky;
 use crate::view::input::{Button, Event, Key};
 use crate::view::{Editor, FrameTarget, Setup, Viewer};
 use clap::Args;
@@ -54,13 +55,21 @@ pub struct Arguments {
     #[command(flatten)]
     options: RenderOptions,
     #[command(flatten)]
+    look: LookArguments,
+    #[command(flatten)]
     gltf: GltfArguments,
 }
 
 /// Opens the window and stays until it is closed.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     heap::share_arena();
-    let scene = arguments.gltf.scene(global, &arguments.scene)?;
+    let mut scene = arguments.gltf.scene(global, &arguments.scene)?;
+    if arguments.look.environment.is_none() {
+        add_sky(&mut scene);
+    }
+    let size = arguments.options.size.unwrap_or([scene.data.output.width, scene.data.output.height]);
+    let time_s = scene.data.output.time_s;
+    arguments.look.apply(global, &arguments.scene, &mut scene, size, time_s)?;
     let events = event_loop()?;
     let owned = events.owned_display_handle();
     let handle = owned.display_handle().map_err(no_display)?.as_raw();

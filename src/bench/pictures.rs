@@ -125,7 +125,7 @@ fn pixel_error(bench: &Bench<'_>, case: &Case, folder: &Path) -> Result<PixelErr
 
 /// Writes two pictures beside each other with the scene's exposure. Returns the path, and their mean FLIP.
 fn beside(case: &Case, size: [u32; 2], [left, right]: [&[f32]; 2], path: &Path) -> Result<(String, f64)> {
-    let exposure_ev = case.scene.data.output.exposure_ev;
+    let exposure_ev = case.scene.data.output.exposure_ev();
     let [width, height] = size;
     let row = 3 * width as usize;
     let both: Vec<f32> = left.chunks(row).zip(right.chunks(row)).flat_map(|(l, r)| [l, r]).flatten().copied().collect();

@@ -16,7 +16,7 @@ pub fn clip_from_world(camera: &Camera, aspect: f64) -> DMat4 {
 }
 
 /// Unit direction from the eye through a place in a picture of that size, in pixels from the top left.
-pub fn through_pixels(camera: &Camera, size: [f64; 2]) -> impl Fn([f64; 2]) -> DVec3 {
+pub fn through_pixels(camera: &Camera, size: [f64; 2]) -> impl Fn([f64; 2]) -> DVec3 + use<> {
     let eye = camera.eye.as_dvec3();
     let to_world = clip_from_world(camera, size[0] / size[1]).inverse();
     move |at| {

@@ -29,6 +29,9 @@ pub struct Film {
     /// Where pictures go, with a run of # for the number; relative to the plan's folder.
     pub pictures: String,
     pub options: frame::Options,
+    /// The scene's exposure in stops, or what the light of picture 0 gives where it states none.
+    #[serde(default)]
+    pub exposure_ev: f32,
     /// Scene time of picture 0, in seconds.
     pub first_s: f64,
     /// Pictures per second of scene time.
@@ -132,7 +135,7 @@ impl Plan {
             }
             Slice::Pictures { film, first, count } => {
                 let film = &self.films[film as usize];
-                json!(["render", film.scene.hash, film.options, film.first_s, film.fps, first, count])
+                json!(["render", film.scene.hash, film.options, film.exposure_ev, film.first_s, film.fps, first, count])
             }
         };
         let all = json!([self.plan_of, self.device, work]).to_string();

@@ -149,8 +149,10 @@ pub struct Output {
     pub width: u32,
     /// Height in pixels, 1 to 16 384. The default is 640.
     pub height: u32,
-    /// Stops by which radiance is brightened before it is encoded, -32 to 32. The default is 0.
-    pub exposure_ev: f32,
+    /// Stops by which radiance is brightened before it is encoded, -32 to 32. Where it is left out, the program finds
+    /// it from the light of the first picture, and the library takes 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposure_ev: Option<f32>,
     /// Scene time of the first picture in seconds. The default is 0.
     #[serde(skip_serializing_if = "crate::field::is_zero")]
     pub time_s: f64,
@@ -159,7 +161,12 @@ pub struct Output {
 impl Output {
     /// Radiance that the exposure shows as white.
     pub fn white(&self) -> f32 {
-        (-self.exposure_ev).exp2()
+        (-self.exposure_ev()).exp2()
+    }
+
+    /// The exposure in stops, 0 where it is left out.
+    pub fn exposure_ev(&self) -> f32 {
+        self.exposure_ev.unwrap_or(0.0)
     }
 
     /// Width over height.
@@ -170,7 +177,7 @@ impl Output {
 
 impl Default for Output {
     fn default() -> Self {
-        Self { width: 960, height: 640, exposure_ev: 0.0, time_s: 0.0 }
+        Self { width: 960, height: 640, exposure_ev: None, time_s: 0.0 }
     }
 }
 
@@ -189,14 +196,13 @@ impl TryFrom<OutputWritten> for Output {
 
     fn try_from(written: OutputWritten) -> std::result::Result<Self, String> {
         let usual = Self::default();
-        let exposure_ev = written.exposure_ev.unwrap_or(usual.exposure_ev);
         let width = written.width.unwrap_or(usual.width);
         let height = written.height.unwrap_or(usual.height);
         check_picture([width, height])?;
-        if !(-32.0..=32.0).contains(&exposure_ev) {
-            return Err(format!("exposure_ev {exposure_ev} is not within -32 to 32"));
+        if let Some(beyond) = written.exposure_ev.filter(|ev| !(-32.0..=32.0).contains(ev)) {
+            return Err(format!("exposure_ev {beyond} is not within -32 to 32"));
         }
-        Ok(Self { width, height, exposure_ev, time_s: written.time_s })
+        Ok(Self { width, height, exposure_ev: written.exposure_ev, time_s: written.time_s })
     }
 }
 

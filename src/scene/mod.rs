@@ -15,6 +15,7 @@ pub mod light;
 pub mod motion;
 pub mod single;
 mod sun;
+pub mod surroundings;
 pub mod values;
 
 use std::collections::BTreeSet;
@@ -32,6 +33,7 @@ pub use builder::{SceneBuilder, Shape};
 pub use data::{Camera, Data, EntityData, MeshData, Output};
 pub use light::{LightMethod, Lights, Spot};
 pub use motion::{Motion, Placement};
+pub use surroundings::Surroundings;
 
 /// Largest number of entities in a scene.
 pub const ENTITY_LIMIT: usize = 4096;

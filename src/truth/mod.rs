@@ -24,6 +24,7 @@ pub mod difference;
 #[cfg(feature = "cli")]
 pub mod error_map;
 pub mod exact;
+pub mod exposure;
 pub mod flip;
 pub mod pixels;
 pub mod ray_mesh;

@@ -85,7 +85,7 @@ impl Editor {
         }
         let before = Snapshot { exposure_ev: Some(self.exposure_ev()), ..Snapshot::default() };
         self.history.note(EditKind::Slide(Slider::Exposure), None, true, || before);
-        self.scene.data.output.exposure_ev = ev;
+        self.scene.data.output.exposure_ev = Some(ev);
         Changed { exposure: true, ..Changed::default() }.into()
     }
 
@@ -133,8 +133,8 @@ impl Editor {
                 changed.sky = scene.set_environment(&source).is_ok();
             }
             if let Some(ev) = snapshot.exposure_ev {
-                back.exposure_ev = Some(scene.data.output.exposure_ev);
-                scene.data.output.exposure_ev = ev;
+                back.exposure_ev = Some(scene.data.output.exposure_ev());
+                scene.data.output.exposure_ev = Some(ev);
                 changed.exposure = true;
             }
             back

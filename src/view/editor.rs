@@ -54,16 +54,22 @@ pub struct Editor {
     pub(super) former: Option<Box<Editor>>,
 }
 
+/// Gives a scene without distant light a generated sky.
+pub(crate) fn add_sky(scene: &mut Scene) {
+    if scene.data.environment.is_empty() {
+        let source = EnvironmentData { sky: Some(Sky::default()), ..scene.data.environment.clone() };
+        if let Err(error) = scene.set_environment(&source) {
+            log::warn!("no generated sky: {error}");
+        }
+    }
+}
+
 impl Editor {
     /// The state in which a scene is first shown: running, with nothing selected. `path` is the scene's file. A scene
-    /// without distant light gets a generated sky, which is saved with it.
+    /// without distant light gets a generated sky, which is saved with it; one without exposure gets 0 stops.
     pub fn new(mut scene: Scene, path: &Path) -> Self {
-        if scene.data.environment.is_empty() {
-            let source = EnvironmentData { sky: Some(Sky::default()), ..scene.data.environment.clone() };
-            if let Err(error) = scene.set_environment(&source) {
-                log::warn!("no generated sky: {error}");
-            }
-        }
+        add_sky(&mut scene);
+        scene.data.output.exposure_ev.get_or_insert(0.0);
         Editor {
             orbit: OrbitCamera::new(&scene.data.camera),
             size: [scene.data.output.width, scene.data.output.height],
@@ -118,7 +124,7 @@ impl Editor {
     }
 
     pub fn exposure_ev(&self) -> f32 {
-        self.scene.data.output.exposure_ev
+        self.scene.data.output.exposure_ev()
     }
 
     pub fn sky(&self) -> f32 {

@@ -1,8 +1,10 @@
 //! Files that are dropped on the window, and the window's end: neither loses edits in silence.
 
+use super::editor::add_sky;
 use super::viewer::Viewer;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
+use crate::truth::exposure;
 use std::path::Path;
 
 impl Viewer {
@@ -27,12 +29,17 @@ impl Viewer {
 
     /// A scene, and what a reader of its glTF file has to know.
     fn read(&self, path: &Path) -> Result<(Scene, Vec<String>)> {
-        let (scene, notes) = Scene::load_with_notes(path)?;
+        let (mut scene, notes) = Scene::load_with_notes(path)?;
         let left_out = notes.left_out();
         if self.setup.strict && !left_out.is_empty() {
             return Err(Error::input(path, format!("--strict: {}", left_out.join("; "))));
         }
-        Ok((scene, left_out.into_iter().chain(notes.said().iter().cloned()).collect()))
+        add_sky(&mut scene);
+        let [width, height] = self.size.map(f64::from);
+        scene.fit_added_camera(width / height);
+        let time_s = scene.data.output.time_s;
+        let exposed = exposure::settle(&mut scene, time_s, width / height);
+        Ok((scene, left_out.into_iter().chain(notes.said().iter().cloned()).chain(exposed).collect()))
     }
 
     /// Ends the window, at the second time if there are edits that are not saved.

@@ -133,7 +133,8 @@ fn example() -> Plan {
     let input = |path: &str| Input { path: path.into(), hash: path.into() };
     plan.add_meshes(["a.obj", "b.obj"].map(input).into(), 1);
     let options = frame::Options::default();
-    let film = Film { scene: input("s.toml"), pictures: "f_#.png".into(), options, first_s: 0.0, fps: 24 };
+    let film =
+        Film { scene: input("s.toml"), pictures: "f_#.png".into(), options, exposure_ev: 0.0, first_s: 0.0, fps: 24 };
     plan.add_film(film, 2, 1);
     plan
 }

@@ -87,7 +87,7 @@ fn defaults() {
     assert_eq!((entity.emits, entity.occludes, entity.receives), (false, true, true));
     assert_eq!((entity.albedo, entity.emission), (Vec3::splat(0.7), Vec3::ZERO));
     assert_eq!(scene.at(3.0)[0], Placement { position: Vec3::ZERO, rotation: Quat::IDENTITY, scale: 1.0 });
-    assert_eq!((scene.data.camera.fov_deg, scene.data.output.width, scene.data.output.exposure_ev), (40.0, 960, 0.0));
+    assert_eq!((scene.data.camera.fov_deg, scene.data.output.width, scene.data.output.exposure_ev), (40.0, 960, None));
     assert!(scene.environment.is_none());
     let light = &ball("emission = [1, 0, 0]").entities[0];
     assert_eq!((light.emits, light.occludes, light.receives), (true, false, true));

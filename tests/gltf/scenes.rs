@@ -4,7 +4,7 @@ use crate::model;
 use glam::{DMat4, DQuat, DVec3, Vec3};
 use model::{F32, I8, I16, Model, U8, U16, U32, cuboid, load};
 use serde_json::json;
-use shadow_fields::scene::{Scene, gltf};
+use shadow_fields::scene::{Scene, Surroundings, gltf};
 use shadow_fields::truth::RayCast;
 use std::path::Path;
 
@@ -292,7 +292,8 @@ fn lights_are_balls_of_their_intensity() {
     assert!((intensity - Vec3::new(12., 6., 0.)).length() < 0.3, "{intensity}");
     let said = import.notes.said().join("\n");
     assert!(said.contains(&format!("point and spot lights (1) are balls of radius {:.3} m", lamp.scale)), "{said}");
-    assert!(said.contains("exposure_ev"), "{said}");
+    assert!(said.contains("no sky") && import.data.environment.uniform.is_some(), "{said}");
+    assert_eq!(import.data.output.exposure_ev, None);
     // Lux on a surface that faces the disc; directional lights look along -z.
     let sun = import.data.environment.sun.as_ref().unwrap();
     let share = std::f32::consts::PI * (sun.angle_deg.to_radians() / 2.0).sin().powi(2);
@@ -323,7 +324,8 @@ fn spots_shine_within_their_cone() {
     let extension = json!({ "KHR_lights_punctual": { "light": light } });
     model.child(outer, json!({ "translation": [0, 0.5, 0], "rotation": [-half, 0, 0, half], "extensions": extension }));
     let folder = tempfile::tempdir().unwrap();
-    let (scene, notes) = Scene::load_with_notes(&model.write(folder.path(), "m")).unwrap();
+    let (mut scene, notes) = Scene::load_with_notes(&model.write(folder.path(), "m")).unwrap();
+    scene.surround(&Surroundings::None).unwrap();
     assert_eq!(notes.left_out(), [""; 0]);
     assert_eq!(scene.entities.len(), 2, "a floor and a lamp: {:?}", notes.said());
     let cast = RayCast { rays: 512, seed: 3, ..Default::default() };

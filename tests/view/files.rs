@@ -92,7 +92,7 @@ fn edits_of_every_scene_outlast_those_that_follow() {
     assert!(open(&mut editor, "teapot_lights").message.unwrap().contains("small_lights"));
     assert_eq!(editor.unsaved(), [Path::new("t.toml"), Path::new("small_lights")]);
     // Back through both, each with its own edits, and the scene that was only looked at is not among them.
-    for (name, ev) in [("small_lights", 2.0), ("t.toml", edited.output.exposure_ev)] {
+    for (name, ev) in [("small_lights", 2.0), ("t.toml", edited.output.exposure_ev())] {
         assert!(editor.apply(Command::Undo).changed.scene, "{name}");
         assert_eq!((editor.path(), editor.exposure_ev()), (Path::new(name), ev));
         if name == "small_lights" {
@@ -124,7 +124,7 @@ fn the_oldest_of_many_edited_scenes_is_saved_and_let_go() {
     assert_eq!((saved.len(), editor.unsaved().len()), (2, FORMER_LIMIT), "{said:#?}");
     for (number, text) in saved.into_iter().enumerate() {
         let path = text.split(" were saved as ").nth(1).unwrap();
-        assert_eq!(Scene::load(Path::new(path)).unwrap().data.output.exposure_ev, 1.0 + number as f32);
+        assert_eq!(Scene::load(Path::new(path)).unwrap().data.output.exposure_ev(), 1.0 + number as f32);
     }
     // Undo still returns to the next one, and a mesh that was read again and again is kept once.
     for _ in 0..FORMER_LIMIT {
@@ -159,7 +159,7 @@ fn a_saved_scene_reads_back_as_the_state() {
         let scene = Scene::load(&path).unwrap();
         assert_eq!(scene.data.output.time_s, editor.time_s);
         assert_eq!([scene.data.output.width, scene.data.output.height], [321, 123]);
-        assert_eq!(scene.data.output.exposure_ev, 0.3);
+        assert_eq!(scene.data.output.exposure_ev(), 0.3);
         assert_eq!(scene.data.camera, *editor.camera());
         assert_eq!(scene.data.environment, editor.scene().data.environment);
         assert_eq!(scene.data.entities, editor.scene().data.entities);
@@ -261,7 +261,7 @@ fn edits_that_would_be_lost_are_saved_beside_the_scene() {
     // The scene before this one can be returned to, so it is saved as well.
     editor.apply(Command::NextScene);
     assert_eq!(editor.rescue().unwrap(), [folder.path().join("small-edited.toml")]);
-    assert_eq!(Scene::load(&folder.path().join("small-edited.toml")).unwrap().data.output.exposure_ev, 1.5);
+    assert_eq!(Scene::load(&folder.path().join("small-edited.toml")).unwrap().data.output.exposure_ev(), 1.5);
     assert_eq!(editor.rescue().unwrap().len(), 0, "once is enough");
 }
 

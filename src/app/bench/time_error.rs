@@ -7,8 +7,9 @@ use crate::bench::cases::Case;
 use crate::bench::time_error::{self, Selection};
 use crate::error::Result;
 use crate::scene;
+use crate::truth::exposure;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `bench time-error`.
 #[derive(Args)]
@@ -40,8 +41,13 @@ pub struct Arguments {
 
 /// Measures and prints the budget, the comparison and the sweep.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
-    let own =
-        arguments.scene.as_deref().map(|path| Case::of_file(path, arguments.gltf.scene(global, path)?)).transpose()?;
+    let own = |path: &Path| {
+        let mut scene = arguments.gltf.scene(global, path)?;
+        let output = scene.data.output.clone();
+        exposure::settle(&mut scene, output.time_s, output.aspect());
+        Case::of_file(path, scene)
+    };
+    let own = arguments.scene.as_deref().map(own).transpose()?;
     let inputs: Vec<PathBuf> = arguments.scene.iter().flat_map(|path| scene::files::of_scene(path)).collect();
     outputs::check_folder("--output", &arguments.out, &inputs)?;
     let selection =

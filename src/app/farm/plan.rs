@@ -11,6 +11,7 @@ use crate::farm::plan::{device_class, plain};
 use crate::farm::{Film, Input, Plan, counted};
 use crate::merge::calibrate;
 use crate::scene::{self, Scene};
+use crate::truth::exposure;
 use clap::Args;
 use rayon::prelude::*;
 use serde_json::json;
@@ -82,11 +83,14 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     inputs.retain(|input| known.insert(input.hash.clone()));
     plan.add_meshes(inputs, arguments.per_slice);
     for (path, pictures) in scenes.iter().zip(patterns) {
-        let scene = Scene::load(path)?;
+        let mut scene = Scene::load(path)?;
         let options = picture.options.frame(&scene)?;
         let first_s = picture.first_s(&scene);
         let input = Input { path: written(path, folder)?, hash: scene_hash(&scene) };
-        let film = Film { scene: input, pictures, options, first_s, fps: picture.fps };
+        let [width, height] = options.size.map(f64::from);
+        exposure::settle(&mut scene, first_s, width / height);
+        let exposure_ev = scene.data.output.exposure_ev();
+        let film = Film { scene: input, pictures, options, exposure_ev, first_s, fps: picture.fps };
         plan.add_film(film, arguments.frames.unwrap_or(1), arguments.per_slice);
     }
     plan.write(&arguments.output)?;

@@ -113,8 +113,9 @@ fn bake_mesh(context: &Context, plan: &Plan, input: &Input, folder: &Path) -> Re
 /// Renders pictures of a film into a folder, where their numbers are their names.
 fn render(context: &Context, plan: &Plan, film: &Film, numbers: Range<u32>, folder: &Path) -> Result<()> {
     let path = plan.path(&film.scene.path);
-    let scene = Scene::load(&path)?;
+    let mut scene = Scene::load(&path)?;
     check_unchanged(&path, &scene_hash(&scene), &film.scene.hash)?;
+    scene.data.output.exposure_ev = Some(film.exposure_ev);
     let shape = &scene.data.output;
     let mut frame = context.frame(&scene, film.options).map_err(|error| match error {
         Error::Input(_) => error.context(path.display()),
@@ -127,7 +128,7 @@ fn render(context: &Context, plan: &Plan, film: &Film, numbers: Range<u32>, fold
         let time_s = film.first_s + f64::from(number) / f64::from(film.fps);
         frame.render(&scene.at(time_s), Some(shape.white()))?;
         let path = folder.join(format!("{number}.png"));
-        picture::write_png(&path, width, height, &frame.picture(), shape.exposure_ev)?;
+        picture::write_png(&path, width, height, &frame.picture(), shape.exposure_ev())?;
         context.progress.pictures(done, count);
     }
     Ok(())

@@ -104,16 +104,14 @@ impl<'a> Lamps<'a> {
         Ok(out)
     }
 
-    /// The exposure in stops at which a white surface in the middle of the scene, lit by all lights, shows half of
-    /// white: their photometric units say nothing of how bright a picture should be. `None` without lights.
-    pub fn exposure_ev(&self, centre: DVec3, scene_radius_m: f64) -> Option<f32> {
+    /// About the radiance of a white surface in the middle of the scene, lit by all lights.
+    pub fn radiance(&self, centre: DVec3, scene_radius_m: f64) -> f64 {
         let irradiance = |(light, stand): &(&Light, &Stand)| {
             let distance_m = centre.distance(stand.rest.translation).max(0.3 * scene_radius_m);
             f64::from(intensity(light).max_element()) / distance_m.powi(2)
         };
         let sun = self.sun.as_ref().map_or(0.0, |sun| f64::from(sun.radiance.max_element()) * disc_sr(sun.angle_deg));
-        let radiance = (self.lights.iter().map(irradiance).sum::<f64>() + sun) / std::f64::consts::PI;
-        (radiance > 0.0).then(|| (((0.5 / radiance).log2() * 2.0).round() / 2.0).clamp(-32.0, 32.0) as f32)
+        (self.lights.iter().map(irradiance).sum::<f64>() + sun) / std::f64::consts::PI
     }
 }
 

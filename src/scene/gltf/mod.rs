@@ -13,6 +13,7 @@
 //! | emissive factor and strength; texture | emission; colours of the mesh's vertices |
 //! | point and spot lights | glowing balls; those of spots shine within a cone |
 //! | the first directional light | the sun of the distant light |
+//! | no light | daylight; a dim uniform sky beside lamps and suns |
 //! | the first perspective camera | the camera; without one, a camera that sees everything |
 
 mod accessor;
@@ -33,14 +34,13 @@ use std::sync::Arc;
 use glam::{DMat3, Vec3};
 
 use crate::asset::Mesh;
-use crate::asset::environment::EnvironmentData;
-use crate::asset::sky::Sky;
+use crate::asset::environment::{EnvironmentData, RADIANCE_LIMIT};
 use crate::error::{Error, Result};
 use crate::scene::data::{Data, EntityData, MeshData, Output};
 use crate::scene::framing;
 use crate::scene::motion::RotationData;
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
-use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, check_counts};
+use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, Surroundings, check_counts};
 use document::Document;
 #[cfg(feature = "cli")]
 pub(crate) use document::FILE_LIMIT_BYTES;
@@ -51,6 +51,8 @@ use surface::Surface;
 use texture::Textures;
 use tree::{SplitTransform, Stand};
 
+/// Radiance of the sky that is added to lights, as a share of what they make a white surface in the middle shine.
+const FILL_SHARE: f64 = 0.1;
 /// What is said of skins.
 const SKINS: &str = "nodes with a skin (their meshes stand still as they are stored)";
 /// Largest number of triangles of all meshes of a scene.
@@ -279,28 +281,34 @@ impl<'a> Builder<'a> {
         }
         let spheres: HashMap<&str, (Vec3, f32)> =
             self.meshes.iter().map(|(name, mesh)| (name.as_str(), mesh.bounding_sphere())).collect();
-        let spheres = entities.iter().filter_map(|entity| Some((*spheres.get(entity.mesh.as_str())?, entity)));
-        let bounds = camera::bounds(spheres);
+        let spheres = || entities.iter().filter_map(|entity| Some((*spheres.get(entity.mesh.as_str())?, entity)));
+        let bounds = camera::bounds(spheres());
         let lamps = Lamps::new(document, stands, bounds.1, &mut self.notes)?;
         let fittings = lamps.entities(document, &mut self.notes)?;
         let camera = camera::camera(document, stands, bounds, &mut self.notes)?;
         let camera_added = camera.is_none();
-        let (camera, mut output) = camera.unwrap_or_else(|| {
+        let (camera, output) = camera.unwrap_or_else(|| {
             let meshes: HashMap<&str, &Mesh> = self.meshes.iter().map(|(name, mesh)| (&**name, &**mesh)).collect();
             let things = entities.iter().filter_map(|e| Some((*meshes.get(e.mesh.as_str())?, e.at(0.0))));
             let output = Output::default();
             (framing::camera(&framing::points(things), output.aspect()), output)
         });
-        if let Some(exposure_ev) = lamps.exposure_ev(bounds.0, bounds.1) {
-            output.exposure_ev = exposure_ev;
-            self.notes.say(format!("exposure_ev is {exposure_ev}, from the intensities of the lights"));
-        }
+        // A surface of radiance 1 is white on a screen; only a brighter one is meant as a lamp.
+        let glow = spheres().filter(|(_, entity)| entity.emission.max_element() > 1.0).map(|(sphere, entity)| {
+            let (centre, radius_m) = entity.at(0.0).sphere(sphere);
+            let distance_m = centre.distance(bounds.0).max(0.3 * bounds.1);
+            f64::from(entity.emission.max_element()) * (radius_m / distance_m).powi(2).min(1.0)
+        });
+        let radiance = lamps.radiance(bounds.0, bounds.1) + glow.sum::<f64>();
+        let environment = if radiance > 0.0 {
+            self.notes.say("the file has lights but no sky: a dim one is added, so that shadows are not black".into());
+            let fill = Vec3::splat((FILL_SHARE * radiance) as f32).min(Vec3::splat(RADIANCE_LIMIT));
+            EnvironmentData { sun: lamps.sun.clone(), uniform: Some(fill), ..EnvironmentData::default() }
+        } else {
+            self.notes.say("no light in the file is bright enough to see by: daylight is added".into());
+            Surroundings::Daylight.data()
+        };
         entities.extend(fittings.entities);
-        let mut environment = EnvironmentData { sun: lamps.sun.clone(), ..EnvironmentData::default() };
-        if environment.sun.is_none() && entities.iter().all(|entity| entity.emission == Vec3::ZERO) {
-            environment.sky = Some(Sky::default());
-            self.notes.say("nothing in the file shines: daylight is added".into());
-        }
         let of_file = |(name, _): &(String, _)| MeshData { name: name.clone(), file: None, generator: None };
         let mut meshes: Vec<MeshData> = self.meshes.iter().map(of_file).collect();
         let mut built: Vec<Arc<Mesh>> = self.meshes.into_iter().map(|(_, mesh)| mesh).collect();

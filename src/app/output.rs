@@ -108,6 +108,11 @@ impl Progress {
         }
     }
 
+    /// Shows that rays were cast for `done` of `all` rows of pixels.
+    pub fn rows(&self, done: u32, all: u32) {
+        self.bar("rows", "casting rays [{bar:32}] {pos}/{len} {msg}, {eta} left", done, all);
+    }
+
     /// Shows that `done` of `all` slices are done.
     pub fn slices(&self, done: u32, all: u32) {
         self.bar("slices", "running [{bar:32}] {pos}/{len} {msg}, {eta} left", done, all);

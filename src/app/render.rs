@@ -7,12 +7,14 @@ use super::{Global, output};
 use crate::asset::false_color::Scheme;
 use crate::asset::picture;
 use crate::bench::figures::spread;
+use crate::draw::Antialias;
 use crate::error::{Error, Result};
 use crate::frame::{self, Frame, PictureMemory, RenderOptions};
 use crate::gpu::Timing;
 use crate::scene::{self, Placement, Scene, light, values::NUMBER_LIMIT};
 use crate::text::{self, number};
-use crate::truth::{self, ErrorMap, error_map, raycast::RayCast};
+use crate::truth::pixels::{self, RayPicture};
+use crate::truth::{self, ErrorMap, RayMeshes, World, error_map, raycast::RayCast};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -49,10 +51,11 @@ pub struct Arguments {
     /// Also write times (ms) and counts
     #[arg(long, value_name = "S.json")]
     stats: Option<PathBuf>,
-    /// Light by ray casting instead of shadow fields: slow, and the truth that errors are measured against
+    /// Cast rays through every pixel instead of using shadow fields: slow, and what pictures should look like
     #[arg(long, group = "judge")]
     reference: bool,
-    /// Also write the error of the last picture's vertices against ray casting in false colour, with a scale bar
+    /// Also write the error of the last picture's vertices in false colour, with a scale bar: against rays from the
+    /// same vertices, which pixels between them do not enter
     #[arg(long, value_name = "E.png", group = "judge", conflicts_with = "reference")]
     error: Option<PathBuf>,
     /// Colours of --error: signed shows too dark in blue and too bright in red, absolute shows the size of the error
@@ -62,9 +65,10 @@ pub struct Arguments {
     /// radiosity; default: the 99th percentile, rounded up
     #[arg(long, value_name = "X", value_parser = number::<f64>((Bound::Excluded(0.0), Bound::Unbounded)), requires = "error", allow_negative_numbers = true)]
     error_limit: Option<f64>,
-    /// With --reference or --error: rays per vertex for the sky and for each light
-    #[arg(long, default_value_t = 1024, value_name = "N", requires = "judge", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
-    rays: u32,
+    /// Rays for the sky and for each light: 256 by default of every pixel with --reference, 1024 of every vertex with
+    /// --error
+    #[arg(long, value_name = "N", requires = "judge", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
+    rays: Option<u32>,
     #[command(flatten)]
     picture: PictureArguments,
     #[command(flatten)]
@@ -74,6 +78,10 @@ pub struct Arguments {
 }
 
 impl Arguments {
+    fn rays(&self) -> u32 {
+        self.rays.unwrap_or(if self.reference { 256 } else { 1024 })
+    }
+
     /// All files that are to be written, none of which may be one that the scene names.
     fn outputs(&self) -> Result<Outputs> {
         let numbers = self.first..self.first + self.frames;
@@ -125,7 +133,7 @@ fn render(global: &Global, arguments: &Arguments) -> Result<()> {
     let context = Context::new(global)?;
     let mut rendering = Rendering::new(global, arguments, &context, &scene)?;
     rendering.write_pictures()?;
-    let last_frame = json!(rendering.frame.merged());
+    let last_frame = json!(rendering.frame.as_ref().map(Frame::merged));
     rendering.write_vertices()?;
     let error = rendering.write_error()?;
     let report = rendering.report(&last_frame, &error);
@@ -134,7 +142,7 @@ fn render(global: &Global, arguments: &Arguments) -> Result<()> {
     }
     output::say(if global.json { report.to_string() } else { rendering.summary() });
     drop(rendering);
-    if arguments.picture.options.variant.is_none() {
+    if arguments.picture.options.variant.is_none() && !arguments.reference {
         context.learn(global)?;
     }
     context.finish()
@@ -147,7 +155,8 @@ struct Rendering<'a> {
     context: &'a Context,
     scene: &'a Scene,
     options: frame::Options,
-    frame: Frame,
+    /// `None` where rays light all that is written.
+    frame: Option<Frame>,
     numbered_exr: Option<Numbered>,
     prepared: Duration,
     /// Scene time of each picture in seconds, its wall time and its passes.
@@ -160,11 +169,16 @@ impl<'a> Rendering<'a> {
     fn new(global: &'a Global, arguments: &'a Arguments, context: &'a Context, scene: &'a Scene) -> Result<Self> {
         let started = Instant::now();
         let options = arguments.picture.options.frame(scene)?;
-        announce(global, context, &options)?;
-        let frame = context.frame(scene, options).map_err(|error| match error {
-            Error::Input(_) => error.context(arguments.scene.display()),
-            other => other,
-        })?;
+        let frame = if arguments.reference && arguments.vertices.is_none() {
+            None
+        } else {
+            announce(global, context, &options)?;
+            let frame = context.frame(scene, options).map_err(|error| match error {
+                Error::Input(_) => error.context(arguments.scene.display()),
+                other => other,
+            })?;
+            Some(frame)
+        };
         let prepared = started.elapsed();
         Ok(Rendering {
             global,
@@ -188,26 +202,46 @@ impl<'a> Rendering<'a> {
         let time_s = arguments.picture.first_s(self.scene) + f64::from(index) / f64::from(arguments.picture.fps);
         let placements = self.scene.at(time_s);
         let start = Instant::now();
-        let passes = if arguments.reference {
-            let error = light_by_rays(&mut self.frame, &placements, arguments.rays, self.global.seed)?;
-            self.worst_error = error.max(self.worst_error);
-            self.frame.redraw(&placements, white)?
-        } else {
-            self.frame.render(&placements, Some(white))?
+        let (shown, linear, passes) = match &mut self.frame {
+            Some(frame) if !arguments.reference => {
+                let passes = frame.render(&placements, Some(white))?;
+                (frame.picture(), None, passes)
+            }
+            _ => {
+                let RayPicture { shown, linear, error } = self.cast(&placements);
+                self.worst_error = error.max(self.worst_error);
+                (shown, Some(linear), Vec::new())
+            }
         };
         self.timings.push((time_s, start.elapsed(), passes));
-        let rgb = self.frame.picture();
         let exr = match &self.numbered_exr {
             Some(numbered) => Some(numbered.path(index)),
             None => arguments.exr.clone().filter(|_| number + 1 == arguments.frames),
         };
         if let Some(path) = exr {
-            self.frame.redraw(&placements, f32::INFINITY)?;
             let [width, height] = self.options.size;
-            picture::write_exr(&path, width, height, &self.frame.picture())?;
+            let linear = match (linear, &mut self.frame) {
+                (None, Some(frame)) => {
+                    frame.redraw(&placements, f32::INFINITY)?;
+                    frame.picture()
+                }
+                (linear, _) => linear.unwrap_or_default(),
+            };
+            picture::write_exr(&path, width, height, &linear)?;
         }
         self.context.progress.pictures(number + 1, arguments.frames);
-        Ok(rgb)
+        Ok(shown)
+    }
+
+    /// One picture by rays.
+    fn cast(&self, placements: &[Placement]) -> RayPicture {
+        let shapes = RayMeshes::new(self.scene);
+        let world = World::new(self.scene, &shapes, placements);
+        let cast = RayCast { rays: self.arguments.rays(), seed: self.global.seed, ..Default::default() };
+        let [_, height] = self.options.size;
+        let tell = |rows: u32| self.context.progress.rows(rows, height);
+        let smoothed = self.options.antialias != Antialias::None;
+        pixels::picture(&world, self.options.size, smoothed, &cast, &tell)
     }
 
     /// Writes all pictures: one file, an animated PNG, or numbered files.
@@ -237,33 +271,35 @@ impl<'a> Rendering<'a> {
     }
 
     fn write_vertices(&mut self) -> Result<()> {
-        let Some(path) = &self.arguments.vertices else { return Ok(()) };
         let last = self.last();
-        if !self.arguments.reference {
+        let (Some(path), Some(frame)) = (&self.arguments.vertices, &mut self.frame) else { return Ok(()) };
+        if self.arguments.reference {
+            light_by_rays(frame, &last, self.arguments.rays(), self.global.seed)?;
+        } else {
             // What no picture showed is lit for this.
-            self.frame.render(&last, None)?;
+            frame.render(&last, None)?;
         }
-        text::write(path, vertex_table(&self.frame, &last)?)
+        text::write(path, vertex_table(frame, &last)?)
     }
 
     /// Compares the last picture's vertices with ray casting, where that is asked for.
     fn write_error(&mut self) -> Result<Value> {
-        let Some(path) = &self.arguments.error else { return Ok(Value::Null) };
         let last = self.last();
-        self.frame.render(&last, None)?;
-        let cast = RayCast { rays: self.arguments.rays, seed: self.global.seed, ..Default::default() };
-        let (reference, noise) = truth::picture(self.scene, &last, &cast);
-        let map = ErrorMap::new(&error_map::radiosity(&self.frame)?, &reference, self.arguments.error_scheme);
-        Ok(json!(map.write(path, &mut self.frame, &last, self.arguments.error_limit, noise)?))
+        let (Some(path), Some(frame)) = (&self.arguments.error, &mut self.frame) else { return Ok(Value::Null) };
+        frame.render(&last, None)?;
+        let cast = RayCast { rays: self.arguments.rays(), seed: self.global.seed, ..Default::default() };
+        let (reference, noise) = truth::picture(frame.scene(), &last, &cast);
+        let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference, self.arguments.error_scheme);
+        Ok(json!(map.write(path, frame, &last, self.arguments.error_limit, noise)?))
     }
 
     /// What `--stats` and `--json` have.
     fn report(&self, last_frame: &Value, error: &Value) -> Value {
-        let frame = &self.frame;
+        let frame = self.frame.as_ref();
         let options = &self.options;
         let pictures = self.timings.iter().map(|(time_s, wall, passes)| {
             let named = |t: &Timing| (format!("{}_ms", t.pass.replace(' ', "_")), json!(t.milliseconds));
-            let evaluated = frame.pixels_evaluated(passes);
+            let evaluated = frame.and_then(|frame| frame.pixels_evaluated(passes));
             let passes: serde_json::Map<_, _> = passes.iter().map(named).collect();
             json!({
                 "time_s": time_s, "frame_ms": wall.as_secs_f64() * 1e3, "passes": passes,
@@ -274,13 +310,14 @@ impl<'a> Rendering<'a> {
             "origin": self.context.origin(self.global),
             "scene": self.arguments.scene.display().to_string(),
             "entities": self.scene.entities.len(),
-            "receiver_vertices": frame.receiver_vertex_count(),
-            "variant": frame.variant().name,
+            "receiver_vertices": frame.map(Frame::receiver_vertex_count),
+            "variant": frame.map(|frame| frame.variant().name),
             "lights": self.lights(),
-            "lookups": frame.counts(&self.last()),
+            "lookups": frame.map(|frame| frame.counts(&self.last())),
             "last_frame": last_frame,
-            "memory_bytes": frame.memory(),
-            "device_bytes": frame.memory().device(),
+            "memory_bytes": frame.map(Frame::memory),
+            "device_bytes": frame.map(|frame| frame.memory().device()),
+            "truth": self.arguments.reference.then_some("pixels"),
             "reference_standard_error": self.arguments.reference.then_some(self.worst_error),
             "error": error,
             "options": {
@@ -289,7 +326,7 @@ impl<'a> Rendering<'a> {
                 "size": options.size, "antialias": options.antialias,
             },
             "prepare_ms": self.prepared.as_secs_f64() * 1e3,
-            "baked": frame.buffers.baked,
+            "baked": frame.map(|frame| &frame.buffers.baked),
             "frames": pictures.collect::<Vec<_>>(),
         })
     }
@@ -304,18 +341,24 @@ impl<'a> Rendering<'a> {
     fn summary(&self) -> String {
         let arguments = self.arguments;
         let walls: Vec<f64> = self.timings.iter().map(|(_, wall, _)| wall.as_secs_f64() * 1e3).collect();
+        let prepared = self.frame.as_ref().map(|frame| {
+            let prepared_ms = self.prepared.as_secs_f64() * 1e3;
+            format!(", {} lit vertices, prepared in {prepared_ms:.0} ms", frame.receiver_vertex_count())
+        });
         format!(
-            "{}: {} entities, {} lit vertices, prepared in {:.0} ms, {} in {:.1} ms (median), variant {}",
+            "{}: {} entities{}, {} in {:.1} ms (median), {}",
             output::shown(&arguments.output),
             self.scene.entities.len(),
-            self.frame.receiver_vertex_count(),
-            self.prepared.as_secs_f64() * 1e3,
+            prepared.unwrap_or_default(),
             if arguments.frames == 1 { "a frame".into() } else { format!("{} frames, each", arguments.frames) },
             spread(&walls).median,
-            if arguments.reference {
-                format!("none: {} rays, relative standard error {:.1e}", arguments.rays, self.worst_error)
-            } else {
-                self.frame.variant().name.into()
+            match &self.frame {
+                Some(frame) if !arguments.reference => format!("variant {}", frame.variant().name),
+                _ => format!(
+                    "{} rays a pixel and light, relative standard error {:.1e}",
+                    arguments.rays(),
+                    self.worst_error
+                ),
             }
         )
     }
@@ -331,14 +374,14 @@ fn announce(global: &Global, context: &Context, options: &frame::Options) -> Res
     Ok(())
 }
 
-/// Replaces what the merge would find by what rays find. Returns the relative standard error.
-fn light_by_rays(frame: &mut Frame, placements: &[Placement], rays: u32, seed: u64) -> Result<f64> {
+/// Replaces what the merge would find at vertices by what rays find there.
+fn light_by_rays(frame: &mut Frame, placements: &[Placement], rays: u32, seed: u64) -> Result<()> {
     let cast = RayCast { rays, seed, ..Default::default() };
-    let (lit, error) = truth::picture(frame.scene(), placements, &cast);
+    let (lit, _) = truth::picture(frame.scene(), placements, &cast);
     for (entity, radiosity) in lit {
         frame.set_radiosity(entity, &radiosity)?;
     }
-    Ok(error)
+    Ok(())
 }
 
 /// A row a vertex of every receiver, world frame.

@@ -15,6 +15,7 @@ use super::radiance::{key_zonal, one};
 use super::short;
 use super::sky::{Dome, Sky};
 use crate::error::{Error, Result};
+use crate::sh::basis::Y00;
 use crate::sh::lobe;
 use crate::sh::rotation::Rotation;
 
@@ -291,6 +292,11 @@ impl Environment {
             sum += picture.radiance(direction) * f64::from(image.scale);
         }
         (sum * f64::from(self.source.strength)).to_array()
+    }
+
+    /// Mean radiance, linear RGB, without [`Environment::discs`]: it is shown behind a scene.
+    pub(crate) fn mean(&self) -> DVec3 {
+        DVec3::from_array(self.coefficients(1).map(|channel| channel[0] * Y00))
     }
 
     /// Projection of each channel to `bands` bands, bands^2 coefficients, without [`Environment::discs`]. All parts but

@@ -12,6 +12,8 @@ use std::path::Path;
 #[derive(Clone, Debug, Serialize)]
 pub struct ErrorPicture {
     pub picture: String,
+    /// Where the rays of the reference begin.
+    pub truth: &'static str,
     /// Mapping from errors to colours.
     pub scale: ColorScale,
     /// Root mean square over all lit vertices, relative to that of the reference.
@@ -65,7 +67,7 @@ impl ErrorMap {
             Scheme::Absolute => "magnitude",
         };
         format!(
-            "error of radiosity / RMS radiosity by ray casting; {what}; RMS {:.4}, of the rays themselves {reference_error:.4}",
+            "error of radiosity / RMS radiosity by rays from vertices; {what}; RMS {:.4}, of the rays themselves {reference_error:.4}",
             self.rms()
         )
     }
@@ -108,9 +110,10 @@ impl ErrorMap {
         let scale = ColorScale { limit: limit.unwrap_or(fitting.limit), ..fitting };
         self.draw(frame, placements, &scale)?;
         let [width, _] = frame.size();
-        let (picture, rows) = scale.with_bar(&frame.picture(), width as usize, &self.title(reference_error));
-        picture::write_png(path, width, rows as u32, &picture, 0.0)?;
-        Ok(ErrorPicture { picture: path.display().to_string(), scale, rms: self.rms(), reference_error })
+        let (drawn, rows) = scale.with_bar(&frame.picture(), width as usize, &self.title(reference_error));
+        picture::write_png(path, width, rows as u32, &drawn, 0.0)?;
+        let picture = path.display().to_string();
+        Ok(ErrorPicture { picture, truth: "vertices", scale, rms: self.rms(), reference_error })
     }
 }
 

@@ -8,6 +8,12 @@ use crate::scene::{Placement, Scene};
 use glam::DVec3;
 use rayon::prelude::*;
 
+/// Vulkan's standard places of four samples in a pixel ("Standard sample locations"), and of one.
+const FOUR: [[f64; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [0.625, 0.875]];
+const ONE: [[f64; 2]; 1] = [[0.5, 0.5]];
+/// Rows of pixels between two reports of progress.
+const ROWS: usize = 8;
+
 /// The scene's camera in front of a world, for pictures of one size.
 pub struct Eye<'w> {
     world: &'w World<'w>,
@@ -62,7 +68,7 @@ impl<'w> Eye<'w> {
 pub fn lit_points(world: &World<'_>, [width, height]: [u32; 2]) -> Vec<(Vertex, VertexView)> {
     let eye = Eye::new(world, [width, height]);
     let surface = |pixel: u32| {
-        let Seen { entity, view, .. } = eye.seen(pixel, [0.5; 2])?;
+        let Seen { entity, view, .. } = eye.seen(pixel, ONE[0])?;
         let entity_data = &world.scene.entities[entity];
         (entity_data.receives && !entity_data.emits).then_some((Vertex { entity, index: pixel as usize }, view))
     };
@@ -77,4 +83,68 @@ pub fn pixels(scene: &Scene, placements: &[Placement], size: [u32; 2], cast: &Ra
     let points = lit_points(&world, size);
     let lit = cast.run_at(&world, &points);
     points.iter().zip(lit).map(|((key, _), estimate)| (key.index, estimate)).collect()
+}
+
+/// A picture by rays: linear RGB, three floats a pixel, rows from the top.
+pub struct RayPicture {
+    /// Samples above the white of the exposure were brought down to it, as pictures for a screen have them.
+    pub shown: Vec<f32>,
+    /// Radiance as it is.
+    pub linear: Vec<f32>,
+    /// Root mean square of the standard error relative to that of the radiosity, over what is lit.
+    pub error: f64,
+}
+
+/// The picture of a scene by rays through its pixels, each at four places where edges are `smoothed`, which share the
+/// rays of `cast`: emission, and light from the sky and from every light past everything, as [`RayCast`] has it. Where
+/// nothing is met it has the mean radiance of the sky. `tell` is given the rows that are done.
+pub fn picture(
+    world: &World<'_>,
+    [width, height]: [u32; 2],
+    smoothed: bool,
+    cast: &RayCast,
+    tell: &dyn Fn(u32),
+) -> RayPicture {
+    let scene = world.scene;
+    let eye = Eye::new(world, [width, height]);
+    let places: &[[f64; 2]] = if smoothed { &FOUR } else { &ONE };
+    let share = cast.rays / places.len() as u32;
+    let runs = cast.runs.min(2);
+    let cast = RayCast { rays: share.max(runs), runs, ..*cast };
+    let caster = cast.caster(world);
+    let background = scene.environment.mean();
+    let white = f64::from(scene.data.output.white());
+    // The two values of a pixel, its squared radiosity and its squared standard error.
+    let pixel = |pixel: u32| {
+        let mut of_pixel = [DVec3::ZERO; 4];
+        for (index, place) in places.iter().enumerate() {
+            let seen = eye.seen(pixel, *place);
+            let mut radiance = seen.as_ref().map_or(background, |seen| seen.emission);
+            if let Some(seen) = seen.filter(|seen| scene.entities[seen.entity].receives) {
+                let key = Vertex { entity: seen.entity, index: pixel as usize * places.len() + index };
+                let Estimate { radiosity, error } = caster.point(&seen.view, key);
+                radiance += DVec3::from(radiosity);
+                of_pixel[2] += DVec3::from(radiosity) * DVec3::from(radiosity);
+                of_pixel[3] += DVec3::from(error) * DVec3::from(error);
+            }
+            of_pixel[0] += radiance.min(DVec3::splat(white));
+            of_pixel[1] += radiance;
+        }
+        of_pixel.map(|value| value / places.len() as f64)
+    };
+    let mut out = RayPicture { shown: Vec::new(), linear: Vec::new(), error: 0.0 };
+    let mut squares = [f64::MIN_POSITIVE, 0.0];
+    for rows in (0..height).step_by(ROWS) {
+        let end = (rows + ROWS as u32).min(height);
+        let values: Vec<[DVec3; 4]> = (rows * width..end * width).into_par_iter().map(pixel).collect();
+        for [shown, linear, radiosity, error] in values {
+            out.shown.extend(shown.as_vec3().to_array());
+            out.linear.extend(linear.as_vec3().to_array());
+            squares[0] += radiosity.element_sum();
+            squares[1] += error.element_sum() / places.len() as f64;
+        }
+        tell(end);
+    }
+    out.error = (squares[1] / squares[0]).sqrt();
+    out
 }

@@ -91,27 +91,43 @@ impl Radiance<'_> {
     }
 }
 
+/// Rays into a world.
+pub(super) struct Caster<'w> {
+    cast: RayCast,
+    world: &'w World<'w>,
+    radiance: Radiance<'w>,
+}
+
+impl Caster<'_> {
+    /// Radiosity of a point of a surface, as [`RayCast::run_at`] has it.
+    pub(super) fn point(&self, view: &VertexView, key: Vertex) -> Estimate {
+        self.cast.point(self.world, &self.radiance, view, key)
+    }
+}
+
 impl RayCast {
     /// Radiosity of the given vertices.
     pub fn run(&self, world: &World<'_>, vertices: &[Vertex]) -> Vec<Estimate> {
-        let radiance = self.radiance(world);
-        vertices.par_iter().map(|&vertex| self.point(world, &radiance, &world.view(vertex), vertex)).collect()
+        let caster = self.caster(world);
+        vertices.par_iter().map(|&vertex| caster.point(&world.view(vertex), vertex)).collect()
     }
 
     /// Radiosity of points of surfaces. A point's entity reflects, and its index decides the rays.
     pub fn run_at(&self, world: &World<'_>, points: &[(Vertex, VertexView)]) -> Vec<Estimate> {
-        let radiance = self.radiance(world);
-        points.par_iter().map(|(key, view)| self.point(world, &radiance, view, *key)).collect()
+        let caster = self.caster(world);
+        points.par_iter().map(|(key, view)| caster.point(view, *key)).collect()
     }
 
-    fn radiance<'w>(&self, world: &World<'w>) -> Radiance<'w> {
+    /// What points of a world can be lit with, one after another.
+    pub(super) fn caster<'w>(&self, world: &'w World<'w>) -> Caster<'w> {
         assert!(self.runs >= 1 && self.rays >= self.runs, "{} rays in {} runs", self.rays, self.runs);
         let environment = &world.scene.environment;
-        match self.distant {
+        let radiance = match self.distant {
             _ if environment.is_none() => Radiance::None,
             Distant::Exact => Radiance::Exact(environment),
             Distant::Bands(bands) => Radiance::Bands(bands, Box::new(environment.coefficients(bands))),
-        }
+        };
+        Caster { cast: *self, world, radiance }
     }
 
     fn point(&self, world: &World<'_>, radiance: &Radiance<'_>, view: &VertexView, vertex: Vertex) -> Estimate {

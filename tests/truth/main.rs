@@ -10,6 +10,7 @@ use shadow_fields::scene::Scene;
 use shadow_fields::sh::basis::MAX_COEFFICIENTS;
 use shadow_fields::sh::lobe;
 use shadow_fields::sh::product::Tensor;
+use shadow_fields::truth::pixels;
 use shadow_fields::truth::raycast::{Distant, Order, RayCast, relative_error};
 use shadow_fields::truth::{ExactChain, RayMeshes, Vertex, World, receiver_vertices, sample_vertices};
 use std::f64::consts::PI;
@@ -17,7 +18,15 @@ use std::path::Path;
 
 /// A ball of radius 0.5 m, 1 m above a floor of 81 vertices and albedo 0.6.
 fn scene(rest: &str) -> Scene {
-    let text = format!(
+    read(&text(rest))
+}
+
+fn read(text: &str) -> Scene {
+    Scene::parse(text, Path::new("test.toml"), &|_| unreachable!("no files")).unwrap()
+}
+
+fn text(rest: &str) -> String {
+    format!(
         r#"
         [camera]
         eye = [0, 3, 6]
@@ -32,8 +41,7 @@ fn scene(rest: &str) -> Scene {
         mesh = "floor"
         albedo = [0.6, 0.6, 0.6]
         {rest}"#
-    );
-    Scene::parse(&text, Path::new("test.toml"), &|_| unreachable!("no files")).unwrap()
+    )
 }
 
 const BALL: &str = "[[entity]]\nmesh = \"ball\"\nposition = [0, 1, 0]\nreceives = false\n";
@@ -318,4 +326,40 @@ fn a_floor_blocks_the_light_from_below() {
             assert!((estimate.radiosity[0] - 0.5).abs() < 0.01, "{seen}");
         }
     }
+}
+
+/// A picture by rays through pixels shows what rays from vertices find, where these lie densely.
+#[test]
+fn pixels_and_dense_vertices_agree() {
+    let text = text(&format!("{BALL}{}{SKY}", bulb(0.3, [1.5, 3.0, 0.5])));
+    let scene = read(&text.replace("cells = 8", "cells = 96").replace("[0, 3, 6]", "[0, 5, 0.5]"));
+    let shapes = RayMeshes::new(&scene);
+    let world = World::new(&scene, &shapes, &scene.at(0.0));
+    let size = [48, 32];
+    let rows = std::cell::Cell::new(0);
+    let cast = RayCast { rays: 256, ..Default::default() };
+    let picture = pixels::picture(&world, size, false, &cast, &|done| rows.set(done));
+    assert_eq!((rows.get(), picture.linear.len()), (size[1], 3 * 48 * 32));
+    assert!(picture.error < 0.02, "{}", picture.error);
+    let shown = picture.shown.iter().zip(&picture.linear);
+    assert!(shown.clone().all(|(shown, linear)| *shown == linear.min(1.0)), "white is 1");
+
+    let vertices: Vec<Vertex> = receiver_vertices(&scene).into_iter().filter(|v| v.entity == 0).collect();
+    let lit = cast.run(&world, &vertices);
+    let points = pixels::lit_points(&world, size);
+    let mut apart = 0.0;
+    let mut whole = 0.0;
+    for (key, view) in points.iter().filter(|(key, _)| key.entity == 0) {
+        // The floor's vertices are rows of 97, 4 m wide.
+        let [x, z] = [view.position.x, view.position.z].map(|c| ((c + 2.0) * 24.0).clamp(0.0, 95.999));
+        let at = |row: f64, column: f64| lit[row as usize * 97 + column as usize].radiosity;
+        let [u, v] = [x.fract(), z.fract()];
+        for c in 0..3 {
+            let [near, far] = [z, z + 1.0].map(|row| at(row, x)[c] * (1.0 - u) + at(row, x + 1.0)[c] * u);
+            let wanted = near * (1.0 - v) + far * v;
+            apart += (f64::from(picture.linear[3 * key.index + c]) - wanted).powi(2);
+            whole += wanted * wanted;
+        }
+    }
+    assert!(whole > 0.0 && apart < 0.03_f64.powi(2) * whole, "{} of the radiosity", (apart / whole).sqrt());
 }

@@ -59,7 +59,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         output::say(serde_json::to_value(&outcome).expect("results are plain data").to_string());
         return context.finish();
     }
-    output::say("Relative RMS error over vertices, by cause (p99 and max of the total)");
+    output::say("Relative RMS error over vertices against rays from them, by cause (p99 and max of the total)");
     let columns = [
         ("scene", "/case"),
         ("centre rule", "/centre_rule/rms_relative"),
@@ -73,7 +73,9 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
         ("T0 error", "/t0_error_relative"),
     ];
     table(&outcome.budgets, &columns);
-    output::say("\nPictures: mean FLIP where both are lit by vertex; at pixels mean FLIP and relative RMS error");
+    output::say(
+        "\nPictures: mean FLIP against rays from vertices; against rays from pixels mean FLIP and relative RMS error",
+    );
     let columns = [
         ("scene", "/case"),
         ("FLIP", "/mean_flip_ratio"),

@@ -19,7 +19,8 @@ float angle_of(float y, float x) {
 // together lie in direction `middle`; `sine` and `cosine` are those of the angle between them.
 void add_side(vec3 normal, vec3 middle, float sine, float cosine, inout float b[FETCHED]) {
     float angle = angle_of(sine, cosine);
-    float half_sine = sqrt(max(0.5 - 0.5 * cosine, 0.0));
+    // Of small angles the cosine is rounded to 1.
+    float half_sine = cosine > 0.0 ? sine * inversesqrt(2.0 + 2.0 * cosine) : sqrt(0.5 - 0.5 * cosine);
     middle = normalize(middle);
     float of_normal[COEFFICIENTS], above[COEFFICIENTS], below[COEFFICIENTS];
     sh_basis(normal, of_normal);

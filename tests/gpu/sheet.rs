@@ -2,15 +2,15 @@
 
 use crate::{common, stage};
 use common::report;
-use shadow_fields::bake;
+use shadow_fields::bake::{self, Quality};
 use shadow_fields::frame;
 use shadow_fields::scene::{Lights, Scene};
 use shadow_fields::truth::{RayCast, RayMeshes, Vertex, World};
 use stage::{Stage, scene, small, stage};
 
-/// The fields that the command line bakes by default, in f32.
+/// The fields that the command line bakes by default, in f32, of meshes as they are.
 fn defaults(lights: Lights) -> frame::Options {
-    let bake = bake::Options { storage: small().bake.storage, ..Default::default() };
+    let bake = bake::Options { storage: small().bake.storage, vertices: 0, ..Quality::Normal.options() };
     frame::Options { bake, lights, ..small() }
 }
 
@@ -128,7 +128,8 @@ fn sheets_hide_sharp_lights() {
         let (_, through) = lit(&format!("{ceiling}{}", lamp(1.7)), lights);
         let (_, open) = lit(&lamp(1.7), lights);
         report(&format!("{lights:?}: {through:.4} of {open:.4} come through a ceiling"));
-        assert!(through < if lights == Lights::Sharp { 1e-6 } else { 0.03 } * open, "{through} of {open}");
+        // Four bands know a ceiling that is 67 degrees wide as a soft one.
+        assert!(through < if lights == Lights::Sharp { 1e-6 } else { 0.2 } * open, "{through} of {open}");
         let (_, beneath) = lit(&ball("[0, -0.6, 0]"), lights);
         assert!(beneath < 1e-6 || lights == Lights::Sh, "{beneath} from below");
     }

@@ -3,13 +3,30 @@
 #include "centroid.glsl"
 layout(location = 0) centroid in vec4 radiance; // w: 1
 layout(location = 0) out vec4 color; // alpha: the entity's tag
+#if PAINTED
+layout(location = 1) centroid in vec3 light; // of a surface of the mean reflectance
+layout(location = 2) centroid in vec2 uv;
+layout(binding = 0) uniform sampler2D picture;
+#endif
 
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
     vec4 emission_white; // w = radiance that is shown as white
     float tag;
+#if PAINTED
+    vec4 paint; // factor on the picture; least alpha
+#endif
 } push;
 
 void main() {
-    color = vec4(finish(within_triangle(radiance.w) * radiance.rgb, push.emission_white.w), push.tag);
+    float within = within_triangle(radiance.w);
+    vec3 shown = radiance.rgb;
+#if PAINTED
+    vec4 texel = texture(picture, within * uv);
+    if (texel.a < push.paint.w) {
+        discard;
+    }
+    shown += push.paint.rgb * texel.rgb * light;
+#endif
+    color = vec4(finish(within * shown, push.emission_white.w), push.tag);
 }

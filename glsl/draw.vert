@@ -3,6 +3,12 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 emission;
 layout(location = 2) in vec4 radiosity;
+#if PAINTED
+layout(location = 3) in vec3 paint; // texture coordinates and tint
+layout(location = 1) out vec3 light;
+layout(location = 2) out vec2 uv;
+#include "paint.glsl"
+#endif
 layout(location = 0) out vec4 radiance; // w: 1
 
 layout(push_constant) uniform Push {
@@ -12,6 +18,12 @@ layout(push_constant) uniform Push {
 } push;
 
 void main() {
-    radiance = vec4(push.emission_white.rgb * emission + radiosity.rgb, 1.0);
+    radiance = vec4(push.emission_white.rgb * emission, 1.0);
+#if PAINTED
+    light = radiosity.rgb * tint_of(paint);
+    uv = paint.xy;
+#else
+    radiance.rgb += radiosity.rgb;
+#endif
     gl_Position = push.clip_from_object * vec4(position, 1.0);
 }

@@ -10,6 +10,11 @@ layout(location = 0) centroid in vec3 at;     // object's frame, metres
 layout(location = 1) centroid in vec3 weights;
 layout(location = 2) flat in uvec3 triangle;
 layout(location = 3) centroid in vec3 emission;
+#if PAINTED
+layout(location = 4) centroid in vec2 uv;
+layout(location = 5) centroid in vec3 tint;
+layout(binding = 12) uniform sampler2D picture;
+#endif
 layout(location = 0) out vec4 color; // alpha: the entity's tag
 
 layout(binding = 1) uniform textureBuffer radiosity; // of every vertex of the scene
@@ -21,6 +26,15 @@ layout(binding = 8) uniform textureBuffer vertices;
 void main() {
     uvec3 lit = push.first + triangle;
     float within = within_triangle(weights.x + weights.y + weights.z);
+#if PAINTED
+    vec4 texel = texture(picture, within * uv);
+    if (texel.a < push.paint.w) {
+        discard;
+    }
+    vec3 reflectance = push.paint.rgb * texel.rgb * within * tint;
+#else
+    vec3 reflectance = vec3(1.0);
+#endif
     vec3 weight = within * weights;
     vec3 light = blend(radiosity, lit, weight);
     uvec2 chain = chain_of(push.cluster_first, min(triangle.x, min(triangle.y, triangle.z)));
@@ -33,5 +47,5 @@ void main() {
         }
         light = blend(soft, lit, weight) + pixel_light(receiver, within * at, facings, chain);
     }
-    color = vec4(finish(within * push.emission_white.rgb * emission + light, push.emission_white.w), push.tag);
+    color = vec4(finish(within * push.emission_white.rgb * emission + reflectance * light, push.emission_white.w), push.tag);
 }

@@ -4,6 +4,12 @@ layout(location = 0) out vec3 at;      // object's frame, metres
 layout(location = 1) out vec3 weights; // of the triangle's three vertices
 layout(location = 2) flat out uvec3 triangle;
 layout(location = 3) out vec3 emission;
+#if PAINTED
+layout(location = 4) out vec2 uv;
+layout(location = 5) out vec3 tint;
+layout(binding = 11) uniform utextureBuffer paints; // the bits of three numbers a vertex
+#include "paint.glsl"
+#endif
 
 layout(binding = 0) uniform utextureBuffer corners;   // vertices of triangles, three each
 layout(binding = 1) uniform textureBuffer radiosity;  // w: whether an edge is near
@@ -32,6 +38,12 @@ void main() {
     emission.x = uintBitsToFloat(texelFetch(emissions, int(3 * own)).x);
     emission.y = uintBitsToFloat(texelFetch(emissions, int(3 * own + 1)).x);
     emission.z = uintBitsToFloat(texelFetch(emissions, int(3 * own + 2)).x);
+#if PAINTED
+    uvec3 bits = uvec3(texelFetch(paints, int(3 * own)).x, texelFetch(paints, int(3 * own + 1)).x,
+        texelFetch(paints, int(3 * own + 2)).x);
+    uv = uintBitsToFloat(bits.xy);
+    tint = tint_of(uintBitsToFloat(bits));
+#endif
     float edge = 0.0;
     for (int i = 0; i < 3; i++) {
         edge = max(edge, texelFetch(radiosity, int(push.first + triangle[i])).w);

@@ -9,4 +9,5 @@ layout(push_constant) uniform Push {
     uint cluster_first;  // its first cluster among those whose chains are known
     uint vertex_first;   // of its mesh, in the vertex buffer
     uint self_first;     // first cell of its mesh's self-visibility, or NONE
+    vec4 paint;          // factor on the picture that varies its reflectance; least alpha
 } push;

@@ -48,6 +48,7 @@ embedded!(
     "merge_sheet.glsl",
     "overlay.frag",
     "overlay.vert",
+    "paint.glsl",
     "pixel_light.glsl",
     "project.comp",
     "raster.comp",

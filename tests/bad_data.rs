@@ -141,7 +141,7 @@ impl Draw {
             position: self.vector(),
             rotation: self.rotation(),
             scale: self.float(),
-            albedo: self.vector(),
+            albedo: self.vector().into(),
             emission: self.vector(),
             emits: self.maybe(|draw| draw.0.bool()),
             occludes: self.maybe(|draw| draw.0.bool()),

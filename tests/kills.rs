@@ -41,7 +41,7 @@ const COMMANDS: [(&str, &[&str]); 8] = [
         "render scene.toml -o n##.png --frames 3 --size 16x16 --variant storage --lattice cube:2x2 --face-px 4 --lights sh",
         &["n00.png", "n01.png", "n02.png"],
     ),
-    ("import t.gltf -o i.toml", &["i.toml", "i_meshes/mesh_0.obj"]),
+    ("import t.gltf -o i.toml", &["i.toml"]),
     ("inspect ../good/f.sf --faces c.png", &["c.png"]),
     ("compare ../good/a.png ../good/a.png -o d.png", &["d.png"]),
 ];

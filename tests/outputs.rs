@@ -152,12 +152,12 @@ fn import_replaces_only_its_own_files() {
     let import = ["import", "model.gltf", "-o", "m.toml"];
     good(folder.path(), &import);
     good(folder.path(), &import);
-    let mesh = folder.path().join("m_meshes").join("mesh_0.obj");
-    std::fs::write(&mesh, TRIANGLE).unwrap();
-    refused(&folder, "import model.gltf -o m.toml --quiet", 2, &["m_meshes/mesh_0.obj", "--force"]);
-    assert_eq!(std::fs::read_to_string(&mesh).unwrap(), TRIANGLE);
+    let scene = folder.path().join("m.toml");
+    std::fs::write(&scene, TRIANGLE).unwrap();
+    refused(&folder, "import model.gltf -o m.toml --quiet", 2, &["m.toml", "--force"]);
+    assert_eq!(std::fs::read_to_string(&scene).unwrap(), TRIANGLE);
     good(folder.path(), &[&import[..], &["--force"]].concat());
-    assert_ne!(std::fs::read_to_string(&mesh).unwrap(), TRIANGLE);
+    assert_ne!(std::fs::read_to_string(&scene).unwrap(), TRIANGLE);
 }
 
 #[test]

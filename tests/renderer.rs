@@ -60,7 +60,7 @@ fn scenes_made_in_code_are_held_to_the_rules_of_scene_files() {
     let ring = || EntityData::of_mesh("ring");
     let cases = [
         (
-            room().entity(EntityData { albedo: Vec3::splat(1.5), ..ring() }),
+            room().entity(EntityData { albedo: Vec3::splat(1.5).into(), ..ring() }),
             "entity 3: 1.5 is out of range for an albedo",
         ),
         (room().entity(EntityData { position: Vec3::NAN, ..ring() }), "entity 3: NaN is out of range for a position"),

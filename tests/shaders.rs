@@ -55,7 +55,6 @@ fn sharp() -> Vec<ShaderPermutation> {
 }
 
 fn drawing() -> Vec<ShaderPermutation> {
-    let flat = [false, true].map(|display| ShaderPermutation::new("draw.frag", 4).define("DISPLAY", display));
     let silhouette = SilhouetteOptions::default();
     let sharp = [false, true].map(|outlines| SharpPermutation {
         reads: Reads::Texels,
@@ -75,12 +74,16 @@ fn drawing() -> Vec<ShaderPermutation> {
     let grids = [false, true].into_iter().flat_map(|display| ways.map(|sharp| DrawGrid::row(display, sharp)));
     let triangles = [false, true]
         .into_iter()
-        .flat_map(|display| sharp.iter().flat_map(move |sharp| DrawTriangles::patch_rows(display, sharp)));
-    let fragments = flat.into_iter().chain(grids).chain(triangles);
+        .flat_map(|display| [false, true].map(|painted| (display, painted)))
+        .flat_map(|(display, painted)| {
+            let patches = sharp.iter().flat_map(move |sharp| DrawTriangles::patch_rows(display, painted, sharp));
+            DrawTriangles::rows(display, painted).into_iter().chain(patches)
+        });
+    let fragments = grids.chain(triangles);
     fragments
         .chain([false, true].map(Smooth::fragment))
         .chain(
-            ["draw.vert", "grid.vert", "overlay.vert", "overlay.frag", "show.vert", "show.frag", "smooth.vert"]
+            ["grid.vert", "overlay.vert", "overlay.frag", "show.vert", "show.frag", "smooth.vert"]
                 .map(|file| ShaderPermutation::new(file, 4)),
         )
         .collect()

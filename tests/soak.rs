@@ -64,7 +64,7 @@ const PERIOD_S: f64 = 4.0;
 /// The scene in one of its states: other colours, a lamp that is brighter, goes out or casts shadows instead.
 fn changed(scene: &Scene, state: u64) -> Scene {
     let mut data = scene.data.clone();
-    data.entities[1].albedo = Vec3::new(0.7, 0.7 - 0.15 * state as f32, 0.3);
+    data.entities[1].albedo = Vec3::new(0.7, 0.7 - 0.15 * state as f32, 0.3).into();
     let lamp = &mut data.entities[3];
     match state {
         0 => {}

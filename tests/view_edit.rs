@@ -79,7 +79,7 @@ fn entity_with(motion: impl Strategy<Value = Motion>) -> impl Strategy<Value = E
             position,
             rotation,
             scale,
-            albedo: Vec3::splat(0.5),
+            albedo: Vec3::splat(0.5).into(),
             emission: Vec3::ZERO,
             spot: None,
             emits: None,

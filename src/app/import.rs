@@ -5,7 +5,7 @@ use super::source::GltfArguments;
 use super::{Global, output};
 use crate::error::{Error, Result, one_line};
 use crate::files;
-use crate::scene::{self, Scene, export::Export, gltf};
+use crate::scene::{self, Scene, gltf};
 use clap::Args;
 use serde_json::json;
 use std::io::Read;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `import`.
 #[derive(Args)]
 #[command(
-    after_help = "The scene file can be edited like any other; its meshes are OBJ files in the folder SCENE_meshes beside it. \
+    after_help = "The scene file can be edited like any other; it names the glTF file for meshes and textures, which has to stay. \
     `render` gives the same picture of both. What has no form in a scene file is left out, with a line for each kind.\n\n\
     Example:\n  shadow-fields import robot.glb -o robot.toml && shadow-fields render robot.toml -o robot.png --frames 48"
 )]
@@ -24,8 +24,7 @@ pub struct Arguments {
     /// Scene file to write
     #[arg(short, long, value_name = "SCENE.toml")]
     output: PathBuf,
-    /// Replace files that stand under the names of the scene file and its meshes, also those that `import` did not
-    /// write
+    /// Replace a file that stands under the scene file's name, also one that `import` did not write
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -60,11 +59,11 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     Outputs::check(&inputs, std::slice::from_ref(&output))?;
     arguments.check_own(&arguments.output)?;
     let scene: Scene = arguments.gltf.scene(global, &arguments.scene)?;
-    let export = Export::new(&scene.data, &scene.meshes, &arguments.output)?;
-    export.mesh_files().try_for_each(|file| arguments.check_own(file))?;
-    let outputs = Outputs::check(&inputs, &[output.with(export.mesh_files())])?;
+    let mut data = scene.data.clone();
+    let folder = |path: &Path| path.parent().unwrap_or(Path::new("")).to_owned();
+    data.move_files(&folder(&arguments.scene), &folder(&arguments.output));
     let name = arguments.scene.file_name().unwrap_or_default().to_string_lossy();
-    export.write(&one_line(&format!("{HEAD} from {name}."))).map_err(|error| outputs.after(error))?;
+    data.write(&arguments.output, &one_line(&format!("{HEAD} from {name}.")))?;
     let meshes = scene.meshes.len();
     let entities = scene.entities.len();
     let triangles: usize = scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum();

@@ -40,26 +40,12 @@ impl Picture {
 
     /// Decodes a PNG, of an animated one the first picture; JPEG; OpenEXR with red, green and blue; or Radiance HDR.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
-        let damaged = |error: image::ImageError| Error::Input(error.to_string().replace('\n', " "));
-        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-        let mut reader = reader.map_err(|error| Error::Input(error.to_string()))?;
-        let format = reader.format().filter(|f| FORMATS.contains(f));
-        let format = format.ok_or_else(|| Error::Input("expected a picture in PNG, JPEG, EXR or HDR".into()))?;
-        let mut limits = Limits::default();
-        // Twice the largest pixel, of four f32: the decoder may hold a copy.
-        limits.max_alloc = Some(PIXEL_LIMIT * 32);
-        reader.limits(limits);
-        let decoder = reader.into_decoder().map_err(damaged)?;
-        let (width, height) = decoder.dimensions();
-        if !(1..=PIXEL_LIMIT).contains(&(u64::from(width) * u64::from(height))) {
-            return Err(Error::Input(format!("{width} x {height} pixels are not within 1 to {PIXEL_LIMIT}")));
-        }
-        let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+        let (decoded, is_linear) = decode(bytes)?;
         let is_transparent =
             decoded.color().has_alpha() && decoded.to_rgba32f().pixels().any(|pixel| pixel.0[3] != 1.0);
-        let rgb = decoded.into_rgb32f().into_raw();
-        let is_linear = matches!(format, ImageFormat::OpenExr | ImageFormat::Hdr);
-        Ok(Picture { width: width as usize, height: height as usize, rgb, is_linear, is_transparent })
+        let width = decoded.width() as usize;
+        let height = decoded.height() as usize;
+        Ok(Picture { width, height, rgb: decoded.into_rgb32f().into_raw(), is_linear, is_transparent })
     }
 
     /// Linear values, multiplied by 2^`exposure_ev` if they are stored so.
@@ -75,4 +61,24 @@ impl Picture {
         let of = |value: &f32| if self.is_linear { srgb_from_linear(value * gain) } else { *value };
         self.rgb.iter().map(of).collect()
     }
+}
+
+/// The pixels of a picture file in one of [`FORMATS`], and whether their values are linear.
+pub(super) fn decode(bytes: &[u8]) -> Result<(DynamicImage, bool)> {
+    let damaged = |error: image::ImageError| Error::Input(error.to_string().replace('\n', " "));
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let mut reader = reader.map_err(|error| Error::Input(error.to_string()))?;
+    let format = reader.format().filter(|f| FORMATS.contains(f));
+    let format = format.ok_or_else(|| Error::Input("expected a picture in PNG, JPEG, EXR or HDR".into()))?;
+    let mut limits = Limits::default();
+    // Twice the largest pixel, of four f32: the decoder may hold a copy.
+    limits.max_alloc = Some(PIXEL_LIMIT * 32);
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(damaged)?;
+    let (width, height) = decoder.dimensions();
+    if !(1..=PIXEL_LIMIT).contains(&(u64::from(width) * u64::from(height))) {
+        return Err(Error::Input(format!("{width} x {height} pixels are not within 1 to {PIXEL_LIMIT}")));
+    }
+    let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    Ok((decoded, matches!(format, ImageFormat::OpenExr | ImageFormat::Hdr)))
 }

@@ -1,6 +1,6 @@
 //! A checked triangle mesh with derived data: bounding sphere, closedness, convexity, flatness and content hash.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::{enclose, outline, topology};
 use crate::error::{Error, Result};
@@ -18,7 +18,7 @@ const RELATIVE_AREA_MINIMUM: f64 = 1e-10;
 
 /// Triangles with one unit normal per vertex; vertices are split where normals differ. Positions in metres.
 ///
-/// The four arrays are public to read. [`Mesh::new`] computes from them what the accessors return, so build a new mesh
+/// The arrays are public to read. [`Mesh::new`] computes from them what the accessors return, so build a new mesh
 /// instead of changing one. Vertices stand in the order of their first use by a triangle; every vertex is used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
@@ -30,6 +30,10 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Linear RGB emission pattern per position, finite and not negative, if the mesh has one.
     pub colors: Option<Vec<Vec3>>,
+    /// Texture coordinates per position, v upwards, if the mesh has any.
+    pub uvs: Option<Vec<Vec2>>,
+    /// Linear RGB factor on the reflectance per position, 0 to 1, if the mesh has any.
+    pub tints: Option<Vec<Vec3>>,
     /// Indices into the arrays above, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     centre: Vec3,
@@ -40,13 +44,40 @@ pub struct Mesh {
     rectangle: Option<Rectangle>,
 }
 
+/// What vertices may have besides positions and normals; each array has one element per position, or is left out. Meshes
+/// have them under the same names.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Attributes {
+    pub colors: Option<Vec<Vec3>>,
+    pub uvs: Option<Vec<Vec2>>,
+    pub tints: Option<Vec<Vec3>>,
+}
+
+impl Attributes {
+    /// The attributes of some vertices, in that order.
+    fn pick(&self, used: &[u32]) -> Self {
+        fn of<T: Copy>(from: &Option<Vec<T>>, used: &[u32]) -> Option<Vec<T>> {
+            from.as_ref().map(|all| used.iter().map(|&i| all[i as usize]).collect())
+        }
+        Attributes { colors: of(&self.colors, used), uvs: of(&self.uvs, used), tints: of(&self.tints, used) }
+    }
+
+    /// Adds the attributes of a vertex halfway between two others.
+    pub(crate) fn add_middle(&mut self, a: usize, b: usize) {
+        if let Some(colors) = &mut self.colors {
+            colors.push(0.5 * (colors[a] + colors[b]));
+        }
+        if let Some(uvs) = &mut self.uvs {
+            uvs.push(0.5 * (uvs[a] + uvs[b]));
+        }
+        if let Some(tints) = &mut self.tints {
+            tints.push(0.5 * (tints[a] + tints[b]));
+        }
+    }
+}
+
 impl Mesh {
-    /// Checks and completes a mesh.
-    ///
-    /// Empty `normals` are computed from the triangles, weighted by angle; given ones are brought to unit length, and
-    /// those of zero length replaced by computed ones. Triangles with two equal corners are dropped, which leaves a
-    /// closed surface closed; needles and other triangles without area are kept, since dropping them could open it.
-    /// Unused vertices are dropped.
+    /// As [`Mesh::with_attributes`], with colours alone.
     pub fn new(
         name: impl Into<String>,
         positions: Vec<Vec3>,
@@ -54,7 +85,23 @@ impl Mesh {
         colors: Option<Vec<Vec3>>,
         triangles: Vec<[u32; 3]>,
     ) -> Result<Self> {
-        check_numbers(&positions, &normals, colors.as_deref(), &triangles)?;
+        Self::with_attributes(name, positions, normals, Attributes { colors, ..Attributes::default() }, triangles)
+    }
+
+    /// Checks and completes a mesh.
+    ///
+    /// Empty `normals` are computed from the triangles, weighted by angle; given ones are brought to unit length, and
+    /// those of zero length replaced by computed ones. Triangles with two equal corners are dropped, which leaves a
+    /// closed surface closed; needles and other triangles without area are kept, since dropping them could open it.
+    /// Unused vertices are dropped.
+    pub fn with_attributes(
+        name: impl Into<String>,
+        positions: Vec<Vec3>,
+        normals: Vec<Vec3>,
+        attributes: Attributes,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<Self> {
+        check_numbers(&positions, &normals, &attributes, &triangles)?;
         let (used, triangles) = compact(&positions, &triangles);
         if triangles.is_empty() {
             return Err(Error::Input("no faces with three different corners".into()));
@@ -63,7 +110,7 @@ impl Mesh {
         let positions = pick(&positions);
         let normals =
             complete_normals(&positions, &triangles, &if normals.is_empty() { normals } else { pick(&normals) });
-        let colors = colors.map(|c| pick(&c));
+        let attributes = attributes.pick(&used);
 
         let (centre, radius_m) = enclose::bounding_sphere(&positions);
         if radius_m < RADIUS_MINIMUM_M {
@@ -74,12 +121,15 @@ impl Mesh {
             return Err(Error::Input("zero total area: all triangles are points or needles".into()));
         }
         let shape = topology::shape(&positions, &triangles, centre, radius_m);
-        let content_hash = hash(&positions, &normals, colors.as_deref(), &triangles);
+        let content_hash = hash(&positions, &normals, &attributes, &triangles);
+        let Attributes { colors, uvs, tints } = attributes;
         let mut mesh = Self {
             name: name.into(),
             positions,
             normals,
             colors,
+            uvs,
+            tints,
             triangles,
             centre,
             radius_m,
@@ -170,11 +220,26 @@ impl Mesh {
         &self,
         positions: Vec<Vec3>,
         normals: Vec<Vec3>,
-        colors: Option<Vec<Vec3>>,
+        attributes: Attributes,
         triangles: Vec<[u32; 3]>,
     ) -> Mesh {
-        let content_hash = hash(&positions, &normals, colors.as_deref(), &triangles);
-        Mesh { name: self.name.clone(), positions, normals, colors, triangles, content_hash, ..self.clone() }
+        let content_hash = hash(&positions, &normals, &attributes, &triangles);
+        let Attributes { colors, uvs, tints } = attributes;
+        Mesh {
+            name: self.name.clone(),
+            positions,
+            normals,
+            colors,
+            uvs,
+            tints,
+            triangles,
+            content_hash,
+            ..self.clone()
+        }
+    }
+
+    pub(crate) fn attributes(&self) -> Attributes {
+        Attributes { colors: self.colors.clone(), uvs: self.uvs.clone(), tints: self.tints.clone() }
     }
 
     /// The rectangle that the mesh covers, if it is flat and does.
@@ -191,14 +256,15 @@ impl Mesh {
         topology::volume_m3(&self.positions, &self.triangles, self.centre)
     }
 
-    /// BLAKE3 of positions, normals, colours and triangles, not of the name: equal meshes share baked fields.
+    /// BLAKE3 of all arrays, not of the name: equal meshes share baked fields.
     pub fn content_hash(&self) -> [u8; 32] {
         self.content_hash
     }
 }
 
 /// Refuses arrays of wrong length, indices out of range and numbers that are not finite or too large.
-fn check_numbers(positions: &[Vec3], normals: &[Vec3], colors: Option<&[Vec3]>, triangles: &[[u32; 3]]) -> Result<()> {
+fn check_numbers(positions: &[Vec3], normals: &[Vec3], attributes: &Attributes, triangles: &[[u32; 3]]) -> Result<()> {
+    let Attributes { colors, uvs, tints } = attributes;
     let fail = |message: String| Err(Error::Input(message));
     if triangles.is_empty() {
         return fail("no faces".into());
@@ -209,8 +275,15 @@ fn check_numbers(positions: &[Vec3], normals: &[Vec3], colors: Option<&[Vec3]>, 
     if !normals.is_empty() && normals.len() != positions.len() {
         return fail(format!("{} normals for {} positions", normals.len(), positions.len()));
     }
-    if colors.is_some_and(|c| c.len() != positions.len()) {
-        return fail(format!("{} colours for {} positions", colors.map_or(0, <[_]>::len), positions.len()));
+    let counts = [
+        ("colours", colors.as_ref().map(Vec::len)),
+        ("texture coordinates", uvs.as_ref().map(Vec::len)),
+        ("tints", tints.as_ref().map(Vec::len)),
+    ];
+    for (of, count) in counts {
+        if let Some(count) = count.filter(|count| *count != positions.len()) {
+            return fail(format!("{count} {of} for {} positions", positions.len()));
+        }
     }
     if let Some(bad) = triangles.iter().flatten().find(|&&i| i as usize >= positions.len()) {
         return fail(format!("index {bad} is out of range: there are {} vertices", positions.len()));
@@ -221,8 +294,14 @@ fn check_numbers(positions: &[Vec3], normals: &[Vec3], colors: Option<&[Vec3]>, 
     if let Some(n) = normals.iter().find(|n| !n.is_finite()) {
         return fail(format!("normal {n} is not finite"));
     }
-    if let Some(c) = colors.into_iter().flatten().find(|c| !c.is_finite() || c.min_element() < 0.0) {
+    if let Some(c) = colors.iter().flatten().find(|c| !c.is_finite() || c.min_element() < 0.0) {
         return fail(format!("colour {c} is negative or not finite"));
+    }
+    if let Some(uv) = uvs.iter().flatten().find(|uv| !uv.is_finite()) {
+        return fail(format!("texture coordinate {uv} is not finite"));
+    }
+    if let Some(t) = tints.iter().flatten().find(|t| !(t.min_element() >= 0.0 && t.max_element() <= 1.0)) {
+        return fail(format!("tint {t} is not within 0 to 1"));
     }
     Ok(())
 }
@@ -288,13 +367,20 @@ fn area_m2(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
     triangles.iter().map(area).sum()
 }
 
-fn hash(positions: &[Vec3], normals: &[Vec3], colors: Option<&[Vec3]>, triangles: &[[u32; 3]]) -> [u8; 32] {
+fn hash(positions: &[Vec3], normals: &[Vec3], attributes: &Attributes, triangles: &[[u32; 3]]) -> [u8; 32] {
+    let Attributes { colors, uvs, tints } = attributes;
     let mut hasher = blake3::Hasher::new();
-    for count in [positions.len(), colors.map_or(0, <[_]>::len), triangles.len()] {
+    for count in [positions.len(), colors.as_ref().map_or(0, Vec::len), triangles.len()] {
         hasher.update(&(count as u64).to_le_bytes());
     }
     // Host byte order: every platform that this crate builds for is little endian.
     hasher.update(bytemuck::cast_slice(positions)).update(bytemuck::cast_slice(normals));
-    hasher.update(bytemuck::cast_slice(colors.unwrap_or_default())).update(bytemuck::cast_slice(triangles));
+    hasher.update(bytemuck::cast_slice(colors.as_deref().unwrap_or_default())).update(bytemuck::cast_slice(triangles));
+    if let Some(uvs) = uvs {
+        hasher.update(b"uvs").update(bytemuck::cast_slice(uvs));
+    }
+    if let Some(tints) = tints {
+        hasher.update(b"tints").update(bytemuck::cast_slice(tints));
+    }
     *hasher.finalize().as_bytes()
 }

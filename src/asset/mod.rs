@@ -32,6 +32,7 @@ pub mod picture;
 mod radiance;
 pub mod sky;
 pub(crate) mod teapot;
+pub mod texture;
 pub mod topology;
 
 pub use generator::Generator;

@@ -1,9 +1,9 @@
 //! Wavefront OBJ: a checking reader around `tobj`, and a writer whose text reads back as the same bits.
 //!
-//! The reader accepts `v x y z [w | r g b]` (colours are linear emission), `vn`, and `f` with any number of corners, as
-//! `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1 or from the end (-1). Groups, objects, materials, texture
-//! coordinates, points and lines are skipped: the file is one mesh. If any corner lacks a normal, all normals are
-//! computed; vertices are then smooth where faces share an index. Faces of more than three corners become fans, so they
+//! The reader accepts `v x y z [w | r g b]` (colours are linear emission), `vt u [v [w]]`, `vn`, and `f` with any number of
+//! corners, as `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1 or from the end (-1). Groups, objects, materials, points
+//! and lines are skipped: the file is one mesh. If any corner lacks a normal, all normals are computed; vertices are then
+//! smooth where faces share an index. If any lacks texture coordinates, the mesh has none. Faces of more than three corners become fans, so they
 //! should be convex.
 //!
 //! `tobj` accepts NaN and indices past the end (some of which it wraps around), panics on faces without corners, and
@@ -14,9 +14,9 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
-use super::mesh::{COORDINATE_LIMIT_M, Mesh, TRIANGLE_LIMIT};
+use super::mesh::{Attributes, COORDINATE_LIMIT_M, Mesh, TRIANGLE_LIMIT};
 use crate::error::{Error, Result};
 
 /// Largest file that is read, in bytes: 256 MiB.
@@ -32,7 +32,8 @@ impl Mesh {
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let text = super::utf8(path, bytes, FILE_LIMIT_BYTES, "mesh")?;
         let count = |keyword| text.lines().filter(|l| l.split_whitespace().next() == Some(keyword)).count();
-        let mut scan = Scan { position_total: count("v"), normal_total: count("vn"), ..Default::default() };
+        let mut scan =
+            Scan { position_total: count("v"), uv_total: count("vt"), normal_total: count("vn"), ..Default::default() };
         for (index, line) in text.lines().enumerate() {
             scan.line(line).map_err(|what| Error::input_at(path, index + 1, what))?;
         }
@@ -46,14 +47,23 @@ impl Mesh {
 struct Scan {
     checked: String,
     position_total: usize,
+    uv_total: usize,
     normal_total: usize,
     position_count: usize,
+    uv_count: usize,
     color_count: usize,
     normal_count: usize,
     triangle_count: usize,
-    faces: String,
-    faces_with_normals: String,
+    faces: Vec<Vec<Corner>>,
+    lacks_uvs: bool,
     lacks_normals: bool,
+}
+
+/// Numbers of a corner's position, texture coordinates and normal, counted from 1.
+struct Corner {
+    position: usize,
+    uv: Option<usize>,
+    normal: Option<usize>,
 }
 
 impl Scan {
@@ -61,6 +71,7 @@ impl Scan {
         let mut words = line.split('#').next().unwrap_or_default().split_whitespace();
         match words.next() {
             Some("v") => self.position(&numbers(words)?),
+            Some("vt") => self.uv(&numbers(words)?),
             Some("vn") => self.normal(&numbers(words)?),
             Some("f") => self.face(words),
             _ => Ok(()),
@@ -98,6 +109,17 @@ impl Scan {
         Ok(())
     }
 
+    fn uv(&mut self, values: &[f32]) -> std::result::Result<(), String> {
+        let uv = match values {
+            [u] => [*u, 0.0],
+            [u, v] | [u, v, _] => [*u, *v],
+            _ => return Err(format!("texture coordinates are 1 to 3 numbers, not {}", values.len())),
+        };
+        self.uv_count += 1;
+        self.write("vt", &uv);
+        Ok(())
+    }
+
     fn write(&mut self, keyword: &str, values: &[f32]) {
         self.checked += keyword;
         values.iter().for_each(|v| self.checked += &format!(" {v:?}"));
@@ -105,26 +127,22 @@ impl Scan {
     }
 
     fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> std::result::Result<(), String> {
-        let mut plain = String::from("f");
-        let mut with_normals = String::from("f");
-        let mut corner_count = 0;
+        let mut corners = Vec::new();
         for word in words {
             let parts: Vec<&str> = word.split('/').collect();
             if parts.len() > 3 {
                 return Err(format!("malformed corner {word:?}"));
             }
             let position = index(parts[0], self.position_count, self.position_total, "position")?;
-            // Writing into a string cannot fail.
-            let _ = write!(plain, " {position}");
-            match parts.get(2) {
-                Some(part) => {
-                    let normal = index(part, self.normal_count, self.normal_total, "normal")?;
-                    let _ = write!(with_normals, " {position}//{normal}");
-                }
-                None => self.lacks_normals = true,
-            }
-            corner_count += 1;
+            // Without texture coordinates a mesh only loses its texture.
+            let uv = parts.get(1).and_then(|part| index(part, self.uv_count, self.uv_total, "texture coordinate").ok());
+            let normal = parts.get(2).map(|part| index(part, self.normal_count, self.normal_total, "normal"));
+            let normal = normal.transpose()?;
+            self.lacks_uvs |= uv.is_none();
+            self.lacks_normals |= normal.is_none();
+            corners.push(Corner { position, uv, normal });
         }
+        let corner_count = corners.len();
         if corner_count < 3 {
             return Err(format!("a face needs at least three corners, not {corner_count}"));
         }
@@ -132,10 +150,7 @@ impl Scan {
         if self.triangle_count > TRIANGLE_LIMIT {
             return Err(format!("over the limit of {TRIANGLE_LIMIT} triangles"));
         }
-        self.faces += &plain;
-        self.faces += "\n";
-        self.faces_with_normals += &with_normals;
-        self.faces_with_normals += "\n";
+        self.faces.push(corners);
         Ok(())
     }
 
@@ -143,27 +158,44 @@ impl Scan {
         if self.triangle_count == 0 {
             return Err(Error::Input("no faces".into()));
         }
-        self.checked += if self.lacks_normals { &self.faces } else { &self.faces_with_normals };
+        let number = |of: Option<usize>, lacks: bool| of.filter(|_| !lacks).map_or(String::new(), |n| n.to_string());
+        for face in &self.faces {
+            self.checked += "f";
+            for Corner { position, uv, normal } in face {
+                // Writing into a string cannot fail.
+                let uv = number(*uv, self.lacks_uvs);
+                let _ = match number(*normal, self.lacks_normals) {
+                    normal if normal.is_empty() => write!(self.checked, " {position}/{uv}"),
+                    normal => write!(self.checked, " {position}/{uv}/{normal}"),
+                };
+            }
+            self.checked += "\n";
+        }
         let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
         let (models, _) = tobj::load_obj_buf(&mut self.checked.as_bytes(), &options, |_| Ok(Default::default()))
             .map_err(|e| Error::Input(e.to_string()))?;
         let [model] = &models[..] else { return Err(Error::Input(format!("{} objects instead of one", models.len()))) };
-        join_indices(name, &model.mesh, !self.lacks_normals)
+        join_indices(name, &model.mesh, !self.lacks_uvs, !self.lacks_normals)
     }
 }
 
-/// Gives every (position, normal) pair in use a vertex of its own.
-fn join_indices(name: &str, from: &tobj::Mesh, has_normals: bool) -> Result<Mesh> {
+/// Gives every triple of position, texture coordinates and normal in use a vertex of its own.
+fn join_indices(name: &str, from: &tobj::Mesh, has_uvs: bool, has_normals: bool) -> Result<Mesh> {
     let triple = |values: &[f32], i: u32| Vec3::from_slice(&values[3 * i as usize..]);
     let mut positions = Vec::new();
     let mut normals = Vec::new();
+    let mut uvs = Vec::new();
     let mut colors = Vec::new();
     let mut vertices = HashMap::new();
     let mut corners = Vec::with_capacity(from.indices.len());
     for (k, &position) in from.indices.iter().enumerate() {
+        let uv = if has_uvs { from.texcoord_indices[k] } else { 0 };
         let normal = if has_normals { from.normal_indices[k] } else { 0 };
-        corners.push(*vertices.entry((position, normal)).or_insert_with(|| {
+        corners.push(*vertices.entry((position, uv, normal)).or_insert_with(|| {
             positions.push(triple(&from.positions, position));
+            if has_uvs {
+                uvs.push(Vec2::from_slice(&from.texcoords[2 * uv as usize..]));
+            }
             if has_normals {
                 normals.push(triple(&from.normals, normal));
             }
@@ -174,7 +206,9 @@ fn join_indices(name: &str, from: &tobj::Mesh, has_normals: bool) -> Result<Mesh
         }));
     }
     let triangles = corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-    Mesh::new(name, positions, normals, (!colors.is_empty()).then_some(colors), triangles)
+    let colors = (!colors.is_empty()).then_some(colors);
+    let attributes = Attributes { colors, uvs: has_uvs.then_some(uvs), tints: None };
+    Mesh::with_attributes(name, positions, normals, attributes, triangles)
 }
 
 /// The numbers of a line, each finite as f32.
@@ -198,7 +232,7 @@ fn index(word: &str, count: usize, total: usize, of: &str) -> std::result::Resul
     Ok(plain as usize)
 }
 
-/// The mesh as OBJ text, which reads back as the same bits. Equal normals are written once.
+/// The mesh as OBJ text, which reads back as the same bits, but for tints, which have no place in it. Equal normals are written once.
 pub fn write_obj(mesh: &Mesh) -> String {
     let mut text =
         format!("# {}: {} vertices, {} triangles, metres\n", mesh.name, mesh.positions.len(), mesh.triangles.len());
@@ -220,10 +254,14 @@ pub fn write_obj(mesh: &Mesh) -> String {
         }
         normal_of.push(number);
     }
+    for uv in mesh.uvs.iter().flatten() {
+        let _ = writeln!(text, "vt {} {}", uv.x, uv.y);
+    }
     for t in &mesh.triangles {
         text += "f";
         for &i in t {
-            let _ = write!(text, " {}//{}", i + 1, normal_of[i as usize]);
+            let uv = if mesh.uvs.is_some() { (i + 1).to_string() } else { String::new() };
+            let _ = write!(text, " {}/{uv}/{}", i + 1, normal_of[i as usize]);
         }
         text += "\n";
     }

@@ -8,6 +8,7 @@
 use super::own_visibility::{Rays, Seen};
 use super::surfaces::GroupSpace;
 use crate::asset::Mesh;
+use crate::asset::mesh::Attributes;
 use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -23,7 +24,7 @@ const GROWTH: f64 = 0.35;
 pub(super) struct Refined {
     pub positions: Vec<Vec3>,
     pub normals: Vec<Vec3>,
-    pub colors: Option<Vec<Vec3>>,
+    pub attributes: Attributes,
     pub triangles: Vec<[u32; 3]>,
     /// Equal positions have equal numbers.
     places: Vec<u32>,
@@ -45,7 +46,7 @@ impl Refined {
         let mut refined = Refined {
             positions: Vec::new(),
             normals: mesh.normals.clone(),
-            colors: mesh.colors.clone(),
+            attributes: mesh.attributes(),
             triangles: mesh.triangles.clone(),
             places: Vec::new(),
             place_of: HashMap::new(),
@@ -65,7 +66,7 @@ impl Refined {
 
     /// The finished mesh, of the shape and name of `mesh`.
     pub fn into_mesh(self, mesh: &Mesh) -> Mesh {
-        mesh.refined(self.positions, self.normals, self.colors, self.triangles)
+        mesh.refined(self.positions, self.normals, self.attributes, self.triangles)
     }
 
     fn length(&self, (a, b): Edge) -> f32 {
@@ -171,9 +172,7 @@ impl Refined {
         let [low, high] = [a as usize, b as usize];
         self.add_position(0.5 * (self.positions[low] + self.positions[high]));
         self.normals.push((self.normals[low] + self.normals[high]).normalize_or(self.normals[low]));
-        if let Some(colors) = &mut self.colors {
-            colors.push(0.5 * (colors[low] + colors[high]));
-        }
+        self.attributes.add_middle(low, high);
         self.transfers.push(self.middles.remove(&(a, b)).map(|(transfer, _)| transfer));
         self.positions.len() as u32 - 1
     }

@@ -9,6 +9,7 @@ use super::triangles::distinct;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
 use crate::asset::Mesh;
 use crate::asset::enclose::around_spheres;
+use crate::asset::mesh::Attributes;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES};
 use crate::layout::CLUSTER_VERTICES;
@@ -507,6 +508,11 @@ pub(super) struct StoredGroup {
     surfaces: Vec<StoredSurface>,
 }
 
+/// The next `count` vectors of a payload.
+fn vectors<'p, T: bytemuck::Pod>(take: &mut impl FnMut(usize) -> Option<&'p [u8]>, count: usize) -> Option<Vec<T>> {
+    Some(bytemuck::pod_collect_to_vec(take(count.checked_mul(size_of::<T>())?)?))
+}
+
 impl GroupPlan {
     /// Header and payload of what was baked.
     pub(super) fn store(&self, surfaces: &[BakedSurface]) -> (StoredGroup, Vec<u8>) {
@@ -519,6 +525,8 @@ impl GroupPlan {
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.positions));
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.normals));
                 payload.extend_from_slice(bytemuck::cast_slice(mesh.colors.as_deref().unwrap_or_default()));
+                payload.extend_from_slice(bytemuck::cast_slice(mesh.uvs.as_deref().unwrap_or_default()));
+                payload.extend_from_slice(bytemuck::cast_slice(mesh.tints.as_deref().unwrap_or_default()));
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.triangles));
             }
             if let Some(floats) = transfer {
@@ -549,7 +557,7 @@ impl GroupPlan {
             return None;
         }
         let mut rest = payload;
-        let mut take = |bytes: usize| {
+        let mut take = |bytes: usize| -> Option<&[u8]> {
             let (taken, after) = rest.split_at_checked(bytes)?;
             rest = after;
             Some(taken)
@@ -558,20 +566,26 @@ impl GroupPlan {
         for (member, stored) in self.members.iter().zip(&header.surfaces) {
             let mut mesh = member.mesh.clone();
             if stored.refined {
-                let mut vectors = || Some(bytemuck::pod_collect_to_vec(take(stored.vertices.checked_mul(12)?)?));
-                let positions: Vec<Vec3> = vectors()?;
-                let normals: Vec<Vec3> = vectors()?;
-                let colors = match mesh.colors {
-                    Some(_) => Some(vectors()?),
-                    None => None,
-                };
+                let positions: Vec<Vec3> = vectors(&mut take, stored.vertices)?;
+                let normals: Vec<Vec3> = vectors(&mut take, stored.vertices)?;
+                let own = &member.mesh;
+                let mut attributes = Attributes::default();
+                if own.colors.is_some() {
+                    attributes.colors = Some(vectors(&mut take, stored.vertices)?);
+                }
+                if own.uvs.is_some() {
+                    attributes.uvs = Some(vectors(&mut take, stored.vertices)?);
+                }
+                if own.tints.is_some() {
+                    attributes.tints = Some(vectors(&mut take, stored.vertices)?);
+                }
                 let triangles: Vec<[u32; 3]> = bytemuck::pod_collect_to_vec(take(stored.triangles.checked_mul(12)?)?);
                 let fits = triangles.iter().flatten().all(|&v| (v as usize) < positions.len());
                 let is_finite = positions.iter().chain(&normals).all(|v| v.is_finite());
                 if !fits || !is_finite {
                     return None;
                 }
-                mesh = Arc::new(mesh.refined(positions, normals, colors, triangles));
+                mesh = Arc::new(mesh.refined(positions, normals, attributes, triangles));
             } else if stored.vertices != mesh.positions.len() {
                 return None;
             }

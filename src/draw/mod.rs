@@ -22,7 +22,7 @@ use crate::draw::pixel_light::{ByPixel, PixelLight};
 use crate::draw::smooth::Smooth;
 use crate::draw::triangles::{DrawTriangles, DrawnTriangles};
 use crate::error::Result;
-use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsState, Image, ImageShape, Keeps, Target};
+use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsState, Image, ImageShape, Keeps, Target, Texture};
 use crate::lists::sight::{Sight, TriangleRun};
 use crate::shaders::Library;
 use crate::sharp::SharpPermutation;
@@ -55,7 +55,10 @@ impl DrawnMesh {
         for (at, &v) in order.iter().enumerate() {
             place[v as usize] = at as u32;
         }
-        if let Some(grid) = Grid::find(mesh).filter(|grid| DrawnGrid::fits(device, grid.vertices.len(), vertices)) {
+        let is_plain = mesh.uvs.is_none() && mesh.tints.is_none();
+        if let Some(grid) =
+            Grid::find(mesh).filter(|_| is_plain).filter(|grid| DrawnGrid::fits(device, grid.vertices.len(), vertices))
+        {
             return Ok(DrawnMesh::Grid(
                 DrawnGrid::new(device, &grid, centre, mesh.normals[0], &place)?,
                 TriangleRun::of(mesh, &mesh.triangles),
@@ -113,8 +116,20 @@ pub struct DrawnEntity<'d> {
     /// Alpha of the picture where the entity is seen.
     pub tag: f32,
     pub index: u32,
+    /// What varies its reflectance, if anything does.
+    pub paint: Option<DrawnPaint<'d>>,
     /// Input of its pixels, where they evaluate sharp lights.
     pub by_pixel: Option<ByPixel>,
+}
+
+/// What varies the reflectance of an entity.
+#[derive(Clone, Copy)]
+pub struct DrawnPaint<'d> {
+    pub texture: &'d Texture,
+    /// Factor on the texture's colour that gives the reflectance over its mean.
+    pub tint: Vec3,
+    /// Places whose alpha is less are not drawn.
+    pub alpha_cutoff: f32,
 }
 
 /// The push constants that all drawing shaders begin with.
@@ -165,7 +180,8 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// For pictures of `width` x `height`; `sharp` where pixels are to evaluate sharp lights.
+    /// For pictures of `width` x `height`; `sharp` where pixels are to evaluate sharp lights,
+    /// `painted` where textures vary reflectances.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
@@ -173,6 +189,7 @@ impl Draw {
         antialias: Antialias,
         finish: Finish,
         sharp: Option<&SharpPermutation>,
+        painted: bool,
     ) -> Result<Self> {
         let samples = antialias.samples(device);
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
@@ -187,7 +204,7 @@ impl Draw {
         };
         let display = finish == Finish::Display;
         Ok(Draw {
-            triangles: DrawTriangles::new(device, library, state, display, sharp)?,
+            triangles: DrawTriangles::new(device, library, state, display, sharp, painted)?,
             grid: DrawGrid::new(device, library, state, display, sharp)?,
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))
@@ -278,7 +295,7 @@ impl Draw {
                         let [left, top, width, height] = viewport.area;
                         drawing.area(left, top, width, height);
                         if let DrawnMesh::Triangles(mesh) = entity.mesh {
-                            self.triangles.bind(drawing, mesh, entity, viewport, white);
+                            self.triangles.bind(drawing, mesh, entity, viewport, white)?;
                         }
                         bound = Some(entity);
                     }

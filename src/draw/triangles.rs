@@ -4,16 +4,16 @@
 //! the screen.
 
 use crate::asset::mesh::Mesh;
-use crate::draw::pixel_light::PixelLight;
-use crate::draw::{DrawnEntity, DrawnViewport, EntityPush};
+use crate::draw::pixel_light::{PixelLight, texels};
+use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush};
 use crate::error::Result;
-use crate::gpu::{Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
+use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
 use crate::lists::sight::TriangleRun;
 use crate::shaders::{Library, ShaderPermutation};
 use crate::sharp::SharpPermutation;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -31,6 +31,8 @@ pub struct DrawnTriangles {
     pub positions: Buffer,
     /// Linear RGB that is multiplied by the entity's emission.
     pub emission: Buffer,
+    /// Texture coordinates, and the tint as [`packed`] says, where the mesh has either.
+    pub paint: Option<Buffer>,
     /// Three indices a triangle; neighbouring triangles stand together.
     pub indices: Buffer,
     /// The indices in runs, and which way the triangles of each run face.
@@ -46,6 +48,14 @@ impl DrawnTriangles {
         let positions: Vec<[f32; 3]> =
             order.iter().map(|&v| (mesh.positions[v as usize] - centre).to_array()).collect();
         let emission: Vec<[f32; 3]> = order.iter().map(|&v| color(v as usize).to_array()).collect();
+        let is_painted = mesh.uvs.is_some() || mesh.tints.is_some();
+        let paint = |&v: &u32| {
+            let uv = mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| uvs[v as usize]);
+            let tint = mesh.tints.as_ref().map_or(Vec3::ONE, |tints| tints[v as usize]);
+            // Textures have their first row on top.
+            [uv.x, 1.0 - uv.y, packed(tint)]
+        };
+        let paint: Option<Vec<[f32; 3]>> = is_painted.then(|| order.iter().map(paint).collect());
         let mut triangles = mesh.triangles.clone();
         triangles.sort_by_cached_key(|t| t.map(|v| place[v as usize]).into_iter().min());
         let mut runs = Vec::with_capacity(triangles.len().div_ceil(RUN_TRIANGLES));
@@ -59,6 +69,7 @@ impl DrawnTriangles {
         Ok(DrawnTriangles {
             positions: Buffer::with_data(device, "draw positions", &positions)?,
             emission: Buffer::with_data(device, "draw emission", &emission)?,
+            paint: paint.map(|paint| Buffer::with_data(device, "draw paint", &paint)).transpose()?,
             indices: Buffer::with_data(device, "draw indices", &triangles)?,
             runs,
         })
@@ -66,7 +77,8 @@ impl DrawnTriangles {
 
     /// Device memory, bytes.
     pub fn size_bytes(&self) -> u64 {
-        self.positions.size_bytes + self.emission.size_bytes + self.indices.size_bytes
+        let paint = self.paint.as_ref().map_or(0, |paint| paint.size_bytes);
+        self.positions.size_bytes + self.emission.size_bytes + self.indices.size_bytes + paint
     }
 
     /// Whether a device's texel views hold the mesh, and the vertices and the self-visibility of all meshes, so that
@@ -79,6 +91,21 @@ impl DrawnTriangles {
     }
 }
 
+/// A tint from 0 to 1 as a whole number below 2^24, which f32 holds: the roots of its channels, 8 bits each.
+fn packed(tint: Vec3) -> f32 {
+    let [r, g, b] = tint.to_array().map(|c| (255.0 * c.sqrt()).round());
+    r + 256.0 * g + 65536.0 * b
+}
+
+/// [`EntityPush`] of a painted entity.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct PaintedPush {
+    entity: EntityPush,
+    padding: [f32; 3],
+    paint: [f32; 4],
+}
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct PatchPush {
@@ -89,9 +116,17 @@ struct PatchPush {
     cluster_first: u32,
     vertex_first: u32,
     self_first: u32,
+    paint: [f32; 4],
 }
 
-pub struct DrawTriangles {
+impl DrawnPaint<'_> {
+    fn push(&self) -> [f32; 4] {
+        self.tint.extend(self.alpha_cutoff).to_array()
+    }
+}
+
+/// Pipelines of surfaces that are painted, or of those that are not.
+struct Pipelines {
     /// Draws both sides of triangles.
     open: GraphicsPipeline,
     /// Culls back faces.
@@ -100,37 +135,64 @@ pub struct DrawTriangles {
     pixel: Option<GraphicsPipeline>,
 }
 
+pub struct DrawTriangles {
+    plain: Pipelines,
+    /// Where the scene has textures.
+    painted: Option<Pipelines>,
+}
+
 impl DrawTriangles {
-    /// For what "draw" draws into; `display` where the picture is encoded.
+    /// For what "draw" draws into; `display` where the picture is encoded, `painted` where there are textures.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
         state: GraphicsState,
         display: bool,
         sharp: Option<&SharpPermutation>,
+        painted: bool,
     ) -> Result<Self> {
-        let vertex = library.shader(&ShaderPermutation::new("draw.vert", 4))?;
-        let fragment = library.shader(&ShaderPermutation::new("draw.frag", 4).define("DISPLAY", display))?;
-        let solid = GraphicsState { cull: vk::CullModeFlags::BACK, ..state };
-        let pixel = |sharp: &SharpPermutation| -> Result<GraphicsPipeline> {
-            let [vertex, fragment] = Self::patch_rows(display, sharp);
-            let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..state };
+        let pipelines = |painted: bool| -> Result<Pipelines> {
+            let [vertex, fragment] = Self::rows(display, painted);
             let vertex = library.shader(&vertex)?;
             let fragment = library.shader(&fragment)?;
-            GraphicsPipeline::new(device, "draw triangle pixels", &vertex, &fragment, nearer)
+            let solid = GraphicsState { cull: vk::CullModeFlags::BACK, ..state };
+            let pixel = |sharp: &SharpPermutation| -> Result<GraphicsPipeline> {
+                let [vertex, fragment] = Self::patch_rows(display, painted, sharp);
+                let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..state };
+                let vertex = library.shader(&vertex)?;
+                let fragment = library.shader(&fragment)?;
+                GraphicsPipeline::new(device, "draw triangle pixels", &vertex, &fragment, nearer)
+            };
+            Ok(Pipelines {
+                open: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
+                solid: GraphicsPipeline::new(device, "draw solid", &vertex, &fragment, solid)?,
+                pixel: sharp.map(pixel).transpose()?,
+            })
         };
-        Ok(DrawTriangles {
-            open: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
-            solid: GraphicsPipeline::new(device, "draw solid", &vertex, &fragment, solid)?,
-            pixel: sharp.map(pixel).transpose()?,
-        })
+        Ok(DrawTriangles { plain: pipelines(false)?, painted: painted.then(|| pipelines(true)).transpose()? })
+    }
+
+    /// The pipelines that draw an entity, and its paint.
+    fn pipelines<'d>(&self, entity: &DrawnEntity<'d>) -> (&Pipelines, Option<DrawnPaint<'d>>) {
+        match (&self.painted, entity.paint) {
+            (Some(painted), Some(paint)) => (painted, Some(paint)),
+            _ => (&self.plain, None),
+        }
+    }
+
+    /// The rows of the shaders that show the light of vertices: vertex and fragment.
+    pub fn rows(display: bool, painted: bool) -> [ShaderPermutation; 2] {
+        [
+            ShaderPermutation::new("draw.vert", 4).define("PAINTED", painted),
+            ShaderPermutation::new("draw.frag", 4).define("DISPLAY", display).define("PAINTED", painted),
+        ]
     }
 
     /// The rows of the shaders whose pixels evaluate lights: vertex and fragment.
-    pub fn patch_rows(display: bool, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
-        let fragment = ShaderPermutation::new("triangle.frag", 4).define("DISPLAY", display);
+    pub fn patch_rows(display: bool, painted: bool, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
+        let fragment = ShaderPermutation::new("triangle.frag", 4).define("DISPLAY", display).define("PAINTED", painted);
         [
-            ShaderPermutation::new("triangle.vert", 4).number("LEAST_PX", LEAST_PX),
+            ShaderPermutation::new("triangle.vert", 4).number("LEAST_PX", LEAST_PX).define("PAINTED", painted),
             sharp.pixel_row(fragment, sharp.self_shadows),
         ]
     }
@@ -143,10 +205,21 @@ impl DrawTriangles {
         entity: &DrawnEntity<'r>,
         viewport: &DrawnViewport<'r>,
         white: f32,
-    ) {
-        let vertices = [(&mesh.positions, 0), (&mesh.emission, 0), (viewport.radiosity, entity.radiosity_offset)];
-        drawing.bind(if entity.culls { &self.solid } else { &self.open }, &vertices, &mesh.indices);
-        drawing.push(&EntityPush::new(entity, white));
+    ) -> Result<()> {
+        let mut vertices =
+            vec![(&mesh.positions, 0), (&mesh.emission, 0), (viewport.radiosity, entity.radiosity_offset)];
+        let (pipelines, paint) = self.pipelines(entity);
+        vertices.extend(mesh.paint.iter().filter(|_| paint.is_some()).map(|paint| (paint, 0)));
+        drawing.bind(if entity.culls { &pipelines.solid } else { &pipelines.open }, &vertices, &mesh.indices);
+        let push = EntityPush::new(entity, white);
+        match paint {
+            None => drawing.push(&push),
+            Some(paint) => {
+                drawing.resources(&[Bind::Texture(paint.texture)])?;
+                drawing.push(&PaintedPush { entity: push, padding: [0.0; 3], paint: paint.push() });
+            }
+        }
+        Ok(())
     }
 
     /// Draws the triangles of an entity again that a shadow's edge comes near. Their pixels evaluate sharp lights
@@ -160,16 +233,22 @@ impl DrawTriangles {
         light: &PixelLight<'r>,
         white: f32,
     ) -> Result<()> {
-        let (Some(pipeline), Some(by_pixel)) = (&self.pixel, entity.by_pixel) else { return Ok(()) };
+        let (pipelines, paint) = self.pipelines(entity);
+        let (Some(pipeline), Some(by_pixel)) = (&pipelines.pixel, entity.by_pixel) else { return Ok(()) };
         drawing.bind(pipeline, &[], &mesh.indices);
-        drawing.resources(&light.binds(
+        let mut binds = light.binds(
             &[(&mesh.indices, vk::Format::R32_UINT), (viewport.radiosity, vk::Format::R32G32B32A32_SFLOAT)],
             &[
                 (light.vertices, vk::Format::R32G32B32A32_SFLOAT),
                 (&mesh.emission, vk::Format::R32_UINT),
                 (light.self_cells, vk::Format::R32G32_UINT),
             ],
-        )?)?;
+        )?;
+        if let (Some(paint), Some(buffer)) = (paint, &mesh.paint) {
+            binds.extend(texels(&[(buffer, vk::Format::R32_UINT)])?);
+            binds.push(Bind::Texture(paint.texture));
+        }
+        drawing.resources(&binds)?;
         let [_, _, width, height] = viewport.area;
         drawing.push(&PatchPush {
             entity: EntityPush::new(entity, white),
@@ -179,6 +258,7 @@ impl DrawTriangles {
             cluster_first: by_pixel.cluster_first,
             vertex_first: by_pixel.vertex_first,
             self_first: by_pixel.self_first,
+            paint: paint.map_or([0.0; 4], |paint| paint.push()),
         });
         entity.indices.iter().for_each(|range| drawing.corners(range.clone()));
         Ok(())

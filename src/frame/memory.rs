@@ -18,6 +18,7 @@ pub struct Memory {
     pub radiosity: u64,
     /// Positions, emission and indices of drawn meshes.
     pub drawables: u64,
+    pub textures: u64,
     /// Entities, clusters, entries, sky and outlines.
     pub lists: u64,
     /// Images and the buffer that a picture is read back through.
@@ -35,6 +36,7 @@ impl Memory {
             + self.vertices
             + self.radiosity
             + self.drawables
+            + self.textures
             + self.lists
             + self.pictures
     }
@@ -50,6 +52,7 @@ impl Frame {
             vertices: self.buffers.vertices.size_bytes,
             radiosity: self.radiosity.size_bytes(),
             drawables: self.buffers.surfaces.iter().map(|surface| surface.drawn.size_bytes()).sum(),
+            textures: self.buffers.texture_bytes(),
             lists: self.work.size_bytes()
                 + self.sky.coefficients.all_bytes()
                 + self.picture.lines.size_bytes()

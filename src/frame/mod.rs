@@ -149,7 +149,7 @@ impl Frame {
             work: ClusterWork::new(device, lists, entity_room)?,
             sky,
             radiosity,
-            picture: FramePicture::new(device, library, &options, &pixels)?,
+            picture: FramePicture::new(device, library, &options, &pixels, !buffers.textures.is_empty())?,
             pixels,
             chains: None,
             buffers,

@@ -33,9 +33,15 @@ pub(super) struct FramePicture {
 
 impl FramePicture {
     /// Makes linear pictures of the size in `options`.
-    pub fn new(device: &Arc<Device>, library: &Library, options: &Options, pixels: &PixelShading) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        options: &Options,
+        pixels: &PixelShading,
+        painted: bool,
+    ) -> Result<Self> {
         Ok(FramePicture {
-            draw: draw(device, library, options, Finish::Linear, pixels)?,
+            draw: draw(device, library, options, Finish::Linear, pixels, painted)?,
             readback: readback(device, options.size)?,
             lines: Lines::new(device)?,
             prepared: Vec::new(),
@@ -64,8 +70,9 @@ fn draw(
     options: &Options,
     finish: Finish,
     pixels: &PixelShading,
+    painted: bool,
 ) -> Result<Draw> {
-    Draw::new(device, library, options.size, options.antialias, finish, pixels.pixels())
+    Draw::new(device, library, options.size, options.antialias, finish, pixels.pixels(), painted)
 }
 
 /// Room for a picture of either finish.
@@ -107,7 +114,8 @@ impl Frame {
     pub(super) fn set_pictures(&mut self, options: Options, finish: Finish) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = PixelShading::new(&self.device, &options, &self.buffers, self.radiosity.soft(), sharp);
-        let draw = draw(&self.device, &self.library, &options, finish, &pixels)?;
+        let painted = !self.buffers.textures.is_empty();
+        let draw = draw(&self.device, &self.library, &options, finish, &pixels, painted)?;
         self.options = options;
         self.pixels = pixels;
         Ok(std::mem::replace(&mut self.picture.draw, draw))

@@ -3,7 +3,7 @@
 use super::Frame;
 use crate::asset::edges::Line;
 use crate::draw::smooth;
-use crate::draw::{DrawnEntity, camera};
+use crate::draw::{DrawnEntity, DrawnPaint, camera};
 use crate::lists::sight::{self, Sight};
 use crate::scene::Placement;
 use glam::Vec3;
@@ -97,6 +97,7 @@ impl Frame {
                 radiosity_offset: self.radiosity.offsets[index],
                 tag: smooth::tag(index),
                 index: index as u32,
+                paint: self.paint(index),
                 by_pixel: self.chains.as_ref().and_then(|chains| chains.of(index)),
             };
             let radius_m = device_mesh.radius_m * f64::from(placement.scale);
@@ -110,11 +111,26 @@ impl Frame {
         drawn.into_iter().map(|(_, _, entity)| entity).collect()
     }
 
-    /// Entities in the order in which a viewport draws them, without emission where it shows none.
+    /// What varies the reflectance of an entity. Its vertices are lit by the mean.
+    fn paint(&self, index: usize) -> Option<DrawnPaint<'_>> {
+        let texture = self.scene.paint(index)?;
+        let entity = &self.scene.entities[index];
+        let over_mean = |factor: f32, mean: f32| if mean > 0.0 { factor / mean } else { 0.0 };
+        Some(DrawnPaint {
+            texture: &self.buffers.textures[entity.texture?],
+            tint: Vec3::from_array(std::array::from_fn(|c| over_mean(texture.factor[c], entity.albedo[c]))),
+            alpha_cutoff: texture.alpha_cutoff.unwrap_or(0.0),
+        })
+    }
+
+    /// Entities in the order in which a viewport draws them, without emission and paint where it shows none.
     pub(super) fn drawn_in(&self, placements: &[Placement], viewport: &Viewport) -> Vec<DrawnEntity<'_>> {
         let mut drawn = self.drawn_entities(placements, [viewport.area[2], viewport.area[3]]);
         if !viewport.adds_emission {
-            drawn.iter_mut().for_each(|entity| entity.emission = Vec3::ZERO);
+            for entity in &mut drawn {
+                entity.emission = Vec3::ZERO;
+                entity.paint = None;
+            }
         }
         drawn
     }

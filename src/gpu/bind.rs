@@ -2,6 +2,7 @@
 
 use super::image::Image;
 use super::memory::{Buffer, TexelView};
+use super::texture::Texture;
 use std::ops::Range;
 
 /// A resource given to a pass; its position in the list is its binding number.
@@ -15,6 +16,8 @@ pub enum Bind<'r> {
     Texel(TexelView<'r>),
     /// An image that is read with `texelFetch`.
     Image(&'r Image),
+    /// A texture that a fragment shader samples.
+    Texture(&'r Texture),
     /// No resource: the shader permutation does not have this binding.
     None,
 }

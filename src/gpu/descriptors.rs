@@ -97,6 +97,11 @@ impl<'r> Commands<'r> {
                     }];
                     write = write.image_info(&images);
                 }
+                // It was filled before, and nothing writes it again.
+                (BindingKind::Sampled, Bind::Texture(texture)) => {
+                    images = [texture.descriptor()];
+                    write = write.image_info(&images);
+                }
                 _ => complain(name, binding, "another kind of resource, or none, was given"),
             }
             // SAFETY: the set is fresh and not yet in use; every resource is borrowed until the commands have run.

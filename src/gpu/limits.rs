@@ -16,7 +16,7 @@ pub(super) fn check(
     at_most(name, "bytes of push constants", push_bytes, limits.max_push_constants_size)?;
     let count = |kinds: &[BindingKind]| bindings.iter().filter(|b| kinds.contains(&b.kind)).count() as u32;
     // A texel buffer counts as a sampled image.
-    let sampled = [BindingKind::Texel, BindingKind::Image];
+    let sampled = [BindingKind::Texel, BindingKind::Image, BindingKind::Sampled];
     for (what, asked, most) in [
         ("storage buffers a stage", count(&[BindingKind::Storage]), limits.max_per_stage_descriptor_storage_buffers),
         ("uniform buffers a stage", count(&[BindingKind::Uniform]), limits.max_per_stage_descriptor_uniform_buffers),

@@ -30,6 +30,7 @@ pub mod select;
 pub mod shader;
 pub mod share;
 pub mod signals;
+pub mod texture;
 pub mod upload;
 pub mod validation;
 #[cfg(feature = "view")]
@@ -47,6 +48,7 @@ pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, Keeps};
 pub use select::{cores, share_cores};
 pub use shader::{Shader, Stage};
 pub use share::Gpu;
+pub use texture::Texture;
 pub use upload::Upload;
 pub use validation::Validation;
 

@@ -95,6 +95,7 @@ pub(super) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
         BindingKind::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
         BindingKind::Texel => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
         BindingKind::Image => vk::DescriptorType::SAMPLED_IMAGE,
+        BindingKind::Sampled => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
     }
 }
 

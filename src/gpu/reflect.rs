@@ -18,6 +18,8 @@ pub enum BindingKind {
     Texel,
     /// `texture2D` without a sampler.
     Image,
+    /// `sampler2D`.
+    Sampled,
 }
 
 /// One binding of descriptor set 0.
@@ -279,6 +281,7 @@ impl<'m> Reader<'m> {
                 Operand::Dim(Dim::Dim2D) => (BindingKind::Image, false),
                 ref other => return Err(Error::Failed(format!("{name}: images of {other:?} are not in use"))),
             },
+            (StorageClass::UniformConstant, Op::TypeSampledImage) => (BindingKind::Sampled, false),
             (class, opcode) => return Err(Error::Failed(format!("{name}: no binding for {class:?} of {opcode:?}"))),
         };
         let block_bytes = if definition.class.opcode == Op::TypeStruct { self.size_bytes(target) } else { 0 };

@@ -1,10 +1,11 @@
 //! Scenes that are put together in code, held to the same rules as scene files.
 
-use super::data::{Camera, Data, EntityData, MeshData, Output, check};
+use super::data::{Camera, Data, EntityData, MeshData, Output, TextureData, check};
 use super::{Scene, check_counts, read_named, resolve_all};
 use crate::asset::Generator;
 use crate::asset::Mesh;
 use crate::asset::environment::{Environment, EnvironmentData};
+use crate::asset::texture::Texture;
 use crate::error::{Error, Result};
 use std::sync::Arc;
 
@@ -41,6 +42,7 @@ pub struct SceneBuilder {
     camera: Camera,
     output: Output,
     environment: EnvironmentData,
+    textures: Vec<(String, Texture)>,
     meshes: Vec<(String, Shape)>,
     entities: Vec<EntityData>,
 }
@@ -52,6 +54,7 @@ impl Default for SceneBuilder {
             camera: Camera::new([0.0, 2.0, 6.0], [0.0, 0.5, 0.0]),
             output: Output::default(),
             environment: EnvironmentData::default(),
+            textures: Vec::new(),
             meshes: Vec::new(),
             entities: Vec::new(),
         }
@@ -77,6 +80,12 @@ impl SceneBuilder {
         self
     }
 
+    /// Adds a texture under a name of its own, for albedos to refer to.
+    pub fn texture(mut self, name: impl Into<String>, texture: Texture) -> Self {
+        self.textures.push((name.into(), texture));
+        self
+    }
+
     /// Adds a mesh under a name of its own, for entities to refer to.
     pub fn mesh(mut self, name: impl Into<String>, shape: impl Into<Shape>) -> Self {
         self.meshes.push((name.into(), shape.into()));
@@ -96,7 +105,7 @@ impl SceneBuilder {
     /// states for scene files, two meshes of one name, an entity without its mesh, a mesh that its generator refuses,
     /// or more of either than a scene may have.
     pub fn build(self) -> Result<Scene> {
-        let SceneBuilder { camera, output, environment, meshes: shapes, entities } = self;
+        let SceneBuilder { camera, output, environment, textures: painted, meshes: shapes, entities } = self;
         check_counts(shapes.len(), entities.len()).map_err(Error::Input)?;
         camera.check()?;
         check("output", &output)?;
@@ -114,17 +123,32 @@ impl SceneBuilder {
             };
             Arc::make_mut(&mut mesh).name.clone_from(&name);
             meshes.push(mesh);
-            named.push(MeshData { name, file: None, generator });
+            named.push(MeshData::new(name, generator));
         }
-        let data = Data { camera, output, environment, meshes: named, entities };
+        let mut textures: Vec<TextureData> = Vec::with_capacity(painted.len());
+        for (name, Texture { wrap, factor, alpha_cutoff, .. }) in &painted {
+            let data = TextureData {
+                name: name.clone(),
+                file: None,
+                image: None,
+                wrap: *wrap,
+                factor: *factor,
+                alpha_cutoff: *alpha_cutoff,
+            };
+            let fail = |what| Error::Input(format!("texture {:?}: {what}", data.name));
+            data.check(&textures).map_err(fail)?;
+            textures.push(data);
+        }
+        let painted: Vec<Arc<Texture>> = painted.into_iter().map(|(_, texture)| Arc::new(texture)).collect();
+        let data = Data { camera, output, environment, textures, meshes: named, entities };
         let what = |index: usize| match &data.entities[index].name {
             Some(name) => format!("entity {name:?}"),
             None => format!("entity {index}"),
         };
         data.entities.iter().enumerate().try_for_each(|(index, entity)| check(what(index), entity))?;
         let fail = |index, error: String| Error::Input(format!("{}: {error}", what(index)));
-        let resolved = resolve_all(&data, &meshes, fail)?;
+        let resolved = resolve_all(&data, &meshes, &painted, fail)?;
         let light = Environment::new(&data.environment, &read_named)?;
-        Ok(Scene::assemble(data, meshes, resolved, light))
+        Ok(Scene::assemble(data, meshes, painted, resolved, light))
     }
 }

@@ -19,6 +19,9 @@
 //! sun = { toward = [1, 2, 1], angle_deg = 0.53, radiance = [9e4, 8e4, 7e4] } # a distant disc, whose shadows are sharp
 //! sky = { sun_elevation_deg = 40, turbidity = 3, radiance = 0.35 }         # generated daylight; sky = {} takes the defaults
 //! image = { file = "studio.hdr", scale = 0.5 }                             # equirectangular HDR, EXR or PNG
+//! [[texture]]                                # what varies an albedo over a surface
+//! name = "wood"
+//! file = "wood.png"
 //! [[mesh]]
 //! name = "ball"
 //! sphere = { radius_m = 0.5, subdivisions = 4 }  # or plane, cuboid, torus, torus_two_colour, teapot, disc, rectangle
@@ -27,7 +30,7 @@
 //! position = [0, 0.6, 0]
 //! rotation = { axis = [0, 1, 0], angle_deg = 30 }
 //! scale = 1
-//! albedo = [0.7, 0.4, 0.2]
+//! albedo = [0.7, 0.4, 0.2]                   # or the name of a texture
 //! emission = [40, 36, 30]                    # makes it a light; emits, occludes and receives override the defaults
 //! spot = { inner_deg = 20, outer_deg = 35 }  # its light shines along its own +y alone
 //! motion = [                                 # applied from first to last; each is a function of time alone
@@ -49,6 +52,7 @@ use super::motion::{Motion, Placement, PlacementF64, RotationData};
 use super::{check_counts, values};
 use crate::asset::Generator;
 use crate::asset::environment::EnvironmentData;
+use crate::asset::texture::Wrap;
 use crate::error::{Error, Result, one_line};
 
 /// Largest width or height of a picture, in pixels.
@@ -74,6 +78,9 @@ pub struct Data {
     /// Distant light. Without it the sky is black.
     #[serde(default)]
     pub environment: EnvironmentData,
+    /// Textures, each with a name that albedos refer to.
+    #[serde(default, rename = "texture", skip_serializing_if = "Vec::is_empty")]
+    pub textures: Vec<TextureData>,
     /// Meshes, each with a name that entities refer to.
     #[serde(default, rename = "mesh")]
     pub meshes: Vec<MeshData>,
@@ -206,39 +213,162 @@ impl TryFrom<OutputWritten> for Output {
     }
 }
 
-/// A mesh, read from a file or made by a generator. In a scene that was read from a glTF file it may be neither: then
-/// only [`super::Scene::meshes`] has it, and a scene file can name it once it is written ([`super::export`]).
+/// A reflectance that varies over a surface: `factor`, times a picture where the mesh has texture coordinates, times the
+/// tints of the mesh's vertices if it has any.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TextureData {
+    /// The name that albedos use; it is unique.
+    pub name: String,
+    /// A picture in PNG or JPEG, relative to the scene file, or a glTF file that has it. The default is white.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Which of a glTF file's images it is, counted from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image: Option<usize>,
+    /// How it goes on beyond its edges along u and v: `"repeat"`, which is the default, `"mirror"` or `"clamp"`.
+    #[serde(default, skip_serializing_if = "repeats")]
+    pub wrap: [Wrap; 2],
+    /// Linear, 0 to 1. The default is 1.
+    #[serde(default = "white", deserialize_with = "values::albedo")]
+    pub factor: Vec3,
+    /// Places whose alpha is less are not drawn, 0 to 1. By default all are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alpha_cutoff: Option<f32>,
+}
+
+impl TextureData {
+    /// A name that is not taken by textures before, an image of a glTF file alone, and an alpha within 0 to 1.
+    pub(super) fn check(&self, before: &[TextureData]) -> std::result::Result<(), String> {
+        if before.iter().any(|other| other.name == self.name) {
+            return Err("another has that name".into());
+        }
+        if self.image.is_some() != self.file.as_deref().is_some_and(super::gltf::is_gltf) {
+            return Err("`image` says which image of a glTF file it is, and of no other file".into());
+        }
+        if self.alpha_cutoff.is_some_and(|alpha| !(0.0..=1.0).contains(&alpha)) {
+            return Err("alpha_cutoff is not within 0 to 1".into());
+        }
+        Ok(())
+    }
+}
+
+fn repeats(wrap: &[Wrap; 2]) -> bool {
+    *wrap == [Wrap::Repeat; 2]
+}
+
+fn white() -> Vec3 {
+    Vec3::ONE
+}
+
+/// The linear reflectance of an entity.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Albedo {
+    /// It is the same everywhere, 0 to 1.
+    Color(Vec3),
+    /// The name of a texture.
+    Texture(String),
+}
+
+impl<T: Into<Vec3>> From<T> for Albedo {
+    fn from(color: T) -> Self {
+        Albedo::Color(color.into())
+    }
+}
+
+impl Serialize for Albedo {
+    fn serialize<S: serde::Serializer>(&self, into: S) -> std::result::Result<S::Ok, S::Error> {
+        match self {
+            Albedo::Color(color) => color.serialize(into),
+            Albedo::Texture(name) => name.serialize(into),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Albedo {
+    fn deserialize<D: serde::Deserializer<'de>>(source: D) -> std::result::Result<Self, D::Error> {
+        struct ColorOrName;
+        impl<'de> serde::de::Visitor<'de> for ColorOrName {
+            type Value = Albedo;
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("an albedo: three numbers from 0 to 1, or the name of a texture")
+            }
+            fn visit_str<E>(self, name: &str) -> std::result::Result<Albedo, E> {
+                Ok(Albedo::Texture(name.to_owned()))
+            }
+            fn visit_seq<A: serde::de::SeqAccess<'de>>(self, list: A) -> std::result::Result<Albedo, A::Error> {
+                values::albedo(serde::de::value::SeqAccessDeserializer::new(list)).map(Albedo::Color)
+            }
+        }
+        source.deserialize_any(ColorOrName)
+    }
+}
+
+/// A mesh, read from a file or made by a generator. In a scene that was put together in code it may be neither: then only
+/// [`super::Scene::meshes`] has it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeshData {
     /// The name that entities use; it is unique.
     pub name: String,
-    /// A Wavefront OBJ file or a glTF file, all triangles of which are taken at rest, relative to the scene file. If
-    /// there is no such file, a built-in mesh of that name is taken, such as `assets/meshes/torus.obj`.
+    /// A Wavefront OBJ file or a glTF file, relative to the scene file. If there is no such file, a built-in mesh of that
+    /// name is taken, such as `assets/meshes/torus.obj`. Of a glTF file all triangles are taken at rest, or one `part`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
+    /// Mesh and primitive of a glTF file, counted from 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub part: Option<[usize; 2]>,
+    /// Columns of a matrix that scales, mirrors or shears the part. The default leaves it as it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bend: Option<[f64; 9]>,
     /// A generator, written as `plane = {...}`, `sphere = {...}` and so on.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub generator: Option<Generator>,
+}
+
+impl MeshData {
+    /// A mesh that a generator makes, or that neither a file nor a generator gives.
+    pub fn new(name: impl Into<String>, generator: Option<Generator>) -> Self {
+        MeshData { name: name.into(), file: None, part: None, bend: None, generator }
+    }
 }
 
 // Written by hand, because serde's flattening would accept unknown keys.
 impl<'de> Deserialize<'de> for MeshData {
     fn deserialize<D: serde::Deserializer<'de>>(source: D) -> std::result::Result<Self, D::Error> {
         use serde::de::Error as _;
-        let mut table = toml::Table::deserialize(source)?;
-        let text = |value: toml::Value| match value {
-            toml::Value::String(text) => Ok(text),
-            _ => Err(D::Error::custom("name and file of a mesh are strings")),
-        };
-        let name = text(table.remove("name").ok_or_else(|| D::Error::missing_field("name"))?)?;
-        let file = table.remove("file").map(text).transpose()?.map(PathBuf::from);
-        if file.is_some() != table.is_empty() {
-            return Err(D::Error::custom(format!("mesh {name:?} has either a file or one generator")));
+        #[derive(Deserialize)]
+        struct Keys {
+            name: String,
+            file: Option<PathBuf>,
+            part: Option<[usize; 2]>,
+            bend: Option<[f64; 9]>,
         }
-        let generator = (!table.is_empty()).then(|| Generator::deserialize(toml::Value::Table(table))).transpose();
+        let table = toml::Table::deserialize(source)?;
+        let (keys, rest): (toml::Table, toml::Table) =
+            table.into_iter().partition(|(key, _)| ["name", "file", "part", "bend"].contains(&key.as_str()));
+        let Keys { name, file, part, bend } =
+            Keys::deserialize(toml::Value::Table(keys)).map_err(|e| D::Error::custom(e.message()))?;
+        let fail = |what: &str| Err(D::Error::custom(format!("mesh {name:?} {what}")));
+        if file.is_some() != rest.is_empty() {
+            return fail("has either a file or one generator");
+        }
+        let of_gltf = file.as_deref().is_some_and(super::gltf::is_gltf);
+        if part.is_some() && !of_gltf || bend.is_some() && part.is_none() {
+            return fail("takes a part of a glTF file alone, and a bend of a part alone");
+        }
+        if bend.is_some_and(|bend| !usable_bend(&bend)) {
+            return fail("has a bend that is not finite, beyond 1e7, or flat");
+        }
+        let generator = (!rest.is_empty()).then(|| Generator::deserialize(toml::Value::Table(rest))).transpose();
         let generator = generator.map_err(|e| D::Error::custom(format!("mesh {name:?}: {}", e.message())))?;
-        Ok(Self { name, file, generator })
+        Ok(Self { name, file, part, bend, generator })
     }
+}
+
+/// Whether a matrix of finite numbers within [`values::SCALE_LIMIT`] keeps what it bends from being flat.
+fn usable_bend(bend: &[f64; 9]) -> bool {
+    bend.iter().all(|x| x.abs() <= f64::from(values::SCALE_LIMIT))
+        && glam::DMat3::from_cols_array(bend).determinant() != 0.0
 }
 
 /// An entity of the scene.
@@ -259,9 +389,9 @@ pub struct EntityData {
     /// A uniform factor, 1e-7 to 1e7. The default is 1.
     #[serde(default = "values::one", deserialize_with = "values::scale")]
     pub scale: f32,
-    /// Linear reflectance, 0 to 1. The default is a grey of 0.7.
-    #[serde(default = "grey", deserialize_with = "values::albedo")]
-    pub albedo: Vec3,
+    /// Linear reflectance. The default is a grey of 0.7.
+    #[serde(default = "grey")]
+    pub albedo: Albedo,
     /// Linear radiance in W m^-2 sr^-1, at most 1e15. It multiplies the colours of a mesh that has them. The default is
     /// 0.
     #[serde(default, deserialize_with = "values::radiance")]
@@ -283,8 +413,8 @@ pub struct EntityData {
     pub motion: Vec<Motion>,
 }
 
-fn grey() -> Vec3 {
-    Vec3::splat(0.7)
+fn grey() -> Albedo {
+    Albedo::Color(Vec3::splat(0.7))
 }
 
 impl EntityData {

@@ -1,77 +1,44 @@
-//! Writes a scene with those of its meshes that no file has.
-
-use std::collections::HashSet;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+//! Writes scenes as files.
 
 use super::FILE_LIMIT_BYTES;
 use super::data::Data;
-use crate::asset::Mesh;
-use crate::asset::{check_size, obj};
+use crate::asset::{check_size, embedded};
 use crate::error::{Error, Result};
 use crate::files;
+use std::path::{Path, PathBuf};
 
-/// A scene file with the meshes that neither have a file nor a generator: OBJ files in the folder `NAME_meshes` beside
-/// it.
-pub struct Export {
-    /// The scene with the names of those files.
-    pub data: Data,
-    path: PathBuf,
-    meshes: Vec<(PathBuf, Arc<Mesh>)>,
-}
-
-impl Export {
-    /// The files of a scene, not yet written.
-    pub fn new(data: &Data, meshes: &[Arc<Mesh>], path: &Path) -> Result<Self> {
-        let mut data = data.clone();
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let folder = PathBuf::from(format!("{stem}_meshes"));
-        let beside = path.parent().unwrap_or(Path::new(""));
-        let mut taken = HashSet::new();
-        let mut own = Vec::new();
-        for (mesh, built) in data.meshes.iter_mut().zip(meshes) {
-            if mesh.file.is_some() || mesh.generator.is_some() {
-                continue;
-            }
-            let file = folder.join(file_name(&mesh.name, &mut taken));
-            own.push((beside.join(&file), built.clone()));
-            mesh.file = Some(file);
-        }
-        if data.meshes.iter().filter_map(|mesh| mesh.file.as_ref()).any(|file| file.to_str().is_none()) {
-            return Err(Error::Failed(format!("{}: a scene file can only name UTF-8 paths", path.display())));
-        }
-        Ok(Export { data, path: path.to_owned(), meshes: own })
+impl Data {
+    /// Makes the names of files, which are relative to the folder `from`, relative to `to`. Files of built-in scenes keep
+    /// their built-in names.
+    pub fn move_files(&mut self, from: &Path, to: &Path) {
+        let meshes = self.meshes.iter_mut().filter_map(|mesh| mesh.file.as_mut());
+        let textures = self.textures.iter_mut().filter_map(|texture| texture.file.as_mut());
+        let image = self.environment.image.iter_mut().map(|image| &mut image.file);
+        meshes.chain(textures).chain(image).for_each(|file| *file = found_from(to, from, file));
     }
 
-    /// The files of meshes that are to be written.
-    pub fn mesh_files(&self) -> impl Iterator<Item = &Path> {
-        self.meshes.iter().map(|(path, _)| path.as_path())
-    }
-
-    /// Writes all files, each with the comment `head` (without `#`) in its first line. The scene file comes last, so
-    /// that it never names what is not there.
-    pub fn write(&self, head: &str) -> Result<()> {
-        let text = format!("# {head}\n\n{}", self.data.to_toml()?);
-        check_size(&self.path, text.len(), FILE_LIMIT_BYTES, "scene")?;
-        Data::parse(&text, &self.path)?;
-        for (path, mesh) in &self.meshes {
-            let text = format!("# {head}\n{}", obj::write_obj(mesh));
-            check_size(path, text.len(), obj::FILE_LIMIT_BYTES, "mesh")?;
-            crate::text::write(path, text)?;
-        }
-        // Unlike meshes, it makes no folder.
-        files::replace_with(&self.path, |file| file.write_all(text.as_bytes())).map_err(|error: std::io::Error| {
-            Error::Failed(format!("{}: cannot be written: {error}", self.path.display()))
-        })
+    /// Writes the scene as a file with the comment `head` (without `#`) in its first line.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] where it cannot be written, or where the path of a file is not UTF-8.
+    pub fn write(&self, path: &Path, head: &str) -> Result<()> {
+        let text = format!("# {head}\n\n{}", self.to_toml()?);
+        check_size(path, text.len(), FILE_LIMIT_BYTES, "scene")?;
+        Data::parse(&text, path)?;
+        files::replace_with(path, |file| file.write_all(text.as_bytes()))
+            .map_err(|error: std::io::Error| Error::Failed(format!("{}: cannot be written: {error}", path.display())))
     }
 }
 
-/// A name that every file system takes and that is not taken, also where case does not count.
-fn file_name(name: &str, taken: &mut HashSet<String>) -> String {
-    let safe = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
-    let stem: String = name.chars().take(60).map(safe).collect();
-    let stem = if stem.is_empty() { "mesh".to_owned() } else { stem };
-    let all = std::iter::once(stem.clone()).chain((2..).map(|n| format!("{stem}_{n}")));
-    let free = all.into_iter().find(|name| taken.insert(name.to_lowercase())).unwrap_or(stem);
-    format!("{free}.obj")
+/// Converts a path `file` of a scene in folder `from` to a path for a scene in folder `to`.
+fn found_from(to: &Path, from: &Path, file: &Path) -> PathBuf {
+    let here = |folder: &Path| std::path::absolute(folder).and_then(|f| f.canonicalize()).ok();
+    let full = from.join(file);
+    match full.canonicalize() {
+        Ok(_) if here(to).is_some() && here(to) == here(from) => file.to_owned(),
+        Ok(full) => here(to).and_then(|to| full.strip_prefix(to).ok().map(Path::to_owned)).unwrap_or(full),
+        // A file that is not on disk is embedded, under its own name or relative to the built-in scene.
+        Err(_) if embedded::find(file).is_some() => file.to_owned(),
+        Err(_) => embedded::name(&full).map_or(full, PathBuf::from),
+    }
 }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct SceneFile {
+    texture: Vec<Named>,
     mesh: Vec<Named>,
     environment: EnvironmentFile,
 }
@@ -51,7 +52,8 @@ pub fn of_scene(path: &Path) -> Vec<PathBuf> {
     let text = if path.is_file() { read_file(&path, FILE_LIMIT_BYTES).unwrap_or_default() } else { Vec::new() };
     let scene: SceneFile = toml::from_slice(&text).unwrap_or_default();
     let folder = path.parent().unwrap_or(Path::new(""));
-    let named = scene.mesh.into_iter().chain([scene.environment.image]).filter_map(|named| named.file);
+    let named =
+        scene.texture.into_iter().chain(scene.mesh).chain([scene.environment.image]).filter_map(|named| named.file);
     let named: Vec<PathBuf> = named.flat_map(|file| of_mesh(&folder.join(file))).collect();
     std::iter::once(path).chain(named).collect()
 }

@@ -4,7 +4,7 @@
 
 pub mod builder;
 pub mod data;
-pub mod export;
+mod export;
 #[cfg(feature = "cli")]
 pub(crate) mod files;
 pub(crate) mod framing;
@@ -18,19 +18,20 @@ mod sun;
 pub mod surroundings;
 pub mod values;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DMat3, Vec3};
 use serde::Deserialize;
 use toml::Spanned;
 
 use crate::asset::environment::{Environment, EnvironmentData};
+use crate::asset::texture::{Texels, Texture};
 use crate::asset::{Mesh, embedded, obj, read_file, utf8};
 use crate::error::{Error, Result};
 pub use builder::{SceneBuilder, Shape};
-pub use data::{Camera, Data, EntityData, MeshData, Output};
+pub use data::{Albedo, Camera, Data, EntityData, MeshData, Output, TextureData};
 pub use light::{LightMethod, Lights, Spot};
 pub use motion::{Motion, Placement};
 pub use surroundings::Surroundings;
@@ -49,6 +50,8 @@ pub struct Scene {
     pub data: Data,
     /// Meshes in the file's order.
     pub meshes: Vec<Arc<Mesh>>,
+    /// Textures in the file's order.
+    pub textures: Vec<Arc<Texture>>,
     /// Entities in the file's order, with their switches resolved, and then suns. [`Scene::at`] gives their placements.
     pub entities: Vec<Entity>,
     /// The surface of each entity ([`Scene::surface`]); empty where all are the meshes themselves.
@@ -70,8 +73,10 @@ pub struct Entity {
     pub name: String,
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
-    /// Linear reflectance, 0 to 1.
+    /// Linear reflectance, 0 to 1; where a texture varies it, the mean over the surface.
     pub albedo: Vec3,
+    /// Index into [`Scene::textures`].
+    pub texture: Option<usize>,
     /// Linear radiance in W m^-2 sr^-1. It is multiplied by the mesh's colours, if there are any.
     pub emission: Vec3,
     /// The cone of its light, if it is a spot.
@@ -114,10 +119,10 @@ impl Scene {
         if !gltf::is_gltf(path) {
             return Ok((Self::load_toml(path)?, gltf::Notes::default()));
         }
-        let gltf::Import { data, meshes, camera_added, notes } = gltf::load(path)?;
-        let entities = resolve_all(&data, &meshes, |_, what| Error::input(path, what))?;
+        let gltf::Import { data, meshes, textures, camera_added, notes } = gltf::load(path)?;
+        let entities = resolve_all(&data, &meshes, &textures, |_, what| Error::input(path, what))?;
         let environment = Environment::new(&data.environment, &read_named).map_err(|e| e.context(path.display()))?;
-        let scene = Self { camera_added, ..Self::assemble(data, meshes, entities, environment) };
+        let scene = Self { camera_added, ..Self::assemble(data, meshes, textures, entities, environment) };
         Ok((scene, notes))
     }
 
@@ -149,25 +154,37 @@ impl Scene {
                 .or_else(|error| embedded::find(file).filter(|_| !full.exists()).map(<[u8]>::to_vec).ok_or(error))
         };
 
+        let mut readers = gltf::Readers::new(folder);
+        let textures = read_textures(&data, &read, &mut readers)
+            .map_err(|(i, what)| Error::input_at(path, lines.texture(i), what))?;
         let mut meshes: Vec<Arc<Mesh>> = Vec::with_capacity(data.meshes.len());
         for (i, mesh) in data.meshes.iter().enumerate() {
             let at = |what: String| Error::input_at(path, lines.mesh(i), what);
             if data.meshes[..i].iter().any(|m| m.name == mesh.name) {
                 return Err(at(format!("there are two meshes {:?}", mesh.name)));
             }
-            let built = build_mesh(mesh, folder, &read).map_err(|e| at(format!("mesh {:?}: {e}", mesh.name)))?;
+            let built =
+                build_mesh(mesh, folder, &read, &mut readers).map_err(|e| at(format!("mesh {:?}: {e}", mesh.name)))?;
             meshes.push(Arc::new(built));
         }
-        let entities = resolve_all(&data, &meshes, |i, what| Error::input_at(path, lines.entity(i), what))?;
+        let fail = |i, what| Error::input_at(path, lines.entity(i), what);
+        let entities = resolve_all(&data, &meshes, &textures, fail)?;
         let environment =
             Environment::new(&data.environment, &read).map_err(|e| Error::input_at(path, lines.environment(), e))?;
-        Ok(Self::assemble(data, meshes, entities, environment))
+        Ok(Self::assemble(data, meshes, textures, entities, environment))
     }
 
-    fn assemble(data: Data, meshes: Vec<Arc<Mesh>>, entities: Vec<Entity>, environment: Environment) -> Self {
+    fn assemble(
+        data: Data,
+        meshes: Vec<Arc<Mesh>>,
+        textures: Vec<Arc<Texture>>,
+        entities: Vec<Entity>,
+        environment: Environment,
+    ) -> Self {
         let mut scene = Self {
             data,
             meshes,
+            textures,
             entities,
             surfaces: Vec::new(),
             loose: BTreeSet::new(),
@@ -210,6 +227,22 @@ impl Scene {
         self.loose.insert(entity);
     }
 
+    /// The texture of an entity whose reflectance varies over its surface.
+    pub(crate) fn paint(&self, entity: usize) -> Option<&Texture> {
+        let Entity { mesh, texture, .. } = self.entities[entity];
+        let mesh = &self.meshes[mesh];
+        let texture = &self.textures[texture?];
+        (texture.texels.is_some() && mesh.uvs.is_some() || mesh.tints.is_some()).then_some(texture)
+    }
+
+    /// Reflectance of an entity at a place of a triangle of its mesh over the entity's mean, by colour.
+    pub(crate) fn over_mean(&self, entity: usize, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
+        let Some(texture) = self.paint(entity) else { return Vec3::ONE };
+        let Entity { mesh, albedo: mean, .. } = self.entities[entity];
+        let found = texture.at(&self.meshes[mesh], corners, weights);
+        Vec3::from_array(std::array::from_fn(|c| if mean[c] > 0.0 { found[c] / mean[c] } else { 0.0 }))
+    }
+
     /// Placements of all entities at `time_s` seconds, in order. They depend on the time alone, not on earlier frames.
     pub fn at(&self, time_s: f64) -> Vec<Placement> {
         self.data.entities.iter().map(|e| e.at(time_s)).chain(self.suns.iter().copied()).collect()
@@ -226,6 +259,11 @@ impl Scene {
         data::check(format!("entity {index}"), &data)?;
         check_spot(&data, &self.meshes[self.entities[index].mesh])
             .map_err(|what| Error::Input(format!("entity {index}: {what}")))?;
+        if let Albedo::Texture(name) = &data.albedo
+            && self.data.textures.iter().all(|texture| texture.name != *name)
+        {
+            return Err(Error::Input(format!("entity {index}: there is no texture {name:?}")));
+        }
         self.put_entity(index, data);
         Ok(())
     }
@@ -233,11 +271,17 @@ impl Scene {
     /// As [`Scene::set_entity`], of numbers in range.
     pub(crate) fn put_entity(&mut self, index: usize, data: EntityData) {
         let before = &self.data.entities[index];
+        let is_repainted = before.albedo != data.albedo;
         if (before.position, before.rotation, before.scale) != (data.position, data.rotation, data.scale) {
             self.loosen(index);
         }
         let mesh = self.entities[index].mesh;
-        self.entities[index] = resolve(index, &data, mesh);
+        let paint = if is_repainted {
+            Paint::new(&data.albedo, &self.data, &self.textures, &self.meshes[mesh])
+        } else {
+            Paint { texture: self.entities[index].texture, mean: self.entities[index].albedo }
+        };
+        self.entities[index] = resolve(index, &data, mesh, paint);
         self.data.entities[index] = data;
     }
 
@@ -270,14 +314,30 @@ fn check_counts(meshes: usize, entities: usize) -> std::result::Result<(), Strin
 
 /// The entities of `data` with their meshes found by name. `fail` is given the number of an entity that names none, and
 /// the message.
-fn resolve_all(data: &Data, meshes: &[Arc<Mesh>], fail: impl Fn(usize, String) -> Error) -> Result<Vec<Entity>> {
-    let entity = |(i, entity): (usize, &EntityData)| {
+fn resolve_all(
+    data: &Data,
+    meshes: &[Arc<Mesh>],
+    textures: &[Arc<Texture>],
+    fail: impl Fn(usize, String) -> Error,
+) -> Result<Vec<Entity>> {
+    let mut paints: HashMap<(&str, &str), Paint> = HashMap::new();
+    let mut entities = Vec::with_capacity(data.entities.len());
+    for (i, entity) in data.entities.iter().enumerate() {
         let mesh = data.meshes.iter().position(|mesh| mesh.name == entity.mesh);
         let mesh = mesh.ok_or_else(|| fail(i, format!("there is no mesh {:?}", entity.mesh)))?;
         check_spot(entity, &meshes[mesh]).map_err(|what| fail(i, what.to_owned()))?;
-        Ok(resolve(i, entity, mesh))
-    };
-    data.entities.iter().enumerate().map(entity).collect()
+        let paint = match &entity.albedo {
+            Albedo::Color(_) => Paint::new(&entity.albedo, data, textures, &meshes[mesh]),
+            Albedo::Texture(name) if data.textures.iter().all(|texture| texture.name != *name) => {
+                return Err(fail(i, format!("there is no texture {name:?}")));
+            }
+            Albedo::Texture(name) => *paints
+                .entry((name, &entity.mesh))
+                .or_insert_with(|| Paint::new(&entity.albedo, data, textures, &meshes[mesh])),
+        };
+        entities.push(resolve(i, entity, mesh, paint));
+    }
+    Ok(entities)
 }
 
 /// Refuses a spot that would be computed by spherical harmonics, which have no cone.
@@ -286,13 +346,35 @@ fn check_spot(data: &EntityData, mesh: &Mesh) -> std::result::Result<(), &'stati
     if data.spot.is_some() && has_colors { Err("a spot takes a mesh without colours of its own") } else { Ok(()) }
 }
 
+/// The texture of an entity, and its mean reflectance.
+#[derive(Clone, Copy)]
+struct Paint {
+    texture: Option<usize>,
+    mean: Vec3,
+}
+
+impl Paint {
+    /// The paint that an albedo is on a mesh. One that names no texture is grey.
+    fn new(albedo: &Albedo, data: &Data, textures: &[Arc<Texture>], mesh: &Mesh) -> Self {
+        match albedo {
+            Albedo::Color(color) => Paint { texture: None, mean: *color },
+            Albedo::Texture(name) => {
+                let texture = data.textures.iter().position(|texture| texture.name == *name);
+                let mean = texture.map_or(Vec3::splat(0.7), |texture| textures[texture].mean(mesh));
+                Paint { texture, mean: mean.min(Vec3::ONE) }
+            }
+        }
+    }
+}
+
 /// Resolves the switches. By default, an entity emits if it has emission, occludes unless it emits, and receives.
-fn resolve(index: usize, data: &EntityData, mesh: usize) -> Entity {
+fn resolve(index: usize, data: &EntityData, mesh: usize, paint: Paint) -> Entity {
     let emits = data.emits.unwrap_or(data.emission != Vec3::ZERO);
     Entity {
         name: data.name.clone().unwrap_or_else(|| format!("entity {index}")),
         mesh,
-        albedo: data.albedo,
+        albedo: paint.mean,
+        texture: paint.texture,
         emission: data.emission,
         spot: data.spot,
         emits,
@@ -310,9 +392,51 @@ pub fn load_mesh(path: &Path) -> Result<(Mesh, gltf::Notes)> {
     if gltf::is_gltf(path) { gltf::load_mesh(path) } else { Ok((Mesh::load(path)?, gltf::Notes::default())) }
 }
 
+/// Reads the pictures of a scene's textures; those of one picture share it. An error comes with the number of the texture.
+fn read_textures(
+    data: &Data,
+    read: &dyn Fn(&Path) -> Result<Vec<u8>>,
+    readers: &mut gltf::Readers,
+) -> std::result::Result<Vec<Arc<Texture>>, (usize, Error)> {
+    let mut pictures: HashMap<(&Path, Option<usize>), Arc<Texels>> = HashMap::new();
+    let mut textures = Vec::with_capacity(data.textures.len());
+    for (i, texture) in data.textures.iter().enumerate() {
+        let fail = |error: Error| (i, error.context(format!("texture {:?}", texture.name)));
+        texture.check(&data.textures[..i]).map_err(|what| fail(Error::Input(what)))?;
+        let texels = texture.file.as_deref().map(|file| {
+            if let Some(known) = pictures.get(&(file, texture.image)) {
+                return Ok(known.clone());
+            }
+            let texels = match texture.image {
+                Some(image) => readers.get(file)?.texels(image)?,
+                None => Arc::new(Texels::decode(&read(file)?).map_err(|error| error.context(file.display()))?),
+            };
+            pictures.insert((file, texture.image), texels.clone());
+            Ok(texels)
+        });
+        let &TextureData { wrap, factor, alpha_cutoff, .. } = texture;
+        textures.push(Arc::new(Texture { texels: texels.transpose().map_err(fail)?, wrap, factor, alpha_cutoff }));
+    }
+    Ok(textures)
+}
+
 /// Reads the file of a scene's mesh or runs its generator.
-fn build_mesh(data: &MeshData, folder: &Path, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Mesh> {
+fn build_mesh(
+    data: &MeshData,
+    folder: &Path,
+    read: &dyn Fn(&Path) -> Result<Vec<u8>>,
+    readers: &mut gltf::Readers,
+) -> Result<Mesh> {
     let mut mesh = match (&data.file, &data.generator) {
+        (Some(file), None) if data.part.is_some() => {
+            let [mesh, at] = data.part.unwrap_or_default();
+            readers.get(file)?.part(
+                mesh,
+                at,
+                data.bend.map_or(DMat3::IDENTITY, |bend| DMat3::from_cols_array(&bend)),
+                &data.name,
+            )?
+        }
         (Some(file), None) if gltf::is_gltf(file) => {
             let path = folder.join(file);
             let (mesh, notes) = gltf::load_mesh(&path)?;
@@ -340,6 +464,8 @@ struct TableLines<'a> {
 
 #[derive(Default, Deserialize)]
 struct Tables {
+    #[serde(default, rename = "texture")]
+    textures: Vec<Spanned<toml::Table>>,
     #[serde(default, rename = "mesh")]
     meshes: Vec<Spanned<toml::Table>>,
     #[serde(default, rename = "entity")]
@@ -354,6 +480,10 @@ impl<'a> TableLines<'a> {
 
     fn line(&self, table: Option<&Spanned<toml::Table>>) -> usize {
         table.map_or(1, |t| data::line_of(self.text, t.span().start))
+    }
+
+    fn texture(&self, index: usize) -> usize {
+        self.line(self.tables.textures.get(index))
     }
 
     fn mesh(&self, index: usize) -> usize {

@@ -42,6 +42,7 @@ impl Scene {
                 name: name.into(),
                 mesh,
                 albedo: Vec3::ZERO,
+                texture: None,
                 emission: (radiance / share).as_vec3(),
                 spot: None,
                 emits: radiance != DVec3::ZERO,

@@ -5,6 +5,7 @@ pub mod clusters;
 mod field_atlas;
 pub mod limits;
 pub mod silhouettes;
+mod textures;
 
 use crate::bake::cluster_order::cluster_order;
 use crate::bake::ensure::Baked;
@@ -16,7 +17,7 @@ use crate::field::extent::Extent;
 use crate::field::quantity::{Storage, channel_stride};
 use crate::field::self_visibility::{self, BYTES};
 use crate::field::sheet::Rectangle;
-use crate::gpu::{Buffer, Device};
+use crate::gpu::{Buffer, Device, Texture};
 use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::ClusterBounds;
 use crate::lists::sight::TriangleRun;
@@ -90,6 +91,8 @@ pub struct SceneBuffers {
     pub vertices: Buffer,
     pub meshes: Vec<DeviceMesh>,
     pub surfaces: Vec<DeviceSurface>,
+    /// The scene's textures; those that are equal are shared.
+    pub textures: Vec<Arc<Texture>>,
     /// The surface of each entity.
     surface_of: Vec<usize>,
     /// The bakes that were not found in the cache.
@@ -192,12 +195,19 @@ impl SceneBuffers {
             vertices: Buffer::with_data(device, "vertices", &vertices)?,
             meshes,
             surfaces,
+            textures: textures::upload(device, &scene.textures)?,
             surface_of: baked.surface_of,
             baked: baked.baked,
             storage: options.storage,
             bands: options.bands,
             field_bands: options.occlusion_bands(),
         })
+    }
+
+    /// Device memory of all textures, bytes.
+    pub fn texture_bytes(&self) -> u64 {
+        let is_first = |i: &usize| !self.textures[..*i].iter().any(|other| Arc::ptr_eq(other, &self.textures[*i]));
+        (0..self.textures.len()).filter(is_first).map(|i| self.textures[i].size_bytes).sum()
     }
 
     /// The surface of an entity.

@@ -1,7 +1,7 @@
 //! T0 at pixels: what pixels show of the scene, lit by rays from there.
 
 use super::raycast::{Estimate, RayCast};
-use super::world::{EntityView, VertexView, World};
+use super::world::{EntityView, SurfaceHit, VertexView, World};
 use super::{RayMeshes, Vertex};
 use crate::draw::camera::through_pixels;
 use crate::scene::{Placement, Scene};
@@ -31,6 +31,8 @@ pub struct Seen {
     pub view: VertexView,
     /// Linear RGB radiance that it emits.
     pub emission: DVec3,
+    /// Reflectance there over the mean of the entity's, by colour.
+    pub over_mean: DVec3,
 }
 
 impl<'w> Eye<'w> {
@@ -54,12 +56,12 @@ impl<'w> Eye<'w> {
         let met = self.sights.iter().filter_map(|sight| Some((sight, world.first_hit_m(sight, direction)?)));
         let (sight, _) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let entity = sight.entity;
-        let (local, normal) = world.surface_hit(sight, direction)?;
+        let SurfaceHit { place, normal, over_mean } = world.surface_hit(sight, direction)?;
         let emission = match world.scene.entities[entity].emission.as_dvec3() {
             DVec3::ZERO => DVec3::ZERO,
             emission => emission * world.emission(sight, direction).unwrap_or(DVec3::ZERO),
         };
-        Some(Seen { entity, view: world.surface(entity, local, normal), emission })
+        Some(Seen { entity, view: world.surface(entity, place, normal), emission, over_mean })
     }
 }
 
@@ -123,9 +125,11 @@ pub fn picture(
             if let Some(seen) = seen.filter(|seen| scene.entities[seen.entity].receives) {
                 let key = Vertex { entity: seen.entity, index: pixel as usize * places.len() + index };
                 let Estimate { radiosity, error } = caster.point(&seen.view, key);
-                radiance += DVec3::from(radiosity);
-                of_pixel[2] += DVec3::from(radiosity) * DVec3::from(radiosity);
-                of_pixel[3] += DVec3::from(error) * DVec3::from(error);
+                let radiosity = seen.over_mean * DVec3::from(radiosity);
+                let error = seen.over_mean * DVec3::from(error);
+                radiance += radiosity;
+                of_pixel[2] += radiosity * radiosity;
+                of_pixel[3] += error * error;
             }
             of_pixel[0] += radiance.min(DVec3::splat(white));
             of_pixel[1] += radiance;

@@ -181,15 +181,19 @@ impl<'s> World<'s> {
         })
     }
 
-    /// Where a ray (unit direction) meets the entity first, in bounding radii from the centre of its mesh, and the
-    /// normal there as smooth shading interpolates it; `None` if it misses.
-    pub fn surface_hit(&self, sight: &EntityView, direction: DVec3) -> Option<(DVec3, DVec3)> {
+    /// The surface where a ray (unit direction) meets the entity first; `None` if it misses.
+    pub fn surface_hit(&self, sight: &EntityView, direction: DVec3) -> Option<SurfaceHit> {
         let direction = sight.to_object * direction.as_vec3a();
         let (distance, triangle, weights) = self.entities[sight.entity].mesh.corners_hit(sight.origin, direction)?;
         let mesh = &self.scene.meshes[self.scene.entities[sight.entity].mesh];
-        let corners = mesh.triangles[triangle].iter().zip(weights);
-        let normal: DVec3 = corners.map(|(i, w)| mesh.normals[*i as usize].as_dvec3() * f64::from(w)).sum();
-        Some(((sight.origin + distance * direction).as_dvec3(), normal.normalize_or(DVec3::Y)))
+        let corners = mesh.triangles[triangle];
+        let normal: DVec3 =
+            corners.iter().zip(weights).map(|(i, w)| mesh.normals[*i as usize].as_dvec3() * f64::from(w)).sum();
+        Some(SurfaceHit {
+            place: (sight.origin + distance * direction).as_dvec3(),
+            normal: normal.normalize_or(DVec3::Y),
+            over_mean: self.scene.over_mean(sight.entity, corners, weights).as_dvec3(),
+        })
     }
 
     /// Distance in metres at which a ray (unit direction) meets the entity first; `None` if it misses.
@@ -217,6 +221,16 @@ impl<'s> World<'s> {
         }
         mesh.emission(sight.origin, sight.to_object * direction).map(|color| color.as_dvec3())
     }
+}
+
+/// A place of a surface that a ray meets.
+pub struct SurfaceHit {
+    /// In bounding radii from the centre of the mesh.
+    pub place: DVec3,
+    /// As smooth shading interpolates it.
+    pub normal: DVec3,
+    /// Reflectance over the mean of the entity's, by colour.
+    pub over_mean: DVec3,
 }
 
 impl VertexView {

@@ -1,9 +1,8 @@
 //! Saves the state as a scene file from which `render` makes the same picture.
 
 use super::editor::Editor;
-use crate::asset::embedded;
 use crate::error::{Error, Result};
-use crate::scene::{Data, export::Export};
+use crate::scene::Data;
 use std::path::{Path, PathBuf};
 
 /// Suffix of a saved scene's name, so that the original file with its comments is kept.
@@ -53,22 +52,15 @@ impl Editor {
         [data.output.width, data.output.height] = self.size();
         data.output.time_s = self.time_s;
         let from = self.path().parent().unwrap_or(Path::new(""));
-        let files = data.meshes.iter_mut().filter_map(|m| m.file.as_mut());
-        for file in files.chain(data.environment.image.iter_mut().map(|image| &mut image.file)) {
-            *file = found_from(folder, from, file);
-            if file.to_str().is_none() {
-                return Err(Error::Failed(format!("{}: a scene file can only name UTF-8 paths", file.display())));
-            }
-        }
+        data.move_files(from, folder);
         Ok(data)
     }
 
-    /// Writes the state as a scene file, and meshes that no file has beside it.
+    /// Writes the state as a scene file.
     pub fn save(&mut self, path: &Path) -> Result<()> {
         let data = self.data(path.parent().unwrap_or(Path::new("")))?;
         let head = "Written by shadow-fields view; `shadow-fields render` gives the same picture.";
-        let export = Export::new(&data, &self.scene().meshes, path)?;
-        export.write(head).map_err(|error| match error {
+        data.write(path, head).map_err(|error| match error {
             Error::Input(message) => Error::Failed(message),
             other => other,
         })?;
@@ -124,17 +116,4 @@ pub(super) fn unedited(stem: &str) -> &str {
     let number = stem.trim_end_matches(|c: char| c.is_ascii_digit());
     let marked = if number.len() < stem.len() { number.strip_suffix('-') } else { Some(stem) };
     marked.and_then(|marked| marked.strip_suffix(SUFFIX)).unwrap_or(stem)
-}
-
-/// Converts a path `file` of a scene in folder `from` to a path for a scene in folder `to`.
-fn found_from(to: &Path, from: &Path, file: &Path) -> PathBuf {
-    let here = |folder: &Path| std::path::absolute(folder).and_then(|f| f.canonicalize()).ok();
-    let full = from.join(file);
-    match full.canonicalize() {
-        Ok(_) if here(to).is_some() && here(to) == here(from) => file.to_owned(),
-        Ok(full) => here(to).and_then(|to| full.strip_prefix(to).ok().map(Path::to_owned)).unwrap_or(full),
-        // A file that is not on disk is embedded, under its own name or relative to the built-in scene.
-        Err(_) if embedded::find(file).is_some() => file.to_owned(),
-        Err(_) => embedded::name(&full).map_or(full, PathBuf::from),
-    }
 }

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use generate::{cuboid, library, plane, sphere, torus, torus_two_colour};
-use glam::{DVec3, Quat, Vec3};
+use glam::{DVec3, Quat, Vec2, Vec3};
 use shadow_fields::asset::Generator;
 use shadow_fields::asset::{Mesh, enclose, obj};
 
@@ -341,8 +341,20 @@ fn obj_dialects() {
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1/2/1 2//1 3//1 4\nl 1 2\np 3\n",
     ];
     for text in same {
-        assert_eq!(parse(text).content_hash(), plain.content_hash(), "{text}");
+        let found = parse(text);
+        assert_eq!((found.positions, found.triangles), (plain.positions.clone(), plain.triangles.clone()), "{text}");
+        assert_eq!(found.normals, plain.normals, "{text}");
     }
+    let textured =
+        parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0\nvt .5 1\nvt 1 0 0\nf 1/1 2/2 3/3\nf 4/-3 3/3 2/1\n");
+    let uvs = textured.uvs.as_ref().unwrap();
+    assert_eq!(
+        uvs[..],
+        [[0.0, 0.0], [0.5, 1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0]].map(Vec2::from),
+        "a seam splits a vertex"
+    );
+    assert_eq!(Mesh::parse(obj::write_obj(&textured).as_bytes(), Path::new("x.obj")).unwrap().uvs, textured.uvs);
+    assert!(parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3\n").uvs.is_none(), "one corner has none");
     let split = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 2\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 4//2 2//2\n");
     assert_eq!((split.positions.len(), split.normals[0]), (6, Vec3::Z), "two normals at two of the positions");
     let colored = parse("v 0 0 0 1 0 0\nv 1 0 0 0 2 0\nv 0 1 0 0 0 .5\nf 1 2 3\n");

@@ -85,7 +85,7 @@ fn defaults() {
     let scene = ball("");
     let entity = &scene.entities[0];
     assert_eq!((entity.emits, entity.occludes, entity.receives), (false, true, true));
-    assert_eq!((entity.albedo, entity.emission), (Vec3::splat(0.7), Vec3::ZERO));
+    assert_eq!((entity.albedo, entity.texture, entity.emission), (Vec3::splat(0.7), None, Vec3::ZERO));
     assert_eq!(scene.at(3.0)[0], Placement { position: Vec3::ZERO, rotation: Quat::IDENTITY, scale: 1.0 });
     assert_eq!((scene.data.camera.fov_deg, scene.data.output.width, scene.data.output.exposure_ev), (40.0, 960, None));
     assert!(scene.environment.is_none());
@@ -279,6 +279,7 @@ fn camera_up() {
 fn documented(text: &str) -> Scene {
     let folder = tempfile::tempdir().unwrap();
     shadow_fields::asset::picture::write_exr(&folder.path().join("studio.hdr"), 2, 1, &[1.0; 6]).unwrap();
+    shadow_fields::asset::picture::write_png(&folder.path().join("wood.png"), 1, 1, &[0.5; 3], 0.0).unwrap();
     std::fs::write(folder.path().join("shown.toml"), text).unwrap();
     Scene::load(&folder.path().join("shown.toml")).unwrap()
 }

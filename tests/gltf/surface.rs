@@ -5,6 +5,7 @@ use glam::Vec3;
 use model::{Model, U8, load};
 use serde_json::json;
 use shadow_fields::asset::picture::{linear_from_srgb, write_png};
+use shadow_fields::scene::Scene;
 
 /// A square of 2 x 2 m with coordinates of textures, of a material that is no metal unless it says so.
 fn square(model: &mut Model, mut material: serde_json::Value, with_uv: bool) -> usize {
@@ -33,7 +34,7 @@ fn texture(model: &mut Model) -> usize {
 }
 
 #[test]
-fn textures_become_means_over_vertices() {
+fn textures_paint_surfaces() {
     let mut model = Model::default();
     let texture = texture(&mut model);
     let material = |factor: [f32; 4], more: serde_json::Value| {
@@ -48,19 +49,82 @@ fn textures_become_means_over_vertices() {
     // A quarter turn: what stands below stands at the right, green and white.
     let turn = json!({ "extensions": { "KHR_texture_transform": { "rotation": std::f32::consts::FRAC_PI_2 } } });
     square(&mut model, material([1.0; 4], turn), true);
-    let import = load(&model);
-    let albedo = |i: usize| import.data.entities[i].albedo;
-    let close = |a: Vec3, b: [f32; 3]| (a - Vec3::from(b)).length() < 1e-3;
-    assert!(close(albedo(0), [0.5, 0.25, 1.0]), "blue and white: {}", albedo(0));
-    assert!(close(albedo(1), [0.5, 0.5, 0.5]), "the whole picture: {}", albedo(1));
-    assert!(close(albedo(2), [0.5, 0.5, 0.0]), "red and green: {}", albedo(2));
-    assert!(close(albedo(3), [0.5, 1.0, 0.5]), "green and white: {}", albedo(3));
-    let left_out = import.notes.left_out();
-    assert_eq!(left_out, ["left out (4): base colour textures (their mean over the vertices is the albedo)"]);
+    let (scene, left_out) = scene_of(&model);
+    assert_eq!(left_out, [""; 0]);
+    let close = |a: Vec3, b: [f32; 3]| assert!((a - Vec3::from(b)).length() < 1e-3, "{a} for {b:?}");
+    // What a place of the square's left and right halves shows, and the mean of what it shows.
+    let shown = |i: usize, x: f32| {
+        let entity = &scene.entities[i];
+        let texture = &scene.textures[entity.texture.unwrap()];
+        let mesh = &scene.meshes[entity.mesh];
+        let uvs = mesh.uvs.as_ref().unwrap();
+        let v = mesh.positions.iter().position(|p| p.x * x > 0.0).unwrap();
+        texture.factor * texture.texels.as_ref().unwrap().at(uvs[v], texture.wrap).truncate()
+    };
+    close(shown(0, -1.0), [0.0, 0.0, 1.0]);
+    close(shown(0, 1.0), [1.0, 0.5, 1.0]);
+    close(scene.entities[0].albedo, [0.5, 0.25, 1.0]);
+    close(scene.entities[1].albedo, [0.5, 0.5, 0.5]);
+    assert!(scene.meshes[1].uvs.is_none(), "without coordinates its mean is shown");
+    close(shown(2, -1.0), [1.0, 0.0, 0.0]);
+    close(shown(2, 1.0), [0.0, 1.0, 0.0]);
+    close(scene.entities[3].albedo, [0.5, 1.0, 0.5]);
+}
+
+/// A model as a scene, and what is left out of it.
+fn scene_of(model: &Model) -> (Scene, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = model.write(folder.path(), "model");
+    let (scene, notes) = Scene::load_with_notes(&path).unwrap();
+    (scene, notes.left_out())
+}
+
+/// A scene file that `import` writes names meshes and images of the glTF file, and reads as the same scene.
+#[test]
+fn an_imported_scene_has_the_same_textures_and_parts() {
+    let mut model = Model::default();
+    let texture = texture(&mut model);
+    let info = json!({ "index": texture });
+    let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": info }, "alphaMode": "MASK", "name": "leaf" });
+    let node = square(&mut model, material, true);
+    model.json["nodes"][node]["scale"] = json!([1, 2, -3]);
+    let folder = tempfile::tempdir().unwrap();
+    let path = model.write(folder.path(), "model");
+    let scene = Scene::load(&path).unwrap();
+    let texture = &scene.data.textures[0];
+    assert_eq!((texture.name.as_str(), texture.image, texture.alpha_cutoff), ("leaf", Some(0), Some(0.5)));
+    let text = scene.to_toml().unwrap();
+    assert!(
+        text.contains("albedo = \"leaf\"") && text.contains("part = [0, 0]") && text.contains("bend = ["),
+        "{text}"
+    );
+    let saved = folder.path().join("saved.toml");
+    std::fs::write(&saved, &text).unwrap();
+    let again = Scene::load(&saved).unwrap();
+    assert_eq!((&again.data, &again.textures), (&scene.data, &scene.textures));
+    assert_eq!(again.meshes[0], scene.meshes[0]);
+    assert_eq!(again.entities, scene.entities);
+
+    for (from, to, message) in [
+        ("part = [0, 0]", "part = [0, 7]", "meshes[0].primitives[7]: there is no such primitive"),
+        ("part = [0, 0]\n", "", "takes a part of a glTF file alone, and a bend of a part alone"),
+        ("image = 0", "image = 3", "images[3]: there is no such image"),
+        ("image = 0", "", "`image` says which image of a glTF file it is"),
+        ("albedo = \"leaf\"", "albedo = \"bark\"", "there is no texture \"bark\""),
+        ("albedo = \"leaf\"", "albedo = 0.5", "an albedo: three numbers from 0 to 1, or the name of a texture"),
+        ("alpha_cutoff = 0.5", "alpha_cutoff = 1.5", "alpha_cutoff is not within 0 to 1"),
+        ("bend = [1.0", "bend = [0.0", "has a bend that is not finite, beyond 1e7, or flat"),
+    ] {
+        assert!(text.contains(from), "{from} in {text}");
+        std::fs::write(&saved, text.replace(from, to)).unwrap();
+        let error = Scene::load(&saved).unwrap_err();
+        let line = error.to_string();
+        assert!(error.exit_code() == 4 && line.contains(message) && !line.contains('\n'), "{line} for {message}");
+    }
 }
 
 #[test]
-fn a_jpeg_texture_becomes_its_mean() {
+fn a_jpeg_texture_without_coordinates_becomes_its_mean() {
     let mut model = Model::default();
     // Two halves of one colour each: blocks of JPEG lie within them.
     let halves = [[200, 80, 40], [40, 120, 220]];
@@ -73,7 +137,7 @@ fn a_jpeg_texture_becomes_its_mean() {
     square(&mut model, json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": texture } } }), false);
     let linear = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
     let [left, right] = halves.map(|half| Vec3::from(half.map(linear)));
-    let found = load(&model).data.entities[0].albedo;
+    let found = scene_of(&model).0.entities[0].albedo;
     let expected = (left + right) / 2.0;
     // A step of 8 bits is at most 0.009 in linear light at these colours, and JPEG at this quality is wrong by about
     // one.
@@ -131,7 +195,7 @@ fn emission_has_its_strength_and_pattern() {
 }
 
 #[test]
-fn colours_of_vertices_are_a_mean_by_area() {
+fn colours_of_vertices_tint_a_surface() {
     let mut model = Model::default();
     // A triangle of 3 m^2 in black and one of 1 m^2 in white.
     let positions = model.positions(&[0., 0., 0., 6., 0., 0., 0., 1., 0., 0., 0., 1., 2., 0., 1., 0., 1., 1.]);
@@ -140,8 +204,12 @@ fn colours_of_vertices_are_a_mean_by_area() {
     model.json["accessors"][colors]["normalized"] = json!(true);
     let mesh = model.mesh(json!({ "POSITION": positions, "COLOR_0": colors }), None, None);
     model.node(json!({ "mesh": mesh }));
-    let import = load(&model);
-    assert!((import.data.entities[0].albedo - Vec3::splat(0.25)).length() < 1e-6);
+    let (scene, _) = scene_of(&model);
+    assert!((scene.entities[0].albedo - Vec3::splat(0.25)).length() < 1e-6, "the mean by area");
+    let mesh = &scene.meshes[0];
+    for (position, tint) in mesh.positions.iter().zip(mesh.tints.as_ref().unwrap()) {
+        assert_eq!(*tint, if position.z == 0.0 { Vec3::ZERO } else { Vec3::ONE });
+    }
 }
 
 #[test]
@@ -166,8 +234,9 @@ fn what_is_left_out_is_counted() {
             "left out (1): further scenes",
             "left out (1): nodes with a skin (their meshes stand still as they are stored)",
             "left out (1): primitives with morph targets (they keep the shape that is stored first)",
+            "left out (1): shadows of masked materials (they are those of the whole shape)",
             "left out (1): textures of normals, roughness, metal or occlusion",
-            "left out (3): transparent materials (they are opaque)",
+            "left out (2): transparent materials (they are opaque)",
         ]
     );
 }

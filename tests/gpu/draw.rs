@@ -2,16 +2,20 @@
 
 use crate::{common, stage};
 use common::report;
-use glam::{Quat, Vec3};
-use shadow_fields::asset::Mesh;
+use glam::{Quat, Vec2, Vec3};
+use shadow_fields::asset::environment::EnvironmentData;
+use shadow_fields::asset::mesh::Attributes;
 use shadow_fields::asset::picture::srgb_from_linear;
+use shadow_fields::asset::texture::{Texels, Texture, Wrap};
+use shadow_fields::asset::{Generator, Mesh};
 use shadow_fields::bake::Baker;
 use shadow_fields::draw::{Antialias, Finish};
 use shadow_fields::frame::{self, PictureMemory};
 use shadow_fields::scene::data::{Camera, EntityData};
-use shadow_fields::scene::{Placement, Scene};
+use shadow_fields::scene::{Albedo, Placement, Scene};
 use shadow_fields::shaders::Library;
 use stage::{at, scene, small, stage};
+use std::sync::Arc;
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 64;
@@ -310,6 +314,71 @@ fn lit_surfaces_have_their_radiosity() {
     for (found, expected) in picture.chunks_exact(3).flatten().zip([0.75_f32, 0.5, 0.75].iter().cycle()) {
         assert!((found - expected).abs() < 1e-3, "{found} for {expected}");
     }
+}
+
+/// A texture shows at every pixel what its texel reflects of the light that a grey surface gets there, whether the pixel
+/// evaluates a sharp light itself or not; what its alpha masks is not there.
+#[test]
+fn textures_multiply_the_light_of_a_grey_surface() {
+    let Some(stage) = stage() else { return };
+    let wall = |albedo: Albedo| {
+        let corners = [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]].map(Vec3::from).to_vec();
+        let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
+        let tints = vec![Vec3::new(1.0, 0.25, 1.0); 4];
+        let attributes = Attributes { uvs: Some(uvs), tints: Some(tints), ..Attributes::default() };
+        let triangles = vec![[0, 1, 2], [0, 2, 3]];
+        let mesh = Mesh::with_attributes("wall", corners, Vec::new(), attributes, triangles).unwrap();
+        let rgba = vec![[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 100]];
+        let texels = Some(Arc::new(Texels { width: 2, height: 2, rgba }));
+        let factor = Vec3::new(0.5, 1.0, 1.0);
+        let texture = Texture { texels, wrap: [Wrap::Clamp; 2], factor, alpha_cutoff: Some(0.5) };
+        let lamp = Generator::Sphere { radius_m: 0.1, subdivisions: 2 };
+        let environment = EnvironmentData { uniform: Some(Vec3::splat(0.2)), ..EnvironmentData::default() };
+        let scene = Scene::builder()
+            .camera(Camera::new([0.0, 0.0, 5.0], [0.0; 3]))
+            .environment(environment)
+            .texture("four", texture)
+            .mesh("wall", mesh)
+            .mesh("ball", lamp)
+            .entity(EntityData { albedo, ..EntityData::of_mesh("wall") })
+            .entity(EntityData { scale: 2.0, position: Vec3::new(0.5, 0.2, 0.6), ..EntityData::of_mesh("ball") })
+            .entity(EntityData {
+                position: Vec3::new(1.0, 1.0, 2.0),
+                emission: Vec3::splat(40.0),
+                ..EntityData::of_mesh("ball")
+            });
+        let scene = scene.build().unwrap();
+        let mut frame = stage.frame(&scene, options(Antialias::Samples));
+        let timings = frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
+        assert!(frame.pixels_evaluated(&timings).is_none_or(|count| count > 100), "no pixel evaluates a light");
+        frame.picture()
+    };
+    let grey = wall(Albedo::Color(Vec3::splat(0.5)));
+    let painted = wall(Albedo::Texture("four".into()));
+    let sky = &painted[..3];
+    let mut compared = [0; 4];
+    for (i, (grey, painted)) in grey.chunks_exact(3).zip(painted.chunks_exact(3)).enumerate() {
+        // Metres from the middle of the wall.
+        let x = 5.0 * 20.0_f32.to_radians().tan() * ((i % WIDTH) as f32 + 0.5 - 48.0) / 32.0;
+        let y = 5.0 * 20.0_f32.to_radians().tan() * (32.0 - (i / WIDTH) as f32 - 0.5) / 32.0;
+        // Texels are constant a quarter from the edge outwards; the balls hide the rest.
+        let within = |c: f32| (1.1..1.7).contains(&c.abs());
+        if !within(x) || !within(y) || x > 0.0 && y > 0.0 {
+            continue;
+        }
+        let quarter = usize::from(x > 0.0) + 2 * usize::from(y < 0.0);
+        let texel = [[0.5, 0.0, 0.0], [0.0, 0.25, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]][quarter];
+        for c in 0..3 {
+            // The corner of the picture shows the sky.
+            let expected = if quarter == 3 { sky[c] } else { grey[c] * texel[c] / 0.5 };
+            assert!(
+                (painted[c] - expected).abs() < 4e-3 * grey[c].max(0.1),
+                "{painted:?} for {texel:?} of {grey:?} at {x}, {y}"
+            );
+        }
+        compared[quarter] += 1;
+    }
+    assert!(compared[0].min(compared[2]).min(compared[3]) > 20, "{compared:?}");
 }
 
 /// A picture for a screen is the linear one over white, in 8 bits of sRGB.

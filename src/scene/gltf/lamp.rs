@@ -84,8 +84,7 @@ impl<'a> Lamps<'a> {
             return Ok(out);
         }
         let generator = Generator::Sphere { radius_m: 1.0, subdivisions: SUBDIVISIONS };
-        out.meshes
-            .push((MeshData { name: BALL.into(), file: None, generator: Some(generator.clone()) }, generator.build()?));
+        out.meshes.push((MeshData::new(BALL, Some(generator.clone())), generator.build()?));
         // A convex body's mean outline is its area over four.
         let outline_m2 = out.meshes[0].1.area_m2() / 4.0 * self.radius_m.powi(2);
         for (light, stand) in &self.lights {

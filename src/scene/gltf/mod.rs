@@ -9,7 +9,8 @@
 //! | translation, rotation, uniform scale | placement |
 //! | other scales, mirrors, shears | a copy of the mesh with the scale baked in |
 //! | animations of nodes | motion `node`, one for every moving node that carries the entity |
-//! | base colour factor, texture, colours of vertices | albedo, a mean over the surface |
+//! | base colour factor | albedo |
+//! | base colour texture, colours of vertices, alpha mask | texture; tints of the mesh's vertices |
 //! | emissive factor and strength; texture | emission; colours of the mesh's vertices |
 //! | point and spot lights | glowing balls; those of spots shine within a cone |
 //! | the first directional light | the sun of the distant light |
@@ -27,16 +28,19 @@ mod surface;
 mod texture;
 mod tree;
 
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::{DMat3, Vec3};
 
 use crate::asset::Mesh;
 use crate::asset::environment::{EnvironmentData, RADIANCE_LIMIT};
+use crate::asset::texture::{Texels, Texture};
 use crate::error::{Error, Result};
-use crate::scene::data::{Data, EntityData, MeshData, Output};
+use crate::scene::data::{Albedo, Data, EntityData, MeshData, Output, TextureData};
 use crate::scene::framing;
 use crate::scene::motion::RotationData;
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
@@ -60,10 +64,12 @@ const TRIANGLES_LIMIT: usize = 16_000_000;
 
 /// A file as a scene.
 pub struct Import {
-    /// The scene. A mesh of the file has neither a file nor a generator.
+    /// The scene; it names the file's meshes and images by the file's name without its folder.
     pub data: Data,
     /// Meshes in the order of the data.
     pub meshes: Vec<Arc<Mesh>>,
+    /// Textures in the order of the data.
+    pub textures: Vec<Arc<Texture>>,
     /// Whether the file has no camera, so that the scene's was added.
     pub camera_added: bool,
     /// What a reader has to know.
@@ -78,7 +84,7 @@ pub fn is_gltf(path: &Path) -> bool {
 /// Reads a scene from a `.glb` or `.gltf` file and the buffers and textures beside it.
 pub fn load(path: &Path) -> Result<Import> {
     let document = Document::load(path)?;
-    let mut import = Builder::new(&document)?.build()?;
+    let mut import = Builder::new(document, path)?.build()?;
     let meshes = import.data.meshes.len();
     let entities = import.data.entities.len();
     check_counts(meshes, entities).map_err(|what| Error::input(path, what))?;
@@ -123,53 +129,148 @@ pub fn load_mesh(path: &Path) -> Result<(Mesh, Notes)> {
 struct Primitive {
     shape: Shape,
     surface: Surface,
+    material: Option<usize>,
     name: String,
 }
 
-/// What is known of a scene while it is made.
-struct Builder<'a> {
-    document: &'a Document,
-    stands: Vec<Stand>,
-    textures: Textures<'a>,
+/// Primitives and images of a file, each read once.
+pub(super) struct Reader {
+    document: Rc<Document>,
+    textures: Textures,
     primitives: HashMap<(usize, usize), Option<Primitive>>,
-    /// Meshes by primitive and bend, the bend as bits.
-    made: HashMap<(usize, usize, [u64; 9]), usize>,
-    meshes: Vec<(String, Arc<Mesh>)>,
-    names: BTreeSet<String>,
     materials: BTreeSet<usize>,
     triangle_count: usize,
-    bent_count: usize,
     notes: Notes,
 }
 
-impl<'a> Builder<'a> {
-    fn new(document: &'a Document) -> Result<Self> {
-        let mut notes = Notes::default();
-        let tracks = animation::tracks(document, &mut notes)?;
-        let stands = tree::stands(document, &tracks, &mut notes)?;
-        Ok(Builder {
+impl Reader {
+    fn new(document: Document) -> Self {
+        let document = Rc::new(document);
+        Reader {
+            textures: Textures::new(&document),
             document,
-            stands,
-            textures: Textures::new(document),
             primitives: HashMap::new(),
-            made: HashMap::new(),
-            meshes: Vec::new(),
-            names: BTreeSet::new(),
             materials: BTreeSet::new(),
             triangle_count: 0,
+            notes: Notes::default(),
+        }
+    }
+
+    /// The texels of an image.
+    pub fn texels(&mut self, image: usize) -> Result<Arc<Texels>> {
+        let fail = |what: &str| self.document.fail(format!("images[{image}]"), what);
+        if image >= self.document.root.images.len() {
+            return Err(fail("there is no such image"));
+        }
+        self.textures
+            .texels(image)?
+            .ok_or_else(|| self.document.fail(format!("images[{image}]"), "neither PNG nor JPEG"))
+    }
+
+    /// The mesh of a primitive under a bend.
+    pub fn part(&mut self, mesh: usize, at: usize, bend: DMat3, name: &str) -> Result<Mesh> {
+        let count = self.document.root.meshes.get(mesh).map_or(0, |mesh| mesh.primitives.len());
+        if at >= count {
+            return Err(self.document.fail(format!("meshes[{mesh}].primitives[{at}]"), "there is no such primitive"));
+        }
+        self.read(mesh, at)?;
+        let Some(Some(primitive)) = self.primitives.get(&(mesh, at)) else {
+            return Err(self.document.fail(format!("meshes[{mesh}].primitives[{at}]"), "it has no triangles"));
+        };
+        self.triangle_count += primitive.shape.triangle_count();
+        if self.triangle_count > TRIANGLES_LIMIT {
+            let what = format!("over the limit of {TRIANGLES_LIMIT} triangles in all");
+            return Err(self.document.fail(&primitive.shape.place, what));
+        }
+        primitive.shape.mesh(&self.document, name, bend, primitive.surface.attributes.clone())
+    }
+
+    /// Reads a primitive once.
+    fn read(&mut self, mesh: usize, at: usize) -> Result<()> {
+        if self.primitives.contains_key(&(mesh, at)) {
+            return Ok(());
+        }
+        let document = self.document.clone();
+        let json = &document.root.meshes[mesh];
+        let shape = Shape::read(&document, mesh, at, &mut self.notes)?;
+        let primitive = shape.map(|shape| {
+            let material = json.primitives[at].material.map(|material| material.value());
+            let notes = &mut self.notes;
+            if let Some(material) = material.filter(|material| self.materials.insert(*material)) {
+                surface::note(&document.root.materials[material], notes);
+            }
+            let surface = Surface::new(&document, material, &shape, &mut self.textures, notes)?;
+            let own = json.name.clone().unwrap_or_else(|| format!("mesh {mesh}"));
+            let name = if json.primitives.len() > 1 { format!("{own} {at}") } else { own };
+            Ok(Primitive { shape, surface, material, name })
+        });
+        self.primitives.insert((mesh, at), primitive.transpose()?);
+        Ok(())
+    }
+}
+
+/// The glTF files of which a scene file takes parts, each opened once.
+pub(super) struct Readers<'f> {
+    folder: &'f Path,
+    readers: HashMap<PathBuf, Reader>,
+}
+
+impl<'f> Readers<'f> {
+    /// For a scene file in `folder`.
+    pub fn new(folder: &'f Path) -> Self {
+        Readers { folder, readers: HashMap::new() }
+    }
+
+    pub fn get(&mut self, file: &Path) -> Result<&mut Reader> {
+        match self.readers.entry(file.to_owned()) {
+            Entry::Occupied(known) => Ok(known.into_mut()),
+            Entry::Vacant(place) => Ok(place.insert(Reader::new(Document::load(&self.folder.join(file))?))),
+        }
+    }
+}
+
+/// What is known of a scene while it is made.
+struct Builder {
+    reader: Reader,
+    stands: Vec<Stand>,
+    /// Meshes by primitive and bend, the bend as bits.
+    made: HashMap<(usize, usize, [u64; 9]), usize>,
+    meshes: Vec<(MeshData, Arc<Mesh>)>,
+    /// Textures by material and number of the image, and the tints that vary the colour.
+    painted: HashMap<(Option<usize>, [u32; 3]), usize>,
+    textures: Vec<(TextureData, Arc<Texture>)>,
+    names: BTreeSet<String>,
+    bent_count: usize,
+    /// The file's name, by which a scene file beside it refers to it.
+    file: PathBuf,
+}
+
+impl Builder {
+    fn new(document: Document, path: &Path) -> Result<Self> {
+        let mut reader = Reader::new(document);
+        let tracks = animation::tracks(&reader.document, &mut reader.notes)?;
+        let stands = tree::stands(&reader.document, &tracks, &mut reader.notes)?;
+        Ok(Builder {
+            reader,
+            stands,
+            made: HashMap::new(),
+            meshes: Vec::new(),
+            painted: HashMap::new(),
+            textures: Vec::new(),
+            names: BTreeSet::new(),
             bent_count: 0,
-            notes,
+            file: path.file_name().map_or_else(|| path.to_owned(), PathBuf::from),
         })
     }
 
     fn build(mut self) -> Result<Import> {
-        let document = self.document;
+        let document = self.reader.document.clone();
         let stands = std::mem::take(&mut self.stands);
         let mut entities = Vec::new();
         for stand in &stands {
             let node = &document.root.nodes[stand.node];
             if node.skin.is_some() {
-                self.notes.leave_out(SKINS);
+                self.reader.notes.leave_out(SKINS);
             }
             let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
             for at in 0..document.root.meshes[mesh].primitives.len() {
@@ -184,26 +285,27 @@ impl<'a> Builder<'a> {
 
     /// The entity of a primitive, if it has triangles.
     fn entity(&mut self, stand: &Stand, mesh: usize, at: usize) -> Result<Option<EntityData>> {
-        self.read(mesh, at)?;
-        let Some(Some(primitive)) = self.primitives.get(&(mesh, at)) else { return Ok(None) };
+        self.reader.read(mesh, at)?;
+        let document = self.reader.document.clone();
+        let Some(Some(primitive)) = self.reader.primitives.get(&(mesh, at)) else { return Ok(None) };
         let Some(parts) = SplitTransform::new(stand.fixed.matrix3) else {
-            self.notes.leave_out("shapes that a scale of 0 makes flat");
+            self.reader.notes.leave_out("shapes that a scale of 0 makes flat");
             return Ok(None);
         };
         let place = format!("nodes[{}]", stand.node);
-        let albedo = primitive.surface.albedo;
         let emission = primitive.surface.emission;
         let scale = parts.uniform_scale().map(|scale| scale as f32);
         if scale.is_some_and(|scale| !(1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(&scale)) {
-            return Err(self.document.fail(place, "its scale is not within 1e-7 to 1e7"));
+            return Err(document.fail(place, "its scale is not within 1e-7 to 1e7"));
         }
         if stand.fixed.translation.abs().max_element() > f64::from(POSITION_LIMIT_M) {
-            return Err(self.document.fail(place, "it stands beyond the limit of 1e7 m"));
+            return Err(document.fail(place, "it stands beyond the limit of 1e7 m"));
         }
         let bend = if scale.is_some() { DMat3::IDENTITY } else { parts.bend };
+        let albedo = self.albedo(mesh, at);
         let made = self.mesh(mesh, at, bend)?;
-        let several = self.document.root.meshes[mesh].primitives.len() > 1;
-        let own = self.document.root.nodes[stand.node].name.clone().unwrap_or_else(|| format!("node {}", stand.node));
+        let several = document.root.meshes[mesh].primitives.len() > 1;
+        let own = document.root.nodes[stand.node].name.clone().unwrap_or_else(|| format!("node {}", stand.node));
         Ok(Some(EntityData {
             name: Some(if several { format!("{own} {at}") } else { own }),
             position: stand.fixed.translation.as_vec3(),
@@ -212,30 +314,34 @@ impl<'a> Builder<'a> {
             albedo,
             emission,
             motion: stand.motion.clone(),
-            ..EntityData::of_mesh(&self.meshes[made].0)
+            ..EntityData::of_mesh(&self.meshes[made].0.name)
         }))
     }
 
-    /// Reads a primitive once.
-    fn read(&mut self, mesh: usize, at: usize) -> Result<()> {
-        if self.primitives.contains_key(&(mesh, at)) {
-            return Ok(());
-        }
-        let json = &self.document.root.meshes[mesh];
-        let shape = Shape::read(self.document, mesh, at, &mut self.notes)?;
-        let primitive = shape.map(|shape| {
-            let material = json.primitives[at].material.map(|material| material.value());
-            let notes = &mut self.notes;
-            if let Some(material) = material.filter(|material| self.materials.insert(*material)) {
-                surface::note(&self.document.root.materials[material], notes);
-            }
-            let surface = Surface::new(self.document, material, &shape, &mut self.textures, notes)?;
-            let own = json.name.clone().unwrap_or_else(|| format!("mesh {mesh}"));
-            let name = if json.primitives.len() > 1 { format!("{own} {at}") } else { own };
-            Ok(Primitive { shape, surface, name })
+    /// The albedo of a primitive that was read; a paint becomes one of the scene's textures.
+    fn albedo(&mut self, mesh: usize, at: usize) -> Albedo {
+        let Some(Some(Primitive { surface, material, .. })) = self.reader.primitives.get(&(mesh, at)) else {
+            unreachable!("the primitive was read")
+        };
+        let Some(paint) = &surface.paint else { return Albedo::Color(surface.albedo) };
+        let key = (*material, surface.albedo.to_array().map(f32::to_bits));
+        let number = *self.painted.entry(key).or_insert_with(|| {
+            let own = material.and_then(|index| self.reader.document.root.materials[index].name.clone());
+            let own = own.unwrap_or_else(|| material.map_or("paint".into(), |index| format!("material {index}")));
+            let is_free = |name: &String| self.textures.iter().all(|(data, _)| data.name != *name);
+            let Texture { wrap, factor, alpha_cutoff, .. } = paint.texture;
+            let data = TextureData {
+                name: free_name(&own, is_free),
+                file: paint.image.map(|_| self.file.clone()),
+                image: paint.image,
+                wrap,
+                factor,
+                alpha_cutoff,
+            };
+            self.textures.push((data, Arc::new(paint.texture.clone())));
+            self.textures.len() - 1
         });
-        self.primitives.insert((mesh, at), primitive.transpose()?);
-        Ok(())
+        Albedo::Texture(self.textures[number].0.name.clone())
     }
 
     /// Index of the mesh of a primitive under a bend.
@@ -244,51 +350,53 @@ impl<'a> Builder<'a> {
         if let Some(made) = self.made.get(&key) {
             return Ok(*made);
         }
-        let Some(Some(primitive)) = self.primitives.get(&(mesh, at)) else { unreachable!("the primitive was read") };
-        self.triangle_count += primitive.shape.triangle_count();
-        if self.triangle_count > TRIANGLES_LIMIT {
-            let what = format!("over the limit of {TRIANGLES_LIMIT} triangles in all");
-            return Err(self.document.fail(&primitive.shape.place, what));
-        }
         if self.meshes.len() >= MESH_LIMIT {
-            return Err(self
-                .document
-                .fail("meshes", format!("over the limit of {MESH_LIMIT} meshes, scaled copies included")));
+            let what = format!("over the limit of {MESH_LIMIT} meshes, scaled copies included");
+            return Err(self.reader.document.fail("meshes", what));
         }
+        let Some(Some(primitive)) = self.reader.primitives.get(&(mesh, at)) else {
+            unreachable!("the primitive was read")
+        };
         let is_bent = bend != DMat3::IDENTITY;
         self.bent_count += usize::from(is_bent);
         // Meshes of lamps have names of their own.
         let own = primitive.name.strip_prefix(lamp::BALL).map(|rest| format!("a {}{rest}", lamp::BALL));
         let own = own.unwrap_or_else(|| primitive.name.clone());
         let wanted = if is_bent { format!("{own} scaled") } else { own };
-        let free = |name: &String| !self.names.contains(name);
-        let name = std::iter::once(wanted.clone()).chain((2..).map(|n| format!("{wanted} {n}"))).find(free);
-        let name = name.unwrap_or(wanted);
-        let colors = primitive.surface.colors.clone();
-        let made = primitive.shape.mesh(self.document, &name, bend, colors)?;
+        let name = free_name(&wanted, |name| !self.names.contains(name));
+        let made = self.reader.part(mesh, at, bend, &name)?;
         self.names.insert(name.clone());
-        self.meshes.push((name, Arc::new(made)));
+        let data = MeshData {
+            name,
+            file: Some(self.file.clone()),
+            part: Some([mesh, at]),
+            bend: is_bent.then(|| bend.to_cols_array()),
+            generator: None,
+        };
+        self.meshes.push((data, Arc::new(made)));
         self.made.insert(key, self.meshes.len() - 1);
         Ok(self.meshes.len() - 1)
     }
 
     /// Adds lamps, the camera, and light where nothing shines.
     fn finish(mut self, stands: &[Stand], mut entities: Vec<EntityData>) -> Result<Import> {
-        let document = self.document;
+        let document = &*self.reader.document.clone();
+        let mut notes = std::mem::take(&mut self.reader.notes);
         if self.bent_count > 0 {
             let copies = self.bent_count;
-            self.notes.say(format!("baked into copies of meshes ({copies}): scales that are not uniform, or mirror"));
+            notes.say(format!("baked into copies of meshes ({copies}): scales that are not uniform, or mirror"));
         }
         let spheres: HashMap<&str, (Vec3, f32)> =
-            self.meshes.iter().map(|(name, mesh)| (name.as_str(), mesh.bounding_sphere())).collect();
+            self.meshes.iter().map(|(data, mesh)| (data.name.as_str(), mesh.bounding_sphere())).collect();
         let spheres = || entities.iter().filter_map(|entity| Some((*spheres.get(entity.mesh.as_str())?, entity)));
         let bounds = camera::bounds(spheres());
-        let lamps = Lamps::new(document, stands, bounds.1, &mut self.notes)?;
-        let fittings = lamps.entities(document, &mut self.notes)?;
-        let camera = camera::camera(document, stands, bounds, &mut self.notes)?;
+        let lamps = Lamps::new(document, stands, bounds.1, &mut notes)?;
+        let fittings = lamps.entities(document, &mut notes)?;
+        let camera = camera::camera(document, stands, bounds, &mut notes)?;
         let camera_added = camera.is_none();
         let (camera, output) = camera.unwrap_or_else(|| {
-            let meshes: HashMap<&str, &Mesh> = self.meshes.iter().map(|(name, mesh)| (&**name, &**mesh)).collect();
+            let meshes: HashMap<&str, &Mesh> =
+                self.meshes.iter().map(|(data, mesh)| (data.name.as_str(), &**mesh)).collect();
             let things = entities.iter().filter_map(|e| Some((*meshes.get(e.mesh.as_str())?, e.at(0.0))));
             let output = Output::default();
             (framing::camera(&framing::points(things), output.aspect()), output)
@@ -301,22 +409,27 @@ impl<'a> Builder<'a> {
         });
         let radiance = lamps.radiance(bounds.0, bounds.1) + glow.sum::<f64>();
         let environment = if radiance > 0.0 {
-            self.notes.say("the file has lights but no sky: a dim one is added, so that shadows are not black".into());
+            notes.say("the file has lights but no sky: a dim one is added, so that shadows are not black".into());
             let fill = Vec3::splat((FILL_SHARE * radiance) as f32).min(Vec3::splat(RADIANCE_LIMIT));
             EnvironmentData { sun: lamps.sun.clone(), uniform: Some(fill), ..EnvironmentData::default() }
         } else {
-            self.notes.say("no light in the file is bright enough to see by: daylight is added".into());
+            notes.say("no light in the file is bright enough to see by: daylight is added".into());
             Surroundings::Daylight.data()
         };
         entities.extend(fittings.entities);
-        let of_file = |(name, _): &(String, _)| MeshData { name: name.clone(), file: None, generator: None };
-        let mut meshes: Vec<MeshData> = self.meshes.iter().map(of_file).collect();
-        let mut built: Vec<Arc<Mesh>> = self.meshes.into_iter().map(|(_, mesh)| mesh).collect();
+        let (mut meshes, mut built): (Vec<_>, Vec<_>) = self.meshes.into_iter().unzip();
+        let (textures, painted) = self.textures.into_iter().unzip();
         for (data, mesh) in fittings.meshes {
             meshes.push(data);
             built.push(Arc::new(mesh));
         }
-        let data = Data { camera, output, environment, meshes, entities };
-        Ok(Import { data, meshes: built, camera_added, notes: self.notes })
+        let data = Data { camera, output, environment, textures, meshes, entities };
+        Ok(Import { data, meshes: built, textures: painted, camera_added, notes })
     }
+}
+
+/// A name, or the first with a number that is free.
+fn free_name(wanted: &str, is_free: impl Fn(&String) -> bool) -> String {
+    let all = std::iter::once(wanted.to_owned()).chain((2..).map(|n| format!("{wanted} {n}")));
+    all.into_iter().find(is_free).expect("numbers do not end")
 }

@@ -10,7 +10,7 @@ use super::accessor;
 use super::document::Document;
 use super::notes::Notes;
 use crate::asset::Mesh;
-use crate::asset::mesh::TRIANGLE_LIMIT;
+use crate::asset::mesh::{Attributes, TRIANGLE_LIMIT};
 use crate::error::Result;
 
 /// The triangles of a primitive. Where it has no normals, every triangle has vertices of its own with its own normal,
@@ -78,10 +78,11 @@ impl Shape {
         Ok(Some(shape))
     }
 
-    /// The mesh, transformed by `bend`, with a colour a vertex if there are any.
-    pub fn mesh(&self, document: &Document, name: &str, bend: DMat3, colors: Option<Vec<Vec3>>) -> Result<Mesh> {
+    /// The mesh, transformed by `bend`.
+    pub fn mesh(&self, document: &Document, name: &str, bend: DMat3, attributes: Attributes) -> Result<Mesh> {
         let shape = self.bent(bend, DVec3::ZERO);
-        Mesh::new(name, shape.0, shape.1, colors, shape.2).map_err(|error| document.fail(&self.place, error))
+        Mesh::with_attributes(name, shape.0, shape.1, attributes, shape.2)
+            .map_err(|error| document.fail(&self.place, error))
     }
 
     /// Positions, normals and triangles after a transformation; a mirrored surface keeps its outside.

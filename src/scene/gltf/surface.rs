@@ -1,29 +1,40 @@
-//! Materials as diffuse surfaces that may glow.
+//! Materials as diffuse surfaces that may be painted and glow.
 
 use ::gltf::json::material::{AlphaMode, Material};
 use ::gltf::json::mesh::Semantic;
 use ::gltf::json::validation::Checked;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::document::Document;
 use super::notes::Notes;
 use super::shape::Shape;
 use super::texture::Textures;
 use crate::asset::environment::RADIANCE_LIMIT;
+use crate::asset::mesh::Attributes;
+use crate::asset::texture::Texture;
 use crate::error::Result;
 
 /// Colours that differ by less than this share of the brightest are one.
 const EVEN: f32 = 0.01;
 
+/// A base colour that varies over a surface.
+#[derive(Clone, Debug)]
+pub struct Paint {
+    /// Number of the image, if there is one.
+    pub image: Option<usize>,
+    pub texture: Texture,
+}
+
 /// What a primitive looks like.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// Linear reflectance, 0 to 1: the mean over the surface.
+    /// Linear reflectance, 0 to 1, where no paint varies it.
     pub albedo: Vec3,
+    pub paint: Option<Paint>,
     /// Linear radiance; candela per square metre are taken as W m^-2 sr^-1.
     pub emission: Vec3,
-    /// A factor on the emission for every vertex, where a texture varies it.
-    pub colors: Option<Vec<Vec3>>,
+    /// Colours are a factor on the emission, where a texture varies it.
+    pub attributes: Attributes,
 }
 
 impl Surface {
@@ -38,34 +49,40 @@ impl Surface {
         let default = Material::default();
         let json = material.map_or(&default, |index| &document.root.materials[index]);
         let place = material.map_or("the default material".to_owned(), |index| format!("materials[{index}]"));
-        let weights = shape.weights();
-        let mean = |colors: &[Vec3]| {
-            if colors.len() != weights.len() {
-                return colors.first().map_or(DVec3::ONE, |color| color.as_dvec3());
-            }
-            let sum: DVec3 = colors.iter().zip(&weights).map(|(color, weight)| color.as_dvec3() * *weight).sum();
-            sum / weights.iter().sum::<f64>().max(f64::MIN_POSITIVE)
-        };
         let [r, g, b, _] = json.pbr_metallic_roughness.base_color_factor.0;
-        let mut albedo = DVec3::new(r.into(), g.into(), b.into());
-        if let Some(info) = &json.pbr_metallic_roughness.base_color_texture
-            && let Some(colors) = textures.at_vertices(info, shape, notes)?
-        {
-            albedo *= mean(&colors);
-            notes.leave_out("base colour textures (their mean over the vertices is the albedo)");
-        }
+        let mut albedo = Vec3::new(r, g, b);
+        let mut attributes = Attributes::default();
         if let Some(colors) = shape.attribute(document, &Semantic::Colors(0), &[3, 4], 3)? {
             let colors: Vec<Vec3> = colors.chunks_exact(3).map(Vec3::from_slice).collect();
-            albedo *= mean(&colors);
-            if !is_even(&colors) {
-                notes.leave_out("colours of vertices (their mean is the albedo)");
+            if is_even(&colors) {
+                albedo *= colors[0];
+            } else {
+                attributes.tints = Some(colors.iter().map(|c| c.clamp(Vec3::ZERO, Vec3::ONE)).collect());
             }
         }
         if !(albedo.is_finite() && albedo.min_element() >= 0.0) {
             return Err(document.fail(place, "its base colour is negative or not finite"));
         }
+        let albedo = albedo.min(Vec3::ONE);
+        let info = json.pbr_metallic_roughness.base_color_texture.as_ref();
+        let applied = info.map(|info| textures.applied(info, shape, notes)).transpose()?.flatten();
+        let alpha_cutoff = match json.alpha_mode {
+            Checked::Valid(AlphaMode::Mask) => Some(json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0.clamp(0.0, 1.0))),
+            _ => None,
+        };
+        let paint = (applied.is_some() || attributes.tints.is_some()).then(|| Paint {
+            image: applied.as_ref().map(|applied| applied.image),
+            texture: Texture {
+                texels: applied.as_ref().map(|applied| applied.texels.clone()),
+                wrap: applied.as_ref().map_or_else(Default::default, |applied| applied.wrap),
+                factor: albedo,
+                alpha_cutoff,
+            },
+        });
+        attributes.uvs = applied.and_then(|applied| applied.uvs);
         let (emission, colors) = glow(document, json, &place, shape, textures, notes)?;
-        Ok(Surface { albedo: albedo.min(DVec3::ONE).as_vec3(), emission, colors })
+        attributes.colors = colors;
+        Ok(Surface { albedo, paint, emission, attributes })
     }
 }
 
@@ -93,7 +110,8 @@ fn glow(
     let Some(info) = json.emissive_texture.as_ref().filter(|_| emission != Vec3::ZERO) else {
         return Ok((emission, None));
     };
-    let Some(colors) = textures.at_vertices(info, shape, notes)? else { return Ok((emission, None)) };
+    let Some(applied) = textures.applied(info, shape, notes)? else { return Ok((emission, None)) };
+    let colors = textures.at_vertices(&applied);
     notes.leave_out("emissive textures (vertices have their colours)");
     if colors.len() != shape.vertex_count() || is_even(&colors) {
         emission *= colors[0];
@@ -105,8 +123,11 @@ fn glow(
 /// Counts what no surface of this program has, once a material that is used.
 pub fn note(json: &Material, notes: &mut Notes) {
     let transmits = json.extensions.as_ref().is_some_and(|e| e.transmission.is_some());
-    if transmits || matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend | AlphaMode::Mask)) {
+    if transmits || matches!(json.alpha_mode, Checked::Valid(AlphaMode::Blend)) {
         notes.leave_out("transparent materials (they are opaque)");
+    }
+    if matches!(json.alpha_mode, Checked::Valid(AlphaMode::Mask)) {
+        notes.leave_out("shadows of masked materials (they are those of the whole shape)");
     }
     let pbr = &json.pbr_metallic_roughness;
     // A file that says nothing means a metal; an unlit material shows its colour, whatever else it says.

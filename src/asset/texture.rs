@@ -1,0 +1,218 @@
+//! Textures: pictures that colour a surface, by its texture coordinates.
+
+use super::decode::decode;
+use super::mesh::Mesh;
+use super::picture::{linear_from_srgb, srgb_from_linear};
+use crate::error::Result;
+use glam::{DVec3, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::{Arc, LazyLock};
+
+/// How a texture goes on beyond its edges, as in glTF.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Wrap {
+    #[default]
+    Repeat,
+    Mirror,
+    /// The texels of the edge.
+    Clamp,
+}
+
+impl Wrap {
+    /// The texel of a row of `count` that a coordinate falls into.
+    fn texel(self, at: f32, count: usize) -> usize {
+        let within = match self {
+            Wrap::Repeat => at.rem_euclid(1.0),
+            Wrap::Clamp => at.clamp(0.0, 1.0),
+            Wrap::Mirror => 1.0 - (at.rem_euclid(2.0) - 1.0).abs(),
+        };
+        ((within * count as f32) as usize).min(count - 1)
+    }
+}
+
+/// Linear values of all bytes of sRGB.
+static LINEAR: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|byte| linear_from_srgb(byte as f32 / 255.0)));
+
+/// Texels of 8 bits, sRGB and alpha; rows from the top.
+#[derive(Debug, PartialEq)]
+pub struct Texels {
+    pub width: usize,
+    pub height: usize,
+    pub rgba: Vec<[u8; 4]>,
+}
+
+impl Texels {
+    /// Decodes a picture in PNG, JPEG, OpenEXR or Radiance HDR; linear ones are cut off at 1.
+    pub fn decode(bytes: &[u8]) -> Result<Self> {
+        let (picture, is_linear) = decode(bytes)?;
+        let rgba: Vec<[u8; 4]> = if is_linear {
+            let encode = |linear: f32| (255.0 * srgb_from_linear(linear.clamp(0.0, 1.0))).round() as u8;
+            let texel = |[r, g, b, a]: [f32; 4]| [encode(r), encode(g), encode(b), (255.0 * a).round() as u8];
+            picture.to_rgba32f().pixels().map(|pixel| texel(pixel.0)).collect()
+        } else {
+            picture.to_rgba8().pixels().map(|pixel| pixel.0).collect()
+        };
+        Ok(Texels { width: picture.width() as usize, height: picture.height() as usize, rgba })
+    }
+
+    /// Linear colour and alpha of a texel.
+    fn linear(&self, x: usize, y: usize) -> Vec4 {
+        let [r, g, b, a] = self.rgba[y * self.width + x];
+        Vec3::from_array([r, g, b].map(|byte| LINEAR[usize::from(byte)])).extend(f32::from(a) / 255.0)
+    }
+
+    /// The linear colour and alpha at texture coordinates, v upwards.
+    pub fn at(&self, uv: Vec2, wrap: [Wrap; 2]) -> Vec4 {
+        self.linear(wrap[0].texel(uv.x, self.width), wrap[1].texel(1.0 - uv.y, self.height))
+    }
+
+    /// The mean linear colour.
+    pub fn mean(&self) -> Vec3 {
+        let all = (0..self.rgba.len()).map(|i| self.linear(i % self.width, i / self.width).truncate().as_dvec3());
+        (all.sum::<DVec3>() / self.rgba.len() as f64).as_vec3()
+    }
+
+    /// The next level of detail, half as wide and high: the mean of two by two texels, of linear colour by alpha.
+    pub fn halved(&self) -> Texels {
+        let width = (self.width / 2).max(1);
+        let height = (self.height / 2).max(1);
+        let mean = |i: usize| {
+            let columns = [2 * (i % width), 2 * (i % width) + 1].map(|x| x.min(self.width - 1));
+            let rows = [2 * (i / width), 2 * (i / width) + 1].map(|y| y.min(self.height - 1));
+            let four = rows.into_iter().flat_map(|y| columns.map(|x| self.linear(x, y)));
+            let texels: Vec<Vec4> = four.collect();
+            let alpha: f32 = texels.iter().map(|texel| texel.w).sum();
+            // Texels that are not seen have a colour only where none is seen.
+            let weight = |texel: &Vec4| if alpha > 0.0 { texel.w / alpha } else { 0.25 };
+            let mean: Vec3 = texels.iter().map(|texel| weight(texel) * texel.truncate()).sum();
+            let [r, g, b] = mean.to_array().map(|c| (255.0 * srgb_from_linear(c)).round() as u8);
+            [r, g, b, (255.0 * alpha / 4.0).round() as u8]
+        };
+        Texels { width, height, rgba: (0..width * height).into_par_iter().map(mean).collect() }
+    }
+}
+
+/// The reflectance that varies over a surface: `factor`, times a texture, times the colours of the mesh's vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    pub texels: Option<Arc<Texels>>,
+    pub wrap: [Wrap; 2],
+    pub factor: Vec3,
+    /// Places whose alpha is less are not drawn.
+    pub alpha_cutoff: Option<f32>,
+}
+
+impl Texture {
+    /// The reflectance at a place of a triangle of a mesh. A texture without coordinates counts as white.
+    pub fn at(&self, mesh: &Mesh, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
+        let corners = corners.map(|v| v as usize);
+        let color = self.texels.as_ref().zip(mesh.uvs.as_ref()).map_or(Vec3::ONE, |(texels, uvs)| {
+            let uv: Vec2 = corners.iter().zip(weights).map(|(&v, weight)| weight * uvs[v]).sum();
+            texels.at(uv, self.wrap).truncate()
+        });
+        let tint = mesh
+            .tints
+            .as_ref()
+            .map_or(Vec3::ONE, |tints| corners.iter().zip(weights).map(|(&v, weight)| weight * tints[v]).sum());
+        self.factor * color * tint
+    }
+
+    /// The mean reflectance of a mesh's surface.
+    pub fn mean(&self, mesh: &Mesh) -> Vec3 {
+        let texels = self.texels.as_ref().zip(mesh.uvs.as_ref());
+        let everywhere = self.texels.as_ref().filter(|_| mesh.uvs.is_none()).map_or(Vec3::ONE, |texels| texels.mean());
+        let mut sum = DVec3::ZERO;
+        let mut whole = 0.0;
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|v| mesh.positions[v as usize].as_dvec3());
+            let area = (b - a).cross(c - a).length();
+            let tint = mesh
+                .tints
+                .as_ref()
+                .map_or(Vec3::ONE, |tints| triangle.iter().map(|&v| tints[v as usize]).sum::<Vec3>() / 3.0);
+            let color = texels.map_or(everywhere, |(texels, uvs)| {
+                let corners = triangle.map(|v| uvs[v as usize]);
+                let size = Vec2::new(texels.width as f32, texels.height as f32);
+                let longest = [0, 1, 2].map(|k| ((corners[k] - corners[(k + 1) % 3]) * size).length());
+                let cuts = (longest.into_iter().fold(0.0, f32::max) / 8.0).clamp(1.0, 8.0) as usize;
+                let places: Vec<Vec2> =
+                    middles(cuts).map(|[a, b, c]| a * corners[0] + b * corners[1] + c * corners[2]).collect();
+                places.iter().map(|uv| texels.at(*uv, self.wrap).truncate()).sum::<Vec3>() / places.len() as f32
+            });
+            sum += area * (tint * color).as_dvec3();
+            whole += area;
+        }
+        self.factor * (sum / whole.max(f64::MIN_POSITIVE)).as_vec3()
+    }
+}
+
+/// Barycentric middles of the triangles into which lines cut a triangle, `cuts` to a side.
+fn middles(cuts: usize) -> impl Iterator<Item = [f32; 3]> {
+    let row = move |i: usize| {
+        (0..cuts - i).flat_map(move |j| {
+            let at = |shift: f32| {
+                let a = (i as f32 + shift) / cuts as f32;
+                let b = (j as f32 + shift) / cuts as f32;
+                [a, b, 1.0 - a - b]
+            };
+            let upper = (j + 1 < cuts - i).then(|| at(2.0 / 3.0));
+            std::iter::once(at(1.0 / 3.0)).chain(upper)
+        })
+    };
+    (0..cuts).flat_map(row)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::mesh::Attributes;
+
+    fn square(texels: Texels, factor: Vec3) -> Vec3 {
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]].map(Vec3::from).to_vec();
+        let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
+        let attributes = Attributes { uvs: Some(uvs), ..Attributes::default() };
+        let mesh =
+            Mesh::with_attributes("square", positions, Vec::new(), attributes, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        Texture { texels: Some(Arc::new(texels)), wrap: [Wrap::Repeat; 2], factor, alpha_cutoff: None }.mean(&mesh)
+    }
+
+    #[test]
+    fn the_mean_of_a_half_white_texture_is_half_its_factor() {
+        let rgba = (0..64 * 64).map(|i| if i % 64 < 32 { [255; 4] } else { [0, 0, 0, 255] }).collect();
+        let mean = square(Texels { width: 64, height: 64, rgba }, Vec3::new(1.0, 0.5, 0.0));
+        assert!((mean - Vec3::new(0.5, 0.25, 0.0)).abs().max_element() < 0.01, "{mean}");
+    }
+
+    #[test]
+    fn v_points_up() {
+        // The upper row is white.
+        let texels = Texels { width: 1, height: 2, rgba: vec![[255; 4], [0, 0, 0, 255]] };
+        assert_eq!(texels.at(Vec2::new(0.5, 0.9), [Wrap::Repeat; 2]).x, 1.0);
+        assert_eq!(texels.at(Vec2::new(0.5, 0.1), [Wrap::Repeat; 2]).x, 0.0);
+        assert_eq!(texels.at(Vec2::new(0.5, 1.1), [Wrap::Repeat; 2]).x, 0.0);
+        assert_eq!(texels.at(Vec2::new(0.5, 1.1), [Wrap::Clamp; 2]).x, 1.0);
+        assert_eq!(texels.at(Vec2::new(0.5, 1.1), [Wrap::Mirror; 2]).x, 1.0);
+    }
+
+    #[test]
+    fn halves_are_means_of_light_and_ignore_what_is_not_seen() {
+        let texels = Texels { width: 2, height: 1, rgba: vec![[255; 4], [0, 0, 0, 255]] };
+        assert_eq!(texels.halved().rgba, [[188, 188, 188, 255]]);
+        let cut = Texels { width: 2, height: 1, rgba: vec![[255; 4], [0, 0, 0, 0]] };
+        assert_eq!(cut.halved().rgba, [[255, 255, 255, 128]]);
+    }
+
+    #[test]
+    fn middles_cover_a_triangle_evenly() {
+        for cuts in 1..5 {
+            let all: Vec<[f32; 3]> = middles(cuts).collect();
+            assert_eq!(all.len(), cuts * cuts);
+            let mean = all.iter().map(|m| Vec3::from_array(*m)).sum::<Vec3>() / all.len() as f32;
+            assert!((mean - Vec3::splat(1.0 / 3.0)).abs().max_element() < 1e-6, "{mean}");
+            assert!(all.iter().flatten().all(|w| *w > 0.0));
+        }
+    }
+}

@@ -220,8 +220,8 @@ fn animation(context: &Context, arguments: &Arguments, name: &str, scene: &Scene
 fn without_occluder(context: &Context, arguments: &Arguments) -> Result<PathBuf> {
     let scene = cases::scene(LIT_SCENE)?.scene;
     let mut bare = scene.data.clone();
-    let lit = |index: usize| !scene.entities[index].occludes;
-    bare.entities = bare.entities.iter().enumerate().filter(|(i, _)| lit(*i)).map(|(_, e)| e.clone()).collect();
+    let stays = |index: usize| scene.entities[index].emits || scene.meshes[scene.entities[index].mesh].is_flat();
+    bare.entities = bare.entities.iter().enumerate().filter(|(i, _)| stays(*i)).map(|(_, e)| e.clone()).collect();
     let source = format!("assets/scenes/{LIT_SCENE}.toml");
     let bare = Scene::parse(&bare.to_toml()?, Path::new(&source), &embedded::read)?;
     let alone = arguments.output.join(format!("{LIT_SCENE}_without_occluder.png"));

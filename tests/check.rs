@@ -62,7 +62,7 @@ fn a_wrong_shader_is_found() {
         ("silhouette_field.glsl", "foot + near.depth * along", "foot + 0.9 * near.depth * along", "sharp"),
         ("sub_light.glsl", "block.weight = 1.0 - light.fine", "block.weight = 0.9996 - light.fine", "sharp"),
         ("merge.comp", "float weight = above_horizon", "float weight = 0.999 * above_horizon", "merge"),
-        ("draw.frag", "finish(within_triangle", "1.01 * finish(within_triangle", "draw"),
+        ("draw.frag", "finish(within * shown", "1.01 * finish(within * shown", "draw"),
         ("grid.frag", "push.emission_white.rgb + light", "1.01 * light", "draw"),
         ("smooth.frag", "float share = 0.5", "float share = 0.6", "smooth"),
         ("show.frag", "push.encode != 0", "push.encode == 0", "show"),

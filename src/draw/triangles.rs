@@ -31,7 +31,7 @@ pub struct DrawnTriangles {
     pub positions: Buffer,
     /// Linear RGB that is multiplied by the entity's emission.
     pub emission: Buffer,
-    /// Texture coordinates, and the tint as [`packed`] says, where the mesh has either.
+    /// Texture coordinates, and the tint as `packed` says, where the mesh has either.
     pub paint: Option<Buffer>,
     /// Three indices a triangle; neighbouring triangles stand together.
     pub indices: Buffer,

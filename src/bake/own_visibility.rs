@@ -180,6 +180,18 @@ pub struct Seen {
     pub buried: bool,
 }
 
+impl Seen {
+    /// Takes all light from the point.
+    pub fn cover(&mut self) {
+        self.transfer.fill(0.0);
+        self.blocked = 1.0;
+        if let Some((angles, distances)) = self.map.split_at_mut_checked(NODES) {
+            angles.fill(encode_angle(-LIMIT_RAD));
+            distances.fill(encode_distance(0.0));
+        }
+    }
+}
+
 /// What blocks a point.
 #[derive(Clone, Copy)]
 pub struct Counts<'c> {

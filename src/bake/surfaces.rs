@@ -24,7 +24,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -370,10 +370,28 @@ impl GroupSpace<'_> {
         let standing = &group.standings[self.member];
         let counts = Counts { blocks: &blocks, in_map };
         let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
-        seen.buried = group.plan.refinement.is_some()
-            && seen.blocked > BURIED_BLOCKED
-            && seen.behind > BURIED_BACKS * seen.blocked;
+        let is_covered = self.is_covered(position, normal, nudge);
+        if is_covered {
+            seen.cover();
+        }
+        let sees_backs = seen.blocked > BURIED_BLOCKED && seen.behind > BURIED_BACKS * seen.blocked;
+        seen.buried = group.plan.refinement.is_some() && (is_covered || sees_backs);
         seen
+    }
+
+    /// Whether another member lies on a point, as the ground on which it stands: between it and the place from which it is
+    /// seen.
+    fn is_covered(&self, position: Vec3, normal: Vec3, nudge: Vec3) -> bool {
+        let group = self.group;
+        let off = nudge.dot(normal) * normal;
+        let [from, to] = [position - off, position + off].map(|place| {
+            let world = self.own().placement.point(place.as_dvec3());
+            ((world - group.centre) / group.radius_m).as_vec3a()
+        });
+        let mut hits = Vec::with_capacity(1);
+        let others = |member: u32| member as usize != self.member && self.blocks(member);
+        group.blockers.first(from, &[(to - from).normalize_or_zero()], others, &mut hits);
+        hits[0].is_some_and(|hit| hit.distance < from.distance(to))
     }
 
     /// The members that are so near a cluster, given by its vertices, that its maps have their shadows.

@@ -32,7 +32,7 @@ impl Data {
 
 /// Converts a path `file` of a scene in folder `from` to a path for a scene in folder `to`.
 fn found_from(to: &Path, from: &Path, file: &Path) -> PathBuf {
-    let here = |folder: &Path| std::path::absolute(folder).and_then(|f| f.canonicalize()).ok();
+    let here = |folder: &Path| if folder == Path::new("") { Path::new(".") } else { folder }.canonicalize().ok();
     let full = from.join(file);
     match full.canonicalize() {
         Ok(_) if here(to).is_some() && here(to) == here(from) => file.to_owned(),

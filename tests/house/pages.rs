@@ -65,6 +65,7 @@ fn keys_that_are_read() -> BTreeMap<String, BTreeSet<String>> {
     };
     add("[camera]", "[camera]\nzzz = 1");
     add("[output]", "[output]\nzzz = 1");
+    add("[[texture]]", "[[texture]]\nzzz = 1");
     add("[environment]", "[environment]\nzzz = 1");
     for part in ["gradient", "key", "sun", "sky", "image"] {
         add("[environment]", &format!("[environment]\n{part} = {{ zzz = 1 }}"));
@@ -82,8 +83,8 @@ fn keys_that_are_read() -> BTreeMap<String, BTreeSet<String>> {
     for part in ["position", "rotation", "scale"] {
         add("[[entity]]", &format!("[[entity]]\nmotion = [{{ node = {{ {part}_keys = {{ zzz = 1 }} }} }}]"));
     }
-    // These two are read by hand; the complaint lists only generators.
-    tables.get_mut("[[mesh]]").unwrap().extend(["name".to_owned(), "file".to_owned()]);
+    // These are read by hand; the complaint lists only generators.
+    tables.get_mut("[[mesh]]").unwrap().extend(["name", "file", "part", "bend"].map(str::to_owned));
     tables
 }
 

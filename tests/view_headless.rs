@@ -139,12 +139,14 @@ fn a_scene_that_stands_still_costs_only_its_showing() {
 /// A hand is quicker than a compiler: what its keys ask for is built once, when all of them are known.
 #[test]
 fn keys_that_wait_cost_one_rebuild() {
-    let sharp = |setup: &mut Setup| setup.frame.lights = Lights::Sharp;
+    let sharp = |setup: &mut Setup| {
+        setup.frame.lights = Lights::Sharp;
+        setup.frame.bake.groups = true;
+    };
     let Some(mut stand) = Stand::with("hasty", sharp) else { return };
     stand.ready();
     stand.letter('q');
-    // The floor as a light and as an occluder: each needs fields that the other's frame does not have. They are baked
-    // here.
+    // The floor as a light and as an occluder: what rests beside it sees past another group. Both are baked here.
     let mut toggle = |count| {
         (0..count).for_each(|_| stand.letter('e'));
         stand.ready();

@@ -222,6 +222,11 @@ impl Scene {
         self.data.entities.get(entity).is_some_and(|data| data.motion.is_empty()) && !self.loose.contains(&entity)
     }
 
+    /// Puts all entities that were taken out back into their groups. Returns whether there were any.
+    pub(crate) fn rejoin(&mut self) -> bool {
+        !std::mem::take(&mut self.loose).is_empty()
+    }
+
     /// Takes an entity out of its group, as one that was moved: it may be moved again.
     pub(crate) fn loosen(&mut self, entity: usize) {
         self.loose.insert(entity);

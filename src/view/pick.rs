@@ -94,9 +94,11 @@ impl Editor {
             }
             Command::DragTo(at) => self.drag_to(at),
             _ => {
-                self.drag = None;
+                let moved = self.drag.take().is_some_and(|drag| drag.moved);
                 self.history.close();
-                Effect::default()
+                // Back among what rests: the group is baked anew while the picture goes on by fields.
+                let regrouped = moved && self.scene.rejoin();
+                Changed { placements: regrouped, ..Changed::default() }.into()
             }
         }
     }

@@ -232,7 +232,8 @@ fn index(word: &str, count: usize, total: usize, of: &str) -> std::result::Resul
     Ok(plain as usize)
 }
 
-/// The mesh as OBJ text, which reads back as the same bits, but for tints, which have no place in it. Equal normals are written once.
+/// The mesh as OBJ text, which reads back as the same bits, but for tints, which have no place in it. Equal normals are
+/// written once.
 pub fn write_obj(mesh: &Mesh) -> String {
     let mut text =
         format!("# {}: {} vertices, {} triangles, metres\n", mesh.name, mesh.positions.len(), mesh.triangles.len());

@@ -122,30 +122,27 @@ impl Texture {
 
     /// The mean reflectance of a mesh's surface.
     pub fn mean(&self, mesh: &Mesh) -> Vec3 {
-        let texels = self.texels.as_ref().zip(mesh.uvs.as_ref());
-        let everywhere = self.texels.as_ref().filter(|_| mesh.uvs.is_none()).map_or(Vec3::ONE, |texels| texels.mean());
+        let coordinates = self.texels.as_ref().zip(mesh.uvs.as_ref());
         let mut sum = DVec3::ZERO;
         let mut whole = 0.0;
         for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(|v| mesh.positions[v as usize].as_dvec3());
             let area = (b - a).cross(c - a).length();
-            let tint = mesh
-                .tints
-                .as_ref()
-                .map_or(Vec3::ONE, |tints| triangle.iter().map(|&v| tints[v as usize]).sum::<Vec3>() / 3.0);
-            let color = texels.map_or(everywhere, |(texels, uvs)| {
+            let cuts = coordinates.map_or(1, |(texels, uvs)| {
                 let corners = triangle.map(|v| uvs[v as usize]);
                 let size = Vec2::new(texels.width as f32, texels.height as f32);
-                let longest = [0, 1, 2].map(|k| ((corners[k] - corners[(k + 1) % 3]) * size).length());
-                let cuts = (longest.into_iter().fold(0.0, f32::max) / 8.0).clamp(1.0, 8.0) as usize;
-                let places: Vec<Vec2> =
-                    middles(cuts).map(|[a, b, c]| a * corners[0] + b * corners[1] + c * corners[2]).collect();
-                places.iter().map(|uv| texels.at(*uv, self.wrap).truncate()).sum::<Vec3>() / places.len() as f32
+                let sides = [0, 1, 2].map(|k| ((corners[k] - corners[(k + 1) % 3]) * size).length());
+                (sides.into_iter().fold(0.0, f32::max) / 8.0).clamp(1.0, 8.0) as usize
             });
-            sum += area * (tint * color).as_dvec3();
+            let color: Vec3 = middles(cuts).map(|weights| self.at(mesh, *triangle, weights)).sum();
+            sum += area * (color / (cuts * cuts) as f32).as_dvec3();
             whole += area;
         }
-        self.factor * (sum / whole.max(f64::MIN_POSITIVE)).as_vec3()
+        let mean = (sum / whole.max(f64::MIN_POSITIVE)).as_vec3();
+        match &self.texels {
+            Some(texels) if mesh.uvs.is_none() => mean * texels.mean(),
+            _ => mean,
+        }
     }
 }
 

@@ -383,6 +383,9 @@ impl GroupSpace<'_> {
     /// seen.
     fn is_covered(&self, position: Vec3, normal: Vec3, nudge: Vec3) -> bool {
         let group = self.group;
+        if group.plan.members.len() == 1 {
+            return false;
+        }
         let off = nudge.dot(normal) * normal;
         let [from, to] = [position - off, position + off].map(|place| {
             let world = self.own().placement.point(place.as_dvec3());

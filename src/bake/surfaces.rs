@@ -9,6 +9,7 @@ use super::triangles::distinct;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
 use crate::asset::Mesh;
 use crate::asset::enclose::around_spheres;
+use crate::asset::grid::Grid;
 use crate::asset::mesh::Attributes;
 use crate::field::quantity::channel_stride;
 use crate::field::self_visibility::{self, BYTES};
@@ -24,7 +25,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -423,20 +424,23 @@ impl GroupSpace<'_> {
         let around = OnceLock::new();
         let stride = channel_stride(plan.bands);
         let mut transfer = vec![0.0; mesh.positions.len() * stride];
-        let mut maps = vec![0; if wanted.self_visibility { mesh.positions.len() * BYTES } else { 0 }];
+        // Pixels of a grid read no maps: all members cast their own shadows there, whose edges are crisp.
+        let has_maps = wanted.self_visibility && Grid::find(&mesh).is_none();
+        let mut maps = vec![0; if has_maps { mesh.positions.len() * BYTES } else { 0 }];
         let mut near = Vec::with_capacity(order.len().div_ceil(CLUSTER_VERTICES as usize));
         let mut any_blocked = false;
         let clusters: Vec<&[u32]> = order.chunks(CLUSTER_VERTICES as usize).collect();
         let mut done = 0;
         for batch in clusters.chunks(16) {
             let look = |cluster: &&[u32]| {
-                let near = self.near(cluster.iter().map(|&v| mesh.positions[v as usize]));
+                let places = cluster.iter().map(|&v| mesh.positions[v as usize]);
+                let near = if has_maps { self.near(places) } else { Vec::new() };
                 let in_map = |member: u32| near.binary_search(&member).is_ok();
                 let vertex = |&v: &u32| {
                     let v = v as usize;
                     let normal = mesh.normals[v];
                     let nudge = nudges[v];
-                    let in_map = wanted.self_visibility.then_some(&in_map as &(dyn Fn(u32) -> bool + Sync));
+                    let in_map = has_maps.then_some(&in_map as &(dyn Fn(u32) -> bool + Sync));
                     let see = |position| self.see_with(position, normal, nudge, Rays::Many, in_map);
                     let position = mesh.positions[v];
                     let here = see(position);
@@ -461,7 +465,7 @@ impl GroupSpace<'_> {
                 for (&v, seen) in cluster.iter().zip(seen) {
                     any_blocked |= seen.blocked > 0.0;
                     transfer[v as usize * stride..][..stride].copy_from_slice(&seen.transfer);
-                    if wanted.self_visibility {
+                    if has_maps {
                         maps[v as usize * BYTES..][..BYTES].copy_from_slice(&seen.map);
                     }
                 }
@@ -473,7 +477,7 @@ impl GroupSpace<'_> {
         BakedSurface {
             mesh,
             transfer: (any_blocked && wanted.transfer).then(|| Arc::new(transfer)),
-            self_visibility: (any_blocked && wanted.self_visibility).then(|| Arc::new(maps)),
+            self_visibility: (any_blocked && has_maps).then(|| Arc::new(maps)),
             near,
         }
     }

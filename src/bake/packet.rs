@@ -93,18 +93,15 @@ impl Packet {
         let along = simd.splat_f32s(corners.normal.dot(to_corner));
         let least = simd.splat_f32s(-SLACK);
         let most = simd.splat_f32s(1.0 + SLACK);
-        let [x, y, z] = [0, 1, 2].map(|k| vectors::<S>(&self.direction[k]));
+        let along_rays =
+            [vectors::<S>(&self.direction[0]), vectors::<S>(&self.direction[1]), vectors::<S>(&self.direction[2])];
         let (distances, _) = S::as_mut_simd_f32s(&mut self.distance);
         let (triangles, _) = S::as_mut_simd_u32s(&mut self.triangle);
-        for i in 0..x.len() {
-            let dot = |v: Vec3A| {
-                let sum = simd.mul_f32s(x[i], simd.splat_f32s(v.x));
-                let sum = simd.add_f32s(sum, simd.mul_f32s(y[i], simd.splat_f32s(v.y)));
-                simd.add_f32s(sum, simd.mul_f32s(z[i], simd.splat_f32s(v.z)))
-            };
-            let inverse = simd.div_f32s(simd.splat_f32s(1.0), dot(corners.normal));
-            let u = simd.mul_f32s(dot(second), inverse);
-            let v = simd.mul_f32s(dot(first), inverse);
+        for i in 0..distances.len() {
+            let direction = [along_rays[0][i], along_rays[1][i], along_rays[2][i]];
+            let inverse = simd.div_f32s(simd.splat_f32s(1.0), dot(simd, direction, corners.normal));
+            let u = simd.mul_f32s(dot(simd, direction, second), inverse);
+            let v = simd.mul_f32s(dot(simd, direction, first), inverse);
             let distance = simd.mul_f32s(along, inverse);
             let within = simd.and_m32s(
                 simd.and_m32s(simd.greater_than_or_equal_f32s(u, least), simd.greater_than_or_equal_f32s(v, least)),
@@ -125,6 +122,14 @@ impl Packet {
 #[inline(always)]
 fn vectors<S: Simd>(lanes: &[f32; LANES]) -> &[S::f32s] {
     S::as_simd_f32s(lanes).0
+}
+
+/// A function and no closure: what is not inlined does not get the processor's instructions.
+#[inline(always)]
+fn dot<S: Simd>(simd: S, direction: [S::f32s; 3], of: Vec3A) -> S::f32s {
+    let sum = simd.mul_f32s(direction[0], simd.splat_f32s(of.x));
+    let sum = simd.add_f32s(sum, simd.mul_f32s(direction[1], simd.splat_f32s(of.y)));
+    simd.add_f32s(sum, simd.mul_f32s(direction[2], simd.splat_f32s(of.z)))
 }
 
 /// A traversal as it is dispatched to what the processor has.

@@ -1,7 +1,7 @@
 //! Rays from one point against a hierarchy of triangles, sixteen at a time: what a box or a triangle costs is shared by
 //! all, and vector instructions take eight of them where the processor has AVX2.
 
-use glam::{Vec3, Vec3A};
+use glam::{Mat3A, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2_from_tris};
 use obvhs::triangle::Triangle;
@@ -47,19 +47,31 @@ struct Packet {
 }
 
 impl Packet {
-    fn new(directions: &[Vec3A]) -> Self {
-        // Lanes without a ray repeat the last one.
-        let lane = |i: usize| directions[i.min(directions.len() - 1)];
-        let axis = |k: usize| -> [f32; LANES] { std::array::from_fn(|i| lane(i)[k]) };
-        let direction = [axis(0), axis(1), axis(2)];
-        Packet {
-            // No infinity: a box that begins in the plane of such a ray would give no number.
-            inverse: direction.map(|axis| axis.map(|d| 1.0 / if d.abs() < 1e-12 { 1e-12_f32.copysign(d) } else { d })),
-            direction,
+    /// Up to [`LANES`] directions that `turn` brings into the triangles' frame. Lanes without a ray repeat the last one.
+    #[inline(always)]
+    fn new(turn: &Mat3A, directions: &[Vec3A]) -> Self {
+        let mut packet = Packet {
+            direction: [[0.0; LANES]; 3],
+            inverse: [[0.0; LANES]; 3],
             distance: [f32::INFINITY; LANES],
             triangle: [u32::MAX; LANES],
-            middle: directions.iter().sum(),
+            middle: Vec3A::ZERO,
+        };
+        for lane in 0..LANES {
+            let direction = *turn * directions[lane.min(directions.len() - 1)];
+            packet.middle += direction;
+            for axis in 0..3 {
+                packet.direction[axis][lane] = direction[axis];
+            }
         }
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let d = packet.direction[axis][lane];
+                // No infinity: a box that begins in the plane of such a ray would give no number.
+                packet.inverse[axis][lane] = 1.0 / if d.abs() < 1e-12 { 1e-12_f32.copysign(d) } else { d };
+            }
+        }
+        packet
     }
 
     /// Whether any ray enters a box, given from the rays' origin, nearer than what it has met.
@@ -132,46 +144,29 @@ fn dot<S: Simd>(simd: S, direction: [S::f32s; 3], of: Vec3A) -> S::f32s {
     simd.add_f32s(sum, simd.mul_f32s(direction[2], simd.splat_f32s(of.z)))
 }
 
-/// A traversal as it is dispatched to what the processor has.
-struct Traverse<'t, F> {
-    blockers: &'t Blockers,
+/// All packets of one origin, as they are dispatched to what the processor has.
+struct Cast<'c> {
+    blockers: &'c Blockers,
     origin: Vec3A,
-    packet: &'t mut Packet,
-    open: &'t mut Vec<u32>,
-    counts: &'t F,
+    turn: &'c Mat3A,
+    directions: &'c [Vec3A],
+    counts: &'c [bool],
+    hits: &'c mut Vec<Option<BlockerHit>>,
 }
 
-impl<F: Fn(u32) -> bool> WithSimd for Traverse<'_, F> {
+impl WithSimd for Cast<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Traverse { blockers, origin, packet, open, counts } = self;
-        if blockers.triangles.is_empty() {
-            return;
-        }
-        let nodes = &blockers.hierarchy.nodes;
-        open.push(0);
-        while let Some(index) = open.pop() {
-            let node = &nodes[index as usize];
-            if !packet.enters(simd, node.aabb.min - origin, node.aabb.max - origin) {
-                continue;
+        let Cast { blockers, origin, turn, directions, counts, hits } = self;
+        let mut open = Vec::with_capacity(64);
+        for rays in directions.chunks(LANES) {
+            let mut packet = Packet::new(turn, rays);
+            blockers.traverse(simd, origin, &mut packet, counts, &mut open);
+            for lane in 0..rays.len() {
+                hits.push(blockers.hit(&packet, lane));
             }
-            if node.prim_count > 0 {
-                for triangle in node.first_index..node.first_index + node.prim_count {
-                    if counts(blockers.members[triangle as usize]) {
-                        packet.meet(simd, origin, &blockers.triangles[triangle as usize], triangle);
-                    }
-                }
-                continue;
-            }
-            // The child that lies nearer along the rays comes first.
-            let [a, b] = [node.first_index, node.first_index + 1];
-            let towards = |child: u32| {
-                let aabb = &nodes[child as usize].aabb;
-                (aabb.min + aabb.max).dot(packet.middle)
-            };
-            open.extend(if towards(a) < towards(b) { [b, a] } else { [a, b] });
         }
     }
 }
@@ -196,29 +191,62 @@ impl Blockers {
         }
     }
 
-    /// The first triangle on each ray of those whose members `counts` keeps.
+    /// The first triangle on each ray of those whose members count. `turn` brings the directions into the triangles' frame.
     pub fn first(
         &self,
         origin: Vec3A,
+        turn: &Mat3A,
         directions: &[Vec3A],
-        counts: impl Fn(u32) -> bool,
+        counts: &[bool],
         hits: &mut Vec<Option<BlockerHit>>,
     ) {
         hits.clear();
-        let arch = Arch::new();
-        let mut open = Vec::new();
-        for rays in directions.chunks(LANES) {
-            let mut packet = Packet::new(rays);
-            arch.dispatch(Traverse { blockers: self, origin, packet: &mut packet, open: &mut open, counts: &counts });
-            hits.extend(rays.iter().enumerate().map(|(lane, direction)| {
-                let triangle = packet.triangle[lane];
-                (triangle != u32::MAX).then(|| BlockerHit {
-                    distance: packet.distance[lane],
-                    member: self.members[triangle as usize],
-                    from_behind: self.triangles[triangle as usize].normal.dot(*direction) > 0.0,
-                })
-            }));
+        Arch::new().dispatch(Cast { blockers: self, origin, turn, directions, counts, hits });
+    }
+
+    #[inline(always)]
+    fn traverse<S: Simd>(&self, simd: S, origin: Vec3A, packet: &mut Packet, counts: &[bool], open: &mut Vec<u32>) {
+        if self.triangles.is_empty() {
+            return;
         }
+        let nodes = &self.hierarchy.nodes;
+        open.push(0);
+        while let Some(index) = open.pop() {
+            let node = &nodes[index as usize];
+            if !packet.enters(simd, node.aabb.min - origin, node.aabb.max - origin) {
+                continue;
+            }
+            if node.prim_count > 0 {
+                for triangle in node.first_index..node.first_index + node.prim_count {
+                    if counts[self.members[triangle as usize] as usize] {
+                        packet.meet(simd, origin, &self.triangles[triangle as usize], triangle);
+                    }
+                }
+                continue;
+            }
+            // The child that lies nearer along the rays comes first.
+            let a = node.first_index;
+            let b = a + 1;
+            let aabbs = [&nodes[a as usize].aabb, &nodes[b as usize].aabb];
+            let apart = aabbs[1].min + aabbs[1].max - aabbs[0].min - aabbs[0].max;
+            let nearer_first = apart.dot(packet.middle) > 0.0;
+            open.push(if nearer_first { b } else { a });
+            open.push(if nearer_first { a } else { b });
+        }
+    }
+
+    #[inline(always)]
+    fn hit(&self, packet: &Packet, lane: usize) -> Option<BlockerHit> {
+        let triangle = packet.triangle[lane];
+        if triangle == u32::MAX {
+            return None;
+        }
+        let direction = Vec3A::new(packet.direction[0][lane], packet.direction[1][lane], packet.direction[2][lane]);
+        Some(BlockerHit {
+            distance: packet.distance[lane],
+            member: self.members[triangle as usize],
+            from_behind: self.triangles[triangle as usize].normal.dot(direction) > 0.0,
+        })
     }
 }
 
@@ -241,7 +269,7 @@ mod tests {
             let origin = 1.5 * random_direction(&mut rng).as_vec3a();
             let directions: Vec<Vec3A> = (0..37).map(|_| random_direction(&mut rng).as_vec3a()).collect();
             for only_odd in [false, true] {
-                blockers.first(origin, &directions, |member| !only_odd || member == 1, &mut hits);
+                blockers.first(origin, &Mat3A::IDENTITY, &directions, &[!only_odd, true], &mut hits);
                 assert_eq!(hits.len(), directions.len());
                 for (direction, hit) in directions.iter().zip(&hits) {
                     let counted = corners.iter().enumerate().filter(|(i, _)| !only_odd || i % 2 == 1);
@@ -257,7 +285,7 @@ mod tests {
             }
         }
         assert!((300..3300).contains(&met), "{met}");
-        Blockers::new([]).first(Vec3A::ZERO, &[Vec3A::X], |_| true, &mut hits);
+        Blockers::new([]).first(Vec3A::ZERO, &Mat3A::IDENTITY, &[Vec3A::X], &[], &mut hits);
         assert_eq!(hits, [None]);
     }
 }

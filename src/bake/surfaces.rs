@@ -16,7 +16,7 @@ use crate::field::self_visibility::{self, BYTES};
 use crate::layout::CLUSTER_VERTICES;
 use crate::scene::groups::Groups;
 use crate::scene::{Placement, Scene};
-use glam::{DMat3, DVec3, Quat, Vec3};
+use glam::{DMat3, DVec3, Mat3A, Quat, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -25,7 +25,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -299,7 +299,9 @@ impl<'p> Group<'p> {
     }
 
     fn space(&self, member: usize) -> GroupSpace<'_> {
-        GroupSpace { group: self, member }
+        let blocks: Vec<bool> = (0..).zip(&self.plan.members).map(|(i, of)| i == member || of.occludes).collect();
+        let others = (0..).zip(&blocks).map(|(i, blocks)| i != member && *blocks).collect();
+        GroupSpace { group: self, member, blocks, others }
     }
 }
 
@@ -307,6 +309,10 @@ impl<'p> Group<'p> {
 pub(super) struct GroupSpace<'g> {
     group: &'g Group<'g>,
     member: usize,
+    /// For each member whether it blocks what this one sees.
+    blocks: Vec<bool>,
+    /// The same without this one.
+    others: Vec<bool>,
 }
 
 impl GroupSpace<'_> {
@@ -317,10 +323,6 @@ impl GroupSpace<'_> {
     /// Lengths in the group's frame over lengths in the member's.
     pub fn scale(&self) -> f32 {
         (f64::from(self.own().placement.scale) / self.group.radius_m) as f32
-    }
-
-    fn blocks(&self, member: u32) -> bool {
-        member as usize == self.member || self.group.plan.members[member as usize].occludes
     }
 
     /// From each vertex towards the middle of its triangles, along the surface; and off the surface by
@@ -356,20 +358,12 @@ impl GroupSpace<'_> {
         self.see_with(position, normal, nudge, rays, None)
     }
 
-    fn see_with(
-        &self,
-        position: Vec3,
-        normal: Vec3,
-        nudge: Vec3,
-        rays: Rays,
-        in_map: Option<&(dyn Fn(u32) -> bool + Sync)>,
-    ) -> Seen {
+    fn see_with(&self, position: Vec3, normal: Vec3, nudge: Vec3, rays: Rays, in_map: Option<&[bool]>) -> Seen {
         let group = self.group;
         let world = self.own().placement.point((position + nudge).as_dvec3());
         let eye = Eye { origin: ((world - group.centre) / group.radius_m).as_vec3(), normal };
-        let blocks = |member: u32| self.blocks(member);
         let standing = &group.standings[self.member];
-        let counts = Counts { blocks: &blocks, in_map };
+        let counts = Counts { blocks: &self.blocks, in_map };
         let mut seen = see(&group.blockers, standing, &eye, group.plan.bands, rays, counts);
         let is_covered = self.is_covered(position, normal, nudge);
         if is_covered {
@@ -393,8 +387,8 @@ impl GroupSpace<'_> {
             ((world - group.centre) / group.radius_m).as_vec3a()
         });
         let mut hits = Vec::with_capacity(1);
-        let others = |member: u32| member as usize != self.member && self.blocks(member);
-        group.blockers.first(from, &[(to - from).normalize_or_zero()], others, &mut hits);
+        let toward = (to - from).normalize_or_zero();
+        group.blockers.first(from, &Mat3A::IDENTITY, &[toward], &self.others, &mut hits);
         hits[0].is_some_and(|hit| hit.distance < from.distance(to))
     }
 
@@ -435,12 +429,13 @@ impl GroupSpace<'_> {
             let look = |cluster: &&[u32]| {
                 let places = cluster.iter().map(|&v| mesh.positions[v as usize]);
                 let near = if has_maps { self.near(places) } else { Vec::new() };
-                let in_map = |member: u32| near.binary_search(&member).is_ok();
+                let mut in_map = vec![false; self.blocks.len()];
+                near.iter().for_each(|&member| in_map[member as usize] = true);
                 let vertex = |&v: &u32| {
                     let v = v as usize;
                     let normal = mesh.normals[v];
                     let nudge = nudges[v];
-                    let in_map = has_maps.then_some(&in_map as &(dyn Fn(u32) -> bool + Sync));
+                    let in_map = has_maps.then_some(&in_map[..]);
                     let see = |position| self.see_with(position, normal, nudge, Rays::Many, in_map);
                     let position = mesh.positions[v];
                     let here = see(position);

@@ -296,13 +296,19 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
             } while (has_outline(packed) && j < count);
 #if SHEETS
             // They stand behind all others of a chain.
+            SheetShadow shadow;
+            shadow.free = vec4(1.0);
+            EACH for (uint k = 0; k < 4; k++) {
+                shadow.edges[k] = vec3(0.0);
+            }
             do {
                 if (is_sheet(packed)) {
-                    share *= past_sheet(ENTITY(packed & SKY_CHAIN), surface, light, block);
+                    pass_sheet(shadow, ENTITY(packed & SKY_CHAIN), surface, light, block);
                     j = next_entry(surface, first, count, j + 1, true);
                     packed = entry_at(first + j);
                 }
             } while (is_sheet(packed) && j < count);
+            share *= shadow.free;
 #endif
         }
         vec4 shines = vec4(shining.light_kind == LIGHT_BALL ? shining.light_share : 1.0);

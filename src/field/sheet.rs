@@ -116,14 +116,14 @@ impl SheetView {
         DVec4::new(sine(x, x0), -sine(x, x1), sine(y, y0), -sine(y, y1))
     }
 
-    /// Share of a small round light that it blocks: the light's middle lies in that unit direction, `distance` metres
-    /// away, `sine` is that of its angular radius, and `slope` the sine of the angle between the light's surface and the
+    /// What it blocks of a small round light: the light's middle lies in that unit direction, `distance` metres away,
+    /// `sine` is that of its angular radius, and `slope` the sine of the angle between the light's surface and the
     /// sheet. `least_m` is the least that the light reaches beyond the sheet.
-    pub fn blocked_of(&self, direction: DVec3, distance: f64, sine: f64, slope: f64, least_m: f64) -> f64 {
+    pub fn shadow(&self, direction: DVec3, distance: f64, sine: f64, slope: f64, least_m: f64) -> SheetShadow {
         let beyond = self.axes[2].dot(direction) * distance - self.height;
         let counts = ((beyond - least_m) / (distance * sine * slope).max(least_m)).clamp(0.0, 1.0);
-        let inside = self.inside(direction);
-        let share = inside.to_array().map(|inside| blocked_share(inside / sine.max(LEAST_PENUMBRA)));
+        let inside = self.inside(direction).to_array();
+        let share = inside.map(|inside| blocked_share(inside / sine.max(LEAST_PENUMBRA)));
         // Cosines of the angles between those planes: the edges' share together depends on them.
         let [[x0, x1], [y0, y1]] = self.ends;
         let tilt = |low: f64, high: f64| {
@@ -136,7 +136,11 @@ impl SheetView {
             end / self.height.hypot(end)
         };
         let cosine = side(share[0], share[1], self.ends[0]) * side(share[2], share[3], self.ends[1]);
-        counts * both(x, y, cosine)
+        let nearest = (1..4).fold(0, |nearest, i| if inside[i] < inside[nearest] { i } else { nearest });
+        let end = self.ends[nearest / 2][nearest % 2];
+        let inward = if nearest % 2 == 0 { 1.0 } else { -1.0 };
+        let normal = self.height * self.axes[nearest / 2] - end * self.axes[2];
+        SheetShadow { free: 1.0 - counts * both(x, y, cosine), edge: inward / self.height.hypot(end) * normal }
     }
 
     /// Sine of the angle between its plane and a surface at right angles to a unit vector.
@@ -146,10 +150,59 @@ impl SheetView {
     }
 }
 
+/// What sheets leave of a small round light.
+#[derive(Clone, Copy, Debug)]
+pub struct SheetShadow {
+    /// The share that is free.
+    pub free: f64,
+    /// Unit normal, towards what is blocked, of the plane through the point and the side that runs nearest to the light.
+    edge: DVec3,
+}
+
+impl SheetShadow {
+    pub const NONE: SheetShadow = SheetShadow { free: 1.0, edge: DVec3::ZERO };
+
+    /// Two sheets that meet in an edge, as the walls of a room, leave nothing free between them: their edges' normals
+    /// are opposite there. The edge of the result is that which divides the light more evenly.
+    pub fn behind(self, other: SheetShadow) -> SheetShadow {
+        let divides = |shadow: &SheetShadow| (shadow.free - 0.5).abs();
+        let edge = if divides(&other) < divides(&self) { other.edge } else { self.edge };
+        SheetShadow { free: both(self.free, other.free, self.edge.dot(other.edge)), edge }
+    }
+}
+
 /// Share of a disc that lies on the inner side of two edges, from the shares inside of each: exact where the edges are
 /// parallel, in the same sense (cosine 1 of their normals) or opposite senses (-1), and where they cross at right angles
 /// in its middle.
 fn both(a: f64, b: f64, cosine: f64) -> f64 {
     let end = if cosine < 0.0 { (a + b - 1.0).max(0.0) } else { a.min(b) };
     a * b + cosine.abs() * (end - a * b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The wall and the ceiling of a room, and a light of 3 degrees behind the edge in which they meet.
+    #[test]
+    fn sheets_that_meet_leave_nothing_between_them() {
+        let sheet = |centre: [f64; 3], axes: [DVec3; 2]| Sheet {
+            centre: centre.into(),
+            rectangle: Rectangle { axes, half_m: [2.0, 2.0] },
+        };
+        let ceiling = sheet([0.0, 4.0, 0.0], [DVec3::X, DVec3::Z]);
+        let wall = sheet([2.0, 2.0, 0.0], [DVec3::Y, DVec3::Z]);
+        let eye = SheetEye {
+            position: DVec3::new(-1.0, 0.5, 0.3),
+            normal: DVec3::Y,
+            receiver: (DVec3::new(0.0, 0.3, 0.0), 1.0),
+        };
+        for across in [-0.03, -0.01, 0.0, 0.004, 0.02] {
+            let toward = (DVec3::new(2.0 + across, 4.0, -0.5) - eye.position).normalize();
+            let [a, b] = [ceiling, wall].map(|sheet| sheet.seen(&eye).shadow(toward, 1e3, 0.026, 0.5, 0.0));
+            assert!(a.free * b.free > 0.1, "{} {}", a.free, b.free);
+            let free = SheetShadow::NONE.behind(a).behind(b).free;
+            assert!(free < 0.02, "{across}: {free}");
+        }
+    }
 }

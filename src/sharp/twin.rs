@@ -1,7 +1,7 @@
 //! The CPU twin of "sharp", in f64 and vertex by vertex, from the same stored numbers.
 
 use crate::field::self_visibility::{self, BYTES};
-use crate::field::sheet::{BEYOND, Sheet, SheetEye};
+use crate::field::sheet::{BEYOND, Sheet, SheetEye, SheetShadow};
 use crate::field::silhouette::{Near, SilhouetteField};
 use crate::field::sub_light::{BLOCK, LightPart, SeenLight};
 use crate::scene::LightMethod;
@@ -107,19 +107,11 @@ impl SharpTwin<'_> {
                 let pairs = occluders.iter().zip(&between);
                 let through: f64 =
                     pairs.map(|(object, near)| 1.0 - blocked(object, near, part, part.distance)).product();
-                let past_sheets: f64 = sheets
-                    .iter()
-                    .map(|sheet| {
-                        let slope = sheet.slope(seen.facing().unwrap_or(part.toward));
-                        1.0 - sheet.blocked_of(
-                            part.toward,
-                            part.distance,
-                            part.sine,
-                            slope,
-                            BEYOND * seen.sine * seen.distance,
-                        )
-                    })
-                    .product();
+                let past_sheets = sheets.iter().fold(SheetShadow::NONE, |shadow, sheet| {
+                    let slope = sheet.slope(seen.facing().unwrap_or(part.toward));
+                    let least_m = BEYOND * seen.sine * seen.distance;
+                    shadow.behind(sheet.shadow(part.toward, part.distance, part.sine, slope, least_m))
+                });
                 let covers =
                     share.unwrap_or(0.0) + own.as_ref().map_or(0.0, |near| blocked(shining, near, part, f64::INFINITY));
                 let sees = self.self_maps.map_or(1.0, |maps| {
@@ -133,7 +125,7 @@ impl SharpTwin<'_> {
                         part.distance / receiver.radius_m,
                     )
                 });
-                part.share(point.normal) * sees * covers * through * past_sheets
+                part.share(point.normal) * sees * covers * through * past_sheets.free
             };
             parts.iter().map(part).sum()
         };

@@ -13,7 +13,7 @@ fn read(text: &str, bytes: &[u8]) -> shadow_fields::Result<gltf::Import> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m.glb");
     std::fs::write(&path, model::glb(text.as_bytes(), bytes)).unwrap();
-    gltf::load(&path)
+    gltf::load(&path, &Default::default())
 }
 
 /// The JSON of a model as it is written.

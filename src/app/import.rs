@@ -6,6 +6,7 @@ use super::{Global, output};
 use crate::error::{Error, Result, one_line};
 use crate::files;
 use crate::scene::{self, Scene, gltf};
+use crate::text::number;
 use clap::Args;
 use serde_json::json;
 use std::io::Read;
@@ -27,6 +28,9 @@ pub struct Arguments {
     /// Replace a file that stands under the scene file's name, also one that `import` did not write
     #[arg(long)]
     force: bool,
+    /// Time at which skins and morph targets stand in their pose, seconds
+    #[arg(long, default_value_t = 0.0, value_name = "S", value_parser = number::<f64>(-1e9..=1e9), allow_negative_numbers = true)]
+    time: f64,
     #[command(flatten)]
     gltf: GltfArguments,
 }
@@ -58,7 +62,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let output = Output::new("--output", &arguments.output, "toml");
     Outputs::check(&inputs, std::slice::from_ref(&output))?;
     arguments.check_own(&arguments.output)?;
-    let scene: Scene = arguments.gltf.scene(global, &arguments.scene)?;
+    let scene: Scene = arguments.gltf.scene(global, &arguments.scene, arguments.time)?;
     let mut data = scene.data.clone();
     let folder = |path: &Path| path.parent().unwrap_or(Path::new("")).to_owned();
     data.move_files(&folder(&arguments.scene), &folder(&arguments.output));

@@ -126,7 +126,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
 }
 
 fn render(global: &Global, arguments: &Arguments) -> Result<()> {
-    let mut scene = arguments.gltf.scene(global, &arguments.scene)?;
+    let mut scene = arguments.gltf.scene(global, &arguments.scene, arguments.picture.time.unwrap_or(0.0))?;
     let size = arguments.picture.options.frame(&scene)?.size;
     let first_s = arguments.picture.first_s(&scene);
     arguments.look.apply(global, &arguments.scene, &mut scene, size, first_s)?;

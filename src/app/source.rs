@@ -53,30 +53,39 @@ impl LookArguments {
 }
 
 /// Options of commands that read glTF.
-#[derive(Args, Clone, Copy, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "glTF files (.glb, .gltf)")]
 pub struct GltfArguments {
     /// End with exit code 4 if anything in a glTF file is left out; by default each kind is only listed
     #[arg(long)]
     pub strict: bool,
+    /// The camera, or the node that holds it, that a glTF file's picture is seen from. Default: the first with
+    /// perspective
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
 }
 
 impl GltfArguments {
-    /// Reads a scene file or a glTF file, and says what is left out of the latter.
-    pub fn scene(self, global: &Global, path: &Path) -> Result<Scene> {
-        let (scene, notes) = Scene::load_with_notes(path)?;
+    /// Reads a scene file or a glTF file, and says what is left out of the latter. Skins and morph targets stand in
+    /// their pose at `time_s`.
+    pub fn scene(&self, global: &Global, path: &Path, time_s: f64) -> Result<Scene> {
+        if self.camera.is_some() && !scene::gltf::is_gltf(path) {
+            return Err(Error::Usage(format!("{}: --camera is for glTF files", path.display())));
+        }
+        let options = scene::gltf::Options { time_s, camera: self.camera.clone() };
+        let (scene, notes) = Scene::load_with_notes(path, &options)?;
         self.tell(global, path, &notes)?;
         Ok(scene)
     }
 
     /// Reads an OBJ file or all triangles of a glTF file, and says what is left out of the latter.
-    pub fn mesh(self, global: &Global, path: &Path) -> Result<Mesh> {
+    pub fn mesh(&self, global: &Global, path: &Path) -> Result<Mesh> {
         let (mesh, notes) = scene::load_mesh(path)?;
         self.tell(global, path, &notes)?;
         Ok(mesh)
     }
 
-    fn tell(self, global: &Global, path: &Path, notes: &Notes) -> Result<()> {
+    fn tell(&self, global: &Global, path: &Path, notes: &Notes) -> Result<()> {
         let left_out = notes.left_out();
         if self.strict && !left_out.is_empty() {
             return Err(Error::input(path, format!("--strict: {}", left_out.join("; "))));

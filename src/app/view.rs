@@ -63,7 +63,7 @@ pub struct Arguments {
 /// Opens the window and stays until it is closed.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     heap::share_arena();
-    let mut scene = arguments.gltf.scene(global, &arguments.scene)?;
+    let mut scene = arguments.gltf.scene(global, &arguments.scene, 0.0)?;
     if arguments.look.environment.is_none() {
         add_sky(&mut scene);
     }

@@ -1,4 +1,4 @@
-//! Reads pictures: PNG, JPEG, OpenEXR and Radiance HDR.
+//! Reads pictures: PNG, JPEG, WebP, OpenEXR and Radiance HDR.
 //!
 //! A picture's size is known before its pixels are decoded, so that a small file cannot ask for much memory.
 
@@ -16,7 +16,8 @@ pub const PIXEL_LIMIT: u64 = 1 << 25;
 /// RGBA.
 const FILE_LIMIT_BYTES: u64 = 512 << 20;
 
-const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::OpenExr, ImageFormat::Hdr];
+const FORMATS: [ImageFormat; 5] =
+    [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP, ImageFormat::OpenExr, ImageFormat::Hdr];
 
 /// A picture as it is stored: rows from the top, pixels from the left, three channels each. Alpha is dropped.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +69,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(DynamicImage, bool)> {
     let damaged = |error: image::ImageError| Error::Input(error.to_string().replace('\n', " "));
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let mut reader = reader.map_err(|error| Error::Input(error.to_string()))?;
-    let format = reader.format().filter(|f| FORMATS.contains(f));
+    let format = reader.format().filter(|f| FORMATS.contains(f) && f.reading_enabled());
     let format = format.ok_or_else(|| Error::Input("expected a picture in PNG, JPEG, EXR or HDR".into()))?;
     let mut limits = Limits::default();
     // Twice the largest pixel, of four f32: the decoder may hold a copy.

@@ -1,8 +1,12 @@
 //! Textures: pictures that colour a surface, by its texture coordinates.
 
+#[cfg(feature = "decoders")]
+use super::decode::PIXEL_LIMIT;
 use super::decode::decode;
 use super::mesh::Mesh;
 use super::picture::{linear_from_srgb, srgb_from_linear};
+#[cfg(feature = "decoders")]
+use crate::error::Error;
 use crate::error::Result;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -36,6 +40,9 @@ impl Wrap {
 static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| linear_from_srgb(byte as f32 / 255.0)));
 
+/// The first bytes of a KTX2 file.
+pub const KTX2: &[u8] = b"\xABKTX 20\xBB\r\n\x1A\n";
+
 /// Texels of 8 bits, sRGB and alpha; rows from the top.
 #[derive(Debug, PartialEq)]
 pub struct Texels {
@@ -45,8 +52,13 @@ pub struct Texels {
 }
 
 impl Texels {
-    /// Decodes a picture in PNG, JPEG, OpenEXR or Radiance HDR; linear ones are cut off at 1.
+    /// Decodes a picture in PNG, JPEG, WebP, KTX2 (Basis Universal), OpenEXR or Radiance HDR; linear ones are cut off
+    /// at 1.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
+        #[cfg(feature = "decoders")]
+        if bytes.starts_with(KTX2) {
+            return Self::transcode(bytes);
+        }
         let (picture, is_linear) = decode(bytes)?;
         let rgba: Vec<[u8; 4]> = if is_linear {
             let encode = |linear: f32| (255.0 * srgb_from_linear(linear.clamp(0.0, 1.0))).round() as u8;
@@ -56,6 +68,33 @@ impl Texels {
             picture.to_rgba8().pixels().map(|pixel| pixel.0).collect()
         };
         Ok(Texels { width: picture.width() as usize, height: picture.height() as usize, rgba })
+    }
+
+    /// The largest level of a KTX2 file.
+    #[cfg(feature = "decoders")]
+    fn transcode(bytes: &[u8]) -> Result<Self> {
+        use basisu::{DecodeFlags, TargetFormat, Transcoder};
+        let damaged = |error: basisu::Error| Error::Input(format!("not a KTX2 picture that is read: {error:?}"));
+        let texture = Transcoder::new(bytes).map_err(damaged)?;
+        let (width, height) = texture.base_dimensions();
+        if !(1..=PIXEL_LIMIT).contains(&(u64::from(width) * u64::from(height))) {
+            return Err(Error::Input(format!("{width} x {height} pixels are not within 1 to {PIXEL_LIMIT}")));
+        }
+        // The transcoder trusts the unpacked size of the first level, which stands at byte 96.
+        let unpacked = bytes.get(96..104).and_then(|size| size.try_into().ok()).map_or(0, u64::from_le_bytes);
+        if unpacked > 16 * u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4)) {
+            return Err(Error::Input(format!("{unpacked} bytes of KTX2 are no picture of {width} x {height} pixels")));
+        }
+        if !texture.supports(TargetFormat::Rgba32) {
+            return Err(Error::Input("not a KTX2 picture that is read: its colours have no 8 bits".into()));
+        }
+        let bytes = texture.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(damaged)?;
+        let (width, height) = (width as usize, height as usize);
+        let rgba = bytes.as_chunks().0.to_vec();
+        if rgba.len() != width * height {
+            return Err(Error::Input(format!("{} texels are not {width} x {height}", rgba.len())));
+        }
+        Ok(Texels { width, height, rgba })
     }
 
     /// Linear colour and alpha of a texel.

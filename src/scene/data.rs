@@ -320,15 +320,28 @@ pub struct MeshData {
     /// Columns of a matrix that scales, mirrors or shears the part. The default leaves it as it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bend: Option<[f64; 9]>,
+    /// The pose of the part's skin and morph targets. The default leaves it as it is stored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pose: Option<PoseData>,
     /// A generator, written as `plane = {...}`, `sphere = {...}` and so on.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub generator: Option<Generator>,
 }
 
+/// The pose of a part of a glTF file. With a skin, its vertices are in the file's world.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseData {
+    /// Number of the node that holds the mesh.
+    pub node: usize,
+    /// Time of the file's animations, seconds.
+    pub time_s: f64,
+}
+
 impl MeshData {
     /// A mesh that a generator makes, or that neither a file nor a generator gives.
     pub fn new(name: impl Into<String>, generator: Option<Generator>) -> Self {
-        MeshData { name: name.into(), file: None, part: None, bend: None, generator }
+        MeshData { name: name.into(), file: None, part: None, bend: None, pose: None, generator }
     }
 }
 
@@ -342,26 +355,30 @@ impl<'de> Deserialize<'de> for MeshData {
             file: Option<PathBuf>,
             part: Option<[usize; 2]>,
             bend: Option<[f64; 9]>,
+            pose: Option<PoseData>,
         }
         let table = toml::Table::deserialize(source)?;
         let (keys, rest): (toml::Table, toml::Table) =
-            table.into_iter().partition(|(key, _)| ["name", "file", "part", "bend"].contains(&key.as_str()));
-        let Keys { name, file, part, bend } =
+            table.into_iter().partition(|(key, _)| ["name", "file", "part", "bend", "pose"].contains(&key.as_str()));
+        let Keys { name, file, part, bend, pose } =
             Keys::deserialize(toml::Value::Table(keys)).map_err(|e| D::Error::custom(e.message()))?;
         let fail = |what: &str| Err(D::Error::custom(format!("mesh {name:?} {what}")));
         if file.is_some() != rest.is_empty() {
             return fail("has either a file or one generator");
         }
         let of_gltf = file.as_deref().is_some_and(super::gltf::is_gltf);
-        if part.is_some() && !of_gltf || bend.is_some() && part.is_none() {
-            return fail("takes a part of a glTF file alone, and a bend of a part alone");
+        if part.is_some() && !of_gltf || (bend.is_some() || pose.is_some()) && part.is_none() {
+            return fail("takes a part of a glTF file alone, and a bend and a pose of a part alone");
+        }
+        if pose.is_some_and(|pose| !pose.time_s.is_finite()) {
+            return fail("has a pose at a time that is not finite");
         }
         if bend.is_some_and(|bend| !usable_bend(&bend)) {
             return fail("has a bend that is not finite, beyond 1e7, or flat");
         }
         let generator = (!rest.is_empty()).then(|| Generator::deserialize(toml::Value::Table(rest))).transpose();
         let generator = generator.map_err(|e| D::Error::custom(format!("mesh {name:?}: {}", e.message())))?;
-        Ok(Self { name, file, part, bend, generator })
+        Ok(Self { name, file, part, bend, pose, generator })
     }
 }
 

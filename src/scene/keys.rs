@@ -92,6 +92,19 @@ impl KeyValue for f32 {
     }
 }
 
+/// The share of a morph target.
+impl KeyValue for [f32; 1] {
+    const WHAT: &'static str = "a share (finite, within 1e7)";
+
+    fn is_usable(&self) -> bool {
+        self[0].abs() <= POSITION_LIMIT_M
+    }
+
+    fn raw(self) -> DVec4 {
+        DVec4::new(self[0].into(), 0.0, 0.0, 0.0)
+    }
+}
+
 /// The values of a property at times; before the first and after the last it is constant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Written<V>", bound(deserialize = "V: KeyValue + DeserializeOwned"))]

@@ -102,24 +102,25 @@ impl Scene {
     /// # Errors
     /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line.
     pub fn load(path: &Path) -> Result<Self> {
-        let (scene, notes) = Self::load_with_notes(path)?;
+        let (scene, notes) = Self::load_with_notes(path, &gltf::Options::default())?;
         notes.left_out().iter().for_each(|line| log::warn!("{}: {line}", path.display()));
         notes.said().iter().for_each(|line| log::info!("{}: {line}", path.display()));
         Ok(scene)
     }
 
-    /// As [`Scene::load`], with what a reader of a glTF file has to know, which is nothing of other files.
+    /// As [`Scene::load`], with what is taken of a glTF file and what a reader of it has to know, which is nothing of
+    /// other files.
     ///
     /// # Errors
     /// As [`Scene::load`].
-    pub fn load_with_notes(path: &Path) -> Result<(Self, gltf::Notes)> {
+    pub fn load_with_notes(path: &Path, options: &gltf::Options) -> Result<(Self, gltf::Notes)> {
         if single::is_obj(path) {
             return Ok((single::load(path)?, gltf::Notes::default()));
         }
         if !gltf::is_gltf(path) {
             return Ok((Self::load_toml(path)?, gltf::Notes::default()));
         }
-        let gltf::Import { data, meshes, textures, camera_added, notes } = gltf::load(path)?;
+        let gltf::Import { data, meshes, textures, camera_added, notes } = gltf::load(path, options)?;
         let entities = resolve_all(&data, &meshes, &textures, |_, what| Error::input(path, what))?;
         let environment = Environment::new(&data.environment, &read_named).map_err(|e| e.context(path.display()))?;
         let scene = Self { camera_added, ..Self::assemble(data, meshes, textures, entities, environment) };
@@ -436,12 +437,8 @@ fn build_mesh(
     let mut mesh = match (&data.file, &data.generator) {
         (Some(file), None) if data.part.is_some() => {
             let [mesh, at] = data.part.unwrap_or_default();
-            readers.get(file)?.part(
-                mesh,
-                at,
-                data.bend.map_or(DMat3::IDENTITY, |bend| DMat3::from_cols_array(&bend)),
-                &data.name,
-            )?
+            let bend = data.bend.map_or(DMat3::IDENTITY, |bend| DMat3::from_cols_array(&bend));
+            readers.get(file)?.part(gltf::Part { mesh, at, pose: data.pose }, bend, &data.name)?
         }
         (Some(file), None) if gltf::is_gltf(file) => {
             let path = folder.join(file);

@@ -29,7 +29,7 @@ impl Viewer {
 
     /// A scene, and what a reader of its glTF file has to know.
     fn read(&self, path: &Path) -> Result<(Scene, Vec<String>)> {
-        let (mut scene, notes) = Scene::load_with_notes(path)?;
+        let (mut scene, notes) = Scene::load_with_notes(path, &crate::scene::gltf::Options::default())?;
         let left_out = notes.left_out();
         if self.setup.strict && !left_out.is_empty() {
             return Err(Error::input(path, format!("--strict: {}", left_out.join("; "))));

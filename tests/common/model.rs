@@ -194,7 +194,7 @@ impl Model {
 /// Reads a model by way of a GLB file.
 pub fn load(model: &Model) -> gltf::Import {
     let folder = tempfile::tempdir().unwrap();
-    gltf::load(&model.write(folder.path(), "m")).unwrap_or_else(|error| panic!("{error}"))
+    gltf::load(&model.write(folder.path(), "m"), &gltf::Options::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A floor, a stretched box on it that turns, a glowing ball-like box and a lamp.

@@ -9,7 +9,7 @@ use shadow_fields::error::Error;
 use shadow_fields::field::Lattice;
 use shadow_fields::gpu::{pipeline_cache, shader};
 use shadow_fields::merge::calibrate::Calibration;
-use shadow_fields::scene::Scene;
+use shadow_fields::scene::{Scene, gltf};
 use shadow_fields::{Result, app};
 use std::path::Path;
 
@@ -37,6 +37,7 @@ pub const TARGETS: &[Target] = &[
         reads_file: true,
     },
     Target { name: "toml", seeds: scenes, tokens: TOML, parse: scene, reads_file: true },
+    Target { name: "glb", seeds: models, tokens: GLTF, parse: model, reads_file: true },
     Target { name: "sf", seeds: stored::fields, tokens: HEADER, parse: stored::field, reads_file: true },
     Target { name: "outlines", seeds: stored::outlines, tokens: HEADER, parse: stored::outline, reads_file: true },
     Target { name: "selfvis", seeds: stored::payloads, tokens: HEADER, parse: stored::payload, reads_file: true },
@@ -79,6 +80,9 @@ const TOML: &str = "\
     plane = { size_m = 1, cells = 2 }\n|sphere = { radius_m = 1, subdivisions = 1 }\n|\
     teapot = { subdivisions = 1 }\n|mesh = \"m\"\n|position = |rotation = |scale = |albedo = |emission = |\
     emits = true\n|motion = [|keyframes = { keys = [|orbit = |spin = |bob = |[0, 1, 0]|true|\n";
+const GLTF: &str = "\
+    \"bufferView\":|\"byteOffset\":|\"byteStride\":|\"count\":|\"componentType\":|\"extensions\":{|\"attributes\":{|\
+    \"mode\":\"INDICES\"|\"filter\":\"QUATERNION\"|\"targets\":[{|\"skin\":0|null|1e999|{|}|[|]";
 const HEADER: &str =
     "\"bands\":|\"lattice\":|\"shells\":|\"cells\":|\"map_px\":|\"view_px\":|\"radius_m\":|null|1e999|{|}|[|]";
 const OPTIONS: &str = "\
@@ -93,6 +97,21 @@ fn meshes() -> Vec<Vec<u8>> {
 
 fn mesh(bytes: &[u8]) -> Result<()> {
     Mesh::parse(bytes, Path::new(NAME)).map(|_| ())
+}
+
+/// Packed meshes and textures.
+fn models() -> Vec<Vec<u8>> {
+    let files: [&[u8]; 4] = [
+        include_bytes!("corpus/glb/draco.glb"),
+        include_bytes!("corpus/glb/meshopt.glb"),
+        include_bytes!("corpus/glb/etc1s.glb"),
+        include_bytes!("corpus/glb/uastc.glb"),
+    ];
+    files.map(<[u8]>::to_vec).to_vec()
+}
+
+fn model(bytes: &[u8]) -> Result<()> {
+    with_file(bytes, |path| gltf::load(path, &gltf::Options::default())).map(|_| ())
 }
 
 fn scenes() -> Vec<Vec<u8>> {

@@ -5,9 +5,12 @@ mod cli;
 mod cli_of_gltf;
 #[path = "../common/mod.rs"]
 mod common;
+#[cfg(feature = "decoders")]
+mod compressed;
 #[path = "../common/model.rs"]
 mod model;
 mod motion;
+mod poses;
 mod refused;
 mod scenes;
 mod surface;

@@ -171,10 +171,10 @@ fn what_placements_cannot_do_is_told() {
     assert_eq!(
         import.notes.left_out(),
         [
-            "left out (1): animations of morph targets",
             "left out (1): animations of scales that reach 0 or mirror (they end at 1e-7)",
             "left out (1): animations of uneven scales (one scale of the same volume stands for them)",
             "left out (1): channels of animations that move what an earlier one moves",
+            "left out (1): movements of skins and morph targets (they stand in one pose)",
             "left out (1): uneven scales of nodes that carry moving ones (one scale of the same volume stands for them)",
         ]
     );

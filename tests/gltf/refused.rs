@@ -88,7 +88,7 @@ fn indices_out_of_range() {
         ("/accessors/0/count", json!(0), ["accessors[0]: ", "a count of 0"]),
         ("/accessors/0/count", json!(u64::MAX), ["accessors[0]: ", "a count of 18446744073709551615"]),
         ("/accessors/0/type", json!("VEC5"), ["accessors[0].type: ", "not a valid one"]),
-        ("/accessors/0/type", json!("MAT4"), ["accessors[0]: ", "matrices"]),
+        ("/accessors/0/type", json!("MAT3"), ["accessors[0]: ", "matrices"]),
         ("/accessors/0/componentType", json!(5124), ["accessors[0].componentType: ", "not a valid one"]),
         ("/accessors/2/componentType", json!(5126), ["accessors[2]: ", ""]),
         ("/bufferViews/0/byteOffset", json!(u64::MAX), ["bufferViews[0]: ", "leave a buffer"]),
@@ -180,8 +180,8 @@ fn nodes_in_circles_and_extensions_that_are_not_known() {
         &["over the limit of 256 nodes in one another"],
     );
     refused_after(
-        |json| json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]),
-        &["extensionsRequired[0]: KHR_draco_mesh_compression is not supported"],
+        |json| json["extensionsRequired"] = json!(["KHR_animation_pointer"]),
+        &["extensionsRequired[0]: KHR_animation_pointer is not supported"],
     );
     refused_after(
         |json| json["nodes"][1]["matrix"] = json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]),
@@ -271,7 +271,7 @@ fn damage_at_random_is_read_or_refused() {
             };
         }
         std::fs::write(&path, &bytes).unwrap();
-        match shadow_fields::scene::gltf::load(&path) {
+        match shadow_fields::scene::gltf::load(&path, &Default::default()) {
             Ok(_) => read += 1,
             Err(error) => {
                 assert_eq!((error.exit_code(), error.line().lines().count()), (4, 1), "{error}");

@@ -256,13 +256,13 @@ fn buffers_may_stand_within_or_beside() {
     let model = arrows();
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let glb = gltf::load(&model.write(folder.path(), "a")).unwrap();
+    let glb = gltf::load(&model.write(folder.path(), "a"), &gltf::Options::default()).unwrap();
     for path in [
         model.write_embedded(folder.path(), "b"),
         model.write_beside(folder.path(), "c", "parts/my%20buffer.bin", &at("parts/my buffer.bin")),
         model.write_beside(folder.path(), "d", "./d.bin", &at("d.bin")),
     ] {
-        let other = gltf::load(&path).unwrap();
+        let other = gltf::load(&path, &gltf::Options::default()).unwrap();
         let mut data = other.data.clone();
         // Each names its own file.
         data.meshes.iter_mut().zip(&glb.data.meshes).for_each(|(own, first)| own.file.clone_from(&first.file));
@@ -327,7 +327,8 @@ fn spots_shine_within_their_cone() {
     let extension = json!({ "KHR_lights_punctual": { "light": light } });
     model.child(outer, json!({ "translation": [0, 0.5, 0], "rotation": [-half, 0, 0, half], "extensions": extension }));
     let folder = tempfile::tempdir().unwrap();
-    let (mut scene, notes) = Scene::load_with_notes(&model.write(folder.path(), "m")).unwrap();
+    let (mut scene, notes) =
+        Scene::load_with_notes(&model.write(folder.path(), "m"), &gltf::Options::default()).unwrap();
     scene.surround(&Surroundings::None).unwrap();
     assert_eq!(notes.left_out(), [""; 0]);
     assert_eq!(scene.entities.len(), 2, "a floor and a lamp: {:?}", notes.said());
@@ -390,7 +391,8 @@ fn a_file_is_one_mesh_where_a_mesh_is_wanted() {
 #[test]
 fn scenes_load_by_their_ending() {
     let folder = tempfile::tempdir().unwrap();
-    let (scene, notes) = Scene::load_with_notes(&arrows().write(folder.path(), "A")).unwrap();
+    let (scene, notes) =
+        Scene::load_with_notes(&arrows().write(folder.path(), "A"), &gltf::Options::default()).unwrap();
     assert_eq!((scene.data.entities.len(), scene.data.meshes.len(), notes.left_out().len()), (4, 4, 0));
     // A scene without light gets a sky, whose sun stands behind the entities of the file.
     assert!(scene.entities[..4].iter().all(|entity| entity.occludes && entity.receives && !entity.emits));

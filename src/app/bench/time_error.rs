@@ -42,7 +42,7 @@ pub struct Arguments {
 /// Measures and prints the budget, the comparison and the sweep.
 pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     let own = |path: &Path| {
-        let mut scene = arguments.gltf.scene(global, path)?;
+        let mut scene = arguments.gltf.scene(global, path, 0.0)?;
         let output = scene.data.output.clone();
         exposure::settle(&mut scene, output.time_s, output.aspect());
         Case::of_file(path, scene)

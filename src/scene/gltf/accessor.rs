@@ -8,7 +8,7 @@ use crate::asset::mesh::TRIANGLE_LIMIT;
 use crate::error::Result;
 
 /// Largest number of elements of an accessor: the corners of the largest mesh.
-const COUNT_LIMIT: u64 = 3 * TRIANGLE_LIMIT as u64;
+pub const COUNT_LIMIT: u64 = 3 * TRIANGLE_LIMIT as u64;
 
 /// Elements without gaps, as they are stored.
 struct Elements {
@@ -82,8 +82,8 @@ fn elements(document: &Document, index: usize) -> Result<Elements> {
     let Checked::Valid(kind) = &accessor.type_ else { return Err(bad("type")) };
     let component = component.0;
     let normalized = accessor.normalized;
-    if matches!(kind, Type::Mat2 | Type::Mat3 | Type::Mat4) {
-        return Err(document.fail(place, "matrices are not read"));
+    if matches!(kind, Type::Mat2 | Type::Mat3) {
+        return Err(document.fail(place, "matrices of two or three columns are not read"));
     }
     let width = kind.multiplicity();
     let count = accessor.count.0;

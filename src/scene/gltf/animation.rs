@@ -23,6 +23,15 @@ pub struct Tracks {
     pub rotation: Option<Keys<[f32; 4]>>,
     /// Keys of the scale, one factor for all axes.
     pub scale: Option<Keys<f32>>,
+    /// Keys of the share of each morph target.
+    pub weights: Vec<Keys<[f32; 1]>>,
+}
+
+impl Tracks {
+    /// Whether they move the node itself.
+    pub fn move_the_node(&self) -> bool {
+        self.position.is_some() || self.rotation.is_some() || self.scale.is_some()
+    }
 }
 
 /// A channel before its numbers become values.
@@ -42,10 +51,6 @@ pub fn tracks(document: &Document, notes: &mut Notes) -> Result<Vec<Option<Track
         let mut channels = Vec::new();
         for (at, channel) in animation.channels.iter().enumerate() {
             let Checked::Valid(property) = channel.target.path else { continue };
-            if property == Property::MorphTargetWeights {
-                notes.leave_out("animations of morph targets");
-                continue;
-            }
             let sampler = &animation.samplers[channel.sampler.value()];
             let times = sampler.input.value();
             let timeless = accessor::is_unfilled(document, times) && document.root.accessors[times].count.0 > 1;
@@ -64,6 +69,7 @@ pub fn tracks(document: &Document, notes: &mut Notes) -> Result<Vec<Option<Track
             let taken = match property {
                 Property::Translation => tracks.position.is_some(),
                 Property::Rotation => tracks.rotation.is_some(),
+                Property::MorphTargetWeights => !tracks.weights.is_empty(),
                 _ => tracks.scale.is_some(),
             };
             if taken {
@@ -73,11 +79,19 @@ pub fn tracks(document: &Document, notes: &mut Notes) -> Result<Vec<Option<Track
             match property {
                 Property::Translation => tracks.position = Some(channel.keys(document, |n| Vec3::from_slice(n))?),
                 Property::Rotation => tracks.rotation = Some(channel.keys(document, |n| [n[0], n[1], n[2], n[3]])?),
+                Property::MorphTargetWeights => tracks.weights = channel.weights(document)?,
                 _ => tracks.scale = Some(channel.scales(document, notes)?),
             }
         }
     }
     Ok(out)
+}
+
+/// How many morph targets the mesh of a node has.
+fn target_count(document: &Document, node: usize) -> usize {
+    let mesh = document.root.nodes[node].mesh.map(|mesh| &document.root.meshes[mesh.value()]);
+    let targets = mesh.and_then(|mesh| mesh.primitives.first()?.targets.as_ref());
+    targets.map_or(0, Vec::len)
 }
 
 /// Reads the numbers of a channel.
@@ -86,13 +100,17 @@ fn read(document: &Document, animation: usize, at: usize) -> Result<Channel> {
     let channel = &json.channels[at];
     let place = format!("animations[{animation}].channels[{at}]");
     let sampler = &json.samplers[channel.sampler.value()];
-    let width = if matches!(channel.target.path, Checked::Valid(Property::Rotation)) { 4 } else { 3 };
+    let (element, width) = match channel.target.path {
+        Checked::Valid(Property::Rotation) => (4, 4),
+        Checked::Valid(Property::MorphTargetWeights) => (1, target_count(document, channel.target.node.value()).max(1)),
+        _ => (3, 3),
+    };
     let input = &document.root.accessors[sampler.input.value()];
     if !matches!(&input.component_type, Checked::Valid(component) if component.0 == ComponentType::F32) {
         return Err(document.fail(place, "its times are not f32"));
     }
     let times_s = accessor::numbers(document, sampler.input.value(), &[1])?;
-    let numbers = accessor::numbers(document, sampler.output.value(), &[width])?;
+    let numbers = accessor::numbers(document, sampler.output.value(), &[element])?;
     let interpolation = match sampler.interpolation {
         Checked::Valid(Interpolation::Step) => Between::Step,
         Checked::Valid(Interpolation::CubicSpline) => Between::Cubic,
@@ -124,6 +142,19 @@ impl Channel {
             period_s: self.period_s,
         };
         Keys::try_from(written).map_err(|what| document.fail(self.place, what))
+    }
+
+    /// Keys of the share of each morph target.
+    fn weights(self, document: &Document) -> Result<Vec<Keys<[f32; 1]>>> {
+        let parts = if self.interpolation == Between::Cubic { 3 } else { 1 };
+        let count = self.numbers.len() / parts / self.times_s.len().max(1);
+        let of = |target: usize| Channel {
+            place: self.place.clone(),
+            times_s: self.times_s.clone(),
+            numbers: self.numbers.iter().skip(target).step_by(count).copied().collect(),
+            ..self
+        };
+        (0..count).map(|target| of(target).keys(document, |n| [n[0]])).collect()
     }
 
     /// One scale for three, which is noted where they differ.

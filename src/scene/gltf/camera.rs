@@ -13,23 +13,35 @@ use crate::scene::data::{Camera, EntityData, Output};
 /// Height of pictures in pixels where the camera states an aspect.
 const HEIGHT_PX: f32 = 640.0;
 
-/// The file's camera and the size of its pictures, for a scene with that bounding sphere (metres); `None` if it has
-/// none.
+/// The file's camera of that name, or its first, and the size of its pictures, for a scene with that bounding sphere
+/// (metres); `None` if it has none.
 pub fn camera(
     document: &Document,
     stands: &[Stand],
+    name: Option<&str>,
     (centre, radius_m): (DVec3, f64),
     notes: &mut Notes,
 ) -> Result<Option<(Camera, Output)>> {
     let mut found = None;
+    let mut names = Vec::new();
     for stand in stands {
-        let Some(index) = document.root.nodes[stand.node].camera.map(|camera| camera.value()) else { continue };
+        let node = &document.root.nodes[stand.node];
+        let Some(index) = node.camera.map(|camera| camera.value()) else { continue };
         let json = &document.root.cameras[index];
+        let own = [node.name.as_deref(), json.name.as_deref()];
+        if name.is_some_and(|name| !own.contains(&Some(name))) {
+            names.extend(own.into_iter().flatten().map(|name| format!("{name:?}")));
+            continue;
+        }
         match (&json.type_, &json.perspective) {
             (Checked::Valid(Type::Perspective), Some(_)) if found.is_some() => notes.leave_out("further cameras"),
             (Checked::Valid(Type::Perspective), Some(perspective)) => found = Some((index, stand, perspective)),
             _ => notes.leave_out("cameras without perspective"),
         }
+    }
+    if let (Some(name), None) = (name, found) {
+        let known = if names.is_empty() { "it has none with a name".into() } else { names.join(", ") };
+        return Err(document.fail("cameras", format!("there is no camera {name:?} with perspective: {known}")));
     }
     let Some((index, stand, perspective)) = found else {
         notes.say("there is no camera: one that sees everything is added".into());

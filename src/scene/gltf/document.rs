@@ -5,14 +5,16 @@
 
 use std::cell::Cell;
 use std::fmt::Display;
+use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 
-use ::gltf::json::validation::{self, Checked, Validate as _};
-use ::gltf::json::{self, Root, Value};
+use ::gltf::json::validation::{self, Checked, USize64, Validate as _};
+use ::gltf::json::{self, Buffer, Index, Root, Value};
 use base64::Engine as _;
 use base64::engine::DecodePaddingMode;
 use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 
+use super::compressed;
 use crate::asset::read_file;
 use crate::error::{Error, Result};
 
@@ -28,14 +30,19 @@ const REWRITTEN_LIMIT_BYTES: usize = 32 << 20;
 const NUMBER_BUDGET: u64 = 1 << 27;
 
 /// Extensions that a file may require, because this reader follows them or says what it leaves out.
-const EXTENSIONS: [&str; 6] = [
+const EXTENSIONS: [&str; 9] = [
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_texture_transform",
 ];
+/// Those that the feature `decoders` adds.
+const DECODED: [&str; 3] = ["EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_texture_basisu"];
 
 /// A file that was read and whose indices are within range.
 pub struct Document {
@@ -45,6 +52,7 @@ pub struct Document {
     pub nodeless_channels: usize,
     path: PathBuf,
     buffers: Vec<Option<Vec<u8>>>,
+    bytes_left: u64,
     numbers_left: Cell<u64>,
 }
 
@@ -60,15 +68,17 @@ impl Document {
             parse(text).map_err(|error| Error::input(path, format!("its JSON: {error}")))?;
         check(&root).map_err(|(place, what)| Error::input(path, format!("{place}: {what}")))?;
         let numbers_left = Cell::new(NUMBER_BUDGET);
-        let mut document =
-            Document { root, nodeless_channels, path: path.to_owned(), buffers: Vec::new(), numbers_left };
-        let mut left = BUFFERS_LIMIT_BYTES;
+        let mut document = Document {
+            root,
+            nodeless_channels,
+            path: path.to_owned(),
+            buffers: Vec::new(),
+            bytes_left: BUFFERS_LIMIT_BYTES,
+            numbers_left,
+        };
         for index in 0..document.root.buffers.len() {
             let buffer = document.buffer(index, &mut rest)?;
-            let size = buffer.as_ref().map_or(0, Vec::len) as u64;
-            left = left.checked_sub(size).ok_or_else(|| {
-                document.fail(format!("buffers[{index}]"), "the buffers are over the limit of 1024 MiB in all")
-            })?;
+            document.take_bytes(buffer.as_ref().map_or(0, Vec::len), &format!("buffers[{index}]"))?;
             document.buffers.push(buffer);
         }
         for (index, view) in document.root.buffer_views.iter().enumerate() {
@@ -80,7 +90,29 @@ impl Document {
                 return Err(document.fail(format!("bufferViews[{index}]"), what));
             }
         }
+        compressed::unpack(&mut document)?;
         Ok(document)
+    }
+
+    /// Takes bytes off what all buffers may hold.
+    pub fn take_bytes(&mut self, count: usize, place: &str) -> Result<()> {
+        let left = self.bytes_left.checked_sub(count as u64);
+        let what = "the buffers are over the limit of 1024 MiB in all";
+        self.bytes_left = left.ok_or_else(|| self.fail(place, what))?;
+        Ok(())
+    }
+
+    /// Adds a buffer, whose bytes were taken by [`Document::take_bytes`]; returns its index.
+    pub fn add_buffer(&mut self, bytes: Vec<u8>) -> Index<Buffer> {
+        let json = Buffer {
+            byte_length: USize64::from(bytes.len()),
+            name: None,
+            uri: None,
+            extensions: None,
+            extras: Default::default(),
+        };
+        self.buffers.push(Some(bytes));
+        self.root.push(json)
     }
 
     /// An error at a place of the JSON.
@@ -92,14 +124,31 @@ impl Document {
     pub fn view(&self, index: usize) -> Result<(&[u8], Option<usize>)> {
         let view = &self.root.buffer_views[index];
         let start = view.byte_offset.unwrap_or_default().0 as usize;
-        let buffer = self.buffers[view.buffer.value()].as_ref().ok_or_else(|| {
-            let what = match view.buffer.value() {
+        let end = start + view.byte_length.0 as usize;
+        let bytes = self.slice(view.buffer.value(), start..end, &format!("bufferViews[{index}]"))?;
+        Ok((bytes, view.byte_stride.map(|stride| stride.0)))
+    }
+
+    /// Bytes of a buffer, for a place of the JSON.
+    pub fn slice(&self, buffer: usize, range: Range<usize>, place: &str) -> Result<&[u8]> {
+        let bytes = self.buffers.get(buffer).ok_or_else(|| self.fail(place, format!("there is no buffer {buffer}")))?;
+        let bytes = bytes.as_ref().ok_or_else(|| {
+            let what = match buffer {
                 0 => "there is neither a uri nor a binary part of a GLB file",
                 _ => "only the first buffer may have no uri",
             };
-            self.fail(format!("buffers[{}]", view.buffer.value()), what)
+            self.fail(format!("buffers[{buffer}]"), what)
         })?;
-        Ok((&buffer[start..start + view.byte_length.0 as usize], view.byte_stride.map(|stride| stride.0)))
+        bytes.get(range.clone()).ok_or_else(|| {
+            let what = format!("bytes {} to {} leave a buffer of {}", range.start, range.end, bytes.len());
+            self.fail(place, what)
+        })
+    }
+
+    /// How many more bytes all buffers may hold.
+    #[cfg(feature = "decoders")]
+    pub fn bytes_left(&self) -> u64 {
+        self.bytes_left
     }
 
     /// Takes numbers off what may be read from accessors.
@@ -250,8 +299,13 @@ fn check(root: &Root) -> std::result::Result<(), Misplaced> {
         return refused("asset".into(), format!("version {version:?} is not supported, only 2.0"));
     }
     for (index, name) in root.extensions_required.iter().enumerate() {
-        if !EXTENSIONS.contains(&name.as_str()) {
-            return refused(format!("extensionsRequired[{index}]"), format!("{name} is not supported"));
+        let place = || format!("extensionsRequired[{index}]");
+        let is_decoded = DECODED.contains(&name.as_str());
+        if is_decoded && cfg!(not(feature = "decoders")) {
+            return refused(place(), format!("{name} is not supported: this program was built without `decoders`"));
+        }
+        if !is_decoded && !EXTENSIONS.contains(&name.as_str()) {
+            return refused(place(), format!("{name} is not supported"));
         }
     }
     // The crate's validation of a primitive takes the index of its positions for checked.

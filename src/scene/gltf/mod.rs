@@ -9,20 +9,25 @@
 //! | translation, rotation, uniform scale | placement |
 //! | other scales, mirrors, shears | a copy of the mesh with the scale baked in |
 //! | animations of nodes | motion `node`, one for every moving node that carries the entity |
+//! | instances (`EXT_mesh_gpu_instancing`) | an entity each |
+//! | skins and morph targets | their shape at one time ([`Options::time_s`]) |
+//! | meshes compressed by Draco and meshoptimizer; KTX2 and WebP | as if they were not |
 //! | base colour factor | albedo |
 //! | base colour texture, colours of vertices, alpha mask | texture; tints of the mesh's vertices |
 //! | emissive factor and strength; texture | emission; colours of the mesh's vertices |
 //! | point and spot lights | glowing balls; those of spots shine within a cone |
 //! | the first directional light | the sun of the distant light |
 //! | no light | daylight; a dim uniform sky beside lamps and suns |
-//! | the first perspective camera | the camera; without one, a camera that sees everything |
+//! | the first perspective camera, or that of a name | the camera; without one, a camera that sees everything |
 
 mod accessor;
 mod animation;
 mod camera;
+mod compressed;
 mod document;
 mod lamp;
 mod notes;
+mod pose;
 mod shape;
 mod surface;
 mod texture;
@@ -34,22 +39,24 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use glam::{DMat3, Vec3};
+use glam::{DAffine3, DMat3, Vec3};
 
 use crate::asset::Mesh;
 use crate::asset::environment::{EnvironmentData, RADIANCE_LIMIT};
 use crate::asset::texture::{Texels, Texture};
 use crate::error::{Error, Result};
-use crate::scene::data::{Albedo, Data, EntityData, MeshData, Output, TextureData};
+use crate::scene::data::{Albedo, Data, EntityData, MeshData, Output, PoseData, TextureData};
 use crate::scene::framing;
 use crate::scene::motion::RotationData;
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
 use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, Surroundings, check_counts};
+use animation::Tracks;
 use document::Document;
 #[cfg(feature = "cli")]
 pub(crate) use document::FILE_LIMIT_BYTES;
 use lamp::Lamps;
 pub use notes::Notes;
+use pose::Pose;
 use shape::Shape;
 use surface::Surface;
 use texture::Textures;
@@ -57,8 +64,8 @@ use tree::{SplitTransform, Stand};
 
 /// Radiance of the sky that is added to lights, as a share of what they make a white surface in the middle shine.
 const FILL_SHARE: f64 = 0.1;
-/// What is said of skins.
-const SKINS: &str = "nodes with a skin (their meshes stand still as they are stored)";
+/// What is said of poses.
+const POSES: &str = "movements of skins and morph targets (they stand in one pose)";
 /// Largest number of triangles of all meshes of a scene.
 const TRIANGLES_LIMIT: usize = 16_000_000;
 
@@ -81,10 +88,22 @@ pub fn is_gltf(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb") || e.eq_ignore_ascii_case("gltf"))
 }
 
+/// What is taken of a file.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Time of the pose of skins and morph targets, seconds.
+    pub time_s: f64,
+    /// The name of the camera, or of the node that holds it; the default is the first with perspective.
+    pub camera: Option<String>,
+}
+
 /// Reads a scene from a `.glb` or `.gltf` file and the buffers and textures beside it.
-pub fn load(path: &Path) -> Result<Import> {
+///
+/// # Errors
+/// [`Error::Input`] in one line, which names the file and a place of its JSON.
+pub fn load(path: &Path, options: &Options) -> Result<Import> {
     let document = Document::load(path)?;
-    let mut import = Builder::new(document, path)?.build()?;
+    let mut import = Builder::new(document, path, options)?.build()?;
     let meshes = import.data.meshes.len();
     let entities = import.data.entities.len();
     check_counts(meshes, entities).map_err(|what| Error::input(path, what))?;
@@ -98,17 +117,21 @@ pub fn load_mesh(path: &Path) -> Result<(Mesh, Notes)> {
     let mut notes = Notes::default();
     notes.leave_out_many("animations (the mesh is as it stands at rest)", document.root.animations.len());
     let none = vec![None; document.root.nodes.len()];
+    let stands = tree::stands(&document, &none, &mut notes)?;
     let mut positions = Vec::new();
     let mut normals = Vec::new();
     let mut triangles = Vec::new();
-    for stand in tree::stands(&document, &none, &mut notes)? {
-        if document.root.nodes[stand.node].skin.is_some() {
-            notes.leave_out(SKINS);
-        }
+    for stand in &stands {
+        let pose = pose::is_posed(&document, stand.node, None)
+            .then(|| Pose::at(&document, stand.node, &stands, None, 0.0))
+            .transpose()?;
+        // A skin's vertices are in the world.
+        let is_skinned = pose.as_ref().is_some_and(|pose| !pose.joints.is_empty());
+        let place = if is_skinned { DAffine3::IDENTITY } else { stand.rest };
         let Some(mesh) = document.root.nodes[stand.node].mesh.map(|mesh| mesh.value()) else { continue };
         for at in 0..document.root.meshes[mesh].primitives.len() {
-            let Some(shape) = Shape::read(&document, mesh, at, &mut notes)? else { continue };
-            let (more, of_more, faces) = shape.bent(stand.rest.matrix3, stand.rest.translation);
+            let Some(shape) = Shape::read(&document, mesh, at, pose.as_ref(), &mut notes)? else { continue };
+            let (more, of_more, faces) = shape.bent(place.matrix3, place.translation);
             let first = positions.len() as u32;
             positions.extend(more);
             normals.extend(of_more);
@@ -133,11 +156,35 @@ struct Primitive {
     name: String,
 }
 
+/// A primitive of a mesh, in a pose if it is given.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Part {
+    pub mesh: usize,
+    pub at: usize,
+    pub pose: Option<PoseData>,
+}
+
+impl Part {
+    /// What tells it from others.
+    fn key(&self) -> PartKey {
+        (self.mesh, self.at, self.pose.map(|pose| (pose.node, pose.time_s.to_bits())))
+    }
+}
+
+type PartKey = (usize, usize, Option<(usize, u64)>);
+
+/// Where nodes stand and how they move.
+struct Stage {
+    stands: Vec<Stand>,
+    tracks: Vec<Option<Tracks>>,
+}
+
 /// Primitives and images of a file, each read once.
 pub(super) struct Reader {
     document: Rc<Document>,
+    stage: Option<Rc<Stage>>,
     textures: Textures,
-    primitives: HashMap<(usize, usize), Option<Primitive>>,
+    primitives: HashMap<PartKey, Option<Primitive>>,
     materials: BTreeSet<usize>,
     triangle_count: usize,
     notes: Notes,
@@ -149,11 +196,22 @@ impl Reader {
         Reader {
             textures: Textures::new(&document),
             document,
+            stage: None,
             primitives: HashMap::new(),
             materials: BTreeSet::new(),
             triangle_count: 0,
             notes: Notes::default(),
         }
+    }
+
+    /// Where nodes stand, found once.
+    fn stage(&mut self) -> Result<Rc<Stage>> {
+        if let Some(stage) = &self.stage {
+            return Ok(stage.clone());
+        }
+        let tracks = animation::tracks(&self.document, &mut self.notes)?;
+        let stands = tree::stands(&self.document, &tracks, &mut self.notes)?;
+        Ok(self.stage.insert(Rc::new(Stage { stands, tracks })).clone())
     }
 
     /// The texels of an image.
@@ -164,18 +222,20 @@ impl Reader {
         }
         self.textures
             .texels(image)?
-            .ok_or_else(|| self.document.fail(format!("images[{image}]"), "neither PNG nor JPEG"))
+            .ok_or_else(|| self.document.fail(format!("images[{image}]"), "its format is not read"))
     }
 
-    /// The mesh of a primitive under a bend.
-    pub fn part(&mut self, mesh: usize, at: usize, bend: DMat3, name: &str) -> Result<Mesh> {
+    /// The mesh of a part under a bend.
+    pub fn part(&mut self, part: Part, bend: DMat3, name: &str) -> Result<Mesh> {
+        let Part { mesh, at, .. } = part;
+        let place = || format!("meshes[{mesh}].primitives[{at}]");
         let count = self.document.root.meshes.get(mesh).map_or(0, |mesh| mesh.primitives.len());
         if at >= count {
-            return Err(self.document.fail(format!("meshes[{mesh}].primitives[{at}]"), "there is no such primitive"));
+            return Err(self.document.fail(place(), "there is no such primitive"));
         }
-        self.read(mesh, at)?;
-        let Some(Some(primitive)) = self.primitives.get(&(mesh, at)) else {
-            return Err(self.document.fail(format!("meshes[{mesh}].primitives[{at}]"), "it has no triangles"));
+        self.read(part)?;
+        let Some(Some(primitive)) = self.primitives.get(&part.key()) else {
+            return Err(self.document.fail(place(), "it has no triangles"));
         };
         self.triangle_count += primitive.shape.triangle_count();
         if self.triangle_count > TRIANGLES_LIMIT {
@@ -185,14 +245,16 @@ impl Reader {
         primitive.shape.mesh(&self.document, name, bend, primitive.surface.attributes.clone())
     }
 
-    /// Reads a primitive once.
-    fn read(&mut self, mesh: usize, at: usize) -> Result<()> {
-        if self.primitives.contains_key(&(mesh, at)) {
+    /// Reads a part once.
+    fn read(&mut self, part: Part) -> Result<()> {
+        if self.primitives.contains_key(&part.key()) {
             return Ok(());
         }
+        let Part { mesh, at, pose } = part;
+        let pose = pose.map(|pose| self.pose(mesh, pose)).transpose()?;
         let document = self.document.clone();
         let json = &document.root.meshes[mesh];
-        let shape = Shape::read(&document, mesh, at, &mut self.notes)?;
+        let shape = Shape::read(&document, mesh, at, pose.as_ref(), &mut self.notes)?;
         let primitive = shape.map(|shape| {
             let material = json.primitives[at].material.map(|material| material.value());
             let notes = &mut self.notes;
@@ -204,8 +266,17 @@ impl Reader {
             let name = if json.primitives.len() > 1 { format!("{own} {at}") } else { own };
             Ok(Primitive { shape, surface, material, name })
         });
-        self.primitives.insert((mesh, at), primitive.transpose()?);
+        self.primitives.insert(part.key(), primitive.transpose()?);
         Ok(())
+    }
+
+    fn pose(&mut self, mesh: usize, PoseData { node, time_s }: PoseData) -> Result<Pose> {
+        let stage = self.stage()?;
+        let holds = self.document.root.nodes.get(node).and_then(|node| node.mesh).map(|mesh| mesh.value());
+        if holds != Some(mesh) {
+            return Err(self.document.fail(format!("nodes[{node}]"), format!("it does not hold mesh {mesh}")));
+        }
+        Pose::at(&self.document, node, &stage.stands, stage.tracks[node].as_ref(), time_s)
     }
 }
 
@@ -232,9 +303,10 @@ impl<'f> Readers<'f> {
 /// What is known of a scene while it is made.
 struct Builder {
     reader: Reader,
-    stands: Vec<Stand>,
-    /// Meshes by primitive and bend, the bend as bits.
-    made: HashMap<(usize, usize, [u64; 9]), usize>,
+    stage: Rc<Stage>,
+    options: Options,
+    /// Meshes by part and bend, the bend as bits.
+    made: HashMap<(PartKey, [u64; 9]), usize>,
     meshes: Vec<(MeshData, Arc<Mesh>)>,
     /// Textures by material and number of the image, and the tints that vary the colour.
     painted: HashMap<(Option<usize>, [u32; 3]), usize>,
@@ -246,13 +318,12 @@ struct Builder {
 }
 
 impl Builder {
-    fn new(document: Document, path: &Path) -> Result<Self> {
+    fn new(document: Document, path: &Path, options: &Options) -> Result<Self> {
         let mut reader = Reader::new(document);
-        let tracks = animation::tracks(&reader.document, &mut reader.notes)?;
-        let stands = tree::stands(&reader.document, &tracks, &mut reader.notes)?;
         Ok(Builder {
+            stage: reader.stage()?,
             reader,
-            stands,
+            options: options.clone(),
             made: HashMap::new(),
             meshes: Vec::new(),
             painted: HashMap::new(),
@@ -265,29 +336,47 @@ impl Builder {
 
     fn build(mut self) -> Result<Import> {
         let document = self.reader.document.clone();
-        let stands = std::mem::take(&mut self.stands);
+        let stage = self.stage.clone();
         let mut entities = Vec::new();
-        for stand in &stands {
+        let mut posed = 0;
+        for stand in &stage.stands {
             let node = &document.root.nodes[stand.node];
-            if node.skin.is_some() {
-                self.reader.notes.leave_out(SKINS);
-            }
             let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
+            let tracks = stage.tracks[stand.node].as_ref();
+            let pose = pose::is_posed(&document, stand.node, tracks)
+                .then_some(PoseData { node: stand.node, time_s: self.options.time_s });
+            // A skin's vertices are in the world.
+            let in_world = node.skin.map(|_| Stand { fixed: DAffine3::IDENTITY, motion: Vec::new(), ..stand.clone() });
+            let stand = in_world.as_ref().unwrap_or(stand);
+            if pose.is_some() {
+                posed += 1;
+                let follows = |node: usize| stage.stands.iter().any(|s| s.node == node && !s.motion.is_empty());
+                let joints = node.skin.iter().flat_map(|skin| &document.root.skins[skin.value()].joints);
+                let moves = joints.map(|joint| joint.value()).any(follows);
+                if moves || tracks.is_some_and(|tracks| !tracks.weights.is_empty()) {
+                    self.reader.notes.leave_out(POSES);
+                }
+            }
             for at in 0..document.root.meshes[mesh].primitives.len() {
-                entities.extend(self.entity(stand, mesh, at)?);
+                entities.extend(self.entity(stand, Part { mesh, at, pose })?);
             }
             if entities.len() > ENTITY_LIMIT {
                 return Err(document.fail("nodes", format!("over the limit of {ENTITY_LIMIT} entities")));
             }
         }
-        self.finish(&stands, entities)
+        if posed > 0 {
+            let time_s = self.options.time_s;
+            self.reader.notes.say(format!("skins and morph targets ({posed}) stand in their pose at {time_s} s"));
+        }
+        self.finish(&stage.stands, entities)
     }
 
-    /// The entity of a primitive, if it has triangles.
-    fn entity(&mut self, stand: &Stand, mesh: usize, at: usize) -> Result<Option<EntityData>> {
-        self.reader.read(mesh, at)?;
+    /// The entity of a part, if it has triangles.
+    fn entity(&mut self, stand: &Stand, part: Part) -> Result<Option<EntityData>> {
+        self.reader.read(part)?;
+        let Part { mesh, at, .. } = part;
         let document = self.reader.document.clone();
-        let Some(Some(primitive)) = self.reader.primitives.get(&(mesh, at)) else { return Ok(None) };
+        let Some(Some(primitive)) = self.reader.primitives.get(&part.key()) else { return Ok(None) };
         let Some(parts) = SplitTransform::new(stand.fixed.matrix3) else {
             self.reader.notes.leave_out("shapes that a scale of 0 makes flat");
             return Ok(None);
@@ -302,8 +391,8 @@ impl Builder {
             return Err(document.fail(place, "it stands beyond the limit of 1e7 m"));
         }
         let bend = if scale.is_some() { DMat3::IDENTITY } else { parts.bend };
-        let albedo = self.albedo(mesh, at);
-        let made = self.mesh(mesh, at, bend)?;
+        let albedo = self.albedo(part);
+        let made = self.mesh(part, bend)?;
         let several = document.root.meshes[mesh].primitives.len() > 1;
         let own = document.root.nodes[stand.node].name.clone().unwrap_or_else(|| format!("node {}", stand.node));
         Ok(Some(EntityData {
@@ -318,9 +407,9 @@ impl Builder {
         }))
     }
 
-    /// The albedo of a primitive that was read; a paint becomes one of the scene's textures.
-    fn albedo(&mut self, mesh: usize, at: usize) -> Albedo {
-        let Some(Some(Primitive { surface, material, .. })) = self.reader.primitives.get(&(mesh, at)) else {
+    /// The albedo of a part that was read; a paint becomes one of the scene's textures.
+    fn albedo(&mut self, part: Part) -> Albedo {
+        let Some(Some(Primitive { surface, material, .. })) = self.reader.primitives.get(&part.key()) else {
             unreachable!("the primitive was read")
         };
         let Some(paint) = &surface.paint else { return Albedo::Color(surface.albedo) };
@@ -344,9 +433,9 @@ impl Builder {
         Albedo::Texture(self.textures[number].0.name.clone())
     }
 
-    /// Index of the mesh of a primitive under a bend.
-    fn mesh(&mut self, mesh: usize, at: usize, bend: DMat3) -> Result<usize> {
-        let key = (mesh, at, bend.to_cols_array().map(|x| (x + 0.0).to_bits()));
+    /// Index of the mesh of a part under a bend.
+    fn mesh(&mut self, part: Part, bend: DMat3) -> Result<usize> {
+        let key = (part.key(), bend.to_cols_array().map(|x| (x + 0.0).to_bits()));
         if let Some(made) = self.made.get(&key) {
             return Ok(*made);
         }
@@ -354,7 +443,7 @@ impl Builder {
             let what = format!("over the limit of {MESH_LIMIT} meshes, scaled copies included");
             return Err(self.reader.document.fail("meshes", what));
         }
-        let Some(Some(primitive)) = self.reader.primitives.get(&(mesh, at)) else {
+        let Some(Some(primitive)) = self.reader.primitives.get(&part.key()) else {
             unreachable!("the primitive was read")
         };
         let is_bent = bend != DMat3::IDENTITY;
@@ -364,12 +453,13 @@ impl Builder {
         let own = own.unwrap_or_else(|| primitive.name.clone());
         let wanted = if is_bent { format!("{own} scaled") } else { own };
         let name = free_name(&wanted, |name| !self.names.contains(name));
-        let made = self.reader.part(mesh, at, bend, &name)?;
+        let made = self.reader.part(part, bend, &name)?;
         self.names.insert(name.clone());
         let data = MeshData {
             name,
             file: Some(self.file.clone()),
-            part: Some([mesh, at]),
+            part: Some([part.mesh, part.at]),
+            pose: part.pose,
             bend: is_bent.then(|| bend.to_cols_array()),
             generator: None,
         };
@@ -392,7 +482,7 @@ impl Builder {
         let bounds = camera::bounds(spheres());
         let lamps = Lamps::new(document, stands, bounds.1, &mut notes)?;
         let fittings = lamps.entities(document, &mut notes)?;
-        let camera = camera::camera(document, stands, bounds, &mut notes)?;
+        let camera = camera::camera(document, stands, self.options.camera.as_deref(), bounds, &mut notes)?;
         let camera_added = camera.is_none();
         let (camera, output) = camera.unwrap_or_else(|| {
             let meshes: HashMap<&str, &Mesh> =

@@ -9,6 +9,7 @@ use glam::{DMat3, DVec3, Vec3};
 use super::accessor;
 use super::document::Document;
 use super::notes::Notes;
+use super::pose::Pose;
 use crate::asset::Mesh;
 use crate::asset::mesh::{Attributes, TRIANGLE_LIMIT};
 use crate::error::Result;
@@ -26,29 +27,63 @@ pub struct Shape {
     attributes: HashMap<Semantic, usize>,
 }
 
+/// Accessors of a primitive by what they hold.
+pub struct Attributed {
+    /// Place in the JSON.
+    pub place: String,
+    attributes: HashMap<Semantic, usize>,
+}
+
+impl Attributed {
+    fn new(place: String, primitive: &Primitive) -> Self {
+        let valid = primitive.attributes.iter().filter_map(|(semantic, accessor)| match semantic {
+            Checked::Valid(semantic) => Some((semantic.clone(), accessor.value())),
+            Checked::Invalid => None,
+        });
+        Attributed { place, attributes: valid.collect() }
+    }
+
+    /// `width` numbers for each of `count` elements; `None` where there is no such attribute.
+    pub fn numbers(&self, document: &Document, of: &Semantic, width: usize, count: usize) -> Result<Option<Vec<f32>>> {
+        let Some(index) = self.attributes.get(of) else { return Ok(None) };
+        let numbers = accessor::numbers(document, *index, &[width])?;
+        if numbers.len() != width * count {
+            return Err(document.fail(&self.place, format!("there are not as many {} as positions", of.to_string())));
+        }
+        Ok(Some(numbers))
+    }
+}
+
 impl Shape {
     /// Reads a primitive; `None` where it is of points or lines, or has no positions or no area, which is noted.
-    pub fn read(document: &Document, mesh: usize, at: usize, notes: &mut Notes) -> Result<Option<Self>> {
+    pub fn read(
+        document: &Document,
+        mesh: usize,
+        at: usize,
+        pose: Option<&Pose>,
+        notes: &mut Notes,
+    ) -> Result<Option<Self>> {
         let place = format!("meshes[{mesh}].primitives[{at}]");
         let primitive = &document.root.meshes[mesh].primitives[at];
-        let attributes = attributes(primitive);
+        let attributed = Attributed::new(place.clone(), primitive);
+        let attributes = &attributed.attributes;
         let Checked::Valid(mode) = primitive.mode else { return Ok(None) };
         if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
             notes.leave_out("primitives of points or lines");
             return Ok(None);
         }
-        if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
-            notes.leave_out("primitives with morph targets (they keep the shape that is stored first)");
-        }
         let Some(positions) = attributes.get(&Semantic::Positions) else {
             notes.leave_out("primitives without positions");
             return Ok(None);
         };
-        let positions = accessor::triples(document, *positions)?;
+        let mut positions = accessor::triples(document, *positions)?;
         let normals = attributes.get(&Semantic::Normals).map(|index| accessor::triples(document, *index));
-        let normals = normals.transpose()?;
+        let mut normals = normals.transpose()?;
         if normals.as_ref().is_some_and(|normals| normals.len() != positions.len()) {
             return Err(document.fail(&place, "there are not as many normals as positions"));
+        }
+        if let Some(pose) = pose {
+            pose.bend(document, primitive, &attributed, &mut positions, normals.as_deref_mut())?;
         }
         let corners = match primitive.indices {
             Some(index) => accessor::indices(document, index.value())?,
@@ -59,6 +94,7 @@ impl Shape {
             return Err(document.fail(format!("{place}.indices"), what));
         }
         let triangles = triangles(mode, &corners).map_err(|what| document.fail(&place, what))?;
+        let attributes = attributed.attributes;
         let mut shape = match normals {
             Some(normals) => {
                 let source = (0..positions.len() as u32).collect();
@@ -136,15 +172,6 @@ impl Shape {
     pub fn triangle_count(&self) -> usize {
         self.triangles.len()
     }
-}
-
-/// Accessors of a primitive by what they hold.
-fn attributes(primitive: &Primitive) -> HashMap<Semantic, usize> {
-    let valid = primitive.attributes.iter().filter_map(|(semantic, accessor)| match semantic {
-        Checked::Valid(semantic) => Some((semantic.clone(), accessor.value())),
-        Checked::Invalid => None,
-    });
-    valid.collect()
 }
 
 fn triangles(mode: Mode, corners: &[u32]) -> std::result::Result<Vec<[u32; 3]>, String> {

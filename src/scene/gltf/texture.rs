@@ -5,14 +5,14 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use ::gltf::json::mesh::Semantic;
-use ::gltf::json::texture::{Info, WrappingMode};
+use ::gltf::json::texture::{Info, Texture, WrappingMode};
 use ::gltf::json::validation::Checked;
 use glam::{Vec2, Vec3};
 
 use super::document::Document;
 use super::notes::Notes;
 use super::shape::Shape;
-use crate::asset::texture::{Texels, Wrap};
+use crate::asset::texture::{KTX2, Texels, Wrap};
 use crate::error::Result;
 
 /// Largest width and height of a texture that vertices alone sample: larger ones are averaged down.
@@ -54,9 +54,9 @@ impl Textures {
     pub fn applied(&mut self, info: &Info, shape: &Shape, notes: &mut Notes) -> Result<Option<Applied>> {
         let document = self.document.clone();
         let texture = &document.root.textures[info.index.value()];
-        let image = texture.source.value();
+        let image = source(texture);
         let Some(texels) = self.texels(image)? else {
-            notes.leave_out("textures that are neither PNG nor JPEG (their factors alone count)");
+            notes.leave_out("textures in formats that are not read (their factors alone count)");
             return Ok(None);
         };
         let sampler = texture.sampler.and_then(|index| document.root.samplers.get(index.value()));
@@ -127,7 +127,7 @@ impl Textures {
             (None, Some(view)) => document.view(view.value())?.0.to_vec(),
             (None, None) => return Err(document.fail(place, "there is neither a uri nor a bufferView")),
         };
-        if ![&b"\x89PNG"[..], b"\xff\xd8\xff"].iter().any(|magic| bytes.starts_with(magic)) {
+        if !is_read(&bytes) {
             return Ok(None);
         }
         let texels = Texels::decode(&bytes).map_err(|error| document.fail(&place, error))?;
@@ -137,4 +137,21 @@ impl Textures {
         }
         Ok(Some(texels))
     }
+}
+
+/// The image of a texture: that of an extension, where it is read.
+fn source(texture: &Texture) -> usize {
+    let named = |name: &str| {
+        let extension = texture.extensions.as_ref()?.others.get(name)?;
+        usize::try_from(extension.get("source")?.as_u64()?).ok()
+    };
+    let decoded = ["KHR_texture_basisu", "EXT_texture_webp"].into_iter().find_map(named);
+    decoded.filter(|_| cfg!(feature = "decoders")).unwrap_or_else(|| texture.source.value())
+}
+
+/// Whether the first bytes of a picture are those of a format that is read.
+fn is_read(bytes: &[u8]) -> bool {
+    let is_webp = || bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP");
+    let compressed = || bytes.starts_with(KTX2) || is_webp();
+    bytes.starts_with(b"\x89PNG") || bytes.starts_with(b"\xff\xd8\xff") || cfg!(feature = "decoders") && compressed()
 }

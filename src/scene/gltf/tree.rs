@@ -7,10 +7,12 @@
 use ::gltf::json::scene::Node as NodeJson;
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
 
+use super::accessor;
 use super::animation::Tracks;
 use super::document::Document;
 use super::notes::Notes;
 use crate::error::Result;
+use crate::scene::data::EntityData;
 use crate::scene::motion::{Motion, Node, RotationData};
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
 
@@ -18,6 +20,8 @@ use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
 const DEPTH_LIMIT: usize = 256;
 /// Largest number of keys of all motions, counted for every node that they carry.
 const KEY_LIMIT: usize = 1_000_000;
+/// Largest number of nodes and instances.
+const INSTANCE_LIMIT: usize = 1_000_000;
 /// What differs by less than this share of the largest is the same: f32 transformations are rounded.
 const SAME: f64 = 1e-5;
 /// A rotation whose length differs from 1 by more than this is noted.
@@ -34,6 +38,19 @@ pub struct Stand {
     pub motion: Vec<Motion>,
     /// From its own space to the world as the file's transformations place it at rest.
     pub rest: DAffine3,
+}
+
+impl Stand {
+    /// From its own space to the world at a time.
+    pub fn at(&self, time_s: f64) -> DAffine3 {
+        let carried = EntityData { motion: self.motion.clone(), ..EntityData::of_mesh("") }.at(time_s);
+        let carried = DAffine3::from_scale_rotation_translation(
+            DVec3::splat(f64::from(carried.scale)),
+            carried.turn(),
+            carried.position.as_dvec3(),
+        );
+        carried * self.fixed
+    }
 }
 
 /// A transformation as a placement and what is left of it.
@@ -99,16 +116,72 @@ pub fn stands(document: &Document, tracks: &[Option<Tracks>], notes: &mut Notes)
         if depth > DEPTH_LIMIT {
             return Err(document.fail(place, format!("over the limit of {DEPTH_LIMIT} nodes in one another")));
         }
-        let stand = placed(document, index, &outer, tracks[index].as_ref(), notes)?;
+        let moves = tracks[index].as_ref().filter(|tracks| tracks.move_the_node());
+        let stand = placed(document, index, &outer, moves, notes)?;
         keys += stand.motion.iter().map(|motion| 1 + key_count(motion)).sum::<usize>();
         if keys > KEY_LIMIT {
             return Err(document.fail(place, format!("over the limit of {KEY_LIMIT} keys, counted for every node")));
         }
         let children = root.nodes[index].children.iter().flatten().rev();
         open.extend(children.map(|child| (child.value(), depth + 1, stand.clone())));
-        out.push(stand);
+        match instances(document, index)? {
+            None => out.push(stand),
+            Some(own) => {
+                if out.len() + own.len() > INSTANCE_LIMIT {
+                    return Err(document.fail(place, format!("over the limit of {INSTANCE_LIMIT} nodes and instances")));
+                }
+                out.extend(own.into_iter().map(|own| Stand {
+                    fixed: stand.fixed * own,
+                    rest: stand.rest * own,
+                    ..stand.clone()
+                }));
+            }
+        }
     }
     Ok(out)
+}
+
+/// The instances of a node's mesh, within the node (`EXT_mesh_gpu_instancing`).
+fn instances(document: &Document, index: usize) -> Result<Option<Vec<DAffine3>>> {
+    const NAME: &str = "EXT_mesh_gpu_instancing";
+    let extension = document.root.nodes[index].extensions.as_ref().and_then(|e| e.others.get(NAME));
+    let Some(extension) = extension else { return Ok(None) };
+    let place = format!("nodes[{index}].extensions.{NAME}");
+    let read = |name: &str, width: usize| {
+        let Some(value) = extension.get("attributes").and_then(|attributes| attributes.get(name)) else {
+            return Ok(None);
+        };
+        let accessor = value.as_u64().filter(|index| (*index as usize) < document.root.accessors.len());
+        let accessor =
+            accessor.ok_or_else(|| document.fail(&place, format!("{name}: there is no accessor {value}")))?;
+        accessor::numbers(document, accessor as usize, &[width]).map(Some)
+    };
+    let positions = read("TRANSLATION", 3)?;
+    let rotations = read("ROTATION", 4)?;
+    let scales = read("SCALE", 3)?;
+    let counts = [(&positions, 3), (&rotations, 4), (&scales, 3)];
+    let mut counts = counts.into_iter().filter_map(|(numbers, width)| Some(numbers.as_ref()?.len() / width));
+    let Some(count) = counts.next() else { return Ok(None) };
+    if counts.any(|other| other != count) {
+        return Err(document.fail(place, "its attributes have different numbers of instances"));
+    }
+    let triple = |numbers: &Option<Vec<f32>>, i: usize, default: f64| {
+        numbers.as_ref().map_or(DVec3::splat(default), |n| Vec3::from_slice(&n[3 * i..]).as_dvec3())
+    };
+    let instance = |i: usize| {
+        let rotation = rotations.as_ref().map_or(DQuat::IDENTITY, |n| {
+            let [x, y, z, w] = std::array::from_fn(|k| f64::from(n[4 * i + k]));
+            DQuat::from_xyzw(x, y, z, w)
+        });
+        let position = triple(&positions, i, 0.0);
+        let scale = triple(&scales, i, 1.0);
+        let within = |v: DVec3| v.abs().max_element() <= f64::from(POSITION_LIMIT_M);
+        let usable = rotation.length() > 1e-6 && within(position) && within(scale);
+        let rotation = if usable { rotation.normalize() } else { DQuat::IDENTITY };
+        usable.then(|| DAffine3::from_scale_rotation_translation(scale, rotation, position))
+    };
+    let all: Option<Vec<_>> = (0..count).map(instance).collect();
+    all.map(Some).ok_or_else(|| document.fail(place, "an instance is too large, too far out, or its rotation is 0"))
 }
 
 fn key_count(motion: &Motion) -> usize {

@@ -90,6 +90,8 @@ pub mod bake;
 #[doc(hidden)]
 pub mod bench;
 #[doc(hidden)]
+pub mod bounce;
+#[doc(hidden)]
 pub mod check;
 #[doc(hidden)]
 pub mod draw;

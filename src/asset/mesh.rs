@@ -197,6 +197,17 @@ impl Mesh {
         area_m2(&self.positions, &self.triangles)
     }
 
+    /// A third of the triangles around each vertex, in square metres.
+    pub fn vertex_areas_m2(&self) -> Vec<f32> {
+        let mut areas = vec![0.0; self.positions.len()];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|v| self.positions[v as usize]);
+            let third = (b - a).cross(c - a).length() / 6.0;
+            triangle.iter().for_each(|&v| areas[v as usize] += third);
+        }
+        areas
+    }
+
     /// Mean over all directions of the share of its bounding sphere's disc that the mesh covers, if it is a ball:
     /// convex, with every face at least 0.9 r from the centre. Of a convex body that mean is its area over four (Cauchy
     /// 1841).

@@ -44,6 +44,8 @@ pub struct BakedScene {
     pub surface_of: Vec<usize>,
     /// For each entity and each of its clusters the entities whose shadows of sharp lights its maps have.
     pub near: Vec<Vec<Vec<u32>>>,
+    /// Entities that never move against each other, in the order of the members of their group.
+    pub rigid: Vec<Vec<usize>>,
     /// Bakes that were not found in the cache.
     pub baked: Vec<Baked>,
 }
@@ -219,6 +221,7 @@ pub fn ensure(
     let mut scene_surfaces = Vec::new();
     let mut surface_of = vec![0; count];
     let mut near = vec![Vec::new(); count];
+    let mut rigid = Vec::new();
     for group in &needs.surfaces.groups {
         let what = group.title();
         let (found, report) = cache.surfaces(group, &|now, all| progress(&what, now, all));
@@ -229,9 +232,14 @@ pub fn ensure(
             surface_of[entity] = scene_surfaces.len() + member;
             near[entity] = found[member].near.iter().map(|members| group.entities_of(members)).collect();
         }
+        if found.len() > 1 {
+            rigid.push(group.entities.clone());
+        } else {
+            rigid.extend(group.entities.iter().map(|&entity| vec![entity]));
+        }
         scene_surfaces.extend(found.iter().cloned());
     }
     // What is held for further bakes is free for pictures.
     baker.rest();
-    Ok(BakedScene { meshes, surfaces: scene_surfaces, surface_of, near, baked: making.baked })
+    Ok(BakedScene { meshes, surfaces: scene_surfaces, surface_of, near, rigid, baked: making.baked })
 }

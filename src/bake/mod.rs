@@ -23,6 +23,7 @@ pub mod chunk;
 pub(crate) mod cluster_order;
 pub mod ensure;
 pub mod levels;
+pub mod links;
 pub mod model;
 mod names;
 mod options;

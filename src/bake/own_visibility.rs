@@ -209,12 +209,26 @@ pub struct Seen {
     pub behind: f64,
     /// Whether the point lies inside a solid or below a sheet.
     pub buried: bool,
+    /// Fronts that the rays met, of [`Rays::Many`] alone.
+    pub fronts: Vec<Front>,
+}
+
+/// A front that a ray met.
+#[derive(Clone, Copy, Debug)]
+pub struct Front {
+    pub member: u32,
+    /// Triangle of the member's mesh, and the weights of its second and third corner there.
+    pub triangle: u32,
+    pub weights: [f32; 2],
+    /// Share of the cosine-weighted hemisphere.
+    pub share: f32,
 }
 
 impl Seen {
     /// Takes all light from the point.
     pub fn cover(&mut self) {
         self.transfer.fill(0.0);
+        self.fronts.clear();
         self.blocked = 1.0;
         if let Some((angles, distances)) = self.map.split_at_mut_checked(NODES) {
             angles.fill(encode_angle(-LIMIT_RAD));
@@ -245,6 +259,11 @@ impl Caster<'_> {
         let mut hits = Vec::with_capacity(locals.len());
         self.blockers.first(self.origin, &self.to_blockers, locals, self.counts.blocks, &mut hits);
         hits
+    }
+
+    fn front(&self, ray: &PatternRay, hit: &BlockerHit) -> Front {
+        let (triangle, weights) = self.blockers.place(self.origin, self.to_blockers * ray.local, hit);
+        Front { member: hit.member, triangle, weights, share: (ray.weight / PI) as f32 }
     }
 
     /// How far each ray comes past all that the map counts; infinity where it is free.
@@ -292,7 +311,13 @@ pub fn see(blockers: &Blockers, standing: &Standing, eye: &Eye, bands: usize, ra
         Rays::Few => FEW_RAYS.iter().zip(&caster.cast(&locals(&*FEW_RAYS))).for_each(|(ray, hit)| add(ray, hit)),
         Rays::Many => {
             let found = CellHits::new(&caster);
-            found.each(add);
+            let mut fronts = Vec::with_capacity(PATTERN);
+            found.each(|ray, hit| {
+                add(ray, hit);
+                let front = hit.filter(|hit| !hit.from_behind && ray.weight > 0.0);
+                fronts.extend(front.map(|hit| caster.front(ray, &hit)));
+            });
+            seen.fronts = fronts;
             if counts.in_map.is_some() {
                 seen.map = found.map(&caster, standing);
             }
@@ -459,7 +484,12 @@ fn angle_to_edge(toward: Vec3A, nearest: Vec3A, edges: &[(Vec3A, f32)]) -> f64 {
 mod tests {
     use super::*;
     use crate::asset::generate;
+    use crate::bake::packet::BlockerTriangle;
     use crate::field::self_visibility::decode_angle;
+
+    fn triangle((member, corners): (u32, [Vec3; 3])) -> BlockerTriangle {
+        BlockerTriangle { member, number: 0, corners }
+    }
 
     /// A receiver at the origin that looks up at a ball of radius 1 whose centre lies `toward`.
     fn under_a_ball(toward: DVec3, with_map: bool) -> Seen {
@@ -471,7 +501,7 @@ mod tests {
             in_map: with_map.then_some(&[false, false, false, false, false, false, false, true]),
         };
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
-        see(&Blockers::new(corners), &standing, &eye, 4, Rays::Many, counts)
+        see(&Blockers::new(corners.map(triangle)), &standing, &eye, 4, Rays::Many, counts)
     }
 
     /// Directions all over the sphere, of equal areas: a Fibonacci lattice.
@@ -523,7 +553,7 @@ mod tests {
             let [a, b, c, d] = corners.map(|[across, y]| Vec3::new(x + across, y, 1.0));
             [(0, [a, b, c]), (0, [a, c, d])]
         };
-        let blockers = Blockers::new((-20..20).flat_map(|i| bar(0.15 * i as f32)));
+        let blockers = Blockers::new((-20..20).flat_map(|i| bar(0.15 * i as f32)).map(triangle));
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         let [mut mean, mut square] = [0.0; 2];
         const PLACES: usize = 400;
@@ -576,7 +606,7 @@ mod tests {
         let standing = Standing { rotation: DMat3::IDENTITY, radius: 1.0 };
         let see_with = |in_map: &[bool], corners: &[(u32, [Vec3; 3])]| {
             let counts = Counts { blocks: &[true; 2], in_map: Some(in_map) };
-            see(&Blockers::new(corners.iter().copied()), &standing, &eye, 4, Rays::Many, counts)
+            see(&Blockers::new(corners.iter().copied().map(triangle)), &standing, &eye, 4, Rays::Many, counts)
         };
         // The member that the map leaves out stands in front of the one that it has.
         let both = see_with(&[true, false], &[&near[..], &far[..]].concat());

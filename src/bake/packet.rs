@@ -19,6 +19,17 @@ pub struct Blockers {
     /// In the order of the hierarchy's leaves.
     triangles: Vec<Corners>,
     members: Vec<u32>,
+    /// Which triangle of the member's mesh each is.
+    numbers: Vec<u32>,
+}
+
+/// A triangle that blocks.
+#[derive(Clone, Copy, Debug)]
+pub struct BlockerTriangle {
+    pub member: u32,
+    /// Which triangle of the member's mesh it is.
+    pub number: u32,
+    pub corners: [Vec3; 3],
 }
 
 /// A corner and the two edges from it.
@@ -34,6 +45,8 @@ struct Corners {
 pub struct BlockerHit {
     pub distance: f32,
     pub member: u32,
+    /// Its place in the hierarchy.
+    index: u32,
     /// Whether the ray meets its back.
     pub from_behind: bool,
 }
@@ -173,11 +186,14 @@ impl WithSimd for Cast<'_> {
 
 impl Blockers {
     /// Builds the hierarchy; one of no triangles blocks nothing.
-    pub fn new(corners: impl IntoIterator<Item = (u32, [Vec3; 3])>) -> Self {
-        let (members, unsorted): (Vec<u32>, Vec<Triangle>) = corners
-            .into_iter()
-            .map(|(member, [a, b, c])| (member, Triangle { v0: a.into(), v1: b.into(), v2: c.into() }))
-            .unzip();
+    pub fn new(triangles: impl IntoIterator<Item = BlockerTriangle>) -> Self {
+        let of: Vec<BlockerTriangle> = triangles.into_iter().collect();
+        let triangle = |BlockerTriangle { corners: [a, b, c], .. }: &BlockerTriangle| Triangle {
+            v0: (*a).into(),
+            v1: (*b).into(),
+            v2: (*c).into(),
+        };
+        let unsorted: Vec<Triangle> = of.iter().map(triangle).collect();
         let hierarchy = build_bvh2_from_tris(&unsorted, BvhBuildParams::slow_build(), &mut Duration::default());
         let corners = |&i: &u32| {
             let Triangle { v0, v1, v2 } = unsorted[i as usize];
@@ -186,7 +202,8 @@ impl Blockers {
         };
         Blockers {
             triangles: hierarchy.primitive_indices.iter().map(corners).collect(),
-            members: hierarchy.primitive_indices.iter().map(|&i| members[i as usize]).collect(),
+            members: hierarchy.primitive_indices.iter().map(|&i| of[i as usize].member).collect(),
+            numbers: hierarchy.primitive_indices.iter().map(|&i| of[i as usize].number).collect(),
             hierarchy,
         }
     }
@@ -245,8 +262,18 @@ impl Blockers {
         Some(BlockerHit {
             distance: packet.distance[lane],
             member: self.members[triangle as usize],
+            index: triangle,
             from_behind: self.triangles[triangle as usize].normal.dot(direction) > 0.0,
         })
+    }
+
+    /// Which triangle of the member's mesh a ray meets, and where: the weights of its second and third corner.
+    pub fn place(&self, origin: Vec3A, direction: Vec3A, hit: &BlockerHit) -> (u32, [f32; 2]) {
+        let Corners { corner, edges, normal } = &self.triangles[hit.index as usize];
+        let from_corner = origin + hit.distance * direction - *corner;
+        let whole = normal.length_squared().max(f32::MIN_POSITIVE);
+        let weights = [from_corner.cross(edges[1]), edges[0].cross(from_corner)].map(|part| part.dot(*normal) / whole);
+        (self.numbers[hit.index as usize], weights)
     }
 }
 
@@ -261,7 +288,9 @@ mod tests {
     fn packets_find_the_first_triangle() {
         let mesh = generate::torus(1.0, 0.3, 24, 12);
         let corners: Vec<[Vec3; 3]> = mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect();
-        let blockers = Blockers::new(corners.iter().enumerate().map(|(i, t)| ((i % 2) as u32, *t)));
+        let triangle =
+            |(number, corners): (u32, &[Vec3; 3])| BlockerTriangle { member: number % 2, number, corners: *corners };
+        let blockers = Blockers::new((0..).zip(&corners).map(triangle));
         let mut rng = fastrand::Rng::with_seed(3);
         let mut hits = Vec::new();
         let mut met = 0;
@@ -280,6 +309,12 @@ mod tests {
                     let wanted = counted.map(distance).fold(f32::INFINITY, f32::min);
                     let found = hit.map_or(f32::INFINITY, |hit| hit.distance);
                     assert!(found == wanted || (found - wanted).abs() < 1e-4, "{found} {wanted}");
+                    if let Some(hit) = hit {
+                        let (number, [v, w]) = blockers.place(origin, *direction, hit);
+                        let [a, b, c] = corners[number as usize].map(Vec3A::from);
+                        let place = a + v * (b - a) + w * (c - a);
+                        assert!(place.distance(origin + found * *direction) < 1e-4, "{hit:?}");
+                    }
                     met += usize::from(hit.is_some());
                 }
             }

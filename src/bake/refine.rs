@@ -26,6 +26,8 @@ pub(super) struct Refined {
     pub normals: Vec<Vec3>,
     pub attributes: Attributes,
     pub triangles: Vec<[u32; 3]>,
+    /// The triangle of the mesh that each is a part of.
+    pub parents: Vec<u32>,
     /// Equal positions have equal numbers.
     places: Vec<u32>,
     place_of: HashMap<[u32; 3], u32>,
@@ -48,6 +50,7 @@ impl Refined {
             normals: mesh.normals.clone(),
             attributes: mesh.attributes(),
             triangles: mesh.triangles.clone(),
+            parents: (0..mesh.triangles.len() as u32).collect(),
             places: Vec::new(),
             place_of: HashMap::new(),
             transfers: vec![None; mesh.positions.len()],
@@ -137,15 +140,16 @@ impl Refined {
         }
         let mut middle_of: HashMap<Edge, u32> = HashMap::new();
         let mut done = Vec::with_capacity(self.triangles.len());
-        let mut open: Vec<[u32; 3]> = std::mem::take(&mut self.triangles);
+        let mut open: Vec<([u32; 3], u32)> =
+            std::mem::take(&mut self.triangles).into_iter().zip(std::mem::take(&mut self.parents)).collect();
         open.reverse();
-        while let Some([a, b, c]) = open.pop() {
+        while let Some(([a, b, c], parent)) = open.pop() {
             let sides: Vec<Edge> = [edge(a, b), edge(b, c), edge(c, a)]
                 .into_iter()
                 .filter(|side| marked.contains(&self.shared(*side)))
                 .collect();
             if sides.is_empty() {
-                done.push([a, b, c]);
+                done.push(([a, b, c], parent));
                 continue;
             }
             let side = self.longest(&sides);
@@ -155,10 +159,10 @@ impl Refined {
                 side if side == edge(b, c) => [b, c, a],
                 _ => [c, a, b],
             };
-            open.push([middle, b, c]);
-            open.push([a, middle, c]);
+            open.push(([middle, b, c], parent));
+            open.push(([a, middle, c], parent));
         }
-        self.triangles = done;
+        (self.triangles, self.parents) = done.into_iter().unzip();
     }
 
     /// The longest side; of equal ones that of the lower places, the same for both triangles at an edge.

@@ -2,8 +2,9 @@
 //! whole group.
 
 use super::cluster_order::cluster_order;
-use super::own_visibility::{Counts, Eye, PATTERN, Rays, Seen, Standing, see};
-use super::packet::Blockers;
+use super::links::{Met, Runs, links};
+use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, see};
+use super::packet::{BlockerTriangle, Blockers};
 use super::refine::{Limits, Refined, refine};
 use super::triangles::distinct;
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
@@ -25,7 +26,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
@@ -78,12 +79,23 @@ pub struct BakedSurface {
     pub self_visibility: Option<Arc<Vec<u8>>>,
     /// For each cluster the members whose shadows of sharp lights its maps have.
     pub near: Vec<Vec<u32>>,
+    /// What every vertex sees of its group's fronts, in the order of clusters; `None` where none sees any.
+    pub links: Option<Arc<Links>>,
+}
+
+/// Links of vertices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Links {
+    /// How many each vertex has.
+    pub counts: Vec<u8>,
+    /// Those of one vertex after those of another: the number of a run of the group, and its share.
+    pub packed: Vec<u32>,
 }
 
 impl BakedSurface {
     /// A mesh as it is, which sees nothing of itself.
     pub fn plain(mesh: &Arc<Mesh>) -> Self {
-        BakedSurface { mesh: mesh.clone(), transfer: None, self_visibility: None, near: Vec::new() }
+        BakedSurface { mesh: mesh.clone(), transfer: None, self_visibility: None, near: Vec::new(), links: None }
     }
 }
 
@@ -218,12 +230,19 @@ impl GroupPlan {
             refine(&mut refined, &limits, &|count| progress((count as u32).min(most) / 2, most));
         }
         let mut surfaces = self.plain();
-        for (member, (refined, ..)) in refining.zip(refined) {
+        let mut parents: Vec<Option<Vec<u32>>> = vec![None; surfaces.len()];
+        for (member, (mut refined, ..)) in refining.zip(refined) {
             let own = &self.members[member].mesh;
             if refined.positions.len() != own.positions.len() {
+                parents[member] = Some(std::mem::take(&mut refined.parents));
                 surfaces[member].mesh = Arc::new(refined.into_mesh(own));
             }
         }
+        let lit = (&surfaces, &self.members, parents);
+        let lit: Vec<Lit> = lit
+            .into_par_iter()
+            .map(|(surface, member, parents)| Lit::new(&member.mesh, &surface.mesh, parents.as_deref()))
+            .collect();
         let total: usize = receivers.iter().map(|&member| surfaces[member].mesh.positions.len()).sum();
         let mut done = 0;
         for &member in &receivers {
@@ -231,7 +250,7 @@ impl GroupPlan {
             let tell = |vertices: usize| {
                 progress((total + done + vertices) as u32 / 2, total.max(1) as u32);
             };
-            surfaces[member] = group.space(member).surface(mesh, self.wanted, &tell);
+            surfaces[member] = group.space(member).surface(mesh, self.wanted, &lit, &tell);
             done += surfaces[member].mesh.positions.len();
         }
         let report = BakeReport { samples: total as u32, total: started.elapsed(), ..Default::default() };
@@ -289,13 +308,18 @@ impl<'p> Group<'p> {
             .collect();
         let to_group =
             |member: &Member, p: Vec3| ((member.placement.point(p.as_dvec3()) - centre) / radius_m).as_vec3();
-        let corners = plan.members.iter().enumerate().flat_map(|(index, member)| {
-            let positions: Vec<Vec3> = member.mesh.positions.iter().map(|&p| to_group(member, p)).collect();
-            let triangles: Vec<[Vec3; 3]> =
-                distinct(&member.mesh).iter().map(|t| t.map(|i| positions[i as usize])).collect();
-            triangles.into_iter().map(move |corners| (index as u32, corners))
+        let triangles = (0..).zip(&plan.members).flat_map(|(index, member)| {
+            let mesh = &member.mesh;
+            let positions: Vec<Vec3> = mesh.positions.iter().map(|&p| to_group(member, p)).collect();
+            // Those that are distinct stand in the mesh's order.
+            let mut all = (0..).zip(&mesh.triangles);
+            let triangle = |vertices: &[u32; 3]| {
+                let number = all.find(|(_, of)| *of == vertices).map_or(0, |(number, _)| number);
+                BlockerTriangle { member: index, number, corners: vertices.map(|v| positions[v as usize]) }
+            };
+            distinct(mesh).iter().map(triangle).collect::<Vec<_>>()
         });
-        Group { plan, blockers: Blockers::new(corners), centre, radius_m, standings, spheres }
+        Group { plan, blockers: Blockers::new(triangles), centre, radius_m, standings, spheres }
     }
 
     fn space(&self, member: usize) -> GroupSpace<'_> {
@@ -410,9 +434,11 @@ impl GroupSpace<'_> {
     }
 
     /// The surface with the own visibility of its vertices. `told` hears of the vertices that are done.
-    fn surface(&self, mesh: Arc<Mesh>, wanted: Wanted, told: &dyn Fn(usize)) -> BakedSurface {
+    /// `lit` are the surfaces of all members.
+    fn surface(&self, mesh: Arc<Mesh>, wanted: Wanted, lit: &[Lit], told: &dyn Fn(usize)) -> BakedSurface {
         let plan = self.group.plan;
-        let order = cluster_order(&mesh);
+        let order = &lit[self.member].order;
+        let runs = Runs::new(lit.iter().map(|lit| lit.order.len()));
         let nudges = self.nudges(&mesh.positions, &mesh.normals, &mesh.triangles);
         // Few meshes have buried vertices, which alone ask for their triangles.
         let around = OnceLock::new();
@@ -423,6 +449,7 @@ impl GroupSpace<'_> {
         let mut maps = vec![0; if has_maps { mesh.positions.len() * BYTES } else { 0 }];
         let mut near = Vec::with_capacity(order.len().div_ceil(CLUSTER_VERTICES as usize));
         let mut any_blocked = false;
+        let mut linked = Links::default();
         let clusters: Vec<&[u32]> = order.chunks(CLUSTER_VERTICES as usize).collect();
         let mut done = 0;
         for batch in clusters.chunks(16) {
@@ -452,12 +479,24 @@ impl GroupSpace<'_> {
                     let free = |place: &Vec3| !self.see(*place, normal, nudge, Rays::Few).buried;
                     ways.find(free).map_or(here, see)
                 };
-                let seen: Vec<Seen> = cluster.par_iter().with_max_len(8).map(vertex).collect();
+                let linked = |v: &u32| {
+                    let mut seen = vertex(v);
+                    let fronts = std::mem::take(&mut seen.fronts).into_iter();
+                    let met = fronts.map(|Front { member, triangle, weights, share }| Met {
+                        member,
+                        place: lit[member as usize].place(triangle, weights),
+                        share,
+                    });
+                    (seen, links(met.collect(), &runs))
+                };
+                let seen: Vec<(Seen, Vec<u32>)> = cluster.par_iter().with_max_len(8).map(linked).collect();
                 (near, seen)
             };
-            let found: Vec<(Vec<u32>, Vec<Seen>)> = batch.par_iter().map(look).collect();
+            let found: Vec<(Vec<u32>, Vec<(Seen, Vec<u32>)>)> = batch.par_iter().map(look).collect();
             for (cluster, (members, seen)) in batch.iter().zip(found) {
-                for (&v, seen) in cluster.iter().zip(seen) {
+                for (&v, (seen, links)) in cluster.iter().zip(seen) {
+                    linked.counts.push(links.len() as u8);
+                    linked.packed.extend(links);
                     any_blocked |= seen.blocked > 0.0;
                     transfer[v as usize * stride..][..stride].copy_from_slice(&seen.transfer);
                     if has_maps {
@@ -474,8 +513,101 @@ impl GroupSpace<'_> {
             transfer: (any_blocked && wanted.transfer).then(|| Arc::new(transfer)),
             self_visibility: (any_blocked && has_maps).then(|| Arc::new(maps)),
             near,
+            links: (!linked.packed.is_empty()).then(|| Arc::new(linked)),
         }
     }
+}
+
+/// The vertices that are lit on the triangles of a mesh.
+struct Lit {
+    /// Vertices in the order of clusters.
+    order: Vec<u32>,
+    /// For each triangle of the mesh: the first of its cells, and how many lie along a side of its square.
+    grids: Vec<(u32, u32)>,
+    /// The place in the order of the vertex that lies nearest to the middle of each cell.
+    cells: Vec<u32>,
+}
+
+impl Lit {
+    /// `surface` is the mesh, or finer: then `parents` has the mesh's triangle of each of its own.
+    fn new(mesh: &Mesh, surface: &Mesh, parents: Option<&[u32]>) -> Self {
+        let order = cluster_order(surface);
+        let mut places = vec![0; order.len()];
+        order.iter().zip(0..).for_each(|(&v, place)| places[v as usize] = place);
+        let mut counts = vec![0_u32; mesh.triangles.len()];
+        let parent = |part: usize| parents.map_or(part, |parents| parents[part] as usize);
+        (0..surface.triangles.len()).for_each(|part| counts[parent(part)] += 1);
+        // Four cells a part at least, as its corners are nearest to a third of it each.
+        let mut end = 0;
+        let grids: Vec<(u32, u32)> = counts
+            .iter()
+            .map(|&count| {
+                let side = (3.0 * f64::from(count).sqrt()).ceil() as u32;
+                let first = end;
+                end += side * side;
+                (first, side)
+            })
+            .collect();
+        let mut cells = vec![u32::MAX; end as usize];
+        for (part, vertices) in surface.triangles.iter().enumerate() {
+            let of = mesh.triangles[parent(part)].map(|v| mesh.positions[v as usize]);
+            let (first, side) = grids[parent(part)];
+            let corners = vertices.map(|v| weights(of, surface.positions[v as usize]));
+            let positions = vertices.map(|v| surface.positions[v as usize]);
+            let step = 1.0 / side as f32;
+            let range = |axis: usize| {
+                let all = corners.map(|corner| corner[axis] / step - 0.5);
+                let low = all.into_iter().fold(f32::INFINITY, f32::min).ceil().max(0.0);
+                let high = all.into_iter().fold(0.0, f32::max).floor().min(side as f32 - 1.0);
+                low as u32..high as u32 + 1
+            };
+            for y in range(1) {
+                for x in range(0) {
+                    let at = [x, y].map(|i| (i as f32 + 0.5) * step);
+                    let cell = &mut cells[(first + y * side + x) as usize];
+                    if *cell == u32::MAX || is_within(corners, at) {
+                        let place = of[0] + at[0] * (of[1] - of[0]) + at[1] * (of[2] - of[0]);
+                        let away = positions.map(|position| position.distance_squared(place));
+                        let nearest = (0..3).min_by(|&a, &b| away[a].total_cmp(&away[b])).unwrap_or(0);
+                        *cell = places[vertices[nearest] as usize];
+                    }
+                }
+            }
+        }
+        // Cells beyond the long side of a triangle, and those that no part covers.
+        for (triangle, &(first, side)) in mesh.triangles.iter().zip(&grids) {
+            let any = places[triangle[0] as usize];
+            let cells = &mut cells[first as usize..][..(side * side) as usize];
+            for i in 0..cells.len() {
+                if cells[i] == u32::MAX {
+                    cells[i] = if i > 0 { cells[i - 1] } else { any };
+                }
+            }
+        }
+        Lit { order, grids, cells }
+    }
+
+    /// The place in the order of the vertex nearest to a place of a triangle.
+    fn place(&self, triangle: u32, weights: [f32; 2]) -> u32 {
+        let (first, side) = self.grids[triangle as usize];
+        let [x, y] = weights.map(|weight| ((weight * side as f32) as u32).min(side - 1));
+        self.cells[(first + y * side + x) as usize]
+    }
+}
+
+/// The weights of the second and third corner of a triangle at a place of its plane.
+fn weights([a, b, c]: [Vec3; 3], place: Vec3) -> [f32; 2] {
+    let edges = [b - a, c - a];
+    let normal = edges[0].cross(edges[1]);
+    let whole = normal.length_squared().max(f32::MIN_POSITIVE);
+    [(place - a).cross(edges[1]), edges[0].cross(place - a)].map(|part| part.dot(normal) / whole)
+}
+
+/// Whether a point lies within a triangle of the plane, which may run either way around.
+fn is_within([a, b, c]: [[f32; 2]; 3], [x, y]: [f32; 2]) -> bool {
+    let side = |p: [f32; 2], q: [f32; 2]| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
+    let sides = [side(a, b), side(b, c), side(c, a)];
+    sides.iter().all(|side| *side >= 0.0) || sides.iter().all(|side| *side <= 0.0)
 }
 
 /// The triangles around every vertex of a mesh.
@@ -517,6 +649,8 @@ struct StoredSurface {
     refined: bool,
     transfer: bool,
     self_visibility: bool,
+    /// Links, whose counts for every vertex come before them; 0 without counts where no vertex has any.
+    links: usize,
     /// Clusters with near members, whose counts and numbers end the payload.
     clusters: usize,
 }
@@ -539,7 +673,7 @@ impl GroupPlan {
         let mut payload = Vec::new();
         let mut stored = Vec::new();
         for (member, surface) in self.members.iter().zip(surfaces) {
-            let BakedSurface { mesh, transfer, self_visibility, near } = surface;
+            let BakedSurface { mesh, transfer, self_visibility, near, links } = surface;
             let refined = !Arc::ptr_eq(mesh, &member.mesh);
             if refined {
                 payload.extend_from_slice(bytemuck::cast_slice(&mesh.positions));
@@ -555,12 +689,17 @@ impl GroupPlan {
             if let Some(maps) = self_visibility {
                 payload.extend_from_slice(maps);
             }
+            if let Some(links) = links {
+                payload.extend_from_slice(&links.counts);
+                payload.extend_from_slice(bytemuck::cast_slice(&links.packed));
+            }
             stored.push(StoredSurface {
                 vertices: mesh.positions.len(),
                 triangles: mesh.triangles.len(),
                 refined,
                 transfer: transfer.is_some(),
                 self_visibility: self_visibility.is_some(),
+                links: links.as_ref().map_or(0, |links| links.packed.len()),
                 clusters: near.len(),
             });
             for members in near {
@@ -618,12 +757,21 @@ impl GroupPlan {
                 true => Some(Arc::new(take(stored.vertices.checked_mul(BYTES)?)?.to_vec())),
                 false => None,
             };
+            let links = match stored.links {
+                0 => None,
+                links => {
+                    let counts = take(stored.vertices)?.to_vec();
+                    let packed: Vec<u32> = vectors(&mut take, links)?;
+                    (counts.iter().map(|count| usize::from(*count)).sum::<usize>() == links).then_some(())?;
+                    Some(Arc::new(Links { counts, packed }))
+                }
+            };
             let mut near = Vec::new();
             for _ in 0..stored.clusters {
                 let count: u32 = bytemuck::pod_read_unaligned(take(4)?);
                 near.push(bytemuck::pod_collect_to_vec(take(4 * count as usize)?));
             }
-            surfaces.push(BakedSurface { mesh, transfer, self_visibility, near });
+            surfaces.push(BakedSurface { mesh, transfer, self_visibility, near, links });
         }
         rest.is_empty().then_some(surfaces)
     }

@@ -26,13 +26,14 @@ use crate::bake::cache::Cache;
 use crate::bake::ensure::SceneProgress;
 use crate::bake::surfaces::SurfacePlan;
 use crate::bake::{self, Baker, SceneNeeds};
+use crate::bounce::{Bounce, Bounces, Linked};
 use crate::draw::Shading;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Timing};
 use crate::layout::{CLUSTER_FORMAT, ENTRY_FORMAT};
 use crate::lists::incremental::{ClusterLists, Merged};
 use crate::merge::calibrate;
-use crate::merge::variant::{MergePermutation, Variant, uniform_entities};
+use crate::merge::variant::{MergePermutation, Reads, Variant, uniform_entities};
 use crate::merge::{MergeInputs, Readable};
 use crate::scene::groups::Groups;
 use crate::scene::{LightMethod, Lights, Placement, Scene, light};
@@ -86,6 +87,8 @@ pub struct Frame {
     /// Chains of sharp lights for pixels, once a picture evaluates any.
     chains: Option<PixelChains>,
     radiosity: RadiosityBuffers,
+    /// What passes light on within rigid groups, where it bounces.
+    bounce: Option<Bounce>,
     picture: FramePicture,
 }
 
@@ -106,6 +109,7 @@ impl Frame {
         let mut baked = bake::ensure(baker, cache, scene, &needs, progress)?;
         let mut near = std::mem::take(&mut baked.near);
         let mut scene = scene.clone();
+        let linked = (options.bounces != Bounces::None).then(|| Linked::new(&baked)).flatten();
         scene.set_surfaces(baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.clone()).collect());
         let buffers = SceneBuffers::new(device, &scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();
@@ -114,7 +118,7 @@ impl Frame {
         let wanted = permutation(&options, wanted, &scene, &methods, uniform_entities(device));
         let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted))?;
         let sharp = permutation::sharp(&options, &merge.permutation, &methods, &scene, &buffers);
-        let radiosity = RadiosityBuffers::new(device, &scene, &buffers, sharp.is_some())?;
+        let radiosity = RadiosityBuffers::new(device, &scene, &buffers, sharp.is_some(), linked.is_some())?;
         let mut lists = ClusterLists::default();
         for (index, _) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
             lists.add(
@@ -130,6 +134,8 @@ impl Frame {
                 "no pixel evaluates lights: the device's texel buffers cannot hold the silhouette fields or the light of all vertices"
             );
         }
+        let texels = merge.permutation.variant.reads == Reads::Texels;
+        let bounce = linked.map(|linked| Bounce::new(device, library, &linked, sharp.is_some(), texels)).transpose()?;
         let edges = pixels.pixels().is_some();
         let sharp =
             sharp.map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting })).transpose()?;
@@ -152,6 +158,7 @@ impl Frame {
             picture: FramePicture::new(device, library, &options, &pixels, !buffers.textures.is_empty())?,
             pixels,
             chains: None,
+            bounce,
             buffers,
         })
     }
@@ -230,8 +237,10 @@ impl Frame {
             inputs: self.inputs()?,
             merge: &self.merge.pass,
             sharp: self.sharp.as_ref().map(|sharp| (sharp, self.sharp_inputs())),
-            soft: self.radiosity.soft(),
-            radiosity: &self.radiosity.merged,
+            entities: &self.work.entities,
+            soft: self.radiosity.soft_direct(),
+            radiosity: self.radiosity.direct(),
+            bounce: self.bounce.as_ref().map(|bounce| (bounce, self.radiosity.bounced(), self.options.bounces.steps())),
         }))
     }
 
@@ -244,7 +253,7 @@ impl Frame {
             cells: &self.buffers.silhouettes.cells,
             vertices: &self.buffers.vertices,
             self_cells: &self.buffers.self_cells,
-            soft: self.radiosity.soft(),
+            soft: self.radiosity.soft_direct(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::bake::cache::Cache;
 use crate::bake::{self, BakeOptions};
+use crate::bounce::Bounces;
 use crate::draw::{Antialias, Shading};
 use crate::error::{Error, Result};
 use crate::lists::skip::{EPS, Skip};
@@ -25,6 +26,9 @@ pub struct Options {
     /// Light that the merge leaves out: contributions to a vertex that are bounded below this share of the radiance
     /// that the scene's exposure shows as white; 0 leaves none out.
     pub eps: f32,
+    /// How often light bounces between what never moves against each other.
+    #[serde(default)]
+    pub bounces: Bounces,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
     /// How edges are kept from showing as stairs.
@@ -48,6 +52,7 @@ impl Default for Options {
             variant: None,
             skip: Skip::ALL,
             eps: EPS,
+            bounces: Bounces::None,
             size: [960, 640],
             antialias: Antialias::default(),
         }
@@ -104,6 +109,12 @@ pub struct RenderOptions {
         arg(long, help_heading = LIGHTING, value_enum, default_value = "sharp", value_name = "sh|sharp")
     )]
     pub lights: Lights,
+    /// How often light bounces between surfaces that never move against each other
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, help_heading = LIGHTING, value_enum, default_value = "0", value_name = "0|1|all")
+    )]
+    pub bounces: Bounces,
     /// Where sharp lights are evaluated for pictures. Default: pixel with four samples a pixel, vertex with one
     #[cfg_attr(feature = "cli", arg(long, help_heading = LIGHTING, value_enum, value_name = "vertex|pixel"))]
     pub shading: Option<Shading>,
@@ -130,9 +141,9 @@ pub fn picture_size(text: &str) -> std::result::Result<[u32; 2], String> {
 impl Default for RenderOptions {
     /// The defaults of `shadow-fields render`.
     fn default() -> Self {
-        let Options { lights, shading, variant, skip, eps, .. } = Options::default();
+        let Options { lights, shading, variant, skip, eps, bounces, .. } = Options::default();
         let bake = BakeOptions::default();
-        RenderOptions { size: None, antialias: None, variant, skip, eps, lights, shading, bake, cache: None }
+        RenderOptions { size: None, antialias: None, variant, skip, eps, lights, bounces, shading, bake, cache: None }
     }
 }
 
@@ -151,6 +162,7 @@ impl RenderOptions {
             variant: self.variant,
             skip: self.skip,
             eps: self.eps,
+            bounces: self.bounces,
             size,
             antialias: self.antialias.unwrap_or_default(),
         })

@@ -80,6 +80,8 @@ impl Frame {
     /// Prepares a frame that lights `relight` and draws `viewports`, if there are any. Where it lights, the merge has
     /// to be recorded next, or every cluster is merged again.
     pub fn prepare(&mut self, placements: &[Placement], viewports: &[Viewport], relight: Relight) -> Result<()> {
+        // Light comes from what no viewport shows, too.
+        let relight = if relight == Relight::Seen && self.bounce.is_some() { Relight::Everything } else { relight };
         if relight != Relight::Nothing {
             self.fit_edges()?;
             self.radiosity.replaced = false;

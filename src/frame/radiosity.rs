@@ -1,6 +1,7 @@
 //! Radiosity of all vertices: what the merge writes, and what comes from elsewhere to be compared with it.
 
 use super::viewport::RadiositySource;
+use crate::bounce::BouncedLight;
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device};
 use crate::scene::Scene;
@@ -13,6 +14,8 @@ pub(super) struct RadiosityBuffers {
     pub merged: Buffer,
     /// Light without that of sharp lights, in a scene that has any: what the merge writes then.
     soft: Option<Buffer>,
+    /// The same two before light has bounced, where it does: then the merge and the pass of sharp lights write these.
+    direct: Option<[Option<Buffer>; 2]>,
     /// Whether any of it was replaced by what was computed elsewhere, and not merged since.
     pub replaced: bool,
     /// The first byte of each entity.
@@ -22,7 +25,13 @@ pub(super) struct RadiosityBuffers {
 
 impl RadiosityBuffers {
     /// Zero for every vertex of a scene.
-    pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers, sharp: bool) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &Scene,
+        buffers: &SceneBuffers,
+        sharp: bool,
+        bounces: bool,
+    ) -> Result<Self> {
         let mut offsets = Vec::new();
         let mut size_bytes = 0;
         for entity in 0..scene.entities.len() {
@@ -31,9 +40,12 @@ impl RadiosityBuffers {
         }
         let mut merged = Buffer::new(device, "radiosity", BufferKind::Device, size_bytes.max(16))?;
         merged.fill(0, &vec![0.0_f32; merged.size_bytes as usize / 4])?;
-        let soft = || Buffer::new(device, "soft radiosity", BufferKind::Device, merged.size_bytes);
+        let another = |name: &str| Buffer::new(device, name, BufferKind::Device, merged.size_bytes);
+        let soft = |name: &str| sharp.then(|| another(name)).transpose();
+        let direct = || Ok([Some(another("direct light")?), soft("soft direct light")?]);
         Ok(RadiosityBuffers {
-            soft: sharp.then(soft).transpose()?,
+            soft: soft("soft radiosity")?,
+            direct: bounces.then(direct).transpose()?,
             merged,
             replaced: false,
             offsets,
@@ -47,13 +59,39 @@ impl RadiosityBuffers {
         first..first + 16 * vertex_count as u64
     }
 
-    /// Output of the merge.
+    /// All light but that of sharp lights.
     pub fn soft(&self) -> &Buffer {
         self.soft.as_ref().unwrap_or(&self.merged)
     }
 
+    /// All direct light: what the merge writes, and the pass of sharp lights.
+    pub fn direct(&self) -> &Buffer {
+        self.direct.as_ref().and_then(|[all, _]| all.as_ref()).unwrap_or(&self.merged)
+    }
+
+    /// Output of the merge.
+    pub fn soft_direct(&self) -> &Buffer {
+        match (&self.direct, &self.soft) {
+            (Some([_, Some(soft)]), _) => soft,
+            (None, Some(soft)) => soft,
+            _ => self.direct(),
+        }
+    }
+
+    /// What bounces take and give.
+    pub fn bounced(&self) -> BouncedLight<'_> {
+        BouncedLight {
+            direct: self.direct(),
+            radiosity: &self.merged,
+            soft_direct: self.soft.as_ref().map(|_| self.soft_direct()),
+            soft: self.soft.as_ref(),
+        }
+    }
+
     pub fn size_bytes(&self) -> u64 {
-        self.merged.size_bytes + self.soft.as_ref().map_or(0, |soft| soft.size_bytes)
+        let soft = self.soft.iter();
+        let direct = self.direct.iter().flatten().flatten();
+        self.merged.size_bytes + soft.chain(direct).map(|buffer| buffer.size_bytes).sum::<u64>()
     }
 
     /// Replaces an entity's values. They come in the mesh's order of vertices, which `order` lists as they are stored.

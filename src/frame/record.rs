@@ -4,6 +4,7 @@
 //! and in who waits: a file submits the recording and waits for its end, the window launches it and goes on to the next
 //! frame.
 
+use crate::bounce::{Bounce, BouncedLight};
 use crate::draw::smooth::Lines;
 use crate::draw::{Draw, DrawnViewport};
 use crate::error::Result;
@@ -17,11 +18,14 @@ pub struct MergeWork<'f> {
     pub(super) cluster_count: u32,
     pub(super) inputs: MergeInputs<'f>,
     pub(super) merge: &'f Merge,
+    pub(super) entities: &'f Buffer,
     /// The pass of sharp lights with what it reads; `None` where the scene has none.
     pub(super) sharp: Option<(&'f Sharp, sharp::SharpInputs<'f>)>,
     /// Output of the merge: all light, or the part to which the pass of sharp lights adds.
     pub(super) soft: &'f Buffer,
     pub(super) radiosity: &'f Buffer,
+    /// What adds bounces to the direct light of all vertices, and in how many steps.
+    pub(super) bounce: Option<(&'f Bounce, BouncedLight<'f>, u32)>,
 }
 
 pub struct PictureWork<'f> {
@@ -74,6 +78,12 @@ pub fn record<'f>(
             commands.barrier(Access::ComputeWrite, Access::ComputeRead);
             commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
             commands.pass("sharp", |c| sharp.record(c, inputs, work.radiosity, work.cluster_count))?;
+        }
+        if let Some((bounce, light, steps)) = &work.bounce {
+            // Direct light of every cluster, of this frame or an earlier one.
+            commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+            commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
+            commands.pass("bounce", |c| bounce.record(c, work.entities, light, *steps))?;
         }
     }
     if merge.is_some() && commands.is_shared() {

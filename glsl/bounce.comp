@@ -1,0 +1,37 @@
+#version 460
+// Adds to the direct light of every vertex what reaches it from the surfaces of its rigid group: src/bounce.rs.
+#include "generated/structs.glsl"
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 0) readonly buffer Entities { Entity entities[]; };
+layout(std430, binding = 1) readonly buffer Ranges { uvec2 ranges[]; }; // first link; how many, and above them the entity
+#include "readable.glsl"
+READ_UINT(2, Links, links, link_at)
+READ_VEC4(3, RunLight, run_light, run_light_at)
+layout(std430, binding = 4) readonly buffer Direct { vec4 direct[]; };
+layout(std430, binding = 5) writeonly buffer Radiosity { vec4 radiosity[]; };
+#if SOFT
+// The same without the light of sharp lights, for pixels that evaluate them.
+layout(std430, binding = 6) readonly buffer SoftDirect { vec4 soft_direct[]; };
+layout(std430, binding = 7) writeonly buffer Soft { vec4 soft[]; };
+#endif
+layout(push_constant) uniform Push { uint count; } push;
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= push.count) {
+        return;
+    }
+    uvec2 range = ranges[i];
+    uint count = range.y & 255;
+    vec3 sum = vec3(0.0);
+    for (uint k = range.x; k < range.x + count; k++) {
+        uint packed = link_at(k);
+        sum += float(packed >> RUN_BITS) * run_light_at(packed & ((1u << RUN_BITS) - 1)).rgb;
+    }
+    vec4 bounced = vec4(PI * entities[range.y >> 8].albedo * sum / WHOLE_SHARE, 0.0); // albedo is over pi
+    radiosity[i] = direct[i] + bounced;
+#if SOFT
+    soft[i] = soft_direct[i] + bounced;
+#endif
+}

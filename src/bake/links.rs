@@ -1,0 +1,157 @@
+//! How light passes between the surfaces of a rigid group: what every vertex sees of it, as links to runs of neighbouring
+//! vertices.
+//!
+//! Nothing of a group moves against it, so what a vertex sees is decided when its own visibility is baked, by the same
+//! rays. Each ray that meets a front has a share of the cosine-weighted hemisphere, and goes to the run of
+//! [`RUNS`]`[0]` vertices around the place that it meets. Runs that are too small as seen from the vertex become parts of
+//! larger ones, and all that light from a far wall takes is one link (Hanrahan, Salzman, Aupperle, *A Rapid Hierarchical
+//! Radiosity Algorithm*, 1991). The sum of a vertex's links is the share of the hemisphere that shows fronts of the group.
+
+/// Vertices of a run, in the order of clusters: the smallest runs, clusters, and groups of those.
+pub const RUNS: [usize; 3] = [8, 64, 512];
+/// A run with a smaller share of the hemisphere becomes part of a larger one.
+const LEAST_SHARE: f32 = 1.0 / 64.0;
+/// Most links of a vertex. Where there are more, the largest take over the shares of the others.
+const MOST_LINKS: usize = 128;
+/// Bits of the number of a run, below those of its share.
+pub const RUN_BITS: u32 = 20;
+/// The share that all bits above those stand for.
+pub const WHOLE_SHARE: u32 = (1 << (32 - RUN_BITS)) - 1;
+
+/// Numbers of the runs of a group's members.
+#[derive(Clone, Debug)]
+pub struct Runs {
+    /// For each member the number of the first run of each size.
+    firsts: Vec<[u32; RUNS.len()]>,
+    vertex_counts: Vec<usize>,
+    count: u32,
+}
+
+impl Runs {
+    /// For members with so many vertices.
+    pub fn new(vertex_counts: impl IntoIterator<Item = usize>) -> Self {
+        let mut runs = Runs { firsts: Vec::new(), vertex_counts: Vec::new(), count: 0 };
+        for vertices in vertex_counts {
+            runs.firsts.push(RUNS.map(|size| {
+                let first = runs.count;
+                runs.count += vertices.div_ceil(size) as u32;
+                first
+            }));
+            runs.vertex_counts.push(vertices);
+        }
+        runs
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Member, first vertex in the order of clusters, and number of vertices of every run.
+    pub fn all(&self) -> impl Iterator<Item = (usize, usize, usize)> {
+        self.vertex_counts.iter().enumerate().flat_map(|(member, &vertices)| {
+            RUNS.into_iter().flat_map(move |size| {
+                (0..vertices).step_by(size).map(move |first| (member, first, size.min(vertices - first)))
+            })
+        })
+    }
+}
+
+/// A ray that meets a front.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Met {
+    pub member: u32,
+    /// The vertex that is nearest to the place, by its place in the order of clusters.
+    pub place: u32,
+    /// Share of the cosine-weighted hemisphere.
+    pub share: f32,
+}
+
+/// The links of one vertex, of which the rays met that. Each has the number of a run and its share.
+pub fn links(mut met: Vec<Met>, runs: &Runs) -> Vec<u32> {
+    met.sort_unstable_by_key(|met| (met.member, met.place));
+    let mut links: Vec<(u32, f32)> = Vec::new();
+    let mut link = |member: u32, size: usize, place: u32, share: f32| {
+        links.push((runs.firsts[member as usize][size] + place / RUNS[size] as u32, share));
+    };
+    let is_one = |size: usize| {
+        move |a: &Met, b: &Met| a.member == b.member && a.place as usize / RUNS[size] == b.place as usize / RUNS[size]
+    };
+    let sum = |met: &[Met]| met.iter().map(|met| met.share).sum::<f32>();
+    for of_largest in met.chunk_by(is_one(2)) {
+        let first = of_largest[0];
+        let mut rest = 0.0;
+        for of_cluster in of_largest.chunk_by(is_one(1)) {
+            let mut rest_of_cluster = 0.0;
+            for of_smallest in of_cluster.chunk_by(is_one(0)) {
+                match sum(of_smallest) {
+                    share if share >= LEAST_SHARE => link(first.member, 0, of_smallest[0].place, share),
+                    share => rest_of_cluster += share,
+                }
+            }
+            match rest_of_cluster {
+                share if share >= LEAST_SHARE => link(first.member, 1, of_cluster[0].place, share),
+                share => rest += share,
+            }
+        }
+        if rest > 0.0 {
+            link(first.member, 2, first.place, rest);
+        }
+    }
+    if links.len() > MOST_LINKS {
+        let all: f32 = links.iter().map(|(_, share)| share).sum();
+        links.select_nth_unstable_by(MOST_LINKS, |a, b| b.1.total_cmp(&a.1));
+        links.truncate(MOST_LINKS);
+        let kept: f32 = links.iter().map(|(_, share)| share).sum();
+        links.iter_mut().for_each(|(_, share)| *share *= all / kept);
+    }
+    packed(&links)
+}
+
+/// Shares in whole steps, so that their sum stays.
+fn packed(links: &[(u32, f32)]) -> Vec<u32> {
+    // What rounding took from the shares so far.
+    let mut lost = 0.0;
+    let pack = |(run, share): &(u32, f32)| {
+        let wanted = share * WHOLE_SHARE as f32 + lost;
+        let whole = wanted.round().clamp(0.0, WHOLE_SHARE as f32);
+        lost = wanted - whole;
+        (whole > 0.0).then_some((whole as u32) << RUN_BITS | run)
+    };
+    links.iter().filter_map(pack).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_keep_the_share_of_all_rays_and_split_where_it_is_large() {
+        let runs = Runs::new([1000, 70]);
+        assert_eq!(runs.count(), 125 + 16 + 2 + 9 + 2 + 1);
+        assert_eq!(runs.all().count() as u32, runs.count());
+        assert_eq!(runs.all().last(), Some((1, 0, 70)));
+        let mut rng = fastrand::Rng::with_seed(1);
+        // A tenth of the rays meet one smallest run, a third one cluster, the others anything.
+        let met: Vec<Met> = (0..600)
+            .map(|i| {
+                let (member, place) = match i % 30 {
+                    0..3 => (1, 8 + rng.u32(0..8)),
+                    3..13 => (0, 128 + rng.u32(0..64)),
+                    _ => (0, 256 + rng.u32(0..744)),
+                };
+                Met { member, place, share: 1.0 / 700.0 }
+            })
+            .collect();
+        let links = links(met, &runs);
+        let share = |link: &u32| f64::from(link >> RUN_BITS) / f64::from(WHOLE_SHARE);
+        let run = |link: &u32| link & ((1 << RUN_BITS) - 1);
+        assert!((links.iter().map(share).sum::<f64>() - 600.0 / 700.0).abs() < 1e-3);
+        let of = |wanted: u32| links.iter().filter(|link| run(link) == wanted).map(share).sum::<f64>();
+        assert!((of(143 + 1) - 60.0 / 700.0).abs() < 1e-3, "the smallest run");
+        let cluster = 125 + 2;
+        let within: f64 = (16..24).map(of).sum();
+        assert!((of(cluster) + within - 200.0 / 700.0).abs() < 0.01, "the cluster or its runs");
+        assert!(links.len() < 40, "{}", links.len());
+    }
+}

@@ -5,7 +5,8 @@
 //! light and albedo times the light along its links. That is Jacobi's iteration of the radiosity equation: each step adds
 //! a bounce.
 //!
-//! Only fronts reflect. What moves neither reflects onto a group nor is lit by one.
+//! Only fronts reflect. What moves neither reflects onto a group nor is lit by one. A lamp in spherical harmonics inside a
+//! closed mesh lights nothing of it, as the mesh's transfer ends where its own far side blocks; a sharp one does.
 
 use crate::bake::BakedScene;
 use crate::bake::links::{RUN_BITS, Runs, WHOLE_SHARE};

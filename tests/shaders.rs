@@ -9,6 +9,7 @@ use shadow_fields::bake::project::Project;
 use shadow_fields::bake::raster::Raster;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
 use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
+use shadow_fields::bounce::{bounce_row, runs_row};
 use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::draw::triangles::DrawTriangles;
@@ -28,6 +29,11 @@ fn baking() -> Vec<ShaderPermutation> {
     let assemble = [Storage::F16, Storage::F32].map(Assemble::row);
     let capture = KINDS.into_iter().flat_map(Capture::rows);
     project.chain([Raster::row()]).chain(assemble).chain(capture).chain(Silhouette::permutations(32, 128, 16)).collect()
+}
+
+fn bouncing() -> Vec<ShaderPermutation> {
+    let rows = |texels| [runs_row(texels), bounce_row(texels, false), bounce_row(texels, true)];
+    [false, true].into_iter().flat_map(rows).collect()
 }
 
 /// Every way of the pass of sharp lights.
@@ -198,6 +204,7 @@ fn baking_shaders_are_valid() {
 #[test]
 fn drawing_shaders_are_valid() {
     check(drawing());
+    check(bouncing());
     check(sharp());
 }
 
@@ -219,8 +226,11 @@ fn merge_of_seven_bands_is_valid() {
 
 #[test]
 fn every_entry_point_is_among_the_rows() {
-    let compiled: BTreeSet<&str> =
-        [baking(), drawing(), measuring(), merging(), sharp()].concat().iter().map(|row| row.file).collect();
+    let compiled: BTreeSet<&str> = [baking(), drawing(), measuring(), merging(), sharp(), bouncing()]
+        .concat()
+        .iter()
+        .map(|row| row.file)
+        .collect();
     let there: BTreeSet<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| !name.ends_with(".glsl")).collect();
     assert_eq!(compiled, there);
 }

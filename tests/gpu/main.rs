@@ -2,6 +2,7 @@
 
 mod bake_levels;
 mod bake_skip;
+mod bounce;
 mod capture;
 #[path = "../common/mod.rs"]
 mod common;

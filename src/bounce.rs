@@ -27,7 +27,7 @@ pub enum Bounces {
     None,
     #[cfg_attr(feature = "cli", value(name = "1"))]
     One,
-    /// As many as are seen: [`MOST`].
+    /// As many as are seen: eight.
     All,
 }
 

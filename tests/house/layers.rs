@@ -23,6 +23,7 @@ const ORDER: &[&str] = &[
     "lists",
     "merge",
     "sharp",
+    "bounce",
     "draw",
     "scene_buffers",
     "frame",

@@ -1,7 +1,7 @@
 //! `shadow-fields import` writes a glTF file as a scene file.
 
 use super::outputs::{Output, Outputs};
-use super::source::GltfArguments;
+use super::source::GltfSceneArguments;
 use super::{Global, output};
 use crate::error::{Error, Result, one_line};
 use crate::files;
@@ -32,7 +32,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 0.0, value_name = "S", value_parser = number::<f64>(-1e9..=1e9), allow_negative_numbers = true)]
     time: f64,
     #[command(flatten)]
-    gltf: GltfArguments,
+    gltf: GltfSceneArguments,
 }
 
 impl Arguments {

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::outputs::{Numbered, Output, Outputs};
-use super::source::{GltfArguments, LookArguments};
+use super::source::{GltfSceneArguments, LookArguments};
 use super::{Global, output};
 use crate::asset::false_color::Scheme;
 use crate::asset::picture;
@@ -74,7 +74,7 @@ pub struct Arguments {
     #[command(flatten)]
     look: LookArguments,
     #[command(flatten)]
-    gltf: GltfArguments,
+    gltf: GltfSceneArguments,
 }
 
 impl Arguments {

@@ -53,19 +53,27 @@ impl LookArguments {
 }
 
 /// Options of commands that read glTF.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "glTF files (.glb, .gltf)")]
 pub struct GltfArguments {
     /// End with exit code 4 if anything in a glTF file is left out; by default each kind is only listed
     #[arg(long)]
     pub strict: bool,
+}
+
+/// Options of commands that read glTF files as scenes.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "glTF files (.glb, .gltf)")]
+pub struct GltfSceneArguments {
+    #[command(flatten)]
+    pub gltf: GltfArguments,
     /// The camera, or the node that holds it, that a glTF file's picture is seen from. Default: the first with
     /// perspective
     #[arg(long, value_name = "NAME")]
-    pub camera: Option<String>,
+    camera: Option<String>,
 }
 
-impl GltfArguments {
+impl GltfSceneArguments {
     /// Reads a scene file or a glTF file, and says what is left out of the latter. Skins and morph targets stand in
     /// their pose at `time_s`.
     pub fn scene(&self, global: &Global, path: &Path, time_s: f64) -> Result<Scene> {
@@ -74,18 +82,20 @@ impl GltfArguments {
         }
         let options = scene::gltf::Options { time_s, camera: self.camera.clone() };
         let (scene, notes) = Scene::load_with_notes(path, &options)?;
-        self.tell(global, path, &notes)?;
+        self.gltf.tell(global, path, &notes)?;
         Ok(scene)
     }
+}
 
+impl GltfArguments {
     /// Reads an OBJ file or all triangles of a glTF file, and says what is left out of the latter.
-    pub fn mesh(&self, global: &Global, path: &Path) -> Result<Mesh> {
+    pub fn mesh(self, global: &Global, path: &Path) -> Result<Mesh> {
         let (mesh, notes) = scene::load_mesh(path)?;
         self.tell(global, path, &notes)?;
         Ok(mesh)
     }
 
-    fn tell(&self, global: &Global, path: &Path, notes: &Notes) -> Result<()> {
+    fn tell(self, global: &Global, path: &Path, notes: &Notes) -> Result<()> {
         let left_out = notes.left_out();
         if self.strict && !left_out.is_empty() {
             return Err(Error::input(path, format!("--strict: {}", left_out.join("; "))));

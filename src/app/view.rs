@@ -1,7 +1,7 @@
 //! `shadow-fields view` opens a window.
 
 use super::context::Context;
-use super::source::{GltfArguments, LookArguments};
+use super::source::{GltfSceneArguments, LookArguments};
 use super::{Global, output};
 use crate::draw::Antialias;
 use crate::error::{Error, Result};
@@ -57,7 +57,7 @@ pub struct Arguments {
     #[command(flatten)]
     look: LookArguments,
     #[command(flatten)]
-    gltf: GltfArguments,
+    gltf: GltfSceneArguments,
 }
 
 /// Opens the window and stays until it is closed.
@@ -225,7 +225,7 @@ impl App<'_> {
             format: target.format(),
             encodes_srgb: target.encodes_srgb(),
             seed: self.global.seed,
-            strict: self.arguments.gltf.strict,
+            strict: self.arguments.gltf.gltf.strict,
             preview_after: Duration::from_secs(1),
         };
         let mut editor = Editor::new(scene, &self.arguments.scene);

@@ -102,7 +102,15 @@ impl Scene {
     /// # Errors
     /// [`Error::Input`], one line that starts with the file and, where one is to blame, the line.
     pub fn load(path: &Path) -> Result<Self> {
-        let (scene, notes) = Self::load_with_notes(path, &gltf::Options::default())?;
+        Self::load_at(path, 0.0)
+    }
+
+    /// As [`Scene::load`]; skins and morph targets of a glTF file stand in their pose at `time_s` seconds.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn load_at(path: &Path, time_s: f64) -> Result<Self> {
+        let (scene, notes) = Self::load_with_notes(path, &gltf::Options { time_s, camera: None })?;
         notes.left_out().iter().for_each(|line| log::warn!("{}: {line}", path.display()));
         notes.said().iter().for_each(|line| log::info!("{}: {line}", path.display()));
         Ok(scene)

@@ -1,7 +1,7 @@
 //! `shadow-fields bench time-error` splits the error of pictures into its causes and compares methods at equal error.
 
 use super::common::{start, table};
-use crate::app::source::GltfArguments;
+use crate::app::source::GltfSceneArguments;
 use crate::app::{Global, output, outputs};
 use crate::bench::cases::Case;
 use crate::bench::time_error::{self, Selection};
@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
-    gltf: GltfArguments,
+    gltf: GltfSceneArguments,
 }
 
 /// Measures and prints the budget, the comparison and the sweep.

@@ -83,9 +83,7 @@ pub fn run(global: &Global, arguments: &Arguments) -> Result<()> {
     inputs.retain(|input| known.insert(input.hash.clone()));
     plan.add_meshes(inputs, arguments.per_slice);
     for (path, pictures) in scenes.iter().zip(patterns) {
-        let time_s = picture.time.unwrap_or(0.0);
-        let (mut scene, _) =
-            Scene::load_with_notes(path, &scene::gltf::Options { time_s, ..scene::gltf::Options::default() })?;
+        let mut scene = Scene::load_at(path, picture.time.unwrap_or(0.0))?;
         let options = picture.options.frame(&scene)?;
         let first_s = picture.first_s(&scene);
         let input = Input { path: written(path, folder)?, hash: scene_hash(&scene) };

@@ -113,8 +113,7 @@ fn bake_mesh(context: &Context, plan: &Plan, input: &Input, folder: &Path) -> Re
 /// Renders pictures of a film into a folder, where their numbers are their names.
 fn render(context: &Context, plan: &Plan, film: &Film, numbers: Range<u32>, folder: &Path) -> Result<()> {
     let path = plan.path(&film.scene.path);
-    let options = scene::gltf::Options { time_s: film.first_s, ..scene::gltf::Options::default() };
-    let (mut scene, _) = Scene::load_with_notes(&path, &options)?;
+    let mut scene = Scene::load_at(&path, film.first_s)?;
     check_unchanged(&path, &scene_hash(&scene), &film.scene.hash)?;
     scene.data.output.exposure_ev = Some(film.exposure_ev);
     let shape = &scene.data.output;

@@ -76,10 +76,15 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(DynamicImage, bool)> {
     limits.max_alloc = Some(PIXEL_LIMIT * 32);
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(damaged)?;
-    let (width, height) = decoder.dimensions();
+    check_size(decoder.dimensions())?;
+    let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    Ok((decoded, matches!(format, ImageFormat::OpenExr | ImageFormat::Hdr)))
+}
+
+/// Refuses pictures of no pixels, or of more than [`PIXEL_LIMIT`].
+pub(super) fn check_size((width, height): (u32, u32)) -> Result<()> {
     if !(1..=PIXEL_LIMIT).contains(&(u64::from(width) * u64::from(height))) {
         return Err(Error::Input(format!("{width} x {height} pixels are not within 1 to {PIXEL_LIMIT}")));
     }
-    let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
-    Ok((decoded, matches!(format, ImageFormat::OpenExr | ImageFormat::Hdr)))
+    Ok(())
 }

@@ -198,11 +198,10 @@ impl Mesh {
     }
 
     /// A third of the triangles around each vertex, in square metres.
-    pub fn vertex_areas_m2(&self) -> Vec<f32> {
+    pub fn vertex_areas_m2(&self) -> Vec<f64> {
         let mut areas = vec![0.0; self.positions.len()];
         for triangle in &self.triangles {
-            let [a, b, c] = triangle.map(|v| self.positions[v as usize]);
-            let third = (b - a).cross(c - a).length() / 6.0;
+            let third = area_m2(&self.positions, std::slice::from_ref(triangle)) / 3.0;
             triangle.iter().for_each(|&v| areas[v as usize] += third);
         }
         areas
@@ -370,7 +369,7 @@ fn is_unit(normal: Vec3) -> bool {
     (normal.as_dvec3().length_squared() - 1.0).abs() < 5e-7
 }
 
-fn area_m2(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
+pub(crate) fn area_m2(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
     let area = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| positions[i as usize].as_dvec3());
         0.5 * (b - a).cross(c - a).length()

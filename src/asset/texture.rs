@@ -1,7 +1,7 @@
 //! Textures: pictures that colour a surface, by its texture coordinates.
 
 #[cfg(feature = "decoders")]
-use super::decode::PIXEL_LIMIT;
+use super::decode::check_size;
 use super::decode::decode;
 use super::mesh::Mesh;
 use super::picture::{linear_from_srgb, srgb_from_linear};
@@ -80,9 +80,7 @@ impl Texels {
         bytes.get_mut(60..64).ok_or_else(|| Error::Input("a KTX2 picture that is cut off".into()))?.fill(0);
         let texture = Transcoder::new(&bytes).map_err(damaged)?;
         let (width, height) = texture.base_dimensions();
-        if !(1..=PIXEL_LIMIT).contains(&(u64::from(width) * u64::from(height))) {
-            return Err(Error::Input(format!("{width} x {height} pixels are not within 1 to {PIXEL_LIMIT}")));
-        }
+        check_size((width, height))?;
         // The transcoder trusts the unpacked size of the first level, which stands at byte 96.
         let unpacked = bytes.get(96..104).and_then(|size| size.try_into().ok()).map_or(0, u64::from_le_bytes);
         if unpacked > 16 * u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4)) {
@@ -92,7 +90,8 @@ impl Texels {
             return Err(Error::Input("not a KTX2 picture that is read: its colours have no 8 bits".into()));
         }
         let bytes = texture.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(damaged)?;
-        let (width, height) = (width as usize, height as usize);
+        let width = width as usize;
+        let height = height as usize;
         let rgba = bytes.as_chunks().0.to_vec();
         if rgba.len() != width * height {
             return Err(Error::Input(format!("{} texels are not {width} x {height}", rgba.len())));

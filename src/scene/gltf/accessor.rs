@@ -26,13 +26,14 @@ pub fn numbers(document: &Document, index: usize, widths: &[usize]) -> Result<Ve
         let what = format!("{} numbers an element instead of {widths:?}", elements.width);
         return Err(document.fail(format!("accessors[{index}]"), what));
     }
-    let scaled = |value: f32, most: f32| if elements.normalized { (value / most).max(-1.0) } else { value };
+    let most = largest(elements.component);
+    let scaled = |value: f32| if elements.normalized { (value / most).max(-1.0) } else { value };
     let number = |bytes: &[u8]| match (elements.component, bytes) {
-        (ComponentType::I8, &[a]) => scaled(f32::from(a as i8), 127.0),
-        (ComponentType::U8, &[a]) => scaled(f32::from(a), 255.0),
-        (ComponentType::I16, &[a, b]) => scaled(f32::from(i16::from_le_bytes([a, b])), 32_767.0),
-        (ComponentType::U16, &[a, b]) => scaled(f32::from(u16::from_le_bytes([a, b])), 65_535.0),
-        (ComponentType::U32, &[a, b, c, d]) => scaled(u32::from_le_bytes([a, b, c, d]) as f32, u32::MAX as f32),
+        (ComponentType::I8, &[a]) => scaled(f32::from(a as i8)),
+        (ComponentType::U8, &[a]) => scaled(f32::from(a)),
+        (ComponentType::I16, &[a, b]) => scaled(f32::from(i16::from_le_bytes([a, b]))),
+        (ComponentType::U16, &[a, b]) => scaled(f32::from(u16::from_le_bytes([a, b]))),
+        (ComponentType::U32, &[a, b, c, d]) => scaled(u32::from_le_bytes([a, b, c, d]) as f32),
         (ComponentType::F32, &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]),
         _ => f32::NAN,
     };
@@ -43,6 +44,18 @@ pub fn numbers(document: &Document, index: usize, widths: &[usize]) -> Result<Ve
             Err(document.fail(format!("accessors[{index}]"), what))
         }
         None => Ok(numbers),
+    }
+}
+
+/// What stands for 1 in quantised numbers that are normalised.
+pub fn largest(component: ComponentType) -> f32 {
+    match component {
+        ComponentType::I8 => 127.0,
+        ComponentType::U8 => 255.0,
+        ComponentType::I16 => 32_767.0,
+        ComponentType::U16 => 65_535.0,
+        ComponentType::U32 => u32::MAX as f32,
+        ComponentType::F32 => 1.0,
     }
 }
 

@@ -55,9 +55,9 @@ pub fn camera(
     if !stand.motion.is_empty() {
         notes.leave_out("movements of cameras (they stand where they are at time 0)");
     }
-    // The placement of an entity that stands there at time 0; cameras look along -z.
-    let at = EntityData { motion: stand.motion.clone(), ..EntityData::of_mesh("") }.at(0.0);
-    let to_world = |p: DVec3| at.point(stand.fixed.transform_point3(p));
+    // Cameras look along -z.
+    let at = stand.at(0.0);
+    let to_world = |p: DVec3| at.transform_point3(p);
     let eye = to_world(DVec3::ZERO);
     let ahead = to_world(DVec3::NEG_Z);
     let ahead = (ahead - eye).try_normalize().ok_or_else(|| document.fail(&place, "its node squeezes space flat"))?;

@@ -158,8 +158,9 @@ fn read<T: for<'de> Deserialize<'de>>(document: &Document, json: Value, place: &
 #[cfg(feature = "decoders")]
 mod draco {
     use super::*;
+    use crate::scene::gltf::accessor::largest;
     use ::gltf::json::Index;
-    use ::gltf::json::accessor::{ComponentType, GenericComponentType};
+    use ::gltf::json::accessor::{Accessor, ComponentType, GenericComponentType};
     use ::gltf::json::buffer::View;
     use ::gltf::json::mesh::Mode;
     use ::gltf::json::validation::{Checked, USize64};
@@ -191,45 +192,29 @@ mod draco {
         let named: Vec<_> = primitive.attributes.iter().map(|(name, index)| (name.clone(), *index)).collect();
         for (name, index) in named {
             let Some(id) = packed.attributes.get(&name.to_string()) else { continue };
-            let attributes = (0..decoded.num_attributes()).map(|id| decoded.attribute(id));
-            let Some(attribute) = attributes.into_iter().find(|attribute| attribute.unique_id() == *id) else {
+            let mut attributes = (0..decoded.num_attributes()).map(|id| decoded.attribute(id));
+            let Some(attribute) = attributes.find(|attribute| attribute.unique_id() == *id) else {
                 return Err(document.fail(place, format!("there is no attribute {id}")));
             };
-            let mut accessor = document.root.accessors[index.value()].clone();
+            let accessor = &document.root.accessors[index.value()];
             let (Checked::Valid(component), Checked::Valid(kind)) = (accessor.component_type, accessor.type_) else {
                 continue; // judged where it is read
             };
-            let whole = match component.0 {
-                ComponentType::I8 => 127.0,
-                ComponentType::U8 => 255.0,
-                ComponentType::I16 => 32_767.0,
-                ComponentType::U16 => 65_535.0,
-                _ => 1.0,
-            };
-            let scale = if accessor.normalized { whole } else { 1.0 };
-            let numbers = attribute.read_f32s(count, kind.multiplicity());
-            let bytes = numbers.iter().flat_map(|number| (number / scale).to_le_bytes());
-            accessor.buffer_view = Some(add_view(document, bytes.collect(), &place)?);
-            accessor.byte_offset = None;
-            accessor.sparse = None;
-            accessor.normalized = false;
-            accessor.count = USize64::from(count);
-            accessor.component_type = Checked::Valid(GenericComponentType(ComponentType::F32));
-            let index = document.root.push(accessor);
+            let scale = if accessor.normalized { largest(component.0) } else { 1.0 };
+            let width = kind.multiplicity();
+            document.take_bytes(4 * count * width, &place)?;
+            let numbers = attribute.read_f32s(count, width);
+            let bytes = numbers.iter().flat_map(|number| (number / scale).to_le_bytes()).collect();
+            let index = add_accessor(document, index, bytes, count, ComponentType::F32);
             document.root.meshes[mesh].primitives[at].attributes.insert(name, index);
         }
-        let corners = decoded.faces().iter().flatten().flat_map(|corner| corner.0.to_le_bytes()).collect();
-        let view = add_view(document, corners, &place)?;
-        let primitive = &document.root.meshes[mesh].primitives[at];
-        let Some(mut accessor) = primitive.indices.map(|index| document.root.accessors[index.value()].clone()) else {
+        let Some(index) = document.root.meshes[mesh].primitives[at].indices else {
             return Err(document.fail(place, "the primitive has no indices"));
         };
-        accessor.buffer_view = Some(view);
-        accessor.byte_offset = None;
-        accessor.sparse = None;
-        accessor.count = USize64::from(3 * decoded.num_faces());
-        accessor.component_type = Checked::Valid(GenericComponentType(ComponentType::U32));
-        let index = document.root.push(accessor);
+        let corner_count = 3 * decoded.num_faces();
+        document.take_bytes(4 * corner_count, &place)?;
+        let corners = decoded.faces().iter().flatten().flat_map(|corner| corner.0.to_le_bytes()).collect();
+        let index = add_accessor(document, index, corners, corner_count, ComponentType::U32);
         let primitive = &mut document.root.meshes[mesh].primitives[at];
         primitive.indices = Some(index);
         primitive.mode = Checked::Valid(Mode::Triangles);
@@ -247,11 +232,17 @@ mod draco {
         Ok(mesh)
     }
 
-    fn add_view(document: &mut Document, bytes: Vec<u8>, place: &str) -> Result<Index<View>> {
+    /// An accessor like another that reads `count` elements of these bytes, which were taken before.
+    fn add_accessor(
+        document: &mut Document,
+        like: Index<Accessor>,
+        bytes: Vec<u8>,
+        count: usize,
+        component: ComponentType,
+    ) -> Index<Accessor> {
         let byte_length = USize64::from(bytes.len());
-        document.take_bytes(bytes.len(), place)?;
         let buffer = document.add_buffer(bytes);
-        Ok(document.root.push(View {
+        let view = document.root.push(View {
             buffer,
             byte_length,
             byte_offset: None,
@@ -260,6 +251,16 @@ mod draco {
             target: None,
             extensions: None,
             extras: Default::default(),
-        }))
+        });
+        let accessor = Accessor {
+            buffer_view: Some(view),
+            byte_offset: None,
+            sparse: None,
+            normalized: false,
+            count: USize64::from(count),
+            component_type: Checked::Valid(GenericComponentType(component)),
+            ..document.root.accessors[like.value()].clone()
+        };
+        document.root.push(accessor)
     }
 }

@@ -11,7 +11,7 @@ use super::document::Document;
 use super::notes::Notes;
 use super::pose::Pose;
 use crate::asset::Mesh;
-use crate::asset::mesh::{Attributes, TRIANGLE_LIMIT};
+use crate::asset::mesh::{Attributes, TRIANGLE_LIMIT, area_m2};
 use crate::error::Result;
 
 /// The triangles of a primitive. Where it has no normals, every triangle has vertices of its own with its own normal,
@@ -107,7 +107,7 @@ impl Shape {
             return Err(document.fail(&shape.place, what));
         }
         shape.triangles.shrink_to_fit();
-        if shape.weights().iter().all(|area| *area == 0.0) {
+        if area_m2(&shape.positions, &shape.triangles) == 0.0 {
             notes.leave_out("shapes without an area (all their triangles are points or lines)");
             return Ok(None);
         }
@@ -151,16 +151,6 @@ impl Shape {
             return Err(document.fail(&self.place, format!("there are fewer {} than positions", of.to_string())));
         }
         Ok(Some(self.source.iter().flat_map(|i| &numbers[*i as usize * stored..][..width]).copied().collect()))
-    }
-
-    /// A third of the area of the triangles around each vertex.
-    pub fn weights(&self) -> Vec<f64> {
-        let mut weights = vec![0.0; self.positions.len()];
-        for triangle in &self.triangles {
-            let [a, b, c] = triangle.map(|i| self.positions[i as usize].as_dvec3());
-            triangle.iter().for_each(|i| weights[*i as usize] += (b - a).cross(c - a).length() / 6.0);
-        }
-        weights
     }
 
     /// How many vertices there are.

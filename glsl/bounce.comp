@@ -15,7 +15,7 @@ layout(std430, binding = 5) writeonly buffer Radiosity { vec4 radiosity[]; };
 layout(std430, binding = 6) readonly buffer SoftDirect { vec4 soft_direct[]; };
 layout(std430, binding = 7) writeonly buffer Soft { vec4 soft[]; };
 #endif
-layout(push_constant) uniform Push { uint count; } push;
+layout(push_constant) uniform Push { uint count; uint last; } push;
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -32,6 +32,8 @@ void main() {
     vec4 bounced = vec4(PI * entities[range.y >> 8].albedo * sum / WHOLE_SHARE, 0.0); // albedo is over pi
     radiosity[i] = direct[i] + bounced;
 #if SOFT
-    soft[i] = soft_direct[i] + bounced;
+    if (push.last != 0) {
+        soft[i] = soft_direct[i] + bounced;
+    }
 #endif
 }

@@ -8,8 +8,9 @@
 //! Only fronts reflect. What moves neither reflects onto a group nor is lit by one. A lamp in spherical harmonics inside a
 //! closed mesh lights nothing of it, as the mesh's transfer ends where its own far side blocks; a sharp one does.
 
-use crate::bake::BakedScene;
+use crate::asset::Mesh;
 use crate::bake::links::{RUN_BITS, Runs, WHOLE_SHARE};
+use crate::bake::surfaces::Links;
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
 use crate::shaders::{Library, ShaderPermutation};
@@ -60,29 +61,20 @@ pub struct Linked {
 }
 
 impl Linked {
-    /// The links of a scene; `None` where no vertex has any, or where there are more runs than links can number.
-    pub fn new(baked: &BakedScene) -> Option<Self> {
-        let surface = |entity: usize| &baked.surfaces[baked.surface_of[entity]];
-        let count = |entity: usize| surface(entity).mesh.positions.len();
-        let mut firsts = Vec::new();
-        let mut vertices = 0;
-        for entity in 0..baked.surface_of.len() {
-            firsts.push(vertices);
-            vertices += count(entity) as u32;
-        }
-        let mut linked = Linked {
-            areas: vec![0.0; vertices as usize],
-            ranges: vec![[0, 0]; vertices as usize],
-            ..Linked::default()
-        };
-        for entities in &baked.rigid {
+    /// The links of a scene's entities, of which those of one list of `rigid` never move against each other; `None` where
+    /// no vertex has any, or where there are more runs than links can number.
+    pub fn new(entities: &[LinkedEntity<'_>], rigid: &[Vec<usize>]) -> Option<Self> {
+        let vertices = entities.iter().map(|entity| entity.order.len()).sum();
+        let mut linked = Linked { areas: vec![0.0; vertices], ranges: vec![[0, 0]; vertices], ..Linked::default() };
+        for members in rigid {
             let base = linked.runs.len() as u32;
-            let runs = Runs::new(entities.iter().map(|&entity| count(entity)));
-            let run =
-                |(member, first, count): (usize, usize, usize)| [firsts[entities[member]] + first as u32, count as u32];
+            let runs = Runs::new(members.iter().map(|&member| entities[member].order.len()));
+            let run = |(member, first, count): (usize, usize, usize)| {
+                [(entities[members[member]].first + first) as u32, count as u32]
+            };
             linked.runs.extend(runs.all().map(run));
-            for &entity in entities {
-                linked.add(entity, firsts[entity] as usize, surface(entity), base);
+            for &member in members {
+                linked.add(member, &entities[member], base);
             }
         }
         if linked.runs.len() >= 1 << RUN_BITS {
@@ -92,18 +84,27 @@ impl Linked {
         (!linked.links.is_empty()).then_some(linked)
     }
 
-    fn add(&mut self, entity: usize, first: usize, surface: &crate::bake::BakedSurface, base: u32) {
-        let Some(links) = &surface.links else { return };
-        let areas = surface.mesh.vertex_areas_m2();
-        let order = crate::bake::cluster_order::cluster_order(&surface.mesh);
+    fn add(&mut self, index: usize, entity: &LinkedEntity<'_>, base: u32) {
+        let Some(links) = &entity.links else { return };
+        let areas = entity.mesh.vertex_areas_m2();
         let mut from = self.links.len() as u32;
-        for ((place, &v), &count) in order.iter().enumerate().zip(&links.counts) {
-            self.areas[first + place] = areas[v as usize];
-            self.ranges[first + place] = [from, u32::from(count) | (entity as u32) << 8];
+        for ((place, &v), &count) in (entity.first..).zip(entity.order).zip(&links.counts) {
+            self.areas[place] = areas[v as usize] as f32;
+            self.ranges[place] = [from, u32::from(count) | (index as u32) << 8];
             from += u32::from(count);
         }
         self.links.extend(links.packed.iter().map(|link| link + base));
     }
+}
+
+/// An entity whose vertices may have links.
+pub struct LinkedEntity<'e> {
+    pub mesh: &'e Mesh,
+    /// Which vertex of the mesh stands at each place of the buffers of light.
+    pub order: &'e [u32],
+    /// The first of these places.
+    pub first: usize,
+    pub links: Option<Arc<Links>>,
 }
 
 /// Light of every vertex before and after bounces: of all lights, and without that of sharp ones where there are any.
@@ -189,7 +190,9 @@ impl Bounce {
                 Bind::Buffer(light.radiosity),
             ];
             resources.extend(light.soft_direct.into_iter().chain(light.soft).map(Bind::Buffer));
-            commands.dispatch(&self.bounce, &resources, &vertex_count, [vertex_count, 1, 1])?;
+            // Pixels read the last step alone.
+            let push = [vertex_count, u32::from(step + 1 == steps)];
+            commands.dispatch(&self.bounce, &resources, &push, [vertex_count, 1, 1])?;
             if step + 1 < steps {
                 written(commands);
                 commands.barrier(Access::ComputeWrite, Access::ComputeWrite);

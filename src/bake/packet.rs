@@ -1,6 +1,7 @@
 //! Rays from one point against a hierarchy of triangles, sixteen at a time: what a box or a triangle costs is shared by
 //! all, and vector instructions take eight of them where the processor has AVX2.
 
+use super::triangles::weights;
 use glam::{Mat3A, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2_from_tris};
@@ -269,11 +270,8 @@ impl Blockers {
 
     /// Which triangle of the member's mesh a ray meets, and where: the weights of its second and third corner.
     pub fn place(&self, origin: Vec3A, direction: Vec3A, hit: &BlockerHit) -> (u32, [f32; 2]) {
-        let Corners { corner, edges, normal } = &self.triangles[hit.index as usize];
-        let from_corner = origin + hit.distance * direction - *corner;
-        let whole = normal.length_squared().max(f32::MIN_POSITIVE);
-        let weights = [from_corner.cross(edges[1]), edges[0].cross(from_corner)].map(|part| part.dot(*normal) / whole);
-        (self.numbers[hit.index as usize], weights)
+        let Corners { corner, edges, .. } = self.triangles[hit.index as usize];
+        (self.numbers[hit.index as usize], weights(edges, origin + hit.distance * direction - corner))
     }
 }
 

@@ -6,7 +6,7 @@ use super::links::{Met, Runs, links};
 use super::own_visibility::{Counts, Eye, Front, PATTERN, Rays, Seen, Standing, see};
 use super::packet::{BlockerTriangle, Blockers};
 use super::refine::{Limits, Refined, refine};
-use super::triangles::distinct;
+use super::triangles::{distinct, weights};
 use super::{BakeReport, Options, Progress, TRANSFER_OFFSET, Wanted, bakes_transfer};
 use crate::asset::Mesh;
 use crate::asset::enclose::around_spheres;
@@ -17,7 +17,7 @@ use crate::field::self_visibility::{self, BYTES};
 use crate::layout::CLUSTER_VERTICES;
 use crate::scene::groups::Groups;
 use crate::scene::{Placement, Scene};
-use glam::{DMat3, DVec3, Mat3A, Quat, Vec3};
+use glam::{DMat3, DVec3, Mat3A, Quat, Vec3, Vec3A};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -238,11 +238,11 @@ impl GroupPlan {
                 surfaces[member].mesh = Arc::new(refined.into_mesh(own));
             }
         }
-        let lit = (&surfaces, &self.members, parents);
-        let lit: Vec<Lit> = lit
+        let lit: Vec<Lit> = (&surfaces, &self.members, &parents)
             .into_par_iter()
             .map(|(surface, member, parents)| Lit::new(&member.mesh, &surface.mesh, parents.as_deref()))
             .collect();
+        let runs = Runs::new(lit.iter().map(|lit| lit.order.len()));
         let total: usize = receivers.iter().map(|&member| surfaces[member].mesh.positions.len()).sum();
         let mut done = 0;
         for &member in &receivers {
@@ -250,7 +250,7 @@ impl GroupPlan {
             let tell = |vertices: usize| {
                 progress((total + done + vertices) as u32 / 2, total.max(1) as u32);
             };
-            surfaces[member] = group.space(member).surface(mesh, self.wanted, &lit, &tell);
+            surfaces[member] = group.space(member).surface(mesh, self.wanted, (&lit, &runs), &tell);
             done += surfaces[member].mesh.positions.len();
         }
         let report = BakeReport { samples: total as u32, total: started.elapsed(), ..Default::default() };
@@ -434,11 +434,16 @@ impl GroupSpace<'_> {
     }
 
     /// The surface with the own visibility of its vertices. `told` hears of the vertices that are done.
-    /// `lit` are the surfaces of all members.
-    fn surface(&self, mesh: Arc<Mesh>, wanted: Wanted, lit: &[Lit], told: &dyn Fn(usize)) -> BakedSurface {
+    /// The surfaces of all members, and the runs of their vertices, are what its links lead to.
+    fn surface(
+        &self,
+        mesh: Arc<Mesh>,
+        wanted: Wanted,
+        (lit, runs): (&[Lit], &Runs),
+        told: &dyn Fn(usize),
+    ) -> BakedSurface {
         let plan = self.group.plan;
         let order = &lit[self.member].order;
-        let runs = Runs::new(lit.iter().map(|lit| lit.order.len()));
         let nudges = self.nudges(&mesh.positions, &mesh.normals, &mesh.triangles);
         // Few meshes have buried vertices, which alone ask for their triangles.
         let around = OnceLock::new();
@@ -487,7 +492,7 @@ impl GroupSpace<'_> {
                         place: lit[member as usize].place(triangle, weights),
                         share,
                     });
-                    (seen, links(met.collect(), &runs))
+                    (seen, links(met.collect(), runs))
                 };
                 let seen: Vec<(Seen, Vec<u32>)> = cluster.par_iter().with_max_len(8).map(linked).collect();
                 (near, seen)
@@ -537,7 +542,7 @@ impl Lit {
         let mut counts = vec![0_u32; mesh.triangles.len()];
         let parent = |part: usize| parents.map_or(part, |parents| parents[part] as usize);
         (0..surface.triangles.len()).for_each(|part| counts[parent(part)] += 1);
-        // Four cells a part at least, as its corners are nearest to a third of it each.
+        // Nine cells a part, half of them within the triangle: each corner is nearest to a third of the part.
         let mut end = 0;
         let grids: Vec<(u32, u32)> = counts
             .iter()
@@ -550,10 +555,11 @@ impl Lit {
             .collect();
         let mut cells = vec![u32::MAX; end as usize];
         for (part, vertices) in surface.triangles.iter().enumerate() {
-            let of = mesh.triangles[parent(part)].map(|v| mesh.positions[v as usize]);
+            let of = mesh.triangles[parent(part)].map(|v| Vec3A::from(mesh.positions[v as usize]));
+            let edges = [of[1] - of[0], of[2] - of[0]];
             let (first, side) = grids[parent(part)];
-            let corners = vertices.map(|v| weights(of, surface.positions[v as usize]));
-            let positions = vertices.map(|v| surface.positions[v as usize]);
+            let positions = vertices.map(|v| Vec3A::from(surface.positions[v as usize]) - of[0]);
+            let corners = positions.map(|position| weights(edges, position));
             let step = 1.0 / side as f32;
             let range = |axis: usize| {
                 let all = corners.map(|corner| corner[axis] / step - 0.5);
@@ -566,7 +572,7 @@ impl Lit {
                     let at = [x, y].map(|i| (i as f32 + 0.5) * step);
                     let cell = &mut cells[(first + y * side + x) as usize];
                     if *cell == u32::MAX || is_within(corners, at) {
-                        let place = of[0] + at[0] * (of[1] - of[0]) + at[1] * (of[2] - of[0]);
+                        let place = at[0] * edges[0] + at[1] * edges[1];
                         let away = positions.map(|position| position.distance_squared(place));
                         let nearest = (0..3).min_by(|&a, &b| away[a].total_cmp(&away[b])).unwrap_or(0);
                         *cell = places[vertices[nearest] as usize];
@@ -593,14 +599,6 @@ impl Lit {
         let [x, y] = weights.map(|weight| ((weight * side as f32) as u32).min(side - 1));
         self.cells[(first + y * side + x) as usize]
     }
-}
-
-/// The weights of the second and third corner of a triangle at a place of its plane.
-fn weights([a, b, c]: [Vec3; 3], place: Vec3) -> [f32; 2] {
-    let edges = [b - a, c - a];
-    let normal = edges[0].cross(edges[1]);
-    let whole = normal.length_squared().max(f32::MIN_POSITIVE);
-    [(place - a).cross(edges[1]), edges[0].cross(place - a)].map(|part| part.dot(normal) / whole)
 }
 
 /// Whether a point lies within a triangle of the plane, which may run either way around.

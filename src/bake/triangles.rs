@@ -1,7 +1,7 @@
 //! The corners of a mesh in the frame of captures, and its triangles that repeat others.
 
 use crate::asset::Mesh;
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
@@ -9,6 +9,13 @@ use std::collections::{HashMap, HashSet};
 pub fn unit_positions(mesh: &Mesh) -> Vec<Vec3> {
     let (centre, radius_m) = mesh.bounding_sphere();
     mesh.positions.iter().map(|p| ((p.as_dvec3() - centre.as_dvec3()) / f64::from(radius_m)).as_vec3()).collect()
+}
+
+/// The weights of the second and third corner of a triangle at a place of its plane, both given from the first corner.
+pub fn weights(edges: [Vec3A; 2], place: Vec3A) -> [f32; 2] {
+    let normal = edges[0].cross(edges[1]);
+    let whole = normal.length_squared().max(f32::MIN_POSITIVE);
+    [place.cross(edges[1]), edges[0].cross(place)].map(|part| part.dot(normal) / whole)
 }
 
 /// The triangles of a mesh without those that repeat another: with corners of the same place and colour, the same way

@@ -2,6 +2,7 @@
 
 use super::Frame;
 use super::pixel::PixelChains;
+use crate::bounce::Bounce;
 use serde::Serialize;
 
 /// Bytes by use.
@@ -48,7 +49,7 @@ impl Frame {
         Memory {
             fields: self.buffers.fields.size_bytes,
             silhouettes: self.buffers.sharp().map(|buffer| buffer.size_bytes).iter().sum(),
-            transfers: self.buffers.transfers.size_bytes,
+            transfers: self.buffers.transfers.size_bytes + self.bounce.as_ref().map_or(0, Bounce::size_bytes),
             vertices: self.buffers.vertices.size_bytes,
             radiosity: self.radiosity.size_bytes(),
             drawables: self.buffers.surfaces.iter().map(|surface| surface.drawn.size_bytes()).sum(),

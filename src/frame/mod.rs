@@ -26,7 +26,7 @@ use crate::bake::cache::Cache;
 use crate::bake::ensure::SceneProgress;
 use crate::bake::surfaces::SurfacePlan;
 use crate::bake::{self, Baker, SceneNeeds};
-use crate::bounce::{Bounce, Bounces, Linked};
+use crate::bounce::{Bounce, Bounces, Linked, LinkedEntity};
 use crate::draw::Shading;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Timing};
@@ -109,7 +109,8 @@ impl Frame {
         let mut baked = bake::ensure(baker, cache, scene, &needs, progress)?;
         let mut near = std::mem::take(&mut baked.near);
         let mut scene = scene.clone();
-        let linked = (options.bounces != Bounces::None).then(|| Linked::new(&baked)).flatten();
+        let links: Vec<_> = baked.surface_of.iter().map(|&surface| baked.surfaces[surface].links.clone()).collect();
+        let rigid = std::mem::take(&mut baked.rigid);
         scene.set_surfaces(baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.clone()).collect());
         let buffers = SceneBuffers::new(device, &scene, &options.bake, baked)?;
         let entity_count = scene.entities.len();
@@ -118,7 +119,7 @@ impl Frame {
         let wanted = permutation(&options, wanted, &scene, &methods, uniform_entities(device));
         let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted))?;
         let sharp = permutation::sharp(&options, &merge.permutation, &methods, &scene, &buffers);
-        let radiosity = RadiosityBuffers::new(device, &scene, &buffers, sharp.is_some(), linked.is_some())?;
+        let mut radiosity = RadiosityBuffers::new(device, &scene, &buffers, sharp.is_some())?;
         let mut lists = ClusterLists::default();
         for (index, _) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
             lists.add(
@@ -135,7 +136,20 @@ impl Frame {
             );
         }
         let texels = merge.permutation.variant.reads == Reads::Texels;
+        let linked = |(entity, links)| LinkedEntity {
+            mesh: scene.surface(entity),
+            order: &buffers.surface(entity).order,
+            first: radiosity.offsets[entity] as usize / 16,
+            links,
+        };
+        let bounces = options.bounces != Bounces::None;
+        let linked = bounces
+            .then(|| links.into_iter().enumerate().map(linked).collect::<Vec<_>>())
+            .and_then(|entities| Linked::new(&entities, &rigid));
         let bounce = linked.map(|linked| Bounce::new(device, library, &linked, sharp.is_some(), texels)).transpose()?;
+        if bounce.is_some() {
+            radiosity.keep_direct()?;
+        }
         let edges = pixels.pixels().is_some();
         let sharp =
             sharp.map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting })).transpose()?;

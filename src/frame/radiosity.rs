@@ -15,7 +15,7 @@ pub(super) struct RadiosityBuffers {
     /// Light without that of sharp lights, in a scene that has any: what the merge writes then.
     soft: Option<Buffer>,
     /// The same two before light has bounced, where it does: then the merge and the pass of sharp lights write these.
-    direct: Option<[Option<Buffer>; 2]>,
+    direct: Option<Direct>,
     /// Whether any of it was replaced by what was computed elsewhere, and not merged since.
     pub replaced: bool,
     /// The first byte of each entity.
@@ -23,15 +23,15 @@ pub(super) struct RadiosityBuffers {
     comparisons: [Option<Buffer>; 2],
 }
 
+/// Direct light: all of it, and that without sharp lights where there are any.
+struct Direct {
+    all: Buffer,
+    soft: Option<Buffer>,
+}
+
 impl RadiosityBuffers {
     /// Zero for every vertex of a scene.
-    pub fn new(
-        device: &Arc<Device>,
-        scene: &Scene,
-        buffers: &SceneBuffers,
-        sharp: bool,
-        bounces: bool,
-    ) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers, sharp: bool) -> Result<Self> {
         let mut offsets = Vec::new();
         let mut size_bytes = 0;
         for entity in 0..scene.entities.len() {
@@ -40,17 +40,25 @@ impl RadiosityBuffers {
         }
         let mut merged = Buffer::new(device, "radiosity", BufferKind::Device, size_bytes.max(16))?;
         merged.fill(0, &vec![0.0_f32; merged.size_bytes as usize / 4])?;
-        let another = |name: &str| Buffer::new(device, name, BufferKind::Device, merged.size_bytes);
-        let soft = |name: &str| sharp.then(|| another(name)).transpose();
-        let direct = || Ok([Some(another("direct light")?), soft("soft direct light")?]);
+        let soft = || Buffer::new(device, "soft radiosity", BufferKind::Device, merged.size_bytes);
         Ok(RadiosityBuffers {
-            soft: soft("soft radiosity")?,
-            direct: bounces.then(direct).transpose()?,
+            soft: sharp.then(soft).transpose()?,
+            direct: None,
             merged,
             replaced: false,
             offsets,
             comparisons: Default::default(),
         })
+    }
+
+    /// Keeps direct light apart from now on, for bounces to add to it.
+    pub fn keep_direct(&mut self) -> Result<()> {
+        let like = |of: &Buffer, name: &str| Buffer::new(of.device(), name, BufferKind::Device, of.size_bytes);
+        self.direct = Some(Direct {
+            all: like(&self.merged, "direct light")?,
+            soft: self.soft.as_ref().map(|soft| like(soft, "soft direct light")).transpose()?,
+        });
+        Ok(())
     }
 
     /// The bytes of an entity of so many vertices.
@@ -66,15 +74,14 @@ impl RadiosityBuffers {
 
     /// All direct light: what the merge writes, and the pass of sharp lights.
     pub fn direct(&self) -> &Buffer {
-        self.direct.as_ref().and_then(|[all, _]| all.as_ref()).unwrap_or(&self.merged)
+        self.direct.as_ref().map_or(&self.merged, |direct| &direct.all)
     }
 
     /// Output of the merge.
     pub fn soft_direct(&self) -> &Buffer {
-        match (&self.direct, &self.soft) {
-            (Some([_, Some(soft)]), _) => soft,
-            (None, Some(soft)) => soft,
-            _ => self.direct(),
+        match &self.direct {
+            Some(direct) => direct.soft.as_ref().unwrap_or(&direct.all),
+            None => self.soft(),
         }
     }
 
@@ -89,9 +96,8 @@ impl RadiosityBuffers {
     }
 
     pub fn size_bytes(&self) -> u64 {
-        let soft = self.soft.iter();
-        let direct = self.direct.iter().flatten().flatten();
-        self.merged.size_bytes + soft.chain(direct).map(|buffer| buffer.size_bytes).sum::<u64>()
+        let direct = self.direct.iter().flat_map(|direct| direct.soft.iter().chain([&direct.all]));
+        self.merged.size_bytes + self.soft.iter().chain(direct).map(|buffer| buffer.size_bytes).sum::<u64>()
     }
 
     /// Replaces an entity's values. They come in the mesh's order of vertices, which `order` lists as they are stored.

@@ -45,8 +45,8 @@ fn all_of_a_hollow_sphere_is_lit_by_its_mean() {
     let scene = hollow();
     let areas = scene.meshes[0].vertex_areas_m2();
     let direct = lit(&stage, &scene, Bounces::None);
-    let weighed = |channel: usize| direct.iter().zip(&areas).map(move |(c, area)| f64::from(c[channel] * area));
-    let whole: f64 = areas.iter().map(|area| f64::from(*area)).sum();
+    let weighed = |channel: usize| direct.iter().zip(&areas).map(move |(c, area)| f64::from(c[channel]) * area);
+    let whole: f64 = areas.iter().sum();
     let mean = [0, 1, 2].map(|channel| weighed(channel).sum::<f64>() / whole);
     assert!(mean[0] > 0.01 && mean[0] > 1.5 * mean[1], "the lamp shines: {mean:?}");
     let albedo = f64::from(ALBEDO);

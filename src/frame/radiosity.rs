@@ -38,13 +38,11 @@ impl RadiosityBuffers {
             offsets.push(size_bytes);
             size_bytes += 16 * buffers.surface(entity).vertices.len() as u64;
         }
-        let mut merged = Buffer::new(device, "radiosity", BufferKind::Device, size_bytes.max(16))?;
-        merged.fill(0, &vec![0.0_f32; merged.size_bytes as usize / 4])?;
-        let soft = || Buffer::new(device, "soft radiosity", BufferKind::Device, merged.size_bytes);
+        let size_bytes = size_bytes.max(16);
         Ok(RadiosityBuffers {
-            soft: sharp.then(soft).transpose()?,
+            merged: zeros(device, "radiosity", size_bytes)?,
+            soft: sharp.then(|| zeros(device, "soft radiosity", size_bytes)).transpose()?,
             direct: None,
-            merged,
             replaced: false,
             offsets,
             comparisons: Default::default(),
@@ -53,7 +51,7 @@ impl RadiosityBuffers {
 
     /// Keeps direct light apart from now on, for bounces to add to it.
     pub fn keep_direct(&mut self) -> Result<()> {
-        let like = |of: &Buffer, name: &str| Buffer::new(of.device(), name, BufferKind::Device, of.size_bytes);
+        let like = |of: &Buffer, name: &str| zeros(of.device(), name, of.size_bytes);
         self.direct = Some(Direct {
             all: like(&self.merged, "direct light")?,
             soft: self.soft.as_ref().map(|soft| like(soft, "soft direct light")).transpose()?,
@@ -146,6 +144,13 @@ impl RadiosityBuffers {
             RadiositySource::Comparison(place) => self.comparisons[place].as_ref().unwrap_or(&self.merged),
         }
     }
+}
+
+/// Zero for every vertex: those that receive no light stay so.
+fn zeros(device: &Arc<Device>, name: &str, size_bytes: u64) -> Result<Buffer> {
+    let mut buffer = Buffer::new(device, name, BufferKind::Device, size_bytes)?;
+    buffer.fill(0, &vec![0_u32; size_bytes as usize / 4])?;
+    Ok(buffer)
 }
 
 /// Values in the mesh's order of vertices, as they are stored.

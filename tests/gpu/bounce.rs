@@ -70,6 +70,7 @@ fn frames_do_not_add_up() {
     let scene = hollow();
     let mut frame = stage.frame(&scene, frame::Options { bounces: Bounces::All, lights: Lights::Sharp, ..small() });
     let first = stage.light(&mut frame, &scene.at(0.0));
+    assert!(first[1].iter().flatten().all(|&c| c == 0.0), "the lamp receives nothing");
     frame.forget();
     assert_eq!(stage.light(&mut frame, &scene.at(0.0)), first);
     assert_eq!(stage.light(&mut frame, &scene.at(0.0)), first, "at rest nothing changes");

@@ -8,11 +8,25 @@ layout(location = 1) centroid in vec3 light; // of a surface of the mean reflect
 layout(location = 2) centroid in vec2 uv;
 layout(binding = 0) uniform sampler2D picture;
 #endif
+#if GLOSS
+layout(location = 3) centroid in vec3 tint;
+#if HIGHLIGHTS
+#include "merge_layout.glsl"
+const uint NONE = 0xffffffffu;
+#define ENTITY_BINDING 7
+#include "entities.glsl"
+#include "sub_light.glsl"
+#endif
+#include "gloss_pixel.glsl"
+#endif
 
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
     vec4 emission_white; // w = radiance that is shown as white
     float tag;
+#if GLOSS
+    uint entity;
+#endif
 #if PAINTED
     vec4 paint; // factor on the picture; least alpha
 #endif
@@ -26,7 +40,15 @@ void main() {
     if (texel.a < push.paint.w) {
         discard;
     }
-    shown += push.paint.rgb * texel.rgb * light;
+    vec3 over_mean = push.paint.rgb * texel.rgb;
+#if GLOSS
+    vec3 base = over_mean * within * tint * gloss_entity_at(push.entity).albedo;
+    shown = within * shown + glossy(push.entity, base, over_mean * within * light, within);
+    color = vec4(finish(shown, push.emission_white.w), push.tag);
+    return;
+#else
+    shown += over_mean * light;
+#endif
 #endif
     color = vec4(finish(within * shown, push.emission_white.w), push.tag);
 }

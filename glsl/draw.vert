@@ -9,12 +9,20 @@ layout(location = 1) out vec3 light;
 layout(location = 2) out vec2 uv;
 #include "paint.glsl"
 #endif
+#if GLOSS
+layout(location = 3) out vec3 tint;
+layout(binding = 1) uniform textureBuffer vertices;
+#include "gloss_vertex.glsl"
+#endif
 layout(location = 0) out vec4 radiance; // w: 1
 
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
     vec4 emission_white; // radiance factor; w = radiance that is shown as white
     float tag;           // number of the entity, for outlines
+#if GLOSS
+    uint entity;         // the entity
+#endif
 } push;
 
 void main() {
@@ -22,6 +30,10 @@ void main() {
 #if PAINTED
     light = radiosity.rgb * tint_of(paint);
     uv = paint.xy;
+#if GLOSS
+    tint = tint_of(paint);
+    pass_gloss(push.entity, uint(gl_VertexIndex));
+#endif
 #else
     radiance.rgb += radiosity.rgb;
 #endif

@@ -30,6 +30,25 @@ vec4 sky_quad(uint i) {
 }
 #endif
 layout(std430, binding = 7) writeonly buffer Radiosity { vec4 radiosity[]; };
+#if KEEPS
+// The sky's chain at its end, for what is seen reflected: sixteen halves a vertex.
+layout(std430, binding = 8) writeonly buffer Through { uvec4 through_all[]; };
+
+float through_at(float through[COEFFICIENTS], uint i) {
+    return i < COEFFICIENTS ? through[min(i, COEFFICIENTS - 1)] : 0.0;
+}
+
+void keep(float through[COEFFICIENTS], uint v) {
+    [[unroll]] for (uint part = 0; part < 2; part++) {
+        uvec4 packed;
+        [[unroll]] for (uint k = 0; k < 4; k++) {
+            uint i = 8 * part + 2 * k;
+            packed[k] = packHalf2x16(vec2(through_at(through, i), through_at(through, i + 1)));
+        }
+        through_all[2 * v + part] = packed;
+    }
+}
+#endif
 
 #include "generated/rotate.glsl"
 
@@ -237,6 +256,9 @@ void main() {
     }
 
     chain_end(t, through);
+#if KEEPS
+    keep(through, cluster.radiosity_first + v);
+#endif
     [[unroll]] for (uint channel = 0; channel < 3; channel++) {
         [[unroll]] for (uint k = 0; k < COEFFICIENTS; k++) {
             sum[channel] += sky_quad(channel * CHANNEL_QUADS + k / 4)[k % 4] * through[k];

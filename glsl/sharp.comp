@@ -23,6 +23,10 @@ READ_UVEC2(7, SelfCells, self_cells, self_cell)
 #endif
 #define FACINGS 1
 #include "sharp_light.glsl"
+#if SHOWN
+layout(std430, binding = 9) readonly buffer ShownLights { uvec4 shown_lights_of[]; }; // of every entity
+layout(std430, binding = 10) writeonly buffer ShownShares { vec4 shown_shares_of[]; }; // of every vertex
+#endif
 
 void main() {
     Cluster cluster = cluster_at(gl_WorkGroupID.x);
@@ -46,6 +50,9 @@ void main() {
 #if EDGES
     float soft = dot(sum.rgb, vec3(1.0)), albedo = dot(receiver.albedo, vec3(1.0));
 #endif
+#if SHOWN
+    shown_lights = shown_lights_of[cluster.receiver];
+#endif
     if (cluster.sharp_count > 0) {
         sum.rgb += sharp_sum(surface, cluster.entry_first, cluster.sharp_count) * receiver.albedo;
     }
@@ -53,4 +60,7 @@ void main() {
     sum.w = EDGE_STEPS * EDGE_STEPS * albedo * missed > albedo * open_light + soft ? 1.0 : 0.0;
 #endif
     radiosity[cluster.radiosity_first + v] = sum;
+#if SHOWN
+    shown_shares_of[cluster.radiosity_first + v] = shown_shares;
+#endif
 }

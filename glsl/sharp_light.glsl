@@ -9,6 +9,17 @@
 #define EACH [[unroll]]
 #endif
 
+#if SHOWN
+// Shares of the lights that the receiver's highlights are of: how much of each arrives of what an open place would have.
+uvec4 shown_lights; // entities, or NONE
+vec4 shown_shares = vec4(0.0);
+float open_share;   // irradiance by the current light with nothing between, of radiance 1
+
+void note_share(uint light, float irradiance) {
+    shown_shares = mix(shown_shares, vec4(irradiance / max(open_share, 1e-30)), equal(shown_lights, uvec4(light)));
+}
+#endif
+
 #if EDGES
 // Vertices carry a shadow's edge badly where its penumbra is narrow against the distance to the next vertex. The error
 // grows with the square of that distance over the penumbra's width, and with the light that the shadow takes away.
@@ -183,9 +194,15 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
         float sine = part_sine(light, block, part, along);
         float reach = reach_of(light, part, along) * surface.inverse_radius;
         float sum = 0.0;
+#if SHOWN
+        float open = 0.0;
+#endif
         EACH for (uint i = 0; i < FACINGS; i++) {
             Facing facing = surface.facings[i];
             float cosine = part_cosine(dot(facing.normal, direction), sine);
+#if SHOWN
+            open += facing.weight * cosine;
+#endif
 #if SELF
             // A part's radius is small enough for its sine to stand for it.
             bool shadows = facing.self_first != NONE;
@@ -194,7 +211,11 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
 #endif
             sum += facing.weight * cosine;
         }
-        share[k] = block.weight * part_light(light, block, part, along) * sum;
+        float unit = block.weight * part_light(light, block, part, along);
+        share[k] = unit * sum;
+#if SHOWN
+        open_share += unit * open;
+#endif
     }
     return share;
 }
@@ -273,6 +294,9 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
     uint b = light.fine >= 1.0 ? 1 : 0, last = light.fine <= 0.0 ? 0 : 4;
     uint j = i;
     float irradiance = 0.0;
+#if SHOWN
+    open_share = 0.0;
+#endif
 #if EDGES
     float unblocked = 0.0;
     finest = 0.0;
@@ -328,6 +352,9 @@ vec3 chain_sum(Surface surface, Entity shining, bool open, uint first, uint coun
 #if EDGES
     find_rim(ramp, shining, surface.step / max(light.distance, 1e-30));
     add_open(unblocked, cone, shining);
+#endif
+#if SHOWN
+    note_share(chain_light(entry_at(first + j)), irradiance * cone);
 #endif
     return irradiance * cone * shining.emission;
 }

@@ -22,6 +22,9 @@ layout(binding = 8) uniform textureBuffer vertices;
 #include "triangle_push.glsl"
 #define FACINGS 3
 #include "pixel_light.glsl"
+#if GLOSS
+#include "gloss_pixel.glsl"
+#endif
 
 void main() {
     uvec3 lit = push.first + triangle;
@@ -47,5 +50,10 @@ void main() {
         }
         light = blend(soft, lit, weight) + pixel_light(receiver, within * at, facings, chain);
     }
+#if GLOSS
+    vec3 base = reflectance * gloss_entity_at(push.receiver).albedo;
+    light = glossy(push.receiver, base, reflectance * light, within);
+    reflectance = vec3(1.0);
+#endif
     color = vec4(finish(within * push.emission_white.rgb * emission + reflectance * light, push.emission_white.w), push.tag);
 }

@@ -16,6 +16,9 @@ layout(binding = 1) uniform textureBuffer radiosity;  // w: whether an edge is n
 layout(binding = 8) uniform textureBuffer vertices;   // position and normal of each
 layout(binding = 9) uniform utextureBuffer emissions; // the bits of three numbers a vertex
 #include "triangle_push.glsl"
+#if GLOSS
+#include "gloss_vertex.glsl"
+#endif
 
 vec4 clip_place(uint v) {
     return push.clip_from_object * vec4(texelFetch(vertices, int(2 * (push.vertex_first + v))).xyz, 1.0);
@@ -43,6 +46,9 @@ void main() {
         texelFetch(paints, int(3 * own + 2)).x);
     uv = uintBitsToFloat(bits.xy);
     tint = tint_of(uintBitsToFloat(bits));
+#endif
+#if GLOSS
+    pass_gloss(push.receiver, own);
 #endif
     float edge = 0.0;
     for (int i = 0; i < 3; i++) {

@@ -26,6 +26,12 @@ impl Shared for [f32; 3] {
 impl Shared for [f32; 4] {
     const GLSL: &'static str = "vec4";
 }
+impl Shared for [u32; 3] {
+    const GLSL: &'static str = "uvec3";
+}
+impl Shared for [u32; 4] {
+    const GLSL: &'static str = "uvec4";
+}
 
 struct SharedField {
     name: &'static str,
@@ -136,6 +142,39 @@ shared_struct! {
     }
 }
 
+/// Lights whose highlights an entity shows: more than a pixel is worth.
+pub const SHOWN_LIGHTS: usize = 4;
+
+shared_struct! {
+    /// A glossy entity as the eye sees it: `GlossEntity` of the shaders.
+    GlossEntity {
+        /// Rows of the matrix from the entity's frame (metres from the centre of its bounding sphere) to the world's
+        /// axes at the eye.
+        row_x: [f32; 4],
+        row_y: [f32; 4],
+        row_z: [f32; 4],
+        /// Mean albedo.
+        albedo: [f32; 3],
+        roughness: f32,
+        /// Place of the eye in the world.
+        eye: [f32; 3],
+        metallic: f32,
+        /// Entities whose highlights it shows, or [`NONE`].
+        lights: [u32; SHOWN_LIGHTS],
+        /// Reflectance of a dielectric that is faced.
+        f0: f32,
+        /// Radiance that 1 in the sky's map stands for.
+        sky_scale: f32,
+        /// First vertex in the vertex buffer.
+        vertex_first: u32,
+        /// First vertex in the radiosity buffer.
+        radiosity_first: u32,
+        /// Texels hold four words.
+        unused: [u32; 3],
+        vertex_count: u32,
+    }
+}
+
 /// Shape of an entity's light in passes that evaluate sharp lights.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -152,13 +191,24 @@ pub enum LightKind {
     Rectangle,
 }
 
-/// The GLSL text of the shared structs.
+/// The GLSL text of the structs that light is computed from.
 pub fn glsl_structs() -> String {
-    let text = |name: &str, fields: &[SharedField]| {
-        let fields: String = fields.iter().map(|field| format!("    {} {};\n", field.glsl, field.name)).collect();
-        format!("struct {name} {{\n{fields}}};\n")
-    };
-    text("Entity", DeviceEntity::FIELDS) + &text("Cluster", Cluster::FIELDS)
+    glsl_struct("Entity", DeviceEntity::FIELDS) + &glsl_struct("Cluster", Cluster::FIELDS)
+}
+
+/// The GLSL text of [`GlossEntity`].
+pub fn glsl_gloss_struct() -> String {
+    glsl_struct("GlossEntity", GlossEntity::FIELDS)
+}
+
+fn glsl_struct(name: &str, fields: &[SharedField]) -> String {
+    let fields: String = fields.iter().map(|field| format!("    {} {};\n", field.glsl, field.name)).collect();
+    format!("struct {name} {{\n{fields}}};\n")
+}
+
+/// `gloss_entity_at(i)`, which reads [`GlossEntity`] from the texel view `gloss_entities`, four words a texel.
+pub fn glsl_gloss_entity_at() -> String {
+    glsl_reader("GlossEntity gloss_entity_at", "gloss_entities", "vec4", GlossEntity::FIELDS)
 }
 
 /// `entity_at(i)`, which reads an entity from the texel view `entities`, four floats a texel.
@@ -185,7 +235,7 @@ fn glsl_reader(function: &str, view: &str, texel: &str, fields: &[SharedField]) 
         let count = field.size_bytes / 4;
         let first = word % texel_words;
         let part = format!("t{}.{}", word / texel_words, &"xyzw"[first..first + count]);
-        if field.glsl == "uint" && texel == "vec4" { format!("floatBitsToUint({part})") } else { part }
+        if field.glsl.starts_with('u') && texel == "vec4" { format!("floatBitsToUint({part})") } else { part }
     };
     let name = function.split(' ').next().unwrap_or(function);
     let reads: Vec<String> = fields.iter().map(read).collect();

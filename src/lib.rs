@@ -104,6 +104,8 @@ pub mod files;
 #[doc(hidden)]
 pub mod frame;
 #[doc(hidden)]
+pub mod gloss;
+#[doc(hidden)]
 pub mod layout;
 #[doc(hidden)]
 pub mod lists;

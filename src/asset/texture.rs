@@ -116,6 +116,12 @@ impl Texels {
         (all.sum::<DVec3>() / self.rgba.len() as f64).as_vec3()
     }
 
+    /// The means of red, green and blue as they are stored, 0 to 1: of a picture that holds no colours.
+    pub fn mean_bytes(&self) -> [f32; 3] {
+        let sum = |channel: usize| self.rgba.iter().map(|texel| u64::from(texel[channel])).sum::<u64>();
+        [0, 1, 2].map(|channel| (sum(channel) as f64 / self.rgba.len() as f64 / 255.0) as f32)
+    }
+
     /// The next level of detail, half as wide and high: the mean of two by two texels, of linear colour by alpha.
     pub fn halved(&self) -> Texels {
         let width = (self.width / 2).max(1);

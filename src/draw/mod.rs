@@ -22,6 +22,7 @@ use crate::draw::pixel_light::{ByPixel, PixelLight};
 use crate::draw::smooth::Smooth;
 use crate::draw::triangles::{DrawTriangles, DrawnTriangles};
 use crate::error::Result;
+use crate::gloss::DrawnReflections;
 use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsState, Image, ImageShape, Keeps, Target, Texture};
 use crate::lists::sight::{Sight, TriangleRun};
 use crate::shaders::Library;
@@ -48,14 +49,14 @@ pub enum DrawnMesh {
 
 impl DrawnMesh {
     /// Uploads a mesh with its vertices in `order`. The emission pattern of a mesh without colours is white. `vertices`
-    /// counts the vertices of everything that is drawn together.
-    pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32], vertices: usize) -> Result<Self> {
+    /// counts the vertices of everything that is drawn together. One that is glossy is drawn by its triangles.
+    pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32], vertices: usize, glossy: bool) -> Result<Self> {
         let (centre, _) = mesh.bounding_sphere();
         let mut place = vec![0; order.len()];
         for (at, &v) in order.iter().enumerate() {
             place[v as usize] = at as u32;
         }
-        let is_plain = mesh.uvs.is_none() && mesh.tints.is_none();
+        let is_plain = mesh.uvs.is_none() && mesh.tints.is_none() && !glossy;
         if let Some(grid) =
             Grid::find(mesh).filter(|_| is_plain).filter(|grid| DrawnGrid::fits(device, grid.vertices.len(), vertices))
         {
@@ -64,7 +65,7 @@ impl DrawnMesh {
                 TriangleRun::of(mesh, &mesh.triangles),
             ));
         }
-        DrawnTriangles::new(device, mesh, order, &place).map(DrawnMesh::Triangles)
+        DrawnTriangles::new(device, mesh, order, &place, !is_plain).map(DrawnMesh::Triangles)
     }
 }
 
@@ -118,6 +119,8 @@ pub struct DrawnEntity<'d> {
     pub index: u32,
     /// What varies its reflectance, if anything does.
     pub paint: Option<DrawnPaint<'d>>,
+    /// Whether it reflects besides diffusely.
+    pub glossy: bool,
     /// Input of its pixels, where they evaluate sharp lights.
     pub by_pixel: Option<ByPixel>,
 }
@@ -158,10 +161,23 @@ pub struct DrawnViewport<'d> {
     /// The entities that are drawn, in this order.
     pub entities: Vec<DrawnEntity<'d>>,
     pub radiosity: &'d Buffer,
+    /// What glossy entities reflect; `None` where they are shown as diffuse.
+    pub gloss: Option<DrawnReflections<'d>>,
     /// Input of pixels that evaluate sharp lights; `None` where only the radiosity of vertices is shown.
     pub pixel: Option<PixelLight<'d>>,
     /// Which of the lines that pass "smooth" reads belong to this region.
     pub lines: Range<u32>,
+}
+
+/// Surfaces that pictures of a scene show.
+#[derive(Clone, Copy)]
+pub struct Surfaces<'p> {
+    /// Where pixels evaluate sharp lights: how.
+    pub sharp: Option<&'p SharpPermutation>,
+    /// Whether textures vary reflectances.
+    pub painted: bool,
+    /// Whether any is glossy, and how the sharp lights are evaluated of which it has highlights.
+    pub gloss: Option<Option<&'p SharpPermutation>>,
 }
 
 /// The pipelines and their images.
@@ -180,16 +196,14 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// For pictures of `width` x `height`; `sharp` where pixels are to evaluate sharp lights,
-    /// `painted` where textures vary reflectances.
+    /// For pictures of `width` x `height`.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
         [width, height]: [u32; 2],
         antialias: Antialias,
         finish: Finish,
-        sharp: Option<&SharpPermutation>,
-        painted: bool,
+        surfaces: &Surfaces<'_>,
     ) -> Result<Self> {
         let samples = antialias.samples(device);
         let color = if finish == Finish::Display { SHOWN } else { COLOR };
@@ -204,8 +218,8 @@ impl Draw {
         };
         let display = finish == Finish::Display;
         Ok(Draw {
-            triangles: DrawTriangles::new(device, library, state, display, sharp, painted)?,
-            grid: DrawGrid::new(device, library, state, display, sharp)?,
+            triangles: DrawTriangles::new(device, library, state, display, surfaces)?,
+            grid: DrawGrid::new(device, library, state, display, surfaces.sharp)?,
             samples: (samples > 1)
                 .then(|| Image::new(device, "draw samples", ImageShape { samples, ..shape }))
                 .transpose()?,

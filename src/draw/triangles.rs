@@ -5,8 +5,9 @@
 
 use crate::asset::mesh::Mesh;
 use crate::draw::pixel_light::{PixelLight, texels};
-use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush};
+use crate::draw::{DrawnEntity, DrawnPaint, DrawnViewport, EntityPush, Surfaces};
 use crate::error::Result;
+use crate::gloss::{self, DrawnReflections};
 use crate::gpu::{Bind, Buffer, Device, Drawing, GraphicsPipeline, GraphicsState, TexelView};
 use crate::lists::sight::TriangleRun;
 use crate::shaders::{Library, ShaderPermutation};
@@ -41,21 +42,20 @@ pub struct DrawnTriangles {
 
 impl DrawnTriangles {
     /// Uploads a mesh with its vertices in `order`, where vertex v of the mesh stands at `place[v]`. The emission
-    /// pattern of a mesh without colours is white.
-    pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32], place: &[u32]) -> Result<Self> {
+    /// pattern of a mesh without colours is white. `painted` where its reflectance may vary.
+    pub fn new(device: &Arc<Device>, mesh: &Mesh, order: &[u32], place: &[u32], painted: bool) -> Result<Self> {
         let (centre, _) = mesh.bounding_sphere();
         let color = |v: usize| mesh.colors.as_ref().map_or(Vec3::ONE, |colors| colors[v]);
         let positions: Vec<[f32; 3]> =
             order.iter().map(|&v| (mesh.positions[v as usize] - centre).to_array()).collect();
         let emission: Vec<[f32; 3]> = order.iter().map(|&v| color(v as usize).to_array()).collect();
-        let is_painted = mesh.uvs.is_some() || mesh.tints.is_some();
         let paint = |&v: &u32| {
             let uv = mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| uvs[v as usize]);
             let tint = mesh.tints.as_ref().map_or(Vec3::ONE, |tints| tints[v as usize]);
             // Textures have their first row on top.
             [uv.x, 1.0 - uv.y, packed(tint)]
         };
-        let paint: Option<Vec<[f32; 3]>> = is_painted.then(|| order.iter().map(paint).collect());
+        let paint: Option<Vec<[f32; 3]>> = painted.then(|| order.iter().map(paint).collect());
         let mut triangles = mesh.triangles.clone();
         triangles.sort_by_cached_key(|t| t.map(|v| place[v as usize]).into_iter().min());
         let mut runs = Vec::with_capacity(triangles.len().div_ceil(RUN_TRIANGLES));
@@ -102,7 +102,8 @@ fn packed(tint: Vec3) -> f32 {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct PaintedPush {
     entity: EntityPush,
-    padding: [f32; 3],
+    index: u32,
+    padding: [f32; 2],
     paint: [f32; 4],
 }
 
@@ -125,7 +126,30 @@ impl DrawnPaint<'_> {
     }
 }
 
-/// Pipelines of surfaces that are painted, or of those that are not.
+/// How a surface looks.
+#[derive(Clone, Copy)]
+pub enum Look<'p> {
+    /// One reflectance.
+    Plain,
+    /// Textures or tints vary the reflectance.
+    Painted,
+    /// It may be painted, and reflects; highlights are of sharp lights that are evaluated so, if there are any.
+    Glossy(Option<&'p SharpPermutation>),
+}
+
+impl Look<'_> {
+    /// The macros of both stages; `first` is the first binding of reflections.
+    fn macros(self, row: ShaderPermutation, first: u32) -> ShaderPermutation {
+        let row = row.define("PAINTED", !matches!(self, Look::Plain));
+        let Look::Glossy(sharp) = self else { return row.define("GLOSS", false) };
+        gloss::macros(row).define("GLOSS", true).define("GLOSS_BINDING", first).define("HIGHLIGHTS", sharp.is_some())
+    }
+}
+
+/// Bindings of reflections in the shaders that show the light of vertices, and in those whose pixels evaluate lights.
+const GLOSS_BINDINGS: [u32; 2] = [2, 13];
+
+/// Pipelines of surfaces of one look.
 struct Pipelines {
     /// Draws both sides of triangles.
     open: GraphicsPipeline,
@@ -139,25 +163,28 @@ pub struct DrawTriangles {
     plain: Pipelines,
     /// Where the scene has textures.
     painted: Option<Pipelines>,
+    /// Where it has glossy surfaces.
+    glossy: Option<Pipelines>,
+    /// Whether these have highlights.
+    highlights: bool,
 }
 
 impl DrawTriangles {
-    /// For what "draw" draws into; `display` where the picture is encoded, `painted` where there are textures.
+    /// For what "draw" draws into; `display` where the picture is encoded.
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
         state: GraphicsState,
         display: bool,
-        sharp: Option<&SharpPermutation>,
-        painted: bool,
+        surfaces: &Surfaces<'_>,
     ) -> Result<Self> {
-        let pipelines = |painted: bool| -> Result<Pipelines> {
-            let [vertex, fragment] = Self::rows(display, painted);
+        let pipelines = |look: Look<'_>| -> Result<Pipelines> {
+            let [vertex, fragment] = Self::rows(display, look);
             let vertex = library.shader(&vertex)?;
             let fragment = library.shader(&fragment)?;
             let solid = GraphicsState { cull: vk::CullModeFlags::BACK, ..state };
             let pixel = |sharp: &SharpPermutation| -> Result<GraphicsPipeline> {
-                let [vertex, fragment] = Self::patch_rows(display, painted, sharp);
+                let [vertex, fragment] = Self::patch_rows(display, look, sharp);
                 let nearer = GraphicsState { nearer_steps: NEARER_STEPS, ..state };
                 let vertex = library.shader(&vertex)?;
                 let fragment = library.shader(&fragment)?;
@@ -166,34 +193,51 @@ impl DrawTriangles {
             Ok(Pipelines {
                 open: GraphicsPipeline::new(device, "draw", &vertex, &fragment, state)?,
                 solid: GraphicsPipeline::new(device, "draw solid", &vertex, &fragment, solid)?,
-                pixel: sharp.map(pixel).transpose()?,
+                pixel: surfaces.sharp.map(pixel).transpose()?,
             })
         };
-        Ok(DrawTriangles { plain: pipelines(false)?, painted: painted.then(|| pipelines(true)).transpose()? })
+        Ok(DrawTriangles {
+            plain: pipelines(Look::Plain)?,
+            painted: surfaces.painted.then(|| pipelines(Look::Painted)).transpose()?,
+            glossy: surfaces.gloss.map(|sharp| pipelines(Look::Glossy(sharp))).transpose()?,
+            highlights: surfaces.gloss.flatten().is_some(),
+        })
     }
 
-    /// The pipelines that draw an entity, and its paint.
-    fn pipelines<'d>(&self, entity: &DrawnEntity<'d>) -> (&Pipelines, Option<DrawnPaint<'d>>) {
-        match (&self.painted, entity.paint) {
-            (Some(painted), Some(paint)) => (painted, Some(paint)),
-            _ => (&self.plain, None),
+    /// The pipelines that draw an entity, its paint, and what it reflects.
+    fn pipelines<'d>(
+        &self,
+        entity: &DrawnEntity<'d>,
+        viewport: &DrawnViewport<'d>,
+    ) -> (&Pipelines, Option<DrawnPaint<'d>>, Option<DrawnReflections<'d>>) {
+        let gloss = viewport.gloss.filter(|_| entity.glossy);
+        match (&self.glossy, gloss, &self.painted, entity.paint) {
+            (Some(glossy), Some(gloss), ..) => {
+                let white = DrawnPaint { texture: &gloss.reflections.white, tint: Vec3::ONE, alpha_cutoff: 0.0 };
+                (glossy, Some(entity.paint.unwrap_or(white)), Some(gloss))
+            }
+            (.., Some(painted), Some(paint)) => (painted, Some(paint), None),
+            _ => (&self.plain, None, None),
         }
     }
 
     /// The rows of the shaders that show the light of vertices: vertex and fragment.
-    pub fn rows(display: bool, painted: bool) -> [ShaderPermutation; 2] {
-        [
-            ShaderPermutation::new("draw.vert", 4).define("PAINTED", painted),
-            ShaderPermutation::new("draw.frag", 4).define("DISPLAY", display).define("PAINTED", painted),
-        ]
+    pub fn rows(display: bool, look: Look<'_>) -> [ShaderPermutation; 2] {
+        let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[0]);
+        let fragment = row("draw.frag").define("DISPLAY", display);
+        let fragment = match look {
+            Look::Glossy(Some(sharp)) => sharp.pixel_row(fragment, false),
+            _ => fragment,
+        };
+        [row("draw.vert"), fragment]
     }
 
     /// The rows of the shaders whose pixels evaluate lights: vertex and fragment.
-    pub fn patch_rows(display: bool, painted: bool, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
-        let fragment = ShaderPermutation::new("triangle.frag", 4).define("DISPLAY", display).define("PAINTED", painted);
+    pub fn patch_rows(display: bool, look: Look<'_>, sharp: &SharpPermutation) -> [ShaderPermutation; 2] {
+        let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[1]);
         [
-            ShaderPermutation::new("triangle.vert", 4).number("LEAST_PX", LEAST_PX).define("PAINTED", painted),
-            sharp.pixel_row(fragment, sharp.self_shadows),
+            row("triangle.vert").number("LEAST_PX", LEAST_PX),
+            sharp.pixel_row(row("triangle.frag").define("DISPLAY", display), sharp.self_shadows),
         ]
     }
 
@@ -208,15 +252,23 @@ impl DrawTriangles {
     ) -> Result<()> {
         let mut vertices =
             vec![(&mesh.positions, 0), (&mesh.emission, 0), (viewport.radiosity, entity.radiosity_offset)];
-        let (pipelines, paint) = self.pipelines(entity);
+        let (pipelines, paint, gloss) = self.pipelines(entity, viewport);
         vertices.extend(mesh.paint.iter().filter(|_| paint.is_some()).map(|paint| (paint, 0)));
         drawing.bind(if entity.culls { &pipelines.solid } else { &pipelines.open }, &vertices, &mesh.indices);
         let push = EntityPush::new(entity, white);
         match paint {
             None => drawing.push(&push),
             Some(paint) => {
-                drawing.resources(&[Bind::Texture(paint.texture)])?;
-                drawing.push(&PaintedPush { entity: push, padding: [0.0; 3], paint: paint.push() });
+                let mut binds = vec![Bind::Texture(paint.texture)];
+                if let Some(gloss) = gloss {
+                    binds.extend(texels(&[(gloss.vertices, vk::Format::R32G32B32A32_SFLOAT)])?);
+                    binds.extend(gloss.binds()?);
+                    if self.highlights {
+                        binds.extend(texels(&[(gloss.lights, vk::Format::R32G32B32A32_SFLOAT)])?);
+                    }
+                }
+                drawing.resources(&binds)?;
+                drawing.push(&PaintedPush { entity: push, index: entity.index, padding: [0.0; 2], paint: paint.push() });
             }
         }
         Ok(())
@@ -233,7 +285,7 @@ impl DrawTriangles {
         light: &PixelLight<'r>,
         white: f32,
     ) -> Result<()> {
-        let (pipelines, paint) = self.pipelines(entity);
+        let (pipelines, paint, gloss) = self.pipelines(entity, viewport);
         let (Some(pipeline), Some(by_pixel)) = (&pipelines.pixel, entity.by_pixel) else { return Ok(()) };
         drawing.bind(pipeline, &[], &mesh.indices);
         let mut binds = light.binds(
@@ -247,6 +299,9 @@ impl DrawTriangles {
         if let (Some(paint), Some(buffer)) = (paint, &mesh.paint) {
             binds.extend(texels(&[(buffer, vk::Format::R32_UINT)])?);
             binds.push(Bind::Texture(paint.texture));
+        }
+        if let Some(gloss) = gloss {
+            binds.extend(gloss.binds()?);
         }
         drawing.resources(&binds)?;
         let [_, _, width, height] = viewport.area;

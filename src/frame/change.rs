@@ -46,6 +46,7 @@ impl Frame {
         if sky {
             self.work.lists.renew();
             self.sky.write(scene, self.options.bake.bands)?;
+            self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.set_sky(&scene.environment))?;
         }
         Ok(())
     }
@@ -85,6 +86,7 @@ impl Frame {
         let drawing = [
             "draw.vert",
             "draw.frag",
+            "gloss.comp",
             "grid.vert",
             "grid.frag",
             "triangle.vert",

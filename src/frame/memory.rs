@@ -3,6 +3,7 @@
 use super::Frame;
 use super::pixel::PixelChains;
 use crate::bounce::Bounce;
+use crate::gloss::Reflections;
 use serde::Serialize;
 
 /// Bytes by use.
@@ -56,6 +57,7 @@ impl Frame {
             textures: self.buffers.texture_bytes(),
             lists: self.work.size_bytes()
                 + self.sky.coefficients.all_bytes()
+                + self.reflections.as_ref().map_or(0, Reflections::size_bytes)
                 + self.picture.lines.size_bytes()
                 + self.chains.as_ref().map_or(0, PixelChains::size_bytes),
             pictures: self.picture.readback.size_bytes + self.picture.draw.size_bytes(),

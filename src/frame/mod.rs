@@ -8,6 +8,7 @@
 
 mod change;
 mod draw_twin;
+mod gloss;
 pub mod memory;
 mod options;
 mod permutation;
@@ -27,8 +28,9 @@ use crate::bake::ensure::SceneProgress;
 use crate::bake::surfaces::SurfacePlan;
 use crate::bake::{self, Baker, SceneNeeds};
 use crate::bounce::{Bounce, Bounces, Linked, LinkedEntity};
-use crate::draw::Shading;
+use crate::draw::{Shading, Surfaces};
 use crate::error::Result;
+use crate::gloss::Reflections;
 use crate::gpu::{Buffer, Commands, Device, Timing};
 use crate::layout::{CLUSTER_FORMAT, ENTRY_FORMAT};
 use crate::lists::incremental::{ClusterLists, Merged};
@@ -89,6 +91,8 @@ pub struct Frame {
     radiosity: RadiosityBuffers,
     /// What passes light on within rigid groups, where it bounces.
     bounce: Option<Bounce>,
+    /// What glossy surfaces reflect.
+    reflections: Option<Reflections>,
     picture: FramePicture,
 }
 
@@ -116,10 +120,23 @@ impl Frame {
         let entity_count = scene.entities.len();
         let wanted = options.variant.unwrap_or_else(|| calibrate::best_known(device));
         let methods = methods(&scene, options.lights);
+        let mut radiosity = RadiosityBuffers::new(device, &scene, &buffers)?;
         let wanted = permutation(&options, wanted, &scene, &methods, uniform_entities(device));
+        let reflections = gloss::reflections(
+            device,
+            library,
+            &scene,
+            &methods,
+            &buffers,
+            radiosity.merged.size_bytes,
+            wanted.variant.reads == Reads::Texels,
+        )?;
+        let wanted = MergePermutation { gloss: reflections.is_some(), ..wanted };
         let merge = CompiledMerge::new(device, library, usable(device, &buffers, entity_count, wanted))?;
         let sharp = permutation::sharp(&options, &merge.permutation, &methods, &scene, &buffers);
-        let mut radiosity = RadiosityBuffers::new(device, &scene, &buffers, sharp.is_some())?;
+        if sharp.is_some() {
+            radiosity.keep_soft()?;
+        }
         let mut lists = ClusterLists::default();
         for (index, _) in scene.entities.iter().enumerate().filter(|(_, entity)| entity.receives) {
             lists.add(
@@ -153,6 +170,12 @@ impl Frame {
         let edges = pixels.pixels().is_some();
         let sharp =
             sharp.map(|fitting| Sharp::new(device, library, SharpPermutation { edges, ..fitting })).transpose()?;
+        let highlights = sharp.as_ref().map(|sharp| sharp.permutation);
+        let surfaces = Surfaces {
+            sharp: pixels.pixels(),
+            painted: !buffers.textures.is_empty(),
+            gloss: reflections.is_some().then_some(highlights.as_ref()),
+        };
         let entity_room = entity_count.max(merge.permutation.entity_limit as usize);
         let mut sky = SkyLight::new(device, options.bake.bands)?;
         sky.write(&scene, options.bake.bands)?;
@@ -169,7 +192,8 @@ impl Frame {
             work: ClusterWork::new(device, lists, entity_room)?,
             sky,
             radiosity,
-            picture: FramePicture::new(device, library, &options, &pixels, !buffers.textures.is_empty())?,
+            picture: FramePicture::new(device, library, &options, &surfaces)?,
+            reflections,
             pixels,
             chains: None,
             bounce,
@@ -268,6 +292,7 @@ impl Frame {
             vertices: &self.buffers.vertices,
             self_cells: &self.buffers.self_cells,
             soft: self.radiosity.soft_direct(),
+            shown: self.kept_for_gloss().map(|[_, lights, shares]| [lights, shares]),
         }
     }
 
@@ -282,6 +307,7 @@ impl Frame {
             transfers: Readable::new(&self.buffers.transfers, permutation.variant, floats)?,
             vertices: Readable::new(&self.buffers.vertices, permutation.variant, floats)?,
             sky: Readable::new(&self.sky.coefficients, permutation.variant, floats)?,
+            through: self.kept_for_gloss().map(|[through, ..]| through),
         })
     }
 

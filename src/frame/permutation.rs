@@ -80,6 +80,7 @@ pub(super) fn sharp(
         halves: any_field(SilhouetteField::has_halves),
         boxes: any_field(SilhouetteField::has_box),
         sheets: merge.sheets,
+        gloss: merge.gloss,
         self_shadows: buffers.surfaces.iter().any(|surface| surface.self_first != NONE),
         cones: lights.len() > 1,
         edges: false,
@@ -142,6 +143,7 @@ pub(super) fn permutation(
         skip: options.skip,
         lights: harmonic_lights(scene, methods),
         sheets: scene.meshes.iter().any(|mesh| mesh.rectangle().is_some()),
+        gloss: scene.entities.iter().any(|entity| entity.receives && entity.gloss.is_some()),
         entity_limit,
     }
 }

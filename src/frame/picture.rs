@@ -3,13 +3,13 @@
 use super::permutation::PixelShading;
 use super::record::PictureWork;
 use super::room::READBACK_PIXEL_BYTES;
-use super::viewport::{RadiositySource, Viewport};
+use super::viewport::Viewport;
 use super::{Frame, Options};
 use crate::asset::edges::Edges;
 use crate::asset::picture::linear_from_srgb;
 use crate::draw::pixel_light::PixelLight;
 use crate::draw::smooth::Lines;
-use crate::draw::{Antialias, Draw, DrawnViewport, Finish};
+use crate::draw::{Antialias, Draw, DrawnViewport, Finish, Surfaces};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferKind, Device, Image, Timing};
 use crate::scene::Placement;
@@ -37,11 +37,10 @@ impl FramePicture {
         device: &Arc<Device>,
         library: &Library,
         options: &Options,
-        pixels: &PixelShading,
-        painted: bool,
+        surfaces: &Surfaces<'_>,
     ) -> Result<Self> {
         Ok(FramePicture {
-            draw: draw(device, library, options, Finish::Linear, pixels, painted)?,
+            draw: draw(device, library, options, Finish::Linear, surfaces)?,
             readback: readback(device, options.size)?,
             lines: Lines::new(device)?,
             prepared: Vec::new(),
@@ -69,10 +68,9 @@ fn draw(
     library: &Library,
     options: &Options,
     finish: Finish,
-    pixels: &PixelShading,
-    painted: bool,
+    surfaces: &Surfaces<'_>,
 ) -> Result<Draw> {
-    Draw::new(device, library, options.size, options.antialias, finish, pixels.pixels(), painted)
+    Draw::new(device, library, options.size, options.antialias, finish, surfaces)
 }
 
 /// Room for a picture of either finish.
@@ -87,6 +85,7 @@ impl Frame {
             area: viewport.area,
             entities: self.drawn_in(placements, viewport),
             radiosity: self.radiosity.source(viewport.radiosity),
+            gloss: self.drawn_reflections().filter(|_| viewport.shows_light()),
             pixel: self.pixel_light(viewport),
             lines: lines.clone(),
         };
@@ -96,6 +95,7 @@ impl Frame {
             background: self.sky.background,
             white,
             lines: &self.picture.lines,
+            gloss: self.gloss_work(),
         }
     }
 
@@ -114,8 +114,12 @@ impl Frame {
     pub(super) fn set_pictures(&mut self, options: Options, finish: Finish) -> Result<Draw> {
         let sharp = self.sharp.as_ref().map(|sharp| sharp.permutation);
         let pixels = PixelShading::new(&self.device, &options, &self.buffers, self.radiosity.soft(), sharp);
-        let painted = !self.buffers.textures.is_empty();
-        let draw = draw(&self.device, &self.library, &options, finish, &pixels, painted)?;
+        let surfaces = Surfaces {
+            sharp: pixels.pixels(),
+            painted: !self.buffers.textures.is_empty(),
+            gloss: self.reflections.is_some().then_some(sharp.as_ref()),
+        };
+        let draw = draw(&self.device, &self.library, &options, finish, &surfaces)?;
         self.options = options;
         self.pixels = pixels;
         Ok(std::mem::replace(&mut self.picture.draw, draw))
@@ -125,8 +129,7 @@ impl Frame {
     fn pixel_light(&self, viewport: &Viewport) -> Option<PixelLight<'_>> {
         self.pixels.pixels()?;
         let chains = self.chains.as_ref().filter(|chains| chains.is_ready())?;
-        let shows_light = viewport.radiosity == RadiositySource::Merged && !viewport.by_vertex;
-        shows_light.then(|| PixelLight {
+        viewport.shows_light().then(|| PixelLight {
             entities: &chains.entities,
             silhouettes: [&self.buffers.silhouettes.nodes, &self.buffers.silhouettes.cells],
             entries: &chains.entries,

@@ -31,7 +31,7 @@ struct Direct {
 
 impl RadiosityBuffers {
     /// Zero for every vertex of a scene.
-    pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers, sharp: bool) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers) -> Result<Self> {
         let mut offsets = Vec::new();
         let mut size_bytes = 0;
         for entity in 0..scene.entities.len() {
@@ -41,12 +41,18 @@ impl RadiosityBuffers {
         let size_bytes = size_bytes.max(16);
         Ok(RadiosityBuffers {
             merged: zeros(device, "radiosity", size_bytes)?,
-            soft: sharp.then(|| zeros(device, "soft radiosity", size_bytes)).transpose()?,
+            soft: None,
             direct: None,
             replaced: false,
             offsets,
             comparisons: Default::default(),
         })
+    }
+
+    /// Keeps light without that of sharp lights apart from now on.
+    pub fn keep_soft(&mut self) -> Result<()> {
+        self.soft = Some(zeros(self.merged.device(), "soft radiosity", self.merged.size_bytes)?);
+        Ok(())
     }
 
     /// Keeps direct light apart from now on, for bounces to add to it.

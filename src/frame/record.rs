@@ -8,6 +8,7 @@ use crate::bounce::{Bounce, BouncedLight};
 use crate::draw::smooth::Lines;
 use crate::draw::{Draw, DrawnViewport};
 use crate::error::Result;
+use crate::gloss::{ReflectionInputs, Reflections};
 use crate::gpu::{self, Access, Buffer, Commands, Drawing, Image};
 use crate::merge::{Merge, MergeInputs};
 use crate::sharp::{self, Sharp};
@@ -34,6 +35,8 @@ pub struct PictureWork<'f> {
     pub(super) background: Vec3,
     pub(super) white: f32,
     pub(super) lines: &'f Lines,
+    /// What glossy surfaces reflect towards the eye.
+    pub(super) gloss: Option<(&'f Reflections, ReflectionInputs<'f>)>,
 }
 
 /// Where the picture goes once it is drawn.
@@ -89,12 +92,18 @@ pub fn record<'f>(
     if merge.is_some() && commands.is_shared() {
         commands.barrier(Access::ComputeWrite, Access::Caller);
     }
-    if merge.is_some() && picture.is_some() {
+    let gloss = picture.and_then(|picture| picture.gloss.as_ref());
+    if let Some((reflections, inputs)) = gloss {
+        commands.barrier(Access::ComputeWrite, Access::ComputeRead);
+        commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
+        commands.pass("gloss", |c| reflections.record(c, inputs))?;
+    }
+    if (merge.is_some() || gloss.is_some()) && picture.is_some() {
         // Triangles read the radiosity as a vertex attribute, grids look it up in the fragment shader.
         commands.barrier(Access::ComputeWrite, Access::VertexRead);
         commands.barrier(Access::ComputeWrite, Access::GraphicsSampled);
     }
-    if let Some(PictureWork { draw, viewports, background, white, lines }) = picture {
+    if let Some(PictureWork { draw, viewports, background, white, lines, .. }) = picture {
         for (image, access) in draw.attachments() {
             commands.image_barrier(image, None, access);
         }

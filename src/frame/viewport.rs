@@ -37,6 +37,11 @@ impl Viewport {
     pub fn merged(area: [u32; 4]) -> Self {
         Viewport { area, radiosity: RadiositySource::Merged, adds_emission: true, by_vertex: false }
     }
+
+    /// Whether it shows light as it is, so that pixels may add to that of vertices.
+    pub(super) fn shows_light(&self) -> bool {
+        self.radiosity == RadiositySource::Merged && !self.by_vertex
+    }
 }
 
 impl Frame {
@@ -98,6 +103,7 @@ impl Frame {
                 tag: smooth::tag(index),
                 index: index as u32,
                 paint: self.paint(index),
+                glossy: entity.receives && entity.gloss.is_some(),
                 by_pixel: self.chains.as_ref().and_then(|chains| chains.of(index)),
             };
             let radius_m = device_mesh.radius_m * f64::from(placement.scale);
@@ -130,6 +136,7 @@ impl Frame {
             for entity in &mut drawn {
                 entity.emission = Vec3::ZERO;
                 entity.paint = None;
+                entity.glossy = false;
             }
         }
         drawn

@@ -156,7 +156,7 @@ impl<'r> Commands<'r> {
     fn descriptor_set(&mut self, layout: &Layout) -> Result<vk::DescriptorSet> {
         let handle = &self.recording.device.handle;
         if self.recording.descriptors.last().is_none_or(|(_, used)| *used == SETS_PER_POOL) {
-            // No pass has more than twelve bindings of one kind.
+            // No pass has more than sixteen bindings of one kind.
             let sizes = [
                 vk::DescriptorType::STORAGE_BUFFER,
                 vk::DescriptorType::UNIFORM_BUFFER,
@@ -164,7 +164,7 @@ impl<'r> Commands<'r> {
                 vk::DescriptorType::SAMPLED_IMAGE,
                 vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
             ]
-            .map(|ty| vk::DescriptorPoolSize { ty, descriptor_count: 12 * SETS_PER_POOL });
+            .map(|ty| vk::DescriptorPoolSize { ty, descriptor_count: 16 * SETS_PER_POOL });
             let create = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
             // SAFETY: destroyed in `Drop`, after the commands that use its sets have run.
             let pool = unsafe { handle.create_descriptor_pool(&create, None) }

@@ -9,16 +9,14 @@ use crate::error::Result;
 use ash::vk;
 use std::sync::Arc;
 
-const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
-
-/// Texels of one level of detail, sRGB and alpha; rows from the top.
+/// Texels of one level of detail; rows from the top.
 pub struct Level<'t> {
     /// Width in texels.
     pub width: u32,
     /// Height in texels.
     pub height: u32,
-    /// Texels, as many as that.
-    pub rgba: &'t [[u8; 4]],
+    /// Texels, as many as that, in the texture's format.
+    pub bytes: &'t [u8],
 }
 
 /// Destroys a texture's handles before its memory is freed.
@@ -42,7 +40,7 @@ impl Drop for TextureHandle {
     }
 }
 
-/// A picture that fragment shaders sample, bilinear and of the nearest level.
+/// A picture that shaders sample, bilinear and of the nearest level.
 pub struct Texture {
     handle: TextureHandle,
     _memory: Allocation,
@@ -55,13 +53,14 @@ impl Texture {
     pub fn new(
         device: &Arc<Device>,
         name: &str,
+        format: vk::Format,
         levels: &[Level<'_>],
         wrap: [vk::SamplerAddressMode; 2],
     ) -> Result<Self> {
         let [first, ..] = levels else { unreachable!("a texture has a level") };
         let create = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
-            .format(FORMAT)
+            .format(format)
             .extent(vk::Extent3D { width: first.width, height: first.height, depth: 1 })
             .mip_levels(levels.len() as u32)
             .array_layers(1)
@@ -80,7 +79,7 @@ impl Texture {
         let view = vk::ImageViewCreateInfo::default()
             .image(image)
             .view_type(vk::ImageViewType::TYPE_2D)
-            .format(FORMAT)
+            .format(format)
             .subresource_range(all(levels.len()));
         // SAFETY: the image is alive and has its memory; the view is destroyed by `TextureHandle`.
         handle.view = unsafe { device.handle.create_image_view(&view, None) }.checked("vkCreateImageView", name)?;
@@ -101,9 +100,9 @@ impl Texture {
 
     fn fill(&self, name: &str, levels: &[Level<'_>]) -> Result<()> {
         let device = &self.handle.device;
-        let texels: Vec<[u8; 4]> = levels.iter().flat_map(|level| level.rgba).copied().collect();
-        let mut staging = Buffer::new(device, name, BufferKind::Upload, 4 * texels.len() as u64)?;
-        staging.write(0, &texels);
+        let bytes: Vec<u8> = levels.iter().flat_map(|level| level.bytes).copied().collect();
+        let mut staging = Buffer::new(device, name, BufferKind::Upload, bytes.len() as u64)?;
+        staging.write(0, &bytes);
         let mut commands = Commands::new(device, name)?;
         commands.fill_texture(&staging, self, levels);
         commands.submit().map(|_| ())
@@ -146,7 +145,7 @@ impl<'r> Commands<'r> {
             let extent = vk::Extent3D { width: level.width, height: level.height, depth: 1 };
             let region = vk::BufferImageCopy::default().buffer_offset(offset).image_subresource(layers);
             regions.push(region.image_extent(extent));
-            offset += 4 * level.rgba.len() as u64;
+            offset += level.bytes.len() as u64;
         }
         let image = to.handle.image;
         let moved = |from: Option<Access>, to: Access| {

@@ -60,6 +60,8 @@ pub struct MergeInputs<'b> {
     /// Coefficients of the sky, a channel after the other, [`crate::field::quantity::channel_stride`] floats apart;
     /// zero without one.
     pub sky: Readable<'b>,
+    /// Where the transfer at the end of the sky's chain goes, in the permutation that keeps it.
+    pub through: Option<&'b Buffer>,
 }
 
 pub struct Merge {
@@ -88,6 +90,7 @@ impl Merge {
             inputs.vertices.bind(),
             inputs.sky.bind(),
             Bind::Buffer(radiosity),
+            inputs.through.map_or(Bind::None, Bind::Buffer),
         ];
         commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])
     }

@@ -107,6 +107,8 @@ pub struct MergePermutation {
     pub lights: bool,
     /// Whether any mesh is a sheet.
     pub sheets: bool,
+    /// Whether the transfer at the end of the sky's chain is kept, for surfaces that reflect.
+    pub gloss: bool,
     /// Entities that uniform blocks hold on the device, [`uniform_entities`].
     pub entity_limit: u32,
 }
@@ -145,6 +147,7 @@ impl MergePermutation {
             .define("SHIFTED", self.packed() && self.variant.shifted)
             .define("LIGHTS", self.lights)
             .define("SHEETS", self.sheets)
+            .define("KEEPS", self.gloss)
             .define("SHEET_COEFFICIENTS", coefficient_count(self.bands.min(POLYGON_BANDS)) as u32)
             .number("CONTACT", CONTACT)
             .number("BEHIND_SHEET", BEHIND_SHEET)

@@ -131,6 +131,7 @@ impl Workload {
     /// The permutation of the shader for a variant.
     pub fn permutation(&self, variant: Variant) -> MergePermutation {
         MergePermutation {
+            gloss: false,
             variant,
             bands: BANDS,
             field_bands: BANDS,
@@ -146,6 +147,7 @@ impl Workload {
     pub fn inputs(&self, variant: Variant) -> Result<MergeInputs<'_>> {
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         Ok(MergeInputs {
+            through: None,
             entities: Readable::shared(&self.entities, variant)?,
             entries: Readable::new(&self.entries, variant, ENTRY_FORMAT)?,
             clusters: Readable::new(&self.clusters, variant, CLUSTER_FORMAT)?,

@@ -47,6 +47,7 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::gloss::Gloss;
 use super::light::Spot;
 use super::motion::{Motion, Placement, PlacementF64, RotationData};
 use super::{check_counts, values};
@@ -409,6 +410,9 @@ pub struct EntityData {
     /// Linear reflectance. The default is a grey of 0.7.
     #[serde(default = "grey")]
     pub albedo: Albedo,
+    /// How it reflects besides diffusely. By default it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gloss: Option<Gloss>,
     /// Linear radiance in W m^-2 sr^-1, at most 1e15. It multiplies the colours of a mesh that has them. The default is
     /// 0.
     #[serde(default, deserialize_with = "values::radiance")]
@@ -444,6 +448,7 @@ impl EntityData {
             rotation: RotationData::default(),
             scale: values::one(),
             albedo: grey(),
+            gloss: None,
             emission: Vec3::ZERO,
             spot: None,
             emits: None,

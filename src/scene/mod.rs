@@ -8,6 +8,7 @@ mod export;
 #[cfg(feature = "cli")]
 pub(crate) mod files;
 pub(crate) mod framing;
+mod gloss;
 pub mod gltf;
 pub mod groups;
 pub mod keys;
@@ -32,6 +33,7 @@ use crate::asset::{Mesh, embedded, obj, read_file, utf8};
 use crate::error::{Error, Result};
 pub use builder::{SceneBuilder, Shape};
 pub use data::{Albedo, Camera, Data, EntityData, MeshData, Output, TextureData};
+pub use gloss::Gloss;
 pub use light::{LightMethod, Lights, Spot};
 pub use motion::{Motion, Placement};
 pub use surroundings::Surroundings;
@@ -77,6 +79,8 @@ pub struct Entity {
     pub albedo: Vec3,
     /// Index into [`Scene::textures`].
     pub texture: Option<usize>,
+    /// How it reflects besides, if it is glossy.
+    pub gloss: Option<Gloss>,
     /// Linear radiance in W m^-2 sr^-1. It is multiplied by the mesh's colours, if there are any.
     pub emission: Vec3,
     /// The cone of its light, if it is a spot.
@@ -390,6 +394,7 @@ fn resolve(index: usize, data: &EntityData, mesh: usize, paint: Paint) -> Entity
         mesh,
         albedo: paint.mean,
         texture: paint.texture,
+        gloss: data.gloss,
         emission: data.emission,
         spot: data.spot,
         emits,

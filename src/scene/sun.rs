@@ -43,6 +43,7 @@ impl Scene {
                 mesh,
                 albedo: Vec3::ZERO,
                 texture: None,
+                gloss: None,
                 emission: (radiance / share).as_vec3(),
                 spot: None,
                 emits: radiance != DVec3::ZERO,

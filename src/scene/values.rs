@@ -109,3 +109,13 @@ pub fn scale<'de, D: Deserializer<'de>>(source: D) -> Result<f32, D::Error> {
 pub fn maybe_scale<'de, D: Deserializer<'de>>(source: D) -> Result<Option<f32>, D::Error> {
     scale(source).map(Some)
 }
+
+/// A share, 0 to 1.
+pub fn share<'de, D: Deserializer<'de>>(source: D) -> Result<f32, D::Error> {
+    let value = f32::deserialize(source)?;
+    if (0.0..=1.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err(D::Error::custom(format!("{} is out of range for a share (0 to 1)", short(value))))
+    }
+}

@@ -120,13 +120,13 @@ struct Packing {
 
 impl Packing {
     /// Adds one surface in the order of its clusters.
-    fn add(&mut self, device: &Arc<Device>, baked: &BakedSurface) -> Result<DeviceSurface> {
+    fn add(&mut self, device: &Arc<Device>, baked: &BakedSurface, glossy: bool) -> Result<DeviceSurface> {
         let Packing { vertices, transfers, self_cells, stride, drawn } = self;
         let mesh = &baked.mesh;
         let (centre, _) = mesh.bounding_sphere();
         let vertex_first = vertices.len() as u32;
         let order = cluster_order(mesh);
-        let drawn = DrawnMesh::new(device, mesh, &order, *drawn)?;
+        let drawn = DrawnMesh::new(device, mesh, &order, *drawn, glossy)?;
         let steps = drawn.grid().map_or_else(|| mesh.steps(), |grid| vec![grid.step_m; order.len()]);
         let longest = || steps.iter().copied().fold(0.0, f32::max);
         let reach_m = drawn.grid().map_or_else(longest, |grid| grid.reach_m);
@@ -180,7 +180,13 @@ impl SceneBuffers {
             stride: channel_stride(options.bands),
             drawn: baked.surface_of.iter().map(|&surface| baked.surfaces[surface].mesh.positions.len()).sum(),
         };
-        let surfaces = baked.surfaces.iter().map(|surface| packing.add(device, surface)).collect::<Result<_>>()?;
+        let is_glossy = |surface: usize| {
+            let mut entities = scene.entities.iter().zip(&baked.surface_of);
+            entities.any(|(entity, of)| *of == surface && entity.receives && entity.gloss.is_some())
+        };
+        let surfaces = baked.surfaces.iter().enumerate();
+        let surfaces = surfaces.map(|(index, surface)| packing.add(device, surface, is_glossy(index)));
+        let surfaces = surfaces.collect::<Result<_>>()?;
         let Packing { vertices, mut transfers, mut self_cells, .. } = packing;
         self_cells.resize(self_cells.len().max(2), [0; 2]);
         // A buffer may not be empty.

@@ -9,7 +9,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 /// What stands for the picture of a texture that has none.
-const WHITE: &[[u8; 4]] = &[[u8::MAX; 4]];
+const WHITE: [u8; 4] = [u8::MAX; 4];
+/// sRGB and alpha.
+const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
 
 /// Uploads textures; those of one picture and one way to go on share what is uploaded. Pictures that are larger than the
 /// device's are halved.
@@ -33,7 +35,7 @@ fn one(device: &Arc<Device>, texture: &Texture) -> Result<texture::Texture> {
         Wrap::Clamp => vk::SamplerAddressMode::CLAMP_TO_EDGE,
     });
     let Some(texels) = &texture.texels else {
-        return texture::Texture::new(device, "white", &[Level { width: 1, height: 1, rgba: WHITE }], wrap);
+        return texture::Texture::new(device, "white", FORMAT, &[Level { width: 1, height: 1, bytes: &WHITE }], wrap);
     };
     let most = device.most_image_px() as usize;
     let mut levels = vec![texels.clone()];
@@ -42,9 +44,9 @@ fn one(device: &Arc<Device>, texture: &Texture) -> Result<texture::Texture> {
     }
     levels.retain(|level| level.width.max(level.height) <= most);
     let levels: Vec<Level<'_>> = levels.iter().map(|level| level_of(level)).collect();
-    texture::Texture::new(device, "texture", &levels, wrap)
+    texture::Texture::new(device, "texture", FORMAT, &levels, wrap)
 }
 
 fn level_of(texels: &Texels) -> Level<'_> {
-    Level { width: texels.width as u32, height: texels.height as u32, rgba: &texels.rgba }
+    Level { width: texels.width as u32, height: texels.height as u32, bytes: texels.rgba.as_flattened() }
 }

@@ -61,6 +61,8 @@ pub struct SharpPermutation {
     pub sheets: bool,
     /// Whether any lit mesh can shadow itself.
     pub self_shadows: bool,
+    /// Whether the shares of lights whose highlights are shown are kept.
+    pub gloss: bool,
     /// Whether every point leaves out the occluders of its lists that stand outside a light's cone. It saves a quarter
     /// of the time or more in scenes of several sharp lights, and costs a fifth under one light.
     pub cones: bool,
@@ -78,7 +80,7 @@ impl SharpPermutation {
 
     /// A fragment shader that evaluates sharp lights. It reads everything through texel views.
     pub fn pixel_row(&self, row: ShaderPermutation, self_shadows: bool) -> ShaderPermutation {
-        SharpPermutation { reads: Reads::Texels, self_shadows, edges: false, ..*self }
+        SharpPermutation { reads: Reads::Texels, self_shadows, edges: false, gloss: false, ..*self }
             .shared(row)
             .define("WORKGROUP", CLUSTER_VERTICES)
     }
@@ -98,6 +100,7 @@ impl SharpPermutation {
             .define("SELF", self.self_shadows)
             .define("CONES", self.cones)
             .define("EDGES", self.edges)
+            .define("SHOWN", self.gloss)
             .define("ROLLED", self.rolled)
             .define("NODE_CELLS", self.silhouette.cells)
             .define("MAP", self.silhouette.map_px);
@@ -170,6 +173,9 @@ pub struct SharpInputs<'b> {
     pub self_cells: &'b Buffer,
     /// Output of the merge.
     pub soft: &'b Buffer,
+    /// For every entity the lights whose highlights it shows, and where their shares at all vertices go, in the
+    /// permutation that keeps them.
+    pub shown: Option<[&'b Buffer; 2]>,
 }
 
 pub struct Sharp {
@@ -206,6 +212,8 @@ impl Sharp {
             Bind::Buffer(radiosity),
             if self_shadows { read(inputs.self_cells, vk::Format::R32G32_UINT)? } else { Bind::None },
             read(inputs.soft, quads)?,
+            inputs.shown.map_or(Bind::None, |[lights, _]| Bind::Buffer(lights)),
+            inputs.shown.map_or(Bind::None, |[_, shares]| Bind::Buffer(shares)),
         ];
         commands.dispatch(&self.pipeline, &resources, &(), [cluster_count * CLUSTER_VERTICES, 1, 1])
     }

@@ -24,6 +24,7 @@ const ORDER: &[&str] = &[
     "merge",
     "sharp",
     "bounce",
+    "gloss",
     "draw",
     "scene_buffers",
     "frame",

@@ -30,11 +30,13 @@ const REWRITTEN_LIMIT_BYTES: usize = 32 << 20;
 const NUMBER_BUDGET: u64 = 1 << 27;
 
 /// Extensions that a file may require, because this reader follows them or says what it leaves out.
-const EXTENSIONS: [&str; 9] = [
+const EXTENSIONS: [&str; 11] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",

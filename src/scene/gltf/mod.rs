@@ -14,6 +14,7 @@
 //! | meshes compressed by Draco and meshoptimizer; KTX2 and WebP | as if they were not |
 //! | base colour factor | albedo |
 //! | base colour texture, colours of vertices, alpha mask | texture; tints of the mesh's vertices |
+//! | roughness, metal, index of refraction, specular factor | gloss |
 //! | emissive factor and strength; texture | emission; colours of the mesh's vertices |
 //! | point and spot lights | glowing balls; those of spots shine within a cone |
 //! | the first directional light | the sun of the distant light |
@@ -382,7 +383,7 @@ impl Builder {
             return Ok(None);
         };
         let place = format!("nodes[{}]", stand.node);
-        let emission = primitive.surface.emission;
+        let Surface { emission, gloss, .. } = primitive.surface;
         let scale = parts.uniform_scale().map(|scale| scale as f32);
         if scale.is_some_and(|scale| !(1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(&scale)) {
             return Err(document.fail(place, "its scale is not within 1e-7 to 1e7"));
@@ -401,6 +402,7 @@ impl Builder {
             rotation: RotationData::Quaternion(parts.rotation.as_quat().to_array()),
             scale: scale.unwrap_or(1.0),
             albedo,
+            gloss,
             emission,
             motion: stand.motion.clone(),
             ..EntityData::of_mesh(&self.meshes[made].0.name)

@@ -1,4 +1,4 @@
-//! Materials as diffuse surfaces that may be painted and glow.
+//! Materials as surfaces that may be painted, reflect and glow.
 
 use ::gltf::json::material::{AlphaMode, Material};
 use ::gltf::json::mesh::Semantic;
@@ -13,6 +13,7 @@ use crate::asset::environment::RADIANCE_LIMIT;
 use crate::asset::mesh::Attributes;
 use crate::asset::texture::Texture;
 use crate::error::Result;
+use crate::scene::Gloss;
 
 /// Colours that differ by less than this share of the brightest are one.
 const EVEN: f32 = 0.01;
@@ -31,6 +32,8 @@ pub struct Surface {
     /// Linear reflectance, 0 to 1, where no paint varies it.
     pub albedo: Vec3,
     pub paint: Option<Paint>,
+    /// How it reflects besides; an unlit surface does not.
+    pub gloss: Option<Gloss>,
     /// Linear radiance; candela per square metre are taken as W m^-2 sr^-1.
     pub emission: Vec3,
     /// Colours are a factor on the emission, where a texture varies it.
@@ -82,8 +85,44 @@ impl Surface {
         attributes.uvs = applied.and_then(|applied| applied.uvs);
         let (emission, colors) = glow(document, json, &place, shape, textures, notes)?;
         attributes.colors = colors;
-        Ok(Surface { albedo, paint, emission, attributes })
+        let gloss = gloss(document, json, &place, shape, textures, notes)?;
+        Ok(Surface { albedo, paint, gloss, emission, attributes })
     }
+}
+
+/// Metallic-roughness reflection; textures count by their means.
+fn gloss(
+    document: &Document,
+    json: &Material,
+    place: &str,
+    shape: &Shape,
+    textures: &mut Textures,
+    notes: &mut Notes,
+) -> Result<Option<Gloss>> {
+    let extensions = json.extensions.as_ref();
+    if extensions.is_some_and(|e| e.unlit.is_some()) {
+        return Ok(None);
+    }
+    let pbr = &json.pbr_metallic_roughness;
+    let mut roughness = pbr.roughness_factor.0;
+    let mut metallic = pbr.metallic_factor.0;
+    if let Some(info) = &pbr.metallic_roughness_texture
+        && let Some(applied) = textures.applied(info, shape, notes)?
+    {
+        let [_, g, b] = applied.texels.mean_bytes();
+        roughness *= g;
+        metallic *= b;
+        notes.leave_out("textures of roughness and metal (they are even, of their means)");
+    }
+    let ior = extensions.and_then(|e| e.ior.as_ref()).map_or(1.5, |ior| ior.ior.0);
+    let specular = extensions.and_then(|e| e.specular.as_ref()).map_or(1.0, |specular| specular.specular_factor.0);
+    // An index of 0 stands for infinity.
+    let faced = if ior == 0.0 { 1.0 } else { (ior - 1.0) / (ior + 1.0) };
+    let f0 = specular * faced * faced;
+    if ![roughness, metallic, f0].iter().all(|share| (0.0..=1.0).contains(share)) {
+        return Err(document.fail(place, "its roughness, metal or specular reflection is not within 0 to 1"));
+    }
+    Ok(Some(Gloss { roughness, metallic, f0 }))
 }
 
 /// Whether all colours are the same, nearly.
@@ -129,14 +168,5 @@ pub fn note(json: &Material, notes: &mut Notes) {
     if matches!(json.alpha_mode, Checked::Valid(AlphaMode::Mask)) {
         notes.leave_out("shadows of masked materials (they are those of the whole shape)");
     }
-    let pbr = &json.pbr_metallic_roughness;
-    // A file that says nothing means a metal; an unlit material shows its colour, whatever else it says.
-    let is_unlit = json.extensions.as_ref().is_some_and(|e| e.unlit.is_some());
-    if !is_unlit && (pbr.metallic_factor.0 > 0.0 || pbr.roughness_factor.0 < 1.0) {
-        notes.leave_out("metallic or glossy materials (they are diffuse)");
-    }
-    let others =
-        [json.normal_texture.is_some(), json.occlusion_texture.is_some(), pbr.metallic_roughness_texture.is_some()];
-    let others = others.into_iter().filter(|used| *used).count();
-    notes.leave_out_many("textures of normals, roughness, metal or occlusion", others);
+    notes.leave_out_many("textures of normals", usize::from(json.normal_texture.is_some()));
 }

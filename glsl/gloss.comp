@@ -1,0 +1,101 @@
+#version 460
+#extension GL_EXT_control_flow_attributes : require
+// Distant and bounced light that glossy surfaces reflect towards the eye, a workgroup's worth of an entity's vertices at
+// a time. The merge has left the transfer past everything at each vertex; what the eye sees of it needs no merge.
+//
+// The share of distant light that gets through is that of the lobe over the cosine: <M T, lobe> over <M C, lobe>, where
+// M is the product by the sky's radiance, T the transfer past everything and C the cosine.
+#include "generated/gloss_structs.glsl"
+#include "generated/basis.glsl"
+#include "generated/cosine.glsl"
+
+layout(local_size_x = WORKGROUP) in;
+
+layout(std430, binding = 0) readonly buffer GlossEntities { GlossEntity entities[]; };
+layout(std430, binding = 1) readonly buffer Groups { uvec2 groups[]; }; // entity among the glossy ones, first vertex
+#include "readable.glsl"
+READ_VEC4(2, Vertices, vertices, vertex_quad)
+layout(std430, binding = 3) readonly buffer Through { uvec4 through[]; }; // of every vertex: sixteen halves
+layout(std140, binding = 4) uniform Products { vec4 products[3 * COEFFICIENTS * COEFFICIENTS / 4]; };
+READ_VEC4(7, Direct, direct, direct_at)
+READ_VEC4(8, Radiosity, radiosity, radiosity_at)
+layout(std430, binding = 9) writeonly buffer Reflected { vec4 reflected[]; }; // two a vertex
+#define MAP_BINDING 5
+#define TABLE_BINDING 6
+#define SKY 1
+#include "gloss.glsl"
+
+// The lobe over the cosine, as coefficients, and the sum of its taps' weights.
+float lobe_over_cosine(View view, float roughness, out float lobe[COEFFICIENTS]) {
+    float whole = 0.0;
+    [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
+        lobe[i] = 0.0;
+    }
+    for (uint k = 0; k < TAPS; k++) {
+        Tap tap = tap_of(view, roughness, k);
+        vec3 bands = lobe_row(TAPS + k, roughness, view.z).xyz;
+        float y[COEFFICIENTS];
+        sh_basis(tap.toward, y);
+        float weight = tap.weight / max(dot(tap.toward, view.normal), LEAST_COSINE);
+        [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
+            lobe[i] += weight * (i == 0 ? 1.0 : i < 4 ? bands.x : i < 9 ? bands.y : bands.z) * y[i];
+        }
+        whole += tap.weight;
+    }
+    return whole;
+}
+
+// The share of distant light of each colour that gets through.
+vec3 share_through(View view, float roughness, uint v) {
+    float lobe[COEFFICIENTS], cosine[COEFFICIENTS], t[COEFFICIENTS];
+    float whole = lobe_over_cosine(view, roughness, lobe);
+    sh_cosine(view.normal, cosine);
+    [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
+        t[i] = unpackHalf2x16(through[2 * v + i / 8][i / 2 % 4])[i % 2];
+    }
+    vec3 share;
+    for (uint channel = 0; channel < 3; channel++) {
+        uint first = channel * COEFFICIENTS * COEFFICIENTS / 4;
+        float met = 0.0, open = 0.0;
+        [[unroll]] for (uint row = 0; row < COEFFICIENTS; row++) {
+            float sum = 0.0;
+            [[unroll]] for (uint quad = 0; quad < COEFFICIENTS / 4; quad++) {
+                vec4 four = products[first + row * COEFFICIENTS / 4 + quad];
+                sum += four.x * lobe[4 * quad] + four.y * lobe[4 * quad + 1]
+                     + four.z * lobe[4 * quad + 2] + four.w * lobe[4 * quad + 3];
+            }
+            met += sum * t[row];
+            open += sum * cosine[row];
+        }
+        // The first product is the mean radiance.
+        share[channel] = met / max(open, LEAST_SHARE * products[first].x * whole + 1e-30);
+    }
+    return clamp(share, vec3(0.0), vec3(MOST_SHARE));
+}
+
+void main() {
+    uvec2 group = groups[gl_WorkGroupID.x];
+    GlossEntity entity = entities[group.x];
+    uint v = group.y + gl_LocalInvocationID.x;
+    if (v >= entity.vertex_count) {
+        return;
+    }
+    vec4 place = vec4(vertex_quad(2 * (entity.vertex_first + v)).xyz, 1.0);
+    vec3 normal = vertex_quad(2 * (entity.vertex_first + v) + 1).xyz;
+    vec3 from_eye = vec3(dot(entity.row_x, place), dot(entity.row_y, place), dot(entity.row_z, place));
+    normal = vec3(dot(entity.row_x.xyz, normal), dot(entity.row_y.xyz, normal), dot(entity.row_z.xyz, normal));
+    View view = view_of(from_eye, normal, entity.roughness);
+    v += entity.radiosity_first;
+    vec3 share = share_through(view, entity.roughness, v);
+    // Light that has bounced comes from everywhere alike: its irradiance over pi.
+    vec3 bounced = max(radiosity_at(v).rgb - direct_at(v).rgb, vec3(0.0)) / max(entity.albedo, vec3(1e-4));
+    if (entity.roughness < PIXEL_ROUGHNESS) {
+        reflected[2 * v] = vec4(share * entity.sky_scale, 0.0);
+        reflected[2 * v + 1] = vec4(bounced, 0.0);
+    } else {
+        Reflection sky = reflect_sky(view, entity.roughness);
+        vec2 of_unit = reflected_share(view, entity.roughness);
+        reflected[2 * v] = vec4(share * entity.sky_scale * sky.facing + of_unit.x * bounced, 0.0);
+        reflected[2 * v + 1] = vec4(share * entity.sky_scale * sky.grazing + of_unit.y * bounced, 0.0);
+    }
+}

@@ -1,0 +1,42 @@
+// What a pixel of a glossy entity reflects towards the eye. The shader that includes this has entities and what
+// sub_light.glsl needs, where the scene has lights that highlights are of.
+layout(binding = GLOSS_BINDING) uniform textureBuffer gloss_entities;
+#include "generated/gloss_structs.glsl"
+#include "generated/gloss_entity_at.glsl"
+layout(location = 6) centroid in vec3 from_eye; // world axes, metres
+layout(location = 7) centroid in vec3 normal;   // world
+layout(location = 8) centroid in vec3 first;    // glsl/gloss.comp
+layout(location = 9) centroid in vec3 second;
+layout(location = 10) centroid in vec4 shares;
+#define MAP_BINDING GLOSS_BINDING + 3
+#define TABLE_BINDING GLOSS_BINDING + 4
+#define SKY 1
+#include "gloss.glsl"
+
+// Radiance of a pixel without emission. `light` is that of a diffuse surface of colour `base`; `within` is that of
+// within_triangle.
+vec3 glossy(uint index, vec3 base, vec3 light, float within) {
+    GlossEntity entity = gloss_entity_at(index);
+    vec3 place = within * from_eye;
+    View view = view_of(place, normal, entity.roughness);
+    Reflection found = Reflection(within * first, within * second);
+    if (entity.roughness < PIXEL_ROUGHNESS) {
+        // Vertices have the share of the sky that gets through, and the light that has bounced.
+        Reflection sky = reflect_sky(view, entity.roughness);
+        vec2 of_unit = reflected_share(view, entity.roughness);
+        found = Reflection(found.facing * sky.facing + of_unit.x * found.grazing,
+            found.facing * sky.grazing + of_unit.y * found.grazing);
+    }
+#if HIGHLIGHTS
+    uvec4 lights = entity.lights;
+    vec4 share = within * shares;
+    for (uint i = 0; i < 4 && lights[i] != NONE; i++) {
+        Entity shining = ENTITY(lights[i]);
+        vec2 part = reflect_light(view, shining.centre.xyz - entity.eye - place, shining);
+        found.facing += share[i] * part.x * shining.emission;
+        found.grazing += share[i] * part.y * shining.emission;
+    }
+#endif
+    vec3 f0 = mix(vec3(entity.f0), base, entity.metallic);
+    return diffuse_share(view.z, entity.metallic, entity.f0) * light + f0 * found.facing + found.grazing;
+}

@@ -1,0 +1,140 @@
+//! Reflections of a frame: which entities have them, of which lights, and how the eye sees them now.
+
+use super::Frame;
+use crate::draw::camera::world_from_centred;
+use crate::gloss::{DrawnReflections, Glossy, ReflectionInputs, Reflections};
+use crate::error::Result;
+use crate::gpu::{Buffer, Device};
+use crate::layout::{GlossEntity, NONE, SHOWN_LIGHTS};
+use crate::scene::{LightMethod, Placement, Scene};
+use crate::scene_buffers::SceneBuffers;
+use crate::shaders::Library;
+use glam::{DVec3, Vec3, Vec4};
+use std::sync::Arc;
+
+/// Reflections of the scene's glossy receivers; `None` where it has none, or where the device's texel views do not hold
+/// them: then these are diffuse.
+pub(super) fn reflections(
+    device: &Arc<Device>,
+    library: &Library,
+    scene: &Scene,
+    methods: &[LightMethod],
+    buffers: &SceneBuffers,
+    light_bytes: u64,
+    texels: bool,
+) -> Result<Option<Reflections>> {
+    let is_glossy = |index: &usize| scene.entities[*index].receives && scene.entities[*index].gloss.is_some();
+    let lights = ShownLights::new(scene, methods);
+    let glossy: Vec<Glossy> = (0..scene.entities.len())
+        .filter(is_glossy)
+        .map(|entity| Glossy {
+            entity,
+            vertex_count: buffers.surface(entity).vertices.len() as u32,
+            lights: lights.of(entity),
+        })
+        .collect();
+    if glossy.is_empty() {
+        return Ok(None);
+    }
+    if !DrawnReflections::fit(device, light_bytes, &buffers.vertices, scene.entities.len()) {
+        log::warn!("no surface is glossy: the device's texel buffers cannot hold what all vertices reflect");
+        return Ok(None);
+    }
+    let count = scene.entities.len();
+    let mut reflections = Reflections::new(device, library, glossy, count, light_bytes, texels)?;
+    reflections.set_sky(&scene.environment)?;
+    Ok(Some(reflections))
+}
+
+/// The sharp lights of a scene at its first time.
+struct ShownLights {
+    /// Number, place and radius in metres, and the sum of its colours.
+    lights: Vec<(usize, DVec3, f64, f64)>,
+    /// Bounding spheres of all entities.
+    spheres: Vec<(DVec3, f64)>,
+}
+
+impl ShownLights {
+    fn new(scene: &Scene, methods: &[LightMethod]) -> Self {
+        let placed = scene.entities.iter().zip(scene.at(0.0));
+        let spheres: Vec<_> =
+            placed.map(|(entity, at)| at.sphere(scene.meshes[entity.mesh].bounding_sphere())).collect();
+        let lights = scene.entities.iter().enumerate().filter(|(i, entity)| entity.emits && methods[*i].is_sharp());
+        let lights = lights.map(|(i, entity)| (i, spheres[i].0, spheres[i].1, entity.emission.element_sum().into()));
+        ShownLights { lights: lights.collect(), spheres }
+    }
+
+    /// Those that are strongest at the centre of a receiver.
+    fn of(&self, receiver: usize) -> [u32; SHOWN_LIGHTS] {
+        let (centre, radius_m) = self.spheres[receiver];
+        let strength = |&(light, at, light_radius_m, emission): &(usize, DVec3, f64, f64)| {
+            let distance_m = at.distance(centre).max(radius_m + light_radius_m);
+            (light != receiver).then(|| (emission * (light_radius_m / distance_m).powi(2), light))
+        };
+        let mut ranked: Vec<(f64, usize)> = self.lights.iter().filter_map(strength).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut shown = [NONE; SHOWN_LIGHTS];
+        shown.iter_mut().zip(ranked).for_each(|(slot, (_, light))| *slot = light as u32);
+        shown
+    }
+}
+
+impl Frame {
+    /// The glossy entities as the scene's camera sees them.
+    pub(super) fn prepare_gloss(&mut self, placements: &[Placement]) -> Result<()> {
+        let Some(reflections) = &self.reflections else { return Ok(()) };
+        let eye = self.scene.data.camera.eye;
+        let mut entities = vec![GlossEntity::default(); placements.len()];
+        for glossy in &reflections.glossy {
+            let index = glossy.entity;
+            let entity = &self.scene.entities[index];
+            let Some(gloss) = entity.gloss else { continue };
+            let mut matrix = world_from_centred(&placements[index], self.buffers.meshes[entity.mesh].centre_m);
+            matrix.w_axis -= DVec3::from(eye).extend(0.0);
+            let row = |row: usize| Vec4::from_array(matrix.row(row).as_vec4().to_array()).to_array();
+            entities[index] = GlossEntity {
+                row_x: row(0),
+                row_y: row(1),
+                row_z: row(2),
+                albedo: entity.albedo.to_array(),
+                roughness: gloss.roughness,
+                eye: Vec3::from(eye).to_array(),
+                metallic: gloss.metallic,
+                lights: glossy.lights,
+                f0: gloss.f0,
+                sky_scale: reflections.sky_scale,
+                vertex_first: self.buffers.surface(index).vertices.start,
+                radiosity_first: (self.radiosity.offsets[index] / 16) as u32,
+                vertex_count: glossy.vertex_count,
+                unused: [0; 3],
+            };
+        }
+        self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.set_entities(&entities))
+    }
+
+    /// What the pass "gloss" works on.
+    pub(super) fn gloss_work(&self) -> Option<(&Reflections, ReflectionInputs<'_>)> {
+        let inputs = ReflectionInputs {
+            vertices: &self.buffers.vertices,
+            direct: self.radiosity.direct(),
+            radiosity: &self.radiosity.merged,
+        };
+        self.reflections.as_ref().map(|reflections| (reflections, inputs))
+    }
+
+    /// What pixels read of reflections.
+    pub(super) fn drawn_reflections(&self) -> Option<DrawnReflections<'_>> {
+        let of = |reflections| DrawnReflections {
+            reflections,
+            vertices: &self.buffers.vertices,
+            lights: &self.work.entities,
+        };
+        self.reflections.as_ref().map(of)
+    }
+
+    /// Where the merge and the pass of sharp lights leave what reflections need.
+    pub(super) fn kept_for_gloss(&self) -> Option<[&Buffer; 3]> {
+        let reflections = self.reflections.as_ref()?;
+        Some([&reflections.through, &reflections.shown_lights, &reflections.shown_shares])
+    }
+}

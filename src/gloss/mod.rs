@@ -1,0 +1,250 @@
+//! Pass "gloss": distant and bounced light that glossy surfaces reflect towards the eye.
+//!
+//! Inputs: the transfer that the merge has left at the end of the sky's chain, light before and after bounces, vertices,
+//! the prefiltered sky and the table of lobes. Output: two quads a vertex, which "draw" takes: what is multiplied by the
+//! colour of the faced surface, and what is added to it. Below [`PIXEL_ROUGHNESS`] the pass gives the share of the sky
+//! that gets through and the light that has bounced, and pixels look the reflection up.
+//!
+//! A moving camera runs this pass alone; nothing is merged again. Highlights of sharp lights are evaluated at pixels
+//! (`glsl/gloss_pixel.glsl`), by the shares that the pass of sharp lights leaves at vertices.
+
+pub mod brdf;
+pub mod lobe;
+pub mod sky_map;
+pub mod twin;
+
+use crate::asset::environment::Environment;
+use crate::error::Result;
+use crate::gpu::texture::Level;
+use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView, Texture, Upload};
+use crate::layout::{CLUSTER_VERTICES, GlossEntity, NONE, SHOWN_LIGHTS};
+use crate::shaders::{Library, ShaderPermutation};
+use ash::vk;
+use half::f16;
+use sky_map::SkyMap;
+use std::sync::Arc;
+
+/// Below this roughness pixels look the sky up themselves, as vertices are too far apart for what it shows.
+pub const PIXEL_ROUGHNESS: f32 = 0.4;
+/// Least cosine by which a lobe is divided, as the transfer holds the cosine already.
+pub const LEAST_COSINE: f64 = 0.25;
+/// Least light that a share is taken of, as a share of the mean of the sky.
+pub const LEAST_SHARE: f64 = 0.1;
+/// Four bands ring: shares are cut off above.
+pub const MOST_SHARE: f64 = 1.1;
+/// Least cosine between normal and view.
+pub const LEAST_VIEW_Z: f64 = 1e-3;
+/// How much wider slopes become by the width of a part of a light that counts as a point.
+pub const WIDENED: f64 = 0.35;
+/// A light counts as one part where the square of the sine of its radius is below this share of that of alpha.
+pub const WHOLE_LIGHT: f64 = 0.05;
+
+const QUADS: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+
+/// A receiver that reflects: its vertices in the buffers of light.
+#[derive(Clone, Copy, Debug)]
+pub struct Glossy {
+    pub entity: usize,
+    pub vertex_count: u32,
+    /// The sharp lights whose highlights it shows, or [`NONE`]. They stay so while things move, as the shares of lights
+    /// that vertices hold are theirs.
+    pub lights: [u32; SHOWN_LIGHTS],
+}
+
+/// The macros of every shader that includes `glsl/gloss.glsl`.
+pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
+    let numbers = [
+        ("PIXEL_ROUGHNESS", f64::from(PIXEL_ROUGHNESS)),
+        ("LEAST_COSINE", LEAST_COSINE),
+        ("LEAST_SHARE", LEAST_SHARE),
+        ("MOST_SHARE", MOST_SHARE),
+        ("LEAST_VIEW_Z", LEAST_VIEW_Z),
+        ("LEAST_ALPHA", brdf::LEAST_ALPHA),
+        ("WIDENED", WIDENED),
+        ("WHOLE_LIGHT", WHOLE_LIGHT),
+        ("TABLE", lobe::TABLE as f64),
+        ("LEVELS", lobe::LEVELS as f64),
+        ("MAP_SIDE", sky_map::SIDE as f64),
+    ];
+    numbers.into_iter().fold(row, |row, (name, value)| row.number(name, value)).define("TAPS", lobe::TAPS as u32)
+}
+
+pub fn gloss_row(texels: bool) -> ShaderPermutation {
+    macros(ShaderPermutation::new("gloss.comp", 4)).define("TEXEL", texels).define("WORKGROUP", CLUSTER_VERTICES)
+}
+
+/// Everything that reflections are computed from and kept in.
+pub struct Reflections {
+    pipeline: ComputePipeline,
+    texels: bool,
+    sky_map: Texture,
+    products: Buffer,
+    /// Radiance that 1 in the map stands for.
+    pub sky_scale: f32,
+    lobes: Texture,
+    /// One white texel, for surfaces of one colour.
+    pub white: Texture,
+    /// The receivers that reflect.
+    pub glossy: Vec<Glossy>,
+    /// Workgroups: an entity, and the first of its vertices.
+    groups: Buffer,
+    group_count: u32,
+    /// [`GlossEntity`] of every entity of the scene.
+    entities: Upload,
+    /// For every entity the sharp lights that its highlights are of.
+    pub shown_lights: Buffer,
+    /// Transfer at the end of the sky's chain, sixteen halves a vertex, which the merge writes.
+    pub through: Buffer,
+    /// Shares of the shown lights at every vertex, which the pass of sharp lights writes.
+    pub shown_shares: Buffer,
+    reflected: Buffer,
+}
+
+/// What the pass reads of a frame.
+pub struct ReflectionInputs<'b> {
+    /// Positions and normals.
+    pub vertices: &'b Buffer,
+    /// Light of every vertex before bounces, and after them.
+    pub direct: &'b Buffer,
+    pub radiosity: &'b Buffer,
+}
+
+/// What drawing shaders read of reflections.
+#[derive(Clone, Copy)]
+pub struct DrawnReflections<'b> {
+    pub reflections: &'b Reflections,
+    pub vertices: &'b Buffer,
+    /// [`crate::layout::DeviceEntity`] of every entity, for highlights.
+    pub lights: &'b Buffer,
+}
+
+impl Reflections {
+    /// For the glossy receivers of a scene of `entity_count` entities, whose buffers of light hold `light_bytes`; `texels` where the device reads texels faster than blocks.
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        glossy: Vec<Glossy>,
+        entity_count: usize,
+        light_bytes: u64,
+        texels: bool,
+    ) -> Result<Self> {
+        let groups: Vec<[u32; 2]> = glossy
+            .iter()
+            .flat_map(|of| {
+                (0..of.vertex_count).step_by(CLUSTER_VERTICES as usize).map(|first| [of.entity as u32, first])
+            })
+            .collect();
+        let mut shown_lights = vec![NO_LIGHTS; entity_count];
+        glossy.iter().for_each(|of| shown_lights[of.entity] = of.lights);
+        let wide = (sky_map::SIDE + 2) as u32;
+        let empty = vec![[0.0; 4]; (wide * wide) as usize * lobe::LEVELS];
+        let kept = |name: &str, bytes: u64| {
+            let mut buffer = Buffer::new(device, name, BufferKind::Device, bytes)?;
+            buffer.fill(0, &vec![0_u32; bytes as usize / 4])?;
+            Ok(buffer)
+        };
+        Ok(Reflections {
+            pipeline: ComputePipeline::new(device, "gloss", &library.shader(&gloss_row(texels))?, &[])?,
+            texels,
+            sky_map: texture(device, "sky map", wide, &empty)?,
+            products: Buffer::with_data(device, "products of the sky", &[0.0_f32; 768])?,
+            sky_scale: 0.0,
+            lobes: texture(device, "lobes", lobe::TABLE as u32, &lobe::texels())?,
+            white: texture(device, "white", 1, &[[1.0; 4]])?,
+            group_count: groups.len() as u32,
+            groups: Buffer::with_data(device, "glossy groups", &groups)?,
+            entities: Upload::new(device, "glossy entities", (entity_count * size_of::<GlossEntity>()) as u64)?,
+            shown_lights: Buffer::with_data(device, "shown lights", &shown_lights)?,
+            through: kept("transfer through", 2 * light_bytes)?,
+            shown_shares: kept("shown shares", light_bytes)?,
+            reflected: kept("reflected", 2 * light_bytes)?,
+            glossy,
+        })
+    }
+
+    /// Takes over distant light.
+    pub fn set_sky(&mut self, environment: &Environment) -> Result<()> {
+        let device = self.products.device().clone();
+        let map = SkyMap::new(environment);
+        self.sky_map = texture(&device, "sky map", (sky_map::SIDE + 2) as u32, &map.texels)?;
+        self.products = Buffer::with_data(&device, "products of the sky", &map.products)?;
+        self.sky_scale = map.scale;
+        Ok(())
+    }
+
+    /// Sets the entities as the eye sees them, one for every entity of the scene.
+    pub fn set_entities(&mut self, entities: &[GlossEntity]) -> Result<()> {
+        self.entities.write(entities)
+    }
+
+    /// Computes what every vertex reflects.
+    pub fn record<'r>(&'r self, commands: &mut Commands<'r>, inputs: &ReflectionInputs<'r>) -> Result<()> {
+        let read = |buffer: &'r Buffer| -> Result<Bind<'r>> {
+            Ok(if self.texels { Bind::Texel(TexelView::new(buffer, QUADS)?) } else { Bind::Buffer(buffer) })
+        };
+        let resources = [
+            Bind::Buffer(&self.entities),
+            Bind::Buffer(&self.groups),
+            read(inputs.vertices)?,
+            Bind::Buffer(&self.through),
+            Bind::Buffer(&self.products),
+            Bind::Texture(&self.sky_map),
+            Bind::Texture(&self.lobes),
+            read(inputs.direct)?,
+            read(inputs.radiosity)?,
+            Bind::Buffer(&self.reflected),
+        ];
+        commands.dispatch(&self.pipeline, &resources, &(), [self.group_count * CLUSTER_VERTICES, 1, 1])
+    }
+
+    /// The two quads of an entity's vertices, as they are stored: `first` is its first vertex.
+    pub fn read(&self, first: usize, vertex_count: usize) -> Result<Vec<[[f32; 4]; 2]>> {
+        let bytes = 32 * first as u64..32 * (first + vertex_count) as u64;
+        self.reflected.download_range(bytes)
+    }
+
+    pub fn size_bytes(&self) -> u64 {
+        let buffers = [
+            &self.products,
+            &self.groups,
+            &self.shown_lights,
+            &self.through,
+            &self.shown_shares,
+            &self.reflected,
+        ];
+        let textures = self.sky_map.size_bytes + self.lobes.size_bytes;
+        buffers.iter().map(|buffer| buffer.size_bytes).sum::<u64>() + textures + self.entities.all_bytes()
+    }
+}
+
+impl<'b> DrawnReflections<'b> {
+    /// Whether a device's texel views hold what pixels read.
+    pub fn fit(device: &Device, light_bytes: u64, vertices: &Buffer, entity_count: usize) -> bool {
+        let entities = (entity_count * size_of::<GlossEntity>()) as u64;
+        [2 * light_bytes, vertices.size_bytes, entities].into_iter().all(|bytes| TexelView::fits(device, QUADS, bytes))
+    }
+
+    /// Bindings from GLOSS_BINDING on: entities, what vertices reflect, shares of lights, sky map and lobes.
+    pub fn binds(&self) -> Result<Vec<Bind<'b>>> {
+        let of = self.reflections;
+        let texels = |buffer| TexelView::new(buffer, QUADS).map(Bind::Texel);
+        Ok(vec![
+            texels(&*of.entities)?,
+            texels(&of.reflected)?,
+            texels(&of.shown_shares)?,
+            Bind::Texture(&of.sky_map),
+            Bind::Texture(&of.lobes),
+        ])
+    }
+}
+
+/// No light is shown.
+const NO_LIGHTS: [u32; SHOWN_LIGHTS] = [NONE; SHOWN_LIGHTS];
+
+/// A texture of halves.
+fn texture(device: &Arc<Device>, name: &str, width: u32, texels: &[[f32; 4]]) -> Result<Texture> {
+    let halves: Vec<u16> = texels.as_flattened().iter().map(|x| f16::from_f32(*x).to_bits()).collect();
+    let level = Level { width, height: texels.len() as u32 / width, bytes: bytemuck::cast_slice(&halves) };
+    let edge = [vk::SamplerAddressMode::CLAMP_TO_EDGE; 2];
+    Texture::new(device, name, vk::Format::R16G16B16A16_SFLOAT, &[level], edge)
+}

@@ -89,13 +89,14 @@ void main() {
     vec3 share = share_through(view, entity.roughness, v);
     // Light that has bounced comes from everywhere alike: its irradiance over pi.
     vec3 bounced = max(radiosity_at(v).rgb - direct_at(v).rgb, vec3(0.0)) / max(entity.albedo, vec3(1e-4));
+    vec2 of_unit = reflected_share(view, entity.roughness);
+    float energy = of_unit.x + of_unit.y;
     if (entity.roughness < PIXEL_ROUGHNESS) {
-        reflected[2 * v] = vec4(share * entity.sky_scale, 0.0);
+        reflected[2 * v] = vec4(share * entity.sky_scale, energy);
         reflected[2 * v + 1] = vec4(bounced, 0.0);
     } else {
         Reflection sky = reflect_sky(view, entity.roughness);
-        vec2 of_unit = reflected_share(view, entity.roughness);
-        reflected[2 * v] = vec4(share * entity.sky_scale * sky.facing + of_unit.x * bounced, 0.0);
+        reflected[2 * v] = vec4(share * entity.sky_scale * sky.facing + of_unit.x * bounced, energy);
         reflected[2 * v + 1] = vec4(share * entity.sky_scale * sky.grazing + of_unit.y * bounced, 0.0);
     }
 }

@@ -5,7 +5,7 @@ layout(binding = GLOSS_BINDING) uniform textureBuffer gloss_entities;
 #include "generated/gloss_entity_at.glsl"
 layout(location = 6) centroid in vec3 from_eye; // world axes, metres
 layout(location = 7) centroid in vec3 normal;   // world
-layout(location = 8) centroid in vec3 first;    // glsl/gloss.comp
+layout(location = 8) centroid in vec4 first;    // glsl/gloss.comp
 layout(location = 9) centroid in vec3 second;
 layout(location = 10) centroid in vec4 shares;
 #define MAP_BINDING GLOSS_BINDING + 3
@@ -19,7 +19,7 @@ vec3 glossy(uint index, vec3 base, vec3 light, float within) {
     GlossEntity entity = gloss_entity_at(index);
     vec3 place = within * from_eye;
     View view = view_of(place, normal, entity.roughness);
-    Reflection found = Reflection(within * first, within * second);
+    Reflection found = Reflection(within * first.rgb, within * second);
     if (entity.roughness < PIXEL_ROUGHNESS) {
         // Vertices have the share of the sky that gets through, and the light that has bounced.
         Reflection sky = reflect_sky(view, entity.roughness);
@@ -38,5 +38,10 @@ vec3 glossy(uint index, vec3 base, vec3 light, float within) {
     }
 #endif
     vec3 f0 = mix(vec3(entity.f0), base, entity.metallic);
-    return diffuse_share(view.z, entity.metallic, entity.f0) * light + f0 * found.facing + found.grazing;
+    vec3 specular = f0 * found.facing + found.grazing;
+    // Light that microfacets pass on to each other: Kulla and Conty, Revisiting Physically Based Shading at Imageworks,
+    // SIGGRAPH 2017 course, as a factor.
+    vec3 again = f0 * entity.mean_energy / max(1.0 - f0 * (1.0 - entity.mean_energy), 1e-6);
+    specular *= 1.0 + again * (1.0 / max(within * first.w, LEAST_ENERGY) - 1.0);
+    return diffuse_share(view.z, entity.metallic, entity.f0) * light + specular;
 }

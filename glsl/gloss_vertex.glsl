@@ -7,7 +7,7 @@ layout(binding = GLOSS_BINDING + 1) uniform textureBuffer reflected;    // two o
 layout(binding = GLOSS_BINDING + 2) uniform textureBuffer shown_shares; // of the lights that highlights are of
 layout(location = 6) out vec3 from_eye; // world axes, metres
 layout(location = 7) out vec3 normal;   // world
-layout(location = 8) out vec3 first;    // glsl/gloss.comp
+layout(location = 8) out vec4 first;   // glsl/gloss.comp
 layout(location = 9) out vec3 second;
 layout(location = 10) out vec4 shares;
 
@@ -18,7 +18,7 @@ void pass_gloss(uint index, uint v) {
     from_eye = vec3(dot(entity.row_x, place), dot(entity.row_y, place), dot(entity.row_z, place));
     vec3 own = texelFetch(vertices, at + 1).xyz;
     normal = vec3(dot(entity.row_x.xyz, own), dot(entity.row_y.xyz, own), dot(entity.row_z.xyz, own));
-    first = texelFetch(reflected, 2 * lit).rgb;
+    first = texelFetch(reflected, 2 * lit);
     second = texelFetch(reflected, 2 * lit + 1).rgb;
     shares = texelFetch(shown_shares, lit);
 }

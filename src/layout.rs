@@ -26,8 +26,8 @@ impl Shared for [f32; 3] {
 impl Shared for [f32; 4] {
     const GLSL: &'static str = "vec4";
 }
-impl Shared for [u32; 3] {
-    const GLSL: &'static str = "uvec3";
+impl Shared for [u32; 2] {
+    const GLSL: &'static str = "uvec2";
 }
 impl Shared for [u32; 4] {
     const GLSL: &'static str = "uvec4";
@@ -169,9 +169,12 @@ shared_struct! {
         vertex_first: u32,
         /// First vertex in the radiosity buffer.
         radiosity_first: u32,
-        /// Texels hold four words.
-        unused: [u32; 3],
         vertex_count: u32,
+        /// What a metal of no colour reflects once of unit light from everywhere, over all views; 0 where light that
+        /// microfacets pass on to each other is lost.
+        mean_energy: f32,
+        /// Texels hold four words.
+        unused: [u32; 2],
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::Frame;
 use crate::draw::camera::world_from_centred;
+use crate::gloss::lobe::mean_energy;
 use crate::gloss::{DrawnReflections, Glossy, ReflectionInputs, Reflections};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device};
@@ -106,7 +107,8 @@ impl Frame {
                 vertex_first: self.buffers.surface(index).vertices.start,
                 radiosity_first: (self.radiosity.offsets[index] / 16) as u32,
                 vertex_count: glossy.vertex_count,
-                unused: [0; 3],
+                mean_energy: if self.options.single_scatter { 0.0 } else { mean_energy(gloss.roughness) },
+                unused: [0; 2],
             };
         }
         self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.set_entities(&entities))

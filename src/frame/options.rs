@@ -29,6 +29,9 @@ pub struct Options {
     /// How often light bounces between what never moves against each other.
     #[serde(default)]
     pub bounces: Bounces,
+    /// Whether light that microfacets pass on to each other is lost, as in glTF's model.
+    #[serde(default)]
+    pub single_scatter: bool,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
     /// How edges are kept from showing as stairs.
@@ -53,6 +56,7 @@ impl Default for Options {
             skip: Skip::ALL,
             eps: EPS,
             bounces: Bounces::None,
+            single_scatter: false,
             size: [960, 640],
             antialias: Antialias::default(),
         }
@@ -115,6 +119,10 @@ pub struct RenderOptions {
         arg(long, help_heading = LIGHTING, value_enum, default_value = "0", value_name = "0|1|all")
     )]
     pub bounces: Bounces,
+    /// Lose the light that microfacets pass on to each other, as glTF's own model does: rough metals become up to half
+    /// as bright
+    #[cfg_attr(feature = "cli", arg(long, help_heading = LIGHTING))]
+    pub single_scatter: bool,
     /// Where sharp lights are evaluated for pictures. Default: pixel with four samples a pixel, vertex with one
     #[cfg_attr(feature = "cli", arg(long, help_heading = LIGHTING, value_enum, value_name = "vertex|pixel"))]
     pub shading: Option<Shading>,
@@ -141,9 +149,21 @@ pub fn picture_size(text: &str) -> std::result::Result<[u32; 2], String> {
 impl Default for RenderOptions {
     /// The defaults of `shadow-fields render`.
     fn default() -> Self {
-        let Options { lights, shading, variant, skip, eps, bounces, .. } = Options::default();
+        let Options { lights, shading, variant, skip, eps, bounces, single_scatter, .. } = Options::default();
         let bake = BakeOptions::default();
-        RenderOptions { size: None, antialias: None, variant, skip, eps, lights, bounces, shading, bake, cache: None }
+        RenderOptions {
+            size: None,
+            antialias: None,
+            variant,
+            skip,
+            eps,
+            lights,
+            bounces,
+            single_scatter,
+            shading,
+            bake,
+            cache: None,
+        }
     }
 }
 
@@ -163,6 +183,7 @@ impl RenderOptions {
             skip: self.skip,
             eps: self.eps,
             bounces: self.bounces,
+            single_scatter: self.single_scatter,
             size,
             antialias: self.antialias.unwrap_or_default(),
         })

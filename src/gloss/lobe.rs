@@ -147,6 +147,27 @@ static LOBES: LazyLock<Vec<Lobe>> = LazyLock::new(|| {
     (0..TABLE * TABLE).into_par_iter().map(|i| Lobe::new(row_roughness(i / TABLE), column_cosine(i % TABLE))).collect()
 });
 
+/// What the lobe of a roughness reflects of unit light from everywhere, in the mean over all views weighed by their
+/// cosine.
+pub fn mean_energy(roughness: f32) -> f32 {
+    let row = |row: usize| {
+        let mut sums = [0.0; 2];
+        for column in 0..TABLE {
+            // Columns are even in the root of 1 - cosine, so that each stands for that root times twice a step.
+            let cosine = column_cosine(column);
+            let weight = cosine * (1.0 - cosine).sqrt();
+            let energy: f64 = LOBES[row * TABLE + column].taps.iter().map(|tap| tap.weight).sum();
+            sums[0] += weight * energy;
+            sums[1] += weight;
+        }
+        sums[0] / sums[1]
+    };
+    let at = f64::from(roughness) * (TABLE - 1) as f64;
+    let below = (at as usize).min(TABLE - 2);
+    let share = at - below as f64;
+    ((1.0 - share) * row(below) + share * row(below + 1)) as f32
+}
+
 /// The table as texels of four numbers, [`TABLE`] wide: for each tap the rows of shift, level, weight and what is
 /// reflected by Schlick's term, then for each tap the rows of its three bands.
 pub fn texels() -> Vec<[f32; 4]> {

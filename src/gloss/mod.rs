@@ -34,6 +34,8 @@ pub const LEAST_SHARE: f64 = 0.1;
 pub const MOST_SHARE: f64 = 1.1;
 /// Least cosine between normal and view.
 pub const LEAST_VIEW_Z: f64 = 1e-3;
+/// Least share of light that counts as reflected once.
+pub const LEAST_ENERGY: f64 = 0.1;
 /// How much wider slopes become by the width of a part of a light that counts as a point.
 pub const WIDENED: f64 = 0.35;
 /// A light counts as one part where the square of the sine of its radius is below this share of that of alpha.
@@ -60,6 +62,7 @@ pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
         ("MOST_SHARE", MOST_SHARE),
         ("LEAST_VIEW_Z", LEAST_VIEW_Z),
         ("LEAST_ALPHA", brdf::LEAST_ALPHA),
+        ("LEAST_ENERGY", LEAST_ENERGY),
         ("WIDENED", WIDENED),
         ("WHOLE_LIGHT", WHOLE_LIGHT),
         ("TABLE", lobe::TABLE as f64),

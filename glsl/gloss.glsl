@@ -127,13 +127,12 @@ vec2 reflected_share(View view, float roughness) {
 vec2 reflect_part(View view, vec3 along, float sine, float omega) {
     float cosine = part_cosine(dot(view.normal, along), sine);
     vec3 half_way = normalize(along + view.toward);
-    float half_z = max(dot(view.normal, half_way), 1e-4), view_half = max(dot(view.toward, half_way), 1e-4);
-    float lit = max(dot(view.normal, along), cosine);
-    float scale = masking(view, lit) * 4.0 * view_half * cosine / half_z;
-    float slopes = omega / (4.0 * view_half * half_z * half_z * half_z);
-    float square = 1.0 / (half_z * half_z) - 1.0;
+    float half_z = max(dot(view.normal, half_way), 0.0), view_half = max(dot(view.toward, half_way), 1e-4);
+    float slopes = min(omega / max(4.0 * view_half * half_z * half_z * half_z, 1e-30), MOST_SLOPES);
     float widened = view.alpha * view.alpha + WIDENED * slopes;
-    float value = scale * slopes * widened / (PI * (widened + square) * (widened + square));
+    float below = (widened - 1.0) * half_z * half_z + 1.0;
+    float lit = max(dot(view.normal, along), cosine);
+    float value = widened / (PI * below * below) * masking(view, lit) * cosine * omega;
     float term = schlick(view_half);
     return cosine > 0.0 ? value * vec2(1.0 - term, term) : vec2(0.0);
 }

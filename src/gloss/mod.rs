@@ -38,6 +38,8 @@ pub const LEAST_VIEW_Z: f64 = 1e-3;
 pub const LEAST_ENERGY: f64 = 0.1;
 /// How much wider slopes become by the width of a part of a light that counts as a point.
 pub const WIDENED: f64 = 0.35;
+/// Largest area of slopes by which they become wider: where view and light graze it has no bound.
+pub const MOST_SLOPES: f64 = 1.0;
 /// A light counts as one part where the square of the sine of its radius is below this share of that of alpha.
 pub const WHOLE_LIGHT: f64 = 0.05;
 
@@ -63,6 +65,7 @@ pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
         ("LEAST_VIEW_Z", LEAST_VIEW_Z),
         ("LEAST_ALPHA", brdf::LEAST_ALPHA),
         ("LEAST_ENERGY", LEAST_ENERGY),
+        ("MOST_SLOPES", MOST_SLOPES),
         ("WIDENED", WIDENED),
         ("WHOLE_LIGHT", WHOLE_LIGHT),
         ("TABLE", lobe::TABLE as f64),

@@ -233,11 +233,22 @@ impl<'a> Rendering<'a> {
         Ok(shown)
     }
 
+    /// The rays of what is compared with pictures, or stands for them.
+    fn rays(&self) -> RayCast {
+        RayCast {
+            rays: self.arguments.rays(),
+            seed: self.global.seed,
+            bounces: self.options.bounces.steps(),
+            single_scatter: self.options.single_scatter,
+            ..Default::default()
+        }
+    }
+
     /// One picture by rays.
     fn cast(&self, placements: &[Placement]) -> RayPicture {
         let shapes = RayMeshes::new(self.scene);
         let world = World::new(self.scene, &shapes, placements);
-        let cast = RayCast { rays: self.arguments.rays(), seed: self.global.seed, ..Default::default() };
+        let cast = self.rays();
         let [_, height] = self.options.size;
         let tell = |rows: u32| self.context.progress.rows(rows, height);
         let smoothed = self.options.antialias != Antialias::None;
@@ -272,9 +283,10 @@ impl<'a> Rendering<'a> {
 
     fn write_vertices(&mut self) -> Result<()> {
         let last = self.last();
+        let cast = self.rays();
         let (Some(path), Some(frame)) = (&self.arguments.vertices, &mut self.frame) else { return Ok(()) };
         if self.arguments.reference {
-            light_by_rays(frame, &last, self.arguments.rays(), self.global.seed)?;
+            light_by_rays(frame, &last, &cast)?;
         } else {
             // What no picture showed is lit for this.
             frame.render(&last, None)?;
@@ -285,9 +297,9 @@ impl<'a> Rendering<'a> {
     /// Compares the last picture's vertices with ray casting, where that is asked for.
     fn write_error(&mut self) -> Result<Value> {
         let last = self.last();
+        let cast = self.rays();
         let (Some(path), Some(frame)) = (&self.arguments.error, &mut self.frame) else { return Ok(Value::Null) };
         frame.render(&last, None)?;
-        let cast = RayCast { rays: self.arguments.rays(), seed: self.global.seed, ..Default::default() };
         let (reference, noise) = truth::picture(frame.scene(), &last, &cast);
         let map = ErrorMap::new(&error_map::radiosity(frame)?, &reference, self.arguments.error_scheme);
         Ok(json!(map.write(path, frame, &last, self.arguments.error_limit, noise)?))
@@ -375,9 +387,8 @@ fn announce(global: &Global, context: &Context, options: &frame::Options) -> Res
 }
 
 /// Replaces what the merge would find at vertices by what rays find there.
-fn light_by_rays(frame: &mut Frame, placements: &[Placement], rays: u32, seed: u64) -> Result<()> {
-    let cast = RayCast { rays, seed, ..Default::default() };
-    let (lit, _) = truth::picture(frame.scene(), placements, &cast);
+fn light_by_rays(frame: &mut Frame, placements: &[Placement], cast: &RayCast) -> Result<()> {
+    let (lit, _) = truth::picture(frame.scene(), placements, cast);
     for (entity, radiosity) in lit {
         frame.set_radiosity(entity, &radiosity)?;
     }

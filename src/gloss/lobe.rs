@@ -147,6 +147,18 @@ static LOBES: LazyLock<Vec<Lobe>> = LazyLock::new(|| {
     (0..TABLE * TABLE).into_par_iter().map(|i| Lobe::new(row_roughness(i / TABLE), column_cosine(i % TABLE))).collect()
 });
 
+/// What the lobe of a roughness reflects of unit light from everywhere, seen at a cosine to the normal; interpolated as
+/// shaders do.
+pub fn energy(roughness: f64, view_z: f64) -> f64 {
+    let last = (TABLE - 1) as f64;
+    let [row, column] = [roughness, (1.0 - view_z).max(0.0).sqrt()].map(|at| at.clamp(0.0, 1.0) * last);
+    let [low, left] = [row, column].map(|at| (at as usize).min(TABLE - 2));
+    let [up, right] = [row - low as f64, column - left as f64];
+    let of = |row: usize, column: usize| LOBES[row * TABLE + column].taps.iter().map(|tap| tap.weight).sum::<f64>();
+    let along = |row: usize| (1.0 - right) * of(row, left) + right * of(row, left + 1);
+    (1.0 - up) * along(low) + up * along(low + 1)
+}
+
 /// What the lobe of a roughness reflects of unit light from everywhere, in the mean over all views weighed by their
 /// cosine.
 pub fn mean_energy(roughness: f32) -> f32 {

@@ -29,6 +29,7 @@ pub mod flip;
 pub mod pixels;
 pub mod ray_mesh;
 pub mod raycast;
+pub mod reflect;
 pub mod sequence;
 pub mod world;
 

@@ -1,6 +1,7 @@
 //! T0 at pixels: what pixels show of the scene, lit by rays from there.
 
 use super::raycast::{Estimate, RayCast};
+use super::reflect::Reflection;
 use super::world::{EntityView, SurfaceHit, VertexView, World};
 use super::{RayMeshes, Vertex};
 use crate::draw::camera::through_pixels;
@@ -29,6 +30,8 @@ pub struct Seen {
     /// The view from there, with the normal of smooth shading. Seen from behind, a surface is lit as it is drawn: by
     /// its normal.
     pub view: VertexView,
+    /// From there towards the eye, unit.
+    pub toward: DVec3,
     /// Linear RGB radiance that it emits.
     pub emission: DVec3,
     /// Reflectance there over the mean of the entity's, by colour.
@@ -61,7 +64,7 @@ impl<'w> Eye<'w> {
             DVec3::ZERO => DVec3::ZERO,
             emission => emission * world.emission(sight, direction).unwrap_or(DVec3::ZERO),
         };
-        Some(Seen { entity, view: world.surface(entity, place, normal), emission, over_mean })
+        Some(Seen { entity, view: world.surface(entity, place, normal), toward: -direction, emission, over_mean })
     }
 }
 
@@ -124,9 +127,13 @@ pub fn picture(
             let mut radiance = seen.as_ref().map_or(background, |seen| seen.emission);
             if let Some(seen) = seen.filter(|seen| scene.entities[seen.entity].receives) {
                 let key = Vertex { entity: seen.entity, index: pixel as usize * places.len() + index };
-                let Estimate { radiosity, error } = caster.point(&seen.view, key);
-                let radiosity = seen.over_mean * DVec3::from(radiosity);
-                let error = seen.over_mean * DVec3::from(error);
+                let entity = &scene.entities[seen.entity];
+                let base = seen.over_mean * entity.albedo.as_dvec3();
+                let surface =
+                    Reflection::seen(base, entity.gloss, seen.view.normal, seen.toward, cast.single_scatter);
+                let Estimate { radiosity, error } = caster.reflected(&seen.view, &surface, key);
+                let radiosity = DVec3::from(radiosity);
+                let error = DVec3::from(error);
                 radiance += radiosity;
                 of_pixel[2] += radiosity * radiosity;
                 of_pixel[3] += error * error;

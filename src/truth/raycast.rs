@@ -5,13 +5,13 @@
 //! vertex has its own scrambling; several runs give the standard error.
 
 use super::Vertex;
-use super::sequence::{COSINE_INTEGRAL, Sequence, cone_solid_angle};
+use super::reflect::{LAMBERT, Reflection};
+use super::sequence::{Axes, COSINE_INTEGRAL, Sequence, cone_solid_angle};
 use super::world::{EntityView, VertexView, World};
 use crate::asset::environment::Environment;
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::f64::consts::PI;
 
 /// The form in which the distant light is integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,12 +45,26 @@ pub struct RayCast {
     pub shadows: bool,
     /// What counts as lying before a local light.
     pub order: Order,
+    /// How often light bounces; each ray that counts it is followed from surface to surface, which reflect diffusely
+    /// with their base colour.
+    pub bounces: u32,
+    /// Whether glossy surfaces lose light that microfacets pass on to each other.
+    pub single_scatter: bool,
 }
 
 impl Default for RayCast {
     /// 4096 rays in 8 runs, which stop at what they meet.
     fn default() -> Self {
-        RayCast { rays: 4096, runs: 8, seed: 1, distant: Distant::Exact, shadows: true, order: Order::Surfaces }
+        RayCast {
+            rays: 4096,
+            runs: 8,
+            seed: 1,
+            distant: Distant::Exact,
+            shadows: true,
+            order: Order::Surfaces,
+            bounces: 0,
+            single_scatter: false,
+        }
     }
 }
 
@@ -101,7 +115,13 @@ pub(super) struct Caster<'w> {
 impl Caster<'_> {
     /// Radiosity of a point of a surface, as [`RayCast::run_at`] has it.
     pub(super) fn point(&self, view: &VertexView, key: Vertex) -> Estimate {
-        self.cast.point(self.world, &self.radiance, view, key)
+        let albedo = self.world.scene.entities[key.entity].albedo.as_dvec3();
+        self.reflected(view, &Reflection::diffuse(albedo), key)
+    }
+
+    /// Radiance that a point of a surface reflects.
+    pub(super) fn reflected(&self, view: &VertexView, surface: &Reflection, key: Vertex) -> Estimate {
+        self.cast.point(self.world, &self.radiance, (view, surface), key)
     }
 }
 
@@ -130,7 +150,13 @@ impl RayCast {
         Caster { cast: *self, world, radiance }
     }
 
-    fn point(&self, world: &World<'_>, radiance: &Radiance<'_>, view: &VertexView, vertex: Vertex) -> Estimate {
+    fn point(
+        &self,
+        world: &World<'_>,
+        radiance: &Radiance<'_>,
+        (view, surface): (&VertexView, &Reflection),
+        vertex: Vertex,
+    ) -> Estimate {
         let mut occluders = world.occluders(view);
         occluders.retain(|occluder| occluder.rises_above(view.normal));
         // Near occluders come first, because they are the most likely to block a ray.
@@ -145,7 +171,6 @@ impl RayCast {
             .map(|light| Shadowed::new(world, view, light, &occluders, self.order))
             .collect();
 
-        let albedo = world.scene.entities[vertex.entity].albedo.as_dvec3();
         let mut sum = DVec3::ZERO;
         let mut squares = DVec3::ZERO;
         for run in 0..self.runs {
@@ -155,11 +180,14 @@ impl RayCast {
                     [u64::from(run), vertex.entity as u64, (vertex.index as u64) << 16 | stream as u64],
                 )
             };
-            let mut found = self.sky(world, view, &occluders, radiance, sequence(0));
+            let at = |stream: usize| Point { world, view, surface, points: sequence(stream) };
+            let mut found = self.sky(&at(0), &occluders, radiance);
             for (stream, light) in lights.iter().enumerate() {
-                found += self.light(world, view, light, sequence(1 + stream));
+                found += self.light(&at(1 + stream), light);
             }
-            found *= albedo / PI;
+            if self.bounces > 0 {
+                found += self.bounced(&at(lights.len() + 1), radiance);
+            }
             sum += found;
             squares += found * found;
         }
@@ -173,49 +201,122 @@ impl RayCast {
         self.rays / self.runs
     }
 
-    /// Irradiance of the distant light.
-    fn sky(
-        &self,
-        world: &World<'_>,
-        view: &VertexView,
-        occluders: &[EntityView],
-        radiance: &Radiance<'_>,
-        points: Sequence,
-    ) -> DVec3 {
+    /// Reflected light of the distant light.
+    fn sky(&self, at: &Point<'_>, occluders: &[EntityView], radiance: &Radiance<'_>) -> DVec3 {
         if matches!(radiance, Radiance::None) {
             return DVec3::ZERO;
         }
-        let axes = super::sequence::Axes::new(view.normal);
-        let mut sum = DVec3::ZERO;
-        for ray in 0..self.rays_a_run() {
-            let direction = axes.cosine(points.point(ray));
+        let Point { world, view, surface, points } = at;
+        let arrives = |direction: DVec3| {
             let blocked = self.shadows
                 && (occluders.iter().any(|occluder| world.blocks(occluder, direction, f64::INFINITY))
                     || world.blocks_itself(view, direction, f64::INFINITY));
-            if !blocked {
-                sum += radiance.at(direction);
-            }
-        }
-        sum * (COSINE_INTEGRAL / f64::from(self.rays_a_run()))
+            if blocked { DVec3::ZERO } else { radiance.at(direction) }
+        };
+        self.gather(view, surface, points, &arrives)
     }
 
-    /// Irradiance of a local light behind what lies before it.
-    fn light(&self, world: &World<'_>, view: &VertexView, shadowed: &Shadowed, points: Sequence) -> DVec3 {
+    /// What a surface reflects of the light that arrives from each direction.
+    fn gather(
+        &self,
+        view: &VertexView,
+        surface: &Reflection,
+        points: &Sequence,
+        arrives: &dyn Fn(DVec3) -> DVec3,
+    ) -> DVec3 {
+        let axes = Axes::new(view.normal);
+        let mut diffuse = DVec3::ZERO;
+        let mut glossy = DVec3::ZERO;
+        for ray in 0..self.rays_a_run() {
+            let direction = axes.cosine(points.point(ray));
+            diffuse += surface.diffuse_share(direction) * arrives(direction);
+            if let Some(lobe) = &surface.lobe {
+                let (direction, weight) = lobe.sample(points.point(self.rays_a_run() + ray));
+                if weight != DVec3::ZERO {
+                    glossy += weight * arrives(direction);
+                }
+            }
+        }
+        (diffuse * surface.base * (LAMBERT * COSINE_INTEGRAL) + glossy) / f64::from(self.rays_a_run())
+    }
+
+    /// Reflected light of a local light behind what lies before it. Directions of a glossy surface are taken half from
+    /// the light and half from the lobe, weighed by the sum of both densities (Veach, *Robust Monte Carlo Methods*,
+    /// 1997, section 9.2.2).
+    fn light(&self, at: &Point<'_>, shadowed: &Shadowed) -> DVec3 {
+        let Point { world, view, surface, points } = at;
         let light = &shadowed.light;
         let cone = light.cone();
+        let density = 1.0 / cone_solid_angle(cone.height);
+        let arrives = |direction: DVec3| {
+            let cosine = direction.dot(view.normal);
+            let pattern = (cosine > 0.0).then(|| world.emission(light, direction)).flatten();
+            let seen = pattern.filter(|_| !(self.shadows && shadowed.hidden(world, view, direction)));
+            (cosine, seen.unwrap_or(DVec3::ZERO))
+        };
         let mut sum = DVec3::ZERO;
         for ray in 0..self.rays_a_run() {
             let direction = cone.axes.cone(points.point(ray), cone.height);
-            let cosine = direction.dot(view.normal);
-            if cosine > 0.0
-                && let Some(pattern) = world.emission(light, direction)
-                && !(self.shadows && shadowed.hidden(world, view, direction))
-            {
-                sum += cosine * pattern;
+            let (cosine, pattern) = arrives(direction);
+            if pattern != DVec3::ZERO {
+                sum += surface.base * (LAMBERT * cosine * surface.diffuse_share(direction) / density) * pattern;
+                if let Some(lobe) = &surface.lobe {
+                    sum += lobe.value(direction) * pattern / (density + lobe.density(direction));
+                }
+            }
+            if let Some(lobe) = &surface.lobe {
+                let (direction, weight) = lobe.sample(points.point(self.rays_a_run() + ray));
+                let of_lobe = lobe.density(direction);
+                if weight != DVec3::ZERO {
+                    sum += weight * arrives(direction).1 * (of_lobe / (of_lobe + density));
+                }
             }
         }
-        let emission = world.emission_at(light.entity, view.position);
-        sum * emission * (cone_solid_angle(cone.height) / f64::from(self.rays_a_run()))
+        sum * world.emission_at(light.entity, view.position) / f64::from(self.rays_a_run())
+    }
+
+    /// Reflected light that comes from other surfaces.
+    fn bounced(&self, at: &Point<'_>, radiance: &Radiance<'_>) -> DVec3 {
+        let Point { world, view, surface, points } = at;
+        let next = std::cell::Cell::new(0);
+        let arrives = |direction: DVec3| {
+            next.set(next.get() + 1);
+            self.along(world, radiance, view, direction, &Walk { points, path: next.get() })
+        };
+        self.gather(view, surface, points, &arrives)
+    }
+
+    /// Radiance without emission along a path that starts at a point.
+    fn along(
+        &self,
+        world: &World<'_>,
+        radiance: &Radiance<'_>,
+        from: &VertexView,
+        toward: DVec3,
+        walk: &Walk<'_>,
+    ) -> DVec3 {
+        let one = RayCast { rays: 1, runs: 1, bounces: 0, ..*self };
+        let mut view = *from;
+        let mut direction = toward;
+        let mut weight = DVec3::ONE;
+        let mut sum = DVec3::ZERO;
+        for bounce in 0..self.bounces {
+            let Some((entity, hit)) = world.first_surface(&view, direction) else { break };
+            view = world.surface(entity, hit.place, hit.normal);
+            let of = &world.scene.entities[entity];
+            // Only fronts reflect.
+            if !of.receives || view.normal.dot(direction) >= 0.0 {
+                break;
+            }
+            let base = of.albedo.as_dvec3() * hit.over_mean;
+            let key = Vertex { entity, index: (walk.path * self.bounces + bounce) as usize };
+            let surface = Reflection::diffuse(base);
+            let step = RayCast { seed: walk.points.seed(), ..one };
+            sum += weight * DVec3::from(step.point(world, radiance, (&view, &surface), key).radiosity);
+            weight *= base;
+            direction = Axes::new(view.normal).cosine(walk.points.other(bounce).point(walk.path));
+        }
+        sum
     }
 
     /// Whether the orders can differ at a vertex: whether what might shadow a light there, the receiver itself
@@ -228,6 +329,20 @@ impl RayCast {
             shadowed.limits_itself || !shadowed.beside.is_empty()
         })
     }
+}
+
+/// A point of a surface on which light falls, and the points of the unit square that its rays are of.
+struct Point<'p> {
+    world: &'p World<'p>,
+    view: &'p VertexView,
+    surface: &'p Reflection,
+    points: Sequence,
+}
+
+/// A path from surface to surface.
+struct Walk<'p> {
+    points: &'p Sequence,
+    path: u32,
 }
 
 /// Distances along a ray that differ by less than this share are equal: rays are cast in f32, each in units of its

@@ -21,6 +21,16 @@ impl Sequence {
         Sequence { seeds: [mixed as u32, (mixed >> 32) as u32] }
     }
 
+    /// Another sequence, which is independent of this one.
+    pub fn other(&self, number: u32) -> Self {
+        Sequence::new(self.seed().into(), [number.into(), 1, 2])
+    }
+
+    /// A seed that is this sequence's own.
+    pub fn seed(&self) -> u64 {
+        u64::from(self.seeds[0]) << 32 | u64::from(self.seeds[1])
+    }
+
     /// Point `index` of the unit square.
     pub fn point(&self, index: u32) -> DVec2 {
         let unit = |bits: u32, seed: u32| (f64::from(scramble(bits, seed)) + 0.5) / 4_294_967_296.0;
@@ -87,6 +97,16 @@ impl Axes {
     pub fn new(axis: DVec3) -> Self {
         let (tangent, bitangent) = axis.any_orthonormal_pair();
         Axes { tangent, bitangent, axis }
+    }
+
+    /// A vector by these axes.
+    pub fn local(&self, world: DVec3) -> DVec3 {
+        DVec3::new(self.tangent.dot(world), self.bitangent.dot(world), self.axis.dot(world))
+    }
+
+    /// A vector that is given by these axes.
+    pub fn world(&self, local: DVec3) -> DVec3 {
+        local.x * self.tangent + local.y * self.bitangent + local.z * self.axis
     }
 
     fn direction(&self, across: DVec2, along: f64) -> DVec3 {

@@ -10,7 +10,7 @@ layout(location = 9) centroid in vec3 second;
 layout(location = 10) centroid in vec4 shares;
 #define MAP_BINDING GLOSS_BINDING + 3
 #define TABLE_BINDING GLOSS_BINDING + 4
-#define SKY 1
+#define SKY MIRROR
 #include "gloss.glsl"
 
 // Radiance of a pixel without emission. `light` is that of a diffuse surface of colour `base`; `within` is that of
@@ -20,22 +20,23 @@ vec3 glossy(uint index, vec3 base, vec3 light, float within) {
     vec3 place = within * from_eye;
     View view = view_of(place, normal, entity.roughness);
     Reflection found = Reflection(within * first.rgb, within * second);
-    if (entity.roughness < PIXEL_ROUGHNESS) {
-        // Vertices have the share of the sky that gets through, and the light that has bounced.
-        Reflection sky = reflect_sky(view, entity.roughness);
-        vec2 of_unit = reflected_share(view, entity.roughness);
-        found = Reflection(found.facing * sky.facing + of_unit.x * found.grazing,
-            found.facing * sky.grazing + of_unit.y * found.grazing);
-    }
+#if MIRROR
+    // Vertices have the share of the sky that gets through, and the light that has bounced.
+    Reflection sky = reflect_sky(view, entity.roughness);
+    vec2 of_unit = reflected_share(view, entity.roughness);
+    found = Reflection(found.facing * sky.facing + of_unit.x * found.grazing,
+        found.facing * sky.grazing + of_unit.y * found.grazing);
+#endif
 #if HIGHLIGHTS
-    uvec4 lights = entity.lights;
-    vec4 share = within * shares;
-    for (uint i = 0; i < 4 && lights[i] != NONE; i++) {
-        Entity shining = ENTITY(lights[i]);
-        vec2 part = reflect_light(view, shining.centre.xyz - entity.eye - place, shining);
-        found.facing += share[i] * part.x * shining.emission;
-        found.grazing += share[i] * part.y * shining.emission;
-    }
+    // Loops are tested at their ends, as in the merge. What is NONE has no share.
+    uint i = 0;
+    do {
+        Entity shining = ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
+        vec2 part = within * shares[i] * reflect_light(view, shining.centre.xyz - entity.eye - place, shining);
+        found.facing += part.x * shining.emission;
+        found.grazing += part.y * shining.emission;
+        i++;
+    } while (i < entity.light_count);
 #endif
     vec3 f0 = mix(vec3(entity.f0), base, entity.metallic);
     vec3 specular = f0 * found.facing + found.grazing;

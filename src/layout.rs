@@ -26,9 +26,6 @@ impl Shared for [f32; 3] {
 impl Shared for [f32; 4] {
     const GLSL: &'static str = "vec4";
 }
-impl Shared for [u32; 2] {
-    const GLSL: &'static str = "uvec2";
-}
 impl Shared for [u32; 4] {
     const GLSL: &'static str = "uvec4";
 }
@@ -173,8 +170,10 @@ shared_struct! {
         /// What a metal of no colour reflects once of unit light from everywhere, over all views; 0 where light that
         /// microfacets pass on to each other is lost.
         mean_energy: f32,
+        /// How many of the lights there are, at least 1.
+        light_count: u32,
         /// Texels hold four words.
-        unused: [u32; 2],
+        unused: u32,
     }
 }
 

@@ -119,8 +119,8 @@ pub struct DrawnEntity<'d> {
     pub index: u32,
     /// What varies its reflectance, if anything does.
     pub paint: Option<DrawnPaint<'d>>,
-    /// Whether it reflects besides diffusely.
-    pub glossy: bool,
+    /// Roughness of what reflects besides diffusely.
+    pub roughness: Option<f32>,
     /// Input of its pixels, where they evaluate sharp lights.
     pub by_pixel: Option<ByPixel>,
 }

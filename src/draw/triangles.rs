@@ -133,16 +133,21 @@ pub enum Look<'p> {
     Plain,
     /// Textures or tints vary the reflectance.
     Painted,
-    /// It may be painted, and reflects; highlights are of sharp lights that are evaluated so, if there are any.
-    Glossy(Option<&'p SharpPermutation>),
+    /// It may be painted, and reflects; highlights are of sharp lights that are evaluated so, if there are any. Of a
+    /// mirror every pixel looks the sky up.
+    Glossy { highlights: Option<&'p SharpPermutation>, mirror: bool },
 }
 
 impl Look<'_> {
     /// The macros of both stages; `first` is the first binding of reflections.
     fn macros(self, row: ShaderPermutation, first: u32) -> ShaderPermutation {
         let row = row.define("PAINTED", !matches!(self, Look::Plain));
-        let Look::Glossy(sharp) = self else { return row.define("GLOSS", false) };
-        gloss::macros(row).define("GLOSS", true).define("GLOSS_BINDING", first).define("HIGHLIGHTS", sharp.is_some())
+        let Look::Glossy { highlights, mirror } = self else { return row.define("GLOSS", false) };
+        gloss::macros(row)
+            .define("GLOSS", true)
+            .define("GLOSS_BINDING", first)
+            .define("HIGHLIGHTS", highlights.is_some())
+            .define("MIRROR", mirror)
     }
 }
 
@@ -163,8 +168,8 @@ pub struct DrawTriangles {
     plain: Pipelines,
     /// Where the scene has textures.
     painted: Option<Pipelines>,
-    /// Where it has glossy surfaces.
-    glossy: Option<Pipelines>,
+    /// Where it has glossy surfaces: of those that are rough, and of mirrors.
+    glossy: Option<[Pipelines; 2]>,
     /// Whether these have highlights.
     highlights: bool,
 }
@@ -196,10 +201,11 @@ impl DrawTriangles {
                 pixel: surfaces.sharp.map(pixel).transpose()?,
             })
         };
+        let glossy = |highlights, mirror| pipelines(Look::Glossy { highlights, mirror });
         Ok(DrawTriangles {
             plain: pipelines(Look::Plain)?,
             painted: surfaces.painted.then(|| pipelines(Look::Painted)).transpose()?,
-            glossy: surfaces.gloss.map(|sharp| pipelines(Look::Glossy(sharp))).transpose()?,
+            glossy: surfaces.gloss.map(|sharp| Ok([glossy(sharp, false)?, glossy(sharp, true)?])).transpose()?,
             highlights: surfaces.gloss.flatten().is_some(),
         })
     }
@@ -210,11 +216,12 @@ impl DrawTriangles {
         entity: &DrawnEntity<'d>,
         viewport: &DrawnViewport<'d>,
     ) -> (&Pipelines, Option<DrawnPaint<'d>>, Option<DrawnReflections<'d>>) {
-        let gloss = viewport.gloss.filter(|_| entity.glossy);
+        let gloss = viewport.gloss.zip(entity.roughness);
         match (&self.glossy, gloss, &self.painted, entity.paint) {
-            (Some(glossy), Some(gloss), ..) => {
+            (Some([rough, mirror]), Some((gloss, roughness)), ..) => {
                 let white = DrawnPaint { texture: &gloss.reflections.white, tint: Vec3::ONE, alpha_cutoff: 0.0 };
-                (glossy, Some(entity.paint.unwrap_or(white)), Some(gloss))
+                let pipelines = if roughness < gloss::PIXEL_ROUGHNESS { mirror } else { rough };
+                (pipelines, Some(entity.paint.unwrap_or(white)), Some(gloss))
             }
             (.., Some(painted), Some(paint)) => (painted, Some(paint), None),
             _ => (&self.plain, None, None),
@@ -226,7 +233,7 @@ impl DrawTriangles {
         let row = |file| look.macros(ShaderPermutation::new(file, 4), GLOSS_BINDINGS[0]);
         let fragment = row("draw.frag").define("DISPLAY", display);
         let fragment = match look {
-            Look::Glossy(Some(sharp)) => sharp.pixel_row(fragment, false),
+            Look::Glossy { highlights: Some(sharp), .. } => sharp.pixel_row(fragment, false),
             _ => fragment,
         };
         [row("draw.vert"), fragment]

@@ -108,7 +108,8 @@ impl Frame {
                 radiosity_first: (self.radiosity.offsets[index] / 16) as u32,
                 vertex_count: glossy.vertex_count,
                 mean_energy: if self.options.single_scatter { 0.0 } else { mean_energy(gloss.roughness) },
-                unused: [0; 2],
+                light_count: glossy.lights.iter().filter(|&&light| light != NONE).count().max(1) as u32,
+                unused: 0,
             };
         }
         self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.set_entities(&entities))

@@ -7,7 +7,9 @@ layout(location = 6) centroid in vec3 from_eye; // world axes, metres
 layout(location = 7) centroid in vec3 normal;   // world
 layout(location = 8) centroid in vec4 first;    // glsl/gloss.comp
 layout(location = 9) centroid in vec3 second;
+#if HIGHLIGHTS
 layout(location = 10) centroid in vec4 shares;
+#endif
 #define MAP_BINDING GLOSS_BINDING + 3
 #define TABLE_BINDING GLOSS_BINDING + 4
 #define SKY MIRROR

@@ -9,7 +9,9 @@ layout(location = 6) out vec3 from_eye; // world axes, metres
 layout(location = 7) out vec3 normal;   // world
 layout(location = 8) out vec4 first;   // glsl/gloss.comp
 layout(location = 9) out vec3 second;
+#if HIGHLIGHTS
 layout(location = 10) out vec4 shares;
+#endif
 
 void pass_gloss(uint index, uint v) {
     GlossEntity entity = gloss_entity_at(index);
@@ -20,5 +22,7 @@ void pass_gloss(uint index, uint v) {
     normal = vec3(dot(entity.row_x.xyz, own), dot(entity.row_y.xyz, own), dot(entity.row_z.xyz, own));
     first = texelFetch(reflected, 2 * lit);
     second = texelFetch(reflected, 2 * lit + 1).rgb;
+#if HIGHLIGHTS
     shares = texelFetch(shown_shares, lit);
+#endif
 }

@@ -12,8 +12,9 @@ use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
 use shadow_fields::bounce::{bounce_row, runs_row};
 use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::smooth::Smooth;
-use shadow_fields::draw::triangles::DrawTriangles;
+use shadow_fields::draw::triangles::{DrawTriangles, Look};
 use shadow_fields::field::{FieldKind, Lattice, Storage};
+use shadow_fields::gloss::gloss_row;
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{MergePermutation, Reads, VARIANTS, Variant};
 use shadow_fields::shaders::{FILES, ShaderPermutation};
@@ -32,7 +33,7 @@ fn baking() -> Vec<ShaderPermutation> {
 }
 
 fn bouncing() -> Vec<ShaderPermutation> {
-    let rows = |texels| [runs_row(texels), bounce_row(texels, false), bounce_row(texels, true)];
+    let rows = |texels| [runs_row(texels), bounce_row(texels, false), bounce_row(texels, true), gloss_row(texels)];
     [false, true].into_iter().flat_map(rows).collect()
 }
 
@@ -50,6 +51,7 @@ fn sharp() -> Vec<ShaderPermutation> {
             halves: on(2) != on(3),
             boxes: on(2) != on(4),
             sheets: on(1),
+            gloss: on(0),
             self_shadows: on(4),
             cones: on(5),
             edges: on(0) == on(2),
@@ -71,6 +73,7 @@ fn drawing() -> Vec<ShaderPermutation> {
         halves: outlines,
         boxes: outlines,
         sheets: outlines,
+        gloss: false,
         self_shadows: true,
         cones: outlines,
         edges: true,
@@ -78,12 +81,14 @@ fn drawing() -> Vec<ShaderPermutation> {
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].into_iter().flat_map(|display| ways.map(|sharp| DrawGrid::row(display, sharp)));
+    let glossy = ways.into_iter().flat_map(|highlights| [false, true].map(|mirror| Look::Glossy { highlights, mirror }));
+    let looks: Vec<Look<'_>> = [Look::Plain, Look::Painted].into_iter().chain(glossy).collect();
     let triangles = [false, true]
         .into_iter()
-        .flat_map(|display| [false, true].map(|painted| (display, painted)))
-        .flat_map(|(display, painted)| {
-            let patches = sharp.iter().flat_map(move |sharp| DrawTriangles::patch_rows(display, painted, sharp));
-            DrawTriangles::rows(display, painted).into_iter().chain(patches)
+        .flat_map(|display| looks.iter().map(move |look| (display, *look)))
+        .flat_map(|(display, look)| {
+            let patches = sharp.iter().flat_map(move |sharp| DrawTriangles::patch_rows(display, look, sharp));
+            DrawTriangles::rows(display, look).into_iter().chain(patches)
         });
     let fragments = grids.chain(triangles);
     fragments
@@ -116,6 +121,7 @@ fn usual_permutation() -> MergePermutation {
         skip: Skip::ALL,
         lights: true,
         sheets: true,
+        gloss: false,
         entity_limit: 48,
     }
 }
@@ -149,6 +155,7 @@ fn merging() -> Vec<ShaderPermutation> {
     permutations.extend(lattices.map(|text| MergePermutation { lattice: lattice(text), ..usual }));
     permutations.push(MergePermutation { lights: false, ..usual });
     permutations.push(MergePermutation { sheets: false, ..usual });
+    permutations.push(MergePermutation { gloss: true, ..usual });
     permutations.extend([(4, 5), (3, 4), (4, 3)].map(|(bands, field_bands)| MergePermutation {
         bands,
         field_bands,

@@ -80,6 +80,7 @@ fn entity_with(motion: impl Strategy<Value = Motion>) -> impl Strategy<Value = E
             rotation,
             scale,
             albedo: Vec3::splat(0.5).into(),
+            gloss: None,
             emission: Vec3::ZERO,
             spot: None,
             emits: None,

@@ -6,6 +6,7 @@
 pub mod assemble;
 pub mod capture;
 pub mod draw;
+pub mod gloss;
 pub mod merge;
 pub mod project;
 pub mod sharp;
@@ -54,13 +55,14 @@ impl CheckRow {
 type PassCheck = fn(&Baker, &mut dyn FnMut(CheckRow)) -> Result<()>;
 
 /// Every pass in the order of execution, by the one word that names it everywhere.
-pub const PASSES: [(&str, PassCheck); 9] = [
+pub const PASSES: [(&str, PassCheck); 10] = [
     ("capture", capture::rows),
     ("project", project::rows),
     ("assemble", assemble::rows),
     ("silhouette", silhouette::rows),
     ("merge", merge::rows),
     ("sharp", sharp::rows),
+    ("gloss", gloss::rows),
     ("draw", draw::rows),
     ("smooth", smooth::rows),
     ("show", show::rows),

@@ -3,6 +3,8 @@
 use super::Frame;
 use crate::draw::camera::world_from_centred;
 use crate::gloss::lobe::mean_energy;
+use crate::gloss::sky_map::SkyMap;
+use crate::gloss::twin::{Twin, TwinVertex};
 use crate::gloss::{DrawnReflections, Glossy, ReflectionInputs, Reflections};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device};
@@ -123,6 +125,30 @@ impl Frame {
             radiosity: &self.radiosity.merged,
         };
         self.reflections.as_ref().map(|reflections| (reflections, inputs))
+    }
+
+    /// What the vertices of an entity reflect in the last picture, as they are stored, and what the twin finds by the
+    /// same transfer.
+    pub fn reflections_beside_twin(&self, entity: usize, placements: &[Placement]) -> Result<[Vec<[DVec3; 2]>; 2]> {
+        let Some(reflections) = &self.reflections else { return Ok([Vec::new(), Vec::new()]) };
+        let surface = self.buffers.surface(entity);
+        let mesh = self.scene.surface(entity);
+        let first = (self.radiosity.offsets[entity] / 16) as usize;
+        let vertex_count = surface.order.len();
+        let roughness = self.scene.entities[entity].gloss.map_or(1.0, |gloss| f64::from(gloss.roughness));
+        let twin = Twin::new(SkyMap::new(&self.scene.environment));
+        let placement = placements[entity];
+        let eye = self.scene.data.camera.eye.as_dvec3();
+        let found = reflections.read(first, vertex_count)?;
+        let found = found.iter().map(|pair| pair.map(|[r, g, b, _]| DVec3::new(r.into(), g.into(), b.into())));
+        let through = reflections.read_through(first, vertex_count)?;
+        let wanted = surface.order.iter().zip(through).map(|(&v, through)| {
+            let place = placement.point(mesh.positions[v as usize].as_dvec3());
+            let normal = (placement.turn() * mesh.normals[v as usize].as_dvec3()).normalize();
+            let vertex = TwinVertex { normal, toward: (eye - place).normalize(), through, bounced: DVec3::ZERO };
+            twin.vertex(&vertex, roughness)
+        });
+        Ok([found.collect(), wanted.collect()])
     }
 
     /// What pixels read of reflections.

@@ -209,6 +209,13 @@ impl Reflections {
         self.reflected.download_range(bytes)
     }
 
+    /// The transfer at the end of the sky's chain, of the same vertices.
+    pub fn read_through(&self, first: usize, vertex_count: usize) -> Result<Vec<[f64; 16]>> {
+        let bytes = 32 * first as u64..32 * (first + vertex_count) as u64;
+        let halves: Vec<[f16; 16]> = self.through.download_range(bytes)?;
+        Ok(halves.iter().map(|of| of.map(f64::from)).collect())
+    }
+
     pub fn size_bytes(&self) -> u64 {
         let buffers = [
             &self.products,

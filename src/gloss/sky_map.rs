@@ -37,7 +37,7 @@ fn direction(place: DVec2) -> DVec3 {
 }
 
 /// The place of a direction.
-fn place(direction: DVec3) -> DVec2 {
+pub(super) fn place(direction: DVec3) -> DVec2 {
     let at = direction / direction.abs().element_sum();
     let fold = |a: f64, b: f64| if at.y < 0.0 { (1.0 - b.abs()) * 1.0_f64.copysign(a) } else { a };
     DVec2::new(fold(at.x, at.z), fold(at.z, at.x)) * 0.5 + DVec2::splat(0.5)

@@ -11,7 +11,8 @@ use shadow_fields::field::{FieldKind, Lattice, Storage};
 use shadow_fields::gpu::reflect::Reflection;
 use shadow_fields::gpu::{Access, Bind, Buffer, Commands, ComputePipeline, TexelView};
 // In a shader there is no other entity.
-use shadow_fields::layout::{CLUSTER_FORMAT, Cluster, DeviceEntity as Entity, ENTRY_BITS};
+use shadow_fields::gloss::gloss_row;
+use shadow_fields::layout::{CLUSTER_FORMAT, Cluster, DeviceEntity as Entity, ENTRY_BITS, GlossEntity};
 use shadow_fields::lists::skip::Skip;
 use shadow_fields::merge::variant::{MergePermutation, Reads, VARIANTS, Variant};
 use shadow_fields::shaders::{Library, ShaderPermutation};
@@ -39,10 +40,38 @@ fn merge() -> Vec<(Variant, Reflection)> {
         skip: Skip::ALL,
         lights: true,
         sheets: true,
+        gloss: false,
         entity_limit: 48,
     };
     let reflection = |row| library().shader(&row).unwrap().reflection;
     VARIANTS.iter().map(|&variant| (variant, reflection(permutation(variant).row()))).collect()
+}
+
+#[test]
+fn glossy_entities() {
+    let reflection = library().shader(&gloss_row(false)).unwrap().reflection;
+    same_layout!(
+        reflection,
+        GlossEntity {
+            row_x,
+            row_y,
+            row_z,
+            albedo,
+            roughness,
+            eye,
+            metallic,
+            lights,
+            f0,
+            sky_scale,
+            vertex_first,
+            radiosity_first,
+            vertex_count,
+            mean_energy,
+            light_count,
+            unused,
+        }
+    );
+    assert_eq!(reflection.strides.get("GlossEntity"), Some(&(size_of::<GlossEntity>() as u32)));
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod capture;
 mod common;
 mod draw;
 mod flight;
+mod gloss;
 mod hidden;
 mod layouts;
 mod light;

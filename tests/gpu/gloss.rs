@@ -1,0 +1,171 @@
+//! What glossy surfaces reflect, against closed forms and rays through pixels.
+
+use super::common::report;
+use super::stage::{Stage, stage};
+use glam::DVec3;
+use shadow_fields::draw::Antialias;
+use shadow_fields::frame;
+use shadow_fields::gloss::lobe;
+use shadow_fields::scene::{Scene, data::Data};
+use shadow_fields::truth::pixels::{self, RayPicture};
+use shadow_fields::truth::raycast::RayCast;
+use shadow_fields::truth::ray_mesh::RayMeshes;
+use shadow_fields::truth::world::World;
+use std::path::Path;
+
+const SIZE: [u32; 2] = [96, 64];
+const CAMERA: &str = "[camera]\neye = [0, 0.8, 4]\ntarget = [0, 0.2, 0]\nfov_deg = 40\n";
+
+fn options() -> frame::Options {
+    frame::Options { size: SIZE, antialias: Antialias::None, ..frame::Options::default() }
+}
+
+fn scene(text: &str) -> Scene {
+    let text = format!("{text}\n{CAMERA}");
+    Data::parse(&text, Path::new("gloss.toml")).unwrap();
+    Scene::parse(&text, Path::new("gloss.toml"), &shadow_fields::asset::embedded::read).unwrap()
+}
+
+/// A ball of that gloss under what `more` adds.
+fn ball(gloss: &str, more: &str) -> Scene {
+    scene(&format!(
+        "{more}\n[[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 1, subdivisions = 4 }}\n\
+         [[entity]]\nmesh = \"ball\"\nalbedo = [1, 1, 1]\ngloss = {{ {gloss} }}\n"
+    ))
+}
+
+fn picture(stage: &Stage, scene: &Scene, options: frame::Options) -> Vec<f32> {
+    let mut frame = stage.frame(scene, options);
+    frame.render(&scene.at(0.0), Some(f32::INFINITY)).unwrap();
+    frame.picture()
+}
+
+fn by_rays(scene: &Scene, rays: u32) -> RayPicture {
+    let shapes = RayMeshes::new(scene);
+    let placements = scene.at(0.0);
+    let world = World::new(scene, &shapes, &placements);
+    pixels::picture(&world, SIZE, false, &RayCast { rays, runs: 2, ..RayCast::default() }, &|_| ())
+}
+
+/// Relative RMS over the pixels where the scene shows a surface: its background is black.
+fn error(found: &[f32], wanted: &[f32]) -> f64 {
+    let square = |x: f32| f64::from(x) * f64::from(x);
+    let apart: f64 = found.iter().zip(wanted).map(|(a, b)| square(a - b)).sum();
+    (apart / wanted.iter().map(|x| square(*x)).sum::<f64>()).sqrt()
+}
+
+/// Under light that is the same from everywhere a white metal is as bright as the light, and one whose microfacets pass
+/// no light on to each other is as bright as its directional albedo.
+#[test]
+fn a_white_metal_vanishes_in_a_furnace() {
+    let Some(stage) = stage() else { return };
+    for roughness in [0.0, 0.2, 0.5, 0.8, 1.0] {
+        let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), "environment = { uniform = [1, 1, 1] }");
+        let found = picture(&stage, &scene, options());
+        let worst = found.iter().map(|c| (c - 1.0).abs()).fold(0.0, f32::max);
+        assert!(worst < 0.03, "{roughness}: {worst} off 1");
+        let single = picture(&stage, &scene, frame::Options { single_scatter: true, ..options() });
+        let middle = single[3 * (SIZE[0] * SIZE[1] / 2 + SIZE[0] / 2) as usize];
+        // The pixel in the middle sees the ball at a cosine of 0.94 or more.
+        let range = [0.93, 1.0].map(|z| lobe::energy(roughness, z) as f32);
+        assert!(middle > range[0].min(range[1]) - 0.02 && middle < range[0].max(range[1]) + 0.02, "{roughness}: {middle}");
+    }
+}
+
+/// A dielectric neither adds nor loses light that can be seen, but at grazing angles, where light that microfacets pass
+/// on to each other is counted a second time by the diffuse part.
+#[test]
+fn a_white_dielectric_nearly_vanishes() {
+    let Some(stage) = stage() else { return };
+    for roughness in [0.1, 0.5, 1.0] {
+        let scene = ball(&format!("roughness = {roughness:.1}"), "environment = { uniform = [1, 1, 1] }");
+        let found = picture(&stage, &scene, options());
+        let mean = found.iter().map(|c| f64::from(*c)).sum::<f64>() / found.len() as f64;
+        assert!((mean - 1.0).abs() < 0.02, "{roughness}: {mean}");
+    }
+}
+
+/// Highlights of each kind of light with nothing between, beside rays: the error that the shape of a highlight has.
+#[test]
+fn highlights_are_those_of_rays() {
+    let Some(stage) = stage() else { return };
+    let lamp = |mesh: &str, rotation: &str| {
+        format!(
+            "[[mesh]]\nname = \"lamp\"\n{mesh}\n[[entity]]\nmesh = \"lamp\"\nposition = [1.2, 2.2, 1.5]\n{rotation}\n\
+             emission = [9, 9, 9]\nreceives = false\n"
+        )
+    };
+    let down = "rotation = { axis = [0, 0, 1], angle_deg = 160 }";
+    let lights = [
+        ("sun", "environment = { sun = { radiance = [900, 900, 900], toward = [1, 2, 1.5], angle_deg = 2 } }".to_owned()),
+        ("ball", lamp("sphere = { radius_m = 0.25, subdivisions = 3 }", "")),
+        ("disc", lamp("disc = { radius_m = 0.3 }", down)),
+        ("rectangle", lamp("rectangle = { size_m = [0.9, 0.4] }", down)),
+    ];
+    let mut lines = Vec::new();
+    for (name, light) in &lights {
+        for (roughness, most) in [(0.3, 0.06), (0.5, 0.04), (0.7, 0.045), (1.0, 0.045)] {
+            let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), light);
+            let found = error(&picture(&stage, &scene, options()), &by_rays(&scene, 256).linear);
+            lines.push(format!("{name} {roughness}: {found:.4}"));
+            assert!(found < most, "{lines:?}");
+        }
+    }
+    report(&lines.join("\n"));
+}
+
+/// A gold ball on a floor under a sky: the shadow that the floor casts into the reflection.
+#[test]
+fn reflections_past_others_are_those_of_rays() {
+    let Some(stage) = stage() else { return };
+    let mut lines = Vec::new();
+    for (roughness, most) in [(0.2, 0.05), (0.5, 0.035), (0.7, 0.035), (1.0, 0.035)] {
+        let floor = "environment = { gradient = { radiance = [1, 1.1, 1.3] } }\n\
+             [[mesh]]\nname = \"floor\"\nplane = { size_m = 6, cells = 12 }\n\
+             [[entity]]\nmesh = \"floor\"\nposition = [0, -1, 0]\n";
+        let scene = ball(&format!("roughness = {roughness:.1}, metallic = 1"), floor);
+        let found = error(&picture(&stage, &scene, options()), &by_rays(&scene, 256).linear);
+        lines.push(format!("{roughness}: {found:.4}"));
+        assert!(found < most, "{lines:?}");
+    }
+    report(&lines.join("\n"));
+}
+
+/// The eye changes what is reflected, and nothing is merged for it.
+#[test]
+fn a_moving_camera_merges_nothing() {
+    let Some(stage) = stage() else { return };
+    let sky = "environment = { gradient = { radiance = [1, 1, 1] } }";
+    let mut scene = ball("roughness = 0.5, metallic = 1", sky);
+    let mut frame = stage.frame(&scene, options());
+    let placements = scene.at(0.0);
+    frame.render(&placements, Some(1.0)).unwrap();
+    let before = frame.picture();
+    scene.data.camera.eye = DVec3::new(3.0, -1.0, 2.0).as_vec3();
+    frame.set_camera(&scene.data.camera);
+    frame.render(&placements, Some(1.0)).unwrap();
+    assert_eq!(frame.merged().merged_clusters, 0);
+    assert_ne!(frame.picture(), before);
+    let mut fresh = stage.frame(&scene, options());
+    fresh.render(&placements, Some(1.0)).unwrap();
+    assert_eq!(frame.picture(), fresh.picture());
+}
+
+/// What is not glossy looks as it did beside what is.
+#[test]
+fn a_diffuse_surface_stays_so() {
+    let Some(stage) = stage() else { return };
+    let two = |gloss: &str| {
+        scene(&format!(
+            "environment = {{ uniform = [1, 1, 1] }}\n[[mesh]]\nname = \"ball\"\nsphere = {{ radius_m = 0.4, subdivisions = 3 }}\n\
+             [[entity]]\nmesh = \"ball\"\nposition = [-0.6, 0, 0]\n[[entity]]\nmesh = \"ball\"\nposition = [0.6, 0, 0]\n{gloss}\n"
+        ))
+    };
+    let plain = picture(&stage, &two(""), options());
+    let beside = picture(&stage, &two("gloss = { roughness = 0.5 }"), options());
+    let left = |pixels: &[f32]| -> Vec<f32> {
+        pixels.chunks_exact(3 * SIZE[0] as usize).flat_map(|row| row[..row.len() / 2].to_vec()).collect()
+    };
+    assert_eq!(left(&plain), left(&beside));
+    assert_ne!(plain, beside);
+}

@@ -5,16 +5,21 @@
 //! light and albedo times the light along its links. That is Jacobi's iteration of the radiosity equation: each step adds
 //! a bounce.
 //!
-//! Only fronts reflect. What moves neither reflects onto a group nor is lit by one. A lamp in spherical harmonics inside a
+//! Onto what moves, pass "bounce" adds the light of larger runs of all that rests, as flat pieces seen from afar with
+//! nothing between; where they take more than the hemisphere, as furniture before a wall does, they are scaled down to
+//! it. What moves reflects nothing onto what rests. Only fronts reflect. A lamp in spherical harmonics inside a
 //! closed mesh lights nothing of it, as the mesh's transfer ends where its own far side blocks; a sharp one does.
 
 use crate::asset::Mesh;
-use crate::bake::links::{RUN_BITS, Runs, WHOLE_SHARE};
+use crate::bake::links::{RUN_BITS, RUNS, Runs, WHOLE_SHARE};
 use crate::bake::surfaces::Links;
 use crate::error::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView};
+use crate::layout::{CLUSTER_VERTICES, ENTRY_BITS};
+use crate::scene::Placement;
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
+use glam::DVec3;
 use std::sync::Arc;
 
 /// How often light bounces.
@@ -23,12 +28,12 @@ use std::sync::Arc;
 #[serde(rename_all = "lowercase")]
 pub enum Bounces {
     /// Direct light alone.
-    #[default]
     #[cfg_attr(feature = "cli", value(name = "0"))]
     None,
     #[cfg_attr(feature = "cli", value(name = "1"))]
     One,
     /// As many as are seen: eight.
+    #[default]
     All,
 }
 
@@ -58,7 +63,16 @@ pub struct Linked {
     ranges: Vec<[u32; 2]>,
     /// Numbers of runs below their shares.
     links: Vec<u32>,
+    /// Of what rests, as what moves sees it: the middle of each run with its number's bits, world, and the sum of its
+    /// normals times their areas.
+    far: Vec<[[f32; 4]; 2]>,
+    /// Workgroups of the vertices of what moves: entity, first vertex in the vertex buffer and in the buffers of light,
+    /// and number of vertices.
+    moved: Vec<[u32; 4]>,
 }
+
+/// Most runs that what moves sees; beyond, they are the next larger ones.
+const MOST_FAR: usize = 512;
 
 impl Linked {
     /// The links of a scene's entities, of which those of one list of `rigid` never move against each other; `None` where
@@ -76,12 +90,47 @@ impl Linked {
             for &member in members {
                 linked.add(member, &entities[member], base);
             }
+            if members.iter().all(|&member| entities[member].rests) {
+                linked.see_from_afar(entities, members, base);
+            }
+        }
+        let moved = entities.iter().enumerate().filter(|(_, entity)| !entity.rests && entity.receives);
+        for (index, entity) in moved.filter(|_| !linked.far.is_empty()) {
+            let count = entity.order.len();
+            linked.moved.extend((0..count).step_by(CLUSTER_VERTICES as usize).map(|first| {
+                let vertices = (count - first).min(CLUSTER_VERTICES as usize);
+                [index, entity.vertex_first + first, entity.first + first, vertices].map(|x| x as u32)
+            }));
         }
         if linked.runs.len() >= 1 << RUN_BITS {
             log::warn!("light does not bounce: {} runs of vertices are more than links number", linked.runs.len());
             return None;
         }
         (!linked.links.is_empty()).then_some(linked)
+    }
+
+    /// Adds the smallest runs of a group of which there are not too many.
+    fn see_from_afar(&mut self, entities: &[LinkedEntity<'_>], members: &[usize], base: u32) {
+        let runs = Runs::new(members.iter().map(|&member| entities[member].order.len()));
+        let size = (0..RUNS.len() - 1).find(|&size| runs.of_size(size).count() <= MOST_FAR).unwrap_or(RUNS.len() - 1);
+        for (number, (member, first, vertices)) in runs.of_size(size) {
+            let entity = &entities[members[member]];
+            let areas = entity.mesh.vertex_areas_m2();
+            let scale = f64::from(entity.placement.scale);
+            let mut middle = DVec3::ZERO;
+            let mut across = DVec3::ZERO;
+            let mut whole = 0.0;
+            for &v in &entity.order[first..first + vertices] {
+                let area = areas[v as usize] * scale * scale;
+                middle += area * entity.placement.point(entity.mesh.positions[v as usize].as_dvec3());
+                across += area * (entity.placement.turn() * entity.mesh.normals[v as usize].as_dvec3());
+                whole += area;
+            }
+            if whole > 0.0 {
+                let [x, y, z] = (middle / whole).as_vec3().to_array();
+                self.far.push([[x, y, z, f32::from_bits(base + number)], across.as_vec3().extend(0.0).to_array()]);
+            }
+        }
     }
 
     fn add(&mut self, index: usize, entity: &LinkedEntity<'_>, base: u32) {
@@ -104,6 +153,12 @@ pub struct LinkedEntity<'e> {
     pub order: &'e [u32],
     /// The first of these places.
     pub first: usize,
+    /// Its first vertex in the vertex buffer.
+    pub vertex_first: usize,
+    /// Whether it never moves, and where it stands then.
+    pub rests: bool,
+    pub placement: Placement,
+    pub receives: bool,
     pub links: Option<Arc<Links>>,
 }
 
@@ -124,6 +179,16 @@ pub struct Bounce {
     ranges: Buffer,
     links: Buffer,
     run_light: Buffer,
+    counts: [u32; 2],
+    moved: Option<Moved>,
+}
+
+/// What lights that which moves.
+struct Moved {
+    pipeline: ComputePipeline,
+    groups: Buffer,
+    far: Buffer,
+    /// Workgroups, and runs that they see.
     counts: [u32; 2],
 }
 
@@ -147,18 +212,30 @@ impl Bounce {
             links: Buffer::with_data(device, "links", &linked.links)?,
             run_light,
             counts,
+            moved: if linked.moved.is_empty() {
+                None
+            } else {
+                Some(Moved {
+                    pipeline: pipeline("moved", moved_row(texels, soft))?,
+                    groups: Buffer::with_data(device, "moved groups", &linked.moved)?,
+                    far: Buffer::with_data(device, "far runs", &linked.far)?,
+                    counts: [linked.moved.len() as u32, linked.far.len() as u32],
+                })
+            },
         })
     }
 
     pub fn size_bytes(&self) -> u64 {
-        [&self.runs, &self.areas, &self.ranges, &self.links, &self.run_light].iter().map(|b| b.size_bytes).sum()
+        let moved = self.moved.iter().flat_map(|moved| [&moved.groups, &moved.far]);
+        let all = [&self.runs, &self.areas, &self.ranges, &self.links, &self.run_light];
+        all.into_iter().chain(moved).map(|buffer| buffer.size_bytes).sum()
     }
 
     /// Adds bounces, one a step, to the direct light of all vertices, which was written before.
     pub fn record<'r>(
         &'r self,
         commands: &mut Commands<'r>,
-        entities: &'r Buffer,
+        [entities, vertices]: [&'r Buffer; 2],
         light: &BouncedLight<'r>,
         steps: u32,
     ) -> Result<()> {
@@ -198,12 +275,31 @@ impl Bounce {
                 commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
             }
         }
-        Ok(())
+        let Some(Moved { pipeline, groups, far, counts }) = &self.moved else { return Ok(()) };
+        commands.barrier(Access::ComputeWrite, Access::ComputeWrite);
+        let mut resources = vec![
+            Bind::Buffer(entities),
+            Bind::Buffer(groups),
+            read(vertices, quads)?,
+            read(far, quads)?,
+            read(&self.run_light, quads)?,
+            Bind::Buffer(light.radiosity),
+        ];
+        resources.extend(light.soft.map(Bind::Buffer));
+        commands.dispatch(pipeline, &resources, &counts[1], [counts[0] * CLUSTER_VERTICES, 1, 1])
     }
 }
 
 pub fn runs_row(texels: bool) -> ShaderPermutation {
     ShaderPermutation::new("runs.comp", 4).define("TEXEL", texels)
+}
+
+pub fn moved_row(texels: bool, soft: bool) -> ShaderPermutation {
+    ShaderPermutation::new("moved.comp", 4)
+        .define("TEXEL", texels)
+        .define("SOFT", soft)
+        .define("WORKGROUP", CLUSTER_VERTICES)
+        .define("ENTRY_BITS", ENTRY_BITS)
 }
 
 pub fn bounce_row(texels: bool, soft: bool) -> ShaderPermutation {

@@ -51,6 +51,7 @@ embedded!(
     "merge_layout.glsl",
     "merge_product.glsl",
     "merge_sheet.glsl",
+    "moved.comp",
     "overlay.frag",
     "overlay.vert",
     "paint.glsl",

@@ -9,7 +9,7 @@ use shadow_fields::bake::project::Project;
 use shadow_fields::bake::raster::Raster;
 use shadow_fields::bake::silhouette::{Silhouette, SilhouetteOptions};
 use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
-use shadow_fields::bounce::{bounce_row, runs_row};
+use shadow_fields::bounce::{bounce_row, moved_row, runs_row};
 use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::smooth::Smooth;
 use shadow_fields::draw::triangles::{DrawTriangles, Look};
@@ -33,7 +33,16 @@ fn baking() -> Vec<ShaderPermutation> {
 }
 
 fn bouncing() -> Vec<ShaderPermutation> {
-    let rows = |texels| [runs_row(texels), bounce_row(texels, false), bounce_row(texels, true), gloss_row(texels)];
+    let rows = |texels| {
+        [
+            runs_row(texels),
+            bounce_row(texels, false),
+            bounce_row(texels, true),
+            moved_row(texels, false),
+            moved_row(texels, true),
+            gloss_row(texels),
+        ]
+    };
     [false, true].into_iter().flat_map(rows).collect()
 }
 
@@ -81,7 +90,8 @@ fn drawing() -> Vec<ShaderPermutation> {
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].into_iter().flat_map(|display| ways.map(|sharp| DrawGrid::row(display, sharp)));
-    let glossy = ways.into_iter().flat_map(|highlights| [false, true].map(|mirror| Look::Glossy { highlights, mirror }));
+    let glossy =
+        ways.into_iter().flat_map(|highlights| [false, true].map(|mirror| Look::Glossy { highlights, mirror }));
     let looks: Vec<Look<'_>> = [Look::Plain, Look::Painted].into_iter().chain(glossy).collect();
     let triangles = [false, true]
         .into_iter()

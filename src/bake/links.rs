@@ -47,6 +47,15 @@ impl Runs {
         self.count
     }
 
+    /// Numbers of the runs of one size, `RUNS[size]`, and what [`Runs::all`] has of each.
+    pub fn of_size(&self, size: usize) -> impl Iterator<Item = (u32, (usize, usize, usize))> {
+        let members = self.firsts.iter().zip(&self.vertex_counts).enumerate();
+        members.flat_map(move |(member, (firsts, &vertices))| {
+            let runs = (0..vertices).step_by(RUNS[size]);
+            (firsts[size]..).zip(runs.map(move |first| (member, first, RUNS[size].min(vertices - first))))
+        })
+    }
+
     /// Member, first vertex in the order of clusters, and number of vertices of every run.
     pub fn all(&self) -> impl Iterator<Item = (usize, usize, usize)> {
         self.vertex_counts.iter().enumerate().flat_map(|(member, &vertices)| {
@@ -131,6 +140,10 @@ mod tests {
         assert_eq!(runs.count(), 125 + 16 + 2 + 9 + 2 + 1);
         assert_eq!(runs.all().count() as u32, runs.count());
         assert_eq!(runs.all().last(), Some((1, 0, 70)));
+        let all: Vec<_> = runs.all().collect();
+        let sized: Vec<_> = (0..RUNS.len()).flat_map(|size| runs.of_size(size).collect::<Vec<_>>()).collect();
+        assert_eq!(sized.len(), all.len());
+        assert!(sized.iter().all(|(number, run)| all[*number as usize] == *run));
         let mut rng = fastrand::Rng::with_seed(1);
         // A tenth of the rays meet one smallest run, a third one cluster, the others anything.
         let met: Vec<Met> = (0..600)

@@ -26,6 +26,7 @@ pub mod trials;
 
 use crate::bake::Baker;
 use crate::bake::cache::Cache;
+use crate::bounce::Bounces;
 use crate::error::Result;
 use crate::frame::{self, Frame};
 use crate::scene::Scene;
@@ -74,5 +75,11 @@ impl Bench<'_> {
 pub fn default_options() -> frame::Options {
     // Frames are timed at rest: each must merge everything.
     let skip = crate::lists::skip::Skip::without("unmoved");
-    frame::Options { skip, size: [16, 16], antialias: crate::draw::Antialias::None, ..frame::Options::default() }
+    frame::Options {
+        skip,
+        size: [16, 16],
+        antialias: crate::draw::Antialias::None,
+        bounces: Bounces::None,
+        ..frame::Options::default()
+    }
 }

@@ -5,6 +5,7 @@ use super::CheckRow;
 use crate::asset::embedded;
 use crate::bake::cache::Cache;
 use crate::bake::{self, Baker};
+use crate::bounce::Bounces;
 use crate::draw::Shading;
 use crate::error::Result;
 use crate::field::Storage;
@@ -83,6 +84,7 @@ pub fn options() -> frame::Options {
         variant: Some(Variant::named("texel-packed").expect("a variant")),
         eps: 0.0,
         size: [64, 48],
+        bounces: Bounces::None,
         ..frame::Options::default()
     }
 }

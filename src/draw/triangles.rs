@@ -275,7 +275,12 @@ impl DrawTriangles {
                     }
                 }
                 drawing.resources(&binds)?;
-                drawing.push(&PaintedPush { entity: push, index: entity.index, padding: [0.0; 2], paint: paint.push() });
+                drawing.push(&PaintedPush {
+                    entity: push,
+                    index: entity.index,
+                    padding: [0.0; 2],
+                    paint: paint.push(),
+                });
             }
         }
         Ok(())

@@ -2,11 +2,11 @@
 
 use super::Frame;
 use crate::draw::camera::world_from_centred;
+use crate::error::Result;
 use crate::gloss::lobe::mean_energy;
 use crate::gloss::sky_map::SkyMap;
 use crate::gloss::twin::{Twin, TwinVertex};
 use crate::gloss::{DrawnReflections, Glossy, ReflectionInputs, Reflections};
-use crate::error::Result;
 use crate::gpu::{Buffer, Device};
 use crate::layout::{GlossEntity, NONE, SHOWN_LIGHTS};
 use crate::scene::{LightMethod, Placement, Scene};

@@ -153,10 +153,15 @@ impl Frame {
             );
         }
         let texels = merge.permutation.variant.reads == Reads::Texels;
+        let placements = scene.at(0.0);
         let linked = |(entity, links)| LinkedEntity {
             mesh: scene.surface(entity),
             order: &buffers.surface(entity).order,
             first: radiosity.offsets[entity] as usize / 16,
+            vertex_first: buffers.surface(entity).vertices.start as usize,
+            rests: scene.is_at_rest(entity),
+            placement: placements[entity],
+            receives: scene.entities[entity].receives,
             links,
         };
         let bounces = options.bounces != Bounces::None;
@@ -276,6 +281,7 @@ impl Frame {
             merge: &self.merge.pass,
             sharp: self.sharp.as_ref().map(|sharp| (sharp, self.sharp_inputs())),
             entities: &self.work.entities,
+            vertices: &self.buffers.vertices,
             soft: self.radiosity.soft_direct(),
             radiosity: self.radiosity.direct(),
             bounce: self.bounce.as_ref().map(|bounce| (bounce, self.radiosity.bounced(), self.options.bounces.steps())),

@@ -55,7 +55,7 @@ impl Default for Options {
             variant: None,
             skip: Skip::ALL,
             eps: EPS,
-            bounces: Bounces::None,
+            bounces: Bounces::default(),
             single_scatter: false,
             size: [960, 640],
             antialias: Antialias::default(),
@@ -116,7 +116,7 @@ pub struct RenderOptions {
     /// How often light bounces between surfaces that never move against each other
     #[cfg_attr(
         feature = "cli",
-        arg(long, help_heading = LIGHTING, value_enum, default_value = "0", value_name = "0|1|all")
+        arg(long, help_heading = LIGHTING, value_enum, default_value = "all", value_name = "0|1|all")
     )]
     pub bounces: Bounces,
     /// Lose the light that microfacets pass on to each other, as glTF's own model does: rough metals become up to half

@@ -33,12 +33,7 @@ pub(super) struct FramePicture {
 
 impl FramePicture {
     /// Makes linear pictures of the size in `options`.
-    pub fn new(
-        device: &Arc<Device>,
-        library: &Library,
-        options: &Options,
-        surfaces: &Surfaces<'_>,
-    ) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, library: &Library, options: &Options, surfaces: &Surfaces<'_>) -> Result<Self> {
         Ok(FramePicture {
             draw: draw(device, library, options, Finish::Linear, surfaces)?,
             readback: readback(device, options.size)?,

@@ -20,6 +20,8 @@ pub struct MergeWork<'f> {
     pub(super) inputs: MergeInputs<'f>,
     pub(super) merge: &'f Merge,
     pub(super) entities: &'f Buffer,
+    /// Positions and normals.
+    pub(super) vertices: &'f Buffer,
     /// The pass of sharp lights with what it reads; `None` where the scene has none.
     pub(super) sharp: Option<(&'f Sharp, sharp::SharpInputs<'f>)>,
     /// Output of the merge: all light, or the part to which the pass of sharp lights adds.
@@ -86,7 +88,7 @@ pub fn record<'f>(
             // Direct light of every cluster, of this frame or an earlier one.
             commands.barrier(Access::ComputeWrite, Access::ComputeRead);
             commands.barrier(Access::ComputeWrite, Access::ComputeSampled);
-            commands.pass("bounce", |c| bounce.record(c, work.entities, light, *steps))?;
+            commands.pass("bounce", |c| bounce.record(c, [work.entities, work.vertices], light, *steps))?;
         }
     }
     if merge.is_some() && commands.is_shared() {

@@ -250,9 +250,8 @@ mod tests {
         for (roughness, view_z) in [(0.5, 0.3), (0.8, 0.8), (1.0, 0.5)] {
             let lobe = Lobe::new(roughness, view_z);
             let alpha = brdf::alpha(roughness);
-            let all = lobe.taps.iter().map(|tap| {
-                tap.weight * tap.bands[0] * Lobe::direction(tap, alpha, f64::acos(view_z))
-            });
+            let all =
+                lobe.taps.iter().map(|tap| tap.weight * tap.bands[0] * Lobe::direction(tap, alpha, f64::acos(view_z)));
             let moment: DVec2 = all.sum();
             let view = DVec3::new((1.0 - view_z * view_z).sqrt(), 0.0, view_z);
             let mut wanted = DVec2::ZERO;

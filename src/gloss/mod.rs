@@ -217,14 +217,8 @@ impl Reflections {
     }
 
     pub fn size_bytes(&self) -> u64 {
-        let buffers = [
-            &self.products,
-            &self.groups,
-            &self.shown_lights,
-            &self.through,
-            &self.shown_shares,
-            &self.reflected,
-        ];
+        let buffers =
+            [&self.products, &self.groups, &self.shown_lights, &self.through, &self.shown_shares, &self.reflected];
         let textures = self.sky_map.size_bytes + self.lobes.size_bytes;
         buffers.iter().map(|buffer| buffer.size_bytes).sum::<u64>() + textures + self.entities.all_bytes()
     }

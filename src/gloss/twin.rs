@@ -133,9 +133,6 @@ impl Twin {
         let whole = taps[TAPS - 1].whole;
         let facing = (1.0 - whole / weights[0].max(1e-6)) * sums[0];
         let grazing = whole * sums[1] / weights[1].max(1e-6);
-        [
-            share * facing + (weights[0] - whole) * vertex.bounced,
-            share * grazing + whole * vertex.bounced,
-        ]
+        [share * facing + (weights[0] - whole) * vertex.bounced, share * grazing + whole * vertex.bounced]
     }
 }

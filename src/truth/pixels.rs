@@ -129,8 +129,7 @@ pub fn picture(
                 let key = Vertex { entity: seen.entity, index: pixel as usize * places.len() + index };
                 let entity = &scene.entities[seen.entity];
                 let base = seen.over_mean * entity.albedo.as_dvec3();
-                let surface =
-                    Reflection::seen(base, entity.gloss, seen.view.normal, seen.toward, cast.single_scatter);
+                let surface = Reflection::seen(base, entity.gloss, seen.view.normal, seen.toward, cast.single_scatter);
                 let Estimate { radiosity, error } = caster.reflected(&seen.view, &surface, key);
                 let radiosity = DVec3::from(radiosity);
                 let error = DVec3::from(error);

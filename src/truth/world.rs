@@ -199,7 +199,8 @@ impl<'s> World<'s> {
     /// The first surface that a ray (unit direction) from a point of a surface meets, of entities that occlude.
     pub fn first_surface(&self, view: &VertexView, direction: DVec3) -> Option<(usize, SurfaceHit)> {
         let others = self.occluders(view);
-        let met = others.iter().chain(view.own()).filter_map(|sight| Some((sight, self.first_hit_m(sight, direction)?)));
+        let met =
+            others.iter().chain(view.own()).filter_map(|sight| Some((sight, self.first_hit_m(sight, direction)?)));
         let (sight, _) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some((sight.entity, self.surface_hit(sight, direction)?))
     }

@@ -3,13 +3,14 @@
 use super::common::report;
 use super::stage::{Stage, stage};
 use glam::DVec3;
+use shadow_fields::bounce::Bounces;
 use shadow_fields::draw::Antialias;
 use shadow_fields::frame;
 use shadow_fields::gloss::lobe;
 use shadow_fields::scene::{Scene, data::Data};
 use shadow_fields::truth::pixels::{self, RayPicture};
-use shadow_fields::truth::raycast::RayCast;
 use shadow_fields::truth::ray_mesh::RayMeshes;
+use shadow_fields::truth::raycast::RayCast;
 use shadow_fields::truth::world::World;
 use std::path::Path;
 
@@ -17,7 +18,7 @@ const SIZE: [u32; 2] = [96, 64];
 const CAMERA: &str = "[camera]\neye = [0, 0.8, 4]\ntarget = [0, 0.2, 0]\nfov_deg = 40\n";
 
 fn options() -> frame::Options {
-    frame::Options { size: SIZE, antialias: Antialias::None, ..frame::Options::default() }
+    frame::Options { size: SIZE, antialias: Antialias::None, bounces: Bounces::None, ..frame::Options::default() }
 }
 
 fn scene(text: &str) -> Scene {
@@ -68,7 +69,10 @@ fn a_white_metal_vanishes_in_a_furnace() {
         let middle = single[3 * (SIZE[0] * SIZE[1] / 2 + SIZE[0] / 2) as usize];
         // The pixel in the middle sees the ball at a cosine of 0.94 or more.
         let range = [0.93, 1.0].map(|z| lobe::energy(roughness, z) as f32);
-        assert!(middle > range[0].min(range[1]) - 0.02 && middle < range[0].max(range[1]) + 0.02, "{roughness}: {middle}");
+        assert!(
+            middle > range[0].min(range[1]) - 0.02 && middle < range[0].max(range[1]) + 0.02,
+            "{roughness}: {middle}"
+        );
     }
 }
 
@@ -97,7 +101,10 @@ fn highlights_are_those_of_rays() {
     };
     let down = "rotation = { axis = [0, 0, 1], angle_deg = 160 }";
     let lights = [
-        ("sun", "environment = { sun = { radiance = [900, 900, 900], toward = [1, 2, 1.5], angle_deg = 2 } }".to_owned()),
+        (
+            "sun",
+            "environment = { sun = { radiance = [900, 900, 900], toward = [1, 2, 1.5], angle_deg = 2 } }".to_owned(),
+        ),
         ("ball", lamp("sphere = { radius_m = 0.25, subdivisions = 3 }", "")),
         ("disc", lamp("disc = { radius_m = 0.3 }", down)),
         ("rectangle", lamp("rectangle = { size_m = [0.9, 0.4] }", down)),

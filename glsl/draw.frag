@@ -13,7 +13,7 @@ layout(location = 3) centroid in vec3 tint;
 #if HIGHLIGHTS
 #include "merge_layout.glsl"
 const uint NONE = 0xffffffffu;
-#define ENTITY_BINDING 7
+#define ENTITY_BINDING GLOSS_BINDING + 8
 #include "entities.glsl"
 #include "sub_light.glsl"
 #endif
@@ -43,7 +43,8 @@ void main() {
     vec3 over_mean = push.paint.rgb * texel.rgb;
 #if GLOSS
     vec3 base = over_mean * within * tint * gloss_entity_at(push.entity).albedo;
-    shown = within * shown + glossy(push.entity, base, over_mean * within * light, within);
+    shown = glow(push.entity, within * shown, push.emission_white.rgb, within * uv);
+    shown += glossy(push.entity, base, over_mean * within * light, within * uv, within);
     color = vec4(finish(shown, push.emission_white.w), push.tag);
     return;
 #else

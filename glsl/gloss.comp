@@ -91,7 +91,7 @@ void main() {
     vec3 bounced = max(radiosity_at(v).rgb - direct_at(v).rgb, vec3(0.0)) / max(entity.albedo, vec3(1e-4));
     vec2 of_unit = reflected_share(view, entity.roughness);
     float energy = of_unit.x + of_unit.y;
-    if (entity.roughness < PIXEL_ROUGHNESS) {
+    if (entity.roughness < PIXEL_ROUGHNESS || entity.textured != 0) {
         reflected[2 * v] = vec4(share * entity.sky_scale, energy);
         reflected[2 * v + 1] = vec4(bounced, 0.0);
     } else {

@@ -14,6 +14,7 @@ struct View {
     vec3 toward; // unit, from the surface to the eye
     float z;     // cosine between them, above 0
     float alpha; // width of the microfacets' slopes
+    vec3 ground; // as the normal, of the surface itself, which textures do not tilt
 };
 
 View view_of(vec3 from_eye, vec3 normal, float roughness) {
@@ -22,6 +23,7 @@ View view_of(vec3 from_eye, vec3 normal, float roughness) {
     view.toward = -normalize(from_eye);
     view.z = max(dot(view.normal, view.toward), LEAST_VIEW_Z);
     view.alpha = max(roughness * roughness, LEAST_ALPHA);
+    view.ground = view.normal;
     return view;
 }
 
@@ -97,6 +99,10 @@ Reflection reflect_sky(View view, float roughness) {
     for (uint k = 0; k < TAPS; k++) {
         Tap tap = tap_of(view, roughness, k);
         vec3 light = tap.weight * sky_at(tap.toward, tap.level);
+#if TEXTURED
+        // The surface itself hides what lies below it.
+        light *= clamp(0.5 + 2.0 * dot(tap.toward, view.ground), 0.0, 1.0);
+#endif
         float term = schlick(dot(view.toward, normalize(view.toward + tap.toward)));
         sum += light;
         by_schlick += term * light;

@@ -15,36 +15,108 @@ layout(location = 10) centroid in vec4 shares;
 #define SKY MIRROR
 #include "gloss.glsl"
 
+#if TEXTURED
+layout(binding = GLOSS_BINDING + 5) uniform sampler2D gloss_picture;  // green: roughness, blue: metal
+layout(binding = GLOSS_BINDING + 6) uniform sampler2D normal_picture; // in tangent space
+layout(binding = GLOSS_BINDING + 7) uniform sampler2D emission_picture;
+
+// The normal that the picture gives a place. The tangents follow from how places and coordinates change over the screen
+// (Schueler, Normal Mapping Without Precomputed Tangents, ShaderX 5).
+vec3 mapped_normal(vec3 n, vec3 place, vec2 uv, float slope) {
+    vec3 place_x = dFdx(place), place_y = dFdy(place);
+    vec2 uv_x = dFdx(uv), uv_y = dFdy(uv);
+    float turn = uv_x.x * uv_y.y - uv_y.x * uv_x.y;
+    vec3 along_u = (place_x * uv_y.y - place_y * uv_x.y) * sign(turn);
+    vec3 against_v = (place_x * uv_y.x - place_y * uv_x.x) * sign(turn);
+    along_u -= n * dot(n, along_u);
+    against_v -= n * dot(n, against_v);
+    vec3 found = 2.0 * texture(normal_picture, uv).xyz - 1.0;
+    vec3 tilted = slope * found.x * along_u / max(length(along_u), 1e-20)
+                + slope * found.y * against_v / max(length(against_v), 1e-20) + max(found.z, 0.0) * n;
+    return turn != 0.0 && dot(tilted, tilted) > 0.0 ? normalize(tilted) : n;
+}
+
+// Light that a surface which faces along `n` would have if as much were blocked for it as for its vertices, and by the
+// surface itself, whose own normal is `ground`.
+vec3 open_light(GlossEntity entity, vec3 n, vec3 ground, vec3 place, vec3 bounced, vec4 share) {
+    // Of the roughest lobe the map holds what a diffuse surface sees.
+    vec3 sum = (0.5 + 0.5 * dot(n, ground)) * (bounced + entity.sky_scale * sky_at(n, LEVELS - 1.0));
+#if HIGHLIGHTS
+    uint i = 0;
+    do {
+        Entity shining = ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
+        SeenLight light = seen_light(shining.centre.xyz - entity.eye - place, shining);
+        vec3 along = along_axes(light, vec2(0.0));
+        float facing = dot(mat3(light.toward, light.across, light.down) * along, n);
+        float unit = part_light(light, Block(vec2(0.0), 0.0, 1.0, 1.0), vec2(0.0), along);
+        sum += share[i] * unit * max(facing, 0.0) / PI * shining.emission;
+        i++;
+    } while (i < entity.light_count);
+#endif
+    return sum;
+}
+#endif
+
 // Radiance of a pixel without emission. `light` is that of a diffuse surface of colour `base`; `within` is that of
 // within_triangle.
-vec3 glossy(uint index, vec3 base, vec3 light, float within) {
+vec3 glossy(uint index, vec3 base, vec3 light, vec2 uv, float within) {
     GlossEntity entity = gloss_entity_at(index);
     vec3 place = within * from_eye;
-    View view = view_of(place, normal, entity.roughness);
+    vec3 n = normalize(normal);
+    float roughness = entity.roughness, metallic = entity.metallic;
     Reflection found = Reflection(within * first.rgb, within * second);
+#if HIGHLIGHTS
+    vec4 share = within * shares;
+#else
+    vec4 share = vec4(0.0);
+#endif
+#if TEXTURED
+    vec4 of_gloss = texture(gloss_picture, uv);
+    roughness = clamp(entity.factors.x * of_gloss.g, 0.0, 1.0);
+    metallic = clamp(entity.factors.y * of_gloss.b, 0.0, 1.0);
+    vec3 mapped = mapped_normal(n, place, uv, entity.factors.z);
+    vec3 smooth_light = open_light(entity, n, n, place, found.grazing, share);
+    vec3 mapped_light = open_light(entity, mapped, n, place, found.grazing, share);
+    light *= clamp(mapped_light / max(smooth_light, vec3(1e-20)), vec3(0.0), vec3(MOST_TILTED));
+    View view = view_of(place, mapped, roughness);
+    view.ground = n;
+#else
+    View view = view_of(place, n, roughness);
+#endif
+    float energy = within * first.w;
 #if MIRROR
     // Vertices have the share of the sky that gets through, and the light that has bounced.
-    Reflection sky = reflect_sky(view, entity.roughness);
-    vec2 of_unit = reflected_share(view, entity.roughness);
+    Reflection sky = reflect_sky(view, roughness);
+    vec2 of_unit = reflected_share(view, roughness);
     found = Reflection(found.facing * sky.facing + of_unit.x * found.grazing,
         found.facing * sky.grazing + of_unit.y * found.grazing);
+    energy = of_unit.x + of_unit.y;
 #endif
 #if HIGHLIGHTS
     // Loops are tested at their ends, as in the merge. What is NONE has no share.
     uint i = 0;
     do {
         Entity shining = ENTITY(entity.lights[i] == NONE ? 0 : entity.lights[i]);
-        vec2 part = within * shares[i] * reflect_light(view, shining.centre.xyz - entity.eye - place, shining);
+        vec2 part = share[i] * reflect_light(view, shining.centre.xyz - entity.eye - place, shining);
         found.facing += part.x * shining.emission;
         found.grazing += part.y * shining.emission;
         i++;
     } while (i < entity.light_count);
 #endif
-    vec3 f0 = mix(vec3(entity.f0), base, entity.metallic);
+    vec3 f0 = mix(vec3(entity.f0), base, metallic);
     vec3 specular = f0 * found.facing + found.grazing;
     // Light that microfacets pass on to each other: Kulla and Conty, Revisiting Physically Based Shading at Imageworks,
     // SIGGRAPH 2017 course, as a factor.
     vec3 again = f0 * entity.mean_energy / max(1.0 - f0 * (1.0 - entity.mean_energy), 1e-6);
-    specular *= 1.0 + again * (1.0 / max(within * first.w, LEAST_ENERGY) - 1.0);
-    return diffuse_share(view.z, entity.metallic, entity.f0) * light + specular;
+    specular *= 1.0 + again * (1.0 / max(energy, LEAST_ENERGY) - 1.0);
+    return diffuse_share(view.z, metallic, entity.f0) * light + specular;
+}
+
+// What a pixel emits, of what its vertices do.
+vec3 glow(uint index, vec3 by_vertex, vec3 factor, vec2 uv) {
+#if TEXTURED
+    return mix(by_vertex, factor * texture(emission_picture, uv).rgb, gloss_entity_at(index).factors.w);
+#else
+    return by_vertex;
+#endif
 }

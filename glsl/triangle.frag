@@ -52,8 +52,11 @@ void main() {
     }
 #if GLOSS
     vec3 base = reflectance * gloss_entity_at(push.receiver).albedo;
-    light = glossy(push.receiver, base, reflectance * light, within);
+    light = glossy(push.receiver, base, reflectance * light, within * uv, within);
     reflectance = vec3(1.0);
+    vec3 glowing = glow(push.receiver, within * push.emission_white.rgb * emission, push.emission_white.rgb, within * uv);
+#else
+    vec3 glowing = within * push.emission_white.rgb * emission;
 #endif
-    color = vec4(finish(within * push.emission_white.rgb * emission + reflectance * light, push.emission_white.w), push.tag);
+    color = vec4(finish(glowing + reflectance * light, push.emission_white.w), push.tag);
 }

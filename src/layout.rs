@@ -172,8 +172,10 @@ shared_struct! {
         mean_energy: f32,
         /// How many of the lights there are, at least 1.
         light_count: u32,
-        /// Texels hold four words.
-        unused: u32,
+        /// 1 where textures vary its gloss or normals, so that pixels look everything up; else 0.
+        textured: u32,
+        /// Factors on the textures: of roughness, metal, and the slope of normals; 1 where a texture has the emission.
+        factors: [f32; 4],
     }
 }
 

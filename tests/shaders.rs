@@ -12,7 +12,7 @@ use shadow_fields::bench::shadow_map::{Filter, ShadowMaps};
 use shadow_fields::bounce::{bounce_row, moved_row, runs_row};
 use shadow_fields::draw::grid::DrawGrid;
 use shadow_fields::draw::smooth::Smooth;
-use shadow_fields::draw::triangles::{DrawTriangles, Look};
+use shadow_fields::draw::triangles::{Detail, DrawTriangles, Look};
 use shadow_fields::field::{FieldKind, Lattice, Storage};
 use shadow_fields::gloss::gloss_row;
 use shadow_fields::lists::skip::Skip;
@@ -90,8 +90,9 @@ fn drawing() -> Vec<ShaderPermutation> {
     });
     let ways = [None, Some(&sharp[0]), Some(&sharp[1])];
     let grids = [false, true].into_iter().flat_map(|display| ways.map(|sharp| DrawGrid::row(display, sharp)));
-    let glossy =
-        ways.into_iter().flat_map(|highlights| [false, true].map(|mirror| Look::Glossy { highlights, mirror }));
+    let glossy = ways.into_iter().flat_map(|highlights| {
+        [Detail::Rough, Detail::Mirror, Detail::Textured].map(|detail| Look::Glossy { highlights, detail })
+    });
     let looks: Vec<Look<'_>> = [Look::Plain, Look::Painted].into_iter().chain(glossy).collect();
     let triangles = [false, true]
         .into_iter()

@@ -81,6 +81,7 @@ fn entity_with(motion: impl Strategy<Value = Motion>) -> impl Strategy<Value = E
             scale,
             albedo: Vec3::splat(0.5).into(),
             gloss: None,
+            maps: Default::default(),
             emission: Vec3::ZERO,
             spot: None,
             emits: None,

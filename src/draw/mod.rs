@@ -20,7 +20,7 @@ use crate::asset::picture::srgb_from_linear;
 use crate::draw::grid::{DrawGrid, DrawnGrid};
 use crate::draw::pixel_light::{ByPixel, PixelLight};
 use crate::draw::smooth::Smooth;
-use crate::draw::triangles::{DrawTriangles, DrawnTriangles};
+use crate::draw::triangles::{Detail, DrawTriangles, DrawnTriangles};
 use crate::error::Result;
 use crate::gloss::DrawnReflections;
 use crate::gpu::{Access, Buffer, Commands, Device, Drawing, GraphicsState, Image, ImageShape, Keeps, Target, Texture};
@@ -119,10 +119,18 @@ pub struct DrawnEntity<'d> {
     pub index: u32,
     /// What varies its reflectance, if anything does.
     pub paint: Option<DrawnPaint<'d>>,
-    /// Roughness of what reflects besides diffusely.
-    pub roughness: Option<f32>,
+    /// How it reflects besides diffusely.
+    pub gloss: Option<DrawnGloss<'d>>,
     /// Input of its pixels, where they evaluate sharp lights.
     pub by_pixel: Option<ByPixel>,
+}
+
+/// How pixels of a glossy entity are drawn.
+#[derive(Clone, Copy)]
+pub struct DrawnGloss<'d> {
+    pub detail: Detail,
+    /// Of gloss, normals and emission.
+    pub maps: [Option<&'d Texture>; 3],
 }
 
 /// What varies the reflectance of an entity.

@@ -133,21 +133,32 @@ pub enum Look<'p> {
     Plain,
     /// Textures or tints vary the reflectance.
     Painted,
-    /// It may be painted, and reflects; highlights are of sharp lights that are evaluated so, if there are any. Of a
-    /// mirror every pixel looks the sky up.
-    Glossy { highlights: Option<&'p SharpPermutation>, mirror: bool },
+    /// It may be painted, and reflects; highlights are of sharp lights that are evaluated so, if there are any.
+    Glossy { highlights: Option<&'p SharpPermutation>, detail: Detail },
+}
+
+/// What the pixels of a glossy surface look up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// Nothing: its vertices reflect.
+    Rough,
+    /// The sky.
+    Mirror,
+    /// The sky, and textures of its gloss, normals and emission.
+    Textured,
 }
 
 impl Look<'_> {
     /// The macros of both stages; `first` is the first binding of reflections.
     fn macros(self, row: ShaderPermutation, first: u32) -> ShaderPermutation {
         let row = row.define("PAINTED", !matches!(self, Look::Plain));
-        let Look::Glossy { highlights, mirror } = self else { return row.define("GLOSS", false) };
+        let Look::Glossy { highlights, detail } = self else { return row.define("GLOSS", false) };
         gloss::macros(row)
             .define("GLOSS", true)
             .define("GLOSS_BINDING", first)
             .define("HIGHLIGHTS", highlights.is_some())
-            .define("MIRROR", mirror)
+            .define("MIRROR", detail != Detail::Rough)
+            .define("TEXTURED", detail == Detail::Textured)
     }
 }
 
@@ -168,8 +179,8 @@ pub struct DrawTriangles {
     plain: Pipelines,
     /// Where the scene has textures.
     painted: Option<Pipelines>,
-    /// Where it has glossy surfaces: of those that are rough, and of mirrors.
-    glossy: Option<[Pipelines; 2]>,
+    /// Where it has glossy surfaces: of each [`Detail`].
+    glossy: Option<[Pipelines; 3]>,
     /// Whether these have highlights.
     highlights: bool,
 }
@@ -201,11 +212,14 @@ impl DrawTriangles {
                 pixel: surfaces.sharp.map(pixel).transpose()?,
             })
         };
-        let glossy = |highlights, mirror| pipelines(Look::Glossy { highlights, mirror });
+        let glossy = |highlights| -> Result<[Pipelines; 3]> {
+            let of = |detail| pipelines(Look::Glossy { highlights, detail });
+            Ok([of(Detail::Rough)?, of(Detail::Mirror)?, of(Detail::Textured)?])
+        };
         Ok(DrawTriangles {
             plain: pipelines(Look::Plain)?,
             painted: surfaces.painted.then(|| pipelines(Look::Painted)).transpose()?,
-            glossy: surfaces.gloss.map(|sharp| Ok([glossy(sharp, false)?, glossy(sharp, true)?])).transpose()?,
+            glossy: surfaces.gloss.map(glossy).transpose()?,
             highlights: surfaces.gloss.flatten().is_some(),
         })
     }
@@ -216,16 +230,22 @@ impl DrawTriangles {
         entity: &DrawnEntity<'d>,
         viewport: &DrawnViewport<'d>,
     ) -> (&Pipelines, Option<DrawnPaint<'d>>, Option<DrawnReflections<'d>>) {
-        let gloss = viewport.gloss.zip(entity.roughness);
+        let gloss = viewport.gloss.zip(entity.gloss.as_ref());
         match (&self.glossy, gloss, &self.painted, entity.paint) {
-            (Some([rough, mirror]), Some((gloss, roughness)), ..) => {
+            (Some(glossy), Some((gloss, drawn)), ..) => {
                 let white = DrawnPaint { texture: &gloss.reflections.white, tint: Vec3::ONE, alpha_cutoff: 0.0 };
-                let pipelines = if roughness < gloss::PIXEL_ROUGHNESS { mirror } else { rough };
-                (pipelines, Some(entity.paint.unwrap_or(white)), Some(gloss))
+                (&glossy[drawn.detail as usize], Some(entity.paint.unwrap_or(white)), Some(gloss))
             }
             (.., Some(painted), Some(paint)) => (painted, Some(paint), None),
             _ => (&self.plain, None, None),
         }
+    }
+
+    /// Textures of gloss, normals and emission, or what stands for those that there are not.
+    fn maps<'d>(entity: &DrawnEntity<'d>, gloss: DrawnReflections<'d>) -> [Bind<'d>; 3] {
+        let maps = entity.gloss.as_ref().map_or([None; 3], |drawn| drawn.maps);
+        let neutral = [&gloss.reflections.white, &gloss.reflections.flat, &gloss.reflections.white];
+        std::array::from_fn(|k| Bind::Texture(maps[k].unwrap_or(neutral[k])))
     }
 
     /// The rows of the shaders that show the light of vertices: vertex and fragment.
@@ -270,6 +290,7 @@ impl DrawTriangles {
                 if let Some(gloss) = gloss {
                     binds.extend(texels(&[(gloss.vertices, vk::Format::R32G32B32A32_SFLOAT)])?);
                     binds.extend(gloss.binds()?);
+                    binds.extend(Self::maps(entity, gloss));
                     if self.highlights {
                         binds.extend(texels(&[(gloss.lights, vk::Format::R32G32B32A32_SFLOAT)])?);
                     }
@@ -314,6 +335,7 @@ impl DrawTriangles {
         }
         if let Some(gloss) = gloss {
             binds.extend(gloss.binds()?);
+            binds.extend(Self::maps(entity, gloss));
         }
         drawing.resources(&binds)?;
         let [_, _, width, height] = viewport.area;

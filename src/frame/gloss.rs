@@ -1,15 +1,17 @@
 //! Reflections of a frame: which entities have them, of which lights, and how the eye sees them now.
 
 use super::Frame;
+use crate::draw::DrawnGloss;
 use crate::draw::camera::world_from_centred;
+use crate::draw::triangles::Detail;
 use crate::error::Result;
 use crate::gloss::lobe::mean_energy;
 use crate::gloss::sky_map::SkyMap;
 use crate::gloss::twin::{Twin, TwinVertex};
-use crate::gloss::{DrawnReflections, Glossy, ReflectionInputs, Reflections};
+use crate::gloss::{DrawnReflections, Glossy, PIXEL_ROUGHNESS, ReflectionInputs, Reflections};
 use crate::gpu::{Buffer, Device};
 use crate::layout::{GlossEntity, NONE, SHOWN_LIGHTS};
-use crate::scene::{LightMethod, Placement, Scene};
+use crate::scene::{Entity, LightMethod, MapIndices, Placement, Scene};
 use crate::scene_buffers::SceneBuffers;
 use crate::shaders::Library;
 use glam::{DVec3, Vec3, Vec4};
@@ -92,6 +94,7 @@ impl Frame {
             let index = glossy.entity;
             let entity = &self.scene.entities[index];
             let Some(gloss) = entity.gloss else { continue };
+            let factor = self.scene.data.entities[index].gloss.unwrap_or(gloss);
             let mut matrix = world_from_centred(&placements[index], self.buffers.meshes[entity.mesh].centre_m);
             matrix.w_axis -= DVec3::from(eye).extend(0.0);
             let row = |row: usize| Vec4::from_array(matrix.row(row).as_vec4().to_array()).to_array();
@@ -111,10 +114,24 @@ impl Frame {
                 vertex_count: glossy.vertex_count,
                 mean_energy: if self.options.single_scatter { 0.0 } else { mean_energy(gloss.roughness) },
                 light_count: glossy.lights.iter().filter(|&&light| light != NONE).count().max(1) as u32,
-                unused: 0,
+                textured: u32::from(entity.maps.any()),
+                factors: [factor.roughness, factor.metallic, 1.0, f32::from(u8::from(entity.maps.glow.is_some()))],
             };
         }
         self.reflections.as_mut().map_or(Ok(()), |reflections| reflections.set_entities(&entities))
+    }
+
+    /// How the pixels of an entity reflect.
+    pub(super) fn drawn_gloss(&self, entity: &Entity) -> Option<DrawnGloss<'_>> {
+        let gloss = entity.gloss.filter(|_| entity.receives)?;
+        let detail = match gloss.roughness {
+            _ if entity.maps.any() => Detail::Textured,
+            roughness if roughness < PIXEL_ROUGHNESS => Detail::Mirror,
+            _ => Detail::Rough,
+        };
+        let MapIndices { gloss, normal, glow } = entity.maps;
+        let texture = |index: Option<usize>| index.map(|index| &*self.buffers.textures[index]);
+        Some(DrawnGloss { detail, maps: [gloss, normal, glow].map(texture) })
     }
 
     /// What the pass "gloss" works on.

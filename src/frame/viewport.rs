@@ -103,7 +103,7 @@ impl Frame {
                 tag: smooth::tag(index),
                 index: index as u32,
                 paint: self.paint(index),
-                roughness: entity.gloss.filter(|_| entity.receives).map(|gloss| gloss.roughness),
+                gloss: self.drawn_gloss(entity),
                 by_pixel: self.chains.as_ref().and_then(|chains| chains.of(index)),
             };
             let radius_m = device_mesh.radius_m * f64::from(placement.scale);
@@ -136,7 +136,7 @@ impl Frame {
             for entity in &mut drawn {
                 entity.emission = Vec3::ZERO;
                 entity.paint = None;
-                entity.roughness = None;
+                entity.gloss = None;
             }
         }
         drawn

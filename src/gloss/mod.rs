@@ -36,6 +36,8 @@ pub const MOST_SHARE: f64 = 1.1;
 pub const LEAST_VIEW_Z: f64 = 1e-3;
 /// Least share of light that counts as reflected once.
 pub const LEAST_ENERGY: f64 = 0.1;
+/// Most by which a normal map brightens diffuse light.
+pub const MOST_TILTED: f64 = 4.0;
 /// How much wider slopes become by the width of a part of a light that counts as a point.
 pub const WIDENED: f64 = 0.35;
 /// Largest area of slopes by which they become wider: where view and light graze it has no bound.
@@ -65,6 +67,7 @@ pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
         ("LEAST_VIEW_Z", LEAST_VIEW_Z),
         ("LEAST_ALPHA", brdf::LEAST_ALPHA),
         ("LEAST_ENERGY", LEAST_ENERGY),
+        ("MOST_TILTED", MOST_TILTED),
         ("MOST_SLOPES", MOST_SLOPES),
         ("WIDENED", WIDENED),
         ("WHOLE_LIGHT", WHOLE_LIGHT),
@@ -90,6 +93,8 @@ pub struct Reflections {
     lobes: Texture,
     /// One white texel, for surfaces of one colour.
     pub white: Texture,
+    /// One texel of a normal that is not tilted.
+    pub flat: Texture,
     /// The receivers that reflect.
     pub glossy: Vec<Glossy>,
     /// Workgroups: an entity, and the first of its vertices.
@@ -157,6 +162,7 @@ impl Reflections {
             sky_scale: 0.0,
             lobes: texture(device, "lobes", lobe::TABLE as u32, &lobe::texels())?,
             white: texture(device, "white", 1, &[[1.0; 4]])?,
+            flat: texture(device, "flat", 1, &[[0.5, 0.5, 1.0, 1.0]])?,
             group_count: groups.len() as u32,
             groups: Buffer::with_data(device, "glossy groups", &groups)?,
             entities: Upload::new(device, "glossy entities", (entity_count * size_of::<GlossEntity>()) as u64)?,

@@ -47,7 +47,7 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::gloss::Gloss;
+use super::gloss::{Gloss, Maps};
 use super::light::Spot;
 use super::motion::{Motion, Placement, PlacementF64, RotationData};
 use super::{check_counts, values};
@@ -413,6 +413,9 @@ pub struct EntityData {
     /// How it reflects besides diffusely. By default it does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gloss: Option<Gloss>,
+    /// Textures of a glossy surface besides its albedo.
+    #[serde(default, skip_serializing_if = "Maps::is_empty")]
+    pub maps: Maps,
     /// Linear radiance in W m^-2 sr^-1, at most 1e15. It multiplies the colours of a mesh that has them. The default is
     /// 0.
     #[serde(default, deserialize_with = "values::radiance")]
@@ -449,6 +452,7 @@ impl EntityData {
             scale: values::one(),
             albedo: grey(),
             gloss: None,
+            maps: Maps::default(),
             emission: Vec3::ZERO,
             spot: None,
             emits: None,

@@ -29,3 +29,47 @@ fn usual_f0() -> f32 {
 fn is_usual_f0(f0: &f32) -> bool {
     *f0 == USUAL_F0
 }
+
+/// Pictures of a surface besides its albedo, by the texture coordinates of its mesh. Each is the name of a texture.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Maps {
+    /// Green is a factor on the roughness, blue on the metallic share, as in glTF.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gloss: Option<String>,
+    /// The normal in tangent space, as in glTF: red along u, green against v, blue away from the surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub normal: Option<String>,
+    /// A factor on the emission that is seen. What the surface shines on others goes by its mesh's colours.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub glow: Option<String>,
+}
+
+impl Maps {
+    pub(crate) fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The names.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &String> {
+        self.gloss.iter().chain(&self.normal).chain(&self.glow)
+    }
+}
+
+/// [`Maps`] by the numbers of textures.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MapIndices {
+    /// Roughness and metal.
+    pub gloss: Option<usize>,
+    /// Normals.
+    pub normal: Option<usize>,
+    /// A factor on the emission that is seen.
+    pub glow: Option<usize>,
+}
+
+impl MapIndices {
+    /// Whether there are any.
+    pub fn any(&self) -> bool {
+        *self != Self::default()
+    }
+}

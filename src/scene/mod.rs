@@ -33,7 +33,7 @@ use crate::asset::{Mesh, embedded, obj, read_file, utf8};
 use crate::error::{Error, Result};
 pub use builder::{SceneBuilder, Shape};
 pub use data::{Albedo, Camera, Data, EntityData, MeshData, Output, TextureData};
-pub use gloss::Gloss;
+pub use gloss::{Gloss, MapIndices, Maps};
 pub use light::{LightMethod, Lights, Spot};
 pub use motion::{Motion, Placement};
 pub use surroundings::Surroundings;
@@ -79,8 +79,10 @@ pub struct Entity {
     pub albedo: Vec3,
     /// Index into [`Scene::textures`].
     pub texture: Option<usize>,
-    /// How it reflects besides, if it is glossy.
+    /// How it reflects besides, if it is glossy; where a texture varies it, the mean over the picture.
     pub gloss: Option<Gloss>,
+    /// Its textures besides the albedo's, if it is glossy and has texture coordinates.
+    pub maps: MapIndices,
     /// Linear radiance in W m^-2 sr^-1. It is multiplied by the mesh's colours, if there are any.
     pub emission: Vec3,
     /// The cone of its light, if it is a spot.
@@ -278,11 +280,7 @@ impl Scene {
         data::check(format!("entity {index}"), &data)?;
         check_spot(&data, &self.meshes[self.entities[index].mesh])
             .map_err(|what| Error::Input(format!("entity {index}: {what}")))?;
-        if let Albedo::Texture(name) = &data.albedo
-            && self.data.textures.iter().all(|texture| texture.name != *name)
-        {
-            return Err(Error::Input(format!("entity {index}: there is no texture {name:?}")));
-        }
+        check_textures(&data, &self.data).map_err(|what| Error::Input(format!("entity {index}: {what}")))?;
         self.put_entity(index, data);
         Ok(())
     }
@@ -300,7 +298,8 @@ impl Scene {
         } else {
             Paint { texture: self.entities[index].texture, mean: self.entities[index].albedo }
         };
-        self.entities[index] = resolve(index, &data, mesh, paint);
+        let coat = Coat::new(&data, &self.data, &self.textures, &self.meshes[mesh]);
+        self.entities[index] = resolve(index, &data, mesh, paint, coat);
         self.data.entities[index] = data;
     }
 
@@ -345,16 +344,15 @@ fn resolve_all(
         let mesh = data.meshes.iter().position(|mesh| mesh.name == entity.mesh);
         let mesh = mesh.ok_or_else(|| fail(i, format!("there is no mesh {:?}", entity.mesh)))?;
         check_spot(entity, &meshes[mesh]).map_err(|what| fail(i, what.to_owned()))?;
+        check_textures(entity, data).map_err(|what| fail(i, what))?;
         let paint = match &entity.albedo {
             Albedo::Color(_) => Paint::new(&entity.albedo, data, textures, &meshes[mesh]),
-            Albedo::Texture(name) if data.textures.iter().all(|texture| texture.name != *name) => {
-                return Err(fail(i, format!("there is no texture {name:?}")));
-            }
             Albedo::Texture(name) => *paints
                 .entry((name, &entity.mesh))
                 .or_insert_with(|| Paint::new(&entity.albedo, data, textures, &meshes[mesh])),
         };
-        entities.push(resolve(i, entity, mesh, paint));
+        let coat = Coat::new(entity, data, textures, &meshes[mesh]);
+        entities.push(resolve(i, entity, mesh, paint, coat));
     }
     Ok(entities)
 }
@@ -386,15 +384,49 @@ impl Paint {
     }
 }
 
+/// Refuses the names of textures that there are not.
+fn check_textures(entity: &EntityData, data: &Data) -> std::result::Result<(), String> {
+    let albedo = if let Albedo::Texture(name) = &entity.albedo { Some(name) } else { None };
+    let is_missing = |name: &&String| data.textures.iter().all(|texture| texture.name != **name);
+    let missing = albedo.into_iter().chain(entity.maps.names()).find(is_missing);
+    missing.map_or(Ok(()), |name| Err(format!("there is no texture {name:?}")))
+}
+
+/// How an entity reflects besides diffusely, and its textures for that.
+struct Coat {
+    gloss: Option<Gloss>,
+    maps: MapIndices,
+}
+
+impl Coat {
+    /// Of an entity whose textures there are.
+    fn new(entity: &EntityData, data: &Data, textures: &[Arc<Texture>], mesh: &Mesh) -> Self {
+        let Some(mut gloss) = entity.gloss else { return Coat { gloss: None, maps: MapIndices::default() } };
+        let number = |name: &Option<String>| {
+            let name = name.as_ref().filter(|_| mesh.uvs.is_some())?;
+            data.textures.iter().position(|texture| texture.name == *name && texture.file.is_some())
+        };
+        let Maps { gloss: varies, normal, glow } = &entity.maps;
+        let maps = MapIndices { gloss: number(varies), normal: number(normal), glow: number(glow) };
+        if let Some(texels) = maps.gloss.and_then(|index| textures[index].texels.as_ref()) {
+            let [_, roughness, metallic] = texels.mean_bytes();
+            gloss.roughness *= roughness;
+            gloss.metallic *= metallic;
+        }
+        Coat { gloss: Some(gloss), maps }
+    }
+}
+
 /// Resolves the switches. By default, an entity emits if it has emission, occludes unless it emits, and receives.
-fn resolve(index: usize, data: &EntityData, mesh: usize, paint: Paint) -> Entity {
+fn resolve(index: usize, data: &EntityData, mesh: usize, paint: Paint, coat: Coat) -> Entity {
     let emits = data.emits.unwrap_or(data.emission != Vec3::ZERO);
     Entity {
         name: data.name.clone().unwrap_or_else(|| format!("entity {index}")),
         mesh,
         albedo: paint.mean,
         texture: paint.texture,
-        gloss: data.gloss,
+        gloss: coat.gloss,
+        maps: coat.maps,
         emission: data.emission,
         spot: data.spot,
         emits,

@@ -5,7 +5,7 @@
 //! changes by 1e-4 radians. The distance is the same for every scene, so that no edit of anything else moves a sun by
 //! the last bit.
 
-use super::{Entity, Placement, Scene};
+use super::{Entity, MapIndices, Placement, Scene};
 use crate::asset::disc::Disc;
 use crate::asset::generate::sphere;
 use glam::{DVec3, Quat, Vec3};
@@ -44,6 +44,7 @@ impl Scene {
                 albedo: Vec3::ZERO,
                 texture: None,
                 gloss: None,
+                maps: MapIndices::default(),
                 emission: (radiance / share).as_vec3(),
                 spot: None,
                 emits: radiance != DVec3::ZERO,

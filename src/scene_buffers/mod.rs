@@ -22,12 +22,13 @@ use crate::layout::{CLUSTER_VERTICES, NONE};
 use crate::lists::gather::ClusterBounds;
 use crate::lists::sight::TriangleRun;
 use crate::scene::groups::Groups;
-use crate::scene::{Lights, Scene};
+use crate::scene::{Lights, MapIndices, Scene};
 pub use field_atlas::FieldSlot;
 use glam::DVec3;
 pub use silhouettes::{SilhouetteSlot, Silhouettes};
 use std::ops::Range;
 use std::sync::Arc;
+use textures::Content;
 
 /// Alignment, in bytes, of everything that a pass may bind as a range. It is the largest that Vulkan lets a device ask
 /// for.
@@ -201,7 +202,11 @@ impl SceneBuffers {
             vertices: Buffer::with_data(device, "vertices", &vertices)?,
             meshes,
             surfaces,
-            textures: textures::upload(device, &scene.textures)?,
+            textures: textures::upload(device, &scene.textures, |index| {
+                let is_number = |maps: MapIndices| maps.gloss == Some(index) || maps.normal == Some(index);
+                let any = scene.entities.iter().any(|entity| is_number(entity.maps));
+                if any { Content::Numbers } else { Content::Colors }
+            })?,
             surface_of: baked.surface_of,
             baked: baked.baked,
             storage: options.storage,

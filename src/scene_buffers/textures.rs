@@ -13,22 +13,35 @@ const WHITE: [u8; 4] = [u8::MAX; 4];
 /// sRGB and alpha.
 const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
 
+/// What a texture's bytes are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Content {
+    /// Colours, sRGB.
+    Colors,
+    /// Numbers.
+    Numbers,
+}
+
 /// Uploads textures; those of one picture and one way to go on share what is uploaded. Pictures that are larger than the
 /// device's are halved.
-pub fn upload(device: &Arc<Device>, textures: &[Arc<Texture>]) -> Result<Vec<Arc<texture::Texture>>> {
-    let mut known: HashMap<(Option<*const Texels>, [Wrap; 2]), Arc<texture::Texture>> = HashMap::new();
+pub fn upload(
+    device: &Arc<Device>,
+    textures: &[Arc<Texture>],
+    content: impl Fn(usize) -> Content,
+) -> Result<Vec<Arc<texture::Texture>>> {
+    let mut known: HashMap<(Option<*const Texels>, [Wrap; 2], Content), Arc<texture::Texture>> = HashMap::new();
     let mut uploaded = Vec::with_capacity(textures.len());
-    for texture in textures {
-        let key = (texture.texels.as_ref().map(Arc::as_ptr), texture.wrap);
+    for (index, texture) in textures.iter().enumerate() {
+        let key = (texture.texels.as_ref().map(Arc::as_ptr), texture.wrap, content(index));
         if !known.contains_key(&key) {
-            known.insert(key, Arc::new(one(device, texture)?));
+            known.insert(key, Arc::new(one(device, texture, content(index))?));
         }
         uploaded.push(known[&key].clone());
     }
     Ok(uploaded)
 }
 
-fn one(device: &Arc<Device>, texture: &Texture) -> Result<texture::Texture> {
+fn one(device: &Arc<Device>, texture: &Texture, content: Content) -> Result<texture::Texture> {
     let wrap = texture.wrap.map(|wrap| match wrap {
         Wrap::Repeat => vk::SamplerAddressMode::REPEAT,
         Wrap::Mirror => vk::SamplerAddressMode::MIRRORED_REPEAT,
@@ -40,11 +53,18 @@ fn one(device: &Arc<Device>, texture: &Texture) -> Result<texture::Texture> {
     let most = device.most_image_px() as usize;
     let mut levels = vec![texels.clone()];
     while let Some(last) = levels.last().filter(|last| last.width.max(last.height) > 1) {
-        levels.push(Arc::new(last.halved()));
+        levels.push(Arc::new(match content {
+            Content::Colors => last.halved(),
+            Content::Numbers => last.halved_numbers(),
+        }));
     }
     levels.retain(|level| level.width.max(level.height) <= most);
     let levels: Vec<Level<'_>> = levels.iter().map(|level| level_of(level)).collect();
-    texture::Texture::new(device, "texture", FORMAT, &levels, wrap)
+    let format = match content {
+        Content::Colors => FORMAT,
+        Content::Numbers => vk::Format::R8G8B8A8_UNORM,
+    };
+    texture::Texture::new(device, "texture", format, &levels, wrap)
 }
 
 fn level_of(texels: &Texels) -> Level<'_> {

@@ -68,7 +68,8 @@ fn glossy_entities() {
             vertex_count,
             mean_energy,
             light_count,
-            unused,
+            textured,
+            factors,
         }
     );
     assert_eq!(reflection.strides.get("GlossEntity"), Some(&(size_of::<GlossEntity>() as u32)));

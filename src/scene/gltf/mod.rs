@@ -15,7 +15,8 @@
 //! | base colour factor | albedo |
 //! | base colour texture, colours of vertices, alpha mask | texture; tints of the mesh's vertices |
 //! | roughness, metal, index of refraction, specular factor | gloss |
-//! | emissive factor and strength; texture | emission; colours of the mesh's vertices |
+//! | textures of roughness and metal, of normals | maps |
+//! | emissive factor and strength; texture | emission; colours of the mesh's vertices, and a map |
 //! | point and spot lights | glowing balls; those of spots shine within a cone |
 //! | the first directional light | the sun of the distant light |
 //! | no light | daylight; a dim uniform sky beside lamps and suns |
@@ -50,7 +51,7 @@ use crate::scene::data::{Albedo, Data, EntityData, MeshData, Output, PoseData, T
 use crate::scene::framing;
 use crate::scene::motion::RotationData;
 use crate::scene::values::{POSITION_LIMIT_M, SCALE_LIMIT};
-use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, Surroundings, check_counts};
+use crate::scene::{ENTITY_LIMIT, MESH_LIMIT, Maps, Surroundings, check_counts};
 use animation::Tracks;
 use document::Document;
 #[cfg(feature = "cli")]
@@ -59,7 +60,7 @@ use lamp::Lamps;
 pub use notes::Notes;
 use pose::Pose;
 use shape::Shape;
-use surface::Surface;
+use surface::{Map, Surface};
 use texture::Textures;
 use tree::{SplitTransform, Stand};
 
@@ -311,6 +312,8 @@ struct Builder {
     meshes: Vec<(MeshData, Arc<Mesh>)>,
     /// Textures by material and number of the image, and the tints that vary the colour.
     painted: HashMap<(Option<usize>, [u32; 3]), usize>,
+    /// Numbers of the textures that maps became.
+    mapped: HashMap<Map, usize>,
     textures: Vec<(TextureData, Arc<Texture>)>,
     names: BTreeSet<String>,
     bent_count: usize,
@@ -328,6 +331,7 @@ impl Builder {
             made: HashMap::new(),
             meshes: Vec::new(),
             painted: HashMap::new(),
+            mapped: HashMap::new(),
             textures: Vec::new(),
             names: BTreeSet::new(),
             bent_count: 0,
@@ -383,7 +387,8 @@ impl Builder {
             return Ok(None);
         };
         let place = format!("nodes[{}]", stand.node);
-        let Surface { emission, gloss, .. } = primitive.surface;
+        let Surface { emission, gloss, maps, .. } = primitive.surface;
+        let has_pattern = primitive.surface.attributes.colors.is_some();
         let scale = parts.uniform_scale().map(|scale| scale as f32);
         if scale.is_some_and(|scale| !(1.0 / SCALE_LIMIT..=SCALE_LIMIT).contains(&scale)) {
             return Err(document.fail(place, "its scale is not within 1e-7 to 1e7"));
@@ -393,6 +398,7 @@ impl Builder {
         }
         let bend = if scale.is_some() { DMat3::IDENTITY } else { parts.bend };
         let albedo = self.albedo(part);
+        let [gloss_map, normal_map, glow_map] = maps.map(|map| map.map(|map| self.map(map)));
         let made = self.mesh(part, bend)?;
         let several = document.root.meshes[mesh].primitives.len() > 1;
         let own = document.root.nodes[stand.node].name.clone().unwrap_or_else(|| format!("node {}", stand.node));
@@ -403,7 +409,11 @@ impl Builder {
             scale: scale.unwrap_or(1.0),
             albedo,
             gloss,
+            maps: Maps { gloss: gloss_map, normal: normal_map, glow: glow_map },
             emission,
+            // What glows in places casts a shadow, and lights others where it is brighter than white on a screen.
+            emits: (has_pattern && emission.max_element() <= 1.0).then_some(false),
+            occludes: has_pattern.then_some(true),
             motion: stand.motion.clone(),
             ..EntityData::of_mesh(&self.meshes[made].0.name)
         }))
@@ -433,6 +443,26 @@ impl Builder {
             self.textures.len() - 1
         });
         Albedo::Texture(self.textures[number].0.name.clone())
+    }
+
+    /// The name of the scene's texture that a map becomes.
+    fn map(&mut self, map: Map) -> String {
+        let number = *self.mapped.entry(map).or_insert_with(|| {
+            let is_free = |name: &String| self.textures.iter().all(|(data, _)| data.name != *name);
+            let data = TextureData {
+                name: free_name(&format!("image {}", map.image), is_free),
+                file: Some(self.file.clone()),
+                image: Some(map.image),
+                wrap: map.wrap,
+                factor: Vec3::ONE,
+                alpha_cutoff: None,
+            };
+            let texels = self.reader.texels(map.image).ok();
+            self.textures
+                .push((data, Arc::new(Texture { texels, wrap: map.wrap, factor: Vec3::ONE, alpha_cutoff: None })));
+            self.textures.len() - 1
+        });
+        self.textures[number].0.name.clone()
     }
 
     /// Index of the mesh of a part under a bend.

@@ -2,16 +2,17 @@
 
 use ::gltf::json::material::{AlphaMode, Material};
 use ::gltf::json::mesh::Semantic;
+use ::gltf::json::texture::Info;
 use ::gltf::json::validation::Checked;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::document::Document;
 use super::notes::Notes;
 use super::shape::Shape;
-use super::texture::Textures;
+use super::texture::{Applied, Textures};
 use crate::asset::environment::RADIANCE_LIMIT;
 use crate::asset::mesh::Attributes;
-use crate::asset::texture::Texture;
+use crate::asset::texture::{Texture, Wrap};
 use crate::error::Result;
 use crate::scene::Gloss;
 
@@ -26,6 +27,23 @@ pub struct Paint {
     pub texture: Texture,
 }
 
+/// A texture besides that of the base colour, which has the same coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Map {
+    /// Number of the image.
+    pub image: usize,
+    pub wrap: [Wrap; 2],
+}
+
+impl Map {
+    /// The map that a texture becomes, where a shape has coordinates and those of the texture are the same. The first
+    /// one decides them.
+    fn of(applied: &Applied, uvs: &mut Option<Vec<Vec2>>) -> Option<Self> {
+        let own = applied.uvs.as_ref()?;
+        (uvs.get_or_insert_with(|| own.clone()) == own).then_some(Map { image: applied.image, wrap: applied.wrap })
+    }
+}
+
 /// What a primitive looks like.
 #[derive(Clone, Debug)]
 pub struct Surface {
@@ -34,6 +52,8 @@ pub struct Surface {
     pub paint: Option<Paint>,
     /// How it reflects besides; an unlit surface does not.
     pub gloss: Option<Gloss>,
+    /// Its textures for that: gloss, normal and emission.
+    pub maps: [Option<Map>; 3],
     /// Linear radiance; candela per square metre are taken as W m^-2 sr^-1.
     pub emission: Vec3,
     /// Colours are a factor on the emission, where a texture varies it.
@@ -83,46 +103,58 @@ impl Surface {
             },
         });
         attributes.uvs = applied.and_then(|applied| applied.uvs);
+        let is_unlit = json.extensions.as_ref().is_some_and(|e| e.unlit.is_some());
+        let mut maps = [None; 3];
+        let mut map = |info: Option<&Info>, attributes: &mut Attributes, notes: &mut Notes| -> Result<_> {
+            let applied = info.filter(|_| !is_unlit).map(|info| textures.applied(info, shape, notes)).transpose()?;
+            let applied = applied.flatten();
+            let map = applied.as_ref().and_then(|applied| Map::of(applied, &mut attributes.uvs));
+            if applied.is_some() && map.is_none() {
+                notes.leave_out("textures with coordinates of their own (their means, or vertices, have their place)");
+            }
+            Ok((map, applied))
+        };
+        let (of_gloss, applied) =
+            map(json.pbr_metallic_roughness.metallic_roughness_texture.as_ref(), &mut attributes, notes)?;
+        let varies = applied.filter(|_| of_gloss.is_none());
+        let gloss = if is_unlit { None } else { Some(gloss(document, json, &place, varies.as_ref())?) };
+        let normal = json.normal_texture.as_ref().map(|normal| Info {
+            index: normal.index,
+            tex_coord: normal.tex_coord,
+            extensions: None,
+            extras: normal.extras.clone(),
+        });
+        let (of_normal, _) = map(normal.as_ref(), &mut attributes, notes)?;
+        let (of_emission, _) = map(json.emissive_texture.as_ref(), &mut attributes, notes)?;
+        maps[0] = of_gloss;
+        maps[1] = of_normal;
         let (emission, colors) = glow(document, json, &place, shape, textures, notes)?;
+        maps[2] = of_emission.filter(|_| emission != Vec3::ZERO);
         attributes.colors = colors;
-        let gloss = gloss(document, json, &place, shape, textures, notes)?;
-        Ok(Surface { albedo, paint, gloss, emission, attributes })
+        Ok(Surface { albedo, paint, gloss, maps, emission, attributes })
     }
 }
 
-/// Metallic-roughness reflection; textures count by their means.
-fn gloss(
-    document: &Document,
-    json: &Material,
-    place: &str,
-    shape: &Shape,
-    textures: &mut Textures,
-    notes: &mut Notes,
-) -> Result<Option<Gloss>> {
+/// Metallic-roughness reflection; a texture that is no map counts by its mean.
+fn gloss(document: &Document, json: &Material, place: &str, texture: Option<&Applied>) -> Result<Gloss> {
     let extensions = json.extensions.as_ref();
-    if extensions.is_some_and(|e| e.unlit.is_some()) {
-        return Ok(None);
-    }
     let pbr = &json.pbr_metallic_roughness;
     let mut roughness = pbr.roughness_factor.0;
     let mut metallic = pbr.metallic_factor.0;
-    if let Some(info) = &pbr.metallic_roughness_texture
-        && let Some(applied) = textures.applied(info, shape, notes)?
-    {
+    if let Some(applied) = texture {
         let [_, g, b] = applied.texels.mean_bytes();
         roughness *= g;
         metallic *= b;
-        notes.leave_out("textures of roughness and metal (they are even, of their means)");
     }
-    let ior = extensions.and_then(|e| e.ior.as_ref()).map_or(1.5, |ior| ior.ior.0);
+    let ior = f64::from(extensions.and_then(|e| e.ior.as_ref()).map_or(1.5, |ior| ior.ior.0));
     let specular = extensions.and_then(|e| e.specular.as_ref()).map_or(1.0, |specular| specular.specular_factor.0);
     // An index of 0 stands for infinity.
     let faced = if ior == 0.0 { 1.0 } else { (ior - 1.0) / (ior + 1.0) };
-    let f0 = specular * faced * faced;
+    let f0 = (f64::from(specular) * faced * faced) as f32;
     if ![roughness, metallic, f0].iter().all(|share| (0.0..=1.0).contains(share)) {
         return Err(document.fail(place, "its roughness, metal or specular reflection is not within 0 to 1"));
     }
-    Ok(Some(Gloss { roughness, metallic, f0 }))
+    Ok(Gloss { roughness, metallic, f0 })
 }
 
 /// Whether all colours are the same, nearly.
@@ -151,8 +183,7 @@ fn glow(
     };
     let Some(applied) = textures.applied(info, shape, notes)? else { return Ok((emission, None)) };
     let colors = textures.at_vertices(&applied);
-    notes.leave_out("emissive textures (vertices have their colours)");
-    if colors.len() != shape.vertex_count() || is_even(&colors) {
+    if colors.len() != shape.vertex_count() {
         emission *= colors[0];
         return Ok((emission, None));
     }
@@ -168,5 +199,4 @@ pub fn note(json: &Material, notes: &mut Notes) {
     if matches!(json.alpha_mode, Checked::Valid(AlphaMode::Mask)) {
         notes.leave_out("shadows of masked materials (they are those of the whole shape)");
     }
-    notes.leave_out_many("textures of normals", usize::from(json.normal_texture.is_some()));
 }

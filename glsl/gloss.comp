@@ -45,15 +45,28 @@ float lobe_over_cosine(View view, float roughness, out float lobe[COEFFICIENTS])
     return whole;
 }
 
-// The share of distant light of each colour that gets through.
-vec3 share_through(View view, float roughness, uint v) {
+// What of the light around a vertex its lobe sees.
+struct Seen {
+    vec3 sky;    // share of distant light of each colour that gets through
+    float nearby; // factor on the mean radiance over the cosine of what stands before it
+};
+
+Seen seen_by(View view, float roughness, uint v) {
     float lobe[COEFFICIENTS], cosine[COEFFICIENTS], t[COEFFICIENTS];
     float whole = lobe_over_cosine(view, roughness, lobe);
     sh_cosine(view.normal, cosine);
     [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
         t[i] = unpackHalf2x16(through[2 * v + i / 8][i / 2 % 4])[i % 2];
     }
-    vec3 share;
+    float through_lobe = 0.0, open_lobe = 0.0;
+    [[unroll]] for (uint i = 0; i < COEFFICIENTS; i++) {
+        through_lobe += t[i] * lobe[i];
+        open_lobe += cosine[i] * lobe[i];
+    }
+    float hidden = 1.0 - clamp(through_lobe / max(open_lobe, LEAST_SHARE * whole), 0.0, 1.0);
+    float hidden_cosine = 1.0 - clamp(t[0] / cosine[0], 0.0, 1.0);
+    Seen seen;
+    seen.nearby = min(hidden / max(hidden_cosine, LEAST_HIDDEN), MOST_NEARBY);
     for (uint channel = 0; channel < 3; channel++) {
         uint first = channel * COEFFICIENTS * COEFFICIENTS / 4;
         float met = 0.0, open = 0.0;
@@ -68,9 +81,10 @@ vec3 share_through(View view, float roughness, uint v) {
             open += sum * cosine[row];
         }
         // The first product is the mean radiance.
-        share[channel] = met / max(open, LEAST_SHARE * products[first].x * whole + 1e-30);
+        float share = met / max(open, LEAST_SHARE * products[first].x * whole + 1e-30);
+        seen.sky[channel] = clamp(share, 0.0, MOST_SHARE);
     }
-    return clamp(share, vec3(0.0), vec3(MOST_SHARE));
+    return seen;
 }
 
 void main() {
@@ -86,9 +100,10 @@ void main() {
     normal = vec3(dot(entity.row_x.xyz, normal), dot(entity.row_y.xyz, normal), dot(entity.row_z.xyz, normal));
     View view = view_of(from_eye, normal, entity.roughness);
     v += entity.radiosity_first;
-    vec3 share = share_through(view, entity.roughness, v);
-    // Light that has bounced comes from everywhere alike: its irradiance over pi.
-    vec3 bounced = max(radiosity_at(v).rgb - direct_at(v).rgb, vec3(0.0)) / max(entity.albedo, vec3(1e-4));
+    Seen seen = seen_by(view, entity.roughness, v);
+    vec3 share = seen.sky;
+    // Light that has bounced comes alike from all that stands before the sky: its irradiance over pi.
+    vec3 bounced = seen.nearby * max(radiosity_at(v).rgb - direct_at(v).rgb, vec3(0.0)) / max(entity.albedo, vec3(1e-4));
     vec2 of_unit = reflected_share(view, entity.roughness);
     float energy = of_unit.x + of_unit.y;
     if (entity.roughness < PIXEL_ROUGHNESS || entity.textured != 0) {

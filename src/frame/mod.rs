@@ -143,7 +143,7 @@ impl Frame {
                 index,
                 pose::clusters(index, buffers.surface(index), radiosity.offsets[index] / 16, options.bake.bands),
             );
-            lists.set_near(std::mem::take(&mut near[index]));
+            lists.set_near(std::mem::take(&mut near[index]), 2.0 * buffers.surface(index).reach_m);
         }
         let sharp = sharp.map(|wanted| wanted.fitting(device, buffers.sharp(), radiosity.soft()));
         let pixels = PixelShading::new(device, &options, &buffers, radiosity.soft(), sharp);

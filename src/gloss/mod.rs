@@ -32,6 +32,10 @@ pub const LEAST_COSINE: f64 = 0.25;
 pub const LEAST_SHARE: f64 = 0.1;
 /// Four bands ring: shares are cut off above.
 pub const MOST_SHARE: f64 = 1.1;
+/// Least share of the cosine-weighted hemisphere that is taken to be hidden where the share that a lobe sees of it is
+/// found, and the most that this may be.
+pub const LEAST_HIDDEN: f64 = 0.02;
+pub const MOST_NEARBY: f64 = 4.0;
 /// Least cosine between normal and view.
 pub const LEAST_VIEW_Z: f64 = 1e-3;
 /// Least share of light that counts as reflected once.
@@ -64,6 +68,8 @@ pub fn macros(row: ShaderPermutation) -> ShaderPermutation {
         ("LEAST_COSINE", LEAST_COSINE),
         ("LEAST_SHARE", LEAST_SHARE),
         ("MOST_SHARE", MOST_SHARE),
+        ("LEAST_HIDDEN", LEAST_HIDDEN),
+        ("MOST_NEARBY", MOST_NEARBY),
         ("LEAST_VIEW_Z", LEAST_VIEW_Z),
         ("LEAST_ALPHA", brdf::LEAST_ALPHA),
         ("LEAST_ENERGY", LEAST_ENERGY),

@@ -2,7 +2,7 @@
 
 use super::lobe::{self, LEVELS, TABLE, TAPS};
 use super::sky_map::{SIDE, SkyMap};
-use super::{LEAST_COSINE, LEAST_SHARE, LEAST_VIEW_Z, MOST_SHARE, PIXEL_ROUGHNESS, brdf};
+use super::{LEAST_COSINE, LEAST_HIDDEN, LEAST_SHARE, LEAST_VIEW_Z, MOST_NEARBY, MOST_SHARE, PIXEL_ROUGHNESS, brdf};
 use crate::sh::basis::{MAX_COEFFICIENTS, evaluate};
 use crate::sh::lobe::clamped_cosine;
 use glam::DVec3;
@@ -85,7 +85,8 @@ impl Twin {
         })
     }
 
-    fn share(&self, vertex: &TwinVertex, taps: &[Tap]) -> DVec3 {
+    /// The share of the sky of each colour that gets through, and the factor on light from what stands before it.
+    fn seen(&self, vertex: &TwinVertex, taps: &[Tap]) -> (DVec3, f64) {
         let mut lobe = [0.0; COUNT];
         let mut basis = [0.0; MAX_COEFFICIENTS];
         for tap in taps {
@@ -109,16 +110,22 @@ impl Twin {
             (meet(&vertex.through) / meet(&cosine).max(least)).clamp(0.0, MOST_SHARE)
         };
         let colors: Vec<f64> = self.map.products.chunks_exact(COUNT * COUNT).map(share).collect();
-        DVec3::from_slice(&colors)
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let through = dot(&vertex.through, &lobe) / dot(&cosine, &lobe).max(LEAST_SHARE * whole);
+        let hidden = 1.0 - through.clamp(0.0, 1.0);
+        let of_cosine = 1.0 - (vertex.through[0] / cosine[0]).clamp(0.0, 1.0);
+        (DVec3::from_slice(&colors), (hidden / of_cosine.max(LEAST_HIDDEN)).min(MOST_NEARBY))
     }
 
     /// What the pass writes for a vertex: what is multiplied by the colour of the faced surface, and what is added.
     pub fn vertex(&self, vertex: &TwinVertex, roughness: f64) -> [DVec3; 2] {
         let z = vertex.normal.dot(vertex.toward).max(LEAST_VIEW_Z);
         let taps = self.taps(vertex, z, roughness);
-        let share = self.share(vertex, &taps) * f64::from(self.map.scale);
+        let (share, nearby) = self.seen(vertex, &taps);
+        let share = share * f64::from(self.map.scale);
+        let bounced = nearby * vertex.bounced;
         if roughness < f64::from(PIXEL_ROUGHNESS) {
-            return [share, vertex.bounced];
+            return [share, bounced];
         }
         let mut sums = [DVec3::ZERO; 2];
         let mut weights = [0.0; 2];
@@ -133,6 +140,6 @@ impl Twin {
         let whole = taps[TAPS - 1].whole;
         let facing = (1.0 - whole / weights[0].max(1e-6)) * sums[0];
         let grazing = whole * sums[1] / weights[1].max(1e-6);
-        [share * facing + (weights[0] - whole) * vertex.bounced, share * grazing + whole * vertex.bounced]
+        [share * facing + (weights[0] - whole) * bounced, share * grazing + whole * bounced]
     }
 }

@@ -13,6 +13,7 @@ use crate::lists::gather::{self, Candidates, ClusterBounds, Counts, GROUP_CLUSTE
 use crate::lists::scope::Scope;
 use crate::lists::sight::{Sight, TriangleRun};
 use crate::scene::Placement;
+use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -72,6 +73,8 @@ pub(crate) struct ClusterLists {
     faces: Vec<TriangleRun>,
     /// Entities whose shadows of sharp lights are in a cluster's own maps.
     near: Vec<Vec<u32>>,
+    /// Those of them that are also in the maps of all clusters beside one: its triangles have vertices of these.
+    near_beside: Vec<Vec<u32>>,
     groups: Vec<WatchedGroup>,
     now: Option<State>,
     /// Every cluster has changed since the last update by something that no [`State`] holds.
@@ -116,9 +119,23 @@ impl ClusterLists {
         }
     }
 
-    /// Says of each cluster of the receiver that was added last which entities' shadows its maps have.
-    pub fn set_near(&mut self, near: Vec<Vec<u32>>) {
-        self.near.resize(self.clusters.len() - near.len(), Vec::new());
+    /// Says of each cluster of the receiver that was added last which entities' shadows its maps have. The corners of a
+    /// triangle are at most `side_m` apart, in the mesh's frame.
+    pub fn set_near(&mut self, near: Vec<Vec<u32>>, side_m: f32) {
+        let first = self.clusters.len() - near.len();
+        let bounds = &self.bounds[first..];
+        let beside = |a: usize, b: usize| {
+            let apart = Vec3::from(bounds[a].centre).distance(Vec3::from(bounds[b].centre));
+            apart <= bounds[a].radius_m + bounds[b].radius_m + side_m
+        };
+        let in_all = |cluster: usize| {
+            let others: Vec<usize> = (0..near.len()).filter(|&other| beside(cluster, other)).collect();
+            let is_in_all = |member: &&u32| others.iter().all(|&other| near[other].binary_search(member).is_ok());
+            near[cluster].iter().filter(is_in_all).copied().collect()
+        };
+        self.near_beside.resize(first, Vec::new());
+        self.near_beside.extend((0..near.len()).into_par_iter().map(in_all).collect::<Vec<_>>());
+        self.near.resize(first, Vec::new());
         self.near.extend(near);
     }
 
@@ -278,7 +295,9 @@ impl ClusterLists {
             let chains = |cluster: usize| {
                 let mut entries = Vec::new();
                 let bounds = around(&self.bounds[cluster]);
-                let scope = Scope::new(&now.scene_bounds, receiver, entity, &bounds, self.near(cluster));
+                // A point between vertices of several clusters is past what any of their maps lacks.
+                let near = self.near_beside.get(cluster).map_or(&[][..], |near| near);
+                let scope = Scope::new(&now.scene_bounds, receiver, entity, &bounds, near);
                 let sharp = gather::gather(&scope, &candidates, &mut entries);
                 entries.truncate(sharp);
                 let has_edge = |&entry: &u32| {

@@ -89,7 +89,7 @@ fn a_saved_state_is_rendered_to_the_picture_that_was_shown() {
     let options =
         frame::Options { bake, variant: Some(variant), size: editor.size(), antialias: Antialias::Samples, ..small() };
     // As the command line has it.
-    let options = frame::Options { lights: Default::default(), shading: None, ..options };
+    let options = frame::Options { lights: Default::default(), bounces: Default::default(), shading: None, ..options };
     let mut frame = stage.frame(editor.scene(), options);
     let white = (-editor.exposure_ev()).exp2();
     frame.render(&editor.placements(), Some(white)).unwrap();

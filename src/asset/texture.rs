@@ -110,6 +110,12 @@ impl Texels {
         self.linear(wrap[0].texel(uv.x, self.width), wrap[1].texel(1.0 - uv.y, self.height))
     }
 
+    /// What is stored at texture coordinates, 0 to 1: of a picture that holds no colours.
+    pub fn numbers_at(&self, uv: Vec2, wrap: [Wrap; 2]) -> Vec4 {
+        let [x, y] = [wrap[0].texel(uv.x, self.width), wrap[1].texel(1.0 - uv.y, self.height)];
+        Vec4::from_array(self.rgba[y * self.width + x].map(|byte| f32::from(byte) / 255.0))
+    }
+
     /// The mean linear colour.
     pub fn mean(&self) -> Vec3 {
         let all = (0..self.rgba.len()).map(|i| self.linear(i % self.width, i / self.width).truncate().as_dvec3());

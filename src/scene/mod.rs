@@ -264,6 +264,40 @@ impl Scene {
         Vec3::from_array(std::array::from_fn(|c| if mean[c] > 0.0 { found[c] / mean[c] } else { 0.0 }))
     }
 
+    /// How an entity reflects at a place of a triangle of its mesh, whose normal there is `normal`, and the normal as its
+    /// map tilts it.
+    pub(crate) fn gloss_at(
+        &self,
+        entity: usize,
+        corners: [u32; 3],
+        weights: [f32; 3],
+        normal: Vec3,
+    ) -> (Option<Gloss>, Vec3) {
+        let Entity { mesh, gloss, maps, .. } = self.entities[entity];
+        let mesh = &self.meshes[mesh];
+        let (Some(mut gloss), Some(uvs)) = (gloss, &mesh.uvs) else { return (gloss, normal) };
+        let [a, b, c] = corners.map(|v| v as usize);
+        let uv = weights[0] * uvs[a] + weights[1] * uvs[b] + weights[2] * uvs[c];
+        let numbers = |map: Option<usize>| {
+            let texture = &self.textures[map?];
+            Some(texture.texels.as_ref()?.numbers_at(uv, texture.wrap))
+        };
+        if let (Some(found), Some(data)) = (numbers(maps.gloss), self.data.entities[entity].gloss) {
+            gloss.roughness = data.roughness * found.y;
+            gloss.metallic = data.metallic * found.z;
+        }
+        let Some(found) = numbers(maps.normal) else { return (Some(gloss), normal) };
+        let [along, across] = [b, c].map(|v| mesh.positions[v] - mesh.positions[a]);
+        let [first, second] = [b, c].map(|v| uvs[v] - uvs[a]);
+        let turn = first.perp_dot(second).signum();
+        let right = turn * (along * second.y - across * first.y);
+        let up = turn * (across * first.x - along * second.x);
+        let flat = |axis: Vec3| (axis - normal * normal.dot(axis)).normalize_or_zero();
+        let found = 2.0 * found - 1.0;
+        let tilted = found.x * flat(right) + found.y * up.normalize_or_zero() + found.z.max(0.0) * normal;
+        (Some(gloss), tilted.normalize_or(normal))
+    }
+
     /// Placements of all entities at `time_s` seconds, in order. They depend on the time alone, not on earlier frames.
     pub fn at(&self, time_s: f64) -> Vec<Placement> {
         self.data.entities.iter().map(|e| e.at(time_s)).chain(self.suns.iter().copied()).collect()

@@ -5,7 +5,7 @@ use super::reflect::Reflection;
 use super::world::{EntityView, SurfaceHit, VertexView, World};
 use super::{RayMeshes, Vertex};
 use crate::draw::camera::through_pixels;
-use crate::scene::{Placement, Scene};
+use crate::scene::{Gloss, Placement, Scene};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -34,6 +34,10 @@ pub struct Seen {
     pub toward: DVec3,
     /// Linear RGB radiance that it emits.
     pub emission: DVec3,
+    /// How it reflects besides diffusely.
+    pub gloss: Option<Gloss>,
+    /// The surface's own normal, which maps do not tilt, unit.
+    pub ground: DVec3,
     /// Reflectance there over the mean of the entity's, by colour.
     pub over_mean: DVec3,
 }
@@ -59,12 +63,14 @@ impl<'w> Eye<'w> {
         let met = self.sights.iter().filter_map(|sight| Some((sight, world.first_hit_m(sight, direction)?)));
         let (sight, _) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let entity = sight.entity;
-        let SurfaceHit { place, normal, over_mean } = world.surface_hit(sight, direction)?;
+        let SurfaceHit { place, normal, over_mean, gloss, tilted } = world.surface_hit(sight, direction)?;
         let emission = match world.scene.entities[entity].emission.as_dvec3() {
             DVec3::ZERO => DVec3::ZERO,
             emission => emission * world.emission(sight, direction).unwrap_or(DVec3::ZERO),
         };
-        Some(Seen { entity, view: world.surface(entity, place, normal), toward: -direction, emission, over_mean })
+        let view = world.surface(entity, place, tilted);
+        let ground = world.surface(entity, place, normal).normal;
+        Some(Seen { entity, view, toward: -direction, emission, gloss, ground, over_mean })
     }
 }
 
@@ -129,7 +135,8 @@ pub fn picture(
                 let key = Vertex { entity: seen.entity, index: pixel as usize * places.len() + index };
                 let entity = &scene.entities[seen.entity];
                 let base = seen.over_mean * entity.albedo.as_dvec3();
-                let surface = Reflection::seen(base, entity.gloss, seen.view.normal, seen.toward, cast.single_scatter);
+                let surface = Reflection::seen(base, seen.gloss, seen.view.normal, seen.toward, cast.single_scatter)
+                    .on(seen.ground);
                 let Estimate { radiosity, error } = caster.reflected(&seen.view, &surface, key);
                 let radiosity = DVec3::from(radiosity);
                 let error = DVec3::from(error);

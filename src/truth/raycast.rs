@@ -229,10 +229,12 @@ impl RayCast {
         let mut glossy = DVec3::ZERO;
         for ray in 0..self.rays_a_run() {
             let direction = axes.cosine(points.point(ray));
-            diffuse += surface.diffuse_share(direction) * arrives(direction);
+            if surface.sees(direction) {
+                diffuse += surface.diffuse_share(direction) * arrives(direction);
+            }
             if let Some(lobe) = &surface.lobe {
                 let (direction, weight) = lobe.sample(points.point(self.rays_a_run() + ray));
-                if weight != DVec3::ZERO {
+                if weight != DVec3::ZERO && surface.sees(direction) {
                     glossy += weight * arrives(direction);
                 }
             }
@@ -250,7 +252,7 @@ impl RayCast {
         let density = 1.0 / cone_solid_angle(cone.height);
         let arrives = |direction: DVec3| {
             let cosine = direction.dot(view.normal);
-            let pattern = (cosine > 0.0).then(|| world.emission(light, direction)).flatten();
+            let pattern = (cosine > 0.0 && surface.sees(direction)).then(|| world.emission(light, direction)).flatten();
             let seen = pattern.filter(|_| !(self.shadows && shadowed.hidden(world, view, direction)));
             (cosine, seen.unwrap_or(DVec3::ZERO))
         };

@@ -14,6 +14,8 @@ pub struct Reflection {
     pub base: DVec3,
     /// The microfacets, where there are any.
     pub lobe: Option<MicrofacetLobe>,
+    /// The normal of the surface itself, which hides what lies below it; `None` where it is that of the view.
+    pub ground: Option<DVec3>,
 }
 
 /// Microfacets that are seen from somewhere.
@@ -32,14 +34,24 @@ pub struct MicrofacetLobe {
 impl Reflection {
     /// Of a surface that is diffuse alone.
     pub fn diffuse(base: DVec3) -> Self {
-        Reflection { base, lobe: None }
+        Reflection { base, lobe: None, ground: None }
     }
 
     /// Of a surface seen from the unit vector `toward`; `single_scatter` where light that microfacets pass on to each
     /// other is lost.
     pub fn seen(base: DVec3, gloss: Option<Gloss>, normal: DVec3, toward: DVec3, single_scatter: bool) -> Self {
         let lobe = gloss.map(|gloss| MicrofacetLobe::new(gloss, base, normal, toward, single_scatter));
-        Reflection { base, lobe }
+        Reflection { base, lobe, ground: None }
+    }
+
+    /// The same on a surface whose own normal is another.
+    pub fn on(self, ground: DVec3) -> Self {
+        Reflection { ground: Some(ground), ..self }
+    }
+
+    /// Whether the surface itself does not hide a direction.
+    pub fn sees(&self, direction: DVec3) -> bool {
+        self.ground.is_none_or(|ground| ground.dot(direction) > 0.0)
     }
 
     /// The share of the base colour that reflects light from a direction diffusely.

@@ -6,7 +6,7 @@ use super::sequence::Axes;
 use crate::bake::TRANSFER_OFFSET;
 use crate::field::lattice::cap_height;
 use crate::field::sheet::{self, Rectangle, Sheet, SheetEye, SheetView};
-use crate::scene::{Placement, Scene};
+use crate::scene::{Gloss, Placement, Scene};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
 pub struct PlacedEntity<'s> {
@@ -189,10 +189,14 @@ impl<'s> World<'s> {
         let corners = mesh.triangles[triangle];
         let normal: DVec3 =
             corners.iter().zip(weights).map(|(i, w)| mesh.normals[*i as usize].as_dvec3() * f64::from(w)).sum();
+        let normal = normal.normalize_or(DVec3::Y);
+        let (gloss, tilted) = self.scene.gloss_at(sight.entity, corners, weights, normal.as_vec3());
         Some(SurfaceHit {
             place: (sight.origin + distance * direction).as_dvec3(),
-            normal: normal.normalize_or(DVec3::Y),
+            normal,
             over_mean: self.scene.over_mean(sight.entity, corners, weights).as_dvec3(),
+            gloss,
+            tilted: tilted.as_dvec3(),
         })
     }
 
@@ -240,6 +244,10 @@ pub struct SurfaceHit {
     pub normal: DVec3,
     /// Reflectance over the mean of the entity's, by colour.
     pub over_mean: DVec3,
+    /// How it reflects besides diffusely.
+    pub gloss: Option<Gloss>,
+    /// The normal as a map tilts it.
+    pub tilted: DVec3,
 }
 
 impl VertexView {

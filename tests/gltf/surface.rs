@@ -5,7 +5,7 @@ use glam::Vec3;
 use model::{Model, U8, load};
 use serde_json::json;
 use shadow_fields::asset::picture::{linear_from_srgb, write_png};
-use shadow_fields::scene::Scene;
+use shadow_fields::scene::{Gloss, Maps, Scene};
 
 /// A square of 2 x 2 m with coordinates of textures, of a material that is no metal unless it says so.
 fn square(model: &mut Model, mut material: serde_json::Value, with_uv: bool) -> usize {
@@ -145,21 +145,53 @@ fn a_jpeg_texture_without_coordinates_becomes_its_mean() {
 }
 
 #[test]
-fn metal_and_gloss_are_said_to_be_diffuse() {
+fn materials_reflect_as_they_say() {
     let mut model = Model::default();
-    for (metallic, roughness) in [(0.0, 1.0), (1.0, 1.0), (0.3, 1.0), (0.0, 0.5)] {
-        let pbr = json!({ "metallicFactor": metallic, "roughnessFactor": roughness });
-        square(&mut model, json!({ "pbrMetallicRoughness": pbr }), false);
-    }
-    // Of a material that is used twice, once; of one that shows its colour as it is, not; of one that says nothing, as
-    // metal is the default.
-    let mesh = model.json["nodes"][1]["mesh"].clone();
-    model.node(json!({ "mesh": mesh }));
-    let index = square(&mut model, json!({ "extensions": { "KHR_materials_unlit": {} } }), false);
-    model.json["materials"][index - 1]["pbrMetallicRoughness"]["metallicFactor"] = json!(1);
-    let index = square(&mut model, json!({}), false);
-    model.json["materials"][index - 1] = json!({});
-    assert_eq!(load(&model).notes.left_out(), ["left out (4): metallic or glossy materials (they are diffuse)"]);
+    let mut add = |material: serde_json::Value| square(&mut model, material, false);
+    add(json!({ "pbrMetallicRoughness": { "metallicFactor": 0.3, "roughnessFactor": 0.5 } }));
+    // One that says nothing is a rough metal.
+    let silent = add(json!({}));
+    let unlit = add(json!({ "extensions": { "KHR_materials_unlit": {} } }));
+    let more = json!({ "KHR_materials_ior": { "ior": 2 }, "KHR_materials_specular": { "specularFactor": 0.5 } });
+    add(json!({ "pbrMetallicRoughness": { "metallicFactor": 0 }, "extensions": more }));
+    model.json["materials"][silent - 1] = json!({});
+    assert!(unlit > silent);
+    let import = load(&model);
+    let gloss = |roughness, metallic, f0| Some(Gloss { roughness, metallic, f0 });
+    let found: Vec<Option<Gloss>> = import.data.entities.iter().map(|entity| entity.gloss).collect();
+    assert_eq!(found[..3], [gloss(0.5, 0.3, 0.04), gloss(1.0, 1.0, 0.04), None]);
+    assert!((found[3].unwrap().f0 - 0.5 / 9.0).abs() < 1e-6, "half of (1 / 3)^2");
+    assert_eq!(import.notes.left_out(), [""; 0]);
+}
+
+/// Textures of roughness, normals and emission are maps where their coordinates are those of the surface.
+#[test]
+fn textures_become_maps() {
+    let mut model = Model::default();
+    let texture = texture(&mut model);
+    let info = json!({ "index": texture });
+    let material = json!({
+        "pbrMetallicRoughness": { "metallicRoughnessTexture": info, "roughnessFactor": 0.5 },
+        "normalTexture": info, "emissiveTexture": info, "emissiveFactor": [1, 1, 1],
+    });
+    square(&mut model, material.clone(), true);
+    let mut moved = material;
+    moved["normalTexture"] = json!({ "index": texture, "texCoord": 1 });
+    square(&mut model, moved, true);
+    // Without coordinates the mean counts.
+    square(&mut model, json!({ "pbrMetallicRoughness": { "metallicRoughnessTexture": info } }), false);
+    let import = load(&model);
+    let [all, other, plain] = [0, 1, 2].map(|index| &import.data.entities[index]);
+    assert!(all.maps.gloss.is_some() && all.maps.gloss == all.maps.normal && all.maps.gloss == all.maps.glow);
+    assert_eq!((all.gloss.unwrap().roughness, all.emits), (0.5, Some(false)));
+    assert!(other.maps.normal.is_none() && other.maps.gloss == all.maps.gloss);
+    assert_eq!(plain.maps, Maps::default());
+    let [_, green, blue] = import.textures[0].texels.as_ref().unwrap().mean_bytes();
+    let gloss = plain.gloss.unwrap();
+    assert_eq!((gloss.roughness, gloss.metallic), (green, blue));
+    let left_out = import.notes.left_out();
+    assert_eq!(left_out.len(), 1, "{left_out:?}");
+    assert!(left_out[0].starts_with("left out (2): textures with coordinates of their own"), "{left_out:?}");
 }
 
 #[test]
@@ -190,8 +222,7 @@ fn emission_has_its_strength_and_pattern() {
     let fill = import.data.environment.uniform.expect("a dim sky beside the lamp of radiance 40");
     assert!(fill.x > 0.01 && fill.x <= 4.0 && import.data.environment.sky.is_none(), "{fill}");
     assert_eq!(import.data.output.exposure_ev, None);
-    let left_out = import.notes.left_out();
-    assert_eq!(left_out, ["left out (1): emissive textures (vertices have their colours)"]);
+    assert_eq!(import.notes.left_out(), [""; 0]);
 }
 
 #[test]
@@ -228,7 +259,7 @@ fn what_is_left_out_is_counted() {
         [
             "left out (1): further scenes",
             "left out (1): shadows of masked materials (they are those of the whole shape)",
-            "left out (1): textures of normals, roughness, metal or occlusion",
+            "left out (1): textures with coordinates of their own (their means, or vertices, have their place)",
             "left out (2): transparent materials (they are opaque)",
         ]
     );

@@ -75,7 +75,9 @@ fn keys_that_are_read() -> BTreeMap<String, BTreeSet<String>> {
     }
     add("[[entity]]", "[[entity]]\nzzz = 1");
     add("[[entity]]", "[[entity]]\nrotation = { zzz = 1 }");
-    add("[[entity]]", "[[entity]]\nspot = { zzz = 1 }");
+    for part in ["spot", "gloss", "maps"] {
+        add("[[entity]]", &format!("[[entity]]\n{part} = {{ zzz = 1 }}"));
+    }
     for movement in add("[[entity]]", "[[entity]]\nmotion = [{ zzz = {} }]") {
         add("[[entity]]", &format!("[[entity]]\nmotion = [{{ {movement} = {{ zzz = 1 }} }}]"));
     }

@@ -51,7 +51,7 @@ void main() {
     triangle += push.first;
     vec3 light = blend(radiosity, triangle, weight);
 #if PIXEL
-    uvec2 chain = chain_of(push.cluster_first, first);
+    uvec2 chain = chain_of(push.cluster_first, first) & uvec2(~0u, ~OWN_MAPS);
     if (chain.y > 0) {
         Entity receiver = ENTITY(push.receiver);
         Facing facings[FACINGS];

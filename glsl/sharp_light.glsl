@@ -34,6 +34,7 @@ struct Facing {
     float weight; // of this vertex in the surface's point
 #if SELF
     uint self_first;  // first cell of its self-visibility, or NONE
+    bool counts;      // whether its self-visibility goes with the list of occluders
     mat3 self_frame;  // about the normal, world
 #endif
 };
@@ -55,6 +56,7 @@ Facing facing_of(Entity receiver, vec3 normal, float weight, uint self_first, ui
     facing.normal = to_world(receiver, normal);
     facing.weight = weight;
 #if SELF
+    facing.counts = true;
     facing.self_first = self_first == NONE ? NONE : self_first + v * ((SELF_SIDE - 1) * (SELF_SIDE - 1));
     mat3 frame = self_frame(normal);
     facing.self_frame = mat3(to_world(receiver, frame[0]), to_world(receiver, frame[1]), facing.normal);
@@ -194,6 +196,9 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
         float sine = part_sine(light, block, part, along);
         float reach = reach_of(light, part, along) * surface.inverse_radius;
         float sum = 0.0;
+#if SELF && FACINGS > 1
+        vec2 counted = vec2(0.0); // of the facings that count: past their self-visibility, and without
+#endif
 #if SHOWN
         float open = 0.0;
 #endif
@@ -207,10 +212,18 @@ vec4 part_shares(Surface surface, SeenLight light, Block block) {
             // A part's radius is small enough for its sine to stand for it.
             bool shadows = facing.self_first != NONE;
             float sees = self_visible(shadows ? facing.self_first : 0, facing.self_frame, direction, sine, reach);
+#if FACINGS > 1
+            counted += facing.counts ? facing.weight * cosine * vec2(shadows ? sees : 1.0, 1.0) : vec2(0.0);
+#else
             cosine *= shadows ? sees : 1.0;
+#endif
 #endif
             sum += facing.weight * cosine;
         }
+#if SELF && FACINGS > 1
+        // The others stand in the shadow of those.
+        sum *= counted.y > 0.0 ? counted.x / counted.y : 1.0;
+#endif
         float unit = block.weight * part_light(light, block, part, along);
         share[k] = unit * sum;
 #if SHOWN

@@ -40,13 +40,19 @@ void main() {
 #endif
     vec3 weight = within * weights;
     vec3 light = blend(radiosity, lit, weight);
-    uvec2 chain = chain_of(push.cluster_first, min(triangle.x, min(triangle.y, triangle.z)));
+    uint nearest = triangle[weight.x >= max(weight.y, weight.z) ? 0 : weight.y >= weight.z ? 1 : 2];
+    uvec2 chain = chain_of(push.cluster_first, nearest);
+    bool own_maps = (chain.y & OWN_MAPS) != 0;
+    chain.y &= ~OWN_MAPS;
     if (chain.y > 0) {
         Entity receiver = ENTITY(push.receiver);
         Facing facings[FACINGS];
         [[unroll]] for (uint i = 0; i < FACINGS; i++) {
             vec3 normal = texelFetch(vertices, int(2 * (push.vertex_first + triangle[i]) + 1)).xyz;
             facings[i] = facing_of(receiver, normal, weight[i], push.self_first, triangle[i]);
+#if SELF
+            facings[i].counts = !own_maps || triangle[i] / WORKGROUP == nearest / WORKGROUP;
+#endif
         }
         light = blend(soft, lit, weight) + pixel_light(receiver, within * at, facings, chain);
     }

@@ -253,8 +253,15 @@ fn demo_writes_pictures_and_a_table() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let ran = good(folder, &["demo", "--timed-frames", "1", "--no-animations", "--size", "96x64", "-o", "made/out"]);
-    let scenes =
-        ["sphere_over_plane", "torus_over_plane", "small_lights", "teapot_lights", "glowing_torus", "twelve_instances"];
+    let scenes = [
+        "room",
+        "sphere_over_plane",
+        "torus_over_plane",
+        "small_lights",
+        "teapot_lights",
+        "glowing_torus",
+        "twelve_instances",
+    ];
     let mut expected: Vec<String> = scenes.iter().map(|s| format!("{s}.png")).collect();
     expected.push("sphere_over_plane_without_occluder.png".to_owned());
     expected.sort();

@@ -31,7 +31,8 @@ pub struct Arguments {
 }
 
 /// The scenes in the order of the table, and whether each is animated too.
-const SCENES: [(&str, bool); 6] = [
+const SCENES: [(&str, bool); 7] = [
+    ("room", false),
     ("sphere_over_plane", false),
     ("torus_over_plane", true),
     ("small_lights", false),

@@ -19,6 +19,7 @@ const FILES: &[(&str, &[u8])] = files![
     "meshes/torus.obj",
     "meshes/torus_two_colour.obj",
     "scenes/glowing_torus.toml",
+    "scenes/room.toml",
     "scenes/small_lights.toml",
     "scenes/sphere_over_plane.toml",
     "scenes/teapot_lights.toml",

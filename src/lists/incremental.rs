@@ -8,7 +8,7 @@
 //! What the camera cannot see is left as it is while things move, and remembered as stale: it is merged once it may be
 //! seen, or once nothing moves any more.
 
-use crate::layout::{self, ListEntry};
+use crate::layout::{self, ListEntry, OWN_MAPS};
 use crate::lists::gather::{self, Candidates, ClusterBounds, Counts, GROUP_CLUSTERS, SceneBounds};
 use crate::lists::scope::Scope;
 use crate::lists::sight::{Sight, TriangleRun};
@@ -73,8 +73,8 @@ pub(crate) struct ClusterLists {
     faces: Vec<TriangleRun>,
     /// Entities whose shadows of sharp lights are in a cluster's own maps.
     near: Vec<Vec<u32>>,
-    /// Those of them that are also in the maps of all clusters beside one: its triangles have vertices of these.
-    near_beside: Vec<Vec<u32>>,
+    /// Whether the maps of a cluster beside one, of whose vertices its triangles may have some, have others.
+    differs: Vec<bool>,
     groups: Vec<WatchedGroup>,
     now: Option<State>,
     /// Every cluster has changed since the last update by something that no [`State`] holds.
@@ -128,13 +128,10 @@ impl ClusterLists {
             let apart = Vec3::from(bounds[a].centre).distance(Vec3::from(bounds[b].centre));
             apart <= bounds[a].radius_m + bounds[b].radius_m + side_m
         };
-        let in_all = |cluster: usize| {
-            let others: Vec<usize> = (0..near.len()).filter(|&other| beside(cluster, other)).collect();
-            let is_in_all = |member: &&u32| others.iter().all(|&other| near[other].binary_search(member).is_ok());
-            near[cluster].iter().filter(is_in_all).copied().collect()
-        };
-        self.near_beside.resize(first, Vec::new());
-        self.near_beside.extend((0..near.len()).into_par_iter().map(in_all).collect::<Vec<_>>());
+        let differs =
+            |cluster: usize| (0..near.len()).any(|other| near[other] != near[cluster] && beside(cluster, other));
+        self.differs.resize(first, false);
+        self.differs.extend((0..near.len()).into_par_iter().map(differs).collect::<Vec<_>>());
         self.near.resize(first, Vec::new());
         self.near.extend(near);
     }
@@ -283,7 +280,7 @@ impl ClusterLists {
 
     /// The chains of sharp lights of all clusters of a receiver at the last update's time, for what lies as far as
     /// `margin_m` (mesh's frame) around their vertices. For each cluster the first of its entries and how many they
-    /// are: none where neither an occluder nor a spot stands on them, so that light changes there no faster than
+    /// are, with [`OWN_MAPS`] where only maps of its own vertices go with them: none where neither an occluder nor a spot stands on them, so that light changes there no faster than
     /// vertices show.
     pub fn sharp_chains(&self, receiver: usize, margin_m: f32) -> (Vec<[u32; 2]>, Vec<u32>) {
         let now = self.now();
@@ -295,9 +292,7 @@ impl ClusterLists {
             let chains = |cluster: usize| {
                 let mut entries = Vec::new();
                 let bounds = around(&self.bounds[cluster]);
-                // A point between vertices of several clusters is past what any of their maps lacks.
-                let near = self.near_beside.get(cluster).map_or(&[][..], |near| near);
-                let scope = Scope::new(&now.scene_bounds, receiver, entity, &bounds, near);
+                let scope = Scope::new(&now.scene_bounds, receiver, entity, &bounds, self.near(cluster));
                 let sharp = gather::gather(&scope, &candidates, &mut entries);
                 entries.truncate(sharp);
                 let has_edge = |&entry: &u32| {
@@ -315,6 +310,11 @@ impl ClusterLists {
         for entries in found.into_iter().flatten() {
             places.push([all.len() as u32, entries.len() as u32]);
             all.extend(entries);
+        }
+        let clusters = groups.iter().flat_map(|group| group.clusters.clone());
+        for ([_, count], cluster) in places.iter_mut().zip(clusters) {
+            let differs = self.differs.get(cluster).is_some_and(|differs| *differs);
+            *count |= if differs { OWN_MAPS } else { 0 };
         }
         (places, all)
     }

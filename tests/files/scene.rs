@@ -33,7 +33,15 @@ fn embedded_scenes_load_and_read_back() {
     let names: Vec<&str> = scenes.iter().map(|s| s.0).collect();
     assert_eq!(
         names,
-        ["glowing_torus", "small_lights", "sphere_over_plane", "teapot_lights", "torus_over_plane", "twelve_instances"]
+        [
+            "glowing_torus",
+            "room",
+            "small_lights",
+            "sphere_over_plane",
+            "teapot_lights",
+            "torus_over_plane",
+            "twelve_instances"
+        ]
     );
     for (name, text) in scenes {
         let path = format!("assets/scenes/{name}.toml");

@@ -154,7 +154,7 @@ fn materials_reflect_as_they_say() {
     let unlit = add(json!({ "extensions": { "KHR_materials_unlit": {} } }));
     let more = json!({ "KHR_materials_ior": { "ior": 2 }, "KHR_materials_specular": { "specularFactor": 0.5 } });
     add(json!({ "pbrMetallicRoughness": { "metallicFactor": 0 }, "extensions": more }));
-    model.json["materials"][silent - 1] = json!({});
+    model.json["materials"][silent] = json!({});
     assert!(unlit > silent);
     let import = load(&model);
     let gloss = |roughness, metallic, f0| Some(Gloss { roughness, metallic, f0 });
@@ -179,7 +179,11 @@ fn textures_become_maps() {
     moved["normalTexture"] = json!({ "index": texture, "texCoord": 1 });
     square(&mut model, moved, true);
     // Without coordinates the mean counts.
-    square(&mut model, json!({ "pbrMetallicRoughness": { "metallicRoughnessTexture": info } }), false);
+    square(
+        &mut model,
+        json!({ "pbrMetallicRoughness": { "metallicRoughnessTexture": info, "metallicFactor": 1 } }),
+        false,
+    );
     let import = load(&model);
     let [all, other, plain] = [0, 1, 2].map(|index| &import.data.entities[index]);
     assert!(all.maps.gloss.is_some() && all.maps.gloss == all.maps.normal && all.maps.gloss == all.maps.glow);

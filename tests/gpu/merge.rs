@@ -41,7 +41,7 @@ fn built_in(name: &str, text: &str) -> Scene {
 fn built_in_scenes() {
     let Some(stage) = stage() else { return };
     let scenes = embedded::scenes();
-    assert_eq!(scenes.len(), 6);
+    assert_eq!(scenes.len(), 7);
     for (name, text) in scenes {
         let scene = built_in(name, text);
         let options =

@@ -41,7 +41,7 @@ fn the_next_scene_comes_round() {
     editor.apply(edit());
     editor.apply(Command::ToggleRunning);
     let mut names = Vec::new();
-    for round in 0..7 {
+    for round in 0..8 {
         let effect = editor.apply(Command::NextScene);
         assert_eq!((effect.changed.scene, effect.message.is_some()), (true, round == 0), "the first was edited");
         assert_eq!((editor.size(), editor.undo_count(), editor.selection), ([300, 200], 0, None));
@@ -51,13 +51,14 @@ fn the_next_scene_comes_round() {
     assert_eq!(
         names,
         [
+            "room",
             "small_lights",
             "sphere_over_plane",
             "teapot_lights",
             "torus_over_plane",
             "twelve_instances",
             "glowing_torus",
-            "small_lights"
+            "room"
         ]
     );
     let mut own = from_text(SMALL);

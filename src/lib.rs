@@ -39,6 +39,10 @@
 //! - Sheets: a flat mesh blocks light from both sides. What a rectangle blocks has a closed form, for SH and for sharp
 //!   lights, so nothing is baked of it; other flat meshes have fields as all others do. A point within 0.002 bounding radii of its receiver from the
 //!   sheet's plane counts as that far from it, on the side of its receiver's centre ([`field::sheet`]).
+//! - Bounces: every vertex of a rigid group has links to runs of vertices that it sees ([`bounce`]). All that reflects
+//!   passes its base colour's share of light on as a diffuse surface does, metals too.
+//! - Gloss: roughness, metal and a base colour as in glTF ([`gloss`]). The merge leaves the transfer past everything, of
+//!   which the share of a reflected sky follows for any view; bounced light fills the rest of a lobe alike.
 //! - Light: it is linear Rec.709 radiance. The radiosity is B = albedo/pi * integral of L V max(0, n.w) dw.
 //! - Numbers: tables are made in f64, shaders compute in f32, and fields are stored as f16 or f32.
 //!
@@ -60,6 +64,8 @@
 //! | [`lists`] | which entities concern which cluster of vertices, and which clusters have to be merged again |
 //! | [`merge`] | the merge pass, its permutations, its CPU twin and its calibration |
 //! | [`sharp`] | the pass of lights whose shadows have edges, and its CPU twin |
+//! | [`bounce`] | the passes of light that surfaces pass on to each other |
+//! | [`gloss`] | the pass of what glossy surfaces reflect, its table of lobes, its sky and its CPU twin |
 //! | [`draw`] | camera, rasterisation, smoothed outlines, tone and encoding |
 //! | [`scene_buffers`] | what a scene keeps on the device, and whether it fits |
 //! | [`frame`] | the sequence of passes with all barriers |

@@ -6,7 +6,7 @@ use crate::bake;
 use crate::error::Result;
 use crate::merge::calibrate;
 use crate::merge::variant::{MergePermutation, Variant};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Entity, Scene};
 use crate::sharp::{Sharp, SharpPermutation};
 
 impl Frame {
@@ -20,7 +20,10 @@ impl Frame {
             compiled.is_some_and(|has| (has.outlines || !wanted.outlines) && (has.panels || !wanted.panels))
         };
         let (groups, surfaces) = bake::ensure::surfaces(scene, &self.options.baked(), self.options.lights);
-        self.groups == groups
+        let look = |entity: &Entity| (entity.gloss.is_some(), entity.maps);
+        let same_looks = scene.entities.iter().map(look).eq(self.scene.entities.iter().map(look));
+        same_looks
+            && self.groups == groups
             && self.surfaces.keys() == surfaces.keys()
             && self.buffers.cover_fields(scene, self.options.lights, &groups)
             && wanted.is_none_or(has)
@@ -86,7 +89,6 @@ impl Frame {
         let drawing = [
             "draw.vert",
             "draw.frag",
-            "gloss.comp",
             "grid.vert",
             "grid.frag",
             "triangle.vert",
@@ -96,6 +98,11 @@ impl Frame {
         ];
         if drawing.into_iter().any(uses) {
             self.set_pictures(self.options, self.picture.draw.finish())?;
+        }
+        if uses("gloss.comp")
+            && let Some(reflections) = &mut self.reflections
+        {
+            reflections.rebuild(&self.library)?;
         }
         if uses("sharp.comp")
             && let Some(sharp) = &mut self.sharp

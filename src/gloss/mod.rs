@@ -180,6 +180,14 @@ impl Reflections {
         })
     }
 
+    /// Compiles the shader anew, from files that have changed.
+    pub fn rebuild(&mut self, library: &Library) -> Result<()> {
+        let device = self.products.device().clone();
+        let shader = library.shader(&gloss_row(self.texels))?;
+        self.pipeline = ComputePipeline::new(&device, "gloss", &shader, &[])?;
+        Ok(())
+    }
+
     /// Takes over distant light.
     pub fn set_sky(&mut self, environment: &Environment) -> Result<()> {
         let device = self.products.device().clone();

@@ -102,7 +102,10 @@ fn the_page_of_scenes_lists_every_key_and_no_other() {
             name = cells[0].replace('`', "");
         }
         let words = cells[1..3].iter().flat_map(|cell| cell.split('`').skip(1).step_by(2));
-        let keys = words.filter(|word| word.chars().all(|c| c.is_ascii_lowercase() || c == '_'));
+        let keys = words.filter(|word| {
+            let begins = word.starts_with(|c: char| c.is_ascii_lowercase());
+            begins && word.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+        });
         let keys = keys.filter(|word| !["true", "false"].contains(word)).map(str::to_owned);
         listed.entry(name.clone()).or_default().extend(keys);
     }

@@ -177,7 +177,7 @@ fn a_saved_scene_reads_back_as_the_state() {
         assert_eq!(Scene::load(&path).unwrap().data, again.scene().data);
     }
     let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert_eq!(left.len(), 6, "nothing but the scenes: {left:?}");
+    assert_eq!(left.len(), 7, "nothing but the scenes: {left:?}");
     let nowhere = folder.path().join("no/such/s.toml");
     let error = built_in("glowing_torus").save(&nowhere).unwrap_err();
     assert_eq!(error.exit_code(), 1);

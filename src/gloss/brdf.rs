@@ -72,3 +72,41 @@ pub fn sampled_lobe(alpha: f64, view: DVec3, light: DVec3) -> [f64; 2] {
     let value = visibility(alpha, view.z, light.z) * light.z * 4.0 * view_half / half.z;
     [value, grazing(view_half)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Light and eye may change places: what is reflected, over the cosine of the light, stays the same.
+    #[test]
+    fn lobes_are_reciprocal() {
+        let at = |z: f64, turn: f64| {
+            let across = (1.0 - z * z).sqrt();
+            DVec3::new(across * turn.cos(), across * turn.sin(), z)
+        };
+        for roughness in [0.0, 0.1, 0.5, 1.0] {
+            for (view, light) in
+                [(at(0.9, 0.3), at(0.4, 2.0)), (at(0.05, 0.0), at(0.7, 3.0)), (at(0.5, 1.0), at(0.5, 4.1))]
+            {
+                let [there, term] = lobe(alpha(roughness), view, light);
+                let [back, other] = lobe(alpha(roughness), light, view);
+                assert!((there / light.z - back / view.z).abs() <= 1e-12 * there.max(1e-300) / light.z, "{roughness}");
+                assert!((term - other).abs() < 1e-12);
+            }
+        }
+        assert_eq!(lobe(0.5, at(0.5, 0.0), DVec3::new(0.6, 0.0, -0.8)), [0.0; 2], "below the horizon");
+    }
+
+    /// At grazing angles everything reflects all light, and faced a dielectric its own share.
+    #[test]
+    fn fresnel_goes_from_facing_to_all() {
+        let gloss = Gloss { roughness: 0.5, metallic: 0.0, f0: 0.04 };
+        let base = DVec3::new(0.9, 0.5, 0.0);
+        assert!((facing(&gloss, base) - DVec3::splat(0.04)).length() < 1e-7);
+        let metal = Gloss { metallic: 1.0, ..gloss };
+        assert!((facing(&metal, base) - base).length() < 1e-7);
+        assert_eq!((grazing(0.0), grazing(1.0)), (1.0, 0.0));
+        assert!((diffuse_share(&gloss, 1.0) - 0.96).abs() < 1e-7);
+        assert_eq!((diffuse_share(&gloss, 0.0), diffuse_share(&metal, 1.0)), (0.0, 0.0));
+    }
+}

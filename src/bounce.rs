@@ -113,15 +113,15 @@ impl Linked {
     fn see_from_afar(&mut self, entities: &[LinkedEntity<'_>], members: &[usize], base: u32) {
         let runs = Runs::new(members.iter().map(|&member| entities[member].order.len()));
         let size = (0..RUNS.len() - 1).find(|&size| runs.of_size(size).count() <= MOST_FAR).unwrap_or(RUNS.len() - 1);
+        let areas: Vec<_> = members.iter().map(|&member| entities[member].mesh.vertex_areas_m2()).collect();
         for (number, (member, first, vertices)) in runs.of_size(size) {
             let entity = &entities[members[member]];
-            let areas = entity.mesh.vertex_areas_m2();
             let scale = f64::from(entity.placement.scale);
             let mut middle = DVec3::ZERO;
             let mut across = DVec3::ZERO;
             let mut whole = 0.0;
             for &v in &entity.order[first..first + vertices] {
-                let area = areas[v as usize] * scale * scale;
+                let area = areas[member][v as usize] * scale * scale;
                 middle += area * entity.placement.point(entity.mesh.positions[v as usize].as_dvec3());
                 across += area * (entity.placement.turn() * entity.mesh.normals[v as usize].as_dvec3());
                 whole += area;
@@ -202,6 +202,14 @@ impl Bounce {
         let texels = texels && fits;
         let pipeline =
             |name: &str, row: ShaderPermutation| ComputePipeline::new(device, name, &library.shader(&row)?, &[]);
+        let moved = || -> Result<Moved> {
+            Ok(Moved {
+                pipeline: pipeline("moved", moved_row(texels, soft))?,
+                groups: Buffer::with_data(device, "moved groups", &linked.moved)?,
+                far: Buffer::with_data(device, "far runs", &linked.far)?,
+                counts: [linked.moved.len() as u32, linked.far.len() as u32],
+            })
+        };
         Ok(Bounce {
             means: pipeline("runs", runs_row(texels))?,
             bounce: pipeline("bounce", bounce_row(texels, soft))?,
@@ -212,16 +220,7 @@ impl Bounce {
             links: Buffer::with_data(device, "links", &linked.links)?,
             run_light,
             counts,
-            moved: if linked.moved.is_empty() {
-                None
-            } else {
-                Some(Moved {
-                    pipeline: pipeline("moved", moved_row(texels, soft))?,
-                    groups: Buffer::with_data(device, "moved groups", &linked.moved)?,
-                    far: Buffer::with_data(device, "far runs", &linked.far)?,
-                    counts: [linked.moved.len() as u32, linked.far.len() as u32],
-                })
-            },
+            moved: (!linked.moved.is_empty()).then(moved).transpose()?,
         })
     }
 

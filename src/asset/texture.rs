@@ -130,34 +130,37 @@ impl Texels {
 
     /// The next level of detail of a picture that holds numbers: the mean of two by two texels.
     pub fn halved_numbers(&self) -> Texels {
-        let width = (self.width / 2).max(1);
-        let height = (self.height / 2).max(1);
-        let mean = |i: usize| {
-            let columns = [2 * (i % width), 2 * (i % width) + 1].map(|x| x.min(self.width - 1));
-            let rows = [2 * (i / width), 2 * (i / width) + 1].map(|y| y.min(self.height - 1));
-            let four = || rows.into_iter().flat_map(|y| columns.map(|x| self.rgba[y * self.width + x]));
-            std::array::from_fn(|channel| ((four().map(|t| u32::from(t[channel])).sum::<u32>() + 2) / 4) as u8)
-        };
-        Texels { width, height, rgba: (0..width * height).into_par_iter().map(mean).collect() }
+        self.halved_by(|four| {
+            let texels = four.map(|(x, y)| self.rgba[y * self.width + x]);
+            let sum = |channel: usize| texels.iter().map(|texel| u32::from(texel[channel])).sum::<u32>();
+            std::array::from_fn(|channel| ((sum(channel) + 2) / 4) as u8)
+        })
     }
 
     /// The next level of detail, half as wide and high: the mean of two by two texels, of linear colour by alpha.
     pub fn halved(&self) -> Texels {
-        let width = (self.width / 2).max(1);
-        let height = (self.height / 2).max(1);
-        let mean = |i: usize| {
-            let columns = [2 * (i % width), 2 * (i % width) + 1].map(|x| x.min(self.width - 1));
-            let rows = [2 * (i / width), 2 * (i / width) + 1].map(|y| y.min(self.height - 1));
-            let four = rows.into_iter().flat_map(|y| columns.map(|x| self.linear(x, y)));
-            let texels: Vec<Vec4> = four.collect();
+        self.halved_by(|four| {
+            let texels = four.map(|(x, y)| self.linear(x, y));
             let alpha: f32 = texels.iter().map(|texel| texel.w).sum();
             // Texels that are not seen have a colour only where none is seen.
             let weight = |texel: &Vec4| if alpha > 0.0 { texel.w / alpha } else { 0.25 };
             let mean: Vec3 = texels.iter().map(|texel| weight(texel) * texel.truncate()).sum();
             let [r, g, b] = mean.to_array().map(|c| (255.0 * srgb_from_linear(c)).round() as u8);
             [r, g, b, (255.0 * alpha / 4.0).round() as u8]
+        })
+    }
+
+    /// Half as wide and high, each texel from the places of two by two.
+    fn halved_by(&self, mean: impl Fn([(usize, usize); 4]) -> [u8; 4] + Sync) -> Texels {
+        let width = (self.width / 2).max(1);
+        let height = (self.height / 2).max(1);
+        let place = |i: usize, k: usize| {
+            let x = (2 * (i % width) + k % 2).min(self.width - 1);
+            let y = (2 * (i / width) + k / 2).min(self.height - 1);
+            (x, y)
         };
-        Texels { width, height, rgba: (0..width * height).into_par_iter().map(mean).collect() }
+        let texel = |i: usize| mean([0, 1, 2, 3].map(|k| place(i, k)));
+        Texels { width, height, rgba: (0..width * height).into_par_iter().map(texel).collect() }
     }
 }
 

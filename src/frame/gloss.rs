@@ -14,7 +14,7 @@ use crate::layout::{GlossEntity, NONE, SHOWN_LIGHTS};
 use crate::scene::{Entity, LightMethod, MapIndices, Placement, Scene};
 use crate::scene_buffers::SceneBuffers;
 use crate::shaders::Library;
-use glam::{DVec3, Vec3, Vec4};
+use glam::DVec3;
 use std::sync::Arc;
 
 /// Reflections of the scene's glossy receivers; `None` where it has none, or where the device's texel views do not hold
@@ -28,7 +28,7 @@ pub(super) fn reflections(
     light_bytes: u64,
     texels: bool,
 ) -> Result<Option<Reflections>> {
-    let is_glossy = |index: &usize| scene.entities[*index].receives && scene.entities[*index].gloss.is_some();
+    let is_glossy = |index: &usize| scene.entities[*index].reflection().is_some();
     let lights = ShownLights::new(scene, methods);
     let glossy: Vec<Glossy> = (0..scene.entities.len())
         .filter(is_glossy)
@@ -46,9 +46,8 @@ pub(super) fn reflections(
         return Ok(None);
     }
     let count = scene.entities.len();
-    let mut reflections = Reflections::new(device, library, glossy, count, light_bytes, texels)?;
-    reflections.set_sky(&scene.environment)?;
-    Ok(Some(reflections))
+    let sky = &scene.environment;
+    Reflections::new(device, library, sky, glossy, count, light_bytes, texels).map(Some)
 }
 
 /// The sharp lights of a scene at its first time.
@@ -96,19 +95,19 @@ impl Frame {
             let Some(gloss) = entity.gloss else { continue };
             let factor = self.scene.data.entities[index].gloss.unwrap_or(gloss);
             let mut matrix = world_from_centred(&placements[index], self.buffers.meshes[entity.mesh].centre_m);
-            matrix.w_axis -= DVec3::from(eye).extend(0.0);
-            let row = |row: usize| Vec4::from_array(matrix.row(row).as_vec4().to_array()).to_array();
+            matrix.w_axis -= eye.as_dvec3().extend(0.0);
+            let row = |row: usize| matrix.row(row).as_vec4().to_array();
             entities[index] = GlossEntity {
                 row_x: row(0),
                 row_y: row(1),
                 row_z: row(2),
                 albedo: entity.albedo.to_array(),
                 roughness: gloss.roughness,
-                eye: Vec3::from(eye).to_array(),
+                eye: eye.to_array(),
                 metallic: gloss.metallic,
                 lights: glossy.lights,
                 f0: gloss.f0,
-                sky_scale: reflections.sky_scale,
+                sky_scale: reflections.sky_scale(),
                 vertex_first: self.buffers.surface(index).vertices.start,
                 radiosity_first: (self.radiosity.offsets[index] / 16) as u32,
                 vertex_count: glossy.vertex_count,
@@ -123,7 +122,7 @@ impl Frame {
 
     /// How the pixels of an entity reflect.
     pub(super) fn drawn_gloss(&self, entity: &Entity) -> Option<DrawnGloss<'_>> {
-        let gloss = entity.gloss.filter(|_| entity.receives)?;
+        let gloss = entity.reflection()?;
         let detail = match gloss.roughness {
             _ if entity.maps.any() => Detail::Textured,
             roughness if roughness < PIXEL_ROUGHNESS => Detail::Mirror,

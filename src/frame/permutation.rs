@@ -143,7 +143,7 @@ pub(super) fn permutation(
         skip: options.skip,
         lights: harmonic_lights(scene, methods),
         sheets: scene.meshes.iter().any(|mesh| mesh.rectangle().is_some()),
-        gloss: scene.entities.iter().any(|entity| entity.receives && entity.gloss.is_some()),
+        gloss: scene.entities.iter().any(|entity| entity.reflection().is_some()),
         entity_limit,
     }
 }

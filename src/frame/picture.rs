@@ -90,7 +90,9 @@ impl Frame {
             background: self.sky.background,
             white,
             lines: &self.picture.lines,
-            gloss: self.gloss_work(),
+            gloss: self
+                .gloss_work()
+                .filter(|_| self.picture.prepared.iter().any(|(viewport, _)| viewport.shows_light())),
         }
     }
 

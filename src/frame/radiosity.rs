@@ -30,7 +30,7 @@ struct Direct {
 }
 
 impl RadiosityBuffers {
-    /// Zero for every vertex of a scene.
+    /// Zero for every vertex of a scene: those that receive no light stay so.
     pub fn new(device: &Arc<Device>, scene: &Scene, buffers: &SceneBuffers) -> Result<Self> {
         let mut offsets = Vec::new();
         let mut size_bytes = 0;
@@ -40,7 +40,7 @@ impl RadiosityBuffers {
         }
         let size_bytes = size_bytes.max(16);
         Ok(RadiosityBuffers {
-            merged: zeros(device, "radiosity", size_bytes)?,
+            merged: Buffer::zeros(device, "radiosity", size_bytes)?,
             soft: None,
             direct: None,
             replaced: false,
@@ -51,13 +51,13 @@ impl RadiosityBuffers {
 
     /// Keeps light without that of sharp lights apart from now on.
     pub fn keep_soft(&mut self) -> Result<()> {
-        self.soft = Some(zeros(self.merged.device(), "soft radiosity", self.merged.size_bytes)?);
+        self.soft = Some(Buffer::zeros(self.merged.device(), "soft radiosity", self.merged.size_bytes)?);
         Ok(())
     }
 
     /// Keeps direct light apart from now on, for bounces to add to it.
     pub fn keep_direct(&mut self) -> Result<()> {
-        let like = |of: &Buffer, name: &str| zeros(of.device(), name, of.size_bytes);
+        let like = |of: &Buffer, name: &str| Buffer::zeros(of.device(), name, of.size_bytes);
         self.direct = Some(Direct {
             all: like(&self.merged, "direct light")?,
             soft: self.soft.as_ref().map(|soft| like(soft, "soft direct light")).transpose()?,
@@ -150,13 +150,6 @@ impl RadiosityBuffers {
             RadiositySource::Comparison(place) => self.comparisons[place].as_ref().unwrap_or(&self.merged),
         }
     }
-}
-
-/// Zero for every vertex: those that receive no light stay so.
-fn zeros(device: &Arc<Device>, name: &str, size_bytes: u64) -> Result<Buffer> {
-    let mut buffer = Buffer::new(device, name, BufferKind::Device, size_bytes)?;
-    buffer.fill(0, &vec![0_u32; size_bytes as usize / 4])?;
-    Ok(buffer)
 }
 
 /// Values in the mesh's order of vertices, as they are stored.

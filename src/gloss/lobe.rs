@@ -50,11 +50,6 @@ pub fn level_alpha(level: f64) -> f64 {
     share * share
 }
 
-/// The level at which slopes have a width.
-pub fn alpha_level(alpha: f64) -> f64 {
-    alpha.clamp(0.0, 1.0).sqrt() * (LEVELS - 1) as f64
-}
-
 /// Means of the Legendre polynomials 1 to 3 of the cosine to the axis, over the lobe of the map: a microfacet reflection
 /// seen along the normal, weighed by the cosine.
 fn map_bands(alpha: f64) -> [f64; 3] {
@@ -121,13 +116,6 @@ impl Lobe {
             Tap { shift: (sum.x.atan2(sum.y) - mirrored) / alpha, level, weight, bands }
         });
         Lobe { taps, grazing }
-    }
-
-    /// Direction of a tap for a view at an angle to the normal, by the axes of the plane of incidence: away from the
-    /// view, and along the normal.
-    pub fn direction(tap: &Tap, alpha: f64, view_rad: f64) -> DVec2 {
-        let (sin, cos) = (view_rad + alpha * tap.shift).sin_cos();
-        DVec2::new(sin, cos.max(0.0)).normalize_or(DVec2::Y)
     }
 }
 
@@ -220,6 +208,13 @@ mod tests {
         sums
     }
 
+    /// Direction of a tap for a view at an angle to the normal, by the axes of the plane of incidence: away from the
+    /// view, and along the normal.
+    fn direction(tap: &Tap, alpha: f64, view_rad: f64) -> DVec2 {
+        let (sin, cos) = (view_rad + alpha * tap.shift).sin_cos();
+        DVec2::new(sin, cos.max(0.0)).normalize_or(DVec2::Y)
+    }
+
     #[test]
     fn lobes_reflect_as_much_as_the_integral_over_all_lights() {
         for (roughness, view_z) in [(0.4, 0.9), (0.5, 0.3), (0.7, 0.6), (1.0, 0.95), (1.0, 0.2), (0.85, 0.05)] {
@@ -238,7 +233,7 @@ mod tests {
         let energy: f64 = lobe.taps.iter().map(|tap| tap.weight).sum();
         assert!((energy - 1.0).abs() < 0.01, "{energy}");
         for tap in &lobe.taps {
-            let direction = Lobe::direction(tap, brdf::LEAST_ALPHA, f64::acos(0.6));
+            let direction = direction(tap, brdf::LEAST_ALPHA, f64::acos(0.6));
             assert!((direction - DVec2::new(0.8, 0.6)).length() < 0.02, "{direction}");
             assert!(tap.level < 1.0, "{}", tap.level);
         }
@@ -250,8 +245,7 @@ mod tests {
         for (roughness, view_z) in [(0.5, 0.3), (0.8, 0.8), (1.0, 0.5)] {
             let lobe = Lobe::new(roughness, view_z);
             let alpha = brdf::alpha(roughness);
-            let all =
-                lobe.taps.iter().map(|tap| tap.weight * tap.bands[0] * Lobe::direction(tap, alpha, f64::acos(view_z)));
+            let all = lobe.taps.iter().map(|tap| tap.weight * tap.bands[0] * direction(tap, alpha, f64::acos(view_z)));
             let moment: DVec2 = all.sum();
             let view = DVec3::new((1.0 - view_z * view_z).sqrt(), 0.0, view_z);
             let mut wanted = DVec2::ZERO;

@@ -16,7 +16,7 @@ pub mod twin;
 use crate::asset::environment::Environment;
 use crate::error::Result;
 use crate::gpu::texture::Level;
-use crate::gpu::{Bind, Buffer, BufferKind, Commands, ComputePipeline, Device, TexelView, Texture, Upload};
+use crate::gpu::{Bind, Buffer, Commands, ComputePipeline, Device, TexelView, Texture, Upload};
 use crate::layout::{CLUSTER_VERTICES, GlossEntity, NONE, SHOWN_LIGHTS};
 use crate::shaders::{Library, ShaderPermutation};
 use ash::vk;
@@ -88,14 +88,30 @@ pub fn gloss_row(texels: bool) -> ShaderPermutation {
     macros(ShaderPermutation::new("gloss.comp", 4)).define("TEXEL", texels).define("WORKGROUP", CLUSTER_VERTICES)
 }
 
+/// Distant light on the device: see [`SkyMap`].
+struct FilteredSky {
+    map: Texture,
+    products: Buffer,
+    /// Radiance that 1 in the map stands for.
+    scale: f32,
+}
+
+impl FilteredSky {
+    fn new(device: &Arc<Device>, environment: &Environment) -> Result<Self> {
+        let SkyMap { texels, products, scale } = SkyMap::new(environment);
+        Ok(FilteredSky {
+            map: texture(device, "sky map", (sky_map::SIDE + 2) as u32, &texels)?,
+            products: Buffer::with_data(device, "products of the sky", &products)?,
+            scale,
+        })
+    }
+}
+
 /// Everything that reflections are computed from and kept in.
 pub struct Reflections {
     pipeline: ComputePipeline,
     texels: bool,
-    sky_map: Texture,
-    products: Buffer,
-    /// Radiance that 1 in the map stands for.
-    pub sky_scale: f32,
+    sky: FilteredSky,
     lobes: Texture,
     /// One white texel, for surfaces of one colour.
     pub white: Texture,
@@ -140,6 +156,7 @@ impl Reflections {
     pub fn new(
         device: &Arc<Device>,
         library: &Library,
+        environment: &Environment,
         glossy: Vec<Glossy>,
         entity_count: usize,
         light_bytes: u64,
@@ -153,19 +170,10 @@ impl Reflections {
             .collect();
         let mut shown_lights = vec![NO_LIGHTS; entity_count];
         glossy.iter().for_each(|of| shown_lights[of.entity] = of.lights);
-        let wide = (sky_map::SIDE + 2) as u32;
-        let empty = vec![[0.0; 4]; (wide * wide) as usize * lobe::LEVELS];
-        let kept = |name: &str, bytes: u64| {
-            let mut buffer = Buffer::new(device, name, BufferKind::Device, bytes)?;
-            buffer.fill(0, &vec![0_u32; bytes as usize / 4])?;
-            Ok(buffer)
-        };
         Ok(Reflections {
             pipeline: ComputePipeline::new(device, "gloss", &library.shader(&gloss_row(texels))?, &[])?,
             texels,
-            sky_map: texture(device, "sky map", wide, &empty)?,
-            products: Buffer::with_data(device, "products of the sky", &[0.0_f32; 768])?,
-            sky_scale: 0.0,
+            sky: FilteredSky::new(device, environment)?,
             lobes: texture(device, "lobes", lobe::TABLE as u32, &lobe::texels())?,
             white: texture(device, "white", 1, &[[1.0; 4]])?,
             flat: texture(device, "flat", 1, &[[0.5, 0.5, 1.0, 1.0]])?,
@@ -173,16 +181,16 @@ impl Reflections {
             groups: Buffer::with_data(device, "glossy groups", &groups)?,
             entities: Upload::new(device, "glossy entities", (entity_count * size_of::<GlossEntity>()) as u64)?,
             shown_lights: Buffer::with_data(device, "shown lights", &shown_lights)?,
-            through: kept("transfer through", 2 * light_bytes)?,
-            shown_shares: kept("shown shares", light_bytes)?,
-            reflected: kept("reflected", 2 * light_bytes)?,
+            through: Buffer::zeros(device, "transfer through", 2 * light_bytes)?,
+            shown_shares: Buffer::zeros(device, "shown shares", light_bytes)?,
+            reflected: Buffer::zeros(device, "reflected", 2 * light_bytes)?,
             glossy,
         })
     }
 
     /// Compiles the shader anew, from files that have changed.
     pub fn rebuild(&mut self, library: &Library) -> Result<()> {
-        let device = self.products.device().clone();
+        let device = self.groups.device().clone();
         let shader = library.shader(&gloss_row(self.texels))?;
         self.pipeline = ComputePipeline::new(&device, "gloss", &shader, &[])?;
         Ok(())
@@ -190,12 +198,13 @@ impl Reflections {
 
     /// Takes over distant light.
     pub fn set_sky(&mut self, environment: &Environment) -> Result<()> {
-        let device = self.products.device().clone();
-        let map = SkyMap::new(environment);
-        self.sky_map = texture(&device, "sky map", (sky_map::SIDE + 2) as u32, &map.texels)?;
-        self.products = Buffer::with_data(&device, "products of the sky", &map.products)?;
-        self.sky_scale = map.scale;
+        self.sky = FilteredSky::new(&self.groups.device().clone(), environment)?;
         Ok(())
+    }
+
+    /// Radiance that 1 in the sky's map stands for.
+    pub fn sky_scale(&self) -> f32 {
+        self.sky.scale
     }
 
     /// Sets the entities as the eye sees them, one for every entity of the scene.
@@ -213,8 +222,8 @@ impl Reflections {
             Bind::Buffer(&self.groups),
             read(inputs.vertices)?,
             Bind::Buffer(&self.through),
-            Bind::Buffer(&self.products),
-            Bind::Texture(&self.sky_map),
+            Bind::Buffer(&self.sky.products),
+            Bind::Texture(&self.sky.map),
             Bind::Texture(&self.lobes),
             read(inputs.direct)?,
             read(inputs.radiosity)?,
@@ -238,8 +247,8 @@ impl Reflections {
 
     pub fn size_bytes(&self) -> u64 {
         let buffers =
-            [&self.products, &self.groups, &self.shown_lights, &self.through, &self.shown_shares, &self.reflected];
-        let textures = self.sky_map.size_bytes + self.lobes.size_bytes;
+            [&self.sky.products, &self.groups, &self.shown_lights, &self.through, &self.shown_shares, &self.reflected];
+        let textures = self.sky.map.size_bytes + self.lobes.size_bytes;
         buffers.iter().map(|buffer| buffer.size_bytes).sum::<u64>() + textures + self.entities.all_bytes()
     }
 }
@@ -259,7 +268,7 @@ impl<'b> DrawnReflections<'b> {
             texels(&*of.entities)?,
             texels(&of.reflected)?,
             texels(&of.shown_shares)?,
-            Bind::Texture(&of.sky_map),
+            Bind::Texture(&of.sky.map),
             Bind::Texture(&of.lobes),
         ])
     }

@@ -171,6 +171,11 @@ impl Buffer {
         Ok(buffer)
     }
 
+    /// A device buffer of zeros, whole words.
+    pub fn zeros(device: &Arc<Device>, name: &str, size_bytes: u64) -> Result<Self> {
+        Self::with_data(device, name, &vec![0_u32; size_bytes as usize / 4])
+    }
+
     /// Writes `data` at a byte offset (a multiple of 4), directly or through a staging buffer as the memory allows. It
     /// first waits for all recordings in flight.
     pub fn fill<T: Pod>(&mut self, offset_bytes: u64, data: &[T]) -> Result<()> {

@@ -95,6 +95,13 @@ pub struct Entity {
     pub receives: bool,
 }
 
+impl Entity {
+    /// How it reflects besides diffusely, where it is lit.
+    pub(crate) fn reflection(&self) -> Option<Gloss> {
+        self.gloss.filter(|_| self.receives)
+    }
+}
+
 impl Scene {
     /// A scene that is put together in code.
     pub fn builder() -> SceneBuilder {

@@ -183,7 +183,7 @@ impl SceneBuffers {
         };
         let is_glossy = |surface: usize| {
             let mut entities = scene.entities.iter().zip(&baked.surface_of);
-            entities.any(|(entity, of)| *of == surface && entity.receives && entity.gloss.is_some())
+            entities.any(|(entity, of)| *of == surface && entity.reflection().is_some())
         };
         let surfaces = baked.surfaces.iter().enumerate();
         let surfaces = surfaces.map(|(index, surface)| packing.add(device, surface, is_glossy(index)));

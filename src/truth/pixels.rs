@@ -69,7 +69,7 @@ impl<'w> Eye<'w> {
             emission => emission * world.emission(sight, direction).unwrap_or(DVec3::ZERO),
         };
         let view = world.surface(entity, place, tilted);
-        let ground = world.surface(entity, place, normal).normal;
+        let ground = (world.entities[entity].rotation * normal).normalize();
         Some(Seen { entity, view, toward: -direction, emission, gloss, ground, over_mean })
     }
 }

@@ -26,12 +26,13 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Counts in every name of the cache: another number where a bake of surfaces computes something else.
-const VERSION: u32 = 11;
+const VERSION: u32 = 12;
 /// How far towards the middle of its triangles a vertex is seen from, as a share of the way: the light of a crease is
 /// that just inside each face. Where meshes are left as they are, so are the places from which they are seen.
 const NUDGE: f32 = 0.02;
-/// A member casts its own sharp shadow on a cluster from this distance on, in its bounding radii; nearer ones are part of
-/// the cluster's maps.
+/// A member that is not convex casts its own sharp shadow on a cluster from this distance on, in its bounding radii;
+/// nearer ones are part of the cluster's maps. Convex ones never are: a floor below large walls would take all of them
+/// from maps, whose edges are coarse (built-in room, direct light: 0.041 RMS of radiance with them and 0.016 without).
 const FAR: f64 = 1.1;
 /// Share of the blocked cosine-weighted hemisphere that shows backs of triangles, from a place inside a solid or below a
 /// sheet.
@@ -426,9 +427,9 @@ impl GroupSpace<'_> {
         let is_near = |member: &usize| {
             let (middle, reach) = group.spheres[*member];
             let of = &group.plan.members[*member];
-            // A rectangle's outline is exact at every distance.
-            let casts_none = of.emits || of.mesh.rectangle().is_some();
-            *member == self.member || (of.occludes && !casts_none && middle.distance(centre) - radius < FAR * reach)
+            // Outlines of these hold at every distance.
+            let keeps_outline = of.emits || of.mesh.rectangle().is_some() || of.mesh.is_convex();
+            *member == self.member || (of.occludes && !keeps_outline && middle.distance(centre) - radius < FAR * reach)
         };
         (0..group.spheres.len()).filter(is_near).map(|member| member as u32).collect()
     }

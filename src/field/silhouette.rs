@@ -372,11 +372,13 @@ impl SilhouetteField {
 
 /// How far an outline counts that lies that far away (in r): one behind the receiver or beyond the limit blocks
 /// nothing. Its nearest point may lie off the ray, as of a wide thin slab below the receiver, and the object then
-/// stands where the ray passes its box.
+/// stands where the ray passes its box: all of it, where the ray enters and leaves the box between receiver and limit.
 fn counts_between(away: f64, limit: f64, [enters, leaves]: [f64; 2]) -> f64 {
     let apart = leaves < TOUCHING || enters > limit - TOUCHING;
     let stands = away.max(enters).min(leaves);
-    if apart { 0.0 } else { fade(stands) * fade(limit - stands) }
+    let begins = if enters > -TOUCHING { 1.0 } else { fade(stands) };
+    let ends = if leaves < limit + TOUCHING { 1.0 } else { fade(limit - stands) };
+    if apart { 0.0 } else { begins * ends }
 }
 
 /// 1 where a length (in r) is positive and 0 where it is negative, with a ramp between that hides the depth's own
